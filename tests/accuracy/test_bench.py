@@ -17,9 +17,9 @@ from hypothesis import strategies as st
 
 import rigidsim
 from rigidsim.accuracy.bench.advice import advice
-from rigidsim.accuracy.bench.dataset import dataset_of, on_front
+from rigidsim.accuracy.bench.dataset import dataset_of
 from rigidsim.accuracy.bench.measure import Measurement, RowStatus, measure
-from rigidsim.accuracy.bench.plan import DEFAULT, Plan, every_setting, grid, make_plan
+from rigidsim.accuracy.bench.plan import DEFAULT, Plan, grid, make_plan
 from rigidsim.accuracy.bench.worker import Task, ask
 from rigidsim.accuracy.comparison import angles_between
 from rigidsim.accuracy.setting import Setting
@@ -27,7 +27,6 @@ from rigidsim.accuracy.trial import try_setting
 from rigidsim.errors import RigidsimError
 from rigidsim.solve.closed_form import closed_form_of
 from rigidsim.solve.problem import prepare
-from rigidsim.workflows.tradeoff import save
 
 FREE = """
 name = "free"
@@ -70,10 +69,6 @@ def dataset(measured: Measurement) -> xarray.Dataset:
     return dataset_of(measured)
 
 
-def error_of(dataset: xarray.Dataset, setting: Setting) -> float:
-    return float(dataset["attitude_error_largest"].sel(setting=setting.title))
-
-
 @pytest.mark.slow
 def test_errors_are_angles_from_the_exact_motion(measured: Measurement, dataset: xarray.Dataset) -> None:
     times = [mpmath.mpf(t) for t in measured.plan.times]
@@ -91,17 +86,6 @@ def test_errors_are_angles_from_the_exact_motion(measured: Measurement, dataset:
 
 
 @pytest.mark.slow
-def test_precision_and_tolerance_order_the_errors(dataset: xarray.Dataset) -> None:
-    # 3 (eps/2) sqrt(steps) |w| t / sqrt 3: the round-off law, over some 270 steps and 115 rad
-    law = 3 * EPSILON / 2 * 270**0.5 * 115 / 3**0.5
-    assert error_of(dataset, DEFAULT) < law
-    assert law < error_of(dataset, LOOSE) < error_of(dataset, SINGLE) * 10
-    # 29 bits between the precisions; each error is a random walk of its own, known to some 5 bits
-    assert error_of(dataset, SINGLE) > error_of(dataset, DEFAULT) * 2**24
-    assert error_of(dataset, CLOSED) < 100 * EPSILON  # no growth: some rounding of O(1) numbers
-
-
-@pytest.mark.slow
 def test_the_default_costs_one_and_every_speed_has_a_spread(dataset: xarray.Dataset) -> None:
     assert float(dataset["cpu_ratio"].sel(setting=DEFAULT.title)) == 1.0
     assert (dataset["cpu_ratio_least"] <= dataset["cpu_ratio"]).all()
@@ -112,53 +96,6 @@ def test_the_default_costs_one_and_every_speed_has_a_spread(dataset: xarray.Data
     assert loose["taylor_order"] < tight["taylor_order"]
     assert loose["work"] < tight["work"]
     assert int(tight["work"]) == int(tight["steps"]) * int(tight["taylor_order"]) ** 2 * 7
-
-
-@pytest.mark.slow
-def test_held_invariants_drift_less_over_a_long_run() -> None:
-    plan = fixed_plan(3e4, closed=True)
-    long = dataset_of(measure(free(3e4), plan=plan, repeats=1, settings=[HELD], budget=LONG))
-    drift = long["drift"].sel(invariant="energy")
-    assert drift.sel(setting=HELD.title) < drift.sel(setting=DEFAULT.title) / 4
-    assert error_of(long, HELD) < error_of(long, DEFAULT) / 30
-
-
-@pytest.mark.slow
-def test_the_dataset_opens_as_it_was(dataset: xarray.Dataset, tmp_path: Path) -> None:
-    save(dataset, tmp_path)
-    with xarray.open_dataset(tmp_path / "tradeoff.h5") as again:
-        xarray.testing.assert_equal(again.load(), dataset)
-        assert set(again.coords) >= {"precision", "tolerance", "formulation", "held", "method"}
-        assert all(again[name].dims[0] == "setting" for name in again.data_vars)
-        for name in again.variables:
-            assert again[name].attrs["long_name"], name
-        for name in again.data_vars:
-            assert "units" in again[name].attrs, name
-        assert again.attrs["reference"] == "closed form to 50 digits"
-        assert rigidsim.parse(again.attrs["config"]).config.name == "free"
-
-
-@pytest.mark.slow
-def test_the_figure_shows_every_point(dataset: xarray.Dataset, tmp_path: Path) -> None:
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-    from matplotlib.image import imread
-
-    from rigidsim.look.work_precision import draw_points
-
-    save(dataset, tmp_path)
-    pixels = imread(tmp_path / "tradeoff.png")[:, :, :3]
-    assert pixels.shape[0] > 700
-    assert pixels.shape[1] > 1200
-    figure = Figure()
-    FigureCanvasAgg(figure)
-    axes = figure.subplots()
-    draw_points(axes, dataset)
-    drawn = {(float(x), float(y)) for line in axes.lines for x, y in zip(*line.get_data(), strict=True)}
-    cost = dataset["cpu_ratio"].values
-    error = np.maximum(dataset["attitude_error_largest"].values, dataset["reference_error"].values)
-    assert {(float(c), float(e)) for c, e in zip(cost, error, strict=True)} <= drawn
-    assert axes.get_xscale() == axes.get_yscale() == "log"
 
 
 def made_up(error: list[float], cost: list[float], status: list[str]) -> xarray.Dataset:
@@ -190,19 +127,6 @@ POINTS = st.lists(
     min_size=1,
     max_size=12,
 )
-
-
-@given(POINTS)
-def test_the_front_is_what_nothing_beats(points: list[tuple[float, float, str]]) -> None:
-    error, cost, status = (list(column) for column in zip(*points, strict=True))
-    front = on_front(made_up(error, cost, status))
-    for n, (e, c, s) in enumerate(points):
-        rivals = [(f, d) for f, d, other in points if other == RowStatus.MEASURED]
-        beaten = any(f <= e and d <= c and (f, d) != (e, c) for f, d in rivals)
-        if s != RowStatus.MEASURED or beaten:
-            assert not front[n]
-        elif rivals.count((e, c)) == 1:
-            assert front[n]
 
 
 @given(POINTS)
@@ -271,29 +195,6 @@ def test_settings_past_the_budget_are_listed_as_left_out() -> None:
     assert status[Setting("extended").title] in (RowStatus.LEFT_OUT, RowStatus.MEASURED)
     reason = str(data["reason"].sel(setting=Setting("quadruple").title).item())
     assert "budget" in reason
-
-
-def test_every_kind_of_setting_is_there_once() -> None:
-    settings = every_setting(CLOSED.method, full=True)
-    assert len(settings) == len(set(settings))
-    kinds = {(s.precision, s.formulation, s.hold_invariants) for s in settings if s.tolerance is None}
-    for precision in ("single", "double", "extended"):
-        for formulation in ("quaternion", "rotation_matrix", "euler_angles", "canonical"):
-            assert {(precision, formulation, False), (precision, formulation, True)} <= kinds
-    assert set(every_setting()) <= set(settings)
-    assert all(s.has_steps for s in every_setting())
-
-
-@given(st.floats(0, 1e6), st.floats(1e-3, 1e9), st.floats(1e-6, 1), st.integers(1, 40))
-def test_sample_times_are_exact_in_single_and_within_the_part(
-    start: float, span: float, part: float, count: int
-) -> None:
-    times = grid(start, start + span, part, count)
-    assert list(times) == sorted(set(times))
-    assert times[-1] <= start + span * part * (1 + 1e-12)
-    assert times[0] > start
-    if len(times) > 1:
-        assert all(float(np.float32(t)) == t for t in times)
 
 
 def test_a_process_that_dies_costs_one_setting(tmp_path: Path) -> None:

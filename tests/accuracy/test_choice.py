@@ -19,7 +19,6 @@ from rigidsim.accuracy.certificate import certify
 from rigidsim.accuracy.choice import choose, chosen
 from rigidsim.accuracy.comparison import angles_between
 from rigidsim.accuracy.cost import cost
-from rigidsim.accuracy.forecast import Forecasts
 from rigidsim.accuracy.setting import Setting
 from rigidsim.accuracy.trial import try_setting
 from rigidsim.errors import ConfigError
@@ -85,17 +84,6 @@ def test_every_kind_of_scene_is_certified_to_what_is_true(number: int, tmp_path:
     assert summary["chosen"]
     assert run.summary["cost"]["seconds"]["certify"] > 0
     assert run.summary["cost"]["seconds"]["choose"] > 0
-
-
-@pytest.mark.slow
-def test_a_choice_is_the_same_each_time_and_dearer_for_more_accuracy() -> None:
-    of = experiment(FREE, 1e-6, 60)
-    first, again = (choose(of, 1e-6) for _ in range(2))
-    assert first == again
-    steps = experiment(FREE, 1e-6, 60, 'integrator.method="taylor"')
-    costs = [cost(choose(steps, 10.0**-n).setting, 100, 5) for n in (4, 8, 12, 16, 25)]
-    assert costs == sorted(costs)
-    assert costs[0] < costs[-1] / 100
 
 
 def test_what_was_chosen_runs_again_from_the_dataset_without_choosing(
@@ -283,18 +271,3 @@ def test_loads_from_python_are_part_of_the_certificate(tmp_path: Path) -> None:
     without = certify(run.dataset, rigidsim.load(run.folder.config), accuracy=1e-9)
     assert without is not None
     assert without.error > 0.1  # another motion
-
-
-def test_errors_far_below_a_double_are_told_apart() -> None:
-    one = [np.array([[1.0, 0, 0, 0]]), np.array([[2.0**-54, 0, 0, 0]]), np.array([[0, 2.0**-120, 0, 0]])]
-    other = [np.array([[1.0, 0, 0, 0]]), np.array([[2.0**-54, 0, 0, 0]]), np.array([[0, 0.0, 0, 0]])]
-    assert angles_between(one, other)[0] == pytest.approx(2 * 2.0**-120, rel=1e-12)
-
-
-def test_forecasts_of_what_was_not_tried_follow_epsilon_and_tolerance() -> None:
-    """Rounding errors are in proportion to epsilon; those of the series, to the tolerance."""
-    forecasts = Forecasts(experiment(FREE, 1e-20, 60, 'integrator.method="taylor"'), 1e-20)
-    double, quadruple = (forecasts.error(Setting(p)) for p in ("double", "quadruple"))
-    assert quadruple == pytest.approx(double * 2.0**-60)
-    loose, tight = (forecasts.error(Setting("quadruple", t)) for t in (1e-18, 1e-22))
-    assert loose == pytest.approx(1e4 * tight)

@@ -13,14 +13,9 @@ from rich.console import Console
 
 import rigidsim
 from rigidsim.accuracy.certificate import Certificate, certify
-from rigidsim.accuracy.choice import choose
-from rigidsim.accuracy.setting import Setting
 from rigidsim.cli.screens import summary as report
 from rigidsim.session.guards import Observer
-from rigidsim.session.progress.bar import TerminalObserver
-from rigidsim.session.progress.progress import LineObserver
-from rigidsim.session.timings import NOT_KEPT, Phases
-from rigidsim.solve.sampler import Progress
+from rigidsim.session.timings import NOT_KEPT
 
 FREE = """name = "free"
 [body]
@@ -155,63 +150,3 @@ def test_an_attempt_that_did_not_keep_the_accuracy_is_part_of_the_cost(
     assert cost["cpu_by_phase"][NOT_KEPT] > 0.5
     assert cost["cpu_seconds"] == pytest.approx(everything, abs=0.1)
     assert sum(cost["cpu_by_phase"].values()) == pytest.approx(cost["cpu_seconds"], abs=0.1)
-
-
-def test_phases_given_again_add_up() -> None:
-    phases = Phases()
-    for name in ("choose", "build", "build"):
-        burn(0.05)
-        phases.next(name)
-    assert phases.cpu["build"] > 0.1 > 0.05 < phases.cpu["choose"]
-    again = phases.begin_again()
-    assert again.cpu == {"choose": phases.cpu["choose"], NOT_KEPT: phases.cpu["build"]}
-    assert again.wall[NOT_KEPT] == phases.wall["build"]
-
-
-def test_piped_lines_say_what_is_tried_and_compared_with(capsys: pytest.CaptureFixture[str]) -> None:
-    now = [0.0]
-    with LineObserver(lambda: now[0]) as observer:
-        observer.choosing("free")
-        observer.trying("double, quaternion", 0.0)
-        observer.trying("double, quaternion", 0.3)  # too soon for another line
-        now[0] += 10
-        observer.trying("double, quaternion", 0.6)
-        observer.phase("certify")
-        observer.trying("double, quaternion", 0.0)
-    assert capsys.readouterr().err.splitlines() == [
-        "free: choosing settings by short trials",
-        "free: trying double, quaternion",
-        "free: trying double, quaternion: 60.0 %",
-        "free: certifying",
-        "free: comparing with double, quaternion",
-    ]
-
-
-def test_a_terminal_shows_one_bar_at_a_time(tmp_path: Path) -> None:
-    out = io.StringIO()
-    console = Console(file=out, force_terminal=True, width=120, height=20, color_system=None)
-    with TerminalObserver(console) as observer:
-        observer.choosing("free")
-        observer.trying("extended, quaternion, held", 0.25)
-        observer._bar.refresh()
-        assert "free: choosing" in out.getvalue()
-        assert "25.0 %  extended, quaternion, held" in out.getvalue()
-        rigidsim.run(scene(), out=tmp_path, observer=observer)
-        observer.progressed(Progress(50, steps=1000, time=150.0))  # no bar of integration is left
-        observer.phase("certify")
-        observer.trying("extended, quaternion", 0.5)
-        observer._bar.refresh()
-        assert "certifying" in out.getvalue()
-        assert "50.0 %  extended, quaternion" in out.getvalue()
-        assert len(observer._bar.tasks) == 1
-
-
-def test_trials_look_at_no_clock() -> None:
-    """Being watched, however slowly, changes no choice."""
-
-    def slowly(title: str, fraction: float) -> None:
-        burn(0.1)
-
-    of = scene("integrator.accuracy=1e-9")
-    assert choose(of, 1e-9) == choose(of, 1e-9, told=slowly)
-    assert choose(of, 1e-9).setting != Setting()

@@ -18,7 +18,6 @@ import numpy as np
 import pytest
 
 import rigidsim
-from rigidsim.solve.taylor_stepper import TaylorStepper
 
 Config = Callable[..., str]
 Command = Callable[..., Any]
@@ -124,63 +123,6 @@ def test_a_passage_close_to_the_singularity_is_warned_of(
     assert "the Euler angles came near" in " ".join(result.stdout.split("\n"))
     with rigidsim.open_run("runs/free").dataset as dataset:
         assert dataset.attrs["warnings"].split("\n") == warnings
-
-
-@pytest.mark.parametrize("samples", [3001, 4])
-def test_a_passage_at_a_distance_is_not(samples: int, config: Config, rigidsim_command: Command) -> None:
-    result = rigidsim_command("run", into_singularity(config, 0.01, "double", samples))
-    assert result.exit_code == 0, result.output
-    assert json.loads(Path("runs/free/summary.json").read_text())["warnings"] == []
-
-
-@pytest.mark.parametrize("time", ["end = 100\nsamples = 1601", "end = 1000\nsamples = 11"])
-def test_a_failing_step_is_found_among_many(
-    time: str, config: Config, rigidsim_command: Command, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Quaternions have no singularity, so a failure is put in: past a time no step stays finite. Whether
-    the run takes blocks or skips, it ends at the last step before, with every sample up to there.
-    """
-    broken = 80.0  # seconds
-    outcome = {name: getattr(TaylorStepper, name) for name in ("step", "skip", "block", "grid")}
-
-    def past(stepper: TaylorStepper) -> bool:
-        return float(stepper.time) > broken / unit
-
-    def step(self: TaylorStepper) -> bool:
-        fine = outcome["step"](self)
-        return fine and not past(self)
-
-    def skip(self: TaylorStepper, count: int) -> bool:
-        fine = outcome["skip"](self, count)
-        return fine and not past(self)
-
-    def block(self: TaylorStepper, count: int) -> tuple[bool, Any]:
-        fine, output = outcome["block"](self, count)
-        return fine and not past(self), output
-
-    def grid(self: TaylorStepper, times: np.ndarray, count: int) -> tuple[bool, np.ndarray]:
-        fine, states = outcome["grid"](self, times, count)
-        return fine and not past(self), states
-
-    name = config(time=time)
-    assert rigidsim_command("run", name, "--out", "whole").exit_code == 0
-    with rigidsim.open_run("whole/free").dataset as whole:
-        unit = 2.0 ** json.loads(whole.attrs["unit_exponents"])["time"]
-        for method in (step, skip, block, grid):
-            monkeypatch.setattr(TaylorStepper, method.__name__, method)
-        result = rigidsim_command("run", name)
-        assert result.exit_code == 3
-        summary = json.loads(Path("runs/free/summary.json").read_text())
-        assert summary["status"] == "stopped: non-finite state"
-        assert "the largest state there was" in summary["message"]
-        assert "Euler" not in summary["message"]
-        assert broken - 1 < summary["engine_time"] <= broken  # steps are below one second here
-        with rigidsim.open_run("runs/free").dataset as kept:
-            count = kept.sizes["time"]
-            spacing = float(whole.time[1])
-            assert count == math.floor(summary["engine_time"] / spacing) + 1
-            for variable in ("time", "angular_velocity", "quaternion", "energy_drift"):
-                np.testing.assert_array_equal(kept[variable], whole[variable][:count])
 
 
 @pytest.mark.parametrize("time", ["end = 3\nsamples = 49", "end = 3000\nsamples = 4"])

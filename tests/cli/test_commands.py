@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import importlib.util
-import io
 import json
-import re
 import subprocess
 import sys
 from collections.abc import Callable
@@ -71,14 +68,6 @@ def test_run_draws_the_timeline_when_asked(config: Config, rigidsim_command: Com
     assert "timeline" in read("runs/free")["cost"]["seconds"]
 
 
-def test_run_several_and_elsewhere(config: Config, rigidsim_command: Command) -> None:
-    result = rigidsim_command("run", config("a"), config("b"), "--out", "deep/er")
-    assert result.exit_code == 0, result.output
-    assert sorted(p.name for p in Path("deep/er").iterdir()) == ["a", "b"]
-    assert not Path("runs").exists()
-    assert result.stdout.index("a  finished") < result.stdout.index("b  finished")
-
-
 def test_run_refuses_all_before_it_starts_any(config: Config, rigidsim_command: Command) -> None:
     bad = config("bad", time="end = 3\nsamples = 49\ntypo = 1")
     result = rigidsim_command("run", config("good"), bad)
@@ -90,41 +79,6 @@ def test_run_refuses_all_before_it_starts_any(config: Config, rigidsim_command: 
     assert not Path("runs").exists()
 
 
-def test_run_json_is_the_summary(config: Config, rigidsim_command: Command) -> None:
-    result = rigidsim_command("run", config("a"), config("b"), "--json")
-    assert result.exit_code == 0, result.output
-    printed = [json.loads(line) for line in result.stdout.splitlines()]
-    assert printed == [read("runs/a"), read("runs/b")]
-
-
-def test_set_replaces_values(config: Config, rigidsim_command: Command) -> None:
-    result = rigidsim_command(
-        "run",
-        config(),
-        *("--set", "time.end=1", "--set", "time.samples=5"),
-        *("--set", "body.principal_moments[1]=1.5"),
-        *("--set", "initial.angular_velocity=[0, 0.25, 1]"),
-        *("--set", "integrator.precision=quadruple"),
-        *("--set", "limits.wall_time=1 h"),
-    )
-    assert result.exit_code == 0, result.output
-    summary = read("runs/free")
-    assert summary["body"]["principal_moments"] == [1.0, 1.5, 2.5]
-    assert summary["precision"] == "quadruple"
-    with rigidsim.open_run("runs/free").dataset as dataset:
-        assert dataset.time.values.tolist() == [0, 0.25, 0.5, 0.75, 1]
-        assert dataset.angular_velocity.values[0].tolist() == [0, 0.25, 1]
-
-
-def test_the_saved_config_is_the_run(config: Config, rigidsim_command: Command) -> None:
-    """With what --set changed, and bit for bit."""
-    rigidsim_command("run", config(), "--set", "body.principal_moments[1]=1.5")
-    result = rigidsim_command("run", "runs/free/config.toml", "--out", "again")
-    assert result.exit_code == 0, result.output
-    assert Path("again/free/config.toml").read_text() == Path("runs/free/config.toml").read_text()
-    same_bits(rigidsim.open_run("runs/free"), rigidsim.open_run("again/free"))
-
-
 def test_comments_of_an_earlier_version_are_told_of(config: Config, rigidsim_command: Command) -> None:
     path = Path(config(time="end = 2\nsamples = 3"))
     path.write_text(path.read_text() + "#:set time.end=1\n")
@@ -133,27 +87,6 @@ def test_comments_of_an_earlier_version_are_told_of(config: Config, rigidsim_com
     assert "#:set comments at its end set nothing" in result.stderr
     with rigidsim.open_run("runs/free").dataset as dataset:
         assert dataset.time[-1] == 2
-
-
-@pytest.mark.parametrize("override", ["time.end", "=3", "time.bogus=1", "time.times[3]=1", "body[0]=1"])
-def test_a_bad_set_is_a_message(override: str, config: Config, rigidsim_command: Command) -> None:
-    result = rigidsim_command("run", config(), "--set", override)
-    assert result.exit_code == 2
-    no_traceback(result)
-    assert result.stderr.startswith("rigidsim: free.toml: ")
-    assert not Path("runs").exists()
-
-
-def test_force_is_needed_to_overwrite(config: Config, rigidsim_command: Command) -> None:
-    assert rigidsim_command("run", config()).exit_code == 0
-    before = Path("runs/free/dataset.h5").read_bytes()
-    refused = rigidsim_command("run", config(), "--set", "time.end=1")
-    assert refused.exit_code == 2
-    no_traceback(refused)
-    assert "runs/free: holds a finished run; --force replaces it" in refused.stderr
-    assert Path("runs/free/dataset.h5").read_bytes() == before
-    assert rigidsim_command("run", config(), "--set", "time.end=1", "--force").exit_code == 0
-    assert Path("runs/free/dataset.h5").read_bytes() != before
 
 
 # plan
@@ -245,34 +178,6 @@ def test_there_is_no_run(command: str, path: str, config: Config, rigidsim_comma
     assert result.exit_code == 2
     no_traceback(result)
     assert result.stderr.startswith(f"rigidsim: {path}: no run here; give a run folder")
-
-
-def test_a_damaged_dataset_is_a_message(config: Config, rigidsim_command: Command) -> None:
-    rigidsim_command("run", config())
-    Path("runs/free/dataset.h5").write_bytes(b"no HDF5")
-    for command in ("info", "plot"):
-        result = rigidsim_command(command, "runs/free")
-        assert result.exit_code == 2
-        no_traceback(result)
-        assert "dataset.h5: can't be read" in result.stderr
-
-
-@pytest.mark.parametrize(
-    ("out", "path", "begins"),
-    [
-        ([], "runs/free/figure.png", b"\x89PNG\r\n"),
-        pytest.param(["--out", "x.png"], "x.png", b"\x89PNG\r\n", marks=pytest.mark.slow),
-        (["--what", "rates", "--out", "x.svg"], "x.svg", b"<?xml"),
-    ],
-)
-def test_plot(out: list[str], path: str, begins: bytes, config: Config, rigidsim_command: Command) -> None:
-    rigidsim_command("run", config())
-    result = rigidsim_command("plot", "runs/free", *out)
-    assert result.exit_code == 0, result.output
-    assert result.stdout.strip() == path
-    content = Path(path).read_bytes()
-    assert content.startswith(begins)
-    assert len(content) > 20_000
 
 
 def test_plot_by_name(config: Config, rigidsim_command: Command, tmp_path: Path) -> None:
@@ -393,48 +298,6 @@ def test_runs_and_members_of_a_sweep_are_viewed_side_by_side(
     assert len(names) == 2
 
 
-def test_schema_describes_every_table(config: Config, rigidsim_command: Command) -> None:
-    result = rigidsim_command("schema")
-    assert result.exit_code == 0
-    schema = json.loads(result.stdout)
-    assert {
-        "name",
-        "description",
-        "body",
-        "initial",
-        "loads",
-        "time",
-        "integrator",
-        "output",
-        "limits",
-    } <= set(schema["properties"])
-    for table, key in {
-        "Body": "principal_moments",
-        "Initial": "angular_velocity",
-        "Time": "samples",
-        "Integrator": "euler_sequence",
-        "Output": "timeline_rows",
-        "Limits": "max_drift",
-    }.items():
-        assert key in schema["$defs"][table]["properties"]
-        assert schema["$defs"][table]["additionalProperties"] is False
-    assert schema["additionalProperties"] is False
-
-
-@pytest.mark.skipif(importlib.util.find_spec("jsonschema") is None, reason="jsonschema isn't installed")
-def test_schema_is_valid_and_accepts_a_config(config: Config, rigidsim_command: Command) -> None:
-    import tomllib
-
-    import jsonschema
-
-    schema = json.loads(rigidsim_command("schema").stdout)
-    jsonschema.Draft7Validator.check_schema(schema)
-    table = tomllib.loads(Path(config()).read_text())
-    jsonschema.validate(table, schema)
-    with pytest.raises(jsonschema.ValidationError):
-        jsonschema.validate(table | {"typo": 1}, schema)
-
-
 # Guards
 
 GUARDS = {
@@ -500,14 +363,6 @@ def test_an_unknown_command(rigidsim_command: Command) -> None:
     result = rigidsim_command("rnu")
     assert result.exit_code == 2
     assert "rnu" in result.stderr
-
-
-def test_a_missing_config(rigidsim_command: Command) -> None:
-    result = rigidsim_command("run", "nowhere.toml")
-    assert result.exit_code == 2
-    no_traceback(result)
-    assert "nowhere.toml" in result.stderr
-    assert "can't be read: No such file or directory" in result.stderr
 
 
 @pytest.mark.parametrize("command", ["run", "plan", "info", "view", "plot", "schema"])
@@ -610,99 +465,3 @@ def test_the_names_of_the_package_stay_functions() -> None:
 
 
 # What a terminal shows
-
-TOP = {
-    "body": "principal_moments = [2, 2, 1]\nmass = 1\ncenter_of_mass = [0, 0, 0.5]",
-    "initial": "euler_angles = [0, 0.5, 0]\nangular_velocity = [0, 0, 8.123456789]",
-    "loads": 'kind = "uniform_gravity"',
-}
-FLIGHT = {
-    "body": "principal_moments = [1, 2, 2.5]\nmass = 1.23456789",
-    "initial": "angular_velocity = [-0.123456789, -1.23456789e-5, 0.5]\n"
-    "position = [0, 0, 0]\nvelocity = [-1.23456789, 2.3456789e-3, 1]",
-}
-
-
-@pytest.mark.parametrize("tables", [TOP, FLIGHT], ids=["top", "flight"])
-def test_the_summary_fits_eighty_columns(tables: dict[str, str], config: Config) -> None:
-    """One line per invariant, with its drift, and no word broken."""
-    from rich.console import Console
-
-    from rigidsim.cli.screens import summary as report
-
-    run = rigidsim.run(config(**tables))
-    summary = run.summary
-    screen = Console(width=80, record=True, file=io.StringIO(), highlight=False)
-    report.print_summary(run.outcome, "runs/[bold]free", screen)
-    lines = screen.export_text().splitlines()
-    assert max(map(len, lines)) <= 80
-    for name, row in summary["invariants"].items():
-        (line,) = [line for line in lines if line.startswith(f"{name} ")]
-        assert len(line.split()) == 5
-        assert f"{row['largest_drift']:.2e}" in line
-        assert f"{row['final_drift']:.2e}" in line
-    text = " ".join(" ".join(lines).split())
-    for row in summary["invariants"].values():
-        scale = "absolute" if row["scale_name"] == "1" else row["scale_name"]
-        assert f"{scale} (" in text
-    assert "folder   runs/[bold]free" in lines  # a path is no markup
-
-
-@pytest.mark.parametrize("width", [80, 120])
-def test_the_bar_is_one_line(width: int, config: Config) -> None:
-    """Name, bar, percentage, rate and time left, none of them cut."""
-    from rich.console import Console
-
-    from rigidsim.session.progress.bar import TerminalObserver
-    from rigidsim.solve.problem import prepare
-    from rigidsim.solve.sampler import Progress
-
-    prepared = prepare(rigidsim.load(config("a_name_of_more_than_twenty_four_letters", time="end = 1000")))
-    screen = io.StringIO()
-    console = Console(width=width, file=screen, force_terminal=True, color_system=None)
-    now = [0.0]
-    with TerminalObserver(console, lambda: now[0]) as observer:
-        observer.started(prepared, Path("runs/x"))
-        now[0] += 3600.0
-        observer.progressed(Progress(11, steps=7_200_000_000, time=250.0))
-        observer._bar.refresh()
-        shown = re.sub(r"\x1b\[[0-9;?]*[A-Za-z]", "", screen.getvalue()).replace("\r", "\n")
-        line = next(x for x in reversed(shown.splitlines()) if "%" in x)
-        assert len(line.rstrip()) <= width
-        assert line.startswith("a_name_of_more_than_twe… ━")
-        assert " 25.0 %" in line
-        assert "2 M steps/s" in line
-        assert "3:00:00 left" in line  # three quarters at the pace of one quarter an hour
-        assert ("t = 250 s" in line) == (width >= 100)
-        observer.phase("dataset")
-        observer._bar.refresh()
-        shown = re.sub(r"\x1b\[[0-9;?]*[A-Za-z]", "", screen.getvalue()).replace("\r", "\n")
-        last = [x for x in shown.splitlines() if x.strip()][-1]
-        assert last.startswith("writing dataset.h5")
-        assert "left" not in last  # how long it takes isn't known
-
-
-def test_plain_lines_say_the_same(config: Config, capsys: pytest.CaptureFixture[str]) -> None:
-    from rigidsim.session.progress.progress import LineObserver
-    from rigidsim.solve.problem import prepare
-    from rigidsim.solve.sampler import Progress
-
-    prepared = prepare(rigidsim.load(config(time="start = 100\nend = 500")))
-    now = [0.0]
-    with LineObserver(lambda: now[0]) as observer:
-        observer.started(prepared, Path("runs/free"))
-        observer.progressed(Progress(11, steps=1, time=100.1))  # too soon for another line
-        now[0] += 100.0
-        observer.progressed(Progress(11, steps=500_000, time=200.0))
-        observer.started(prepared, Path("runs/free"))
-        observer.resumed(Progress(11, steps=400_000, time=180.0))  # another session
-        now[0] += 100.0
-        observer.progressed(Progress(11, steps=500_000, time=220.0))
-        observer.phase("timeline")
-    assert capsys.readouterr().err.splitlines() == [
-        "free: integrating into runs/free",
-        "free: 25.0 %, t = 200 s, 5 k steps/s, 0:05:00 left",
-        "free: integrating into runs/free",
-        "free: 30.0 %, t = 220 s, 1 k steps/s, 0:11:40 left",
-        "free: drawing timeline.rrd",
-    ]

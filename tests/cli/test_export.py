@@ -263,18 +263,6 @@ def test_tables_have_dates(sky: xarray.Dataset) -> None:
     assert event[1].startswith("0.125,2029-04-13T21:46:00.125,")
 
 
-def test_stores_have_dates(sky: xarray.Dataset, rigidsim_command: Command) -> None:
-    pytest.importorskip("zarr")
-    parquet = pytest.importorskip("pyarrow.parquet")
-    for file_format in ("zarr", "parquet"):
-        assert rigidsim_command("export", "runs/sky", "--format", file_format).exit_code == 0
-    with xarray.open_zarr("sky.zarr") as store:
-        np.testing.assert_array_equal(store.date.values, sky.date.values, strict=True)
-        assert {"year", "julian_date", "date"} <= set(store.coords)
-    dates = parquet.read_table("sky.parquet")["date"].to_numpy()
-    np.testing.assert_array_equal(dates, sky.date.values)
-
-
 def test_independent_readers_read_orbit_messages(sky: xarray.Dataset) -> None:
     """Epochs, frames and numbers as ``oem`` and ``ccsds-ndm`` see them."""
     moments = [str(moment)[:23] for moment in sky.date.values]
@@ -310,27 +298,6 @@ def test_an_independent_reader_reads_attitude_messages(sky: xarray.Dataset) -> N
     expected = sky.quaternion.values / np.linalg.norm(sky.quaternion.values, axis=1)[:, None]
     np.testing.assert_allclose(found, expected, rtol=0, atol=1e-15)  # it normalises
     assert str(segment.states[1].epoch) == "2029-04-13 21:46:00.250 TDB"
-
-
-def test_no_message_names_what_nobody_said(
-    config: Config, run_once: Callable[[str], None], rigidsim_command: Command
-) -> None:
-    run_once(config("plain", time="end = 2\nsamples = 9"))
-    run_once(config("sky", time=TIMED, rest=SKY))
-    refusals = {
-        ("plain",): "doesn't say what its time 0 is, which a message must: give [time] epoch in the config",
-        ("plain", "--epoch", "J2000"): "what its space axes are, which a message must: give [frame] axes",
-        ("plain", "--epoch", "2020-01-01"): '--epoch: given "2020-01-01"; a date and time with its scale',
-        ("plain", "--epoch", "J2000", "--axes", "ecliptic"): 'did you mean "ecliptic J2000"?',
-        ("plain", "--epoch", "J2000", "--axes", "EME200"): 'did you mean "EME2000"?',
-        ("sky", "--epoch", "J2000"): "given 2000-01-01T12:00:00 TDB, but time 0 of the run is 2029-04-13",
-        ("sky", "--axes", "EME2000"): 'but the run\'s axes are "ecliptic J2000"; leave the option out',
-    }
-    for (name, *options), phrase in refusals.items():
-        result = rigidsim_command("export", f"runs/{name}", "--format", "aem", *options)
-        assert result.exit_code == 2
-        assert phrase in result.output
-        assert not Path(f"{name}.aem").exists()
 
 
 def test_what_a_format_can_not_hold_is_said(config: Config, rigidsim_command: Command) -> None:

@@ -16,7 +16,6 @@ from rigidsim.cli.commands import COMMANDS
 from rigidsim.errors import RigidsimError
 from rigidsim.scene.methods import METHODS
 from rigidsim.workflows import templates
-from rigidsim.workflows.check import check
 
 Config = Callable[..., str]
 Command = Callable[..., Any]
@@ -25,27 +24,12 @@ Command = Callable[..., Any]
 # templates
 
 
-def test_every_template_is_listed() -> None:
-    folder = Path(templates.__file__).with_name("templates")
-    assert sorted(path.stem for path in folder.glob("*.toml")) == sorted(templates.SCENES)
-    assert all(templates.described().values())
-
-
 def marked(*quick: str) -> list[Any]:
     """All scenes, the quick ones in the usual suite."""
     return [
         pytest.param(scene, id=scene, marks=[] if scene in quick else [pytest.mark.slow])
         for scene in templates.SCENES
     ]
-
-
-@pytest.mark.parametrize("scene", marked(*(s for s in templates.SCENES if s not in ("gyroscope", "planet"))))
-def test_a_template_is_valid_and_means_nothing_else(scene: str, tmp_path: Path) -> None:
-    path = templates.write_new(scene, folder=tmp_path)
-    found = check(path)
-    assert found.valid, found.problems
-    assert found.cautions == ()
-    assert rigidsim.load(path).config.name == scene
 
 
 @pytest.mark.parametrize("scene", marked("coin", "thrusters"))
@@ -112,15 +96,6 @@ def test_check(config: Config, rigidsim_command: Command) -> None:
     assert rigidsim_command("check", "nowhere.toml").exit_code == 2
     assert rigidsim_command("check").exit_code == 2
     assert sorted(path.name for path in Path().iterdir()) == ["bad.toml", "good.toml"]  # nothing is written
-
-
-def test_check_knows_what_will_have_no_effect(config: Config, rigidsim_command: Command) -> None:
-    path = config(
-        body="principal_moments = [1, 2, 2.5]\nmass = 1", rest='[[loads]]\nkind = "uniform_gravity"'
-    )
-    found = json.loads(rigidsim_command("check", path, "--json").stdout)
-    assert found["valid"]
-    assert found["warning_codes"] == ["no_effect"]
 
 
 def test_a_new_user_is_shown_the_way(

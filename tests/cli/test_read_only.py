@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import errno
 import importlib.util
-import os
-import shutil
 import subprocess
 from collections.abc import Callable, Iterator
 from functools import partial
@@ -17,7 +14,6 @@ import pytest
 from support import cases, same_bits
 
 import rigidsim
-from rigidsim.errors import RunFolderError
 from rigidsim.session.tuning import Tuning
 from rigidsim.solve.sampler import Pacing
 from rigidsim.store import atomic, segments
@@ -201,21 +197,6 @@ def test_a_timeline_that_cannot_be_written_costs_nothing_else(
     assert rigidsim_command("verify", "disk/free").exit_code == 0
 
 
-def test_a_timeline_that_has_no_room(
-    config: Config, rigidsim_command: Command, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Told before it is drawn: the viewer's library waits for ever on a full disk."""
-    usage = shutil.disk_usage(".")
-    with monkeypatch.context() as patch:
-        patch.setattr(shutil, "disk_usage", lambda _: usage._replace(free=100_000))
-        drawn = rigidsim_command("run", config(), "--set", "output.timeline=true")
-    told = message(drawn, code=3)
-    assert "runs/free/timeline.rrd: can't be written: it may need 0.6 MB, and 0.1 MB are free" in told
-    assert rigidsim.open_run("runs/free").status == "finished"
-    assert not Path("runs/free/timeline.rrd").exists()
-    assert rigidsim_command("verify", "runs/free").exit_code == 0
-
-
 def test_a_run_that_cannot_even_begin_says_so(
     config: Config, rigidsim_command: Command, remount: Remount, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -232,71 +213,3 @@ def test_a_run_that_cannot_even_begin_says_so(
     assert told == "rigidsim: disk/free: can't be written: Read-only file system; choose another --out"
     remount("rw")
     assert rigidsim_command("run", name, "--out", "disk").exit_code == 0
-
-
-def as_somebody(work: Callable[[], None]) -> None:
-    """Do something in a process without root's privileges, to which permission bits apply."""
-    pid = os.fork()
-    if pid == 0:
-        code = 1
-        try:
-            if os.geteuid() == 0:
-                os.setegid(65534)
-                os.seteuid(65534)
-            work()
-            code = 0
-        except BaseException as error:  # the parent's assertion shows it
-            print(repr(error), flush=True)
-        finally:
-            os._exit(code)
-    assert os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1]) == 0
-
-
-@pytest.fixture
-def open_to_all(tmp_path: Path) -> Iterator[Path]:
-    """A folder that others may reach: ``tmp_path`` lies in folders that are the user's alone."""
-    ways = [p for p in (tmp_path, *tmp_path.parents) if p.stat().st_uid == os.geteuid() and p != Path("/")]
-    before = {p: p.stat().st_mode for p in ways}
-    for path in ways:
-        path.chmod(before[path] | 0o055)
-    yield tmp_path
-    for path in ways:
-        path.chmod(before[path])
-
-
-@pytest.mark.parametrize(
-    ("bits", "readable"), [(0o555, True), (0o000, False)], ids=["no writing", "no entering"]
-)
-def test_permission_bits(
-    bits: int, readable: bool, config: Config, rigidsim_command: Command, open_to_all: Path
-) -> None:
-    name = config(time=LONG, rest="[limits]\nmax_steps = 500")
-    assert rigidsim_command("run", name).exit_code == 3
-    folder = open_to_all / "runs" / "free"
-    for path in folder.rglob("*"):
-        path.chmod(0o555 if path.is_dir() else 0o444)
-    folder.chmod(bits)
-
-    def refused(words: str, work: Callable[[], object]) -> None:
-        with pytest.raises(RunFolderError) as caught:
-            work()
-        assert words in str(caught.value), str(caught.value)
-        assert os.strerror(errno.EACCES) in str(caught.value), str(caught.value)
-
-    def work() -> None:
-        if readable:
-            assert 0 < rigidsim.open_run(folder).dataset.sizes["time"] < 3001
-            refused("once it may be written", lambda: rigidsim.resume(folder))
-        else:
-            refused("runs/free: can't be read", lambda: rigidsim.open_run(folder))
-            refused("runs/free: can't be read", lambda: rigidsim.resume(folder))
-        experiment = rigidsim.load(open_to_all / name, overrides=['name="other"'])
-        refused("other: can't be written", lambda: rigidsim.run(experiment, out=folder))
-
-    try:
-        as_somebody(work)
-    finally:
-        folder.chmod(0o755)
-        for path in folder.rglob("*"):
-            path.chmod(0o755 if path.is_dir() else 0o644)
-    assert rigidsim_command("resume", "runs/free", "--set", "limits.max_steps=100000").exit_code == 0

@@ -2,17 +2,12 @@
 
 from __future__ import annotations
 
-import io
 import json
 from collections.abc import Callable
 from typing import Any
 
 import pytest
-from rich.console import Console
 
-from rigidsim.cli.screens import summary as tables
-from rigidsim.cli.screens.understood import understood
-from rigidsim.model.loads import Load
 from rigidsim.scene.config import parse
 from rigidsim.session.understood import told_loads
 from rigidsim.solve.problem import prepare
@@ -147,34 +142,6 @@ def test_each_kind_describes_itself(line: Callable[[], str], expected: str) -> N
     assert line() == expected
 
 
-def test_point_masses_are_told_by_name() -> None:
-    line = told(
-        'kind = "gravity_gradient"\norbit = {body = "sun"}',
-        body='principal_moments = [1, 2, 2.5]\nhost = "here"',
-        more='bodies = [{name = "sun", gravitational_parameter = 1.32712440018e20}, {name = "here", '
-        'gravitational_parameter = 1, orbit = {about = "sun", semi_major_axis = "1 au"}}]',
-    )
-    assert line == (
-        'gravity gradient of the moving point mass "sun", the Sun (G M 1.327e+20 m^3/s^2), 1 au at the '
-        "start; "
-        "torque up to 8.919e-14 N m"
-    )
-
-
-def test_a_load_of_ones_own_is_told_by_its_docstring() -> None:
-    class Wind(Load):
-        """A breeze from the west.
-
-        More of it.
-        """
-
-        title = "wind"
-
-    prepared = prepare(parse('name = "w"\nbody.principal_moments = [1, 2, 2]\ninitial.angular_velocity = '
-                             "[0, 0, 1]\ntime = {end = 1, samples = 2}"), loads=[Wind()])  # fmt: skip
-    assert told_loads(prepared) == ("wind: A breeze from the west.",)
-
-
 def test_check_plan_and_info_show_it_and_run_does_not(config: Config, rigidsim_command: Command) -> None:
     text = config(
         initial="angular_velocity = [0, 0, 1e-3]",
@@ -192,13 +159,3 @@ def test_check_plan_and_info_show_it_and_run_does_not(config: Config, rigidsim_c
         told_json = json.loads(rigidsim_command(*command, "--json").stdout)
         assert told_json["loads"][0].startswith(said)
         assert "length_without_unit" in told_json["warning_codes"]
-
-
-def test_it_reads_well_at_80_columns() -> None:
-    loads = [line() for line, _ in SAID.values()]
-    out = io.StringIO()
-    tables.print_understood(None, None, None, Console(file=out, width=80, highlight=False), loads)
-    lines = out.getvalue().splitlines()
-    assert max(map(len, lines)) <= 80
-    words = [word for _, text in understood(None, None, None, loads) for word in text.split()]
-    assert [word for line in lines for word in line[9:].split()] == words  # beside the labels

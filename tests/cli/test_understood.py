@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-import io
 import json
 from collections.abc import Callable
 from typing import Any
 
 import pytest
-from rich.console import Console
 
-from rigidsim.cli.screens import summary as tables
-from rigidsim.cli.screens.understood import body_text, start_text, time_text, understood
+from rigidsim.cli.screens.understood import body_text, start_text, time_text
 from rigidsim.scene.config import parse
 from rigidsim.scene.scene import build_scene
 from rigidsim.session.understood import body_of, span_of, start_of
@@ -24,22 +21,6 @@ def texts(body: str, initial: str, time: str, more: str = "") -> tuple[str, str,
     text = f'name = "echo"\n{more}\n[body]\n{body}\n[initial]\n{initial}\n[time]\n{time}\n'
     scene = build_scene(parse(text))
     return body_text(body_of(scene)), start_text(start_of(scene)), time_text(span_of(scene))
-
-
-def test_radians_instead_of_degrees_are_seen() -> None:
-    plate = 'shape = "plate"\nsize = [1, 1]\nmass = 12\nreference = "corner"'
-    body, start, time = texts(
-        plate, "angular_velocity = [0, 0, 2]\neuler_angles = [40, 60, 30]", "end = 120\nevery = 0.01"
-    )
-    assert body == (
-        "from shape, mass 12 kg, centre of mass at (0.5, 0.5, 0) m from the point it turns about\n"
-        "principal moments 1, 7, 8 kg m^2 about (0.7071, 0.7071, 0), (0.7071, -0.7071, 0), -z"
-    )
-    assert start == (
-        "attitude zxz 2291.83, 3437.75, 1718.87 deg\n"
-        "angular velocity 0, 0, 2 rad/s about x, y, z (114.6 deg/s, a turn in 3.142 s)"
-    )
-    assert time == "0 to 2 min, 12,001 samples, one every 10 ms"
 
 
 def test_a_planet_in_days_and_dates() -> None:
@@ -92,20 +73,3 @@ def test_run_and_info_and_plan_say_it(degrees: str, rigidsim_command: Command) -
         "start_s": 0.0, "end_s": 3.0, "samples": 49, "every_s": 0.0625, "epoch": "", "unit": ""
     }  # fmt: skip
     assert of_run["warning_codes"][0] == of_plan["warning_codes"][0] == "angle_without_unit"
-
-
-def test_it_reads_well_at_80_columns_without_colour() -> None:
-    text = (
-        'name = "w"\nbody = {points = [{mass = 1, position = [1, 2, 3]}, {mass = 2, position = [-3, 1, 1]}, '
-        "{mass = 3, position = [0, 1, -2]}]}\ninitial = {angular_velocity = [0.123456, 1, 2], "
-        "position = [7e6, 1, 2]}\ntime.end = 1\n"
-    )
-    scene = build_scene(parse(text))
-    out = io.StringIO()
-    parts = body_of(scene), start_of(scene), span_of(scene)
-    tables.print_understood(*parts, Console(file=out, width=80, highlight=False))
-    lines = out.getvalue().splitlines()
-    assert max(map(len, lines)) <= 80
-    assert "\x1b" not in out.getvalue()
-    words = [word for _, told in understood(*parts) for word in told.split()]
-    assert [word for line in lines for word in line[9:].split()] == words  # beside the labels

@@ -52,13 +52,6 @@ def test_a_run_that_a_guard_stopped_is_resumed_next(screen: Callable[..., list[s
     assert not any(line.startswith("advice") for line in lines)
 
 
-def test_held_invariants_fit_into_eighty_columns(screen: Callable[..., list[str]]) -> None:
-    lines = screen("--set", "integrator.hold_invariants=true")
-    assert max(map(len, lines)) <= 80
-    assert "put back" in "\n".join(lines)
-    assert "projected away" in " ".join(said(lines, "verdict"))
-
-
 def test_commands_quote_places_with_spaces() -> None:
     assert next_lines("finished", 0, "my runs/free")[0] == "rigidsim view 'my runs/free'"
     assert next_lines("finished", 0, "") == []

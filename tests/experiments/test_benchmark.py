@@ -4,53 +4,15 @@ from __future__ import annotations
 
 import json
 import re
-from dataclasses import asdict
 from pathlib import Path
 
 import pytest
 
 from experiments import benchmark
-from experiments.benchmark import Result
 from experiments.benchmarking.rows import rows
 
 _PEERS = "left out"
 _PLAIN = ("sparse", "dense", "timeline", "extended", "extended_alike", "warm")
-
-
-def test_bounds_are_kept_or_not() -> None:
-    made = Result("dense", "a run", "a script", 0.6, ratios=[0.5, 0.58, 0.7], estimated=[0.61])
-    assert made.ratio == 0.58
-    assert made.met
-    assert "| 0.58 | 0.6 | met | 3 | 0.5 .. 0.7 | 0.61 |" in made.line
-    assert not Result("dense", "a run", "a script", 0.57, ratios=made.ratios).met
-    assert Result("dense", "a run", "a script", 0.57, ratios=made.ratios, judged=False).met is None
-    assert Result("none", "a run", "nothing", 1.0).met is None
-
-
-def test_earlier_rows_are_put_into_a_page(tmp_path: Path) -> None:
-    made = Result("tiny", "a run", "a script", 2.2, ratios=[2.0, 2.1], ours=0.5, bare=0.25, wall=(0.6, 0.3))
-    older = {**asdict(made), "ratios": [7.0], "ratio": 7.0, "met": False}
-    del older["measure"]  # as earlier versions wrote it
-    for name, rows_of in (("older", [older]), ("newer", [asdict(made)])):
-        (tmp_path / f"{name}.json").write_text(json.dumps(rows_of))
-    page = tmp_path / "page.md"
-    page.write_text(f"before\n{benchmark.BEGIN}\nwhat was there\n{benchmark.END}\nafter\n")
-    files = [str(tmp_path / "older.json"), str(tmp_path / "newer.json")]
-    arguments = ["--given", *files, "--into", str(page), "--out", str(tmp_path)]
-    assert benchmark.main(arguments) == 0  # the last that is given counts
-    text = page.read_text()
-    assert text.startswith(f"before\n{benchmark.BEGIN}\n| work |")
-    assert text.endswith(f"\n{benchmark.END}\nafter\n")
-    assert "| 2.05 | 2.2 | met | 2 | 2 .. 2.1 |  | 0.5 / 0.25 | 0.6 / 0.3 |" in text
-    assert "what was there" not in text
-    with pytest.raises(ValueError, match="no lines"):
-        benchmark.replaced("a page without a place", "a table")
-
-
-def test_unknown_rows_are_refused(capsys: pytest.CaptureFixture[str]) -> None:
-    with pytest.raises(SystemExit):
-        benchmark.main(["--rows", "dense,thick"])
-    assert "--rows: thick: allowed are sparse, dense, " in capsys.readouterr().err
 
 
 @pytest.mark.slow(100)

@@ -12,7 +12,7 @@ import rigidsim
 from experiments import kill_campaign
 from experiments.durability import damages
 from experiments.durability.judging import Tally, check_after, check_complete, saved_rows
-from experiments.durability.scenes import SCENES, same, text_of
+from experiments.durability.scenes import same, text_of
 from rigidsim.store.folder import RunFolder
 
 SHORT = text_of("double_driven").replace("end = 3000", "end = 30").replace("3001", "31")
@@ -21,11 +21,6 @@ SHORT = text_of("double_driven").replace("end = 3000", "end = 30").replace("3001
 @pytest.fixture(scope="module")
 def finished(tmp_path_factory: pytest.TempPathFactory) -> RunFolder:
     return rigidsim.run(rigidsim.parse(SHORT), out=tmp_path_factory.mktemp("runs")).folder
-
-
-@pytest.mark.parametrize("name", SCENES)
-def test_every_scene_is_a_config(name: str) -> None:
-    assert rigidsim.parse(text_of(name)).config.name == name
 
 
 def test_lost_rows_and_changed_bits_are_failures(finished: RunFolder) -> None:
@@ -47,14 +42,6 @@ def test_lost_rows_and_changed_bits_are_failures(finished: RunFolder) -> None:
     assert tally.failures[1:] == ["changed: energy differs", "changed: energy"]
 
 
-def test_the_sign_of_zero_is_a_bit(finished: RunFolder) -> None:
-    with rigidsim.open_run(finished.path).dataset as dataset:
-        whole = dataset.load()
-    turned = whole.copy(deep=True)
-    turned["time"] = whole.time.copy(data=np.where(whole.time.values == 0, -0.0, whole.time.values))
-    assert same(whole, turned) == "time"
-
-
 def test_damage_changes_the_file(finished: RunFolder, tmp_path: Path) -> None:
     content = finished.dataset.read_bytes()
     other = finished.checkpoint
@@ -63,14 +50,6 @@ def test_damage_changes_the_file(finished: RunFolder, tmp_path: Path) -> None:
         target.write_bytes(content)
         done = damages.damage(target, random.Random(seed), [other])
         assert done == "lost" if not target.exists() else target.read_bytes() != content, done
-
-
-def test_totals_are_told_when_time_is_up(capsys: pytest.CaptureFixture[str]) -> None:
-    arguments = ["--kills", "5", "--full-disks", "5", "--read-only", "5", "--damages", "0", "--seconds", "0"]
-    assert kill_campaign.main(arguments) == 0
-    told = capsys.readouterr().out
-    assert told.count("==") == 3
-    assert told.splitlines()[-1].split() == ["failures", "0"]
 
 
 @pytest.mark.slow(40)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 import xarray
@@ -40,21 +38,6 @@ def test_a_random_walk_has_the_exponents_of_brouwer() -> None:
     assert all(check.passed for check in study.checks([data]))
 
 
-def test_a_bias_fails_the_check() -> None:
-    failed = [check.name for check in study.checks([made_up(1e-17, 1e-18)]) if not check.passed]
-    assert len(failed) == 3
-    assert "energy" in failed[0]
-
-
-def test_lost_attitudes_are_not_fitted() -> None:
-    fitted = study.fit(made_up(1e-10, 0.0), "attitude")
-    assert fitted is None or fitted.end < 1e6
-
-
-def test_too_few_times_are_not_fitted() -> None:
-    assert study.fit(made_up(1e-17, 0.0, starts=4, horizon=1e3), "energy") is None
-
-
 @pytest.fixture(scope="module")
 def measured() -> dict[tuple[str, bool], xarray.Dataset]:
     return {
@@ -74,32 +57,3 @@ def test_errors_stay_within_the_law(body: str, measured: dict[tuple[str, bool], 
     assert (plain > 0).all()
     # held: no more than some eps to a radian is left
     assert held.max() < 8 * 2.0**-52 * HORIZON
-
-
-def test_starts_differ_and_are_near() -> None:
-    rates = [
-        [
-            float(x.rational)
-            for x in study.experiment("heavy symmetric top", n, 10).config.initial.angular_velocity
-        ]
-        for n in range(study.STARTS)
-    ]
-    assert len({tuple(r) for r in rates}) == study.STARTS
-    for r in rates:
-        assert np.allclose(r, study.RATES["heavy symmetric top"], atol=64 / 16384)
-        assert all(float(np.float32(x)) == x or abs(x) < 1 for x in r)
-
-
-@pytest.mark.slow
-def test_figure_and_table_hold_every_series(
-    measured: dict[tuple[str, bool], xarray.Dataset], tmp_path: Path
-) -> None:
-    series = list(measured.values())
-    study.keep(series, tmp_path)
-    with xarray.open_dataset(tmp_path / "long_horizon.h5", group="series_3") as again:
-        assert again.attrs["held"] == 1
-        assert again["error"].shape == series[3]["error"].shape
-    assert study.draw(series, tmp_path).stat().st_size > 50_000
-    rows = study.markdown(series).splitlines()
-    assert len(rows) == 2 + len(series)
-    assert sum("| yes |" in row for row in rows) == 2

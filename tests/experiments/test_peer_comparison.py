@@ -3,22 +3,15 @@
 from __future__ import annotations
 
 import math
-import tomllib
 from pathlib import Path
 
-import mpmath
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 from matplotlib.image import imread
 
-ROOT = Path(__file__).parents[2]
-
-from experiments import peer_comparison as study  # noqa: E402
-from experiments.peers import ADAPTERS, campaign  # noqa: E402
-from experiments.peers.child import measure, thinned  # noqa: E402
-from experiments.peers.curves import STEPWISE, Point, angle, cost_at, frontier  # noqa: E402
-from experiments.peers.scenes import SCENES  # noqa: E402
+from experiments import peer_comparison as study
+from experiments.peers import ADAPTERS, campaign
+from experiments.peers.curves import angle
+from experiments.peers.scenes import SCENES
 
 SHORT = [(name, 16.0) for name in SCENES]
 
@@ -87,37 +80,6 @@ def test_the_reference_is_the_closed_form(name: str) -> None:
     assert angle(campaign.reference(name, end), truth) < law
 
 
-def test_a_satellite_has_no_closed_form() -> None:
-    assert campaign.closed_form(SCENES["satellite"], 1.0) is None
-
-
-def test_an_absent_peer_is_named_with_the_extra_to_install(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    (tmp_path / "rebound.py").write_text("raise ImportError('No module named rebound')")
-    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
-    measured = campaign.measure(["rebound", "heyoka"], SHORT[:1], repeats=2, stride=20, fill=0.0)
-    (note,) = measured.notes
-    assert note.startswith("rebound left out: No module named")
-    assert note.endswith('pip install "rigidsim[peers]"')
-    assert {p.peer for p in measured.points.values()} == {"heyoka"}
-    assert all(len(p.seconds) == 2 for p in measured.points.values())
-
-
-def test_extras_hold_what_the_messages_promise() -> None:
-    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
-    for peer in set(ADAPTERS) - {"heyoka", "rigidsim"}:
-        extra = campaign.how_to_install(peer).split("[")[1].split("]")[0]
-        assert any(line.startswith(f"{peer}>=") for line in project["optional-dependencies"][extra])
-
-
-def test_mistyped_peers_are_refused(capsys: pytest.CaptureFixture[str]) -> None:
-    with pytest.raises(SystemExit) as stop:
-        study.main(["--peers", "heyoka,reboun"])
-    assert stop.value.code == 2
-    assert "given reboun; known: heyoka" in capsys.readouterr().err
-
-
 @pytest.mark.slow
 def test_the_command_prints_ratios_and_draws(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     arguments = ["--short", "--scenes", "free_top", "--peers", "heyoka,scipy", "--repeats", "1"]
@@ -129,54 +91,3 @@ def test_the_command_prints_ratios_and_draws(tmp_path: Path, capsys: pytest.Capt
     assert float(row.split("|")[4]) > 5
     pixels = imread(tmp_path / "peer_comparison.png")[:, :, :3]
     assert 0.01 < (pixels < 0.9).any(axis=2).mean() < 0.9
-
-
-def curve_of(exponent: float, factor: float, errors: list[float], title: str = "a") -> list[Point]:
-    return [Point("p", title, "s", 1.0, e, e, seconds=[factor * e**-exponent]) for e in errors]
-
-
-@given(st.floats(0.01, 2), st.floats(1e-6, 1e3), st.floats(-11.9, -3.1))
-def test_a_power_law_is_read_off_exactly(exponent: float, factor: float, logarithm: float) -> None:
-    points = curve_of(exponent, factor, [1e-3, 1e-5, 1e-6, 1e-9, 1e-12])
-    error = 10**logarithm
-    expected = factor * error**-exponent
-    # logarithms of up to 60 carry 60 eps into the exponential
-    assert cost_at(points, error) == pytest.approx(expected, rel=1e-12)
-
-
-def test_no_curve_is_extended_and_the_cheapest_way_counts() -> None:
-    points = curve_of(0.1, 1.0, [1e-4, 1e-8]) + curve_of(0.1, 0.5, [1e-7, 1e-10], "b")
-    assert cost_at(points, 1e-11) is None
-    assert cost_at(points, 1e-10) == pytest.approx(5.0)
-    assert cost_at(points, 1e-6) == pytest.approx(0.5 * 1e-7**-0.1)  # b's loosest, not less
-    assert cost_at([], 1e-3) is None
-    assert cost_at(curve_of(0.1, 1.0, [1e-4, 1e-8], STEPWISE[0]), 1e-6) == pytest.approx(1e-8**-0.1)
-
-
-def test_the_frontier_drops_what_another_beats_in_both() -> None:
-    worse = Point("p", "a", "s", 1.0, 0.0, error=1e-5, seconds=[9.0])
-    best = curve_of(0.1, 1.0, [1e-4, 1e-8])
-    failed = Point("p", "a", "s", 1.0, 0.0, error=math.nan, seconds=[0.1])
-    assert frontier([worse, failed, *best]) == best
-
-
-@given(st.floats(1e-15, 3.1), st.sampled_from([1.0, -1.0, 0.5]))
-def test_the_angle_between_attitudes_ignores_sign_and_norm(turned: float, factor: float) -> None:
-    with mpmath.workdps(50):
-        half = mpmath.mpf(turned) / 2
-        there = [factor * mpmath.cos(half), 0, factor * mpmath.sin(half), 0]
-        assert angle(there, [1, 0, 0, 0]) == pytest.approx(turned, rel=1e-15)
-
-
-def test_the_tightest_setting_is_always_measured() -> None:
-    assert thinned([5.0, 4.0, 3.0, 2.0, 1.0], 3) == [4.0, 1.0]
-    assert thinned([3.0, 2.0, 1.0], 3) == [3.0, 2.0, 1.0]
-
-
-def test_slow_calls_are_not_repeated_and_the_fastest_counts(monkeypatch: pytest.MonkeyPatch) -> None:
-    clock = iter([0.0, 1.0, 1.0, 4.0, 0.0, 1.0, 1.0, 1.5, 1.5, 1.75, 1.75, 2.75])
-    monkeypatch.setattr("experiments.peers.child.time.process_time", lambda: next(clock))
-    slow = measure(lambda: lambda: [1.0, 0.0, 0.0, 0.0], fill=0.0)
-    assert (slow["prepare"], slow["seconds"]) == (1.0, 3.0)
-    fast = measure(lambda: lambda: [1.0, 0.0, 0.0, 0.0], fill=0.0)
-    assert (fast["prepare"], fast["seconds"]) == (1.0, 0.25)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rigidsim.look.coasts import coasts, earth, earth_map, land_map
+from rigidsim.look.coasts import coasts, land_map
 
 PLACES = {
     # name: degrees north, degrees east, whether it is land
@@ -39,23 +39,3 @@ def test_land_covers_its_share_of_the_earth() -> None:
     # 29.2 %: 148.94 of 510.07 million km^2 (CIA World Factbook); coarse coasts miss lakes and islands
     assert (land.mean(axis=1) * weight).sum() / weight.sum() == pytest.approx(0.292, abs=0.01)
     assert len(coasts()) > 50
-
-
-def test_the_globe_wears_the_map_where_it_belongs() -> None:
-    """At the middle of each triangle: the map's longitude and latitude are those of the place."""
-    half = np.array([1.0, 1.0, 0.9966])
-    mesh = earth(half)
-    assert mesh.picture is earth_map()
-    assert mesh.places is not None
-    across, down = mesh.places.reshape(-1, 3, 2).mean(axis=1).T
-    middle = (mesh.vertices / half).reshape(-1, 3, 3).mean(axis=1)
-    middle /= np.linalg.norm(middle, axis=1, keepdims=True)
-    east = np.arctan2(middle[:, 1], middle[:, 0]) / (2 * np.pi)
-    apart = (across - east + 0.5) % 1 - 0.5
-    # a triangle's corners are 1/64 of a turn apart, and at the poles a third of it
-    assert np.abs(apart * np.hypot(middle[:, 0], middle[:, 1])).max() < 1 / 128
-    assert np.abs(down - (0.5 - np.arcsin(middle[:, 2]) / np.pi)).max() < 1 / 128
-    assert np.ptp(mesh.places.reshape(-1, 3, 2)[..., 0], axis=1).max() < 1 / 32  # none goes round the back
-    moved = mesh.scaled(2.0).moved(np.eye(3), np.ones(3))
-    assert moved.picture is mesh.picture
-    assert moved.places is mesh.places

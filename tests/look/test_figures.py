@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable
 from itertools import combinations
 from pathlib import Path
@@ -19,8 +18,7 @@ from matplotlib.image import imread
 from matplotlib.text import Text
 
 from rigidsim.look import figures, signals
-from rigidsim.look.figures import composing, drift, fits, polhode, scales, timelines
-from rigidsim.look.plots import pretty_unit
+from rigidsim.look.figures import drift, fits, polhode
 from rigidsim.solve.problem import DRIFT_FACTOR
 
 Build = Callable[..., xarray.Dataset]
@@ -192,29 +190,6 @@ def test_obliquity_and_longitude_have_axes_of_their_own_and_say_what_was_taken_o
     )
 
 
-@pytest.mark.parametrize(("swing", "whole"), [(50.0, True), (0.5, True), (0.05, False)])
-def test_swings_that_ticks_tell_are_drawn_with_nothing_taken_off(swing: float, whole: bool) -> None:
-    dataset = precessing()
-    wave = np.deg2rad(swing) * np.sin(2 * np.pi * dataset["time"].values / (18.6 * YEAR))
-    dataset["obliquity"].values[:] = np.deg2rad(89.3) + wave[:, None]
-    dataset["node_longitude"].values[:] = np.deg2rad(60) + wave[:, None]
-    page = figures.figure(dataset, "obliquity")
-    upper, lower = (axes.get_lines()[0].get_ydata() for axes in page.axes)
-    assert titles(page)[0].startswith("Obliquity less its mean, ") != whole
-    # half a radian from the mean motion is no small path about it
-    assert ("nutation" in figures.available(dataset)) == (swing < 30)
-    assert titles(page)[1].startswith("Longitude of the node less its mean motion, ") != whole
-    if whole:
-        assert titles(page) == ["Obliquity", "Longitude of the node"]
-        np.testing.assert_allclose(upper, 89.3 + np.rad2deg(wave), rtol=1e-12)
-        np.testing.assert_allclose(lower, 60 + np.rad2deg(wave), rtol=1e-12)
-    assert [axes.get_ylabel() for axes in page.axes] == (
-        ["obliquity [deg]", "longitude [deg]"]
-        if whole
-        else ["obliquity − mean [arcsec]", "longitude − line [arcsec]"]
-    )
-
-
 def test_the_page_of_a_run_with_axes_alone_is_about_their_precession() -> None:
     dataset = precessing()  # as of an averaged model: neither attitude nor rates
     page = figures.figure(dataset.assign_attrs(formulation="orbit_averaged"))
@@ -251,18 +226,6 @@ def test_nutation_ellipse_has_its_period_and_its_axes() -> None:
     (label,) = [t.get_text() for t in axes.get_legend().get_texts() if "semi-axes" in t.get_text()]
     assert label == "18.6 yr: semi-axes 9.2″, 6.9″"
     assert axes.get_ylabel() == "Δobliquity [arcsec]"
-
-
-def test_pole_path_is_in_the_distance_of_the_obliquity() -> None:
-    page = figures.figure(precessing(years=26000 / 10), "pole_path")
-    assert [axes.get_xlabel() for axes in page.axes] == [
-        "along X [deg]",
-        "Δlongitude · sin(obliquity) [arcsec]",
-    ]
-    paths, center, _ = figures.catalogue.poles.pole_paths(precessing())
-    assert center == "reference pole"
-    tilt = precessing()["obliquity"].values[:, 0]
-    np.testing.assert_allclose(np.hypot(*paths["figure"].T), tilt, rtol=1e-12)
 
 
 def test_pole_of_a_free_body_circles_the_momentum(symmetric_top: Build) -> None:
@@ -335,23 +298,6 @@ def test_herpolhode_of_a_symmetric_body_is_a_circle(symmetric_top: Build) -> Non
     np.testing.assert_allclose(np.hypot(*plane.T), np.hypot(*plane[0]), rtol=1e-9)
 
 
-def test_a_symmetric_bodys_nutation_angle_is_constant_below_its_attitude(symmetric_top: Build) -> None:
-    page = figures.figure(symmetric_top(), "attitude")
-    assert titles(page)[-1] == "Nutation angle: the figure axis from the momentum"
-    angle = page.axes[-1].get_lines()[0].get_ydata()
-    rates = symmetric_top()["angular_velocity"].values[0]
-    expected = np.degrees(np.arccos(2 * rates[2] / np.linalg.norm(rates * [1, 1, 2])))  # cos = C w3 / L
-    np.testing.assert_allclose(angle, expected, rtol=1e-9)
-
-
-def test_motion_off_the_surfaces_is_drawn_without_them(symmetric_top: Build) -> None:
-    dataset = symmetric_top()
-    dataset.attrs["principal_moments"] = "[1, 2, 2]"
-    assert titles(figures.figure(dataset, "polhode")) == ["Path of ω in body axes [rad/s]"]
-    del dataset.attrs["principal_moments"]
-    assert titles(figures.figure(dataset, "polhode")) == ["Path of ω in body axes [rad/s]"]
-
-
 def test_drifts_stand_over_the_band_of_rounding(symmetric_top: Build) -> None:
     dataset = symmetric_top().assign_attrs(steps=400, tolerance=2.0**-52)
     law = drift.law(dataset)
@@ -366,33 +312,7 @@ def test_drifts_stand_over_the_band_of_rounding(symmetric_top: Build) -> None:
     assert drift.MOST == DRIFT_FACTOR
 
 
-def test_drifts_that_are_exactly_zero_are_said_so() -> None:
-    (axes,) = figures.figure(earth(), "drift").axes
-    assert [t.get_text() for t in axes.texts] == ["exactly 0: energy"]
-
-
-def test_the_table_has_every_invariant(symmetric_top: Build) -> None:
-    dataset = symmetric_top()
-    for k in range(14):
-        dataset[f"constant_{k}_drift"] = dataset["energy_drift"].assign_attrs(drift_of=f"constant_{k}")
-    page = figures.figure(dataset)
-    rows = [text.get_text() for text in page.axes[-1].texts]
-    assert [f"largest drift, constant {k}" in rows for k in range(14)] == [True] * 14
-    assert collisions(page) == []
-
-
 # the page
-
-
-def test_no_text_covers_another_on_the_pages_of_scenes(symmetric_top: Build) -> None:
-    place = np.random.default_rng(1).random((1001, 3))
-    moving = symmetric_top().assign(position=(("time", "space_axis"), place))
-    long = heavy_top().assign_attrs(
-        config=f'name = "x"\ndescription = "{"a very long description of it " * 9}"',
-        title="a_name_that_goes_on_and_on_" * 5,
-    )
-    for dataset in (earth(), precessing(), long, satellite(), moving):
-        assert collisions(figures.figure(dataset)) == []
 
 
 @pytest.mark.slow
@@ -404,17 +324,6 @@ def test_no_text_covers_another_in_any_figure(symmetric_top: Build) -> None:
             assert collisions(figures.figure(dataset, name)) == [], name
             drawn += 1
     assert drawn > 20
-
-
-def test_of_a_fast_motion_the_start_is_shown_and_said(symmetric_top: Build) -> None:
-    page = figures.figure(symmetric_top(count=20000, end=2000.0))
-    labels = [axes.get_xlabel() for axes in page.axes if axes.get_xlabel().startswith("time")]
-    assert labels[0].startswith("time [min], the first 3.3 min")
-    assert labels[-1] == "time [min]"
-    low, high = page.axes[0].get_xlim()
-    # w_x = sin(psi) turns with |1/C - 1/A| cos(0.5) = 0.439 rad/s: fourteen turns
-    assert (low, high) == (0.0, pytest.approx(14 * 2 * np.pi / 0.4388 / 60, rel=0.02))
-    assert "first" not in figures.figure(symmetric_top()).axes[0].get_xlabel()
 
 
 def test_unknown_and_impossible_figures_are_refused_with_those_there_are(symmetric_top: Build) -> None:
@@ -461,119 +370,4 @@ def test_one_sample_and_nan_are_drawn(symmetric_top: Build) -> None:
     np.testing.assert_allclose(shown, broken["angular_velocity"].values[:, 0])
 
 
-def test_rates_only_and_moving_runs_have_their_panels(symmetric_top: Build) -> None:
-    dataset = symmetric_top()
-    rates = titles(figures.figure(dataset[["angular_velocity"]].assign_attrs(dataset.attrs)))
-    assert rates[0] == "Angular velocity, body axes"
-    assert not any("z axis" in t for t in rates)
-    angles = dataset.assign(euler_angles=(("time", "euler_angle"), np.ones((1001, 3))))
-    assert "Euler angles" in titles(figures.figure(angles))
-    flat = np.stack([np.cos(dataset["time"]), np.sin(dataset["time"]), np.zeros(1001)], axis=1)
-    moving = figures.figure(dataset.assign(position=(("time", "space_axis"), 7e6 * flat)))
-    axes = next(
-        axes for axes in moving.axes if "Path in its plane" in titles(moving)[moving.axes.index(axes)]
-    )
-    assert axes.get_xlabel() == "X [Mm]"
-
-
-def test_largest_drift_is_that_of_every_sample(symmetric_top: Build) -> None:
-    dataset = symmetric_top(count=9999)
-    dataset["energy_drift"][4567] = -3e-9  # between the samples that the curves show
-    shown = composing.shown_rows(dataset, 500)
-    assert shown.rows.sizes["time"] <= 500
-    assert (shown.largest, shown.complete) == ({"energy": 3e-9}, True)
-    shown = composing.shown_rows(dataset, 500, 5000)
-    assert (shown.largest, shown.complete) == ({"energy": pytest.approx(1e-16 * 9998)}, False)
-    assert ("largest drift, energy", "≥ 1.0e-12") in composing.facts_of(shown)
-
-
 # units and numbers
-
-
-def test_fast_spin_does_not_press_the_other_angles_flat(symmetric_top: Build) -> None:
-    dataset = symmetric_top()
-    seconds = dataset["time"].values
-    angles = np.stack([0 * seconds, 0.1 * np.sin(seconds), 40 * seconds + 0.2 * np.sin(seconds)], axis=1)
-    shown, labels = timelines.without_growth(dataset, np.rad2deg(angles))
-    assert labels[:2] == ["φ", "θ"]
-    assert labels[2].startswith("ψ − 6.3")
-    assert labels[2].endswith("turns/s")
-    # The swing of 0.2 rad both ways, and what the mean growth misses of it at the end.
-    assert np.ptp(shown[:, 2]) < np.rad2deg(3 * 0.2)
-    np.testing.assert_array_equal(shown[:, 1], np.rad2deg(angles[:, 1]))
-
-
-def test_values_get_si_prefixes_and_angles_their_units() -> None:
-    assert scales.si_scale(np.array([7e-5]), "rad/s") == (pytest.approx(1e-6), "µrad/s")
-    assert scales.si_scale(np.array([4.2e7]), "m") == (pytest.approx(1e6), "Mm")
-    assert scales.si_scale(np.zeros(3), "m") == (1.0, "m")
-    assert scales.si_scale(np.array([3e-9]), "m")[1] == "nm"
-    assert scales.si_scale(np.array([1.5e21]), "m")[1] == "1e21 m"
-    for value, unit in ((0.4, "deg"), (1e-4, "arcsec"), (1e-7, "mas"), (1e-10, "µas"), (0.0, "deg")):
-        assert scales.angle_scale(np.array([value]))[1] == unit
-    assert scales.angle_text(1e-7) == "20.63 mas"
-    assert scales.angle_text(-np.deg2rad(23.44)) == "−23.44°"
-
-
-def test_secular_part_and_circulation_are_those_of_the_motion() -> None:
-    time = np.linspace(0.0, 50.0, 4001)
-    line = fits.secular(time, 1.0 + 0.3 * time + 0.01 * np.sin(2.1 * time))
-    assert line.rate == pytest.approx(0.3, abs=1e-6)
-    assert line.at(time[:1])[0] == pytest.approx(1.0, abs=1e-4)
-    circle = np.stack([np.cos(2.5 * time), -np.sin(2.5 * time)], axis=1)
-    assert fits.circulation(time, circle) == pytest.approx(-2.5, rel=1e-9)
-    assert fits.circulation(time[::200], circle[::200]) is None  # 6.25 rad between samples
-    assert fits.circulation(time, np.stack([2 + np.cos(time), np.sin(time)], axis=1)) is None
-    assert fits.circulation(time, np.stack([np.cos(time**2 / 9), np.sin(time**2 / 9)], axis=1)) is None
-
-
-def test_leading_ellipse_is_the_strongest_of_two() -> None:
-    time = np.linspace(0.0, 100.0, 2001)
-    plane = np.stack([3 * np.cos(time) + 0.1 * np.sin(7 * time), 2 * np.sin(time)], axis=1)
-    found = fits.leading_ellipse(time, plane)
-    assert found is not None
-    assert found.rate == pytest.approx(1.0, rel=1e-4)
-    assert found.semi_axes == (pytest.approx(3.0, rel=1e-2), pytest.approx(2.0, rel=1e-2))
-    assert fits.leading_ellipse(time[:60], plane[:60]) is None  # half a turn
-
-
-@pytest.mark.parametrize(
-    ("unit", "wanted"),
-    [
-        ("rad s-1", "rad/s"),
-        ("kg m2 s-1", "kg m²/s"),
-        ("kg m^2/s", "kg m²/s"),
-        ("s^-4", "1/s⁴"),
-        ("J", "J"),
-        ("1", ""),
-        ("", ""),
-    ],
-)
-def test_units_read_as_people_write_them(unit: str, wanted: str) -> None:
-    assert pretty_unit(unit) == wanted
-
-
-def test_figure_axis_is_that_of_symmetry_or_of_the_largest_moment(symmetric_top: Build) -> None:
-    assert signals.figure_index(np.array([2.0, 2.0, 1.0])) == 2
-    assert signals.figure_index(np.array([1.0, 2.0, 2.0])) == 0
-    assert signals.figure_index(np.array([1.0, 3.0, 2.0])) == 1
-    dataset = symmetric_top()
-    turned = json.dumps([[0, 1, 0], [0, 0, 1], [1, 0, 0]])
-    np.testing.assert_array_equal(
-        signals.figure_direction(dataset.assign_attrs(principal_axes=turned)), [1.0, 0.0, 0.0]
-    )
-    asked = dataset.assign_attrs(config='[frame]\nfigure_axis = "y"\n')
-    np.testing.assert_array_equal(signals.figure_direction(asked), [0.0, 1.0, 0.0])
-
-
-def test_an_axis_that_is_nowhere_defined_has_no_path() -> None:
-    """The figure axis of an average over a tumbling rotation."""
-    angles = [[np.nan, 1.0], [np.nan, 1.25]]
-    dataset = xarray.Dataset(
-        dict.fromkeys(("obliquity", "node_longitude"), (("time", "axis"), angles)),
-        coords={"axis": ["figure", "momentum"]},
-    )
-    assert signals.orientation(dataset, "figure") is None
-    found = signals.orientation(dataset, "momentum")
-    assert found is not None
-    assert [column.tolist() for column in found] == [[1.0, 1.25], [1.0, 1.25]]

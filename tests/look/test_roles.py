@@ -9,7 +9,7 @@ import pytest
 
 import rigidsim
 from rigidsim.look.plots import DRIFTS, plan_plots
-from rigidsim.look.roles import drifts, in_words, put_backs
+from rigidsim.look.roles import drifts
 from rigidsim.look.thinning import thin
 from rigidsim.store.variables import parts_in
 
@@ -28,21 +28,3 @@ def test_no_residual_is_a_variable_of_its_own(
         plotted = [series.name for plot in plan_plots(shown) for series in plot.series]
         drifting = {str(variable.name) for variable in drifts(shown).values()}
         assert sorted(plotted) == sorted([DRIFTS, *(set(map(str, shown)) - drifting)])
-
-
-def test_drifts_and_what_was_put_back_go_by_their_invariant(
-    free_body: Callable[..., str], tmp_path: Path
-) -> None:
-    text = free_body().replace("[integrator]", "[integrator]\nhold_invariants = true")
-    with rigidsim.run(rigidsim.parse(text), out=tmp_path).dataset as dataset:
-        assert set(put_backs(dataset)) <= set(drifts(dataset))
-        assert drifts(dataset)["energy"].name == "energy_drift"
-        assert put_backs(dataset)["energy"].name == "energy_put_back"
-        (drift,) = [s for p in plan_plots(thin(dataset, 10)) if p.key == "drift" for s in p.series]
-        assert {"energy", "energy put back"} <= set(drift.labels)
-        assert len(drift.labels) == len(drift.colors) == drift.values.shape[1]
-
-
-def test_an_orbits_norm_says_whose_it_is() -> None:
-    assert in_words("orbit_norm_2") == "norm of orbit 2's cosine and sine"
-    assert in_words("quaternion_norm") == "quaternion norm"

@@ -14,7 +14,6 @@ from rigidsim.look.solids import (
     MINOR_SEGMENTS,
     SEGMENTS,
     body_meshes,
-    rotation_matrix,
     solid_mesh,
 )
 from rigidsim.scene.bodies.outlines import THINNESS, Arc, Revolved, StraightPiece
@@ -106,12 +105,6 @@ def test_surface_is_closed_and_normals_point_outwards(solid: str) -> None:
     assert (along > 0).all()
 
 
-@pytest.mark.parametrize("solid", EXAMPLES)
-def test_rotation_shows_by_more_than_one_colour(solid: str) -> None:
-    colors = solid_mesh(solid, EXAMPLES[solid]).colors
-    assert len(np.unique(colors, axis=0)) >= 3
-
-
 def test_composite_is_placed_in_body_axes() -> None:
     turn = [np.sqrt(0.5), 0, np.sqrt(0.5), 0]  # a quarter about y: z to x
     drawing = [
@@ -125,13 +118,6 @@ def test_composite_is_placed_in_body_axes() -> None:
     np.testing.assert_allclose(light.vertices.mean(axis=0), (0, 0, 9), atol=1e-2)
     assert np.ptp(heavy.vertices[:, 0]) == pytest.approx(9 * 2 * 0.8 / 6, rel=1e-3)
     assert 0 < np.ptp(light.vertices[:, 0]) < np.ptp(heavy.vertices[:, 0])
-
-
-def test_ideally_thin_body_is_drawn_with_some_thickness() -> None:
-    mesh = solid_mesh("cuboid", {"size": [3.0, 0.0, 1.0]})
-    np.testing.assert_allclose(np.ptp(mesh.vertices, axis=0), (3, 3 * THINNESS, 1))
-    with pytest.raises(ValueError, match="no extent"):
-        solid_mesh("cuboid", {"size": [0, 0, 0]})
 
 
 HEMISPHERE = Shape(
@@ -164,11 +150,6 @@ def test_a_shape_is_one_entry(monkeypatch: pytest.MonkeyPatch, free_body: Callab
     np.testing.assert_allclose(mesh.vertices[:, 2].min(), -2, atol=1e-12)
 
 
-def test_missing_drawing_is_a_unit_cube() -> None:
-    (mesh,) = body_meshes(None)
-    assert mesh.volume() == pytest.approx(1)
-
-
 @pytest.mark.parametrize(
     ("drawing", "message"),
     [
@@ -187,9 +168,3 @@ def test_missing_drawing_is_a_unit_cube() -> None:
 def test_unreadable_drawing_is_refused_with_what_is_wrong(drawing: str, message: str) -> None:
     with pytest.raises(ValueError, match=message):
         body_meshes(drawing)
-
-
-def test_rotation_matrix_turns_body_to_space() -> None:
-    quarter = rotation_matrix([np.sqrt(0.5), 0, 0, np.sqrt(0.5)])  # about Z: x to Y
-    np.testing.assert_allclose(quarter @ [1, 0, 0], [0, 1, 0], atol=1e-15)
-    np.testing.assert_allclose(rotation_matrix([3.0, 0, 0, 3.0]), quarter, atol=1e-15)

@@ -10,16 +10,11 @@ import pytest
 import xarray
 
 from rigidsim.look import surroundings
-from rigidsim.look.drawing import SCENE_ROWS, still_stride, trail_stride
-from rigidsim.look.page import legible
-from rigidsim.look.plots import plan_plots
-from rigidsim.look.solids import rotation_matrix, solid_mesh
-from rigidsim.look.stages.bodies import FIELD, camera
+from rigidsim.look.solids import rotation_matrix
 from rigidsim.look.stages.orbits import local_frame
-from rigidsim.look.stages.parts import Picture, Stage, quaternion_of, trail
+from rigidsim.look.stages.parts import Picture
 from rigidsim.look.stages.registry import build_picture
 from rigidsim.look.states import charts_of, sections_of, states_of
-from rigidsim.look.symbols import globe, sharp_edges, spinning_top
 
 Build = Callable[..., xarray.Dataset]
 
@@ -96,53 +91,6 @@ def test_a_motion_under_an_unknown_torque_gets_the_generic_stage(symmetric_top: 
     assert picture(dataset).kind == "motion of a rigid body"
 
 
-@pytest.mark.parametrize("kind", KINDS)
-@pytest.mark.parametrize("size", [1e-10, 1.0])
-def test_the_eye_has_body_and_path_in_its_field(symmetric_top: Build, kind: str, size: float) -> None:
-    found, subject = build_picture(KINDS[kind](symmetric_top(count=101, size=size)))
-    for stage in found.stages:
-        eye = camera(stage, subject=subject)
-        forward = eye.target - eye.position
-        forward = forward / np.linalg.norm(forward)
-        points = np.concatenate([places(stage), *(a.vectors for a in stage.arrows if not stage.looked_from)])
-        away = points - eye.position
-        depth = away @ forward
-        assert (depth > 0).all()
-        across = np.linalg.norm(away - np.outer(depth, forward), axis=1)
-        # within the cone that the pyramid of the view holds, but for a tenth for the ends of arrows
-        assert (across / depth).max() < 1.1 * np.tan(FIELD / 2)
-
-
-def places(stage: Stage) -> np.ndarray:
-    """Corners of the body where it begins and where it ends, and the path, as they are looked at."""
-    moved = np.zeros((2, 3)) if stage.translation is None else stage.translation[[0, -1]]
-    reach = max((mesh.reach() for mesh in stage.meshes), default=0.0)
-    corners = [place + reach * way for place in moved for way in np.vstack([np.eye(3), -np.eye(3)])]
-    return np.array(corners)
-
-
-def test_an_orbit_goes_about_a_planet_of_its_size(symmetric_top: Build) -> None:
-    stage = picture(orbiting(symmetric_top(count=101))).stages[1]
-    assert stage.title == "Orbit about the Earth"
-    assert stage.unit == pytest.approx(7e6)
-    planet = next(solid for solid in stage.solids if solid.name == "planet")
-    assert planet.mesh.reach() == pytest.approx(6.3781e6 / 7e6, rel=1e-6)
-
-
-def test_a_kepler_path_keeps_to_the_laws_of_kepler() -> None:
-    orbit = {**CIRCLE, "eccentricity": 0.6, "periapsis": 1.1}
-    seconds = np.linspace(0, 2 * np.pi / orbit["mean_motion"], 2001)
-    path = surroundings.kepler_path(orbit, seconds)
-    distance = np.linalg.norm(path, axis=1)
-    assert distance.min() == pytest.approx(0.4 * 6.9e6, rel=1e-5)
-    assert distance.max() == pytest.approx(1.6 * 6.9e6, rel=1e-5)
-    np.testing.assert_allclose(path[0], path[-1], rtol=0, atol=1e-6 * 6.9e6)
-    np.testing.assert_allclose(path @ surroundings.orbit_normal(orbit), 0, atol=1e-14 * 1e8)
-    # equal areas in equal times: of the triangles, a chord's square below the sectors
-    areas = np.linalg.norm(np.cross(path[:-1], path[1:]), axis=1) / 2
-    assert np.ptp(areas) / areas.mean() < (2 * np.pi / 2000 * 6) ** 2
-
-
 def averaged(dataset: xarray.Dataset, axis: str, drawn: xarray.Dataset) -> xarray.Dataset:
     """A pole that goes backwards about Z, 0.4 rad from it, and nothing else; the Sun goes round fast."""
     node = 1.0 - 0.05 * dataset["time"].values
@@ -183,68 +131,6 @@ def test_a_globe_without_rotation_points_where_its_axis_does(symmetric_top: Buil
         assert any("direction of the Sun isn't shown" in note for note in found.notes)
 
 
-def test_where_a_longitude_strays_as_far_as_it_advances_no_circle_of_precession_is_drawn(
-    symmetric_top: Build,
-) -> None:
-    top = symmetric_top(count=101)
-    dataset = averaged(top, "momentum", top)
-    node = dataset["node_longitude"]
-    swings = 2.0 * np.ptp(node.values) * np.cos(np.linspace(0.0, 2 * np.pi, node.size))[:, None]
-    found = picture(dataset.assign(node_longitude=node + swings))
-    assert "precession" not in {line.name for line in found.stages[0].lines}
-    assert "precession" in {line.name for line in picture(dataset).stages[0].lines}
-
-
-def test_against_a_moving_plane_a_globe_is_seen_from_that_plane(symmetric_top: Build) -> None:
-    top = symmetric_top(count=101)
-    dataset = averaged(top, "figure", earth(top))
-    pole = dataset["figure_axis"].values  # of its angles against the plane, whichever way that lies
-    config = dataset.attrs["config"] + '\n[frame]\nreference = "orbit"\n'
-    dataset = dataset.drop_vars("figure_axis").assign_attrs(config=config)
-    found, _ = build_picture(dataset)
-    (stage,) = found.stages
-    assert stage.quaternion is not None
-    turn = rotation_matrix(stage.quaternion[:, [3, 0, 1, 2]])
-    np.testing.assert_allclose(turn[:, :, 2], pole, rtol=0, atol=1e-6)  # float32
-    assert [arrow.name for arrow in stage.arrows] == ["figure_axis"]  # nothing says where the Sun is
-    assert any("as seen from it" in note for note in found.notes)
-
-
-def test_of_a_tumbling_body_without_attitude_the_momentum_is_shown_alone(symmetric_top: Build) -> None:
-    top = symmetric_top(count=101)
-    dataset = averaged(top, "momentum", top)
-    found, subject = build_picture(dataset)
-    assert found.kind == "axes in space"
-    (stage,) = found.stages
-    assert stage.meshes == []
-    assert stage.quaternion is None
-    (arrow,) = stage.arrows
-    np.testing.assert_allclose(arrow.vectors, 1.45 * dataset["momentum_axis"].values, rtol=1e-12)
-    assert {"plane of reference", "precession of the momentum: once in 2.09 min"} <= {
-        line.words for line in stage.lines
-    }
-    assert any("isn't drawn" in note for note in found.notes)
-    with_axis = averaged(top, "figure", top)  # a disk whose axis is known is drawn, along it
-    found, _ = build_picture(with_axis)
-    assert found.kind == "axes in space"
-    assert len(found.stages[0].meshes) == len(subject.meshes) > 0
-    turn = rotation_matrix(found.stages[0].quaternion[:, [3, 0, 1, 2]])
-    np.testing.assert_allclose(turn[:, :, 2], with_axis["figure_axis"].values, rtol=0, atol=1e-6)
-
-
-def test_the_local_frame_points_forward_and_down() -> None:
-    seconds = np.linspace(0, 3000, 50)
-    source = surroundings.kepler_path(CIRCLE, seconds)
-    frame = local_frame(-source, surroundings.orbit_normal(CIRCLE))
-    np.testing.assert_allclose(
-        frame[:, :, 2], source / np.linalg.norm(source, axis=1, keepdims=True), atol=1e-14
-    )
-    np.testing.assert_allclose(np.linalg.det(frame), 1, atol=1e-13)
-    velocity = -(surroundings.kepler_path(CIRCLE, seconds + 1) - source)
-    velocity /= np.linalg.norm(velocity, axis=1, keepdims=True)
-    assert (np.einsum("ij,ij->i", frame[:, :, 0], velocity) > 0.999).all()
-
-
 def test_a_satellite_without_attitude_in_space_is_turned_by_roll_pitch_and_yaw(symmetric_top: Build) -> None:
     dataset = satellite(symmetric_top(count=101)).drop_vars(["quaternion", "angular_momentum"])
     angles = np.deg2rad(np.tile([10.0, 20.0, 30.0], (101, 1)))
@@ -271,75 +157,6 @@ def test_the_ellipsoid_of_energy_touches_the_invariable_plane_at_the_tip(symmetr
     np.testing.assert_allclose(heights, heights[0], rtol=1e-9)
     rim = next(line for line in rolling.lines if line.name == "plane/rim")
     np.testing.assert_allclose(rim.points[:, 2], heights[0], rtol=1e-9)
-
-
-def test_a_top_of_known_moments_is_drawn_as_one_that_stands_on_its_pivot(symmetric_top: Build) -> None:
-    cuboid = [
-        {"solid": "cuboid", "dimensions": {"size": [1, 1, 1]}, "position": [0, 0, 0.04], "equivalent": True}
-    ]
-    dataset = heavy(symmetric_top(count=101)).assign_attrs(
-        drawing=json.dumps(cuboid), principal_moments="[2e-4, 2e-4, 1e-4]"
-    )
-    (mesh,) = picture(dataset).stages[0].meshes
-    assert mesh.vertices[:, 2].min() == pytest.approx(0, abs=1e-12)
-    # the disk's radius is sqrt(2 C / m), in units of the stem's 7 cm
-    radius = np.hypot(mesh.vertices[:, 0], mesh.vertices[:, 1]).max()
-    assert radius == pytest.approx(np.sqrt(2e-4 / 0.1) / 0.07, rel=1e-9)
-    shaped = dataset.assign_attrs(drawing=json.dumps([{**cuboid[0], "equivalent": False}]))
-    (mesh,) = picture(shaped).stages[0].meshes
-    assert len(mesh.triangles) == 12  # a shape that is known is drawn
-
-
-def test_a_plate_is_never_seen_edge_on_at_the_start(symmetric_top: Build) -> None:
-    dataset = symmetric_top(count=401)
-    for turn in ([1, 0, 0, 0], [np.sqrt(0.5), np.sqrt(0.5), 0, 0], [np.sqrt(0.5), 0, np.sqrt(0.5), 0]):
-        fixed = dataset.assign(quaternion=(("time", "quaternion_component"), np.tile(turn, (401, 1))))
-        found, subject = build_picture(fixed.drop_vars("angular_momentum"))
-        eye = camera(found.stages[0], subject=subject)
-        way = (eye.position - eye.target) / np.linalg.norm(eye.position - eye.target)
-        normal = rotation_matrix(turn) @ [0, 0, 1]
-        assert abs(way @ normal) > 0.4
-
-
-def test_quaternions_of_matrices_give_them_back() -> None:
-    random = np.random.default_rng(3).normal(size=(500, 4))
-    matrices = rotation_matrix(random)
-    found = quaternion_of(matrices)
-    np.testing.assert_allclose(rotation_matrix(found), matrices, atol=1e-14)
-    assert (np.einsum("ij,ij->i", found[1:], found[:-1]) >= 0).all()
-
-
-def test_sharp_edges_are_those_of_the_solid() -> None:
-    assert len(sharp_edges(solid_mesh("cuboid", {"size": [1, 2, 3]}))) == 12
-    assert len(sharp_edges(globe(np.ones(3), (1, 2, 3)))) == 0
-    top = spinning_top(0.5, 1.0, 1.7)
-    assert top.volume() > 0
-    assert len(sharp_edges(top)) % 64 == 0
-
-
-def test_long_trails_and_arrows_are_thinned_only_where_nothing_is_lost() -> None:
-    turns = np.linspace(0, 2 * np.pi, 5 * SCENE_ROWS)
-    slow = np.stack([np.cos(turns), np.sin(turns), 0 * turns], axis=1)
-    fast = np.stack([np.cos(3000 * turns), np.sin(3000 * turns), 0 * turns], axis=1)
-    assert still_stride(slow) == 64
-    assert still_stride(fast) == 1
-    assert still_stride(slow[:SCENE_ROWS]) == 1
-    assert trail_stride(trail("t", (1, 2, 3), slow)) == 16
-    assert trail_stride(trail("t", (1, 2, 3), fast)) == 1  # 33 points a turn
-
-
-def test_what_the_scene_is_about_is_plotted_first_and_in_readable_units(symmetric_top: Build) -> None:
-    dataset = symmetric_top()
-    dataset["tilt"] = ("time", np.linspace(0.1, 0.5, 1001), {"units": "rad"})
-    plots = plan_plots(dataset, ("tilt", "precession_angle"))
-    assert [plot.title for plot in plots if plot.place == "leading"] == ["Tilt [°]"]
-    np.testing.assert_allclose(plots[0].series[0].values[:, 0], np.rad2deg(dataset["tilt"]), rtol=1e-15)
-    assert plots[0].series[0].error is None
-    banded = plan_plots(dataset.assign_attrs(attitude_error=0.02), ("tilt",))[0].series[0].error
-    assert banded is not None
-    assert banded[[0, -1]] == pytest.approx([0.0, np.rad2deg(0.02)])
-    assert banded[500] == pytest.approx(np.rad2deg(0.02) * 0.5**1.5)
-    assert plan_plots(dataset)[0].title == "Angular velocity [rad/s]"
 
 
 def test_events_have_a_lane_and_a_section(symmetric_top: Build) -> None:
@@ -386,46 +203,6 @@ def test_a_run_in_euler_angles_has_a_lane_of_its_charts(symmetric_top: Build) ->
     assert charts_of(named.drop_vars("quaternion")) == []
 
 
-def test_the_announced_error_is_a_level_beside_the_drifts(symmetric_top: Build) -> None:
-    def levels(dataset: xarray.Dataset) -> list[tuple[str, float]]:
-        return [(level.label, level.value) for plot in plan_plots(dataset) for level in plot.levels]
-
-    dataset = symmetric_top(count=11)
-    assert levels(dataset) == []
-    assert levels(dataset.assign_attrs(attitude_error=1e-8)) == [
-        ("error of the attitude at the end, rad", -8.0)
-    ]
-    averaged = dataset.assign_attrs(attitude_error=1e-6, formulation="orbit_averaged")
-    assert levels(averaged) == [("error of the axis at the end, rad", pytest.approx(-6.0))]
-
-
-def test_a_constant_curve_is_not_magnified(symmetric_top: Build) -> None:
-    dataset = symmetric_top(count=101)
-    dataset["tilt"] = ("time", 0.5 + 1e-15 * np.arange(101), {"units": "rad"})
-    tilt, *_ = plan_plots(dataset, ("tilt",))
-    assert tilt.range == pytest.approx(np.rad2deg([0.475, 0.525]))
-    dataset["tilt"] = ("time", 0.5 + 1e-7 * np.arange(101), {"units": "rad"})
-    assert plan_plots(dataset, ("tilt",))[0].range is None
-    # unless all that it does is less than what is known of it
-    uncertain = dataset.assign_attrs(attitude_error=1e-5)
-    assert plan_plots(uncertain, ("tilt",))[0].range is not None
-
-
-def test_rates_have_prefixes_and_axes_that_lie_together_one_curve(symmetric_top: Build) -> None:
-    dataset = symmetric_top(count=101, scale=1e-13)
-    dataset["obliquity"] = (
-        ("time", "axis"),
-        np.stack([np.linspace(0.4, 0.5, 101)] * 2 + [np.linspace(0.5, 0.4, 101)], axis=1),
-        {"units": "rad"},
-    )
-    dataset = dataset.assign_coords(axis=["figure", "spin", "momentum"])
-    plots = {plot.key: plot for plot in plan_plots(dataset, ("obliquity",))}
-    assert plots["angular_velocity"].title == "Angular velocity [Trad/s]"
-    assert np.abs(plots["angular_velocity"].series[0].values).max() < 10
-    assert plots["obliquity"].series[0].labels == ["figure, spin", "momentum"]
-    assert plots["obliquity"].series[0].values.shape == (101, 2)
-
-
 def test_point_masses_beside_the_body_are_pointed_to(symmetric_top: Build) -> None:
     """From the one that the body is, not from the origin."""
     dataset = earth(symmetric_top(count=11))
@@ -441,8 +218,3 @@ def test_point_masses_beside_the_body_are_pointed_to(symmetric_top: Build) -> No
     moon, sun = (arrows[name].vectors[0] for name in ("to the Moon", "to the Sun"))
     np.testing.assert_allclose(moon / np.linalg.norm(moon), [0, 0, 1], atol=1e-15)
     np.testing.assert_allclose(sun / np.linalg.norm(sun), [-1, 0, 0], atol=0.01)
-
-
-def test_a_page_has_only_letters_that_the_viewer_can_draw() -> None:
-    assert legible("ω = 2π/T, naïve Größe, 10⁻³ kg m²/s ≤ ½") == "ω = 2π/T, naïve Größe, 10⁻³ kg m²/s ≤ ½"
-    assert legible("a 🪐 of 質量 1") == "a ? of ?? 1"

@@ -85,39 +85,6 @@ def test_directions_are_drawn_on_the_sphere_each_with_its_value() -> None:
     assert pytest.approx(vectors / 3, abs=1e-12) == back.T
 
 
-@pytest.mark.parametrize("vectors", [grid(40) * np.linspace(1, 2, 40)[:, None], grid(5), np.ones((40, 4))])
-def test_vectors_of_other_lengths_are_no_directions_and_their_members_are_dots(vectors: np.ndarray) -> None:
-    dataset = members_of(moments=vectors)
-    assert directions(dataset, "moments") is None
-    [line] = sweep_figure(dataset).axes[0].lines
-    assert line.get_linewidth() == 0
-    assert line.get_marker() == "o"
-
-
-def test_members_in_the_order_of_a_swept_number_are_joined_and_drawn_ones_are_not() -> None:
-    dataset = members_of(member=np.arange(9.0)).drop_vars("member")
-    for values, width in ((np.linspace(0, 1, 9), True), (np.array([3.0, 1, 4, 1.5, 9, 2, 6, 5, 3.5]), False)):
-        axis = xarray.DataArray(values, dims="member", attrs={"swept_key": "time.end"})
-        [line] = sweep_figure(dataset.assign_coords(end=axis)).axes[0].lines
-        assert (line.get_linewidth() > 0) == width
-
-
-def test_texts_and_vectors_are_told_at_their_ticks() -> None:
-    """Not at fractions of their numbers, and in titles and keys as values, too."""
-    bodies = np.array([[1, 2, 2.5], [1, 2, 3], [1, 1, 1]])
-    page = sweep_figure(members_of(push=np.arange(4.0), body=bodies), "energy_final")
-    ticks = page.axes[0].get_yticklabels()
-    assert [tick.get_text() for tick in ticks] == ["[1, 2, 2.5]", "[1, 2, 3]", "[1, 1, 1]"]
-    assert page.axes[1].get_ylim() == (1, 12)  # all colours: no value lies beyond
-    lines = sweep_figure(members_of(push=np.arange(9.0), body=bodies), "energy_final").axes[0].get_lines()
-    assert [line.get_label() for line in lines][1:] == ["body [1, 2, 3]", "body [1, 1, 1]"]
-    words = members_of(way=np.array(["quaternion", "rates"]), push=np.arange(8.0), k=np.arange(7.0))
-    assert "way = quaternion" in sweep_figure(words, "energy_final").axes[0].get_title(loc="left")
-    many = np.random.default_rng(0).normal(size=(40, 3))
-    page = sweep_figure(members_of(push=np.arange(12.0), body=many), "energy_final")
-    assert all(float(tick) == int(tick) for tick in page.axes[0].get_yticks())
-
-
 def test_a_section_is_drawn_in_the_components_that_it_does_not_cut() -> None:
     """Those of the second one are rounding errors of the section itself."""
     random = np.random.default_rng(0).normal(size=(5, 7, 3)) * [1, 1e-16, 2]

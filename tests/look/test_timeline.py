@@ -14,8 +14,6 @@ pytest.importorskip("rerun")
 import rigidsim
 from rigidsim.look.drawing import OLDER
 from rigidsim.look.recording import CHUNK, STRETCH
-from rigidsim.look.stages.bodies import plane_view
-from rigidsim.look.thinning import KeptRows, thin
 from rigidsim.look.timeline import write_timeline
 
 Build = Callable[..., xarray.Dataset]
@@ -38,29 +36,6 @@ def component(path: Path, entity: str, name: str) -> list[object]:
 
 def page(path: Path, name: str = "summary") -> str:
     return str(component(path, f"/{name}", "TextDocument:text")[0])
-
-
-@pytest.mark.parametrize(("cuts", "rows"), [([1001], 77), ([1, 499, 500, 1], 100), ([300, 701], 2000)])
-def test_rows_kept_on_the_way_are_those_that_would_be_read(
-    symmetric_top: Build, cuts: list[int], rows: int
-) -> None:
-    dataset, first = symmetric_top(), 0
-    kept = KeptRows(1001, rows)
-    for size in cuts:
-        assert kept.columns(1001) is None
-        names = [str(name) for name in dataset.variables if "time" in dataset[name].dims]
-        block = {name: dataset[name].values[first : first + size].reshape(size, -1) for name in names}
-        kept.take(first, {**block, "time": block["time"][:, 0]})
-        first += size
-    shown, wanted = thin(dataset, rows, kept=kept), thin(dataset, rows)
-    assert list(shown.data_vars) == list(wanted.data_vars)
-    for name in ("time", *shown.data_vars):
-        assert shown[name].attrs == wanted[name].attrs
-        np.testing.assert_array_equal(shown[name].values, wanted[name].values)
-    assert kept.columns(1000) is None  # of a run that was stopped others are shown
-    late = KeptRows(1001, rows)
-    late.take(500, block)
-    assert late.columns(1001) is None
 
 
 def test_a_run_draws_what_it_kept(tmp_path: Path, read_back: Read) -> None:
@@ -92,23 +67,6 @@ def test_attitude_is_the_datasets_to_float32(symmetric_top: Build, read_back: Re
     np.testing.assert_array_equal(rows["step"], np.arange(1001))
 
 
-def test_a_body_on_two_stages_is_written_once(symmetric_top: Build, read_back: Read, tmp_path: Path) -> None:
-    """The ellipsoid of energy turns in the frame of the body itself, and is drawn from its own stage's."""
-    write_timeline(symmetric_top(), tmp_path / "t.rrd")
-    assert "Transform3D:quaternion" in read_back(tmp_path / "t.rrd", "/scene/body")
-    assert component(tmp_path / "t.rrd", "/poinsot/body", "Transform3D:parent_frame") == ["tf#/scene/body"]
-
-
-def test_quaternion_of_any_norm_is_drawn_as_a_rotation(
-    symmetric_top: Build, read_back: Read, tmp_path: Path
-) -> None:
-    dataset = symmetric_top(count=11)
-    dataset["quaternion"] = dataset["quaternion"] * 1.5
-    write_timeline(dataset, tmp_path / "t.rrd")
-    drawn = read_back(tmp_path / "t.rrd", "/scene/body")["Transform3D:quaternion"]
-    np.testing.assert_allclose(np.linalg.norm(drawn.astype(float), axis=1), 1, atol=1.5e-7)
-
-
 def test_times_are_exact_nanoseconds(symmetric_top: Build, read_back: Read, tmp_path: Path) -> None:
     write_timeline(symmetric_top(), tmp_path / "t.rrd")
     rows = read_back(tmp_path / "t.rrd", "/plots/angular_velocity")
@@ -127,20 +85,6 @@ def test_values_of_plots_are_float64(symmetric_top: Build, read_back: Read, tmp_
     assert np.isfinite(drift[0])  # the drift of zero at the start
 
 
-def test_drift_of_zero_stays_below_the_others_at_any_precision(
-    symmetric_top: Build, read_back: Read, tmp_path: Path
-) -> None:
-    dataset = symmetric_top()
-    dataset["energy_drift"] = ("time", 1e-34 * (1 + np.arange(1001.0)), {"drift_of": "energy"})
-    dataset["quaternion_norm_drift"] = ("time", np.zeros(1001), {"drift_of": "quaternion_norm"})
-    write_timeline(dataset, tmp_path / "t.rrd")
-    drifts = read_back(tmp_path / "t.rrd", "/plots/drift/all")["Scalars:scalars"]
-    energy, zero = drifts.T
-    np.testing.assert_allclose(energy[50:], np.log10(1e-34 * (1 + np.arange(50, 1001.0))), rtol=1e-12)
-    assert zero.max() <= energy.min()
-    assert zero.min() > -40
-
-
 def test_thinned_run_keeps_its_first_and_last_rows(
     symmetric_top: Build, read_back: Read, tmp_path: Path
 ) -> None:
@@ -151,12 +95,6 @@ def test_thinned_run_keeps_its_first_and_last_rows(
     assert (len(steps), steps[0], steps[-1]) == (910, 0, 9997)
     wanted = dataset["quaternion"].values[steps][:, [1, 2, 3, 0]]
     np.testing.assert_allclose(rows["Transform3D:quaternion"], wanted, rtol=0, atol=2.0**-25)
-
-
-@pytest.mark.parametrize("piece", [1, 11, 100, 5000])
-def test_rows_read_in_pieces_are_those_read_at_once(piece: int, symmetric_top: Build) -> None:
-    dataset = symmetric_top(count=9998)
-    xarray.testing.assert_identical(thin(dataset, 1000, at_once=piece), thin(dataset, 1000))
 
 
 def test_only_the_rows_shown_are_read_from_a_file(symmetric_top: Build, tmp_path: Path) -> None:
@@ -246,22 +184,6 @@ def test_rates_only_run_shows_the_body_in_its_own_axes(
     assert "no attitude was recorded" in page(tmp_path / "t.rrd", "picture")
 
 
-@pytest.mark.parametrize("size", [1e-10, 1.0, 1e7])
-def test_bodies_of_any_size_are_drawn_in_units_of_order_one(
-    symmetric_top: Build, tmp_path: Path, size: float
-) -> None:
-    from rerun.chunk import RrdReader
-
-    write_timeline(symmetric_top(count=11, size=size), tmp_path / "t.rrd")
-    for chunk in RrdReader(tmp_path / "t.rrd").stream():
-        if chunk.entity_path == "/scene/body/solids/0":
-            column = chunk.to_record_batch().column("Mesh3D:vertex_positions")
-            vertices = np.array(column.flatten().flatten()).reshape(-1, 3)
-            assert np.linalg.norm(vertices, axis=1).max() == pytest.approx(1, rel=1e-6)
-    note = page(tmp_path / "t.rrd", "picture").split("reach: 1 unit = ")[1]
-    assert float(note.split()[0]) == pytest.approx(size, rel=1e-3)
-
-
 def with_position(dataset: xarray.Dataset, position: np.ndarray) -> xarray.Dataset:
     return dataset.assign(position=(("time", "space_axis"), position, {"units": "m"}))
 
@@ -310,36 +232,6 @@ def test_a_variable_nobody_foresaw_gets_a_plot(symmetric_top: Build, read_back: 
     assert not {"/plots/note", "/plots/energy_lo"} & found
 
 
-def test_fast_rotation_is_drawn_by_its_extremes_and_not_by_its_average(
-    symmetric_top: Build, tmp_path: Path
-) -> None:
-    from rerun.chunk import RrdReader
-    from rerun.components import AggregationPolicy
-
-    dataset = symmetric_top(count=5000)
-    turn = np.arange(5000)
-    dataset["fast"] = ("time", np.sin(2.4 * turn))
-    dataset["slow"] = ("time", np.sin(turn / 1000))
-    write_timeline(dataset, tmp_path / "t.rrd")
-    found = {}
-    for chunk in RrdReader(tmp_path / "t.rrd").stream():
-        if chunk.is_static and chunk.entity_path.startswith("/plots/"):
-            column = chunk.to_record_batch().column("SeriesLines:aggregation_policy")
-            found[chunk.entity_path.split("/")[-1]] = column.to_pylist()[0][0]
-    assert found["fast"] == AggregationPolicy.MinMax.value
-    assert found["slow"] == AggregationPolicy.Average.value
-    assert found["all"] == AggregationPolicy.Max.value
-
-
-def test_camera_sees_an_orbit_from_outside_its_plane() -> None:
-    angle = np.linspace(0, 2 * np.pi, 100)
-    inclined = np.stack([np.cos(angle), 0.6 * np.sin(angle), 0.8 * np.sin(angle)], axis=1)
-    elevation, azimuth = plane_view(inclined)
-    eye = [np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth)]
-    normal = np.array([0, -0.8, 0.6])
-    assert abs(np.dot([*eye, np.sin(elevation)], normal)) > 0.5
-
-
 def test_one_sample_is_a_picture_too(symmetric_top: Build, tmp_path: Path) -> None:
     assert write_timeline(symmetric_top().isel(time=[0]), tmp_path / "t.rrd") == 1
 
@@ -362,16 +254,6 @@ def test_page_states_the_config_and_the_largest_drift(symmetric_top: Build, tmp_
     assert "of the rows shown" not in text
     write_timeline(symmetric_top(), tmp_path / "t.rrd", rows=100)
     assert "largest drift of the rows shown" in page(tmp_path / "t.rrd")
-
-
-def test_strict_mode_of_rerun_is_put_back(symmetric_top: Build, tmp_path: Path) -> None:
-    import rerun as rr
-    from rerun.error_utils import strict_mode
-
-    before = strict_mode()
-    write_timeline(symmetric_top(count=10), tmp_path / "t.rrd")
-    assert strict_mode() == before
-    assert rr.get_data_recording() is None  # nothing global was left behind
 
 
 def test_dataset_without_samples_is_refused(symmetric_top: Build, tmp_path: Path) -> None:

@@ -24,9 +24,7 @@ from equations import (
 from scipy.spatial.transform import Rotation
 
 from rigidsim.model.system import System
-from rigidsim.scene.config import parse
 from rigidsim.scene.fields import EULER_SEQUENCES
-from rigidsim.solve.problem import prepare
 
 # ---- (a) Euler's equations --------------------------------------------------------------------------------
 
@@ -473,76 +471,6 @@ def test_numerical_invariants(formulation: str) -> None:
 
 
 # ---- (g) units of powers of two ---------------------------------------------------------------------------
-
-
-def exact(value: float, power: int) -> str:
-    """value * 2**power as a TOML string that holds it exactly."""
-    numerator, denominator = value.as_integer_ratio()
-    if power >= 0:
-        return f'"{numerator * 2**power}/{denominator}"'
-    return f'"{numerator}/{denominator * 2**-power}"'
-
-
-def row(values: list[float], power: int) -> str:
-    return "[" + ", ".join(exact(v, power) for v in values) + "]"
-
-
-def scaled_scene(kind: str, inertia: int, rate: int, length: int = 0) -> System:
-    """A scene with all inertia times 2**inertia, times over 2**rate, lengths of flight times 2**length."""
-    tensor = [[1.0, 0.1, 0.2], [0.1, 2.0, 0.3], [0.2, 0.3, 2.5]]
-    spin = f"angular_velocity = {row([0.1, 1.0, 0.05], rate)}\nquaternion = [0.5, 0.1, -0.3, 0.7]"
-    loads = ""
-    if kind == "free":
-        body = f"principal_moments = {row([1.0, 2.0, 2.5], inertia)}"
-    elif kind == "general":
-        body = f"inertia_tensor = [{', '.join(row(r, inertia) for r in tensor)}]"
-    elif kind == "heavy":
-        body = (
-            f"principal_moments = {row([1.0, 1.0, 0.3], inertia)}\nmass = {exact(1.7, inertia)}\n"
-            "center_of_mass = [0, 0, 0.4]"
-        )
-        loads = GRAVITY + f"acceleration = {row([0.0, 0.0, -9.8], 2 * rate)}"
-    else:
-        body = f"principal_moments = {row([1.0, 2.0, 2.5], inertia)}\nmass = {exact(1.7, 0)}"
-        spin += (
-            f"\nposition = {row([1.0, 2.0, 3.0], length)}\nvelocity = {row([4.0, 5.0, 6.0], length + rate)}"
-        )
-        loads = GRAVITY + f"acceleration = {row([0.0, 0.0, -9.8], length + 2 * rate)}"
-    record = {"flight": '["position", "velocity", "quaternion"]'}.get(kind, "")
-    load = f"[[loads]]\n{loads}" if loads else ""
-    output = f"[output]\nrecord = {record}" if record else ""
-    text = (
-        f'name = "scaled"\n[body]\n{body}\n[initial]\n{spin}\n{load}\n'
-        f"[time]\nend = {exact(8.0, -rate)}\n{output}\n"
-    )
-    return prepare(parse(text)).system
-
-
-@pytest.mark.parametrize("kind", ["free", "general", "heavy", "flight"])
-@pytest.mark.parametrize("inertia", [600, -600, 0])
-@pytest.mark.parametrize("rate", [27, -27])
-def test_powers_of_two_change_no_bit(kind: str, inertia: int, rate: int) -> None:
-    """Equations and scaled initial states are literally those of the scene of order one."""
-    if kind == "flight":
-        inertia = inertia // 20  # its energy adds two kinds of terms, which a common factor would keep apart
-    plain = scaled_scene(kind, 0, 0)
-    scaled = scaled_scene(kind, inertia, rate, length=40 if kind == "flight" else 0)
-    assert [str(rhs) for _, rhs in scaled.equations] == [str(rhs) for _, rhs in plain.equations]
-    assert scaled.equations == plain.equations  # also the digits that a text doesn't show
-    assert scaled.initial == plain.initial
-    assert scaled.scaling.time == plain.scaling.time - rate
-    assert scaled.scaling.inertia == plain.scaling.inertia + inertia
-    if kind != "flight":
-        assert scaled.outputs == plain.outputs
-        by_name = {r.name: r.exponents for r in plain.recorded}
-        for recorded in scaled.recorded:
-            shift = {
-                "energy": inertia + 2 * rate,
-                "angular_velocity": rate,
-                "angular_momentum": inertia + rate,
-            }
-            if recorded.name in shift:
-                assert recorded.exponents == [e + shift[recorded.name] for e in by_name[recorded.name]]
 
 
 @pytest.mark.parametrize("size", [1e-12, 1e-3, 1.0, 1e6])

@@ -82,19 +82,6 @@ def test_figure_and_spin_axes_stand_off_as_they_do(full: rigidsim.Run, reduced: 
     assert np.abs(same).max() <= 4 * np.finfo(float).eps  # both are divided by their length
 
 
-def test_angles_are_the_same_observables(full: rigidsim.Run, reduced: Both) -> None:
-    run = reduced["orbit_averaged", True]
-    for name in ("obliquity", "node_longitude"):
-        assert run.dataset[name].dims == full.dataset[name].dims
-        assert run.dataset[name].attrs["units"] == "rad"
-        error = np.abs(run.dataset[name].values - full.dataset[name].values).max()
-        # longitudes are angles over sin(25 deg) at least
-        assert error < apart(run, full, "momentum_axis") * 4 + 8 * RATE / SPIN * 2
-    energy = run.dataset["energy"].values
-    assert (energy == energy[0]).all()
-    assert energy[0] == pytest.approx(SPIN**2 / 2, rel=1e-15)
-
-
 def test_the_announced_error_covers_the_true_one(full: rigidsim.Run) -> None:
     for level, more in (("spin_averaged", True), ("orbit_averaged", True), ("orbit_averaged", False)):
         run = run_text(text(level, short_period=more), estimate=True)
@@ -117,12 +104,6 @@ def test_windows_tell_what_becomes_of_a_long_run() -> None:
     true = run_text(text("full", time="end = 4000\nsamples = 81"))
     assert apart(run, true, "momentum_axis") <= found["momentum_axis"]
     assert found["momentum_axis"] <= 10 * apart(run, true, "momentum_axis")
-
-
-def test_a_run_that_is_told_not_to_look_says_so() -> None:
-    run = run_text(text("orbit_averaged"))
-    assert "momentum_axis" not in run.summary["modelling"]
-    assert "estimate = false" in run.summary["modelling"]["how"]
 
 
 def test_more_digits_are_kept_from_text_to_dataset() -> None:
@@ -150,16 +131,6 @@ def test_the_accuracy_of_axes_chooses_the_model() -> None:
     assert choice is not None
     assert choice.level == "full"
     assert "every rotation" in choice.considered[0].why_not
-
-
-def test_a_chosen_model_is_what_the_run_says() -> None:
-    given = text("auto", time="end = 20\nsamples = 21")
-    run = run_text(given, "integrator.accuracy_axis=1e-2", estimate=True)
-    assert run.summary["formulation"] == "orbit_averaged"
-    assert run.summary["modelling"]["requested"] == 0.01
-    assert run.summary["modelling"]["momentum_axis"] <= 0.01
-    assert run.summary["warnings"] == []
-    assert rigidsim.parse(run.dataset.attrs["config"]).config.model.level == "orbit_averaged"
 
 
 def test_auto_without_an_accuracy_is_refused() -> None:
@@ -244,14 +215,6 @@ def test_tradeoff_has_models_beside_settings() -> None:
     assert 0 < cost[0] < cost[1] < 0.5
     assert with_models(empty, rigidsim.parse(config(BODY, START, LOAD, "end = 1\nsamples = 2"))) is empty
     assert Tradeoff(found).dataset.sizes["model"] == 2
-
-
-def test_datasets_keep_the_modelling_error() -> None:
-    run = run_text(text("orbit_averaged", short_period=True, time="end = 2\nsamples = 3"), estimate=True)
-    found = run.summary["modelling"]
-    worst = max(found["momentum_axis"], found["figure_axis"])
-    assert run.dataset.attrs["modelling_error"] == worst
-    assert "modelling_error" not in run_text(text("orbit_averaged")).dataset.attrs
 
 
 def test_a_long_run_that_records_axes_is_told_of_the_cheaper_model(full: rigidsim.Run) -> None:

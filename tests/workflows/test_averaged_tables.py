@@ -11,7 +11,6 @@ from support import config, run_text
 
 import rigidsim
 from rigidsim.solve.problem import prepare
-from rigidsim.solve.turns.count import angle_rate, angles_to_join
 
 FLATTENING, SPIN, ECCENTRICITY = 0.02, 60.0, 0.2
 NODE, PERIAPSIS = 0.004, 0.006  # rad/s beside a mean motion of 1
@@ -77,31 +76,6 @@ def test_a_table_of_an_orbit_averages_as_the_orbit_does(level: str, full: rigids
     # and the model's own error is what it is for elements (tests/workflows/test_averaged_runs.py)
     nodding = RATE * (1 - ECCENTRICITY) ** -3
     assert apart(found, full) < 10 * path * (nodding**2 + nodding / SPIN + NODE * nodding) + bound
-
-
-def test_the_average_over_an_orbit_carries_its_elements_alone() -> None:
-    """Neither place nor anomaly of the orbit, which a step would have to follow."""
-    for short_period, more in ((False, []), (True, ["table_longitude1"])):
-        system = prepare(
-            rigidsim.parse(text("orbit_averaged", by_table=True, short_period=short_period))
-        ).system
-        names = ["table_part1", "table_k1", "table_h1", "table_q1", "table_p1"]
-        assert system.states == ["sx", "sy", "sz", *names, *more]
-        # nor do turns of angles between samples have to be counted along the orbit, whose mean motion is 1
-        assert angle_rate(system, angles_to_join(system)) < 0.02
-    mean = run_text(text("orbit_averaged", by_table=True, short_period=False))
-    nodding = run_text(text("orbit_averaged", by_table=True))
-    assert 0.05 * RATE < apart(mean, nodding) < RATE * (1 - ECCENTRICITY) ** -3
-
-
-def test_without_an_anomaly_nutation_follows_keplers_law() -> None:
-    """Its mean longitude and not its anomaly then goes at Kepler's rate."""
-    found = run_text(text("orbit_averaged", by_table=True, anomaly=False))
-    slower = KEPLER[:-1] + f", period = {2 * math.pi / (1 - NODE - PERIAPSIS)!r}}}"
-    same = run_text(text("orbit_averaged", by_table=False).replace(KEPLER, slower))
-    # whose size is that of the mean motion by Kepler's law, or of the anomaly's: they differ by 1 %
-    assert apart(found, same) < (NODE + PERIAPSIS) * RATE * (1 - ECCENTRICITY) ** -3
-    assert apart(found, run_text(text("orbit_averaged", by_table=True))) > 1e-4
 
 
 def test_the_announced_error_covers_the_true_one(full: rigidsim.Run) -> None:

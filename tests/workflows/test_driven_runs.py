@@ -9,11 +9,8 @@ import pytest
 from support import config, run_text
 
 import rigidsim
-from rigidsim.accuracy.braking import forecast_pace
-from rigidsim.accuracy.motion import run_pilot
 from rigidsim.errors import ConfigError
 from rigidsim.solve.problem import prepare
-from rigidsim.solve.steppers import stepper_of
 
 EPS = np.finfo(float).eps
 START = 'angular_velocity = [0.4, 0.5, 1.2]\neuler_angles = [0.3, "35 deg", 0]'
@@ -91,37 +88,6 @@ def test_errors_are_of_the_first_order() -> None:
         errors.append(apart(run_text(text("spin_averaged", loads, end)), run_text(text("full", loads, end))))
     for name, coarse in errors[0].items():
         assert 7 < coarse / errors[1][name] < 14, name
-
-
-@pytest.mark.parametrize(
-    ("loads", "braked"),
-    [
-        (viscous(4e-4), True),
-        ('kind = "torque"\ncomponents = ["0", "0", "8e-4*wz"]\nframe = "body"', False),
-    ],
-)
-def test_steps_are_forecast_as_torques_change_the_rotation(loads: str, braked: bool) -> None:
-    """From the beginning alone they would be half as many again, or 2/3."""
-    prepared = prepare(rigidsim.parse(text("full", loads, 2500.0)))
-    clock, stepper = (
-        prepared.clock,
-        stepper_of(prepared.system, prepared.precision, None, prepared.clock.start),
-    )
-    pilot = run_pilot(stepper, clock, steps=100)
-    whole = run_pilot(stepper, clock, steps=10**6)
-    assert (pilot.whole > 1.3 * whole.whole) if braked else (pilot.whole < 0.77 * whole.whole)
-    pace = forecast_pace(prepared, pilot)
-    assert pace is not None
-    assert pilot.whole * pace == pytest.approx(whole.whole, rel=0.03)
-    assert forecast_pace(prepared, whole) == 1
-
-
-@pytest.mark.parametrize(("loads", "pace"), [(viscous(0.3), None), (GRADIENT, 1.0)])
-def test_the_pace_of_steps_is_not_known_where_no_average_applies(loads: str, pace: float | None) -> None:
-    """A damping as strong as the rotation is fast; and nothing to know without any."""
-    prepared = prepare(rigidsim.parse(text("full", loads, 60.0)))
-    stepper = stepper_of(prepared.system, prepared.precision, None, prepared.clock.start)
-    assert forecast_pace(prepared, run_pilot(stepper, prepared.clock, steps=1, chunk=1)) == pace
 
 
 def test_a_rotation_that_dies_away_is_refused_from_then_on() -> None:

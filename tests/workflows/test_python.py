@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import html
 import re
 import subprocess
 import sys
@@ -18,7 +17,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import rigidsim
-from rigidsim.errors import FORCE, RigidsimError
 from rigidsim.model.loads import Load
 from rigidsim.scene.config import Experiment
 
@@ -159,30 +157,6 @@ def test_a_run_in_memory_stops_as_any_other() -> None:
     assert 0 < run.dataset.sizes["time"] < 41
     with pytest.raises(rigidsim.RunFolderError, match="of memory, and the machine has"):
         rigidsim.run(TOP, changes={"time.samples": 10**12}, out=None)
-
-
-def test_what_a_notebook_shows() -> None:
-    run = rigidsim.run({**TOP, "name": "a", "description": "<b>"}, out=None)
-    assert repr(run) == "<Run 'a' (memory): finished>"
-    shown = run._repr_html_()
-    assert "angular_momentum" in shown
-    assert "estimated error" in shown
-    experiment = Experiment.from_dict({**TOP, "description": "<b>"})
-    assert repr(experiment) == "<Experiment 'top' (config): no load, to t = 4 s, double>"
-    assert html.escape("<b>") in experiment._repr_html_()
-    assert '<b>"' not in experiment._repr_html_()
-
-
-def test_errors_speak_the_language_of_who_reads_them(tmp_path: Path) -> None:
-    changes = {"output.timeline": False}
-    rigidsim.run(TOP, changes=changes, out=tmp_path)
-    with pytest.raises(rigidsim.RunFolderError) as caught:
-        rigidsim.run(TOP, changes=changes, out=tmp_path)
-    assert "force=True replaces it, another out puts this one elsewhere" in str(caught.value)
-    assert "--force replaces it, another --out" in caught.value.for_command_line()
-    with pytest.raises(rigidsim.ConfigError, match=r"replacing time\.end\.x=1: there is nothing at"):
-        rigidsim.load(ROOT / "configs" / "intermediate_axis.toml", overrides={"time.end.x": 1})
-    assert str(RigidsimError(f"give {FORCE}")) == "give force=True"
 
 
 def test_the_package_tells_what_it_has() -> None:

@@ -7,7 +7,6 @@ import os
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 from support import EAGER, IMPATIENT, cases, config, loaded, same_bits
 
@@ -16,7 +15,6 @@ from rigidsim.errors import ConfigError, RunFolderError
 from rigidsim.session.guards import Observer
 from rigidsim.solve import driver
 from rigidsim.store import atomic, provenance
-from rigidsim.store.segments import read_chain
 
 # arguments of ``config``, which by default is an asymmetric free body
 FREE: dict[str, str] = {}
@@ -147,14 +145,6 @@ def test_a_run_cut_many_times_is_the_run_in_one_go(case: str, tmp_path: Path) ->
     assert done.summary["cost"]["steps"] == whole.summary["cost"]["steps"]
     assert done.summary["cost"]["sessions"] == sessions + 1
     assert not done.folder.segments.exists()
-
-
-def test_the_comparison_sees_one_bit(tmp_path: Path) -> None:
-    run = rigidsim.run(rigidsim.parse(text_with("end = 3\nsamples = 7")), out=tmp_path)
-    one, other = loaded(run), loaded(run).copy(deep=True)
-    other["energy"].values.view(np.int64)[3] ^= 1
-    with pytest.raises(AssertionError, match=r"energy\[3\]: .* the first of 1 differences"):
-        same_bits(one, other)
 
 
 # --- what can end a session -------------------------------------------------------------------------
@@ -512,36 +502,3 @@ def test_other_versions_are_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     assert claim["claim"] is False
     assert f"version_heyoka {versions['heyoka']} -> 99.0" in claim["holds_for"]
     assert "99.0" in loaded(done).attrs["mixed_provenance"]
-
-
-def test_what_is_read_of_a_partial_run_is_read_lazily(tmp_path: Path) -> None:
-    """Any selection across segments is that of the finished dataset."""
-    text = text_with("end = 60\nsamples = 121", "max_steps = 30")
-    whole = loaded(
-        rigidsim.run(
-            rigidsim.parse(text_with("end = 60\nsamples = 121")), out=tmp_path / "whole", tuning=IMPATIENT
-        )
-    )
-    run = rigidsim.run(rigidsim.parse(text), out=tmp_path / "cut", tuning=IMPATIENT)
-    run = rigidsim.resume(run.folder.path, overrides=["limits.max_steps=20"], tuning=IMPATIENT)
-    run = rigidsim.resume(run.folder.path, overrides=["limits.max_steps=20"], tuning=IMPATIENT)
-    assert len(read_chain(run.folder.segments).paths) >= 3
-    with run.dataset as partial:
-        rows = partial.sizes["time"]
-        assert 10 < rows < 121
-        for rule in (
-            slice(None),
-            slice(3, rows, 7),
-            slice(rows, 3, -5),
-            slice(5, 5),
-            [0, rows - 1, 4],
-            7,
-            -1,
-        ):
-            expected = whole.isel(time=slice(rows)).isel(time=rule)
-            same_bits(partial.isel(time=rule).load(), expected)
-            assert not partial.energy.variable._in_memory
-        np.testing.assert_array_equal(
-            partial.quaternion.sel(time=7, quaternion_component="x"),
-            whole.quaternion.sel(time=7, quaternion_component="x"),
-        )

@@ -108,19 +108,6 @@ def test_a_prolonged_folder_of_the_first_version_is_resumed(earlier: rigidsim.Ru
     assert "end = 70 # long" in done.folder.config.read_text()
 
 
-def test_a_changed_comment_of_the_first_version_is_refused(earlier: rigidsim.Run) -> None:
-    earlier.folder.config.write_text(earlier_text("body.principal_moments=[1,2,2.6]"))
-    with pytest.raises(RunFolderError, match=r"was changed since the run began \(line 3"):
-        rigidsim.resume(earlier.folder.path)
-
-
-def test_without_anything_saved_no_comment_is_believed(earlier: rigidsim.Run) -> None:
-    for path in earlier.folder.segments.iterdir():
-        path.unlink()
-    with pytest.raises(RunFolderError, match=r"config\.toml: ends with #:set comments, .* force=True"):
-        rigidsim.resume(earlier.folder.path)
-
-
 def test_a_dataset_of_the_first_version_is_verified(whole: rigidsim.Run, tmp_path: Path) -> None:
     kept = tmp_path / "kept.h5"
     kept.write_bytes(whole.folder.dataset.read_bytes())

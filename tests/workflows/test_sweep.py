@@ -5,44 +5,36 @@ from __future__ import annotations
 import json
 import multiprocessing
 import os
-import pickle
 import shutil
 import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from concurrent.futures import Future
-from concurrent.futures.process import BrokenProcessPool, _ResultItem
+from concurrent.futures.process import BrokenProcessPool
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any
 
 import h5py
-import heyoka as hy
 import numpy as np
 import pytest
 from typer.testing import CliRunner
 
 import rigidsim
 from rigidsim.cli.app import app
-from rigidsim.errors import ConfigError, Problem, RunFolderError
+from rigidsim.errors import ConfigError, RunFolderError
 from rigidsim.look.figures.sweep_maps import drawable, sweep_figure
-from rigidsim.scene.exact import ExactNumber
-from rigidsim.scene.sweeps.sweep import Axis, Sweep
 from rigidsim.solve.batch.lanes import recommended_width
-from rigidsim.solve.batch.members import AxisNumbers, Members
 from rigidsim.store.seal import seal
 from rigidsim.store.sweeps.folder import SweepFolder
-from rigidsim.store.sweeps.generation import Work, ranges_of
 from rigidsim.store.sweeps.run import open_sweep
 from rigidsim.workflows.read import parse
-from rigidsim.workflows.sweeps.members import batches_of, get_ready, run_members, sweep_of
-from rigidsim.workflows.sweeps.scan import scanned
+from rigidsim.workflows.sweeps.members import batches_of, run_members, sweep_of
 from rigidsim.workflows.sweeps.sweep import resume_sweep
 from rigidsim.workflows.sweeps.sweep import sweep as run_sweep
 from rigidsim.workflows.sweeps.verify import verify_sweep
-from rigidsim.workflows.sweeps.ways import task
-from rigidsim.workflows.sweeps.workers import Workers, leave_tile
+from rigidsim.workflows.sweeps.workers import Workers
 
 pytestmark = pytest.mark.optimised  # compared with runs of other processes
 
@@ -165,21 +157,6 @@ def test_a_longer_axis_and_one_more_output_compute_only_what_is_new(tmp_path: Pa
         swept(tmp_path, (CONFIG + SWEEP).replace("end = 5", "end = 6"))
 
 
-def test_a_thousand_columns_prolonged_by_a_hundred_are_a_hundred(tmp_path: Path) -> None:
-    from rigidsim.scene.sweeps.sweep import Sweep
-    from rigidsim.store.sweeps.sources import positions
-
-    short, long = (
-        Sweep.of(parse(f'{CONFIG}[sweep.axes]\n"time.end" = {{linspace = [1, {end}, {count}]}}\n'
-                       f'"initial.angular_velocity[0]" = {{values = [1, 2, 3]}}'))
-        for end, count in ((2, 1001), (2.1, 1101))
-    )  # fmt: skip
-    found = positions(long, short)
-    assert (found < 0).sum() == 100 * 3
-    np.testing.assert_array_equal(found[: 1001 * 3], np.arange(1001 * 3))
-    assert (positions(short, long) == np.arange(1001 * 3)).all()
-
-
 @pytest.mark.slow  # variational equations compiled for each member
 def test_indicators_come_from_a_tangent_vector_that_is_not_kept(tmp_path: Path) -> None:
     text = (CONFIG + SWEEP).replace("end = 5", "end = 200").replace("samples = 6", "samples = 201")
@@ -258,23 +235,6 @@ axes."time.end" = {step = [5, 0.01, COUNT], name = "end"}
 )
 
 
-def test_whom_a_process_meets_first_decides_nothing() -> None:
-    """Each time of its own needs equations of its own, which soon costs more than a run of its own."""
-    few, many = (sweep_of(MANY_ENDS.replace("COUNT", count)) for count in ("9", "65"))
-    found = {}
-    for order in ([0, 8], [8, 0]):
-        for sweep, engine in ((few, "batch of"), (many, "alone")):
-            batches_of.cache_clear()
-            results = [run_members(sweep, [member], ["final"]) for member in order]
-            assert all(key.startswith(engine) for result in results for key in result.engines)
-            rows = {m: r.kept["angular_velocity_final"].values for m, r in zip(order, results, strict=True)}
-            found.setdefault(sweep.count, []).append(np.concatenate([rows[0], rows[8]]))
-    for one, other in found.values():
-        np.testing.assert_array_equal(one, other)
-    assert run_members(many, [0], ["final"]).why_alone == "families"
-    assert run_members(many, [0], ["final"], apart=False).why_alone == ""
-
-
 @pytest.mark.slow  # sixty-six systems of equations
 def test_members_that_are_added_run_as_those_before(tmp_path: Path) -> None:
     begun = swept(tmp_path, MANY_ENDS.replace("COUNT", "3"))
@@ -323,36 +283,6 @@ def test_verify_runs_members_again_and_finds_a_flipped_bit(folder: Path, tmp_pat
     wrong = CliRunner().invoke(app, ["verify", str(folder), "--members", "0"])
     assert wrong.exit_code == 2
     assert "one or more are allowed" in wrong.output
-
-
-def test_values_of_an_axis_are_worked_out_once_however_many_members_have_them(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    sweep = sweep_of(PLANAR_MAP.replace("SAMPLES", "2"))
-    asked: list[tuple[str, int]] = []
-    exact = Axis.exact
-
-    def counted(axis: Axis, index: int) -> tuple[ExactNumber, ...]:
-        asked.append((axis.name, index))
-        return exact(axis, index)
-
-    monkeypatch.setattr(Axis, "exact", counted)
-    axes = AxisNumbers(sweep)
-    for tile in (range(8), range(8, 15)):
-        members = Members.of(sweep, tile, axes)
-        for place, member in enumerate(tile):
-            values = [column.of(place) for column in members.numbers]
-            own = sweep.exact([member])
-            assert values == [column[0] for column in own]
-    assert len(asked) == 3 + 5 + 2 * sweep.count  # by both tiles together, and each member's own
-
-
-def test_ranges_of_members_and_their_places() -> None:
-    members = np.array([0, 1, 2, 5, 7, 8])
-    work = Work((), ranges_of(members))
-    assert work.ranges == ((0, 3), (5, 6), (7, 9))
-    np.testing.assert_array_equal(work.members(2, 5), [2, 5, 7])
-    np.testing.assert_array_equal(work.places(np.array([-1, 0, 2, 3, 5, 8, 9])), [-1, 0, 2, -1, 3, 5, -1])
 
 
 def test_a_failing_member_is_recorded_and_the_rest_go_on(tmp_path: Path) -> None:
@@ -468,22 +398,6 @@ def test_what_a_batch_estimates_is_told_of_all_and_of_one(tmp_path: Path) -> Non
     assert "its members are 0 to 1" in refused.output
 
 
-def test_a_quick_scan() -> None:
-    base = parse(CONFIG)
-    found = scanned(base, ["time.end=[1, 2]", "initial.angular_velocity[0] = linspace(0, 1, 5)"])
-    assert found.config.sweep is not None
-    ways = [axis.way for axis in found.config.sweep.axes.values()]
-    assert ways == ["values", "linspace"]
-    with pytest.raises(ConfigError, match="write KEY=SPEC"):
-        scanned(base, ["time.end"])
-    drawn = scanned(base, ["time.end=uniform(1, 2, 5)", "initial.angular_velocity=sphere('1 deg/s', 7)"])
-    assert drawn.config.sweep is not None
-    assert [axis.count for axis in drawn.config.sweep.axes.values()] == [5, 7]
-    for spec in ("5", "foo(1, 2)", "1, 2", "linspace(1 s, 2 s, 3)"):
-        with pytest.raises(ConfigError, match=r"--sweep time\.end=.*given .*allowed: \[1, 2, 4\], linspace"):
-            scanned(base, [f"time.end={spec}"])
-
-
 def test_plan_and_check_know_sweeps(tmp_path: Path) -> None:
     path = tmp_path / "c.toml"
     path.write_text(CONFIG + SWEEP)
@@ -572,109 +486,6 @@ def test_no_tile_is_lost_to_a_pool_that_breaks(folder: Path) -> None:
     (generation,) = SweepFolder(open_sweep(folder).folder.path).generations()
     tiles = range(generation.tiles)
     assert sorted(tile for tile, _ in Breaking(2).images(generation, tiles)) == list(tiles)
-
-
-def test_workers_get_ready_before_the_check_and_end_with_a_refusal(tmp_path: Path) -> None:
-    """What they compile takes as long as the check; no process and no folder is left of a refused sweep."""
-    done: list[str] = []
-
-    class Pool:
-        def submit(self, function: Callable[..., Any], *of: object) -> Future[Any]:
-            done.append(function.__name__)
-            made: Future[Any] = Future()
-            made.set_result(function(*of))
-            return made
-
-        def shutdown(self, **_: object) -> None:
-            done.append("shutdown")
-
-    class Noted(Workers):
-        places: ClassVar[list[Path]] = []
-
-        def _pool(self, count: int, between: Path) -> Pool:  # type: ignore[override]
-            done.append(f"pool of {count}")
-            self.places.append(between)
-            return Pool()
-
-    class Check:
-        def __init__(self, sweep: Sweep, **_: object) -> None:
-            self.sweep = sweep
-
-        def finish(self) -> None:
-            done.append("check")
-            if "tile = 7" in self.sweep.experiment.text:
-                raise ConfigError(Problem("a key", "bad"))
-
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("rigidsim.workflows.sweeps.sweep.SweepCheck", Check)
-        patch.setattr("rigidsim.workflows.sweeps.sweep.Workers", Noted)
-        assert swept(tmp_path, workers=2).finished
-        tiles = ["leave_tile"] * 3
-        begun = ["get_imported"] * min(2, os.cpu_count() or 1)
-        assert done == ["pool of 2", *begun, "get_ready", "get_ready", "check", *tiles, "shutdown"]
-        done.clear()
-        with pytest.raises(ConfigError, match="bad"):
-            swept(tmp_path, CONFIG + SWEEP.replace("tile = 2", "tile = 7"), workers=9, force=True)
-        begun = ["get_imported"] * min(9, os.cpu_count() or 1)
-        assert done == ["pool of 9", *begun, *["get_ready"] * 6, "check", "shutdown"]
-        assert not any(place.exists() for place in Noted.places)
-
-
-@pytest.mark.parametrize("lasting", [0, 2, 5])
-def test_what_workers_that_died_should_have_looked_at_is_looked_at_here(lasting: int) -> None:
-    asked: list[int] = []
-
-    def looked(share: int) -> int:
-        asked.append(share)
-        return share**2
-
-    class Pool:
-        def submit(self, *_: object) -> None: ...
-
-        def map(self, function: Callable[[int], int], tasks: list[int]) -> Iterator[int]:
-            yield from (share**2 for share in tasks[:lasting])
-            if lasting < len(tasks):
-                raise BrokenProcessPool("a worker died")
-
-        def shutdown(self, **_: object) -> None: ...
-
-    class Mortal(Workers):
-        def _pool(self, *_: object) -> Pool:  # type: ignore[override]
-            return Pool()
-
-    with Mortal(2) as workers, workers.ready_for(sweep_of(CONFIG + SWEEP)):
-        assert list(workers.each(looked, list(range(5)))) == [0, 1, 4, 9, 16]
-    assert asked == list(range(lasting, 5))
-
-
-def test_a_worker_that_got_ready_compiles_nothing_more(monkeypatch: pytest.MonkeyPatch) -> None:
-    made: list[str] = []
-    text = PLANAR_MAP.replace("SAMPLES", "2").replace('["final"]', '["final", "megno"]')
-    text = text.replace("1e-9", "1.5e-9")  # which nothing else is compiled for
-    for name in ("taylor_adaptive_batch", "cfunc"):
-        real = getattr(hy, name)
-
-        def counted(*given: Any, _name: str = name, _real: Any = real, **options: Any) -> Any:
-            made.append(_name)
-            return _real(*given, **options)
-
-        monkeypatch.setattr(hy, name, counted)
-    get_ready(text)
-    assert made.count("taylor_adaptive_batch") >= 2  # with the tangent vector and without
-    made.clear()
-    sweep = sweep_of(text)
-    assert run_members(sweep, range(sweep.count), sweep.table.keep).engines
-    assert not made
-
-
-def test_what_a_worker_sends_back_is_one_write(folder: Path, tmp_path: Path) -> None:
-    """One that is killed within a longer answer leaves the pool waiting for the rest of it; writes of
-    up to 512 bytes (POSIX's least ``PIPE_BUF``) are whole.
-    """
-    (generation,) = SweepFolder(open_sweep(folder).folder.path).generations()
-    answer = leave_tile(tmp_path / "tile", *task(generation, 0))
-    assert answer == (tmp_path / "tile").stat().st_size > 512
-    assert len(pickle.dumps(_ResultItem(0, result=answer))) < 512
 
 
 def test_every_kept_quantity_can_be_drawn(folder: Path) -> None:

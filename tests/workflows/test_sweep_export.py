@@ -131,17 +131,6 @@ def test_series_and_events_are_long_tables(box: SavedSweep, tmp_path: Path) -> N
     assert [float(row["middle_times"]) for row in found] == times[~np.isnan(times)].tolist()
 
 
-def test_tables_are_the_same_read_in_small_blocks(box: SavedSweep, tmp_path: Path) -> None:
-    pytest.importorskip("zarr")
-    whole = [path.read_bytes() for path in written(box, "csv", tmp_path)]
-    for numbers in (30, 100):  # two samples of a member, or a few members
-        found = export(box, "csv", tmp_path / "out.csv", force=True, block_numbers=numbers)
-        assert [path.read_bytes() for path in found] == whole
-    (store,) = export(box, "zarr", tmp_path / "out.zarr", block_numbers=1)
-    with xarray.open_zarr(store) as found:
-        xarray.testing.assert_identical(found.load().drop_attrs(), box.dataset.load().drop_attrs())
-
-
 def test_parquet_has_residuals_and_whole_numbers(box: SavedSweep, tmp_path: Path) -> None:
     parquet = pytest.importorskip("pyarrow.parquet")
     main, series, _ = written(box, "parquet", tmp_path)
@@ -190,17 +179,6 @@ def test_texts_failures_and_angles(pairs: SavedSweep, tmp_path: Path) -> None:
     with xarray.open_zarr(path) as store:
         assert store.precision.values.tolist() == ["double", "extended", "quadruple"]
         assert store.failed_reason.values.tolist() == dataset.failed_reason.values.tolist()
-
-
-def test_digits_are_enough_for_the_finest_of_several_precisions(pairs: SavedSweep, tmp_path: Path) -> None:
-    path, _ = written(pairs, "csv", tmp_path)
-    finest, text = pairs.dataset.isel(member=2), rows(path)[2]["nutation_angle_final"]
-    parts = [finest[f"nutation_angle_final{part}"] for part in ("_lo2", "_lo", "")]
-    with localcontext() as context:
-        context.prec = 400
-        whole = sum((Decimal(float(part)) for part in parts), Decimal(0))
-        assert abs(Decimal(text) - whole) < whole * Decimal(2) ** -114
-    assert float(parts[1]) != 0
 
 
 def test_what_makes_no_sense_is_refused(box: SavedSweep, tmp_path: Path) -> None:

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import os
 import shutil
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import numpy as np
@@ -15,10 +13,6 @@ from typer.testing import CliRunner
 
 from rigidsim.cli.app import app
 from rigidsim.errors import ConfigError, RunFolderError
-from rigidsim.scene.overrides import apply_overrides
-from rigidsim.scene.sweeps.sweep import Sweep
-from rigidsim.solve.problem import prepare
-from rigidsim.store.sweeps.folder import SweepFolder
 from rigidsim.store.sweeps.run import SavedSweep, open_sweep
 from rigidsim.workflows.read import parse
 from rigidsim.workflows.sweeps.sweep import SweepObserver, resume_sweep
@@ -190,23 +184,6 @@ def test_fewer_events_kept_than_before_are_fewer(tmp_path: Path) -> None:
     np.testing.assert_array_equal(fewer.flip_times[:, 0], fewer.flip_first)
 
 
-def test_the_rate_is_that_of_the_session_at_work(out: Path) -> None:
-    """Two members in 100 seconds; two other tiles are an hour older."""
-    (out / "box" / "dataset.h5").unlink()
-    (out / "box" / "summary.json").unlink()
-    now = time.time()
-    for number, age in enumerate((3600, 3599, 0)):
-        os.utime(out / "box" / "tiles" / f"g000-{number:07d}.h5", (now - age, now - age))
-    os.utime(out / "box" / "tiles" / "g000.json", (now - 100, now - 100))
-    with SweepFolder(out / "box").locked():
-        found = open_sweep(out / "box").summary
-    assert found["status"] == "running"
-    assert 0.01 < found["members_per_second"] <= 0.02
-    begun = (out / "box" / "tiles" / "g000.json").stat().st_mtime
-    swept(out)
-    assert (out / "box" / "tiles" / "g000.json").stat().st_mtime > begun
-
-
 def test_shares_need_tiles_of_a_length_that_is_told(tmp_path: Path) -> None:
     many = CONFIG.replace("tile = 2\n", "").replace("0.1, 6]", "0.01, 65]")
     with pytest.raises(ConfigError, match=r"\[sweep\] tile: missing.*tile = 64"):
@@ -273,51 +250,11 @@ def test_a_bad_sweep_is_told_where_and_why(case: str, tmp_path: Path) -> None:
     assert not list(tmp_path.iterdir())
 
 
-def test_truths_and_loose_tolerances_are_values_too(tmp_path: Path) -> None:
-    axes = (
-        'axes."integrator.hold_invariants".values = [true, false]\n'
-        'axes."integrator.tolerance".values = [0.03, 1]\n'
-    )
-    found, _ = swept(tmp_path, CONFIG.partition("tile")[0] + axes)
-    assert found.dataset.hold_invariants.values.tolist() == ["true", "false"]
-    assert found.summary["outcomes"] == {"finished": 4}
-
-
-def test_dates_are_values_too() -> None:
-    axes = 'axes."time.epoch".values = ["2029-04-13T21:46:00 TDB", "J2000"]'
-    sweep = Sweep.of(parse(CONFIG.partition("tile")[0] + axes))
-    assert [sweep.experiment_of(i).config.time.epoch is not None for i in range(2)] == [True, True]
-    assert sweep.told(0) == 'epoch = "2029-04-13T21:46:00 TDB"'
-
-
-def test_expressions_that_look_like_numbers_with_units_are_expressions() -> None:
-    load = '[[loads]]\nkind = "torque"\ncomponents = ["t", "0", "0"]\n'
-    base = CONFIG.partition("[[events]]")[0] + load + "[sweep]\n"
-    sweep = Sweep.of(parse(base + 'axes."loads[0].components[0]".values = ["0.5*t", "2*pi*t"]'))
-    assert sweep.texts(0) == ('"0.5*t"',)
-    prepare(sweep.experiment_of(1))
-    rates = Sweep.of(parse(base + 'axes."initial.angular_velocity[0]".values = ["2*rad/s", "1 deg/s"]'))
-    assert rates.numeric
-    quoted = Sweep.of(parse(base + "axes.\"initial.'angular_velocity'[0]\".values = [1]"))
-    assert quoted.dims == ("angular_velocity_0",)
-
-
 def test_a_limit_of_time_is_kept_where_it_is_swept(tmp_path: Path) -> None:
     axes = 'axes."limits.wall_time" = {values = ["1e-9 s", "1 h"], name = "limit"}\n'
     found, _ = swept(tmp_path, CONFIG.partition("tile")[0] + axes)
     assert found.summary["outcomes"] == {"finished": 1, "stopped: wall_time": 1}
     assert found.summary["why_alone"] == "wall_time"
-
-
-def test_remedies_are_worded_for_whoever_reads_them() -> None:
-    """Also within a config's problems, whose control characters are made visible."""
-    with pytest.raises(ConfigError) as caught:
-        prepare(parse(CONFIG))
-    assert "rigidsim.sweep(...) runs them" in str(caught.value)
-    assert "rigidsim sweep runs them" in caught.value.for_command_line()
-    with pytest.raises(ConfigError) as caught:
-        apply_overrides({}, ["a\x02b\x1b[0].c=1"])
-    assert "a\\x02b\\x1b[0]" in str(caught.value)
 
 
 @pytest.mark.slow  # five times two processes that import everything
