@@ -42,18 +42,6 @@ def test_links_lead_to_places_of_the_site(pages: Path) -> None:
     assert "](configs/heavy_top_nutating.toml)" in (pages / "gallery.md").read_text(encoding="utf-8")
 
 
-def test_dead_links_are_errors(tmp_path: Path) -> None:
-    for page in ("docs/page.md", *staging.ELSEWHERE):
-        (tmp_path / page).parent.mkdir(exist_ok=True)
-        (tmp_path / page).touch()
-    (tmp_path / "docs" / "page.md").write_text(
-        "[gone](nowhere.md), `[code](is.md)` and\n```\n[a fence](is.md)\n```\n"
-    )
-    with pytest.raises(staging.DeadLinkError) as raised:
-        staging.gather(tmp_path / "pages", tmp_path)
-    assert str(raised.value) == "docs/page.md: [gone](nowhere.md) leads nowhere"
-
-
 @pytest.mark.parametrize(
     ("page", "fault"),
     [
@@ -115,18 +103,6 @@ def test_every_config_is_in_the_gallery() -> None:
     drawn = ROOT / "docs" / "figures" / "gallery"
     assert [n for n in names if not (drawn / f"{n}.png").exists()] == []
     assert [n for n in names if not (drawn / f"{n}_timeline.png").exists()] == []
-
-
-def test_a_site_built_before_is_no_source(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """docs/_site has copies of the notebooks for download."""
-    monkeypatch.syspath_prepend(str(ROOT / "docs" / "builder"))
-    import staging
-
-    for name in ("index.md", "notebooks/first.ipynb", "_site/_downloads/76a2/first.ipynb", "_site/a.md"):
-        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
-        (tmp_path / name).touch()
-    found = [str(page.relative_to(tmp_path)) for page in staging.sources(tmp_path)]
-    assert found == ["index.md", "notebooks/first.ipynb"]
 
 
 @pytest.mark.slow

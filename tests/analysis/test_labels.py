@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from rigidsim.analysis.labels import Known, Label, combinations, label, named, settled
+from rigidsim.analysis.labels import Known, Label, combinations, label
 
 YEAR, MONTH, NODE = 2 * math.pi / 365.25, 2 * math.pi / 27.3217, -2 * math.pi / 6798.38
 KNOWN = [Known("year", YEAR), Known("month", MONTH), Known("node", NODE)]
@@ -22,13 +22,6 @@ def test_combinations_are_complete_and_the_simplest_come_first() -> None:
     assert (orders[1:] >= orders[:-1]).all()
     # lattice points of the octahedron of radius n: (2n + 1)(2n^2 + 2n + 3)/3
     assert len(vectors) == 33 * (2 * 16**2 + 2 * 16 + 3) // 3
-
-
-def test_names_read_as_sums() -> None:
-    assert named((2, 0, -1), KNOWN) == "2 year - node"
-    assert named((-1, 1, 0), KNOWN) == "month - year"
-    assert named((-1, 0, 0), KNOWN) == "-year"
-    assert named((0, 0, 0), KNOWN) == "0"
 
 
 @pytest.mark.parametrize("real", [False, True])
@@ -63,31 +56,7 @@ def test_what_fits_two_frequencies_is_not_unfolded() -> None:
     assert not alone.doubtful
 
 
-def test_nothing_fits_by_chance() -> None:
-    # with an error of a twentieth of the band some combination always fits
-    assert label(1.9, math.pi / 20, KNOWN, math.pi, real=False) == Label()
-    assert label(0.1234, 1e-9, KNOWN, math.pi, real=False) == Label()
-    # nor is a line called constant whose error is as large as a bin
-    assert label(1e-3, 1e-3, KNOWN, math.pi, real=False, resolution=1e-3) == Label()
-    assert label(1e-6, 1e-6, KNOWN, math.pi, real=False, resolution=1e-3).text == "0"
-
-
 def test_signals_in_space_know_nothing_of_a_spin_about_an_axis_of_symmetry() -> None:
     spin = Known("spin", 2 * math.pi + YEAR, where="body")
     assert not label(YEAR, 1e-9, [KNOWN[0], spin], math.pi, real=False).doubtful
     assert label(YEAR, 1e-9, [KNOWN[0], spin], math.pi, real=False, in_body=True).doubtful == ("spin",)
-
-
-def test_blends_are_called_after_what_is_next_to_them() -> None:
-    off = YEAR * (1 + 1e-6)
-    assert label(off, 1e-12, KNOWN, math.pi, real=False) == Label()
-    assert label(off, 1e-12, KNOWN, math.pi, real=False, blend=1e-7).text == "year"
-
-
-def test_rough_frequencies_are_those_of_the_strongest_line_near_them() -> None:
-    rough = [Known("pitch", 1.0, tolerance=0.1), Known("roll", 2.0, tolerance=0.1), Known("orbit", 0.6)]
-    lines = {"a": [(0.97, 1e-9, 1.0), (1.03, 1e-9, 0.1)], "b": [(1.04, 1e-9, 5.0), (0.98, 1e-9, 8.0)]}
-    found = settled(rough, lines)
-    # each signal's own strongest counts as 1; no line is near the roll
-    assert [(k.name, float(k.value)) for k in found] == [("pitch", 0.97), ("orbit", 0.6)]
-    assert found[0].error == 1e-9

@@ -71,33 +71,6 @@ def test_what_has_no_closed_form_is_promised_nothing() -> None:
     assert advised(run(driven)) == {}
 
 
-def test_a_verdict_names_the_worst(plain: rigidsim.Run) -> None:
-    found = verdict_on(plain.outcome)
-    drifts = {
-        n: row["largest_drift"] for n, row in plain.summary["invariants"].items() if not row["numerical"]
-    }
-    assert found.soundness is Soundness.SOUND
-    assert found.worst == max(drifts, key=lambda name: drifts[name])
-    assert found.share == pytest.approx(
-        drifts[found.worst] / plain.summary["invariants"][found.worst]["bound"]
-    )
-
-
-def test_verdicts_go_by_the_worst_that_can_be_said(plain: rigidsim.Run) -> None:
-    summary = plain.outcome
-    energy = summary.invariants["energy"]
-    drifted = energy.having(largest_drift=2 * energy.bound)
-    many = {**summary.invariants, "energy": drifted}
-    assert verdict_on(summary.having(hold_invariants=True)).soundness is Soundness.HELD
-    lost = summary.having(warnings=("gone",), warning_codes=("attitude_uncertain",))
-    assert verdict_on(lost).soundness is Soundness.LOST
-    assert verdict_on(lost.having(invariants=many)).soundness is Soundness.DRIFTED
-    assert verdict_on(lost.having(invariants=many)).worst == "energy"
-    assert verdict_on(summary.having(invariants={})).soundness is Soundness.UNCHECKED
-    amplified = summary.accuracy.having(amplification=5.0)
-    assert verdict_on(summary.having(accuracy=amplified)).soundness is Soundness.AMPLIFIED
-
-
 def test_no_verdict_contradicts_a_warning(plain: rigidsim.Run) -> None:
     """Over all warnings, and all ways in which an invariant, a norm by definition too, can drift."""
     assert set(LEAST) == set(WarningCode)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import warnings
 from fractions import Fraction
 from pathlib import Path
-from typing import Any
 
 import h5py
 import mpmath
@@ -58,25 +57,6 @@ def test_julian_dates_of_a_grid_are_those_of_its_rational_times(
         assert high[i] + low[i] == high[i]  # the first is the nearest double
 
 
-def test_a_sample_has_the_same_bits_however_blocks_are_cut() -> None:
-    dates = Dates(FLYBY, grid(Fraction(1, 3), Fraction(10, 7), 200_000))
-    whole = dates.of_samples(0, 200_000)
-    for first, count in ((0, 1), (65535, 2), (65536, 3), (131000, 69000)):
-        part = dates.of_samples(first, count)
-        for name, columns in part.items():
-            for column, all_of_it in zip(columns, whole[name], strict=True):
-                np.testing.assert_array_equal(column, all_of_it[first : first + count], strict=True)
-
-
-def test_whole_days_are_exact() -> None:
-    """From J2000: whole days, a year of 365.25 days, and dates of the calendar."""
-    dates = Dates(parse_epoch("J2000"), grid(Fraction(0), Fraction(86400), 36526))
-    found = dates.of_samples(0, 36526)
-    np.testing.assert_array_equal(found["julian_date"][0], 2451545.0 + np.arange(36526))
-    assert not found["julian_date"][1].any()
-    assert found["year"][0][[0, 1461, 36525]].tolist() == [2000, 2004, 2100]
-
-
 @pytest.mark.parametrize(
     ("epoch", "begin", "end", "known"),
     [
@@ -95,38 +75,6 @@ def test_dates_are_given_where_all_samples_have_one(epoch: str, begin: int, end:
     names = ["year", "julian_date"] + ["date"] * known
     assert [variable.name for variable in dates.variables] == names
     assert list(dates.of_samples(0, 5)) == names
-
-
-def as_xarray(dates: Dates, columns: dict[str, list[np.ndarray]]) -> Any:
-    """The dates as a reader sees them."""
-    attributes = dict(dates.variables[-1].attributes)
-    return xarray.decode_cf(xarray.Dataset({"date": ("time", columns["date"][0], attributes)})).date.values
-
-
-def test_a_leap_second_has_no_date() -> None:
-    """UTC from 28 s before the end of 2016, whose last second was the 61st of its minute."""
-    dates = Dates(parse_epoch("2016-12-31T23:59:32.25 UTC"), grid(Fraction(0), Fraction(1, 4), 201))
-    found = as_xarray(dates, dates.of_samples(0, 201))
-    assert np.isnat(found).nonzero()[0].tolist() == [111, 112, 113, 114]
-    assert found[110] == np.datetime64("2016-12-31T23:59:59.75")
-    assert found[115] == np.datetime64("2017-01-01T00:00:00")
-    assert dates.scale == "TT"
-    # TT - UTC was 68.184 s, and 69.184 s after it
-    epoch = parse_epoch("2017-01-01T00:00:41.434 TT").julian_date()
-    assert parse_epoch("2016-12-31T23:59:32.25 UTC").julian_date() == epoch - Fraction(1, 86400)
-
-
-def test_events_and_lists_have_the_dates_of_their_times() -> None:
-    times = [Fraction(1, 3), Fraction(2), Fraction(10**15, 7)]
-    dates = Dates(FLYBY, SampleTimes.listed(Fraction(0), times, mpmath.mp))
-    found = dates.of_samples(1, 2)
-    for i, time in enumerate(times[1:]):
-        wanted = FLYBY.julian_date() + time / 86400
-        assert found["julian_date"][0][i] == float(wanted)
-        assert exact(*(part[i] for part in found["julian_date"])) == pytest.approx(wanted, rel=1e-31)
-    assert found["year"][0][0] == pytest.approx(
-        float(2000 + (FLYBY.julian_date() - J2000) / Fraction("365.25"))
-    )
 
 
 def test_a_run_with_an_epoch_has_its_dates_as_coordinates(tmp_path: Path) -> None:
@@ -217,9 +165,3 @@ def test_events_whose_names_are_taken_are_refused(events: list[str], double: str
         return
     with pytest.raises(ConfigError, match=f'given "{events[-1]}", by which .* the name "{double}" twice'):
         refuse_taken_names(prepared)
-
-
-def test_runs_without_an_epoch_have_no_dates() -> None:
-    with run_text(config()).dataset as dataset:
-        assert not {"year", "julian_date", "date"} & set(dataset.variables)
-        assert "coordinates" not in dataset.quaternion.encoding

@@ -3,23 +3,19 @@
 from __future__ import annotations
 
 import itertools
-import os
-import signal
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from support import cases, config, loaded, run_estimated, run_text, same_bits
+from support import cases, config, loaded, run_text, same_bits
 
 import rigidsim
-from rigidsim.session.guards import Interruption
 from rigidsim.session.tuning import Tuning
 from rigidsim.solve.assembly import Assembly, assemble, sampler
 from rigidsim.solve.checkpoint import Position
 from rigidsim.solve.evaluate import Evaluator
-from rigidsim.solve.neighbours.lanes import StepperLanes
 from rigidsim.solve.problem import InitialValueProblem, prepare
 from rigidsim.solve.sample_block import SampleBlock
 from rigidsim.solve.sampler import Pacing, Progress, SampleReceiver
@@ -174,54 +170,6 @@ def test_ctrl_c_within_a_chunk_takes_it_back(scene: str, monkeypatch: pytest.Mon
     assert kept.all() == reference
 
 
-def test_a_signal_ends_what_nobody_would_miss_at_once() -> None:
-    """Wherever it is, once; elsewhere it is noted, and what is done goes on."""
-    interruption, passed = Interruption(), []
-    with interruption.watching():
-        with interruption.dispensable():
-            passed.append("begun")
-            os.kill(os.getpid(), signal.SIGINT)
-            for _ in range(10_000):  # the handler runs between two of these at the latest
-                pass
-            passed.append("went on")
-        assert interruption.requested
-        with interruption.dispensable():
-            passed.append("once more")
-        os.kill(os.getpid(), signal.SIGINT)
-        for _ in range(10_000):
-            pass
-        passed.append("saved")
-    assert passed == ["begun", "once more", "saved"]
-
-
-def test_ctrl_c_within_a_stretch_of_an_estimate(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Neighbours of a motion that switches take thousands of steps between two questions whether to go on."""
-    text = config(
-        loads='kind = "torque"\ncomponents = ["-0.2*sign(wx)", "0", "0"]',
-        time="end = 20\nsamples = 5",
-    )
-    whole = run_estimated(text, out=tmp_path / "whole")
-    taken = 0
-    advanced = StepperLanes.advance
-
-    def interrupted(self: StepperLanes, *given: Any) -> Any:
-        nonlocal taken
-        os.kill(os.getpid(), signal.SIGINT)
-        found = advanced(self, *given)
-        taken += 1
-        return found
-
-    with monkeypatch.context() as patch:
-        patch.setattr(StepperLanes, "advance", interrupted)
-        run = run_estimated(text, out=tmp_path / "cut")
-    assert run.status == "interrupted"
-    assert taken == 0
-    resumed = rigidsim.resume(run.folder.path)
-    same_bits(resumed, whole)
-    announced = [one.summary["accuracy"]["estimated_attitude_error"] for one in (resumed, whole)]
-    assert announced[0] == announced[1] > 0
-
-
 def test_max_drift_ends_with_the_first_sample_past_it(tmp_path: Path) -> None:
     """Whichever way the run takes, with the same samples and steps; under another guard it goes on."""
     text = config(time="end = 300\nsamples = 601", integrator='precision = "single"', output=PLAIN)
@@ -262,23 +210,6 @@ def test_max_drift_looks_at_the_last_sample_too(method: str, tmp_path: Path) -> 
     again = rigidsim.resume(run.folder.path)
     assert again.status == "stopped: max_drift"
     assert rigidsim.resume(run.folder.path, overrides=["limits.max_drift=1"]).status == "finished"
-
-
-def test_an_event_ends_a_run_at_the_same_step_however_it_is_driven() -> None:
-    text = config(
-        time="end = 1000\nsamples = 5",
-        more='[[events]]\nname = "late"\nexpression = "t - 223.4"\naction = "stop"',
-    )
-    prepared = prepare(rigidsim.parse(text))
-    ends = set()
-    for pacing in DRIVES.values():
-        parts = assemble(prepared)
-        progress = sampler(prepared, parts, Kept(parts.evaluator), pacing=pacing).run()
-        ends.add((progress.status, progress.steps, progress.time, progress.next_sample))
-    assert len(ends) == 1
-    status, _, when, samples = ends.pop()
-    assert (status, samples) == (Status.EVENT, 1)
-    assert 223.4 <= when < 230
 
 
 def test_an_event_past_the_last_sample_ends_nothing(tmp_path: Path) -> None:
@@ -323,24 +254,3 @@ def test_a_plunge_ends_at_the_same_step_however_it_is_driven() -> None:
         loop = sampler(prepared, parts, Kept(parts.evaluator), start=position, most_steps=most)
         progress, position = loop.run(), loop.position()
     assert (progress.status, progress.steps) == (Status.COLLAPSED, steps)
-
-
-@pytest.mark.slow  # steps as small as they get
-def test_the_move_to_a_whole_time_is_given_up_where_steps_are_smaller() -> None:
-    """Where natural steps are 1e-25 of the time, half its last bit may take a billion of them. Rounding
-    decides at which depth of the fall the way out is the shorter one; either way nothing is left half done.
-    """
-    prepared = prepare(rigidsim.parse(PLUNGE))
-    stepper = assemble(prepared).stepper
-    outcomes = []
-    for depth in 10.0 ** -np.arange(22, 33):
-        while stepper.step() and stepper.largest > depth:
-            pass
-        mark = stepper.mark()
-        outcomes.append(stepper.to_whole_time())
-        if outcomes[-1]:
-            assert stepper.mark().time[1] == 0
-            stepper.back_to(mark)
-        assert stepper.mark().time == mark.time
-        assert np.array_equal(stepper.mark().state, mark.state)
-    assert not all(outcomes)

@@ -14,7 +14,6 @@ from support import cases, same_bits
 import rigidsim
 from rigidsim.session.tuning import Tuning
 from rigidsim.solve.assembly import assemble, sampler
-from rigidsim.solve.compiled import evaluate_rows
 from rigidsim.solve.evaluate import Evaluator
 from rigidsim.solve.problem import prepare
 from rigidsim.solve.sample_block import SampleBlock
@@ -142,18 +141,6 @@ def test_the_sample_grid_does_not_change_the_motion(tmp_path: Path, free_body: C
     assert coarse.sizes["time"] == 9
     for name in ("time", "angular_velocity", "quaternion", "energy", "angular_momentum_drift"):
         np.testing.assert_array_equal(fine[name].values[::128], coarse[name].values[:5])
-
-
-def test_a_row_does_not_depend_on_its_block() -> None:
-    """The padding in ``evaluate_rows`` is what makes it so: heyoka's rest of a batch has other bits."""
-    x, y = hy.make_vars("x", "y")
-    function = hy.cfunc([hy.sqrt(x * x + y * y) / (1.0 + x * y), hy.sin(x) * hy.cos(y)], [x, y])
-    states = np.random.default_rng(1).uniform(-1, 1, (301, 2))
-    whole = evaluate_rows(function, states)
-    assert whole.shape == (2, 301)
-    for first, last in ((0, 1), (1, 64), (64, 301), (300, 301), (100, 165)):
-        piece = evaluate_rows(function, states[first:last])
-        np.testing.assert_array_equal(piece, whole[:, first:last])
 
 
 @pytest.mark.parametrize(

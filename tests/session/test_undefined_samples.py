@@ -12,7 +12,6 @@ from support import IMPATIENT
 
 import rigidsim
 from rigidsim.cli.screens.summary import print_summary
-from rigidsim.session.statistics import SampleStatistics, Undefined
 
 # spins about its middle axis and turns over: its spin leaves the cone about that axis and comes back
 FLIPPING = """
@@ -111,15 +110,3 @@ def test_members_of_a_batch_are_warned_of_as_single_runs_are(tmp_path: Path) -> 
         bit = 1 << meanings.index("undefined")
         codes[batch] = [bool(bits & bit) for bits in warnings.values.tolist()]
     assert codes == {True: [True, False], False: [True, False]}
-
-
-@pytest.mark.parametrize("cuts", [(7,), (1, 6), (2, 5), (3, 4), (1, 1, 1, 1, 1, 1, 1)])
-def test_counts_dont_depend_on_the_blocks_that_samples_come_in(cuts: tuple[int, ...]) -> None:
-    bad = np.array([1, 1, 0, 1, 0, 0, 1], dtype=bool)
-    values = np.column_stack([np.where(bad, np.nan, 1.0), np.zeros(7)])
-    seen, first = SampleStatistics(), 0
-    for count in cuts:
-        rows = slice(first, first + count)
-        seen.see_undefined("x", values[rows], first, np.arange(7.0)[rows])
-        first += count
-    assert seen.undefined == {"x": Undefined(count=4, leading=2, since=3.0)}

@@ -40,11 +40,6 @@ def test_a_tolerance_below_an_eighth_of_epsilon_is_warned_of(precision: str) -> 
     assert not told(name + 'tolerance = "auto"')
 
 
-def test_the_precision_in_digits_has_its_own_smallest_tolerance() -> None:
-    assert not told("precision = 50\ntolerance = 1e-50")
-    assert "50 digits" in told("precision = 50\ntolerance = 1e-55")[0]
-
-
 def test_a_smaller_tolerance_gains_nothing() -> None:
     """What the warning claims, against 80 bits: a tolerance of 1e-30 takes more orders, and errs as much,
     within what rounding scatters by.
@@ -83,11 +78,6 @@ def test_lost_digits_are_blamed_on_the_loose_tolerance() -> None:
     assert "higher precision" not in warning
 
 
-def test_a_closed_form_has_no_use_for_a_tolerance() -> None:
-    assert "takes no steps" in told('method = "closed_form"\ntolerance = 1e-9')[0]
-    assert not told('method = "closed_form"')
-
-
 @pytest.mark.parametrize("formulation", ["auto", "planar", "quaternion", "euler_angles"])
 def test_a_scene_without_a_closed_form_is_told_so_first(formulation: str) -> None:
     """A planar gradient among them, whose equations are planar though the config says auto."""
@@ -96,9 +86,3 @@ def test_a_scene_without_a_closed_form_is_told_so_first(formulation: str) -> Non
     with pytest.raises(ConfigError, match="a gravity-gradient load has no closed form here") as refused:
         prepare(rigidsim.parse(text))
     assert "formulation" not in str(refused.value)
-
-
-def test_a_free_body_in_other_variables_is_told_of_auto() -> None:
-    text = config(integrator='method = "closed_form"\nformulation = "euler_angles"')
-    with pytest.raises(ConfigError, match='not euler_angles; set formulation = "auto"'):
-        prepare(rigidsim.parse(text))

@@ -13,47 +13,10 @@ import pytest
 from support import config, run_text, same_bits
 
 import rigidsim
-from rigidsim.solve.compiled import building, compiled_engine, give_up, interruptible, take_up
+from rigidsim.solve.compiled import compiled_engine
 
 PLAIN = "estimate = false"
 AWAKE = 60.0  # seconds that nobody waits for
-
-
-def test_a_signal_ends_the_wait() -> None:
-    never, before = threading.Event(), signal.signal(signal.SIGINT, signal.default_int_handler)
-    try:
-        threading.Timer(0.05, lambda: os.kill(os.getpid(), signal.SIGINT)).start()
-        with pytest.raises(KeyboardInterrupt):
-            interruptible(lambda: never.wait(AWAKE))
-        assert building()
-    finally:
-        signal.signal(signal.SIGINT, before)
-        never.set()
-
-
-def test_what_is_made_or_raised_comes_back() -> None:
-    assert interruptible(threading.current_thread) is not threading.main_thread()
-    with pytest.raises(ZeroDivisionError):
-        interruptible(lambda: 1 // 0)
-    inside: list[bool] = []
-
-    def work() -> None:  # signals reach the main thread alone
-        inside.append(interruptible(threading.current_thread) is threading.current_thread())
-
-    other = threading.Thread(target=work)
-    other.start()
-    other.join()
-    assert inside == [True]
-
-
-def test_nothing_more_is_begun_that_nobody_waits_for() -> None:
-    give_up()
-    try:
-        with pytest.raises(KeyboardInterrupt):
-            interruptible(lambda: 1)
-    finally:
-        take_up()
-    assert interruptible(lambda: 1) == 1
 
 
 def test_ctrl_c_while_another_chart_is_compiled(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -15,10 +15,7 @@ from support import cases, config, same_bits
 import rigidsim
 from rigidsim.session.guards import Observer
 from rigidsim.session.tuning import Tuning
-from rigidsim.solve.assembly import assemble
-from rigidsim.solve.checkpoint_arrays import pack
 from rigidsim.solve.compiled import CodeStore, kept_in
-from rigidsim.solve.corrected_stepper import CorrectedStepper
 from rigidsim.solve.problem import prepare
 from rigidsim.solve.sampler import Pacing, Progress
 from rigidsim.store import netcdf
@@ -108,32 +105,6 @@ def test_a_killed_run_resumes_bit_for_bit(precision: str, tmp_path: Path) -> Non
     assert sorted(one) == sorted(other)
     for name in set(one) - {"effort", "sessions"}:
         np.testing.assert_array_equal(one[name], other[name], name)
-
-
-@pytest.mark.parametrize("precision", cases(PRECISIONS, ("double", "30")))
-def test_the_boundary_without_an_engine_is_the_engines_own(precision: str) -> None:
-    prepared = prepare(top(precision))
-    parts = assemble(prepared)
-    without, remembered = parts.corrected.boundary(), memories(parts.corrected)
-    stepping = parts.steps()
-    engines = stepping.boundary()
-    for one, other in ((without.mark.time, engines.mark.time), (without.mark.state, engines.mark.state)):
-        arrays = [
-            pack(np.array(values, dtype=prepared.precision.scalar), prepared.precision, "found")
-            for values in (one, other)
-        ]
-        for name, values in arrays[0].items():
-            assert values.tobytes() == arrays[1][name].tobytes()
-    assert (without.mark.steps, without.mark.events) == (engines.mark.steps, engines.mark.events) == (0, 0)
-    no_changes = {"rhythm_chart_changes": np.zeros(1)}  # where it has angles, which may be left
-    np.testing.assert_equal(no_changes | remembered, no_changes | memories(stepping))
-
-
-def memories(corrected: CorrectedStepper) -> dict[str, np.ndarray]:
-    """What its effects remember, as a checkpoint holds it."""
-    remembered = corrected.boundary().memories
-    packed = (e.pack(memory) for e, memory in zip(corrected.effects, remembered, strict=True))
-    return {name: values for arrays in packed for name, values in arrays.items()}
 
 
 @pytest.mark.parametrize("precision", PRECISIONS)

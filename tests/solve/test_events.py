@@ -149,14 +149,6 @@ def test_a_coin_stops_when_it_lands(runs: Path) -> None:
     assert all(line in text for line in said)
 
 
-def test_the_time_reached_is_that_of_the_last_sample() -> None:
-    run = run_text(FLIPS.format(samples=11) + FLIP, "time.end=10")
-    assert run.summary["time_reached"] == 10 < run.summary["engine_time"]
-    assert run.summary["event_times"]["flip"]["last"] <= 10
-    stopped = run_text(FLIPS.format(samples=2001) + "[limits]\nmax_steps = 20")
-    assert stopped.summary["time_reached"] == stopped.dataset.time.values[-1]
-
-
 def test_events_read_attitude_position_and_time() -> None:
     text = """
     name = "throw"
@@ -192,12 +184,6 @@ def test_events_read_attitude_position_and_time() -> None:
     assert data["rising_time"].values == pytest.approx([1 - np.sqrt(0.8)], abs=1e-14)
     assert data["turned_time"].values == pytest.approx([1.0], abs=1e-13)  # qz = sin(3 t / 2) exactly
     assert data["top_position"].values[0, 2] == pytest.approx(5.0, abs=1e-13)
-
-
-def test_an_event_that_never_happens_is_an_empty_variable() -> None:
-    run = run_text(FLIPS.format(samples=11) + FLIP.replace('"wy"', '"wy - 5"'))
-    assert run.dataset.sizes["flip"] == 0
-    assert run.summary["events"] == {"flip": 0}
 
 
 @pytest.mark.parametrize(

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import heyoka as hy
 import numpy as np
 import pytest
 from support import config, loaded, run_text
 
 import rigidsim
-from rigidsim.model.tangents import _varied
 from rigidsim.solve.indicators import indicators
 from rigidsim.solve.problem import prepare
 
@@ -72,56 +70,6 @@ def test_growth_agrees_with_the_spectrum_and_with_128_bits() -> None:
     plain = loaded(run_text(hyperion(short))).tangent_growth.values
     wide = loaded(run_text(hyperion(short, 'precision = "quadruple"'))).tangent_growth.values
     assert np.abs(plain - wide).max() < 1e-9
-
-
-ABOUT_BELOW = "angular_velocity = [0, 0, -1.1]\neuler_angles = [0, 0, 0.4]"
-ABOUT_X = "angular_velocity = [1.1, 0, 0]\nquaternion = [1, 0, 1, 0]"
-TWO = GRADIENT + '\n[[loads]]\nkind = "gravity_gradient"\ngravitational_parameter = 0.2\nposition = [0, 2, 0]'
-DAMPED = GRADIENT + '\n[[loads]]\nkind = "viscous_torque"\ncoefficients = [0, 0, 0.1]'
-DRIVEN = GRADIENT + '\n[[loads]]\nkind = "torque"\ncomponents = ["0", "0", "0.1*qz*qw"]'
-
-
-@pytest.mark.parametrize(
-    ("initial", "loads", "seen"),
-    [
-        (SPIN, GRADIENT, True),
-        (ABOUT_BELOW, GRADIENT, True),
-        (ABOUT_X, GRADIENT, True),
-        (SPIN, TWO, True),
-        (SPIN, DAMPED, True),
-        (SPIN, DRIVEN, False),  # a torque that reads the attitude itself
-    ],
-    ids=["above", "below", "x", "two", "damped", "driven"],
-)
-def test_a_planar_vector_obeys_the_variational_equations(initial: str, loads: str, seen: bool) -> None:
-    """Written with what is seen from the body or not, they are the derivatives of the motion's equations."""
-    output = 'record = ["tangent_growth"]'
-    text = config(
-        "principal_moments = [1, 1.2, 1.35]", initial, loads, "end = 1\nsamples = 2",
-        'formulation = "planar"', output,
-    )  # fmt: skip
-    system = prepare(rigidsim.parse(text)).system
-    names = [str(variable) for variable in system.variables]
-    own = [names.index(name) for name in ("angle", "spin")]
-    rights = [system.equations[n][1] for n in own]
-    along = [system.equations[names.index(f"tangent_{name}")] for name in ("angle", "spin")]
-    usual = _varied([system.variables[n] for n in own], rights, [variable for variable, _ in along])
-    rng = np.random.default_rng(1)
-    states = rng.uniform(0.1, 0.9, (len(names), 50))
-    states[own[0]] *= 2.0**-20 * 7
-    found, expected = (
-        hy.cfunc(expressions, system.variables)(states) for expressions in ([r for _, r in along], usual)
-    )
-    np.testing.assert_allclose(found, expected, rtol=1e-13, atol=1e-13 * np.abs(expected).max())
-    products = [
-        sum(" * u_" in str(x) and str(x).startswith("(u_") for x, _ in parts)
-        for parts in (hy.taylor_adaptive(
-            [*list(system.equations)[: names.index("tangent_angle")],
-             *((v, r) for (v, _), r in zip(along, rights, strict=True))],
-            np.zeros(len(names)), compact_mode=True,
-        ).decomposition for rights in ([r for _, r in along], usual))
-    ]  # fmt: skip
-    assert (products[0] < products[1]) == seen
 
 
 def test_a_regular_spin_has_a_megno_of_two() -> None:

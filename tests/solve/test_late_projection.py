@@ -7,23 +7,19 @@ from pathlib import Path
 from typing import Any
 
 import h5py
-import heyoka as hy
 import numpy as np
 import pytest
 from support import IMPATIENT, angle_between, bits, cases, config, law, run_text, same_bits
 
 import rigidsim
-from rigidsim.errors import ConfigError, RunFolderError
+from rigidsim.errors import RunFolderError
 from rigidsim.model.kinematics import Kinematics
 from rigidsim.model.load import Load, Term
 from rigidsim.scene.sweeps.sweep import Sweep
 from rigidsim.session.verdict import Soundness, verdict_on
-from rigidsim.solve.correction import lacking_rates
-from rigidsim.solve.precision import precision_of
 from rigidsim.solve.problem import prepare
 from rigidsim.solve.projection import LATE
 from rigidsim.store import seal
-from rigidsim.workflows.recorded_then import as_begun
 
 EPS = 2.0**-52
 BODY = "principal_moments = [1, 2, 3]"
@@ -181,27 +177,6 @@ def test_the_guard_of_drifts_counts_what_was_put_back() -> None:
     assert stopped.dataset.sizes["time"] == int(np.argmax(past > limit)) + 1
 
 
-def test_what_rounded_coefficients_lack_is_known() -> None:
-    """Of a body (3, 1, 2) the coefficient of the first rate is (1 - 2) / 3, which no binary number is; those
-    of the others are whole.
-    """
-    system = prepare(
-        rigidsim.parse(
-            config(body="principal_moments = [3, 1, 2]", initial=SPIN, integrator='precision = "single"')
-        )
-    ).system
-    single, double = precision_of("single"), precision_of("double")
-    exact = system.rounded(double.number)
-    integrated = system.rounded(lambda value: double.number(single.exact(single.number(value))))
-    lacking = hy.cfunc(lacking_rates(exact, integrated), exact.variables)
-    state = double.array(exact.initial)
-    found = lacking(state)
-    missing = -1 / 3 - float(np.float32(-1) / np.float32(3))
-    assert found[0] == pytest.approx(missing * state[1] * state[2], rel=1e-6)
-    assert found[0] != 0
-    assert not found[1:].any()
-
-
 def test_where_nothing_can_be_held_it_means_nothing() -> None:
     for load in (
         'kind = "torque"\ncomponents = ["0.01*sin(t)", 0, 0]',
@@ -249,23 +224,6 @@ def test_equations_that_change_with_time_are_no_trouble(load: str) -> None:
     assert "angular_momentum_axial_put_back" in auto.dataset
     moved = angle_between(plain.dataset.quaternion.values, auto.dataset.quaternion.values)
     assert 0 < moved.max() < law(EPS, steps(plain), 3.3, 4000)
-
-
-def test_anything_else_is_refused() -> None:
-    with pytest.raises(ConfigError, match='given "late"; true, false or "auto" is allowed'):
-        rigidsim.parse(text(10, '"late"'))
-
-
-def test_what_was_saved_before_it_was_the_default_stays_plain(tmp_path: Path) -> None:
-    """Such a run's config says nothing of it, and its dataset that nothing was put back."""
-    run = run_text(text(10, "false"), out=tmp_path)
-    says_nothing = rigidsim.parse(text(10, "false").replace("hold_invariants = false\n", ""))
-    assert says_nothing.config.integrator.hold_invariants == "auto"
-    assert as_begun(says_nothing, run.folder.dataset).config.integrator.hold_invariants is False
-    asked = rigidsim.parse(text(10, '"auto"'))
-    assert as_begun(asked, run.folder.dataset).config.integrator.hold_invariants == "auto"
-    now = rigidsim.run(says_nothing, out=tmp_path / "now")
-    assert as_begun(says_nothing, now.folder.dataset).config.integrator.hold_invariants == "auto"
 
 
 def test_members_of_a_sweep_are_plain() -> None:

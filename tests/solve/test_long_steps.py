@@ -5,13 +5,11 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
-import heyoka as hy
 import numpy as np
 import pytest
 from support import config, run_text
 
 import rigidsim
-from rigidsim.solve.step_bounds import bound_of_sparse_series, bounds_of_sparse_series, longest_step
 
 THROWN = config(
     "principal_moments = [1, 1, 1]\nmass = 1",
@@ -51,14 +49,6 @@ def test_a_kink_far_within_a_long_step_is_one_of_its_ends(precision: str, formul
     assert run.dataset.angular_velocity.values[-1, 2] == pytest.approx(exact, rel=rounding)
     without = 0.026 + 1e-6 * end * (end / 2 - late)  # had it been stepped over
     assert abs(without - exact) > 0.04 * exact
-
-
-@pytest.mark.parametrize("number", [np.float32, np.float64, np.longdouble])
-@pytest.mark.parametrize("order", [2, 10, 20, 40])
-def test_powers_of_the_longest_step_up_to_the_order_are_numbers(number: type, order: int) -> None:
-    longest = longest_step(order, number)
-    assert np.isfinite(number(longest) ** order)
-    assert 1.0 < longest <= longest_step(2, np.longdouble) == longest_step(400, hy.real128) == 2.0**30
 
 
 @pytest.mark.parametrize("power", [1, 4])
@@ -128,30 +118,3 @@ def test_it_does_in_the_sequence_that_takes_over_at_the_start() -> None:
     # angles are rounded in a chart whose derivatives are at most 1 / sin(pi / 6)
     bound = 8 * 2.0**-52 * 2 * math.sqrt(run.summary["cost"]["steps"])
     assert np.abs(end - exact).max() < bound
-
-
-@pytest.mark.parametrize("highest", [2, 3, 4, 5, 6, 20])
-def test_series_side_by_side_have_the_bounds_of_each(highest: int) -> None:
-    """A tolerance of 1 has series of order 2, one of 0.001 of order 5."""
-    order = np.arange(highest + 1)
-    random = np.random.default_rng(1)
-    gaps = (order[:, None] % np.arange(1, 9) == 0) * random.uniform(0.5, 2, (len(order), 8))
-    sizes = gaps * random.uniform(0.2, 2, 8) ** order[:, None]
-    none = np.zeros((len(order), 1))
-    sizes = np.hstack([sizes, sizes + 1e-12, sizes + 1e-4, none, np.full_like(none, np.nan)])
-    found = bounds_of_sparse_series(sizes)
-    alone = [bound_of_sparse_series(column[None]) for column in sizes[:, :-1].T]
-    assert found.tolist() == [*alone, math.inf]
-    if highest == 20:
-        assert 2 < np.isfinite(found).sum() < len(alone)
-
-
-def test_all_other_series_are_left_alone() -> None:
-    """Those that end, those of a turning body, and those of a pole."""
-    order = np.arange(21)
-    turning = np.array([[0.5**m / math.factorial(m) for m in order]])
-    assert bound_of_sparse_series(turning) == math.inf
-    assert bound_of_sparse_series(np.array([2.0**-order])) == math.inf
-    assert bound_of_sparse_series(np.where(order < 3, 1.0, 0.0)[None, :]) == math.inf
-    gaps = np.where(order % 3 == 0, 2.0**-order, 0.0)[None, :]
-    assert bound_of_sparse_series(gaps) == pytest.approx(2 * math.exp(-2 - 0.7 / 19))

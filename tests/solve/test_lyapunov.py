@@ -12,10 +12,7 @@ from equations import prepared
 from support import run_text, same_bits
 
 import rigidsim
-from rigidsim.model.loads import ExtraStates, LoadModel, Term
-from rigidsim.model.mechanics import Mechanics
 from rigidsim.solve import lyapunov
-from rigidsim.solve.problem import prepare
 
 BODY = ["wx", "wy", "wz", "qw", "qx", "qy", "qz"]
 SATELLITE = """
@@ -194,23 +191,6 @@ def test_what_is_carried_beside_the_motion_adds_no_exponents() -> None:
     assert found[1]["exponents"] == pytest.approx(found[0]["exponents"], abs=1e-9)
 
 
-class Bearing(LoadModel):
-    """A damped wheel inside the body: its state acts on the body and feels it, and so is of the motion."""
-
-    title = "bearing"
-
-    def extra_states(self, m: Mechanics) -> ExtraStates:
-        zero = m.scene.context.zero
-        wheel = hy.make_vars("wheel")
-        slip = 0.1 * (m.rates[2] - wheel)
-        return ExtraStates(["wheel", "counter"], [slip, wheel * wheel], [zero, zero])
-
-    def torque(self, m: Mechanics) -> list[Term]:
-        one, zero = m.scene.context.one, m.scene.context.zero
-        wheel = hy.make_vars("wheel")
-        return [([zero, zero, one], -0.1 * (m.rates[2] - wheel))]
-
-
 ECCENTRIC = "gravitational_parameter = 1\norbit = {semi_major_axis = 2, eccentricity = 0.1}"
 FALLING = "principal_moments = [1, 2, 3]\nmass = 1"
 TOP = "principal_moments = [1, 1, 2]\nmass = 1\ncenter_of_mass = [0, 0, 0.2]"
@@ -228,23 +208,6 @@ SYSTEMS = {
     "damped": (FALLING, SPIN, 'kind = "viscous_torque"\ncoefficients = [1, 1, 1]', '["quaternion", "energy"]',
                BODY, ["work"]),
 }  # fmt: skip
-
-
-@pytest.mark.parametrize("case", SYSTEMS)
-def test_the_states_of_a_motion(case: str) -> None:
-    body, initial, load, record, motion, beside = SYSTEMS[case]
-    system = prepared(body, initial, load, record).system
-    found = [system.states[i] for i in lyapunov.motion_states(system)]
-    assert found == motion
-    assert [name for name in system.states if name not in found] == beside
-
-
-def test_a_load_with_a_memory_is_of_the_motion() -> None:
-    text = f'name = "s"\n[body]\n{FALLING}\n[initial]\n{SPIN}\n[time]\nend = 1\n'
-    system = prepare(rigidsim.parse(text), loads=[Bearing()]).system
-    assert {"wheel", "counter"} < set(system.states)
-    found = [system.states[i] for i in lyapunov.motion_states(system)]
-    assert found == [*BODY, "wheel"]  # what only counts is not
 
 
 @pytest.mark.parametrize("case", ["orbit", "damped", "free"])

@@ -99,10 +99,3 @@ def test_a_list_has_exact_labels_in_single_precision_too() -> None:
     assert dataset["time"].values.tolist() == [0, 0.1, 1 / 3]
     narrow = np.array([0, 0.1, 1 / 3], dtype=np.float32).astype(float)
     np.testing.assert_array_equal(dataset["time"].values + dataset["time_lo"].values, narrow)
-
-
-def test_a_block_of_samples_takes_no_arithmetic_of_their_number() -> None:
-    """1e12 samples: the last block as quickly as the first, and nothing held of the rest."""
-    clock = clock_of('end = "1000.0000000001"\nsamples = 1000000000000', "double")
-    step = Fraction("1000.0000000001") / (10**12 - 1)
-    check(clock, [i * step for i in range(10**12 - 3, 10**12)], 10**12 - 3, 53)

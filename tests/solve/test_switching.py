@@ -16,8 +16,6 @@ import rigidsim
 from rigidsim.accuracy.setting import Setting
 from rigidsim.accuracy.trial import try_setting
 from rigidsim.errors import ConfigError
-from rigidsim.scene.scene import build_scene
-from rigidsim.scene.surfaces import surfaces_of
 from rigidsim.solve.assembly import assemble, sampler
 from rigidsim.solve.problem import prepare
 from rigidsim.solve.sample_block import SampleBlock
@@ -279,26 +277,6 @@ def test_a_plan_lists_the_surfaces_each_once() -> None:
     plan = rigidsim.plan(rigidsim.parse(text), pilot_seconds=0.0)
     assert [surface["surface"] for surface in plan["switching"]] == ["sign(2*wz)", "min(t, 3)"]
     assert plan["turning"] == ["psi"]
-
-
-@pytest.mark.parametrize(
-    ("one", "other", "same"),
-    [
-        ("t - 5", "10 - 2*t", True),
-        ("wx*wy", "-wy*wx/3", True),
-        ("(wx + wy)^2 - wz", "2*wz - 4*wx*wy - 2*wx^2 - 2*wy^2", True),
-        ("(wx + 1)^2 - wy", "wy - wx^2 - 2*wx - 1", True),
-        ("t - 5", "t - 5.0000000000000000000001", False),
-        ("wx - 1", "wx - 1.0000000000000000000000000001", False),
-        ("max(t - 5, 0) - 1", "max(t - 8, 0) - 1", False),
-        ("max(wx - 1e3, 0) - 1", "max(wx - 2e3, 0) - 1", False),
-    ],
-)
-def test_surfaces_are_one_if_their_ratio_is_constant(one: str, other: str, same: bool) -> None:
-    """In all digits as written, and also where no state of the scene would tell them apart."""
-    torque = f'kind = "torque"\ncomponents = ["sign({one})", "sign({other})", "0"]'
-    scene = build_scene(rigidsim.parse(config(initial=TILTED, loads=torque)))
-    assert len(surfaces_of(scene).found) == (1 if same else 2 + ("max" in one) * 2)
 
 
 def test_a_norm_that_vanishes_is_not_passed_over() -> None:

@@ -6,14 +6,9 @@ import math
 
 import numpy as np
 import pytest
-from matplotlib.figure import Figure
 from support import bits, config, loaded, run_text
 
 import rigidsim
-from rigidsim.look.figures import timelines
-from rigidsim.solve.assembly import assemble
-from rigidsim.solve.problem import prepare
-from rigidsim.solve.turns.count import Place, TurnCounter, angles_to_join
 
 ANGLES = 'record = ["quaternion", "euler_angles"]'
 SYMMETRIC = "principal_moments = [1, 1, 1.5]"
@@ -105,20 +100,6 @@ def within_one_turn(run: rigidsim.Run, since: float) -> None:
     assert f"from {since:.6g} " in run.summary["warnings"][0]
 
 
-def test_turns_that_nobody_knows_are_not_shown() -> None:
-    """A closed form over millions of turns between samples, and in the figure neither lines nor growth."""
-    text = config(SYMMETRIC, PRECESSING, (), "end = 1e9\nsamples = 11", 'method = "closed_form"', ANGLES)
-    run = run_text(text)
-    within_one_turn(run, 0.0)
-    axes = Figure().add_subplot()
-    timelines.attitude(axes, run.dataset)
-    assert (axes.get_title("left") or axes.get_title()) == "Euler angles, within one turn"
-    assert {line.get_linestyle() for line in axes.get_lines()} == {"None"}
-    legend = axes.get_legend()
-    assert legend is not None
-    assert [text.get_text() for text in legend.get_texts()] == ["φ", "θ", "ψ"]
-
-
 def test_angles_at_events_are_within_one_turn_and_say_so() -> None:
     """Nobody follows the motion from event to event; phi = 0.3 + 2 t."""
     event = '[[events]]\nname = "level"\nexpression = "wx"'
@@ -154,25 +135,3 @@ def test_turns_that_a_load_reads_are_not_counted_from_samples() -> None:
     within_one_turn(run_text(config(loads=torque, time="end = 30\nsamples = 4", output=ANGLES)), 0.0)
     dense = run_text(config(loads=torque, time="end = 30\nsamples = 301", output=ANGLES), 'name="d"')
     assert "angles_wrapped_from" not in dense.dataset.attrs
-
-
-def test_a_motion_that_does_not_arrive_tells_no_turns() -> None:
-    """From a sample to another motion's: nothing is counted; from it to its own later state everything."""
-    prepared = prepare(
-        rigidsim.parse(config(SYMMETRIC, PRECESSING, (), "end = 100\nsamples = 2", "", ANGLES))
-    )
-    parts = assemble(prepared)
-    angles = angles_to_join(prepared.system)
-    unit = prepared.clock.exponent
-    start = Place(0.0, np.array(parts.stepper.state), np.array([0.3, 1.1, 0.2]))
-    assert parts.stepper.to(math.ldexp(100.0, -unit))
-    psi = 0.2 - 200 * math.cos(1.1) / 3
-    late = np.array([200.3, 1.1, psi]) % (2 * math.pi)
-    there = Place(math.ldexp(100.0, -unit), np.array(parts.stepper.state), late)
-    counter = TurnCounter(prepared.system, angles)
-    counter.begin(start)
-    turns = counter.turns(there)
-    assert turns is not None
-    np.testing.assert_allclose(late + 2 * math.pi * turns, [200.3, 1.1, psi], atol=1e-9)
-    counter.begin(Place(1.0, start.state, start.angles))
-    assert counter.turns(there) is None

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import threading
 import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -14,7 +13,7 @@ import numpy as np
 import pytest
 
 from rigidsim.store import chunks, netcdf
-from rigidsim.store.chunks import THREADS, ZLIB, ChunkedVariable, Threads, chunked, packed
+from rigidsim.store.chunks import THREADS, ChunkedVariable, Threads, chunked, packed
 from rigidsim.store.netcdf_file import writing
 
 ROWS = 70
@@ -69,13 +68,6 @@ def test_a_chunk_is_what_hdf5_would_have_written(tmp_path: Path) -> None:
     assert zlib.decompress(packed(values)) == zlib.decompress(theirs)
 
 
-def test_without_isal_the_content_is_the_same() -> None:
-    pytest.importorskip("isal")
-    fast, slow = packed(table()), packed(table(), ZLIB)
-    assert slow != fast  # another library's choice of words
-    assert zlib.decompress(slow) == zlib.decompress(fast)
-
-
 def test_chunks_that_fit_are_taken_as_they_are(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Of a finished dataset that is prolonged only the last chunk is compressed again."""
     values = table(100)
@@ -99,23 +91,3 @@ def test_chunks_that_fit_are_taken_as_they_are(tmp_path: Path, monkeypatch: pyte
     with h5py.File(tmp_path / "d.h5", "r") as file:
         assert file["rates"][:].tobytes() == values.tobytes()
         assert file["energy"][:].tobytes() == values[:, 1].tobytes()
-
-
-@pytest.mark.parametrize("options", [{}, {"compression": "gzip"}, {"chunks": (8, 3), "shuffle": True}])
-def test_chunks_of_another_make_are_not_taken(options: dict[str, object], tmp_path: Path) -> None:
-    with h5py.File(tmp_path / "other.h5", "w") as other, under_construction(tmp_path / "d.h5", ROWS) as made:
-        assert made["rates"].add_chunks_of(other.create_dataset("x", data=table(), **options)) == 0
-        made["rates"].add(table())
-        made["energy"].add(table()[:, 0])
-
-
-def test_an_error_ends_the_threads(tmp_path: Path) -> None:
-    def interrupted() -> None:
-        with under_construction(tmp_path / "d.h5", ROWS, Threads(2, fewest=0)) as made:
-            made["rates"].add(table())
-            assert any(thread.name.startswith("rigidsim-chunks") for thread in threading.enumerate())
-            raise KeyboardInterrupt
-
-    with pytest.raises(KeyboardInterrupt):
-        interrupted()
-    assert not [thread for thread in threading.enumerate() if thread.name.startswith("rigidsim-chunks")]

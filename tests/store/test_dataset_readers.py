@@ -28,10 +28,8 @@ from rigidsim.solve.precision import Precision, precision_of
 from rigidsim.solve.problem import InitialValueProblem, prepare
 from rigidsim.solve.sample_block import SampleBlock
 from rigidsim.solve.sampler import SampleReceiver
-from rigidsim.store.reader import open_dataset
 
 PRECISIONS = ['"single"', '"double"', '"extended"', '"quadruple"', "50"]
-PARTS = {'"single"': 1, '"double"': 1, '"extended"': 2, '"quadruple"': 3, "50": 4}
 
 HEAVY_TOP = """\
 name = "top"
@@ -120,32 +118,6 @@ def test_every_reader_reads_the_same(free: tuple[str, rigidsim.Run]) -> None:
             np.testing.assert_array_equal(values, old[name][:])
             if values.dtype == np.float64:
                 np.testing.assert_array_equal(values, raw[name][:], strict=True)
-
-
-@pytest.mark.parametrize(
-    "path", sorted((Path(__file__).parents[1] / "data").glob("*.h5")), ids=lambda p: p.stem
-)
-def test_our_reader_sees_what_the_general_one_sees(path: Path) -> None:
-    """Files that earlier versions wrote with h5netcdf, as well as those of this one."""
-    with open_dataset(path) as ours, xarray.open_dataset(path, engine="h5netcdf") as other:
-        assert ours.identical(other)
-        assert list(ours.variables) == list(other.variables)
-        assert ours.encoding == other.encoding
-        for name, variable in other.variables.items():
-            found = ours.variables[name]
-            assert (found.dtype, found.attrs) == (variable.dtype, variable.attrs)
-            told = set(found.encoding)
-            assert found.encoding == {key: variable.encoding[key] for key in told}
-        rows = np.array([3, 0, 2])
-        assert ours.isel(time=rows).identical(other.isel(time=rows))
-        assert ours.isel(time=slice(None, None, -2)).identical(other.isel(time=slice(None, None, -2)))
-
-
-def test_times_stay_numbers(free: tuple[str, rigidsim.Run]) -> None:
-    """Units that some readers would turn into dates are avoided."""
-    with xarray.open_dataset(free[1].folder.dataset) as dataset:
-        assert dataset.time.dtype == np.float64
-        assert dataset.time.attrs["units"] == "s"
 
 
 @pytest.mark.skipif(shutil.which("ncdump") is None, reason="ncdump isn't installed")
@@ -247,29 +219,6 @@ def test_the_summary_knows_the_dataset(free: tuple[str, rigidsim.Run]) -> None:
     assert run.summary["samples"] == run.summary["samples_planned"] == 49
 
 
-def test_only_doubles_and_texts_are_stored(free: tuple[str, rigidsim.Run]) -> None:
-    """netCDF4 readers crash on native long double; its digits are in the residuals."""
-    precision, run = free
-    with h5py.File(run.folder.dataset, "r") as raw:
-        kinds = {name: raw[name].dtype for name in raw}
-        texts = {name for name, kind in kinds.items() if h5py.check_string_dtype(kind)}
-        assert texts == {"body_axis", "space_axis", "quaternion_component"}
-        assert {kind for name, kind in kinds.items() if name not in texts} == {np.dtype("<f8")}
-        residuals = {name.removeprefix("energy") for name in raw if re.fullmatch(r"energy(_lo\d*)?", name)}
-    assert residuals == set(["", "_lo", "_lo2", "_lo3"][: PARTS[precision]])
-
-
-def test_long_runs_are_chunked_and_compressed(tmp_path: Path, free_body: Callable[..., str]) -> None:
-    run = rigidsim.run(rigidsim.parse(free_body("end = 4\nsamples = 8195")), out=tmp_path)
-    with h5py.File(run.folder.dataset, "r") as raw:
-        for name in ("time", "angular_velocity", "quaternion", "energy", "energy_drift"):
-            variable = raw[name]
-            assert variable.shape[0] == 8195
-            assert variable.chunks == (8192, *variable.shape[1:])
-            assert (variable.compression, variable.compression_opts) == ("gzip", 4)
-            assert variable.shuffle
-
-
 # Times
 
 
@@ -278,50 +227,6 @@ def _exact(dataset: xarray.Dataset, name: str) -> list[Fraction]:
     parts = [name + suffix for suffix in ("", "_lo", "_lo2", "_lo3") if name + suffix in dataset]
     columns = [dataset[part].values.ravel() for part in parts]
     return [sum((Fraction(float(x)) for x in row), Fraction(0)) for row in zip(*columns, strict=True)]
-
-
-def _rounded(value: Fraction, bits: int) -> Fraction:
-    """Nearest number of so many bits, ties to even."""
-    if value == 0:
-        return value
-    exponent = math.floor(math.log2(abs(value))) + 1 - bits
-    while abs(value) / Fraction(2) ** exponent >= 2**bits:
-        exponent += 1
-    return round(value / Fraction(2) ** exponent) * Fraction(2) ** exponent
-
-
-def test_dyadic_times_are_exact(free: tuple[str, rigidsim.Run]) -> None:
-    with free[1].dataset as dataset:
-        assert _exact(dataset, "time") == [Fraction(i, 16) for i in range(49)]
-
-
-@pytest.mark.parametrize("precision", PRECISIONS)
-def test_listed_times_are_the_decimals_as_written(
-    precision: str, tmp_path: Path, free_body: Callable[..., str]
-) -> None:
-    written = ["0", "0.1", "0.3", "1", "1.2345678901234567890123456789", "2.7"]
-    text = free_body(f"times = [{', '.join(written)}]", precision=precision)
-    prepared = prepare(rigidsim.parse(text))
-    with rigidsim.run(rigidsim.parse(text), out=tmp_path).dataset as dataset:
-        times = _exact(dataset, "time")
-    assert times == [_rounded(Fraction(t), prepared.precision.bits) for t in written]
-
-
-def test_a_decimal_grid_is_i_times_span_over_intervals(tmp_path: Path, free_body: Callable[..., str]) -> None:
-    """Never added up: sample i is the double nearest to i/10, the last one the end itself."""
-    with rigidsim.run(rigidsim.parse(free_body("end = 3.3\nevery = 0.1")), out=tmp_path).dataset as dataset:
-        times = dataset.time.values
-    assert len(times) == 34
-    assert times[-1] == 3.3
-    # i * 3.3 / 33: two roundings of half an ulp and the half of 3.3 itself
-    np.testing.assert_allclose(times, np.arange(34) / 10, rtol=1.5 * 2.0**-52, atol=0)
-
-
-def test_a_start_that_is_not_zero(tmp_path: Path, free_body: Callable[..., str]) -> None:
-    text = free_body("start = 1.5\nend = 3.5\nsamples = 5")
-    with rigidsim.run(rigidsim.parse(text), out=tmp_path).dataset as dataset:
-        assert dataset.time.values.tolist() == [1.5, 2.0, 2.5, 3.0, 3.5]
-        assert dataset.angular_velocity.values[0].tolist() == [0.3, 1.0, 0.5]
 
 
 # Every digit
@@ -363,19 +268,6 @@ def test_the_parts_add_up_to_the_state(free: tuple[str, rigidsim.Run]) -> None:
     assert quaternions == [x for row in expected for x in row[3:]]
     if bits > 53:  # and the residuals do say something that a double doesn't
         assert sum(Fraction(float(x)) != x for x in quaternions) > len(quaternions) // 2
-
-
-@pytest.mark.parametrize("precision", ['"extended"', '"quadruple"', "50"])
-def test_the_lead_is_the_nearest_double(
-    precision: str, tmp_path: Path, free_body: Callable[..., str]
-) -> None:
-    text = free_body(precision=precision)
-    with rigidsim.run(rigidsim.parse(text), out=tmp_path).dataset as dataset:
-        for name in ("time", "angular_velocity", "quaternion", "angular_momentum", "energy"):
-            exact = _exact(dataset, name)
-            assert dataset[name].values.ravel().tolist() == [float(x) for x in exact]  # correctly rounded
-            assert dataset[f"{name}_lo"].attrs["residual_of"] == name
-            assert f"{name}_lo + {name}" in dataset[name].attrs["exact_value"]
 
 
 NAMES: list[str | int] = ["single", "double", "extended", "quadruple", 20, 50, 100, 250]

@@ -91,25 +91,6 @@ def test_it_is_what_h5netcdf_writes(path: Path, tmp_path: Path) -> None:
         assert found[name] == expected[name], name
 
 
-def test_netcdf_goes_on_writing_it(path: Path) -> None:
-    """Only files that keep the order of what is in them can be changed by netCDF's own library."""
-    with netCDF4.Dataset(path, "a") as data:
-        data.createVariable("more", "f8", ("time",))[:] = VALUES[:, 2]
-        data.title = "changed"
-    with xarray.open_dataset(path) as dataset:
-        assert dataset.attrs["title"] == "changed"
-        np.testing.assert_array_equal(dataset.more, dataset.rates.sel(axis="z"))
-
-
-def test_what_no_reader_would_understand_is_refused(tmp_path: Path) -> None:
-    with (
-        (tmp_path / "x.h5").open("w+b") as target,
-        writing(target) as file,
-        pytest.raises(TypeError, match="attribute of_what: None is neither a text nor made of numbers"),
-    ):
-        file.attributes({"of_what": None})
-
-
 def test_groups_hold_plain_arrays(tmp_path: Path) -> None:
     arrays = {"counts": np.array([1, 2, 3]), "state_0": np.array([[0.1, -0.0]]), "scalar": np.array(2.5)}
     made = tmp_path / "made.h5"

@@ -8,13 +8,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
 import rigidsim
-from rigidsim.cli.app import app
 from rigidsim.errors import RunFolderError
-from rigidsim.store.folder import RunFolder
-from rigidsim.store.summary import Brief
 
 
 @pytest.fixture
@@ -66,15 +62,6 @@ def test_force_replaces_all_of_it(finished: rigidsim.Run, free_body: Callable[..
     assert "samples = 9" in again.folder.config.read_text()
 
 
-def test_force_replaces_a_run_that_was_plotted(finished: rigidsim.Run, free_body: Callable[..., str]) -> None:
-    result = CliRunner().invoke(app, ["plot", str(finished.folder.path)])
-    assert result.exit_code == 0, result.output
-    assert (finished.folder.path / "figure.png").exists()
-    again = rigidsim.run(rigidsim.parse(free_body()), out=finished.folder.path.parent, force=True)
-    assert again.status == "finished"
-    assert not (finished.folder.path / "figure.png").exists()
-
-
 def test_an_unfinished_run_is_not_overwritten(tmp_path: Path, free_body: Callable[..., str]) -> None:
     stopped = partial(tmp_path, free_body)
     assert stopped.status == "stopped: max_steps"
@@ -95,20 +82,6 @@ def test_foreign_files_are_left_alone(force: bool, tmp_path: Path, free_body: Ca
         rigidsim.run(rigidsim.parse(free_body()), out=tmp_path, force=force)
     assert [p.name for p in (tmp_path / "free").iterdir()] == ["thesis.tex"]
     assert thesis.read_text() == "years of work"
-
-
-def test_hidden_files_are_no_obstacle(tmp_path: Path, free_body: Callable[..., str]) -> None:
-    """What a file manager leaves behind, or a killed run's temporary file."""
-    (tmp_path / "free").mkdir()
-    (tmp_path / "free" / ".DS_Store").touch()
-    assert rigidsim.run(rigidsim.parse(free_body()), out=tmp_path).status == "finished"
-
-
-def test_a_file_in_the_place_of_the_folder(tmp_path: Path, free_body: Callable[..., str]) -> None:
-    (tmp_path / "free").write_text("a file")
-    with pytest.raises(RunFolderError, match="is no folder; choose another out or name"):
-        rigidsim.run(rigidsim.parse(free_body()), out=tmp_path, force=True)
-    assert (tmp_path / "free").read_text() == "a file"
 
 
 @pytest.mark.parametrize("where", ["a file as parent", "/proc"])
@@ -165,15 +138,6 @@ def test_a_damaged_summary_is_refused(content: bytes, finished: rigidsim.Run) ->
         rigidsim.open_run(finished.folder.path)
 
 
-@pytest.mark.parametrize("kept", [0, 100, 5000])
-def test_a_damaged_dataset_is_refused(kept: int, finished: rigidsim.Run) -> None:
-    content = finished.folder.dataset.read_bytes()
-    assert len(content) > 5000
-    finished.folder.dataset.write_bytes(content[:kept])
-    with pytest.raises(RunFolderError, match=r"dataset\.h5: can't be read"):
-        _ = rigidsim.open_run(finished.folder.path).dataset
-
-
 def test_a_run_without_a_summary_was_killed(finished: rigidsim.Run) -> None:
     finished.folder.summary.unlink()
     finished.folder.dataset.unlink()
@@ -183,12 +147,3 @@ def test_a_run_without_a_summary_was_killed(finished: rigidsim.Run) -> None:
     assert "killed" in opened.summary["message"]
     with pytest.raises(RunFolderError, match="nothing was saved"):
         _ = opened.dataset
-
-
-def test_a_summary_is_replaced_as_a_whole(tmp_path: Path) -> None:
-    folder = RunFolder(tmp_path)
-    folder.write_summary(Brief.model_validate({"status": "running", "value": 0.1}))
-    with pytest.raises(ValueError, match="Out of range float"):
-        folder.write_summary(Brief.model_validate({"status": "finished", "value": float("nan")}))
-    assert folder.read_summary().as_dict() == {"status": "running", "value": 0.1}
-    assert [p.name for p in tmp_path.iterdir()] == ["summary.json"]

@@ -18,7 +18,7 @@ import rigidsim
 from rigidsim.errors import RunFolderError
 from rigidsim.session.tuning import Tuning
 from rigidsim.solve.sampler import Pacing
-from rigidsim.store import chunks, netcdf, segments
+from rigidsim.store import netcdf
 from rigidsim.store.segments import SegmentLimits, SegmentWriter, read_chain, segment_paths
 from rigidsim.store.variables import SCHEMA_VERSION, Variable, time_variable
 
@@ -76,17 +76,6 @@ def test_each_segment_is_a_dataset_of_its_own(tmp_path: Path) -> None:
             np.testing.assert_array_equal(segment.energy_drift, expected["energy_drift"][0][:, 0])
 
 
-def test_a_written_segment_is_never_touched_again(tmp_path: Path) -> None:
-    w = writer(tmp_path / "s")
-    w.add(block(0, 4))
-    w.flush(CHECKPOINT, {})
-    first = tmp_path / "s" / "00000000.h5"
-    before = (first.read_bytes(), first.stat().st_mtime_ns, first.stat().st_ino)
-    w.add(block(4, 4))
-    w.flush(CHECKPOINT, {})
-    assert (first.read_bytes(), first.stat().st_mtime_ns, first.stat().st_ino) == before
-
-
 def test_a_segment_without_samples_still_has_a_checkpoint(tmp_path: Path) -> None:
     """A slow run between two samples has something to lose, too."""
     w = writer(tmp_path / "s")
@@ -102,31 +91,6 @@ def test_a_segment_without_samples_still_has_a_checkpoint(tmp_path: Path) -> Non
         "state_parts": [[0.1, 0.2]],
     }
     assert w.complete(tmp_path / "d.h5", {}) == 3
-
-
-def test_a_segment_is_due_by_size(tmp_path: Path) -> None:
-    row = 8 * (2 + 6 + 1)
-    w = writer(tmp_path / "s", SegmentLimits(bytes=10 * row))
-    w.add(block(0, 9))
-    assert not w.due
-    w.add(block(9, 1))
-    assert w.due
-    w.flush(CHECKPOINT, {})
-    assert w.saved_rows == 10
-    assert not w.due
-
-
-def test_a_segment_is_due_by_age(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    now = [100.0]
-    monkeypatch.setattr(segments.time, "monotonic", lambda: now[0])
-    w = writer(tmp_path / "s", SegmentLimits(seconds=30.0))
-    w.add(block(0, 1))
-    now[0] += 30.0 - 0.1
-    assert not w.due
-    now[0] += 0.2
-    assert w.due
-    w.flush(CHECKPOINT, {})
-    assert not w.due
 
 
 def full_disk(*_: Any, **__: Any) -> None:
@@ -241,32 +205,6 @@ def test_a_run_in_many_segments_is_the_run_in_one(
         assert not run.folder.segments.exists()
         assert names(run.folder.path) == ["checkpoint.h5", "config.toml", "dataset.h5", "summary.json"]
     same_bits(one, many)
-
-
-def test_whole_chunks_are_compressed_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Those of segments that begin with a chunk are copied: here the fourth and the fifth of six."""
-    chunk, packed = netcdf.CHUNK_ROWS, []
-    original = chunks.packed
-    monkeypatch.setattr(chunks, "packed", lambda values: packed.append(values.size) or original(values))
-    w = writer(tmp_path / "s")
-    first = 0
-    for rows in (chunk - 3, 2 * chunk + 3, chunk, chunk + 5, 100):  # the last segment begins within a chunk
-        w.add(block(first, rows))
-        w.flush(CHECKPOINT, {})
-        first += rows
-    numbers = sorted(chunk * width for width in (1, 1, 3, 3, 1))  # of a chunk of each part
-    assert sorted(packed) == sorted(3 * numbers)  # with what begins the sixth
-    with (
-        h5py.File(tmp_path / "s" / "00000002.h5") as segment,
-        h5py.File(tmp_path / "s" / "00000004.h5") as rest,
-    ):
-        assert segment["rates"].chunks == (chunk, 3)
-        assert rest["rates"].chunks is None
-    packed.clear()
-    assert w.complete(tmp_path / "d.h5", {}) == first
-    assert sorted(packed) == sorted(4 * numbers)
-    with xarray.open_dataset(tmp_path / "d.h5") as dataset:
-        np.testing.assert_array_equal(dataset.rates_lo, block(0, first)["rates"][1])
 
 
 def test_a_dense_run_saves_whole_chunks_and_resumes_from_there(

@@ -9,13 +9,11 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from pydantic import ValidationError
 
 import rigidsim
 from rigidsim.errors import RunFolderError
 from rigidsim.store.attributes import Use, read_attributes
-from rigidsim.store.summary import Brief, Summary, read_summary
-from rigidsim.store.summary_parts import Caution, WarningCode
+from rigidsim.store.summary import Brief, read_summary
 
 # hundreds of turns between samples, of a quaternion that matrices don't carry: a warning is certain
 BLURRED = (
@@ -38,25 +36,6 @@ def test_what_a_run_returns_is_what_it_wrote(run: rigidsim.Run) -> None:
     opened = rigidsim.open_run(run.folder.path)
     assert opened.summary == written
     assert opened.outcome == run.outcome
-
-
-def test_a_warning_has_a_code_beside_its_text(run: rigidsim.Run) -> None:
-    assert run.summary["warning_codes"] == ["not_joined"]
-    assert len(run.summary["warnings"]) == 1
-    assert "can't be joined with certainty" in run.summary["warnings"][0]
-    assert isinstance(run.outcome, Summary)
-    assert run.outcome.cautions == [Caution(WarningCode.NOT_JOINED, run.summary["warnings"][0])]
-
-
-def test_what_becomes_known_goes_into_a_copy(run: rigidsim.Run) -> None:
-    assert isinstance(run.outcome, Summary)
-    later = run.outcome.having(timeline_sha256="0" * 64)
-    assert later.as_dict() == {**run.summary, "timeline_sha256": "0" * 64}
-    assert "timeline_sha256" not in run.outcome.as_dict()
-    with pytest.raises(ValidationError, match="frozen"):
-        run.outcome.status = "finished"  # type: ignore[misc]
-    with pytest.raises(ValidationError, match="timeline_sha256"):
-        run.outcome.having(timeline_sha256="none")
 
 
 def test_an_older_summary_is_read_and_written_again_as_it_is(run: rigidsim.Run, tmp_path: Path) -> None:

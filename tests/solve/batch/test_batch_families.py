@@ -1,11 +1,8 @@
 """Families: whoever shares a system has exactly the numbers of its own build; others are told apart."""
 
 import re
-from decimal import Decimal
-from fractions import Fraction
 
 import heyoka as hy
-import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -13,16 +10,9 @@ from support import config
 
 from rigidsim.errors import ConfigError
 from rigidsim.scene.config import parse
-from rigidsim.scene.exact import ExactNumber, decimal_text
-from rigidsim.scene.sweep_table import AxisTable
 from rigidsim.scene.sweeps.sweep import Sweep
-from rigidsim.scene.sweeps.values import axis_values
-from rigidsim.scene.tracing.numbers import Traced
-from rigidsim.scene.tracing.whole import TracedWhole
-from rigidsim.solve.batch.double_double import nearest_double
-from rigidsim.solve.batch.exact_doubles import Distinct, drawn_in_two_doubles
 from rigidsim.solve.batch.family import Alone, Families, batchable
-from rigidsim.solve.batch.members import AxisNumbers, Members
+from rigidsim.solve.batch.members import Members
 from rigidsim.solve.problem import prepare
 
 FREE = config(
@@ -59,8 +49,6 @@ TORQUE = config(
     output='record = ["angular_velocity", "quaternion"]',
     more='[parameters]\nk = 0.1\n[[events]]\nname = "flip"\nexpression = "wx - k/3"',
 )
-
-COUNT = 500
 
 
 def swept(text: str, axes: dict[str, str], mode: str = "zip") -> Sweep:
@@ -188,14 +176,6 @@ def test_a_bad_member_is_refused_as_its_own_run_would_be() -> None:
     assert sorted(numbers.members.tolist() for _, numbers in found.groups) == [[0, 1, 4]]
 
 
-def test_what_is_no_parameter_separates_families() -> None:
-    axes = {"time.end": "values = [5, 10]", "initial.angular_velocity[0]": "values = [0.2, 0.3]"}
-    found = Families(Members.of(swept(FREE, axes, mode="product"))).sort()
-    assert sorted(numbers.members.tolist() for _, numbers in found.groups) == [[0, 1], [2, 3]]
-    ends = {float(family.traced.prepared.scene.end) for family, _ in found.groups}
-    assert ends == {5.0, 10.0}
-
-
 @pytest.mark.parametrize(
     ("override", "reason"),
     [
@@ -247,75 +227,3 @@ def test_a_member_belongs_to_its_family_whoever_represents_it() -> None:
         numbers.append(rows)
     assert numbers[0] == numbers[1]
     assert sorted(numbers[0]) == [0, 1, 2]
-
-
-def test_traced_numbers_are_hashed_for_comparison_alone() -> None:
-    family = Families(Members.of(swept(FREE, {"body.mass": "values = [1, 2]"}))).sort().groups[0][0]
-    mass = family.traced.system.scene.body.mass
-    assert isinstance(mass, Traced)
-    assert hash(mass) == hash(mass + 1)
-    assert isinstance(family.traced.system.scaling.time, int | TracedWhole)
-    assert np.isfinite(float(mass.value))
-
-
-@pytest.mark.parametrize(
-    ("text", "exact"),
-    [
-        ("0", True),
-        ("3", True),
-        ("0.375", True),
-        ("9007199254740993", True),  # one more than a double holds
-        ("0.1", False),
-        ("-1/3", False),
-        ("5791275151624127793/2500000000000000000", False),
-        ("1e-320", False),  # the second part is below every double
-        ("123456789012345678901234567890123456789/10000000000000000000000000000000000000001", False),
-    ],
-)
-def test_a_swept_number_in_two_doubles_is_within_its_bound(text: str, exact: bool) -> None:
-    value = Fraction(text)
-    found = Distinct([ExactNumber(value)]).doubled
-    high, low, error = (Fraction(float(part[0])) for part in (found.high, found.low, found.error))
-    assert high == Fraction(float(value))
-    assert abs(value - high - low) <= error
-    assert error <= abs(value) * Fraction(1, 2**105) + Fraction(5e-324)
-    assert (error == 0) == exact
-
-
-@given(
-    way=st.sampled_from(["uniform", "normal"]),
-    ends=st.tuples(*[st.decimals(allow_nan=False, allow_infinity=False, places=7)] * 2),
-    power=st.integers(-320, 290),
-    seed=st.integers(0, 99),
-)
-@settings(max_examples=60, deadline=None)
-def test_numbers_drawn_together_are_within_their_bounds_and_rounded_right(
-    way: str, ends: tuple[Decimal, Decimal], power: int, seed: int
-) -> None:
-    low, high = (Fraction(end) / 10**9 * Fraction(10) ** power for end in sorted(ends))
-    given = [decimal_text(low), decimal_text(high if way == "uniform" else high - low)]
-    count = 5
-    table = AxisTable.model_validate({way: given, "count": count})
-    values = axis_values(table, "body.mass", seed, 0)
-    assert values.drawn is not None
-    found = drawn_in_two_doubles(values.drawn[0], np.arange(count))
-    nearest, sure = nearest_double(found)
-    for index in range(count):
-        exact = values.drawn[0].value(index)
-        if not np.isfinite([found.high[index], found.low[index], found.error[index]]).all():
-            assert not sure[index]
-            continue
-        parts = (Fraction(float(part[index])) for part in (found.high, found.low, found.error))
-        first, second, error = parts
-        assert abs(exact - first - second) <= error
-        assert not sure[index] or nearest[index] == float(exact)
-
-
-def test_labels_are_the_doubles_nearest_to_drawn_values() -> None:
-    rates = f"uniform = [[-1, 0, 0], [1, 1e-3, 0]], count = {COUNT}"
-    sweep = swept(FREE, {"initial.angular_velocity": rates, "time.end": f"normal = [9, 1], count = {COUNT}"})
-    numbers = AxisNumbers(sweep)
-    numbers.look_at(np.arange(0, COUNT, 3))
-    for place, axis in enumerate(sweep.axes):
-        exact = [[float(x.rational) for x in axis.exact(index)] for index in range(COUNT)]
-        assert np.array_equal(numbers.nearest(place), exact)

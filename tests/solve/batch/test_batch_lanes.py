@@ -199,12 +199,3 @@ def test_events_and_guards_end_members() -> None:
             assert set(block.status) == {status}
             assert (block.reached < 5).all()
             assert (block.steps <= 3).all() or status is Status.MAX_DRIFT
-
-
-def test_drift_bounds_and_turns_between_samples() -> None:
-    (block,) = blocks_of(swept(FREE, {"initial.angular_velocity[0]": "values = [0.5, 0.6]"}))
-    largest = max(np.abs(table).max() for table in block.drifts.values())
-    assert 0 < largest < block.drift_bound.min()
-    assert np.allclose(block.drift_bound, 50 * EPSILON["double"] * np.sqrt(block.steps))
-    rates = np.linalg.norm(block.values["angular_velocity"], axis=2).max(axis=0)
-    assert (block.radians_between >= 0.5 * rates * 2.5).all()
