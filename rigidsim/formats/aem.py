@@ -21,13 +21,8 @@ def write_aem(table: Table, path: Path, source: TableSource) -> None:
     """Write the attitude of one run.
 
     Args:
-        table: table along time.
         path: the file, which is replaced.
         source: the run, whose attributes or naming give epoch and axes.
-
-    Raises:
-        RigidsimError: no quaternion was recorded, epoch or axes are unknown, or there is something that
-            the standard can't express.
     """
     quaternion = ccsds.columns_of(table, "quaternion", "wxyz", "AEM")
     named = labels(source.naming, source.attributes)

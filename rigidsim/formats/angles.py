@@ -16,11 +16,7 @@ _PI = np.longdouble("3.141592653589793238462643383279502884")
 
 
 def angle_unit_named(name: str) -> AngleUnit:
-    """The unit of angle with the given name.
-
-    Raises:
-        RigidsimError: there is no such unit.
-    """
+    """The unit of angle with the given name."""
     if name not in ANGLE_UNITS:
         raise RigidsimError(f'--angle-unit: given "{name[:40]}"; allowed: {", ".join(ANGLE_UNITS)}')
     return ANGLE_UNITS[name]

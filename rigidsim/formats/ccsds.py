@@ -25,11 +25,7 @@ LONGEST_LINE = 254
 
 
 def tag(epoch: Epoch, seconds: Decimal) -> str:
-    """The time tag ``YYYY-MM-DDThh:mm:ss.d`` of a time of the scene, in the epoch's scale, to 1e-14 s.
-
-    Raises:
-        RigidsimError: the scale has no time tags.
-    """
+    """The time tag ``YYYY-MM-DDThh:mm:ss.d`` of a time of the scene, in the epoch's scale, to 1e-14 s."""
     try:
         return epoch.after(seconds).calendar()
     except ValueError as error:
@@ -44,11 +40,7 @@ def number(value: Decimal) -> str:
 
 
 def _keyword(name: str, value: str) -> str:
-    """A ``NAME = VALUE`` line.
-
-    Raises:
-        RigidsimError: the value holds characters that a message can't.
-    """
+    """A ``NAME = VALUE`` line."""
     text = value.upper()
     if not re.fullmatch(r"[\x21-\x7e]([\x20-\x7e]*[\x21-\x7e])?", text) or len(text) > 200:
         raise RigidsimError(f"{name}: given {value[:60]!a}; 1 to 200 printable ASCII characters are allowed")
@@ -63,16 +55,7 @@ def opening(
     frames: Sequence[tuple[str, str]],
     *ending: str,
 ) -> list[str]:
-    """The lines above a message's data: header and metadata.
-
-    Args:
-        message: "AEM" or "OEM".
-        frames: keywords for the reference frames, with their values.
-        ending: last lines of the metadata.
-
-    Raises:
-        RigidsimError: the run has no samples, or there is something that the standard can't express.
-    """
+    """The lines above a message's data: header and metadata."""
     naming = source.naming
     start, stop = _span(table, labels.epoch, source.bits)
     notes = [
@@ -105,11 +88,7 @@ def _comments(lines: Sequence[str]) -> list[str]:
 
 
 def columns_of(table: Table, variable: str, labels: Sequence[str], message: str) -> list[TableColumn]:
-    """The columns of a variable.
-
-    Raises:
-        RigidsimError: the variable wasn't recorded.
-    """
+    """The columns of a variable."""
     found = [table.column(f"{variable}_{label}") for label in labels]
     if any(column is None for column in found):
         raise RigidsimError(
@@ -120,11 +99,7 @@ def columns_of(table: Table, variable: str, labels: Sequence[str], message: str)
 
 
 def _span(table: Table, epoch: Epoch, bits: int) -> tuple[str, str]:
-    """Time tags of the first and the last sample.
-
-    Raises:
-        RigidsimError: there are no samples, or times that have no tag.
-    """
+    """Time tags of the first and the last sample."""
     time = table.columns[0]
     if not table.rows or time.name != "time":
         raise RigidsimError("the run holds no samples yet; there is nothing to export")
@@ -147,9 +122,6 @@ def data_lines(
 
     Args:
         shown: converts a row's numbers: units, order, axes.
-
-    Raises:
-        RigidsimError: a number isn't finite, or neighbouring times have the same tag.
     """
     previous, row = "", 0
     for block in table.blocks([table.columns[0], *columns]):

@@ -25,9 +25,7 @@ def write_csv(table: Table, path: Path, source: TableSource) -> None:
     """Write one table.
 
     Args:
-        table: rows and columns.
         path: the file, which is replaced.
-        source: the run, for the comment at the top and for the digits.
     """
     columns = [column for column in table.columns if not column.is_date]
     dates = _dates(table, source)

@@ -32,12 +32,6 @@ _FIRST = ("status", "warnings", "steps")
 class MemberTable(Table):
     """A table of members, the last axis varying fastest; in a long table a member's own rows follow one
     another.
-
-    Attributes:
-        members: dimensions of the members.
-        values: columns of kept values, among ``columns``.
-        reasons: why members failed, by member.
-        block_numbers: numbers of all columns held in memory at once.
     """
 
     members: tuple[str, ...] = ()
@@ -118,12 +112,7 @@ class MemberTable(Table):
 
 
 class _Block:
-    """Members, with some of their samples, that are read together.
-
-    Attributes:
-        members: numbers of the members.
-        steps: indices of the samples, events or lines of each.
-    """
+    """Members, with some of their samples, that are read together."""
 
     def __init__(self, dataset: xarray.Dataset, members: range, steps: range) -> None:
         self.members, self.steps = members, steps
@@ -151,10 +140,7 @@ def member_tables(
     """The table of the members, then the long tables.
 
     Args:
-        dataset: dataset of a sweep.
         angle_unit: unit to which angles are converted.
-        bits: bits of the members' precision, or more.
-        block_numbers: numbers held in memory at once.
     """
     members = tuple(map(str, dataset["status"].dims))
     axes = [str(name) for name, variable in dataset.variables.items() if "swept_key" in variable.attrs]

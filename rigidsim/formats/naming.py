@@ -34,8 +34,6 @@ class Naming:
         axes: the scene's space axes, as in ``[frame] axes``, or another name that sender and receiver agree
             on (capitals, digits and underscores); empty for the config's.
         object_name: name of the body; empty for the run's name.
-        object_id: its international designator, or UNKNOWN.
-        center: name of the origin of positions.
     """
 
     epoch: str = ""
@@ -52,7 +50,6 @@ class Turn:
     Attributes:
         quaternion: attitude of the scene's axes in the message's, w x y z.
         matrix: turns vectors of the scene's axes into the message's.
-        words: description for the message's comments.
     """
 
     quaternion: list[Decimal]
@@ -76,7 +73,6 @@ class Labels:
     """Epoch and axes that a message names.
 
     Attributes:
-        epoch: time zero of the scene.
         frame: axes of the message: the scene's, if the standard knows them.
         turn: rotation from the scene's axes to the message's; None if they are the same.
     """
@@ -111,11 +107,7 @@ def _decimals(values: list[Any]) -> list[Decimal]:
 
 
 def labels(naming: Naming, attributes: Mapping[str, Any]) -> Labels:
-    """Epoch and axes of a message, from the options given and the run's own attributes.
-
-    Raises:
-        RigidsimError: one of them is given by neither, they contradict each other, or an option is malformed.
-    """
+    """Epoch and axes of a message, from the options given and the run's own attributes."""
     epoch = named_epoch(naming, attributes)
     axes = _axes(naming.axes, str(attributes.get("axes", "")))
     if axes != ECLIPTIC:
@@ -127,11 +119,7 @@ def labels(naming: Naming, attributes: Mapping[str, Any]) -> Labels:
 
 
 def named_epoch(naming: Naming, attributes: Mapping[str, Any]) -> Epoch:
-    """Date of time 0, from the run or from an option.
-
-    Raises:
-        RigidsimError: neither gives it, they contradict each other, or the option is malformed.
-    """
+    """Date of time 0, from the run or from an option."""
     given, known = naming.epoch, str(attributes.get("epoch", ""))
     try:
         epoch = parse_epoch(given) if given else None

@@ -17,13 +17,8 @@ def write_oem(table: Table, path: Path, source: TableSource) -> None:
     """Write the flight of one run, km and km/s.
 
     Args:
-        table: table along time.
         path: the file, which is replaced.
         source: the run, whose attributes or naming give epoch and axes.
-
-    Raises:
-        RigidsimError: no position and velocity were recorded, epoch or axes are unknown, or something that
-            the standard can't express.
     """
     state = [
         *ccsds.columns_of(table, "position", "XYZ", "OEM"),

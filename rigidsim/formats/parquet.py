@@ -14,7 +14,6 @@ def write_parquet(table: Table, path: Path, source: TableSource) -> None:
     Args:
         table: rows and columns; residuals become columns such as ``time_lo``.
         path: the file, which is replaced.
-        source: the run, for the file's metadata.
     """
     import pyarrow as pa
     import pyarrow.parquet as pq

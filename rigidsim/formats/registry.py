@@ -21,9 +21,6 @@ class TableSource:
     """The run, or the sweep, that a table comes from.
 
     Attributes:
-        title: its name.
-        bits: bits of its precision.
-        attributes: attributes of its dataset.
         naming: what the dataset may not say about itself.
         angle_unit: unit of angles; None for rad.
     """
@@ -55,11 +52,7 @@ class Format:
 
 
 def format_named(name: str) -> Format:
-    """The format ``rigidsim.formats.NAME.FORMAT``.
-
-    Raises:
-        RigidsimError: there is no such format, or the package that it needs is missing.
-    """
+    """The format ``rigidsim.formats.NAME.FORMAT``."""
     if name not in FORMATS:
         raise RigidsimError(f'--format: given "{name[:40]}"; allowed: {", ".join(FORMATS)}')
     found: Format = import_module(f"rigidsim.formats.{name}").FORMAT

@@ -30,11 +30,8 @@ class TableColumn:
 
     Attributes:
         variable: variable that it is a component of, such as ``angular_velocity``.
-        suffix: suffix of the component, such as ``_x``.
         index: index of the component, besides the row.
         parts: names of the variables whose sum, smallest first, is the exact value; the nearest double first.
-        attributes: the variable's units, long_name, ...
-        kind: "f" for float64, "M" for datetime64, "i" for int64, "U" for texts.
         angle_unit: unit of its angles, with which the column's name ends; None if unchanged.
     """
 
@@ -90,10 +87,7 @@ class Table:
     """Columns along one dimension.
 
     Attributes:
-        dim: "time", or the name of an event, ...
-        columns: the columns, beginning with the coordinate if there is one.
         dataset: dataset from which the columns are read, block by block.
-        bits: bits of the run's precision.
     """
 
     dim: str
@@ -154,7 +148,6 @@ def tables_of(dataset: xarray.Dataset, angle_unit: AngleUnit | None = None, bits
 
     Args:
         angle_unit: unit to which angles are converted.
-        bits: bits of the run's precision.
     """
     variables = dataset.variables
     names = [str(name) for name, found in variables.items() if found.dims and found.dtype.kind in "fM"]

@@ -26,8 +26,6 @@ def write_zarr(table: Table, path: Path, source: TableSource) -> None:
 
     Args:
         table: table along time, or of a sweep's members; its whole dataset is written.
-        path: the folder.
-        source: the run, for the attributes of the store.
     """
     dataset = table.dataset
     attributes = {str(key): _json(value) for key, value in source.attributes.items()}

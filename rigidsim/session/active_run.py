@@ -34,7 +34,6 @@ class ActiveRun:
 
     Attributes:
         folder: the run's folder; None in memory.
-        run_id: the same in all sessions of a run.
         attributes: root attributes of its segments, and of its dataset as far as they are known beforehand.
         variables: what the dataset holds along time.
     """
@@ -55,14 +54,7 @@ class ActiveRun:
     def begun(
         cls, session: Session, prepared: InitialValueProblem, folder: RunFolder | None, chain: Chain | None
     ) -> ActiveRun:
-        """Compile what the run needs, and go to where it begins.
-
-        Args:
-            chain: segments to resume from, with the arrays of the last one's checkpoint.
-
-        Raises:
-            RunFolderError: the folder can't be written, or the checkpoint belongs to another system.
-        """
+        """Compile what the run needs, and go to where it begins."""
         parts = assemble(prepared)
         system, progress = prepared.system, Progress(prepared.clock.count)
         statistics = SampleStatistics([i.name for i in system.invariants], [r.name for r in system.recorded])

@@ -26,7 +26,6 @@ def root_attributes(
 
     Args:
         parts: what it was compiled to.
-        run_id: identifies this run.
         mixed: what changed in versions or machine since the run began; empty if nothing did.
     """
     scene, system = prepared.scene, prepared.system
@@ -101,11 +100,7 @@ def _as_json(tables: Mapping[str, TableErrors]) -> str | None:
 def of_complete(
     attributes: RootAttributes, summary: Summary, effort: Effort, angles_wrapped_from: float = math.nan
 ) -> RootAttributes:
-    """Attributes of the dataset of a run that ended.
-
-    Args:
-        angles_wrapped_from: see ``SampleStatistics``.
-    """
+    """Attributes of the dataset of a run that ended."""
     put_back = {name: row.put_back for name, row in summary.invariants.items()}
     return attributes.having(
         status=summary.status,

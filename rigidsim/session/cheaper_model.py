@@ -17,7 +17,6 @@ class CheaperModel:
     """An averaged model that could replace a run that resolved every rotation.
 
     Attributes:
-        level: level of ``[model]``, with short-period terms.
         error: error of the recorded axes at the end, rad.
         share: largest share of the run's steps that it would take.
     """

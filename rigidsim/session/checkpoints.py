@@ -14,11 +14,7 @@ from rigidsim.store.segments import Chain
 
 
 class Checkpoints:
-    """Packs and restores stepper, effects, events, and other parts that samples and counts depend on.
-
-    Args:
-        others: the parts besides those of the assembly, by name.
-    """
+    """Packs and restores stepper, effects, events, and other parts that samples and counts depend on."""
 
     def __init__(self, parts: Assembly, **others: SavedPart) -> None:
         self._precision, self._system = parts.prepared.precision, parts.prepared.system
@@ -39,17 +35,7 @@ class Checkpoints:
         return pack_events(self._log.found[first : position.boundary.mark.events], self._precision)
 
     def restore(self, chain: Chain) -> Position:
-        """Put the last checkpoint back.
-
-        Args:
-            chain: the segments to resume from.
-
-        Returns:
-            Where the integration continues.
-
-        Raises:
-            RunFolderError: the checkpoint belongs to another system, or to other code.
-        """
+        """Put the last checkpoint back."""
         try:
             arrays = netcdf.read_group(chain.paths[-1], "checkpoint")
             check_versions(arrays, self._versions)

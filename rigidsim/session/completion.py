@@ -29,7 +29,6 @@ class Completion:
     """Completes the files of a run that has ended.
 
     Attributes:
-        extras: variables with dimensions of their own.
         unused: names of variables along time that the dataset leaves out.
         summary: without the files' digests at first; replaced as they become known.
     """
@@ -45,9 +44,6 @@ class Completion:
     def complete(self) -> Summary:
         """Write the files; after a Ctrl-C, leave a state that can be resumed from and return a summary that
         says so.
-
-        Raises:
-            RunFolderError: the folder can't be written.
         """
         try:
             self._write_dataset()
@@ -110,14 +106,7 @@ def with_timeline(
     observer: Observer,
     kept: KeptRows | None = None,
 ) -> Summary:
-    """Draw a complete dataset's timeline, if requested; returns the summary with its digest.
-
-    Args:
-        kept: the timeline's rows, if they were kept.
-
-    Raises:
-        StoppedWritingError: the timeline can't be written.
-    """
+    """Draw a complete dataset's timeline, if requested; returns the summary with its digest."""
     if not output.timeline or not summary.samples:
         return summary
     from rigidsim.look.timeline import write_timeline

@@ -33,12 +33,7 @@ Parts = tuple[float, float, float]
 
 @dataclass(frozen=True)
 class Dates:
-    """Coordinates besides ``time`` for a scene whose time 0 is known.
-
-    Attributes:
-        epoch: date of time 0.
-        samples: times of the samples.
-    """
+    """Coordinates besides ``time`` for a scene whose time 0 is known."""
 
     epoch: Epoch
     samples: SampleTimes

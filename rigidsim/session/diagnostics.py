@@ -66,10 +66,8 @@ class Diagnostics:
         """The diagnostics with an estimate of the errors.
 
         Args:
-            trail: some of the run's samples.
             corrected: what took the run's steps; left as it was.
             go_on: polled repeatedly; False ends the estimate without a result.
-            own: the estimate of the run's solver, if its algorithm has its own.
         """
         from rigidsim.accuracy.estimates.estimate import Estimate, estimate_errors
 

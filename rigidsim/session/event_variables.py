@@ -50,11 +50,7 @@ def event_variables(
 
 
 def refuse_taken_names(prepared: InitialValueProblem) -> None:
-    """Refuse a run whose dataset would use one name twice.
-
-    Raises:
-        ConfigError: an event's dimension or variables would have the name of something else.
-    """
+    """Refuse a run whose dataset would use one name twice."""
     taken = {name for variable in dataset_variables(prepared) for name in variable.part_names()}
     taken |= {*LABELS, *OF_THE_RUN, *LYAPUNOV_NAMES, "checkpoint", "events"}
     dates, variables = dates_of(prepared), recorded_variables(prepared)

@@ -34,10 +34,6 @@ def execute(
 
     Args:
         folder: the run's folder; None for a run in memory.
-        chain: segments to resume from, with the arrays of the last one's checkpoint.
-
-    Raises:
-        RunFolderError: the folder can't be written, or the checkpoint belongs to another system.
     """
     run = ActiveRun.begun(session, prepared, folder, chain)
     with run.interruption.watching():

@@ -24,7 +24,6 @@ class KeptVariable:
     """One variable for the members of a tile.
 
     Attributes:
-        dims: dimensions besides the members'.
         values: (members, ...), float64 or int64.
         item: item of ``[sweep] keep`` that it belongs to, or ``ALWAYS``.
     """
@@ -44,7 +43,6 @@ class MemberSeries:
     """The samples of some members.
 
     Attributes:
-        variable: the sampled variable.
         parts: float64 parts, each (members, samples, components); missing samples at the end are nan.
     """
 
@@ -71,10 +69,8 @@ def kept_of_series(
     """What is asked for of recorded variables; drifts are always kept.
 
     Args:
-        series: series of all recorded variables except time.
         times: (samples,), or (members, samples) if each has its own, s.
         lengths: samples that each member has, (members,).
-        hidden: variables recorded only for indicators.
     """
     found: Kept = {}
     for one in series:
@@ -218,8 +214,6 @@ def kept_events(
 
     Args:
         times: times for each member, s.
-        most: largest number of times kept per member.
-        points: values recorded at the event.
     """
     count = len(times)
     found: Kept = {}
@@ -258,11 +252,7 @@ def _padded(rows: Sequence[np.ndarray], most: int, shape: tuple[int, ...]) -> np
 
 
 def joined(parts: Sequence[Kept], counts: Sequence[int]) -> Kept:
-    """Concatenate groups of members, with nan (0 for counts) where a group lacks a variable.
-
-    Args:
-        counts: members in each group.
-    """
+    """Concatenate groups of members, with nan (0 for counts) where a group lacks a variable."""
     names = dict.fromkeys(name for part in parts for name in part)
     found: Kept = {}
     for name in names:

@@ -31,9 +31,6 @@ def spectrum_of(
 
     Returns:
         The spectrum; None if it was interrupted, or stopped being finite.
-
-    Raises:
-        RunFolderError: the folder can't be written.
     """
     clock = prepared.clock
     system = double_twin(prepared)

@@ -52,7 +52,6 @@ class MemberResults:
 
     Attributes:
         kept: kept variables by name, each (members, ...).
-        reasons: by place among the members, why those failed.
         engines: engines that ran members, with the number of members each.
         why_alone: code of the reason why members were run one by one; empty if none was.
         estimating: CPU seconds spent on error estimates.
@@ -175,13 +174,7 @@ def run_alone(
 
     Args:
         run: function that runs it.
-        keep, most_events: as in ``[sweep]``.
-        events: names of the scene's events.
         more: function that returns what else is to be kept of the run.
-        hidden: variables recorded only for indicators.
-
-    Raises:
-        KeyboardInterrupt: the run was interrupted.
     """
     try:
         result = run()

@@ -35,7 +35,6 @@ class Recorder(SampleReceiver):
 
     Attributes:
         statistics: what the summary needs of all samples.
-        trail: some of the samples, if errors are estimated from them.
         kept: rows for the timeline; None if no timeline is asked for.
 
     Args:

@@ -15,10 +15,7 @@ class Session:
     """The work of one process on a run: all of it, or what was left.
 
     Attributes:
-        remarks: remarks for the summary on how the session began.
         mixed: what changed in versions or machine since the run began; empty if nothing did.
-        effort, phases: cost of all sessions and of this one, including choosing and certifying.
-        tuning: how often it checks and saves, and when it looks for a cheaper model.
     """
 
     observer: Observer

@@ -17,8 +17,6 @@ class Undefined:
     """Number of samples at which a recorded variable is NaN.
 
     Attributes:
-        count: number of such samples so far.
-        leading: how many of them precede its first defined sample.
         since: time of the first one after those (s); nan if there is none.
     """
 
@@ -32,10 +30,6 @@ class SampleStatistics:
     """Statistics of the samples taken so far, in all sessions.
 
     Attributes:
-        invariants, recorded: names of the system's invariants and recorded variables, in order.
-        largest, final: largest and last relative drift by invariant.
-        put_back: corrections put back into projected invariants before the latest sample.
-        nearest_singularity: smallest absolute singular factor at a sample.
         singularity_time: time of that sample, s.
         angles_wrapped_from: time of the first sample whose angles are within one turn, since their turns
             aren't known, seconds; nan where all are.

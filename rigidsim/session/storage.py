@@ -23,7 +23,6 @@ class Storage:
     Attributes:
         row: bytes per sample in memory and in a segment.
         segments: size of all segments, which are deleted once the dataset is complete.
-        free: free space on the run folder's disk, as far as it is known.
     """
 
     row: float
@@ -70,11 +69,7 @@ def storage(prepared: InitialValueProblem, place: Path) -> Storage:
 
 
 def refuse_too_large(prepared: InitialValueProblem, place: Path) -> None:
-    """Refuse a run that can only end at its last sample and would fill the disk.
-
-    Raises:
-        RunFolderError: the predicted size doesn't fit.
-    """
+    """Refuse a run that can only end at its last sample and would fill the disk."""
     limits = prepared.scene.config.limits
     guarded = (limits.wall_time, limits.max_steps, limits.max_drift) != (None, None, None)
     if guarded or any(crossing.stop for crossing in prepared.system.crossings):
@@ -85,11 +80,7 @@ def refuse_too_large(prepared: InitialValueProblem, place: Path) -> None:
 
 
 def refuse_too_large_for_memory(prepared: InitialValueProblem) -> None:
-    """Refuse a run that would take more memory than there is.
-
-    Raises:
-        RunFolderError: the predicted size doesn't fit.
-    """
+    """Refuse a run that would take more memory than there is."""
     row = 8.0 * sum(v.parts * math.prod(v.shape) for v in dataset_variables(prepared))
     needed = 2 * row * prepared.clock.count  # the blocks, and the dataset made of them
     there = float(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES"))

@@ -63,13 +63,8 @@ def summarise(
     """The summary without the digests of files that are still to be written.
 
     Args:
-        found: diagnostics, with the estimate of the errors if there is one.
-        message: the status in words.
         remarks: remarks on how the session began; they precede the warnings.
-        initial: initial values of the invariants, SI.
-        attributes: attributes of the dataset.
         time_reached: time reached, s.
-        events, event_times: how often each event was found, and when.
     """
     prepared, progress = found.prepared, found.progress
     scene, system = prepared.scene, prepared.system

@@ -21,7 +21,6 @@ class Effort:
     """Cost of a run over all its sessions.
 
     Attributes:
-        sessions: number of sessions, including this one.
         wall_seconds, cpu_seconds: seconds of the sessions before this one.
     """
 
@@ -72,8 +71,8 @@ class Phases:
     """Seconds by phase of one session, in the order in which the phases ended.
 
     Attributes:
-        wall, cpu: seconds of each; the CPU's are those of all threads of this process. The engine's own
-            stand among the former.
+        wall, cpu: seconds of each; the CPU's are those of all threads of this process. The engine's own stand
+            among the former.
     """
 
     def __init__(self) -> None:

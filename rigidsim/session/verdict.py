@@ -27,8 +27,8 @@ class RunVerdict:
     """Verdict on a run that ended.
 
     Attributes:
-        share: largest drift of any invariant, or correction put back, over what rounding explains; None
-            if nothing was checked.
+        share: largest drift of any invariant, or correction put back, over what rounding explains; None if
+            nothing was checked.
         worst: the invariant with that drift; empty for none.
     """
 

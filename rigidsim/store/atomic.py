@@ -15,11 +15,7 @@ from pathlib import Path
 
 @contextmanager
 def replacing(path: Path) -> Iterator[Path]:
-    """A temporary path beside ``path`` for a file that replaces it when the block ends without an error.
-
-    Raises:
-        OSError: it can't be written.
-    """
+    """A temporary path beside ``path`` for a file that replaces it when the block ends without an error."""
     path.parent.stat()  # a missing parent folder is reported before the work is done
     temporary = _hidden(path, "partial")
     try:
@@ -41,9 +37,6 @@ def replacing(path: Path) -> Iterator[Path]:
 def replacing_folder(path: Path) -> Iterator[Path]:
     """The same for a folder, in two steps if there is one already: a rename can't replace a folder with
     files.
-
-    Raises:
-        OSError: it can't be written.
     """
     temporary, old = _hidden(path, "partial"), _hidden(path, "replaced")
     try:

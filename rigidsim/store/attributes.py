@@ -30,10 +30,6 @@ class RootAttributes(BaseModel):
         config: the TOML text of what was run, one visible value per key; its digest is config_sha256.
         config_given: the text as it was given, before settings replaced values in it; older files have none,
             and keep settings in ``#:set`` comments at the end of config.
-        config_set: the settings (KEY=VALUE), one per line.
-        run_id: tells this run from all others.
-        states: names of the states, in order.
-        tolerance: the effective tolerance.
         unit_exponents, principal_moments, principal_axes, inertia_tensor, drawing, put_back, table_errors:
             JSON.
         modelling_error: largest error of an averaged model's directions until the end, rad.
@@ -42,17 +38,13 @@ class RootAttributes(BaseModel):
         mass: the body's mass, kg, if known.
         surroundings: objects around the body, for pictures (see ``rigidsim.look.surroundings``): JSON.
         attitude_error: estimate for the end of the run, rad, if one was made.
-        recorded: names of the variables along time, without drifts and residuals: if the config names
-            none, a later version may record more by default.
+        recorded: names of the variables along time, without drifts and residuals: if the config names none, a
+            later version may record more by default.
         hold_from_step: natural steps after which invariants are projected; None if from the start.
-        python_loads: class names of loads given from Python.
         axes: what the space axes are, if known.
-        epoch: date, time and scale of time 0, if known.
         time_unit: unit in which times are shown, if the config asks for one.
         started_at, finished_at: UTC.
         mixed_provenance: what changed, if the run was resumed with other versions or on another machine.
-        warnings: one per line.
-        wall_seconds, cpu_seconds: sums over all sessions.
         angles_wrapped_from: from this time on (s) Euler angles are within one turn, since nobody knows their
             turns; none where all are known.
     """
@@ -154,11 +146,7 @@ def _names(use: Use) -> list[str]:
 
 
 def read_attributes(path: Path) -> RootAttributes:
-    """The root attributes of a dataset or segment.
-
-    Raises:
-        RunFolderError: the file isn't one of rigidsim's.
-    """
+    """The root attributes of a dataset or segment."""
     try:
         return RootAttributes.model_validate(netcdf.root_attributes(path))
     except ValidationError as error:

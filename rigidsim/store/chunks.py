@@ -187,11 +187,7 @@ class RowCutter:
 
 
 class ChunkedVariable:
-    """Chunks of one compressed variable, filled with rows as they arrive.
-
-    Args:
-        target: HDF5 dataset with chunks along its first dimension only.
-    """
+    """Chunks of one compressed variable, filled with rows as they arrive."""
 
     def __init__(self, target: h5d.DatasetID, writer: ChunkWriter) -> None:
         self._target = target

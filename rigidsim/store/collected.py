@@ -21,9 +21,6 @@ from rigidsim.store.variables import Variable
 class CollectedRows:
     """The rows since the last segment.
 
-    Attributes:
-        rows: number of rows.
-
     Args:
         first: index of the first row; chunks are compressed if it begins one.
     """

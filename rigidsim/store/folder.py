@@ -67,11 +67,7 @@ class RunFolder(WorkFolder):
         return self.path / "set_aside"
 
     def begin(self, config: str, *, force: bool) -> None:
-        """Make the folder ready for a new run: write its config and mark it as under way.
-
-        Raises:
-            RunFolderError: as for ``create``.
-        """
+        """Make the folder ready for a new run: write its config and mark it as under way."""
         self.create(force=force)
         try:
             atomic.write_bytes(self.config, config.encode())
@@ -80,12 +76,7 @@ class RunFolder(WorkFolder):
             raise self.unwritable(error) from None
 
     def create(self, *, force: bool) -> None:
-        """Create the folder, or clear it of an earlier run.
-
-        Raises:
-            RunFolderError: it holds a run and ``force`` is false, or something that is no run, or it can't
-                be written.
-        """
+        """Create the folder, or clear it of an earlier run."""
         files = [self.config, self.dataset, self.timeline, self.summary, self.checkpoint, self.figure]
         files += [self.figure_of(name) for name in FIGURES]
         files += [self.analysis, self.spectrum]
@@ -130,11 +121,7 @@ class RunFolder(WorkFolder):
         return None
 
     def refuse_read_only(self) -> None:
-        """Refuse a folder that can't be written, before hours of work whose result couldn't be saved.
-
-        Raises:
-            RunFolderError: the folder can't be written.
-        """
+        """Refuse a folder that can't be written, before hours of work whose result couldn't be saved."""
         error = self.read_only
         if error is not None:
             raise RunFolderError(
@@ -182,11 +169,7 @@ class RunFolder(WorkFolder):
             self.write_summary(summary.having(timeline_sha256=provenance.file_sha256(drawn)))
 
     def read_summary(self) -> Brief:
-        """The summary; a run that was killed has none and reads as "running".
-
-        Raises:
-            RunFolderError: the summary is damaged.
-        """
+        """The summary; a run that was killed has none and reads as "running"."""
         if not self.summary.exists():
             return Brief(status="running", message="the run is under way, or was killed")
         return read_summary(self.summary)
@@ -200,11 +183,7 @@ def _may_write(folder: Path) -> bool:
 
 
 def find_run(path: str | Path) -> RunFolder:
-    """The run at ``path``: a run folder, or a file in one.
-
-    Raises:
-        RunFolderError: there is no run.
-    """
+    """The run at ``path``: a run folder, or a file in one."""
     given = Path(path)
     try:
         run = RunFolder(given if given.is_dir() else given.parent)

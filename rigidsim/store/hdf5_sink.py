@@ -99,11 +99,7 @@ class Sink(io.RawIOBase):
 
 @contextmanager
 def sink(path: Path) -> Iterator[Sink]:
-    """A file into which one HDF5 file can be written inside the block.
-
-    Raises:
-        OSError: when the block ends, if anything couldn't be written.
-    """
+    """A file into which one HDF5 file can be written inside the block."""
     opened = Sink(path)
     try:
         yield opened

@@ -20,11 +20,7 @@ if TYPE_CHECKING:
 
 
 class MemoryWriter:
-    """Takes what a ``SegmentWriter`` takes, and keeps it in memory.
-
-    Attributes:
-        blocks: blocks of samples, in order.
-    """
+    """Takes what a ``SegmentWriter`` takes, and keeps it in memory."""
 
     due = False
 
@@ -42,15 +38,7 @@ class MemoryWriter:
 
 @dataclass(frozen=True, repr=False)
 class MemoryRun(Run):
-    """A run in memory; ``dataset`` equals the one that ``dataset.h5`` would hold, attribute for attribute.
-
-    Attributes:
-        outcome: the run's ``Summary``.
-        variables: the dataset's variables, time first.
-        blocks: blocks of samples, in order.
-        extras: variables with dimensions of their own.
-        attributes: the dataset's attributes.
-    """
+    """A run in memory; ``dataset`` equals the one that ``dataset.h5`` would hold, attribute for attribute."""
 
     outcome: Brief
     variables: Sequence[Variable]

@@ -56,11 +56,7 @@ def add_extras(file: NetcdfFile, extras: Sequence[Extra]) -> None:
 
 
 class FileRows(Protocol):
-    """Values of all variables of a file.
-
-    Attributes:
-        rows: number of rows.
-    """
+    """Values of all variables of a file."""
 
     rows: int
 
@@ -92,11 +88,7 @@ def image(
 
 @contextmanager
 def reading(path: Path) -> Iterator[Any]:
-    """An HDF5 file open for reading.
-
-    Raises:
-        RunFolderError: it isn't an HDF5 file, or is damaged.
-    """
+    """An HDF5 file open for reading."""
     try:
         with h5py.File(path, "r") as file:
             yield file
@@ -105,11 +97,7 @@ def reading(path: Path) -> Iterator[Any]:
 
 
 def root_attributes(path: Path) -> dict[str, Any]:
-    """Root attributes of a dataset or segment as Python values, and its ``rows``.
-
-    Raises:
-        RunFolderError: the file isn't a dataset.
-    """
+    """Root attributes of a dataset or segment as Python values, and its ``rows``."""
     try:
         with h5py.File(path, "r") as file:
             found = {
@@ -125,11 +113,7 @@ def root_attributes(path: Path) -> dict[str, Any]:
 
 
 def read_group(path: Path, name: str) -> dict[str, np.ndarray]:
-    """The plain arrays of a group; empty if there is no such group.
-
-    Raises:
-        RunFolderError: the group holds something other than numbers.
-    """
+    """The plain arrays of a group; empty if there is no such group."""
     with reading(path) as file:
         if not isinstance(file.get(name), h5py.Group):
             return {}

@@ -78,12 +78,8 @@ class NetcdfFile:
         """Create a variable of doubles along declared dimensions.
 
         Args:
-            attributes: texts and numbers.
             chunk_rows: rows per chunk along the first dimension; None for contiguous storage.
             gzip: the level at which its chunks are compressed after a byte shuffle.
-
-        Returns:
-            The variable, for ``write_rows``.
         """
         shape = tuple(self._sizes[dim] for dim in dims)
         if chunk_rows is None and 0 in shape:
@@ -101,11 +97,7 @@ class NetcdfFile:
         gzip: int | None,
         whole: bool = False,
     ) -> h5d.DatasetID:
-        """Create a variable of doubles or integers, in chunks of any shape.
-
-        Returns:
-            The variable, for ``write_box``.
-        """
+        """Create a variable of doubles or integers, in chunks of any shape."""
         how = _new_dataset(None if chunk is None else tuple(chunk), gzip)
         return self._created(name, dims, _INTEGER if whole else _DOUBLE, attributes, how)
 

@@ -66,9 +66,6 @@ def refuse_damaged(path: Path, expected: str | None) -> None:
 
     Args:
         expected: SHA-256 of the file, if the summary beside it gives one.
-
-    Raises:
-        RunFolderError: the file is damaged, edited, replaced, or of a newer version than this rigidsim.
     """
     try:
         unsealed = read_seal(path) is None
@@ -96,11 +93,7 @@ def refuse_other(path: Path, digest: str, expected: str | None) -> None:
 
 
 def inspect(path: Path) -> None:
-    """Refuse a file whose content doesn't match what its metadata declare.
-
-    Raises:
-        RunFolderError: the content doesn't match.
-    """
+    """Refuse a file whose content doesn't match what its metadata declare."""
     if path.is_symlink():
         raise RunFolderError(f"{path}: is a symbolic link; a run's files are files of its folder")
     with h5py.File(path, "r") as file:

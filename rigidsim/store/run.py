@@ -88,11 +88,7 @@ class Run:
 
     @contextmanager
     def recording(self) -> Iterator[Path]:
-        """The timeline: the run's own, or one drawn for this purpose.
-
-        Raises:
-            RunFolderError: the timeline can't be drawn.
-        """
+        """The timeline: the run's own, or one drawn for this purpose."""
         with tempfile.TemporaryDirectory(prefix="rigidsim-view-") as scratch:
             timeline = Path(scratch) / "timeline.rrd"
             self._draw(timeline)
@@ -125,7 +121,6 @@ class SavedRun(Run):
     """A run on disk, finished or partial.
 
     Attributes:
-        folder: its files.
         outcome: the contents of ``summary.json``; a ``Summary`` if the run ended.
     """
 
@@ -170,11 +165,7 @@ class SavedRun(Run):
         return self.opened()
 
     def refuse_damaged(self) -> None:
-        """Check a complete dataset against its seal and the summary, which reads the whole file.
-
-        Raises:
-            RunFolderError: it is damaged, edited, or another run's.
-        """
+        """Check a complete dataset against its seal and the summary, which reads the whole file."""
         from rigidsim.store.reader import refuse_damaged
 
         if self.folder.dataset.exists():
@@ -185,9 +176,6 @@ class SavedRun(Run):
     def opened(self, *, indexed: bool = True) -> xarray.Dataset:
         """The dataset as in ``dataset``; without ``indexed``, sample times aren't loaded and can't be
         selected by.
-
-        Raises:
-            RunFolderError: nothing was saved, or a file is damaged.
         """
         from rigidsim.store.reader import open_dataset
 

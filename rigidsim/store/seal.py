@@ -43,11 +43,7 @@ def seal(path: Path) -> tuple[str, str]:
 
 
 def refuse_special(path: Path) -> None:
-    """Refuse anything but a plain file: a link shows another file's content, a pipe never ends.
-
-    Raises:
-        RunFolderError: the path is something else, or doesn't exist.
-    """
+    """Refuse anything but a plain file: a link shows another file's content, a pipe never ends."""
     try:
         mode = path.lstat().st_mode
     except OSError as error:
@@ -59,11 +55,7 @@ def refuse_special(path: Path) -> None:
 
 
 def read_seal(path: Path) -> str | None:
-    """The digest that a file claims for its content; None without a seal.
-
-    Raises:
-        OSError: the file can't be read.
-    """
+    """The digest that a file claims for its content; None without a seal."""
     with path.open("rb") as file:
         size = file.seek(0, 2)
         file.seek(max(0, size - _LENGTH))
@@ -74,11 +66,7 @@ def read_seal(path: Path) -> str | None:
 
 
 def check_seal(path: Path) -> str:
-    """The digest of a sealed file, verified against its content.
-
-    Raises:
-        RunFolderError: no seal (torn or foreign), or content that differs from it (damaged, edited).
-    """
+    """The digest of a sealed file, verified against its content."""
     return check_whole(path)[0]
 
 

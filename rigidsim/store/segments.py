@@ -51,10 +51,7 @@ class Chain:
     """The segments of a run that belong together.
 
     Attributes:
-        paths: paths in order.
-        rows: rows of all segments.
         run: the run's identity; empty without segments.
-        seal: seal of the last segment.
         damage: what is wrong with the first segment that doesn't belong, or None.
         spoiled: that segment and all after it.
     """
@@ -71,15 +68,11 @@ class SegmentWriter:
     """Collects blocks and writes them as segments.
 
     Attributes:
-        saved_rows, count: rows in segments, and the number of segments.
         dataset_sha256: SHA-256 of the complete dataset's file, once there is one.
 
     Args:
         folder: ``segments/`` of a run folder; created.
-        variables: the dataset's variables, time first.
         attributes: root attributes that make a segment readable on its own; ``run_id`` among them.
-        chain: earlier segments, to continue from.
-        limits: when a segment is due.
     """
 
     def __init__(
@@ -126,10 +119,6 @@ class SegmentWriter:
 
         Args:
             checkpoint: state from which the run continues after the last collected sample.
-            events: events since the last segment.
-
-        Raises:
-            RunFolderError: the disk is full or fails; collected rows stay in memory.
         """
         content = self._image(self._collected, checkpoint, events, self._place())
         path = self._folder / f"{self.count:08d}.h5"
@@ -184,9 +173,6 @@ class SegmentWriter:
             unused: variables that are zero throughout, and left out.
             checkpoint: where to leave a last checkpoint and all events, from which the run can be prolonged.
             conclude: writes everything else of a complete run; called before the segments are removed.
-
-        Raises:
-            RunFolderError: a segment is missing, or the disk is full or fails; the segments stay.
         """
         paths = segment_paths(self._folder)
         if len(paths) < self.count:  # rows that nothing fills would read as zeros
@@ -215,11 +201,7 @@ class SegmentWriter:
 
 
 def segment_paths(folder: Path) -> list[Path]:
-    """The segments of a run folder in order.
-
-    Raises:
-        RunFolderError: a segment is missing in the sequence, or the folder can't be read.
-    """
+    """The segments of a run folder in order."""
     paths = _numbered(folder)
     for number, path in enumerate(paths):
         if path.stem != f"{number:08d}":

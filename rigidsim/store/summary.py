@@ -64,12 +64,9 @@ class Summary(Brief):
         warnings, warning_codes: texts, and a ``WarningCode`` for each; older summaries have only texts.
         time_reached: time of the last sample, or of the event that ended the run, s.
         engine_time: time that the integration reached, s; its own steps go past the last sample.
-        events, event_times: how often each event happened, and when.
         loads: what acts on the body, in a reader's terms.
-        tables: interpolation errors of tabulated orbits, by name.
         advice: settings that would do better at about the same cost, the best last.
         undefined_samples: number of NaN samples of each recorded variable that has any.
-        provenance: attributes repeated from the dataset.
         dataset_sha256, timeline_sha256: SHA-256 of the files, once there are any.
     """
 
@@ -118,11 +115,7 @@ class Summary(Brief):
 
     @property
     def cautions(self) -> list[Caution]:
-        """The warnings with their codes.
-
-        Raises:
-            ValueError: the summary is of another version.
-        """
+        """The warnings with their codes."""
         pairs = zip(self.warning_codes, self.warnings, strict=True)
         return [Caution(WarningCode(code), text) for code, text in pairs]
 
@@ -141,11 +134,7 @@ def as_fields(cautions: Iterable[Caution]) -> dict[str, Any]:
 
 
 def read_summary(path: Path) -> Brief:
-    """Read a ``summary.json``; a ``Summary`` if the run ended.
-
-    Raises:
-        RunFolderError: it can't be read, or isn't what a run writes; the text names the first thing wrong.
-    """
+    """Read a ``summary.json``; a ``Summary`` if the run ended."""
     try:
         size = path.stat().st_size
         if path.is_symlink() or size > _LARGEST_FILE:

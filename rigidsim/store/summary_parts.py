@@ -82,7 +82,6 @@ class Cost(SummaryPart):
     """What a run cost.
 
     Attributes:
-        steps_redone: steps taken once more on the way to an event or a chart change.
         smallest_step, largest_step: seconds; None if no step was taken, or none was finite.
         seconds, cpu_by_phase: wall and CPU seconds of this session by phase.
         cpu_seconds, wall_seconds: seconds of all sessions.
@@ -103,13 +102,10 @@ class InvariantDrift(SummaryPart):
     """How well an invariant was kept.
 
     Attributes:
-        initial: value, or components, in ``units``.
         scale: size that drifts are relative to, in ``units``.
         largest_drift, final_drift: relative drifts; None if no sample was taken.
         bound: relative drift that rounding alone explains.
         put_back: for a projected invariant, the drift that would have been.
-        why: why it is an invariant.
-        numerical: whether it is constant by definition, whatever the motion.
     """
 
     initial: Annotated[FiniteNumber | tuple[FiniteNumber, ...] | None, Claim()]
@@ -128,14 +124,12 @@ class Accuracy(SummaryPart):
     """Attitude error at the end, rad: requested, estimated, and certified against a reference.
 
     Attributes:
-        requested_position, certified_position: position error, m.
         estimated_position_error, estimated_velocity_error: at the end, m and m/s.
         amplification: factor by which the motion amplifies rounding errors; None if not estimated.
         error_growth_rate: 1/s; 0 where errors don't grow exponentially.
         predictable_seconds: time from the start after which no digit is left; None if never.
-        examined_share: share of the run over which error growth was followed without a gap from its start;
-            1 for all of it.
-        how: how the certificate was obtained.
+        examined_share: share of the run over which error growth was followed without a gap from its start; 1
+            for all of it.
         chosen, chosen_why, forecast: the setting that was chosen for ``requested``, and its forecast.
     """
 
@@ -166,7 +160,6 @@ class TableErrors(SummaryPart):
 
     Attributes:
         direction: largest error of the source's direction with every other row left out, rad.
-        distance: the same for the distance, relative.
         expected: factor by which both shrink with all rows present, if the rows follow smooth functions.
     """
 
@@ -180,7 +173,6 @@ class ModellingWindow(SummaryPart):
 
     Attributes:
         start, end: times, s.
-        steps: steps of the full model.
         momentum_axis, figure_axis: largest distances between both models' directions, with what averaging
             removed added back, rad; None if the figure axis has no mean direction.
         growth_along, growth_across: growth of the former, along and across the precession, rad/s.
@@ -201,7 +193,6 @@ class Modelling(SummaryPart):
     """Error of a reduced model against the full one, apart from numerical errors.
 
     Attributes:
-        level: level of the model.
         short_period: whether what averaging removed is added back in what is recorded.
         resonance: spin-orbit resonance whose angle is kept, such as "3:2"; empty for none.
         momentum_axis, figure_axis: largest distances of the directions recorded from the full model's, until
@@ -209,9 +200,7 @@ class Modelling(SummaryPart):
         angular_momentum_norm, energy: largest errors of the momentum's size and the energy of rotation,
             relative to their values; None where averaging keeps them.
         growth, oscillation: secular growth of the distance, rad/s, and its oscillating part, rad.
-        whole: whether the full model was followed to the end.
         requested: largest error that was asked for, rad.
-        how: how it was found, or why it wasn't.
         unmeasured: an ``UnmeasuredCode``, why it wasn't found; empty where it was.
     """
 
@@ -268,7 +257,6 @@ class Advice(SummaryPart):
     """A setting that would do better.
 
     Attributes:
-        code: an ``AdviceCode``.
         now, then: attitude error at the end as it is, and as it would be, rad; for an averaged model the
             error of the recorded axes.
         level: level of the model advised; empty for none.

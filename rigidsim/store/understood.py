@@ -27,7 +27,6 @@ class Start(SummaryPart):
     """The state that a motion starts from.
 
     Attributes:
-        euler_sequence, euler_angles_deg: the attitude as intrinsic angles, unchanged if given so.
         quaternion: w x y z, body to space.
         angular_velocity: body axes, rad/s.
         position, velocity: of the centre of mass, space axes, m and m/s; None unless it moves freely.

@@ -51,9 +51,7 @@ class Variable:
 
     Attributes:
         dims: dimensions besides time; each is a key of ``LABELS``, or among ``OF_THE_RUN``.
-        attributes: units, long_name, frame, ...
         parts: number of float64 that hold one value exactly; part 0 has the plain name.
-        own_labels: labels of the dimensions whose labels depend on the run.
     """
 
     name: str
@@ -123,7 +121,6 @@ class Extra:
 
     Attributes:
         dims: names of dimensions; a variable named like its only dimension is that one's coordinate.
-        values: float64.
     """
 
     name: str

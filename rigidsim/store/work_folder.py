@@ -50,9 +50,6 @@ class WorkFolder:
 
         Args:
             shared: admit other processes that share the work.
-
-        Raises:
-            RunFolderError: another process works there, or the folder can't be written.
         """
         try:
             self.refuse_a_file()
@@ -95,11 +92,7 @@ class WorkFolder:
         return False
 
     def refuse_a_file(self) -> None:
-        """Refuse a plain file in the folder's place.
-
-        Raises:
-            RunFolderError: there is a file.
-        """
+        """Refuse a plain file in the folder's place."""
         if self.path.exists() and not self.path.is_dir():
             raise RunFolderError(f"{self.path}: is no folder; choose another {OUT} or name")
 

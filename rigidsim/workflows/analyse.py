@@ -100,11 +100,7 @@ def save(analysis: Analysis, out: Path, figure: Path | None = None) -> Saved:
     """Write dataset and figure, each of which appears only when complete.
 
     Args:
-        out: netCDF-4 file.
         figure: PNG or SVG file; by default beside ``out``.
-
-    Raises:
-        RigidsimError: a file can't be written.
     """
     from rigidsim.look.spectrum import save_spectrum
 

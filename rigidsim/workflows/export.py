@@ -78,11 +78,7 @@ def _name(saved: SavedRun | SavedSweep) -> str:
 
 
 def _unit(name: str | None, file_format: str, found: Format) -> AngleUnit | None:
-    """The unit of angles; None for the format's own.
-
-    Raises:
-        RigidsimError: the unit is unknown, or the format prescribes another.
-    """
+    """The unit of angles; None for the format's own."""
     unit = None if name is None else angle_unit_named(name)
     if unit is not None and not found.angles:
         raise RigidsimError(

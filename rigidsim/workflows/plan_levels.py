@@ -29,10 +29,6 @@ def compared_levels(
 ) -> list[dict[str, Any]]:
     """All levels, the cheapest first, if the config says anything about models.
 
-    Args:
-        experiment: the experiment as given.
-        choice: result of ``level = "auto"``, whose measurements aren't repeated.
-
     Returns:
         For JSON: the level; ``error_rad``, the modelling error of axes forecast from the beginning,
         None if there is none; ``steps`` and ``cpu_seconds`` of the integration, from a short pilot;

@@ -20,11 +20,7 @@ Given = Experiment | str | Path | Mapping[str, Any]
 
 
 def as_experiment(given: Given, changes: Mapping[str, Any] | None = None) -> Experiment:
-    """Convert what is given to an experiment, with some values replaced.
-
-    Raises:
-        ConfigError: with every problem found.
-    """
+    """Convert what is given to an experiment, with some values replaced."""
     if isinstance(given, Mapping):
         given = Experiment.from_dict(given)
     if not isinstance(given, Experiment | str | Path):

@@ -120,11 +120,7 @@ def resume(
 
 
 def _as_it_is(folder: RunFolder, experiment: Experiment, session: Session, loads: Sequence[Load]) -> SavedRun:
-    """A run whose dataset is complete; finishes what a Ctrl-C left out after that.
-
-    Raises:
-        RunFolderError: the folder can't be written, or the dataset is damaged.
-    """
+    """A run whose dataset is complete; finishes what a Ctrl-C left out after that."""
     done = open_run(folder.path)
     done.refuse_damaged()
     summary = done.outcome
@@ -208,11 +204,7 @@ def _prolonged(experiment: Experiment, until: str) -> Experiment:
 
 
 def _of_finished(folder: RunFolder) -> Chain:
-    """A finished run's dataset and its checkpoint as a chain of segments from which it is prolonged.
-
-    Raises:
-        RunFolderError: the run didn't end at its last sample, or a file is damaged.
-    """
+    """A finished run's dataset and its checkpoint as a chain of segments from which it is prolonged."""
     found = read_attributes(folder.dataset)
     if found.status != Status.FINISHED.value:
         raise RunFolderError(f"{folder.path}: cannot be prolonged: {found.status_message}")
@@ -245,11 +237,7 @@ def _set_aside(chain: Chain, folder: RunFolder) -> Caution:
 
 
 def _continued(experiment: Experiment, last: Path) -> Experiment:
-    """The experiment with its values when the run began, and the later end that it has since been given.
-
-    Raises:
-        RunFolderError: the experiment isn't that of the last saved file.
-    """
+    """The experiment with its values when the run began, and the later end that it has since been given."""
     begun = embedded(last)
     ends: list[str] = []
     if experiment.text != begun.text:
@@ -273,11 +261,7 @@ def _prolongs(experiment: Experiment, begun: Experiment, ends: Sequence[str]) ->
 
 
 def _compared(prepared: InitialValueProblem, chain: Chain) -> str:
-    """Differences in versions or machine from the run's beginning; empty if there are none.
-
-    Raises:
-        RunFolderError: the segments are of another experiment.
-    """
+    """Differences in versions or machine from the run's beginning; empty if there are none."""
     last = chain.paths[-1]
     saved = read_attributes(last)
     version, oldest = saved.schema_version, 3 if prepared.holds_invariants else 2

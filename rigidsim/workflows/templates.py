@@ -28,11 +28,7 @@ SCENES = (
 
 
 def template(scene: str) -> str:
-    """The text of a template.
-
-    Raises:
-        RigidsimError: there is no template of this name.
-    """
+    """The text of a template."""
     if scene not in SCENES:
         raise RigidsimError(
             f"new: given {shown(scene)}{nearest(scene, SCENES)}; scenes to choose from: {', '.join(SCENES)}"
@@ -50,9 +46,6 @@ def write_new(scene: str, name: str | None = None, folder: Path = Path()) -> Pat
 
     Args:
         name: name of the experiment and its file; by default the scene's.
-
-    Raises:
-        RigidsimError: unknown scene, a name that no run folder can have, or a file that can't be written.
     """
     text = template(scene)
     name = scene if name is None else name.removesuffix(".toml")

@@ -157,11 +157,7 @@ def with_models(dataset: xarray.Dataset, experiment: Experiment) -> xarray.Datas
 
 
 def save(dataset: xarray.Dataset, folder: Path) -> None:
-    """Write dataset and figure, each of which appears only when complete.
-
-    Raises:
-        RunFolderError: a file can't be written.
-    """
+    """Write dataset and figure, each of which appears only when complete."""
     from rigidsim.look.work_precision import save_work_precision
     from rigidsim.store import atomic
 

@@ -56,11 +56,9 @@ class Verdict:
     Attributes:
         identical: every number of every variable agrees in every bit, the files are whole, and the summary's
             claims hold.
-        problems: faults of the files themselves, or of the summary's claims, in words.
         difference: the first difference, or None.
         differing: names of all variables that differ.
         environment: versions and machine features that changed since, which can explain it.
-        samples: number of samples compared.
     """
 
     path: str
@@ -148,12 +146,7 @@ def _scratch() -> tempfile.TemporaryDirectory[str]:
 
 
 def embedded(dataset: Path, *, overrides: Sequence[str] = ()) -> Experiment:
-    """The experiment that a dataset was made from; ``overrides`` as in ``rigidsim.load``.
-
-    Raises:
-        RunFolderError: the file isn't a dataset of rigidsim.
-        ConfigError: the config in it isn't valid.
-    """
+    """The experiment that a dataset was made from; ``overrides`` as in ``rigidsim.load``."""
     found = root_attributes(dataset)
     text, given, settings = (found.get(name) for name in ("config", "config_given", "config_set"))
     if not isinstance(text, str):

@@ -23,7 +23,6 @@ def summary_problems(saved: Brief, again: Brief, folder: RunFolder, version: int
 
     Args:
         saved, again: summaries; the saved one may be of an older version, which claimed less.
-        version: schema version of the dataset beside it.
     """
     if not isinstance(saved, Summary):
         return []  # a run that was killed claims nothing

@@ -24,11 +24,6 @@ def runs_of(paths: Sequence[Path], members: Sequence[int] = ()) -> list[tuple[st
 
     Args:
         paths: run folders; with ``members``, the folder of one sweep.
-        members: members of the sweep, each run by itself for this purpose.
-
-    Raises:
-        RunFolderError: no run there, a sweep without chosen members, or members without a sweep.
-        ConfigError: there is no such member.
     """
     if members:
         return _members(paths, members)
@@ -71,9 +66,6 @@ def show(named: Sequence[tuple[str, Run]], *, web: bool = False) -> int:
 
     Returns:
         The viewer's exit code; 130 after Ctrl-C.
-
-    Raises:
-        RunFolderError: a timeline can't be drawn, no viewer is installed, or there is no screen for it.
     """
     from rigidsim.look.viewer import NoDisplay, open_viewer
 
@@ -92,15 +84,7 @@ def show(named: Sequence[tuple[str, Run]], *, web: bool = False) -> int:
 def render(
     named: Sequence[tuple[str, Run]], target: Path, *, seconds: float | None = None, told: Told | None = None
 ) -> Path:
-    """Draw runs to a PNG picture, or a GIF or MP4 film, without a screen.
-
-    Args:
-        seconds: duration of a film.
-        told: called with its progress: frames done and total.
-
-    Raises:
-        RunFolderError: the picture can't be drawn or written; the message says what to install.
-    """
+    """Draw runs to a PNG picture, or a GIF or MP4 film, without a screen."""
     from rigidsim.look import film
     from rigidsim.look.viewer import NoGraphics
 
@@ -127,11 +111,7 @@ def _new(target: Path) -> Iterator[Path]:
 
 @contextmanager
 def recording_of(named: Sequence[tuple[str, Run]]) -> Iterator[Path]:
-    """The recording of a run, or a temporary one of several runs side by side.
-
-    Raises:
-        RunFolderError: a run can't be drawn.
-    """
+    """The recording of a run, or a temporary one of several runs side by side."""
     if len(named) == 1:
         with named[0][1].recording() as timeline:
             yield timeline

@@ -123,7 +123,6 @@ def watched(given: Observer | None, progress: bool | None) -> Iterator[Observer]
     """The observer of a run.
 
     Args:
-        given: the caller's own observer, if any.
         progress: whether to show a bar if no observer is given; None: only in notebooks.
     """
     if given is not None or not (in_notebook() if progress is None else progress):

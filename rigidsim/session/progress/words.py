@@ -37,7 +37,6 @@ class Pace:
     """Pace of a session, from what it did itself.
 
     Args:
-        steps: steps taken before it.
         fraction: fraction of the run that was done before it.
     """
 
@@ -49,7 +48,6 @@ class Pace:
 
         Args:
             elapsed: seconds since the session began.
-            steps, fraction: steps taken and fraction done of the whole run.
         """
         share = (fraction - self._fraction) / (1 - self._fraction) if self._fraction < 1 else 1.0
         return rate_text((steps - self._steps) / max(elapsed, 1e-9)), left(elapsed, share)
