@@ -18,7 +18,7 @@ import rigidsim
 from rigidsim.accuracy.comparison import angles_between  # noqa: F401  (for the tests)
 from rigidsim.accuracy.setting import Setting
 from rigidsim.accuracy.trial import Trial, try_setting
-from rigidsim.session.tuning import Tuning
+from rigidsim.session.session import Tuning
 from rigidsim.solve import compiled
 from rigidsim.solve.problem import prepare
 from rigidsim.solve.sampler import Pacing
@@ -35,7 +35,7 @@ EAGER = Tuning(IMPATIENT.pacing, SegmentLimits(seconds=0.0))
 # for a process of its own, before it calls the command line
 OFTEN = """
 import functools, rigidsim.workflows.run as workflow
-from rigidsim.session.tuning import Tuning
+from rigidsim.session.session import Tuning
 from rigidsim.solve.sampler import Pacing
 from rigidsim.store.segments import SegmentLimits
 tuning = Tuning(Pacing(patience=0.05), SegmentLimits(seconds=0.05))

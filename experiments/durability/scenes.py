@@ -9,7 +9,7 @@ import numpy as np
 import xarray
 
 import rigidsim
-from rigidsim.session.tuning import Tuning
+from rigidsim.session.session import Tuning
 from rigidsim.solve.sampler import Pacing
 from rigidsim.store.segments import SegmentLimits
 

@@ -34,7 +34,7 @@ def run_all(
         RigidsimError: a config can't be run, or the arguments contradict each other.
     """
     from rigidsim.scene.config import has_earlier_settings
-    from rigidsim.session.progress import progress
+    from rigidsim.session import progress
     from rigidsim.workflows.read import load
     from rigidsim.workflows.run import run as run_experiment
 

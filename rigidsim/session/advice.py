@@ -3,10 +3,18 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 from rigidsim.accuracy.error_law import CLOSED_FORM
 from rigidsim.accuracy.estimates.estimate import label_rounding
+from rigidsim.accuracy.models.modelling import measure_modelling
+from rigidsim.accuracy.models.side_by_side import Unmeasured
+from rigidsim.errors import ConfigError
+from rigidsim.model.capabilities import gradient_source_of
+from rigidsim.scene.model_table import FULL, REDUCED
 from rigidsim.session.diagnostics import Diagnostics
+from rigidsim.session.session import AdviceLimits
+from rigidsim.solve.problem import prepare
 from rigidsim.store.summary_parts import Advice, AdviceCode
 
 _LONG = 8192
@@ -27,17 +35,9 @@ def advice_on(found: Diagnostics) -> tuple[Advice, ...]:
     Only what was measured is promised: projecting invariants removes the errors of integrable motions (those
     with a closed form), whose frequencies depend on the projected invariants alone.
     """
-    prepared, estimate, cheaper = found.prepared, found.estimate, found.cheaper
-    if estimate is not None and cheaper is not None:
-        now = estimate.leading
-        averaged = Advice(
-            code=AdviceCode.AVERAGED.value,
-            now=now,
-            then=cheaper.error,
-            level=cheaper.level,
-            share=cheaper.share,
-        )
-        return (averaged,)
+    prepared, estimate = found.prepared, found.estimate
+    if found.cheaper is not None:
+        return (found.cheaper,)
     if estimate is None or not estimate.closed_form or estimate.attitude is None:
         return ()
     formulation, config = prepared.system.requirements.formulation, prepared.scene.config
@@ -54,3 +54,35 @@ def advice_on(found: Diagnostics) -> tuple[Advice, ...]:
     if not stepped and now > _FAR * exact:
         advice.append(Advice(code=AdviceCode.CLOSED_FORM.value, now=now, then=exact))
     return tuple(advice)
+
+
+def cheaper_model(found: Diagnostics, limits: AdviceLimits, go_on: Callable[[], bool]) -> Advice | None:
+    """The most averaged model that keeps the axes accurate, measured over the beginning of the run.
+
+    Args:
+        go_on: polled repeatedly; False ends the comparison.
+
+    Returns:
+        None if no model does, the run is short or has no estimate, or what is recorded needs every rotation.
+    """
+    prepared, estimate = found.prepared, found.estimate
+    config, loads = prepared.scene.config, prepared.system.plan.loads
+    suited = bool(loads) and all(gradient_source_of(load) is not None for load in loads)
+    short = found.progress.steps < limits.steps or estimate is None
+    if short or not suited or config.model.level != FULL or config.output.record is None:
+        return None
+    for level in reversed(REDUCED):
+        keys = [f'model.level="{level}"', "model.short_period=true"]
+        try:
+            other = prepare(prepared.experiment.having(keys), loads=prepared.python_loads)
+            error = measure_modelling(other, go_on=go_on)
+        except ConfigError:  # no such average exists, or it can't provide what is recorded
+            continue
+        except Unmeasured:
+            return None
+        if error.worst <= limits.apart:
+            assert estimate is not None
+            share = error.windows[0].reduced_steps / error.windows[0].steps
+            code, now = AdviceCode.AVERAGED.value, estimate.leading
+            return Advice(code=code, now=now, then=error.worst, level=level, share=share)
+    return None

@@ -5,12 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
+from rigidsim.accuracy.estimates.estimate import Estimate, estimate_errors
 from rigidsim.accuracy.estimates.growth import UNCERTAIN
+from rigidsim.accuracy.models.modelling import ModellingError, measure_modelling
+from rigidsim.accuracy.models.side_by_side import Unmeasured
 from rigidsim.scene.readable_time import TimeWords, span_text
 from rigidsim.session.statistics import SampleStatistics
-from rigidsim.session.tuning import AdviceLimits
 from rigidsim.session.understood import time_words
 from rigidsim.solve.corrected_stepper import CorrectedStepper
 from rigidsim.solve.effects.waypoints import Waypoints
@@ -19,13 +20,7 @@ from rigidsim.solve.sampler import Progress
 from rigidsim.solve.stepper import OwnErrors
 from rigidsim.solve.taylor_stepper import TaylorStepper
 from rigidsim.solve.trail import SampleTrail
-from rigidsim.store.summary_parts import Caution, WarningCode
-
-if TYPE_CHECKING:
-    from rigidsim.accuracy.estimates.estimate import Estimate
-    from rigidsim.accuracy.models.modelling import ModellingError
-    from rigidsim.accuracy.models.side_by_side import Unmeasured
-    from rigidsim.session.cheaper_model import CheaperModel
+from rigidsim.store.summary_parts import Advice, Caution, WarningCode
 
 NEAR_SINGULAR = 1e-3
 """Singular factor below which Euler angles lose digits near their singularity."""
@@ -49,7 +44,7 @@ class Diagnostics:
     estimate: Estimate | None = None
     modelling: ModellingError | None = None
     unmeasured: Unmeasured | None = None
-    cheaper: CheaperModel | None = None
+    cheaper: Advice | None = None
 
     @property
     def drift_bound(self) -> float:
@@ -69,8 +64,6 @@ class Diagnostics:
             corrected: what took the run's steps; left as it was.
             go_on: polled repeatedly; False ends the estimate without a result.
         """
-        from rigidsim.accuracy.estimates.estimate import Estimate, estimate_errors
-
         progress, stepper, beside = self.progress, None, ""
         if self.prepared.algorithm.own_errors:
             told = own()
@@ -97,21 +90,10 @@ class Diagnostics:
 
     def modelled(self, trail: SampleTrail | None, go_on: Callable[[], bool] = lambda: True) -> Diagnostics:
         """The diagnostics with the error of a reduced model; arguments as for ``estimated``."""
-        from rigidsim.accuracy.models.modelling import measure_modelling
-        from rigidsim.accuracy.models.side_by_side import Unmeasured
-
         try:
             return replace(self, modelling=measure_modelling(self.prepared, trail, go_on))
         except Unmeasured as why:
             return replace(self, unmeasured=why)
-
-    def compared(self, limits: AdviceLimits, go_on: Callable[[], bool] = lambda: True) -> Diagnostics:
-        """The diagnostics with an averaged model that would have sufficed; arguments as for
-        ``cheaper_model``.
-        """
-        from rigidsim.session.cheaper_model import cheaper_model
-
-        return replace(self, cheaper=cheaper_model(self.prepared, self.progress.steps, limits, go_on))
 
     def cautions(self) -> list[Caution]:
         """Reasons not to trust the result; empty for a sound run."""

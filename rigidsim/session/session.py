@@ -1,13 +1,132 @@
-"""The work of one process on a run."""
+"""The work of one process on a run: what it costs, and how much it may spend on guards, saving and advice."""
 
 from __future__ import annotations
 
+import time
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
+from typing import ClassVar
+
+import numpy as np
 
 from rigidsim.session.guards import Observer
-from rigidsim.session.timings import Effort, Phases
-from rigidsim.session.tuning import Tuning
-from rigidsim.store.summary_parts import Caution
+from rigidsim.solve.checkpoint_arrays import Arrays, numbers
+from rigidsim.solve.sampler import Pacing, Progress
+from rigidsim.store.segments import SegmentLimits
+from rigidsim.store.summary_parts import ENGINE, Caution
+
+
+@dataclass(frozen=True)
+class AdviceLimits:
+    """When a run that resolved every rotation is compared with averaged models.
+
+    Attributes:
+        steps: least steps of such a run: the windows in which both are followed have 2e4 to 2e5 of them.
+        apart: largest distance of axes, rad, at which a model is advised; two seconds of arc.
+    """
+
+    steps: int = 1_000_000
+    apart: float = 1e-5
+
+
+@dataclass(frozen=True)
+class Tuning:
+    """Intervals and limits of a run; the defaults were measured, see each part. Tests and studies of damage
+    save far more often.
+    """
+
+    pacing: Pacing = field(default_factory=Pacing)
+    segments: SegmentLimits = field(default_factory=SegmentLimits)
+    advice: AdviceLimits = AdviceLimits()
+
+
+NOT_KEPT = "attempts_not_kept"
+
+
+@dataclass
+class Effort:
+    """Cost of a run over all its sessions.
+
+    Attributes:
+        wall_seconds, cpu_seconds: seconds of the sessions before this one.
+    """
+
+    sessions: int = 1
+    wall_seconds: float = 0.0
+    cpu_seconds: float = 0.0
+    started: float = field(default_factory=time.perf_counter)
+    cpu_started: float = field(default_factory=time.process_time)
+
+    @property
+    def wall(self) -> float:
+        """Wall seconds of all sessions."""
+        return self.wall_seconds + time.perf_counter() - self.started
+
+    @property
+    def cpu(self) -> float:
+        """CPU seconds of all sessions."""
+        return self.cpu_seconds + time.process_time() - self.cpu_started
+
+
+@dataclass
+class RunCost:
+    """What a run has cost in all of its sessions, as a part of checkpoints."""
+
+    effort: Effort
+    progress: Progress
+    version: ClassVar[int] = 1
+
+    def pack(self) -> Arrays:
+        """See ``SavedPart``."""
+        effort, progress = self.effort, self.progress
+        return {
+            "steps_seen": np.array([progress.smallest_step, progress.largest_step]),
+            "effort": np.array([effort.wall, effort.cpu, progress.integration_seconds]),
+            "sessions": np.array([effort.sessions, progress.redone_steps], dtype=np.int64),
+        }
+
+    def restore(self, arrays: Mapping[str, np.ndarray]) -> None:
+        """See ``SavedPart``."""
+        effort, progress = self.effort, self.progress
+        progress.smallest_step, progress.largest_step = numbers(arrays, "steps_seen", 2)
+        effort.wall_seconds, effort.cpu_seconds, progress.integration_seconds = numbers(arrays, "effort", 3)
+        sessions, redone = numbers(arrays, "sessions", 2)
+        effort.sessions, progress.redone_steps = int(sessions) + 1, int(redone)
+
+
+class Phases:
+    """Seconds by phase of one session, in the order in which the phases ended.
+
+    Attributes:
+        wall, cpu: seconds of each; the CPU's are those of all threads of this process. The engine's own stand
+            among the former.
+    """
+
+    def __init__(self) -> None:
+        self.wall: dict[str, float] = {}
+        self.cpu: dict[str, float] = {}
+        self._since = time.perf_counter(), time.process_time()
+
+    def next(self, finished: str) -> None:
+        """Close the current phase under a name; repeated names add up."""
+        now = time.perf_counter(), time.process_time()
+        for seconds, begin, end in zip((self.wall, self.cpu), self._since, now, strict=True):
+            seconds[finished] = seconds.get(finished, 0.0) + end - begin
+        self._since = now
+
+    def engine(self, seconds: float) -> None:
+        """Note the time of the engine alone in all sessions; it is part of other phases."""
+        self.wall[ENGINE] = seconds
+
+    def begin_again(self, *, keep: Iterable[str] = ("choose",)) -> Phases:
+        """Phases for another attempt: this one's time counts as a single phase, except those to keep."""
+        again = Phases()
+        for old, new in ((self.wall, again.wall), (self.cpu, again.cpu)):
+            kept = {name: old[name] for name in keep if name in old}
+            new |= kept
+            new[NOT_KEPT] = sum(v for name, v in old.items() if name not in kept and name != ENGINE)
+        again._since = self._since
+        return again
 
 
 @dataclass

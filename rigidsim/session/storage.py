@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from rigidsim.errors import RunFolderError
-from rigidsim.session.variables import dataset_variables
+from rigidsim.session.dataset import dataset_variables
 from rigidsim.solve.problem import InitialValueProblem
 
 _SHRINK = 0.9  # compression ratio of gzip on doubles whose low bits are noise; measured 0.85 to 0.95

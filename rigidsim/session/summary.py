@@ -7,16 +7,12 @@ import sys
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
-import numpy as np
-
-from rigidsim.model.capabilities import Rooted, having, table_of
-from rigidsim.session.diagnostics import NEAR_SINGULAR, Diagnostics
-from rigidsim.session.timings import Effort, Phases
-from rigidsim.session.understood import body_of, cautions_of, span_of, start_of, time_words, told_loads
-from rigidsim.session.variables import unused_variables
-from rigidsim.solve.assembly import Assembly
-from rigidsim.solve.effects.charts import Charts
-from rigidsim.solve.events import EventLog
+from rigidsim.model.capabilities import table_of
+from rigidsim.session.advice import advice_on
+from rigidsim.session.dataset import unused_variables
+from rigidsim.session.diagnostics import Diagnostics
+from rigidsim.session.session import Effort, Phases
+from rigidsim.session.understood import body_of, cautions_of, span_of, start_of, told_loads
 from rigidsim.solve.problem import InitialValueProblem
 from rigidsim.solve.projection import LATE
 from rigidsim.solve.sampler import Progress
@@ -25,7 +21,6 @@ from rigidsim.store.attributes import RootAttributes, Use
 from rigidsim.store.summary import Summary, as_fields
 from rigidsim.store.summary_parts import (
     Accuracy,
-    Advice,
     BitForBit,
     Caution,
     ChartChanges,
@@ -101,18 +96,9 @@ def summarise(
         events=events,
         event_times=event_times,
         chart_changes=chart_changes,
-        advice=_advice(found),
+        advice=advice_on(found),
         undefined_samples={name: seen.count for name, seen in found.statistics.undefined.items()},
     )
-
-
-def _advice(found: Diagnostics) -> tuple[Advice, ...]:
-    """Settings that would do better; empty without an estimate."""
-    if found.estimate is None:
-        return ()
-    from rigidsim.session.advice import advice_on
-
-    return advice_on(found)
 
 
 def cost_so_far(prepared: InitialValueProblem, progress: Progress, phases: Phases, effort: Effort) -> Cost:
@@ -134,73 +120,6 @@ def cost_so_far(prepared: InitialValueProblem, progress: Progress, phases: Phase
 def _seconds(step: float, exponent: int) -> float | None:
     value = math.ldexp(step, exponent) if math.isfinite(step) else math.inf
     return value if math.isfinite(value) else None
-
-
-def time_reached(prepared: InitialValueProblem, progress: Progress, log: EventLog) -> float:
-    """Time of the last sample, or of the event that ended the run, s; the start time before the first
-    sample.
-    """
-    clock = prepared.clock
-    if progress.status is Status.EVENT and log.stop is not None:
-        return clock.seconds(log.stop)
-    return clock.label(progress.next_sample - 1) if progress.next_sample else clock.seconds(clock.start)
-
-
-def closing_words(prepared: InitialValueProblem, progress: Progress, parts: Assembly) -> str:
-    """The status in words: which event ended the run and when, or where and why it broke down."""
-    log = parts.log
-    text, words = progress.status.message, time_words(prepared.scene)
-    if progress.status is Status.EVENT:
-        ending = next(f for f in log.found if log.stops[f.index])
-        name, when = prepared.system.crossings[ending.index].name, prepared.clock.seconds(ending.time)
-        return f"{text}: {name} at {words.moment(when)}"
-    if progress.status is Status.UNRESOLVED:
-        return f"{text}: {progress.detail} (at {words.moment(progress.time)}, after {progress.steps} steps)"
-    if progress.status not in (Status.NON_FINITE, Status.COLLAPSED):
-        return text
-    text += f"; last good state at {words.moment(progress.time)} after {progress.steps} steps"
-    if progress.last_good is None:
-        return text
-    state = np.array([progress.last_good.mark.state], dtype=prepared.precision.scalar)
-    factors = parts.evaluator.singular_factors(state, np.array([parts.stepper.chart]))  # where it stands
-    if factors is not None and abs(float(factors[0])) < NEAR_SINGULAR:
-        middle = float(state[0][prepared.system.states.index("theta")])
-        text += (
-            f"; the middle Euler angle theta = {middle:.9g} rad came within {abs(float(factors[0])):.2g} of "
-            f"the singularity of {prepared.system.sequence}"
-        )
-        if progress.status is Status.NON_FINITE and prepared.precision.name == "single":
-            # they go with the distance to the power of the order, and some
-            text += ", where coefficients of the series exceed the range of single precision (3.4e38)"
-        text += ': choose formulation = "quaternion"'
-    else:
-        from rigidsim.session.abrupt import why_it_broke
-
-        reason = why_it_broke(prepared, progress.time)
-        if reason:
-            return text + reason
-        m = prepared.system.mechanics
-        if any(load.roots(m) for load in having(Rooted, m.loads)):
-            text += (
-                "; a root of zero has no series: if one of the loads vanished there, such as a norm, write "
-                "abs(u) for the component u that moves, or add a small number under the root"
-            )
-        largest = int(np.argmax(np.abs(state[0].astype(np.float64))))
-        text += f"; the largest state there was {prepared.system.states[largest]}"
-    return text
-
-
-def chart_changes(prepared: InitialValueProblem, parts: Assembly) -> ChartChanges | None:
-    """How often a run in Euler angles changed charts; None for other formulations."""
-    system = prepared.system
-    if system.partner is None:
-        return None
-    charts = parts.corrected.effect(Charts)
-    return ChartChanges(
-        count=0 if charts is None else charts.changes,
-        sequence=system.sequence,
-        partner=system.partner.sequence,
-    )
 
 
 def _invariants(found: Diagnostics, initial: Mapping[str, list[float]]) -> dict[str, InvariantDrift]:

@@ -26,7 +26,7 @@ def certified(
     session: Session,
     loads: Sequence[Load] = (),
 ) -> tuple[AnyRun, bool]:
-    """Certify a finished run, if its config asks for an accuracy, and put the certificate into its summary."""
+    """Certify a finished run, if its config asks for an accuracy: the certificate is put into its summary."""
     integrator, summary = experiment.config.integrator, result.outcome
     accuracy, length = wanted(experiment), integrator.accuracy_position
     complete = result.status in (Status.FINISHED.value, Status.EVENT.value)

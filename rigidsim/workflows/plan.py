@@ -21,10 +21,9 @@ from rigidsim.accuracy.error_law import (
 from rigidsim.accuracy.models.level import choose_level
 from rigidsim.model.equation_text import equation_texts
 from rigidsim.model.load import Load
-from rigidsim.session.event_variables import refuse_taken_names
+from rigidsim.session.dataset import dataset_variables, refuse_taken_names, unused_variables
 from rigidsim.session.storage import storage
 from rigidsim.session.understood import body_of, cautions_of, span_of, start_of, told_loads
-from rigidsim.session.variables import dataset_variables, unused_variables
 from rigidsim.solve.assembly import Assembly, assemble
 from rigidsim.solve.problem import InitialValueProblem, prepare
 from rigidsim.solve.projection import LATE

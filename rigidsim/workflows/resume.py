@@ -14,13 +14,12 @@ from rigidsim.errors import FORCE, RunFolderError, either
 from rigidsim.scene.config import Experiment, Overrides, has_earlier_settings, parse, parse_earlier
 from rigidsim.scene.overrides import assignments
 from rigidsim.scene.python_values import assignments_of
-from rigidsim.session.attributes import root_attributes as attributes_now
 from rigidsim.session.completion import with_timeline
+from rigidsim.session.dataset import root_attributes as attributes_now
 from rigidsim.session.execution import execute
 from rigidsim.session.guards import Observer
-from rigidsim.session.progress.progress import watched
-from rigidsim.session.session import Session
-from rigidsim.session.tuning import Tuning
+from rigidsim.session.progress import watched
+from rigidsim.session.session import Session, Tuning
 from rigidsim.solve.assembly import assemble
 from rigidsim.solve.problem import InitialValueProblem, prepare
 from rigidsim.solve.status import Status

@@ -10,13 +10,12 @@ from typing import TYPE_CHECKING, Any, overload
 from rigidsim.accuracy.asked import leaves_choice, wanted
 from rigidsim.errors import ConfigError
 from rigidsim.scene.model_table import AUTO, FULL
-from rigidsim.session.event_variables import refuse_taken_names
+from rigidsim.session.dataset import refuse_taken_names
 from rigidsim.session.execution import execute
 from rigidsim.session.guards import Observer
-from rigidsim.session.progress.progress import watched
-from rigidsim.session.session import Session
+from rigidsim.session.progress import watched
+from rigidsim.session.session import Session, Tuning
 from rigidsim.session.storage import refuse_too_large, refuse_too_large_for_memory
-from rigidsim.session.tuning import Tuning
 from rigidsim.solve.problem import InitialValueProblem, prepare
 from rigidsim.store.folder import RunFolder
 from rigidsim.store.memory import MemoryRun

@@ -15,7 +15,7 @@ import rigidsim
 from rigidsim.accuracy.certificate import Certificate, certify
 from rigidsim.cli.screens import summary as report
 from rigidsim.session.guards import Observer
-from rigidsim.session.timings import NOT_KEPT
+from rigidsim.session.session import NOT_KEPT
 
 FREE = """name = "free"
 [body]

@@ -14,7 +14,7 @@ import pytest
 from support import cases, same_bits
 
 import rigidsim
-from rigidsim.session.tuning import Tuning
+from rigidsim.session.session import Tuning
 from rigidsim.solve.sampler import Pacing
 from rigidsim.store import atomic, segments
 from rigidsim.store.folder import RunFolder

@@ -85,7 +85,7 @@ def test_sigterm_while_the_equations_are_compiled(config: Config, start: Start) 
     prelude = (
         "import os, signal, rigidsim.session.guards as g\n"
         "g.Observer.started = lambda *_: os.kill(os.getpid(), signal.SIGTERM)\n"
-        "import rigidsim.session.progress.progress as p\n"
+        "import rigidsim.session.progress as p\n"
         "for c in vars(p).values():\n"
         "    if isinstance(c, type) and issubclass(c, g.Observer): c.started = g.Observer.started"
     )

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import rigidsim
 from rigidsim.session.guards import Observer
-from rigidsim.session.tuning import Tuning
+from rigidsim.session.session import Tuning
 from rigidsim.solve.sampler import Pacing, Progress
 from rigidsim.store.segments import SegmentLimits
 

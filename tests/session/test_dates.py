@@ -19,8 +19,8 @@ import rigidsim
 from rigidsim.errors import ConfigError, RunFolderError
 from rigidsim.scene.epochs import parse_epoch
 from rigidsim.scene.sample_times import SampleTimes
+from rigidsim.session.dataset import refuse_taken_names
 from rigidsim.session.dates import Dates
-from rigidsim.session.event_variables import refuse_taken_names
 from rigidsim.solve.problem import prepare
 from rigidsim.store.seal import seal
 

@@ -12,7 +12,7 @@ import pytest
 from support import cases, config, loaded, run_text, same_bits
 
 import rigidsim
-from rigidsim.session.tuning import Tuning
+from rigidsim.session.session import Tuning
 from rigidsim.solve.assembly import Assembly, assemble, sampler
 from rigidsim.solve.checkpoint import Position
 from rigidsim.solve.evaluate import Evaluator

@@ -12,7 +12,7 @@ import xarray
 from support import cases, same_bits
 
 import rigidsim
-from rigidsim.session.tuning import Tuning
+from rigidsim.session.session import Tuning
 from rigidsim.solve.assembly import assemble, sampler
 from rigidsim.solve.evaluate import Evaluator
 from rigidsim.solve.problem import prepare

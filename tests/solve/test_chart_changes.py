@@ -16,7 +16,7 @@ import rigidsim
 from rigidsim.model.euler_charts import is_proper, partner_sequence
 from rigidsim.scene.attitude import AXES
 from rigidsim.scene.fields import EULER_SEQUENCES
-from rigidsim.session.tuning import Tuning
+from rigidsim.session.session import Tuning
 from rigidsim.solve.precision import precision_of
 from rigidsim.solve.sampler import Pacing
 from rigidsim.solve.solvers.taylor.ways import Ways

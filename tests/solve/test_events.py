@@ -16,7 +16,7 @@ from support import EPSILON, amplification, angle_between, cases, config, law, r
 import rigidsim
 from rigidsim.cli.screens.summary import print_summary
 from rigidsim.errors import ConfigError
-from rigidsim.session.tuning import Tuning
+from rigidsim.session.session import Tuning
 from rigidsim.solve.sampler import Pacing
 from rigidsim.solve.solvers.taylor.ways import Ways
 

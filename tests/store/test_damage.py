@@ -13,7 +13,7 @@ from support import same_bits
 
 import rigidsim
 from rigidsim.errors import RunFolderError
-from rigidsim.session.tuning import Tuning
+from rigidsim.session.session import Tuning
 from rigidsim.solve.sampler import Pacing
 from rigidsim.solve.solvers.taylor.ways import Ways
 from rigidsim.store import seal

@@ -16,7 +16,7 @@ from support import cases, same_bits
 
 import rigidsim
 from rigidsim.errors import RunFolderError
-from rigidsim.session.tuning import Tuning
+from rigidsim.session.session import Tuning
 from rigidsim.solve.sampler import Pacing
 from rigidsim.store import netcdf
 from rigidsim.store.segments import SegmentLimits, SegmentWriter, read_chain, segment_paths

@@ -11,7 +11,7 @@ from support import config, run_text
 import rigidsim
 from rigidsim.accuracy.models.level import choose_level
 from rigidsim.errors import ConfigError
-from rigidsim.session.tuning import AdviceLimits, Tuning
+from rigidsim.session.session import AdviceLimits, Tuning
 
 FLATTENING, SPIN, ECCENTRICITY = 0.02, 60.0, 0.2
 BODY = f"principal_moments = [{1 - FLATTENING}, {1 - FLATTENING}, 1]"

@@ -44,7 +44,7 @@ def resume(
                 "rigidsim sweep CONFIG again, which computes only what is new"
             )
         _resume_sweep(run_path, workers, as_json)
-    from rigidsim.session.progress import progress
+    from rigidsim.session import progress
     from rigidsim.workflows.resume import resume as go_on
 
     with progress.observer() as observer:

@@ -20,7 +20,7 @@ def verify(run_path: RunPath, members: MembersOption = 100, as_json: JsonOption 
     Example: rigidsim verify runs/intermediate_axis
     """
     from rigidsim.cli.screens import summary as tables
-    from rigidsim.session.progress import progress
+    from rigidsim.session import progress
     from rigidsim.store.sweeps.folder import is_sweep
 
     if is_sweep(run_path):

@@ -15,6 +15,7 @@ from rigidsim.accuracy.estimates.member_estimate import MemberErrors, MemberEsti
 from rigidsim.errors import ConfigError
 from rigidsim.scene.config import Experiment
 from rigidsim.scene.sweeps.sweep import Sweep
+from rigidsim.session.dataset import dataset_variables
 from rigidsim.session.kept import Kept, KeptVariable, MemberSeries, Points, kept_events, kept_of_series
 from rigidsim.session.members import (
     ENDED_WELL,
@@ -27,7 +28,6 @@ from rigidsim.session.members import (
     warning_bits,
     warnings_variable,
 )
-from rigidsim.session.variables import dataset_variables
 from rigidsim.solve.batch.family import Alone, Families, Family, Sorted, batchable
 from rigidsim.solve.batch.members import AxisNumbers, Members
 from rigidsim.solve.batch.run import BatchBlock, BatchRun

@@ -10,7 +10,7 @@ from rigidsim.scene.initial_values import check_start
 from rigidsim.scene.registry import OBSERVABLES
 from rigidsim.scene.scene import build_scene
 from rigidsim.scene.sweeps.sweep import Sweep
-from rigidsim.session.event_variables import refuse_taken_names
+from rigidsim.session.dataset import refuse_taken_names
 from rigidsim.solve.problem import InitialValueProblem, prepare
 from rigidsim.store.sweeps.dataset import RESERVED, SUFFIXES
 from rigidsim.workflows.sweeps.batch import why_alone

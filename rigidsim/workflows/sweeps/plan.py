@@ -7,7 +7,7 @@ from typing import Any
 
 from rigidsim.errors import ConfigError, Problem, either
 from rigidsim.scene.sweeps.sweep import Sweep
-from rigidsim.session.variables import dataset_variables
+from rigidsim.session.dataset import dataset_variables
 from rigidsim.solve.batch.lanes import recommended_width
 from rigidsim.solve.problem import InitialValueProblem, prepare
 from rigidsim.workflows.plan import plan

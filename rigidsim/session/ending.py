@@ -1,4 +1,4 @@
-"""Why a run broke down at something abrupt in its loads: too narrow for the time, or beyond the range."""
+"""How a run ended, in words: which event ended it, or where and why it broke down."""
 
 from __future__ import annotations
 
@@ -7,18 +7,91 @@ from typing import Any
 
 import numpy as np
 
+from rigidsim.model.capabilities import Rooted, having
 from rigidsim.scene.expressions.lines import lines_in
 from rigidsim.scene.expressions.tree import Expression, ExpressionError, evaluate, names_used
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.transitions import narrow_parts, operations
+from rigidsim.session.diagnostics import NEAR_SINGULAR
 from rigidsim.session.understood import time_words
+from rigidsim.solve.assembly import Assembly
+from rigidsim.solve.effects.charts import Charts
+from rigidsim.solve.events import EventLog
 from rigidsim.solve.problem import InitialValueProblem
+from rigidsim.solve.sampler import Progress
+from rigidsim.solve.status import Status
+from rigidsim.store.summary_parts import ChartChanges
 
 _NARROW = 64.0  # spacings of the times: steps are parts of a width, and 32 below a spacing count as collapsed
 _NARROWEST = 400  # bits
 
 
-def why_it_broke(prepared: InitialValueProblem, time: float) -> str:
+def time_reached(prepared: InitialValueProblem, progress: Progress, log: EventLog) -> float:
+    """Time of the last sample, or of the event that ended the run, s; the start time before the first
+    sample.
+    """
+    clock = prepared.clock
+    if progress.status is Status.EVENT and log.stop is not None:
+        return clock.seconds(log.stop)
+    return clock.label(progress.next_sample - 1) if progress.next_sample else clock.seconds(clock.start)
+
+
+def closing_words(prepared: InitialValueProblem, progress: Progress, parts: Assembly) -> str:
+    """The status in words: which event ended the run and when, or where and why it broke down."""
+    log = parts.log
+    text, words = progress.status.message, time_words(prepared.scene)
+    if progress.status is Status.EVENT:
+        ending = next(f for f in log.found if log.stops[f.index])
+        name, when = prepared.system.crossings[ending.index].name, prepared.clock.seconds(ending.time)
+        return f"{text}: {name} at {words.moment(when)}"
+    if progress.status is Status.UNRESOLVED:
+        return f"{text}: {progress.detail} (at {words.moment(progress.time)}, after {progress.steps} steps)"
+    if progress.status not in (Status.NON_FINITE, Status.COLLAPSED):
+        return text
+    text += f"; last good state at {words.moment(progress.time)} after {progress.steps} steps"
+    if progress.last_good is None:
+        return text
+    state = np.array([progress.last_good.mark.state], dtype=prepared.precision.scalar)
+    factors = parts.evaluator.singular_factors(state, np.array([parts.stepper.chart]))  # where it stands
+    if factors is not None and abs(float(factors[0])) < NEAR_SINGULAR:
+        middle = float(state[0][prepared.system.states.index("theta")])
+        text += (
+            f"; the middle Euler angle theta = {middle:.9g} rad came within {abs(float(factors[0])):.2g} of "
+            f"the singularity of {prepared.system.sequence}"
+        )
+        if progress.status is Status.NON_FINITE and prepared.precision.name == "single":
+            # they go with the distance to the power of the order, and some
+            text += ", where coefficients of the series exceed the range of single precision (3.4e38)"
+        text += ': choose formulation = "quaternion"'
+    else:
+        reason = _why_it_broke(prepared, progress.time)
+        if reason:
+            return text + reason
+        m = prepared.system.mechanics
+        if any(load.roots(m) for load in having(Rooted, m.loads)):
+            text += (
+                "; a root of zero has no series: if one of the loads vanished there, such as a norm, write "
+                "abs(u) for the component u that moves, or add a small number under the root"
+            )
+        largest = int(np.argmax(np.abs(state[0].astype(np.float64))))
+        text += f"; the largest state there was {prepared.system.states[largest]}"
+    return text
+
+
+def chart_changes(prepared: InitialValueProblem, parts: Assembly) -> ChartChanges | None:
+    """How often a run in Euler angles changed charts; None for other formulations."""
+    system = prepared.system
+    if system.partner is None:
+        return None
+    charts = parts.corrected.effect(Charts)
+    return ChartChanges(
+        count=0 if charts is None else charts.changes,
+        sequence=system.sequence,
+        partner=system.partner.sequence,
+    )
+
+
+def _why_it_broke(prepared: InitialValueProblem, time: float) -> str:
     """The reason in words, with what to do; empty if the loads show none.
 
     Args:

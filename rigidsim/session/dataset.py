@@ -1,0 +1,296 @@
+"""What a run's dataset holds: variables along time, those along events, and root attributes."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+
+from rigidsim.errors import ConfigError, Problem
+from rigidsim.model.outputs import Invariant
+from rigidsim.session.dates import Dates
+from rigidsim.session.session import Effort
+from rigidsim.solve.assembly import Assembly
+from rigidsim.solve.evaluate import Evaluator, RecordedParts
+from rigidsim.solve.events import EventLog, samples_at
+from rigidsim.solve.problem import InitialValueProblem
+from rigidsim.solve.projection import LATE
+from rigidsim.solve.status import Status
+from rigidsim.store import provenance
+from rigidsim.store.attributes import RootAttributes
+from rigidsim.store.summary import Summary
+from rigidsim.store.summary_parts import EventTimes
+from rigidsim.store.variables import LABELS, OF_THE_RUN, SCHEMA_VERSION, Extra, Variable, time_variable
+
+LYAPUNOV_NAMES = ("lyapunov_time", "lyapunov_index", "lyapunov_exponents")
+"""Names of variables and dimensions."""
+
+
+def drift_name(invariant: str) -> str:
+    """Name of the variable with an invariant's drift; its attribute ``drift_of`` names the invariant."""
+    return f"{invariant}_drift"
+
+
+def put_back_name(invariant: str) -> str:
+    """Name of the variable with what was put back of an invariant, which its ``put_back_of`` names."""
+    return f"{invariant}_put_back"
+
+
+def dataset_variables(prepared: InitialValueProblem) -> list[Variable]:
+    """Time first, then dates if known, recorded variables, each invariant's drift, and the corrections put
+    back into projected ones.
+    """
+    system, projected = prepared.system, prepared.projected_scalars
+    time, *recorded = recorded_variables(prepared)
+    found = [
+        *recorded,
+        *(_drift(invariant) for invariant in system.invariants),
+        *(_put_back(invariant, projected) for invariant in system.invariants if invariant.name in projected),
+    ]
+    dates = dates_of(prepared)
+    if dates is None:
+        return [time, *found]
+    beside = " ".join(name for variable in dates.variables for name in variable.part_names())
+    dated = [replace(v, attributes={**v.attributes, "coordinates": beside}) for v in found]
+    return [time, *dates.variables, *dated]
+
+
+def unused_variables(prepared: InitialValueProblem, steps: int) -> set[str]:
+    """Variables of corrections put back, if the run ended before the step at which projection begins."""
+    if not prepared.holds_late or steps > LATE:
+        return set()
+    return {put_back_name(name) for name in prepared.projected_scalars}
+
+
+def dates_of(prepared: InitialValueProblem) -> Dates | None:
+    """Dates of samples; None if the date of time 0 is unknown."""
+    scene = prepared.scene
+    return None if scene.epoch is None else Dates(scene.epoch, scene.samples)
+
+
+def recorded_variables(prepared: InitialValueProblem) -> list[Variable]:
+    """Time and the recorded variables; each with residuals beyond double precision.
+
+    In single precision time has one too, since its labels are exact to a double.
+    """
+    parts, bodies = prepared.precision.part_count, prepared.scene.bodies
+    result = [time_variable(prepared.clock.part_count)]
+    for recorded in prepared.system.recorded:
+        attributes: dict[str, Any] = {"units": recorded.units, "long_name": recorded.long_name}
+        if recorded.frame:
+            attributes["frame"] = recorded.frame
+        if recorded.name == "euler_angles":
+            attributes["euler_sequence"] = prepared.system.sequence
+            attributes["convention"] = "intrinsic"
+        if recorded.continuity == "unwrap":
+            attributes["angle"] = "continuous"
+        attributes |= recorded.attributes
+        if recorded.invariant:
+            attributes["invariant"] = 1
+        own = {"point_mass": bodies.names} if bodies is not None and "point_mass" in recorded.dims else {}
+        result.append(Variable(recorded.name, recorded.dims, attributes, parts, own))
+    return result
+
+
+def _drift(invariant: Invariant) -> Variable:
+    several = len(invariant.expressions) > 1
+    definition = "norm of (value - initial) / scale" if several else "(value - initial) / scale"
+    return _of_invariant(drift_name(invariant.name), invariant, "drift of", definition, "drift_of")
+
+
+def _put_back(invariant: Invariant, projected: Sequence[str]) -> Variable:
+    """The corrections put back into an invariant; ``projected``: that of each projected scalar."""
+    what = "norm of the sum of the changes" if projected.count(invariant.name) > 1 else "sum of the changes"
+    definition = (
+        f"{what} of (value - initial) / scale from one correction to the next, up to the last one before "
+        "each sample: to first order what the drift would have been without them"
+    )
+    name = put_back_name(invariant.name)
+    return _of_invariant(name, invariant, "what was put back of", definition, "put_back_of")
+
+
+def _of_invariant(name: str, invariant: Invariant, what: str, definition: str, of: str) -> Variable:
+    attributes = {
+        "units": "1",
+        "long_name": f"{what} the {invariant.long_name}",
+        "scale": float(invariant.scale),
+        "scale_units": invariant.units,
+        "scale_name": invariant.scale_name,
+        "definition": definition,
+        of: invariant.name,
+    }
+    return Variable(name, (), attributes)
+
+
+def event_variables(
+    prepared: InitialValueProblem, log: EventLog, evaluator: Evaluator, last: float
+) -> list[Extra]:
+    """``NAME_time``, dates and ``NAME_<variable>`` along a dimension ``NAME``, with residuals beyond double.
+
+    Args:
+        last: time of the run's last sample, internal units; steps and crossings may lie past it.
+    """
+    extras: list[Extra] = []
+    variables, dates = recorded_variables(prepared), dates_of(prepared)
+    if dates is not None:
+        variables[1:1] = dates.variables
+    for index, crossing in enumerate(prepared.system.crossings):
+        found = log.occurrences(index, last)
+        values: RecordedParts = {}
+        times = prepared.clock.internal(0, 0)
+        if found:
+            block = samples_at(found, prepared.precision)
+            values, times = evaluator.evaluate_apart(block), block.times
+        exponent = prepared.clock.exponent
+        values["time"] = [np.ldexp(part, exponent) for part in prepared.precision.parts(times)]
+        while len(values["time"]) < prepared.clock.part_count:  # found by the engine: no label to be off
+            values["time"].append(np.zeros(len(times)))
+        if dates is not None:
+            rows = zip(*values["time"], strict=True)
+            values |= dates.of_times([sum((Fraction(float(x)) for x in row), Fraction(0)) for row in rows])
+        for variable in variables:
+            wrapped = "angle" in variable.attributes
+            more = dict.fromkeys(("turns", "angle"), "within one turn") if wrapped else {}
+            more["event"] = crossing.name
+            for part, name in enumerate(variable.part_names()):
+                column = values[variable.name][part] if variable.name in values else np.zeros(0)
+                extras.append(
+                    Extra(
+                        f"{crossing.name}_{name}",
+                        (crossing.name, *variable.dims),
+                        column.reshape(len(found), *variable.shape),
+                        {**variable.part_attributes(part), **more},
+                    )
+                )
+    return extras
+
+
+def refuse_taken_names(prepared: InitialValueProblem) -> None:
+    """Refuse a run whose dataset would use one name twice."""
+    taken = {name for variable in dataset_variables(prepared) for name in variable.part_names()}
+    taken |= {*LABELS, *OF_THE_RUN, *LYAPUNOV_NAMES, "checkpoint", "events"}
+    dates, variables = dates_of(prepared), recorded_variables(prepared)
+    if dates is not None:
+        variables += dates.variables
+    for crossing in prepared.system.crossings:
+        names = [f"{crossing.name}_{name}" for variable in variables for name in variable.part_names()]
+        double = next((name for name in (crossing.name, *names) if name in taken), None)
+        if double is not None:
+            events = [table.name for table in prepared.scene.config.events]
+            problem = Problem(
+                f"[[events]] number {events.index(crossing.name) + 1} name",
+                f'given "{crossing.name}", by which the dataset would need the name "{double}" twice; choose '
+                "another",
+            )
+            raise ConfigError(problem, prepared.experiment.source)
+        taken.update((crossing.name, *names))
+
+
+def event_times(prepared: InitialValueProblem, log: EventLog, last: float) -> dict[str, EventTimes]:
+    """First and last times of each event that was found."""
+    clock, times = prepared.clock, {}
+    for index, crossing in enumerate(prepared.system.crossings):
+        found = [clock.seconds(event.time) for event in log.occurrences(index, last)]
+        if found:
+            early = tuple(found[: EventTimes.EARLY])
+            times[crossing.name] = EventTimes(first=early[0], last=found[-1], early=early)
+    return times
+
+
+def root_attributes(
+    prepared: InitialValueProblem, parts: Assembly, run_id: str, mixed: str = ""
+) -> RootAttributes:
+    """Attributes of segments, and of a dataset before the end of its run is known.
+
+    Args:
+        mixed: what changed in versions or machine since the run began; empty if nothing did.
+    """
+    scene, system = prepared.scene, prepared.system
+    platform: dict[str, Any] = {f"version_{k}": v for k, v in provenance.versions().items()}
+    platform |= {f"code_{k}": v for k, v in provenance.code_target(parts.evaluator.code).items()}
+    exponents = {
+        "time": system.scaling.time,
+        "inertia": system.scaling.inertia,
+        "states": system.state_exponents,
+    }
+    return RootAttributes(
+        title=scene.name,
+        comment=scene.description,
+        source="rigidsim",
+        run_id=run_id,
+        schema_version=SCHEMA_VERSION,
+        status=Status.RUNNING.value,
+        config=prepared.experiment.text,
+        config_sha256=prepared.experiment.sha256,
+        config_given=prepared.experiment.given,
+        config_set="\n".join(prepared.experiment.settings),
+        formulation=system.requirements.formulation,
+        euler_sequence=system.sequence,
+        euler_partner_sequence="" if system.partner is None else system.partner.sequence,
+        states=" ".join(system.states),
+        precision=prepared.precision.name,
+        precision_bits=prepared.precision.bits,
+        tolerance=prepared.effective_tolerance,
+        integrator=prepared.algorithm.title,
+        method=scene.config.integrator.method,
+        hold_invariants=int(prepared.holds_invariants),
+        hold_from_step=LATE if prepared.holds_late else None,
+        taylor_order=parts.order,
+        compact_mode=int(prepared.precision.compact or system.wide),
+        high_accuracy=0,
+        batch_size=1,
+        unit_exponents=json.dumps(exponents),
+        principal_moments=json.dumps([float(m) for m in scene.body.principal_moments]),
+        principal_axes=json.dumps([[float(x) for x in a] for a in scene.body.principal_axes]),
+        inertia_tensor=json.dumps([[float(x) for x in row] for row in scene.body.inertia]),
+        body_source=scene.body.source,
+        drawing=json.dumps(scene.body.drawing),
+        center_of_mass=json.dumps([float(x) for x in scene.body.center_of_mass]),
+        mass=None if scene.body.mass is None else float(scene.body.mass),
+        surroundings=json.dumps(_surroundings(prepared)),
+        axes=scene.axes,
+        epoch=None if scene.epoch is None else str(scene.epoch),
+        time_unit=scene.config.time.unit,
+        recorded=" ".join(variable.name for variable in system.recorded),
+        python_loads=" ".join(type(load).__name__ for load in prepared.python_loads),
+        cpu_model=provenance.cpu_model(),
+        started_at=provenance.now(),
+        **platform,
+        mixed_provenance=mixed or None,
+    )
+
+
+def _surroundings(prepared: InitialValueProblem) -> list[dict[str, Any]]:
+    """Gravity and the pictured objects of every load."""
+    scene = prepared.scene
+    shown = [load.pictured() for load in (*scene.loads, *prepared.python_loads)]
+    if scene.gravity is not None:
+        shown.append({"what": "gravity", "acceleration": [float(g) for g in scene.gravity]})
+    return [one for one in shown if one is not None]
+
+
+def of_complete(
+    attributes: RootAttributes, summary: Summary, effort: Effort, angles_wrapped_from: float = math.nan
+) -> RootAttributes:
+    """Attributes of the dataset of a run that ended."""
+    put_back = {name: row.put_back for name, row in summary.invariants.items()}
+    tables = {name: found.as_dict() for name, found in summary.tables.items()}
+    return attributes.having(
+        status=summary.status,
+        status_message=summary.message,
+        warnings="\n".join(summary.warnings),
+        steps=summary.cost.steps,
+        wall_seconds=effort.wall,
+        cpu_seconds=effort.cpu,
+        finished_at=provenance.now(),
+        put_back=json.dumps(put_back) if summary.held else None,
+        attitude_error=summary.accuracy.estimated_attitude_error,
+        modelling_error=None if summary.modelling is None else summary.modelling.worst,
+        table_errors=json.dumps(tables) if tables else None,
+        angles_wrapped_from=None if math.isnan(angles_wrapped_from) else angles_wrapped_from,
+    )

@@ -1,1 +1,0 @@
-"""Progress of a run while it goes on, here or in another terminal."""
