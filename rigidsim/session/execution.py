@@ -11,12 +11,11 @@ from pathlib import Path
 from rigidsim.errors import VIEW, StoppedWritingError
 from rigidsim.look.thinning import KeptRows
 from rigidsim.scene.schema import Output
-from rigidsim.session import dataset
+from rigidsim.session import dataset, lyapunov
 from rigidsim.session.advice import cheaper_model
 from rigidsim.session.diagnostics import Diagnostics
 from rigidsim.session.ending import chart_changes, closing_words, time_reached
 from rigidsim.session.guards import Guards, Interruption, Observer
-from rigidsim.session.lyapunov import lyapunov_variables, spectrum_of
 from rigidsim.session.recorder import Checkpoints, Recorder
 from rigidsim.session.session import RunCost, Session
 from rigidsim.session.statistics import SampleStatistics
@@ -58,7 +57,7 @@ def execute(
     summary = run.summarised(found, spectrum)
     extras = dataset.event_variables(prepared, run.parts.log, run.parts.evaluator, run.last_time)
     if spectrum is not None:
-        extras += lyapunov_variables(spectrum)
+        extras += lyapunov.lyapunov_variables(spectrum)
     if isinstance(run.writer, MemoryWriter):
         unused = dataset.unused_variables(prepared, run.progress.steps)
         variables = [variable for variable in run.variables if variable.name not in unused]
@@ -142,7 +141,9 @@ class _ActiveRun:
         session.observer.phase("lyapunov")
         with suppress(KeyboardInterrupt):  # while its equations were compiled
             seconds = session.tuning.segments.seconds
-            spectrum = spectrum_of(self.prepared, self._folder, self._run_id, self.interruption, seconds)
+            spectrum = lyapunov.spectrum_of(
+                self.prepared, self._folder, self._run_id, self.interruption, seconds
+            )
         session.phases.next("lyapunov")
         self._heed_interruption()
         return spectrum

@@ -14,9 +14,8 @@ from rigidsim.errors import FORCE, RunFolderError, either
 from rigidsim.scene.config import Experiment, Overrides, has_earlier_settings, parse, parse_earlier
 from rigidsim.scene.overrides import assignments
 from rigidsim.scene.python_values import assignments_of
-from rigidsim.session.completion import with_timeline
 from rigidsim.session.dataset import root_attributes as attributes_now
-from rigidsim.session.execution import execute
+from rigidsim.session.execution import execute, with_timeline
 from rigidsim.session.guards import Observer
 from rigidsim.session.progress import watched
 from rigidsim.session.session import Session, Tuning
