@@ -270,6 +270,7 @@ def python_page() -> str:
     parts = [
         "# Python\n\nWhat `import rigidsim` offers, and what loads and observables of your own are made of. "
         "How they are used: [from Python](../howto/python.md), [a load](../howto/own_load.md), "
+        "[a carrier of momentum](../howto/own_carrier.md), "
         "[an observable](../howto/own_observable.md), [a solver](../howto/own_solver.md).",
         "## Functions\n\n"
         + "\n\n".join(_directive("autofunction", f"rigidsim.{name}") for name in functions),
@@ -280,6 +281,7 @@ def python_page() -> str:
             [
                 _directive("autoclass", "rigidsim.model.load.Load", members=True),
                 _directive("automodule", "rigidsim.model.capabilities", members=True),
+                _directive("autoclass", "rigidsim.model.carriers.Carrier", members=True),
                 *(
                     _directive("autoclass", f"rigidsim.model.scaling.{name}", members=True)
                     for name in ("Sized", "Swift", "BoundsFlight")

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import heyoka as hy
 
+from rigidsim.model.body import BODY
 from rigidsim.model.canonical import MOMENTA, CanonicalStates, canonical_states, hamilton_equations
 from rigidsim.model.capabilities import Reacting, having, orbit_of, table_of
 from rigidsim.model.equations import (
@@ -32,8 +33,7 @@ from rigidsim.scene.arithmetic import apply, transpose
 from rigidsim.scene.orbit_tables.pieces import TabulatedOrbit
 from rigidsim.scene.orbits import KeplerOrbit
 
-RATES, VERTICAL = ["wx", "wy", "wz"], ["gx", "gy", "gz"]
-POSITION, VELOCITY = ["x", "y", "z"], ["vx", "vy", "vz"]
+RATES, VERTICAL, POSITION, VELOCITY = BODY.rates, BODY.vertical, BODY.position, BODY.velocity
 
 
 def assemble_states(
@@ -161,7 +161,8 @@ def _rotation_blocks(m: Mechanics, plan: ModelPlan) -> list[StateBlock]:
         for w, e in zip(scene.angular_velocity, scaling.rates, strict=True)
     ]
     exponents = [e - scaling.time for e in scaling.rates]
-    blocks = [StateBlock(RATES, rate_equations(m, m.torque), initial, exponents=exponents, why=why["rates"])]
+    turning = rate_equations(m, [*m.torque, *m.inner_torque])
+    blocks = [StateBlock(RATES, turning, initial, exponents=exponents, why=why["rates"])]
     if m.attitude is not None:
         reason = why["attitude"]
         if m.attitude.orbital is not None:

@@ -14,6 +14,7 @@ import heyoka as hy
 
 from rigidsim.errors import ConfigError, Problem
 from rigidsim.model import rotations
+from rigidsim.model.carriers import carried_beside
 from rigidsim.model.formulations import AttitudeStates, euler_states
 from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.numbers import Rounder, ScaledNumbers
@@ -85,6 +86,9 @@ def hamilton_equations(m: Mechanics) -> list[Symbolic]:
     Raises:
         ConfigError: a load without a potential.
     """
+    if beside := carried_beside(m.loads):
+        what = f'given "canonical", but {beside}; choose another formulation'
+        raise ConfigError(Problem("[integrator] formulation", what))
     parts = [m.rotational_energy]
     for load in m.loads:
         if not load.torque(m):

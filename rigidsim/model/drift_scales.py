@@ -21,13 +21,15 @@ def momentum_scale(m: Mechanics) -> tuple[Any, str]:
     """abs(L) at the start, or the momentum that gravity can build up, if that is larger."""
     scene, context = m.scene, m.scene.context
     initial = norm(context, apply(scene.body.inertia, scene.angular_velocity))
+    for carrier in m.carriers:
+        initial += norm(context, carrier.carried_at_start(scene)[0])
     fed = potential_amplitude(scene) + loads_amplitude(scene) + _driven(m)
     swing = context.sqrt(2 * largest_of(scene.body.principal_moments) * fed)
     swing = largest_of([swing, largest_of(scene.body.principal_moments) * source_rate(scene)])
     if initial == 0 and swing == 0:
         return context.one, "1 kg m^2/s (the body is at rest)"
     if initial >= swing:
-        return initial, "initial norm of the angular momentum"
+        return initial, "initial norm of the angular momentum" + (", of each carrier" if m.carriers else "")
     return swing, "angular momentum that the loads can build up"
 
 
@@ -36,6 +38,8 @@ def rotational_scale(m: Mechanics) -> tuple[Any, str]:
     scene, context = m.scene, m.scene.context
     momentum = apply(scene.body.inertia, scene.angular_velocity)
     kinetic = dot(scene.angular_velocity, momentum) / 2
+    for carrier in m.carriers:
+        kinetic += carrier.carried_at_start(scene)[1]
     carried = largest_of(scene.body.principal_moments) * source_rate(scene) ** 2 / 2
     amplitude = potential_amplitude(scene) + loads_amplitude(scene) + carried + _driven(m)
     if kinetic + amplitude == 0:

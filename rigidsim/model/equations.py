@@ -30,7 +30,7 @@ def rate_equations(m: Kinematics, torque: list[Term]) -> list[Symbolic]:
     principal axes the coefficients that vanish are left out (Landau & Lifshitz, Mechanics, eq. 36.4-5).
 
     Args:
-        torque: terms of all loads, body axes, internal units.
+        torque: terms of all loads and carriers, body axes, internal units.
     """
     context, numbers, states = m.scene.context, m.numbers, m.rate_states
     zero = context.zero

@@ -42,7 +42,7 @@ def equatorial_top(m: Mechanics) -> EquatorialTop | None:
     """The scene as such a top; None for any other body, or if another load exerts a torque too."""
     context, scene = m.scene.context, m.scene
     axis, arm = m.symmetry_direction, scene.torque_arm
-    if m.vertical is None or axis is None or arm is None or scene.gravity is None:
+    if m.vertical is None or axis is None or arm is None or scene.gravity is None or m.carriers:
         return None
     if any(about_vertical(load) and load.torque(m) for load in m.loads):
         return None

@@ -189,7 +189,7 @@ def along(m: Mechanics, axis: Vector) -> Symbolic:
 
 def sources_alone(m: Mechanics) -> bool:
     """Whether all torque comes from fixed sources."""
-    turning = m.turning
+    turning = [] if m.carriers else m.turning
     return bool(turning) and all(fixed_source_of(load, m.scene) is not None for load in turning)
 
 

@@ -12,6 +12,7 @@ from typing import Any
 import heyoka as hy
 
 from rigidsim.model import rotations
+from rigidsim.model.body import BODY
 from rigidsim.model.rotations import Symbolic, SymbolicMatrix
 from rigidsim.model.state_blocks import StateBlock
 from rigidsim.scene import attitude
@@ -89,7 +90,7 @@ def quaternion_kinematics(q: list[Symbolic], rates: list[Symbolic]) -> list[Symb
 
 def quaternion_states(scene: Scene, rates: list[Symbolic]) -> AttitudeStates:
     """Four states, no singularity: q' = q (0, w) / 2 (the cheapest and the default)."""
-    names = ["qw", "qx", "qy", "qz"]
+    names = BODY.quaternion
     q = list(hy.make_vars(*names))
     derivatives = quaternion_kinematics(q, rates)
     squared = hy.sum([c * c for c in q])

@@ -12,6 +12,7 @@ from typing import Any, TypeVar
 
 import heyoka as hy
 
+from rigidsim.model.body import BODY, RotatingBody
 from rigidsim.model.formulations import AttitudeStates
 from rigidsim.model.numbers import Rounder, ScaledNumbers
 from rigidsim.model.orbits.kepler_states import OrbitStates, orbit_states
@@ -45,6 +46,7 @@ class Kinematics:
         surfaces: switching surfaces, between which expressions are smooth.
         tables: positions of the states and parameters of tabulated orbits.
         clocked: whether expressions of the time need it in two numbers (``rigidsim.model.two_part_time``).
+        body: names the states of the body.
     """
 
     scene: Scene
@@ -60,6 +62,7 @@ class Kinematics:
     surfaces: Surfaces = field(default_factory=Surfaces)
     tables: Mapping[TabulatedOrbit, TablePlace] = field(default_factory=dict)
     clocked: bool = False
+    body: RotatingBody = BODY
     _orbits: dict[KeplerOrbit | TabulatedOrbit, OrbitStates] = field(
         default_factory=dict, init=False, repr=False
     )
@@ -77,20 +80,9 @@ class Kinematics:
         return in_common_unit(self.rate_states, self.numbers.rate_units, self.number)
 
     @cached_property
-    def momentum_body(self) -> list[Symbolic]:
-        """Angular momentum I w, body axes."""
-        largest = largest_of([abs(x) for row in self.numbers.inertia for x in row])
-        least = largest * negligible(self.scene.context)
-        rows = []
-        for row in self.numbers.inertia:
-            terms = [self.number(x) * w for x, w in zip(row, self.rates, strict=True) if abs(x) > least]
-            rows.append(hy.sum(terms) if terms else hy.expression(0.0))
-        return rows
-
-    @cached_property
-    def momentum_space(self) -> list[Symbolic]:
-        """Angular momentum R I w, space axes."""
-        return apply(self.matrix, self.momentum_body)
+    def own_momentum(self) -> list[Symbolic]:
+        """Angular momentum I w of the body itself, body axes."""
+        return self.body.momentum(self.numbers.inertia, self.rates, self.number, self.scene.context)
 
     @staticmethod
     def carried(part: T | None) -> T:
@@ -125,11 +117,6 @@ class Kinematics:
     def seen_so_far(self) -> Sequence[list[Symbolic]]:
         """Results of ``seen``; some may be there several times."""
         return self._seen_vectors
-
-    @cached_property
-    def rotational_energy(self) -> Symbolic:
-        """Rotational energy w . I w / 2."""
-        return 0.5 * hy.sum([w * m for w, m in zip(self.rates, self.momentum_body, strict=True)])
 
     @property
     def marked(self) -> Vector | None:

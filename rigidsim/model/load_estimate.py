@@ -16,7 +16,9 @@ from itertools import product
 import heyoka as hy
 import numpy as np
 
+from rigidsim.model.body import BODY
 from rigidsim.model.capabilities import Narrow, having
+from rigidsim.model.carriers import Carrier
 from rigidsim.model.equations import vertical_from_attitude
 from rigidsim.model.formulations import BUILDERS
 from rigidsim.model.heyoka_expressions import to_heyoka
@@ -65,6 +67,7 @@ def estimate_drive(scene: Scene, loads: Sequence[Load], requirements: Requiremen
         return None
     m = probe(scene, requirements, loads)
     torque = [term for load in loads for term in torque_terms(load, m)]
+    torque += [term for carrier in having(Carrier, loads) for term in carrier.exerted_torque(m)]
     force = [term for load in loads for term in force_terms(load, m)] if m.velocity is not None else []
     names, start = start_of(m, loads)
     narrow = [u for load in having(Narrow, loads) for u in load.narrow(m)]
@@ -106,14 +109,14 @@ def probe(scene: Scene, requirements: Requirements, loads: Sequence[Load]) -> Me
     """The scene in double precision with quaternions, in units chosen without these loads."""
     scaling = choose_scaling(scene)
     numbers = scaled_numbers(scene, scaling)
-    states = list(hy.make_vars("wx", "wy", "wz"))
+    states = list(hy.make_vars(*BODY.rates))
     rates = in_common_unit(states, numbers.rate_units, float)
     attitude = None if requirements.formulation == "rates" else BUILDERS["quaternion"](scene, rates)
-    vertical = list(hy.make_vars("gx", "gy", "gz")) if requirements.vertical else None
+    vertical = list(hy.make_vars(*BODY.vertical)) if requirements.vertical else None
     if attitude is not None and numbers.arm is not None:
         vertical = vertical_from_attitude(attitude.matrix, numbers, float)
-    position = list(hy.make_vars("x", "y", "z")) if requirements.flight else None
-    velocity = list(hy.make_vars("vx", "vy", "vz")) if requirements.flight else None
+    position = list(hy.make_vars(*BODY.position)) if requirements.flight else None
+    velocity = list(hy.make_vars(*BODY.velocity)) if requirements.flight else None
     return Mechanics(
         scene, scaling, numbers, states, attitude, vertical, position, velocity, float, loads=list(loads)
     )
@@ -124,17 +127,15 @@ def start_of(m: Mechanics, loads: Sequence[Load]) -> tuple[list[str], np.ndarray
     scene, scaling, context = m.scene, m.scaling, m.scene.context
     values = {
         name: context.ldexp(w, scaling.time - e)
-        for name, w, e in zip(("wx", "wy", "wz"), scene.angular_velocity, scaling.rates, strict=True)
+        for name, w, e in zip(BODY.rates, scene.angular_velocity, scaling.rates, strict=True)
     }
-    values |= zip(("qw", "qx", "qy", "qz"), scene.quaternion, strict=True)
+    values |= zip(BODY.quaternion, scene.quaternion, strict=True)
     if m.numbers.up is not None:
         up = apply(transpose(numeric.rotation_matrix(scene.quaternion)), m.numbers.up)
-        values |= zip(("gx", "gy", "gz"), up, strict=True)
+        values |= zip(BODY.vertical, up, strict=True)
     if scene.position is not None and scene.velocity is not None:
-        values |= zip("xyz", [context.ldexp(x, -scaling.length) for x in scene.position], strict=True)
-        values |= zip(
-            ("vx", "vy", "vz"), [context.ldexp(v, -scaling.speed) for v in scene.velocity], strict=True
-        )
+        values |= zip(BODY.position, [context.ldexp(x, -scaling.length) for x in scene.position], strict=True)
+        values |= zip(BODY.velocity, [context.ldexp(v, -scaling.speed) for v in scene.velocity], strict=True)
     for load in loads:
         extra = load.extra_states(m)
         if extra is not None:
@@ -169,10 +170,10 @@ class _Samples:
         generator = np.random.default_rng(0)  # the same each time: the units are a function of the scene
         states = np.repeat(start[:, None], _STATES, axis=1)
         index = {name: i for i, name in enumerate(names)}
-        for name in ("wx", "wy", "wz", "x", "y", "z", "vx", "vy", "vz"):
+        for name in (*BODY.rates, *BODY.position, *BODY.velocity):
             if name in index:
                 states[index[name], _STATES // 2 :] *= -1
-        first = [index[name] for name in ("qw", "qx", "qy", "qz")]
+        first = [index[name] for name in BODY.quaternion]
         turns = [_product(start[first], _product(g, h)) for g in _TETRAHEDRAL for h in _OBLIQUE]
         states[first] = np.tile(np.array([start[first], *turns]).T, (1, 2))
         self._states = states

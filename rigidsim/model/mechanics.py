@@ -8,13 +8,15 @@ from typing import Any
 
 import heyoka as hy
 
-from rigidsim.model.capabilities import KeepsAxial, linear_potential_of
+from rigidsim.model.capabilities import KeepsAxial, having, linear_potential_of
+from rigidsim.model.carriers import Carrier, inner_torque, momentum_terms
 from rigidsim.model.kinematics import Kinematics
 from rigidsim.model.load import Load, Term, force_terms, torque_terms
 from rigidsim.model.rotations import Symbolic, apply
 from rigidsim.model.scaling import exponent
 from rigidsim.model.two_part import as_factor
 from rigidsim.scene.arithmetic import Vector, dot, negligible, norm
+from rigidsim.scene.arithmetic import apply as multiply
 from rigidsim.scene.tracing.numbers import largest_of
 
 
@@ -63,6 +65,52 @@ class Mechanics(Kinematics):
     def spin_space(self) -> list[Symbolic]:
         """Vector along the angular velocity, space axes; not normalized."""
         return apply(self.matrix, self.rates)
+
+    # --- sums over what carries momentum and energy ------------------------------------------------------
+
+    @cached_property
+    def carriers(self) -> list[Carrier]:
+        """What carries angular momentum beside the body."""
+        return having(Carrier, self.loads)
+
+    @cached_property
+    def momentum_body(self) -> list[Symbolic]:
+        """Angular momentum of the body and all carriers, body axes."""
+        rows = [[own] for own in self.own_momentum]
+        for vector, expression in momentum_terms(self.carriers, self):
+            for row, x in zip(rows, vector, strict=True):
+                row += [self.number(x) * expression] if x != 0 else []
+        return [row[0] if len(row) == 1 else hy.sum(row) for row in rows]
+
+    @cached_property
+    def momentum_space(self) -> list[Symbolic]:
+        """The same in space axes."""
+        return apply(self.matrix, self.momentum_body)
+
+    @cached_property
+    def rotational_energy(self) -> Symbolic:
+        """Kinetic energy of rotation of the body, w . I w / 2, and of all carriers."""
+        own = self.body.energy(self.rates, self.own_momentum)
+        others = [found for x in self.carriers if (found := x.carried_energy(self)) is not None]
+        return hy.sum([own, *others]) if others else own
+
+    @cached_property
+    def starting_momentum(self) -> Vector:
+        """Angular momentum of the body and all carriers at the start (mpf, SI), body axes."""
+        total = multiply(self.scene.body.inertia, self.scene.angular_velocity)
+        for carrier in self.carriers:
+            momentum, _ = carrier.carried_at_start(self.scene)
+            total = [x + y for x, y in zip(total, momentum, strict=True)]
+        return total
+
+    @cached_property
+    def inner_torque(self) -> list[Term]:
+        """Terms of the torque that the carriers exert on the body, which no total feels: body axes, internal
+        units of energy.
+        """
+        return inner_torque(self.carriers, self)
+
+    # --- what the loads do -------------------------------------------------------------------------------
 
     @cached_property
     def _torques(self) -> list[list[Term]]:
@@ -122,12 +170,21 @@ class Mechanics(Kinematics):
                     pairs = zip(vector, self.velocity, strict=True)
                     along = hy.sum([self.number(scale * x) * v for x, v in pairs if x != 0])
                     terms.append(expression * along)
+        supplied = [found for x in self.carriers if (found := x.supplied_power(self)) is not None]
+        unit = self.number(context.ldexp(context.one, scaling.energy - self.work_unit))
+        terms += [unit * power for power in supplied]
         return hy.sum(terms) if terms else None
 
     @property
+    def driven_within(self) -> bool:
+        """Whether a carrier's drive or friction changes the energy."""
+        return any(carrier.supplied_power(self) is not None for carrier in self.carriers)
+
+    @property
     def conserves_energy(self) -> bool:
-        """Whether every acting load has a time-independent potential."""
-        return all(load.conservative or not (load.torque(self) or load.force(self)) for load in self.loads)
+        """Whether every acting load has a time-independent potential, and no carrier is driven."""
+        kept = all(load.conservative or not (load.torque(self) or load.force(self)) for load in self.loads)
+        return kept and not self.driven_within
 
     @cached_property
     def energy(self) -> Symbolic:
@@ -154,7 +211,7 @@ class Mechanics(Kinematics):
     def keeps_axial(self) -> bool:
         """Whether the angular momentum along the symmetry axis is conserved."""
         axis = self.symmetry_direction
-        if axis is None:
+        if axis is None or self.carriers:
             return False
         return all(
             load.keeps_axial(self, axis) if isinstance(load, KeepsAxial) else self._spares(terms, axis)

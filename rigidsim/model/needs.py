@@ -120,7 +120,8 @@ def _isotropic_damping(m: Mechanics) -> bool:
     to a multiple of the inertia tensor.
     """
     found = [load.damping() if isinstance(load, Damping) else None for load in m.turning]
-    if not found or any(c is None for c in found) or all(w == 0 for w in m.scene.angular_velocity):
+    at_rest = all(w == 0 for w in m.scene.angular_velocity)
+    if m.carriers or not found or any(c is None for c in found) or at_rest:
         return False
     total = [sum((c[i] for c in found if c is not None), m.scene.context.zero) for i in range(3)]
     inertia, k = m.scene.body.inertia, max(range(3), key=lambda i: m.scene.body.inertia[i][i])

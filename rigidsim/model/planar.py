@@ -21,6 +21,7 @@ import heyoka as hy
 from rigidsim.errors import ConfigError, Problem
 from rigidsim.model import rotations
 from rigidsim.model.capabilities import KeepsPlane, has_source
+from rigidsim.model.carriers import carried_beside
 from rigidsim.model.formulations import AttitudeStates
 from rigidsim.model.load import Load, Term
 from rigidsim.model.numbers import Rounder, ScaledNumbers
@@ -81,6 +82,8 @@ def plane_of(scene: Scene, loads: Sequence[Load]) -> PlaneOfMotion:
     """
     if scene.free_flight:
         raise NotPlanar("the body has a position and flies")
+    if beside := carried_beside(loads):
+        raise NotPlanar(beside)
     context = scene.context
     axis = _spin_axis(scene, loads)
     normal = apply(attitude.rotation_matrix(scene.quaternion), axis)

@@ -15,6 +15,7 @@ import heyoka as hy
 import numpy as np
 
 from rigidsim.errors import ConfigError, Problem
+from rigidsim.model.body import BODY
 from rigidsim.model.capabilities import GradientAlone, Reacting
 from rigidsim.model.formulations import AttitudeStates
 from rigidsim.model.load import Load, force_terms, torque_terms
@@ -32,7 +33,6 @@ _SAME_BODY = 1e-3
 """Relative difference of gravitational parameters below which two sources are taken to be one."""
 _STATES = 16
 _NOISE = 1e-9  # of the largest component: far above rounding, far below any load that means its sign
-_QUATERNION = ("qw", "qx", "qy", "qz")
 
 
 def refuse_singular_start(scene: Scene, attitude: AttitudeStates | None) -> None:
@@ -94,7 +94,7 @@ def refuse_odd_loads(scene: Scene, requirements: Requirements, loads: Sequence[L
         names, start = start_of(m, [load])
         generator = np.random.default_rng(0)  # the same each time
         states = start[:, None] + generator.uniform(-1, 1, (len(names), _STATES))
-        rows = [names.index(name) for name in _QUATERNION]
+        rows = [names.index(name) for name in BODY.quaternion]
         states[rows] /= np.linalg.norm(states[rows], axis=0)
         other = states.copy()
         other[rows] *= -1

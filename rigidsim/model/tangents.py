@@ -30,8 +30,6 @@ SMALL = 900
 """The vector is carried 2**-SMALL of its size."""
 LARGEST = 500.0
 """Growth, as a logarithm, past which it is no longer carried small."""
-_RATES, _VERTICAL = ("wx", "wy", "wz"), ("gx", "gy", "gz")
-_FLIGHT = ("x", "y", "z", "vx", "vy", "vz")
 _GOLDEN = (math.sqrt(5) - 1) / 2
 
 
@@ -41,8 +39,8 @@ def own_names(m: Mechanics) -> list[str]:
     if m.attitude is not None and m.attitude.kind == "planar":
         return [*names, SPIN]
     if m.attitude is None and m.vertical is not None:
-        names = list(_VERTICAL)
-    return [*_RATES, *names, *(_FLIGHT if m.velocity is not None else ())]
+        names = m.body.vertical
+    return [*m.body.rates, *names, *([*m.body.position, *m.body.velocity] if m.velocity is not None else [])]
 
 
 def moving_names(own: Iterable[str], reads: Mapping[str, set[str]]) -> set[str]:
@@ -168,7 +166,7 @@ def _axis_of_turn(m: Mechanics) -> tuple[int, int] | None:
 
 def _weights(m: Mechanics, names: Sequence[str]) -> list[int]:
     """Binary exponents that make offsets of states comparable: angles in rad, rates in 1 / internal time."""
-    rates = dict(zip(_RATES, m.scaling.rates, strict=True))
+    rates = dict(zip(m.body.rates, m.scaling.rates, strict=True))
     attitude = m.attitude
     turned = attitude is not None and attitude.kind == "quaternion"
     weights = []

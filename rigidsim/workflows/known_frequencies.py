@@ -12,6 +12,7 @@ import mpmath
 
 from rigidsim.analysis.labels import Known
 from rigidsim.model.capabilities import GradientAlone, gradient_source_of, orbit_of
+from rigidsim.model.carriers import carried_beside
 from rigidsim.model.load import loads_of
 from rigidsim.scene.arithmetic import Vector, apply, dot, transpose
 from rigidsim.scene.attitude import rotation_matrix
@@ -49,6 +50,8 @@ def known_frequencies(scene: Scene, *, driven: bool = False) -> list[Known]:
         return [Known(k.name, mpmath.ldexp(k.value, -closed.scaling.time), 0.0, k.source) for k in found]
     found = []
     loads = loads_of(scene)
+    if carried_beside(loads):
+        return []
     orbits = [orbit for load in loads if (orbit := orbit_of(load)) is not None]
     for number, orbit in enumerate(orbits, 1):
         found += _of_orbit(orbit, str(number) if len(orbits) > 1 else "")

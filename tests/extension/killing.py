@@ -19,6 +19,7 @@ _CODE = """
 import sys
 sys.path[:0] = {places!r}
 import {extension}
+getattr({extension}, "register", lambda: None)()
 from killing import run_until_killed
 run_until_killed({text!r}, {out!r})
 """

@@ -21,6 +21,7 @@ from rigidsim.model.averaged.sources import Source
 from rigidsim.model.averaged.spectrum import BodySpectrum
 from rigidsim.model.averaged.torques import reads_rates_alone
 from rigidsim.model.capabilities import gradient_source_of
+from rigidsim.model.carriers import carried_beside
 from rigidsim.model.load import Load
 from rigidsim.scene.model_table import ORBIT_AVERAGED
 from rigidsim.scene.readable_time import span_text
@@ -59,6 +60,8 @@ def refuse_scene(scene: Scene, loads: Sequence[Load]) -> None:
     against: str | None = None
     if scene.free_flight:
         against = "the body has a position and flies"
+    elif against := carried_beside(loads):
+        pass
     elif not loads:
         against = "no torque acts, so that the direction of the angular momentum rests"
     elif max(scene.body.principal_moments) == min(scene.body.principal_moments):

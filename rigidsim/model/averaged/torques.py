@@ -20,7 +20,9 @@ import heyoka as hy
 import numpy as np
 
 from rigidsim.model.averaged.polhode import Polhodes, mean_square_sine, means_needed, nodes_needed
+from rigidsim.model.body import BODY
 from rigidsim.model.capabilities import Damping, Reacting, has_source, orbit_of, table_of
+from rigidsim.model.carriers import Carrier
 from rigidsim.model.load import Load
 from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.numbers import Rounder, ScaledNumbers
@@ -30,7 +32,7 @@ from rigidsim.model.two_part import as_factor
 from rigidsim.scene.arithmetic import Vector, dot
 from rigidsim.scene.scene import Scene
 
-RATE_STATES = ("wx", "wy", "wz")
+RATE_STATES = BODY.rates
 _CLOCK = "t_of_torque"
 _MOST_NODES = 1024
 _CHECKED = 1e-12
@@ -42,8 +44,8 @@ _BITS_CHECKED = 40
 
 def reads_rates_alone(load: Load) -> bool:
     """Whether a load is a function of the body's rates, in body axes, that doesn't depend on time."""
-    placed = orbit_of(load) or table_of(load) or has_source(load) or isinstance(load, Reacting)
-    return not (load.reads or placed)
+    placed = orbit_of(load) or table_of(load) or has_source(load)
+    return not (load.reads or placed or isinstance(load, Reacting | Carrier))
 
 
 @dataclass(frozen=True)

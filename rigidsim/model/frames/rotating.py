@@ -38,7 +38,7 @@ def _same_frame(m: Mechanics, a: KeplerOrbit, b: KeplerOrbit) -> bool:
 def rotating_orbit(m: Mechanics) -> KeplerOrbit | None:
     """An orbit with whose frame all potentials turn; None if there is none."""
     orbits = [orbit for load in m.turning if (orbit := corotating_orbit_of(load)) is not None]
-    if not orbits or not all(_same_frame(m, orbits[0], orbit) for orbit in orbits[1:]):
+    if not orbits or m.driven_within or not all(_same_frame(m, orbits[0], orbit) for orbit in orbits[1:]):
         return None
     others = [load for load in m.turning if corotating_orbit_of(load) is None]
     if not all(load.conservative for load in others) or not keeps(m, _normal(m, orbits[0]), others):

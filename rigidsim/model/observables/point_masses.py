@@ -18,7 +18,7 @@ from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.observables.observable import SPACE, Observable, same_unit
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.scaling import exponent
-from rigidsim.scene.arithmetic import Vector, apply, cross, norm
+from rigidsim.scene.arithmetic import Vector, cross, norm
 from rigidsim.scene.point_masses import PointMasses
 from rigidsim.scene.registry import register_observable
 
@@ -80,7 +80,7 @@ def _angular_scale(m: Mechanics) -> tuple[Any, str]:
     context = m.scene.context
     size = sum((k * norm(context, cross(x, v)) for k, _, _, x, v in _moving(m)), context.zero)
     if _masses(m).full:
-        size += norm(context, apply(m.scene.body.inertia, m.scene.angular_velocity))
+        size += norm(context, m.starting_momentum)
     return (size or context.one), "sum of the sizes of all angular momenta at the start"
 
 

@@ -56,7 +56,7 @@ def _andoyer_angles(m: Mechanics) -> list[Angle]:
 def _senses(m: Mechanics) -> tuple[int, int]:
     """Side of the reference plane, and of the figure's equator, on which the momentum starts: +1 or -1."""
     scene = m.scene
-    momentum = apply_numbers(scene.body.inertia, scene.angular_velocity)
+    momentum = m.starting_momentum
     in_space = apply_numbers(attitude.rotation_matrix(scene.quaternion), momentum)
     above = dot(in_space, initial_normal(scene, m.loads))
     return (-1 if above < 0 else 1), (-1 if dot(momentum, scene.figure.pole) < 0 else 1)

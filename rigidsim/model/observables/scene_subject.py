@@ -51,7 +51,7 @@ def is_planet(m: Mechanics) -> bool:
 
 def is_nearly_axial(m: Mechanics) -> bool:
     """Whether a torque-free body or a planet turns nearly, but not exactly, about its figure axis."""
-    if m.torque and not is_planet(m):
+    if m.carriers or (m.torque and not is_planet(m)):
         return False
     scene, pole = m.scene, m.scene.figure.pole
     wobbles = norm(scene.context, cross(pole, scene.angular_velocity)) != 0

@@ -54,7 +54,7 @@ def _bounds(m: Mechanics) -> _Bounds | None:
     body, pole = scene.body, scene.figure.pole
     momentum = apply(body.inertia, scene.angular_velocity)
     size = norm(context, momentum)
-    if size == 0 or (m.torque and not is_planet(m)):
+    if size == 0 or m.carriers or (m.torque and not is_planet(m)):
         return None
     turned = apply(body.inertia, pole)
     polar = dot(pole, turned)

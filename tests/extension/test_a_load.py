@@ -1,8 +1,11 @@
-"""A load or an observable is one thing in one place: registered, it is there by its name everywhere."""
+"""A load from outside the package: a class that is registered by one line is a kind of ``[[loads]]``.
+
+Everything above the tests is what its author writes. It is checked, planned, recorded and reproduced like
+rigidsim's own.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, Literal
 
@@ -10,31 +13,16 @@ import mpmath
 import numpy as np
 import pytest
 from equations import CLOSE, derivative
-from support import config, run_text, tried, wide
+from killing import killed
+from support import angle_between, config, loaded, run_text, same_bits, tried
 
 import rigidsim
 from rigidsim.errors import ConfigError
 from rigidsim.model.kinematics import Kinematics
 from rigidsim.model.load import Load, Term
-from rigidsim.model.mechanics import Mechanics
-from rigidsim.model.observables import Observable, only_when_named
-from rigidsim.scene import registry
 from rigidsim.scene.fields import Moment, Rate
-from rigidsim.scene.registry import LoadFields, Surroundings, register_load, register_observable
+from rigidsim.scene.registry import LoadFields, Surroundings, register_load
 from rigidsim.solve.problem import prepare
-
-
-@pytest.fixture(autouse=True)
-def registries() -> Iterator[None]:
-    """What a test registers is gone after it."""
-    loads, observables = dict(registry.LOAD_KINDS), dict(registry.OBSERVABLES)
-    yield
-    for known, before in ((registry.LOAD_KINDS, loads), (registry.OBSERVABLES, observables)):
-        known.clear()
-        known.update(before)
-
-
-# --- a load -------------------------------------------------------------------------------------------------
 
 
 class SpringFields(LoadFields):
@@ -73,14 +61,17 @@ class TorsionWire(Load):
         return 2 * self.stiffness
 
 
+def register() -> None:
+    register_load(TorsionWire)
+
+
+# --- the tests ----------------------------------------------------------------------------------------------
+
 WIRE = 'kind = "torsion_wire"\ninertia = "2 kg m^2"\nfrequency = "30 rpm"'
 STIFFNESS = 2 * np.pi**2
 
 
 def test_a_load_with_fields_is_usable_in_a_config(runs: Path) -> None:
-    with pytest.raises(ConfigError, match="torsion_wire"):
-        rigidsim.parse(config(loads=WIRE))
-    register_load(TorsionWire)
     text = config(loads=WIRE, output='record = ["quaternion", "energy", "potential_energy"]')
     system = prepare(rigidsim.parse(text)).system
     w, q = np.array([0.3, 1.0, 0.5]), np.array([1.0, 0, 0, 0])
@@ -104,7 +95,6 @@ def test_a_load_with_fields_is_usable_in_a_config(runs: Path) -> None:
 
 
 def test_its_keys_are_checked_like_any_others() -> None:
-    register_load(TorsionWire)
     with pytest.raises(ConfigError, match=r"number 1 inertia.*given -1; a positive number is allowed"):
         prepare(rigidsim.parse(config(loads=WIRE.replace('"2 kg m^2"', "-1"))))
     with pytest.raises(ConfigError, match=r'frequncy.*"?frequency"?'):
@@ -114,7 +104,6 @@ def test_its_keys_are_checked_like_any_others() -> None:
 
 
 def test_a_name_is_given_once_and_a_config_needs_keys() -> None:
-    register_load(TorsionWire)
 
     class Other(TorsionWire):
         """Another class of the same kind."""
@@ -129,62 +118,21 @@ def test_a_name_is_given_once_and_a_config_needs_keys() -> None:
         register_load(Bare)
 
 
-# --- an observable ------------------------------------------------------------------------------------------
+LONGER = config(loads=WIRE, time="end = 6\nsamples = 25")
 
 
-def spin_parameter(m: Mechanics) -> list[Any]:
-    """w_x^2 + w_y^2 over the square of the unit of rates: a quantity that nobody else records."""
-    return [m.rates[0] ** 2.0 + m.rates[1] ** 2.0]
+def test_its_announced_error_is_true() -> None:
+    run = run_text(LONGER, estimate=True)
+    exact = loaded(run_text(LONGER, 'integrator.precision="quadruple"'))["quaternion"].values
+    true = angle_between(loaded(run)["quaternion"].values, exact).max()
+    assert true / 3 <= run.summary["accuracy"]["estimated_attitude_error"] <= 100 * true
 
 
-TRANSVERSE = Observable(
-    "transverse_rate_squared", (), "rad2 s-2", "square of the rate across the body's z axis",
-    spin_parameter, lambda m: [-2 * m.scaling.time], "body axes", by_default=only_when_named,
-)  # fmt: skip
-
-
-def test_an_observable_is_recorded_by_its_name() -> None:
-    with pytest.raises(ConfigError, match="transverse_rate_squared"):
-        prepare(rigidsim.parse(config(output='record = ["transverse_rate_squared"]')))
-    register_observable(TRANSVERSE)
-    assert "transverse_rate_squared" not in run_text(config()).dataset  # only where it is named
-    named = config(output='record = ["angular_velocity", "transverse_rate_squared"]')
-    dataset = run_text(named).dataset
-    found = dataset["transverse_rate_squared"]
-    assert found.attrs["units"] == "rad2 s-2"
-    assert found.attrs["long_name"] == "square of the rate across the body's z axis"
-    assert found.dims == ("time",)
-    rates = dataset["angular_velocity"].values
-    # two products, a sum and the rounding of the recorded rates
-    np.testing.assert_allclose(found.values, rates[:, 0] ** 2 + rates[:, 1] ** 2, rtol=8 * 2.0**-53)
-
-
-def test_its_residuals_are_recorded_in_extended_precision() -> None:
-    register_observable(TRANSVERSE)
-    text = config(
-        integrator='precision = "extended"',
-        output='record = ["angular_velocity", "transverse_rate_squared"]',
-    )
-    dataset = run_text(text).dataset
-    assert np.any(dataset["transverse_rate_squared_lo"].values != 0)
-    rates = wide(dataset, "angular_velocity")
-    exact = rates[:, 0] ** 2 + rates[:, 1] ** 2
-    error = np.abs(wide(dataset, "transverse_rate_squared") - exact)
-    assert (error <= 8 * 2.0**-64 * exact).all()
-    # the high part is the nearest double
-    assert (dataset["transverse_rate_squared"].values == exact.astype(float)).mean() > 0.99
-
-
-def test_unknown_names_still_name_the_nearest() -> None:
-    register_observable(TRANSVERSE)
-    for wrong, nearest in (
-        ("transverse_rate_square", "transverse_rate_squared"),
-        ("angular_velocty", "angular_velocity"),
-    ):
-        with pytest.raises(ConfigError, match=f'"{nearest}"'):
-            prepare(rigidsim.parse(config(output=f'record = ["{wrong}"]')))
-    with pytest.raises(ValueError, match='an observable named "energy" is registered already'):
-        register_observable(Observable("energy", (), "J", "mine", spin_parameter))
+@pytest.mark.optimised  # as in the process that is killed
+def test_a_killed_run_resumes_bit_for_bit(tmp_path: Path) -> None:
+    done = rigidsim.resume(killed("test_a_load", LONGER, tmp_path))
+    assert done.summary["cost"]["sessions"] == 2
+    same_bits(run_text(LONGER), done)
 
 
 # --- loads that share an orbit ------------------------------------------------------------------------------

@@ -1,0 +1,74 @@
+"""What carries angular momentum and kinetic energy beside the body: rotors, a fluid core.
+
+With the body's I w and the momentum h_k of each carrier, all in body axes,
+
+    L = I w + sum of h_k,    T = w . I w / 2 + sum of T_k,
+
+and Euler's equations L' + w x L = torque become
+
+    I w' = (I w) x w + torque + sum of (h_k x w + g_k),
+
+where g_k = -h_k' is the torque that a carrier exerts on the body, a motor's or friction's (Hughes, Spacecraft
+Attitude Dynamics, 1986, section 3.4). The body's tensor I is then that of what turns with it: of a rotor on a
+bearing it includes the mass, but not the moment about the bearing's axis.
+
+A carrier is a load: it brings its states by ``extra_states``, and is registered, configured and told in the
+same way. Motions and formulations that know the body alone ask ``carried_beside``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any, Protocol, runtime_checkable
+
+from rigidsim.model.kinematics import Kinematics
+from rigidsim.model.load import Load, Term
+from rigidsim.model.numbers import unit_vectors
+from rigidsim.model.rotations import Symbolic
+from rigidsim.scene.arithmetic import Vector, cross
+from rigidsim.scene.scene import Scene
+
+
+@runtime_checkable
+class Carrier(Protocol):
+    """A load that carries angular momentum relative to the body."""
+
+    def carried_momentum(self, m: Kinematics) -> list[Term]:
+        """Its momentum h, body axes, in internal units of momentum."""
+
+    def carried_energy(self, m: Kinematics) -> Symbolic | None:
+        """Its kinetic energy, internal units; None for none."""
+
+    def exerted_torque(self, m: Kinematics) -> list[Term]:
+        """The torque -h' that it exerts on the body, body axes, in internal units of energy."""
+
+    def supplied_power(self, m: Kinematics) -> Symbolic | None:
+        """The power that its drive feeds in, less what its friction takes, in internal units of energy over
+        time; None if it keeps the energy.
+        """
+
+    def carried_at_start(self, scene: Scene) -> tuple[Vector, Any]:
+        """Its momentum (mpf, kg m^2/s, body axes) and kinetic energy (mpf, J) at the start."""
+
+
+def carried_beside(loads: Iterable[Load]) -> str:
+    """Why momentum is carried by more than the body, for what can't do with that; empty if it isn't."""
+    found = next((load.title for load in loads if isinstance(load, Carrier)), "")
+    return f"{found} carries angular momentum beside the body" if found else ""
+
+
+def momentum_terms(carriers: Iterable[Carrier], m: Kinematics) -> list[Term]:
+    """Momentum of all carriers beside the body; what is zero for good is left out."""
+    terms = (term for carrier in carriers for term in carrier.carried_momentum(m))
+    return [(vector, expression) for vector, expression in terms if any(x != 0 for x in vector)]
+
+
+def inner_torque(carriers: Iterable[Carrier], m: Kinematics) -> list[Term]:
+    """Terms of h x w and of the torques that carriers exert on the body, in internal units of energy."""
+    carriers, found = list(carriers), []
+    for vector, expression in momentum_terms(carriers, m):
+        for axis, unit, rate in zip(
+            unit_vectors(m.scene.context), m.numbers.rate_units, m.rate_states, strict=True
+        ):
+            found.append(([x * unit for x in cross(vector, axis)], expression * rate))
+    return found + [term for carrier in carriers for term in carrier.exerted_torque(m)]

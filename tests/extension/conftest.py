@@ -1,0 +1,19 @@
+"""What a module of this folder registers, by its ``register``, is there for its own tests alone."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import pytest
+
+from rigidsim.scene import registry
+
+
+@pytest.fixture(autouse=True)
+def registries(request: pytest.FixtureRequest) -> Iterator[None]:
+    kept = {id(known): dict(known) for known in (registry.LOAD_KINDS, registry.OBSERVABLES)}
+    getattr(request.module, "register", lambda: None)()
+    yield
+    for known in (registry.LOAD_KINDS, registry.OBSERVABLES):
+        known.clear()
+        known.update(kept[id(known)])

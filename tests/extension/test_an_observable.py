@@ -1,0 +1,127 @@
+"""Observables from outside the package: one entry each, recorded by name; one that is conserved is watched.
+
+Everything above the tests is what their author writes.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import heyoka as hy
+import numpy as np
+import pytest
+from killing import killed
+from support import config, loaded, run_text, same_bits, wide
+
+import rigidsim
+from rigidsim.errors import ConfigError
+from rigidsim.model.mechanics import Mechanics
+from rigidsim.model.observables import Observable, only_when_named
+from rigidsim.scene.registry import register_observable
+from rigidsim.solve.problem import prepare
+
+
+def spin_parameter(m: Mechanics) -> list[Any]:
+    """w_x^2 + w_y^2 over the square of the unit of rates: a quantity that nobody else records."""
+    return [m.rates[0] ** 2.0 + m.rates[1] ** 2.0]
+
+
+TRANSVERSE = Observable(
+    "transverse_rate_squared", (), "rad2 s-2", "square of the rate across the body's z axis",
+    spin_parameter, lambda m: [-2 * m.scaling.time], "body axes", by_default=only_when_named,
+)  # fmt: skip
+
+
+def free_of_torque(m: Mechanics) -> str | None:
+    return None if m.torque else "no torque acts"
+
+
+def ratio_scale(m: Mechanics) -> tuple[Any, str]:
+    return m.scene.context.one, "1 kg m^2"
+
+
+RATIO = Observable(
+    "momentum_squared_over_energy", (), "kg m2", "squared angular momentum over twice the energy",
+    lambda m: [hy.sum([x * x for x in m.momentum_body]) / (2.0 * m.rotational_energy)],
+    lambda m: [m.scaling.inertia], conserved=free_of_torque, drift_scale=ratio_scale,
+    by_default=only_when_named,
+)  # fmt: skip
+
+
+def register() -> None:
+    register_observable(TRANSVERSE)
+    register_observable(RATIO)
+
+
+# --- the tests ----------------------------------------------------------------------------------------------
+
+
+def test_an_observable_is_recorded_by_its_name() -> None:
+    assert "transverse_rate_squared" not in run_text(config()).dataset  # only where it is named
+    named = config(output='record = ["angular_velocity", "transverse_rate_squared"]')
+    dataset = run_text(named).dataset
+    found = dataset["transverse_rate_squared"]
+    assert found.attrs["units"] == "rad2 s-2"
+    assert found.attrs["long_name"] == "square of the rate across the body's z axis"
+    assert found.dims == ("time",)
+    rates = dataset["angular_velocity"].values
+    # two products, a sum and the rounding of the recorded rates
+    np.testing.assert_allclose(found.values, rates[:, 0] ** 2 + rates[:, 1] ** 2, rtol=8 * 2.0**-53)
+
+
+def test_its_residuals_are_recorded_in_extended_precision() -> None:
+    text = config(
+        integrator='precision = "extended"',
+        output='record = ["angular_velocity", "transverse_rate_squared"]',
+    )
+    dataset = run_text(text).dataset
+    assert np.any(dataset["transverse_rate_squared_lo"].values != 0)
+    rates = wide(dataset, "angular_velocity")
+    exact = rates[:, 0] ** 2 + rates[:, 1] ** 2
+    error = np.abs(wide(dataset, "transverse_rate_squared") - exact)
+    assert (error <= 8 * 2.0**-64 * exact).all()
+    # the high part is the nearest double
+    assert (dataset["transverse_rate_squared"].values == exact.astype(float)).mean() > 0.99
+
+
+def test_unknown_names_still_name_the_nearest() -> None:
+    for wrong, nearest in (
+        ("transverse_rate_square", "transverse_rate_squared"),
+        ("angular_velocty", "angular_velocity"),
+    ):
+        with pytest.raises(ConfigError, match=f'"{nearest}"'):
+            prepare(rigidsim.parse(config(output=f'record = ["{wrong}"]')))
+    with pytest.raises(ValueError, match='an observable named "energy" is registered already'):
+        register_observable(Observable("energy", (), "J", "mine", spin_parameter))
+
+
+RECORDED = config(
+    output='record = ["quaternion", "transverse_rate_squared", "momentum_squared_over_energy"]',
+    time="end = 6\nsamples = 25",
+    estimate=True,
+)
+
+
+def test_one_that_is_conserved_is_watched_and_reproduced(tmp_path: Path) -> None:
+    """By hand: sum (I w)^2 / sum I w^2 of the rates at the start."""
+    run = rigidsim.run(rigidsim.parse(RECORDED), out=tmp_path)
+    row = run.summary["invariants"]["momentum_squared_over_energy"]
+    assert 0 <= row["largest_drift"] <= row["bound"]
+    moments, rates = np.array([1, 2, 2.5]), np.array([0.3, 1.0, 0.5])
+    expected = (moments * rates) @ (moments * rates) / (moments * rates @ rates)
+    found = run.dataset["momentum_squared_over_energy"].values
+    np.testing.assert_allclose(found, expected, rtol=row["bound"])
+    assert rigidsim.verify(run.folder.path).identical
+
+
+@pytest.mark.optimised  # as in the process that is killed
+def test_a_killed_run_resumes_bit_for_bit(tmp_path: Path) -> None:
+    done = rigidsim.resume(killed("test_an_observable", RECORDED, tmp_path))
+    whole = run_text(RECORDED, estimate=True)
+    same_bits(whole, done)
+    errors = [run.summary["accuracy"]["estimated_attitude_error"] for run in (whole, done)]
+    exact = loaded(run_text(RECORDED, 'integrator.precision="quadruple"'))["transverse_rate_squared"].values
+    true = np.abs(loaded(whole)["transverse_rate_squared"].values - exact).max()
+    assert errors[0] == errors[1]
+    assert 0 < true <= 100 * errors[0]
