@@ -70,6 +70,13 @@ SOLVER = Question(
     ("rigidsim/scene/", "rigidsim/solve/closed_form/", "rigidsim/solve/solvers/"),
 )
 
+FORMULATION = Question(
+    ("rates", "quaternion", "euler_angles", "rotation_matrix", "canonical", "planar"),
+    ("canonical", "planar", "average", "averaged"),
+    ("rigidsim/scene/", "rigidsim/model/formulations/", "rigidsim/model/averaged/"),
+)
+"""Most of these are names of recorded variables, too: half of the modules that are counted ask for such."""
+
 
 def of_folder(root: Path) -> Sources:
     """The Python code of the package and of its tests as it stands in a folder."""
@@ -117,6 +124,8 @@ def figures(sources: Sources) -> dict[str, int]:
         "imports within functions": sum(map(late_imports, own.values())),
         "modules that name a solver": len(SOLVER.named_in(own)),
         "modules that ask which solver it is": len(SOLVER.asked_in(own)),
+        "modules that name a formulation": len(FORMULATION.named_in(own)),
+        "modules that ask which formulation it is": len(FORMULATION.asked_in(own)),
     }
 
 
@@ -134,6 +143,7 @@ if __name__ == "__main__":
     read = {commit: of_commit(commit) for commit in sys.argv[1:]} | {"working tree": of_folder(ROOT)}
     print(table({name: figures(sources) for name, sources in read.items()}))
     for name, sources in read.items():
-        print(f"\n{name}: these name a solver (* and ask which it is)")
-        asked = SOLVER.asked_in(own := package(sources))
-        print("\n".join(f"  {path}{' *' if path in asked else ''}" for path in SOLVER.named_in(own)))
+        for kind, question in (("solver", SOLVER), ("formulation", FORMULATION)):
+            print(f"\n{name}: these name a {kind} (* and ask which it is)")
+            asked = question.asked_in(own := package(sources))
+            print("\n".join(f"  {path}{' *' if path in asked else ''}" for path in question.named_in(own)))

@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 from types import FrameType
 
-from house_figures import LONGEST, ROOT, SOLVER, late_imports, length, of_folder, package
+from house_figures import FORMULATION, LONGEST, ROOT, SOLVER, late_imports, length, of_folder, package
 from typer.testing import CliRunner
 
 from rigidsim.cli.app import app
@@ -38,6 +38,11 @@ def test_hardly_any_module_asks_which_solver_it_is() -> None:
         {"a.py": 'if m in ("taylor", "b"): c', "b.py": "d.closed", "c.py": 'e = "taylor"'}
     )
     assert found == ["a.py", "b.py"]
+
+
+def test_hardly_any_module_asks_which_formulation_it_is() -> None:
+    """They ask ``rigidsim.model.formulations`` what it can do."""
+    assert len(FORMULATION.asked_in(MODULES)) <= 15
 
 
 def test_imports_within_functions_are_counted_once() -> None:

@@ -35,7 +35,8 @@ def is_braked(prepared: InitialValueProblem) -> bool:
     """Whether torques that are functions of the rates change a full motion's rotation lastingly."""
     plan = prepared.system.plan
     alone = [load for load in plan.loads if gradient_source_of(load) is None]
-    return plan.average is None and bool(alone) and all(reads_rates_alone(load) for load in alone)
+    full = plan.formulation.resolves_rotation
+    return full and bool(alone) and all(reads_rates_alone(load) for load in alone)
 
 
 def mean_pace(prepared: InitialValueProblem) -> float | None:

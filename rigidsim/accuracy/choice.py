@@ -23,6 +23,7 @@ from rigidsim.accuracy.trial import Told
 from rigidsim.errors import ConfigError, Problem
 from rigidsim.model.load import Load
 from rigidsim.scene.config import Experiment
+from rigidsim.scene.formulations import attitude_variables, variables_named
 from rigidsim.scene.integrator_table import LARGEST_DIGITS
 from rigidsim.scene.readable_time import span_text
 
@@ -170,17 +171,16 @@ def _candidates(experiment: Experiment, motion: KnownMotion) -> list[Setting]:
     """All settings that the config leaves open."""
     integrator = experiment.config.integrator
     given = integrator.model_fields_set
-    formulation = integrator.formulation
-    charts = formulation not in ("auto", "rates", "quaternion")
+    formulation = attitude_variables(integrator.formulation)
     precisions = (integrator.precision,) if "precision" in given else _LADDER
     found: list[Setting] = []
     if motion.exact and (integrator.method == motion.exact or "method" not in given):
-        open_ = not charts and not experiment.config.events
+        open_ = variables_named(formulation).in_closed_form and not experiment.config.events
         open_ = open_ and not (integrator.hold_invariants is True and "hold_invariants" in given)
         found += [Setting(p, method=motion.exact) for p in precisions if p != "extended" and open_]
     if not integrator.has_steps:
         return found
-    plain = Setting(formulation=formulation if charts else "quaternion", method=integrator.method)
+    plain = Setting(formulation=formulation, method=integrator.method)
     holds = [integrator.hold_invariants is True] if "hold_invariants" in given else [False, True]
     looser = 13
     for precision in precisions:

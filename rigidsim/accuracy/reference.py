@@ -19,6 +19,7 @@ import numpy as np
 from rigidsim.accuracy.motion import KnownMotion
 from rigidsim.accuracy.setting import Setting, epsilon
 from rigidsim.scene.arithmetic import working_bits
+from rigidsim.scene.formulations import DEFAULT_FORMULATION, variables_named
 
 INCOMPARABLE = 0.5
 """Difference (rad) past which all digits are gone."""
@@ -133,7 +134,7 @@ def references(
     elif motion.exact:  # too long for steps: the closed form must check itself, with many more digits
         costly.append(exact_to(digits_beyond(setting.precision), motion.exact))
     else:
-        other = "rotation_matrix" if setting.formulation == "quaternion" else "quaternion"
+        other = variables_named(setting.formulation).checked_by
         peer = replace(setting, formulation=other, tolerance=None)
         costly.append(Reference(peer, ReferenceKind.PEER))
     finer = [stepped_reference(p, motion, motion.steps, policy) for p in stepped]
@@ -158,7 +159,11 @@ def exact_beyond(precision: str | int, method: str) -> Reference:
 
 
 def stepped_reference(
-    precision: str | int, motion: KnownMotion, steps: float, policy: Policy, formulation: str = "quaternion"
+    precision: str | int,
+    motion: KnownMotion,
+    steps: float,
+    policy: Policy,
+    formulation: str = DEFAULT_FORMULATION,
 ) -> Setting:
     """An integration at a precision's epsilon. Invariants are projected where that is right: with more digits
     than 64 bits rounding doesn't matter, nor does it over a short way in double precision.
@@ -197,12 +202,13 @@ def equals_of(best: Setting, there: Iterable[Setting]) -> list[Setting]:
     rotation-matrix states, which round other initial values and coefficients.
     """
     second = _SECOND.get(best.precision)
+    peers = (variables_named(best.formulation).checked_by,) if second is None else ()
     return [
         other
         for other in there
         if other != best
         and (other.precision, other.method, other.tolerance) == (best.precision, best.method, second)
-        and other.formulation in (best.formulation, *(("rotation_matrix",) if second is None else ()))
+        and other.formulation in (best.formulation, *peers)
     ]
 
 

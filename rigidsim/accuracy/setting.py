@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 from rigidsim.scene.arithmetic import working_bits
 from rigidsim.scene.config import Experiment
+from rigidsim.scene.formulations import DEFAULT_FORMULATION, attitude_variables
 from rigidsim.scene.methods import DEFAULT_METHOD, METHODS
 from rigidsim.solve.problem import auto_tolerance
 
@@ -25,7 +26,7 @@ class Setting:
 
     precision: str | int = "double"
     tolerance: float | None = None
-    formulation: str = "quaternion"
+    formulation: str = DEFAULT_FORMULATION
     hold_invariants: bool = False
     method: str = DEFAULT_METHOD
 
@@ -101,7 +102,7 @@ def setting_of(experiment: Experiment) -> Setting:
     return Setting(
         integrator.precision,
         None if isinstance(tolerance, str) else float(tolerance),
-        "quaternion" if integrator.formulation in ("auto", "rates") else integrator.formulation,
+        attitude_variables(integrator.formulation),
         integrator.hold_invariants is True,  # "auto" begins plainly, and does no worse than that
         integrator.method,
     )

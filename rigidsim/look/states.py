@@ -77,7 +77,7 @@ def charts_of(dataset: Table) -> list[States]:
         str(dataset.attrs.get(f"euler_{word}", "")) for word in ("sequence", "partner_sequence")
     )
     attitude = signals.values(dataset, "quaternion")
-    if dataset.attrs.get("formulation") != "euler_angles" or not (asked and partner) or attitude is None:
+    if not (asked and partner) or attitude is None:
         return []
     turned = rotation_matrix(attitude)
     # of an intrinsic sequence i j k the entry (i, k) is the cosine or sine that its middle angle leaves

@@ -1,4 +1,4 @@
-"""Equations of motion of the body rates, of the vertical in body axes, and of free flight.
+"""Equations of motion of the body rates, of vertical and quaternion, and of free flight.
 
 Every coefficient is worked out in the scene's arithmetic (mpmath with guard bits) and rounded once, to
 the working precision, by ``number``.
@@ -74,6 +74,18 @@ def vertical_equations(vertical: list[Symbolic], rates: list[Symbolic]) -> list[
         g[1] * w[2] - g[2] * w[1],
         g[2] * w[0] - g[0] * w[2],
         g[0] * w[1] - g[1] * w[0],
+    ]
+
+
+def quaternion_kinematics(q: list[Symbolic], rates: list[Symbolic]) -> list[Symbolic]:
+    """q (0, w) / 2 for a quaternion [w, x, y, z] and rates in body axes."""
+    w, x, y, z = q
+    p, r, s = rates
+    return [
+        0.5 * (-x * p - y * r - z * s),
+        0.5 * (w * p + y * s - z * r),
+        0.5 * (w * r + z * p - x * s),
+        0.5 * (w * s + x * r - y * p),
     ]
 
 

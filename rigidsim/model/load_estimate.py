@@ -20,7 +20,8 @@ from rigidsim.model.body import BODY
 from rigidsim.model.capabilities import Narrow, having
 from rigidsim.model.carriers import Carrier
 from rigidsim.model.equations import vertical_from_attitude
-from rigidsim.model.formulations import BUILDERS
+from rigidsim.model.formulations.formulation import Requirements
+from rigidsim.model.formulations.quaternion import quaternion_states
 from rigidsim.model.heyoka_expressions import to_heyoka
 from rigidsim.model.kinematics import in_common_unit
 from rigidsim.model.load import Load, Term, force_terms, torque_terms
@@ -29,7 +30,6 @@ from rigidsim.model.numbers import scaled_numbers
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.scaling import Drive, choose_scaling
 from rigidsim.model.state_names import state_names
-from rigidsim.model.state_selection import Requirements
 from rigidsim.scene import attitude as numeric
 from rigidsim.scene.arithmetic import apply, transpose
 from rigidsim.scene.expressions.tree import names_used
@@ -111,7 +111,7 @@ def probe(scene: Scene, requirements: Requirements, loads: Sequence[Load]) -> Me
     numbers = scaled_numbers(scene, scaling)
     states = list(hy.make_vars(*BODY.rates))
     rates = in_common_unit(states, numbers.rate_units, float)
-    attitude = None if requirements.formulation == "rates" else BUILDERS["quaternion"](scene, rates)
+    attitude = quaternion_states(scene, rates) if requirements.attitude else None
     vertical = list(hy.make_vars(*BODY.vertical)) if requirements.vertical else None
     if attitude is not None and numbers.arm is not None:
         vertical = vertical_from_attitude(attitude.matrix, numbers, float)

@@ -14,6 +14,7 @@ from rigidsim.model.frames.rotating import rotating_orbit
 from rigidsim.model.load import loads_of
 from rigidsim.model.mechanics import Mechanics
 from rigidsim.scene.arithmetic import negligible
+from rigidsim.scene.formulations import variables_named
 from rigidsim.scene.scene import Scene
 
 
@@ -58,9 +59,9 @@ def _has_energy(m: Mechanics) -> bool:
 
 
 def _no_attitude(scene: Scene, formulation: str) -> str | None:
-    if formulation != "rates":
+    if variables_named(formulation).keeps_attitude:
         return None
-    return 'needs the attitude; choose another formulation than "rates", such as "auto"'
+    return f'needs the attitude; choose another formulation than "{formulation}", such as "auto"'
 
 
 def _no_position(scene: Scene, formulation: str) -> str | None:

@@ -109,7 +109,7 @@ def projected_invariants(system: System) -> tuple[list[ProjectedScalar], list[tu
         raise ConfigError(
             Problem(
                 "[integrator] hold_invariants",
-                f"given true, but the loads leave nothing constant that {system.requirements.formulation} "
+                f"given true, but the loads leave nothing constant that {system.formulation.name} "
                 'carries; set it to false, or choose formulation = "quaternion", whose norm can be projected',
             )
         )

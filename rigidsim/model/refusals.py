@@ -1,5 +1,5 @@
-"""What keeps a system from being integrated or recorded: a start in a singularity, numbers out of range, and
-loads that are no functions of the attitude.
+"""What keeps a system from being integrated or recorded: numbers out of range, and loads that are no
+functions of the attitude.
 
 These must be the same for a quaternion q and for -q, which are one attitude. A load that is odd in the
 quaternion would depend on the formulation: on whether its attitude has a sign at all, and on how that was
@@ -17,12 +17,11 @@ import numpy as np
 from rigidsim.errors import ConfigError, Problem
 from rigidsim.model.body import BODY
 from rigidsim.model.capabilities import GradientAlone, Reacting
-from rigidsim.model.formulations import AttitudeStates
+from rigidsim.model.formulations.formulation import Requirements
 from rigidsim.model.load import Load, force_terms, torque_terms
 from rigidsim.model.load_estimate import probe, start_of
 from rigidsim.model.numbers import Rounder
 from rigidsim.model.outputs import Invariant, Recorded
-from rigidsim.model.state_selection import Requirements
 from rigidsim.scene.scene import Scene
 
 _LARGEST_EXPONENT = 1000
@@ -33,30 +32,6 @@ _SAME_BODY = 1e-3
 """Relative difference of gravitational parameters below which two sources are taken to be one."""
 _STATES = 16
 _NOISE = 1e-9  # of the largest component: far above rounding, far below any load that means its sign
-
-
-def refuse_singular_start(scene: Scene, attitude: AttitudeStates | None) -> None:
-    """Refuse a start at which canonical momenta of Euler angles don't exist.
-
-    Raises:
-        ConfigError: the start is singular.
-    """
-    if attitude is None or attitude.singular_factor is None:
-        return
-    context = scene.context
-    middle = attitude.initial[1]
-    proper = attitude.sequence[0] == attitude.sequence[2]
-    factor = abs(context.sin(middle) if proper else context.cos(middle))
-    if factor < context.mpf(2) ** -20:
-        raise ConfigError(
-            Problem(
-                "[integrator] formulation",
-                f"the motion starts {context.nstr(factor, 3)} rad from the singularity of the sequence "
-                f"{attitude.sequence} (middle angle {context.nstr(middle, 8)} rad), where Euler angles have "
-                'no momenta; choose formulation = "euler_angles", which changes its sequence there, '
-                '"quaternion", or another euler_sequence',
-            )
-        )
 
 
 def refuse_out_of_range(
@@ -85,7 +60,7 @@ def refuse_odd_loads(scene: Scene, requirements: Requirements, loads: Sequence[L
         ConfigError: a load is odd; names it, what was found, and what to write instead.
     """
     for load in loads:
-        if "attitude" not in load.reads or requirements.formulation == "rates":
+        if "attitude" not in load.reads or not requirements.attitude:
             continue
         m = probe(scene, requirements, [load])
         terms = [*torque_terms(load, m), *(force_terms(load, m) if m.velocity is not None else [])]

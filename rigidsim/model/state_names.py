@@ -20,8 +20,8 @@ TANGENT = "tangent_"
 def plain_angles(m: Kinematics) -> list[Symbolic]:
     """Euler angles of the scene's sequence within one turn, rad."""
     sequence = m.scene.config.integrator.euler_sequence
-    if m.attitude is not None and m.attitude.kind == "euler_angles" and m.attitude.sequence == sequence:
-        return list(hy.make_vars(*m.attitude.names))
+    if m.attitude is not None and m.attitude.sequence == sequence:
+        return m.attitude.variables
     if starts_near_pole(m.scene):
         return angles_of_matrix(m, differentiable=True)
     return euler_from_matrix(sequence, m.matrix)

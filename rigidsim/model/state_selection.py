@@ -1,75 +1,60 @@
-"""Selection of states: what a scene requires, and the reason for each.
+"""Selection of the formulation and of states: what a scene requires, and the reason for each.
 
 It starts from what is recorded and what the loads read, and adds a state only if something needs it.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
 
 from rigidsim.errors import ConfigError, Problem
+from rigidsim.model.averaged.average import Average
+from rigidsim.model.formulations.averaged import Averaged
+from rigidsim.model.formulations.formulation import REGISTERED, Formulation, Requirements, Unsuited
+from rigidsim.model.formulations.planar import Planar
+from rigidsim.model.formulations.quaternion import Quaternion
+from rigidsim.model.formulations.rates import Rates
 from rigidsim.model.frames.reference_plane import refuse_without_plane
 from rigidsim.model.load import Load
 from rigidsim.model.needs import NEEDS
 from rigidsim.scene.expressions.tree import ATTITUDE_NAMES, FLIGHT_NAMES
+from rigidsim.scene.formulations import AUTO, variables_named
 from rigidsim.scene.registry import OBSERVABLES
 from rigidsim.scene.scene import Scene
 
-PLANAR = "planar"
-"""The formulation of a body that turns about one axis."""
 
-
-@dataclass(frozen=True)
-class Requirements:
-    """Which states a scene requires.
-
-    Attributes:
-        formulation: "rates", or the one that carries the attitude.
-        vertical: whether the vertical is carried as three states of its own (Euler-Poisson equations).
-        flight: whether position and velocity are carried.
-        record: names asked for, or None for everything that the scene has.
-        why: reasons for what is carried: "rates", "attitude", "vertical", "flight".
-        left_out: (what, why) for groups that are not carried.
-    """
-
-    formulation: str
-    vertical: bool
-    flight: bool
-    record: list[str] | None
-    why: Mapping[str, str]
-    left_out: Sequence[tuple[str, str]] = ()
-
-    @property
-    def canonical(self) -> bool:
-        """Whether Euler angles and their momenta are carried, from which the rates follow."""
-        return self.formulation == "canonical"
-
-    @property
-    def planar(self) -> bool:
-        """Whether an angle and its rate are the only states of the rotation."""
-        return self.formulation == PLANAR
-
-    def in_plane(self) -> Requirements:
-        """The same requirements for a motion that was found to stay in a plane."""
-        why = {
-            **self.why,
-            "attitude": f"{self.why['attitude']}; the body turns about a principal axis, along which every "
-            'torque points and stays (formulation = "quaternion" carries the full motion)',
-        }
-        return replace(self, formulation=PLANAR, vertical=False, why=why)
-
-
-def choose_requirements(scene: Scene, loads: Sequence[Load] = ()) -> Requirements:
-    """Decide which states are carried.
+def choose_formulation(
+    scene: Scene, loads: Sequence[Load], along: Average | None = None
+) -> tuple[Formulation, Requirements]:
+    """Decide how the rotation is written, and which states are carried besides.
 
     Args:
         loads: the scene's loads, which declare what they read.
+        along: the average, already chosen, of a motion that this scene is a part of.
 
     Raises:
-        ConfigError: the formulation or the scene can't provide something that is to be recorded.
+        ConfigError: the formulation or the scene can't provide something that is to be recorded, or the
+            formulation that is asked for doesn't apply.
     """
+    if scene.config.model.reduced:
+        averaged = Averaged.along(scene, loads, along)
+        return averaged, averaged.requirements(scene)
+    requirements = choose_requirements(scene, loads)
     asked = scene.config.integrator.formulation
+    if asked == AUTO:
+        if not requirements.attitude:
+            return Rates(), requirements
+        return Planar.by_gradients(scene, loads) or Quaternion.of(scene, loads), requirements
+    try:
+        return REGISTERED[asked].of(scene, loads), requirements
+    except Unsuited as why:
+        raise ConfigError(Problem("[integrator] formulation", f'given "{asked}", but {why}')) from None
+
+
+def choose_requirements(scene: Scene, loads: Sequence[Load]) -> Requirements:
+    """Which states a full motion takes, and why."""
+    asked = scene.config.integrator.formulation
+    keeps_attitude = variables_named(asked).keeps_attitude
     record = scene.config.output.record
     _check_recordable(scene, asked, record)
     refuse_without_plane(scene, loads)
@@ -78,14 +63,16 @@ def choose_requirements(scene: Scene, loads: Sequence[Load] = ()) -> Requirement
         for need, names in (("attitude", ATTITUDE_NAMES), ("flight", FLIGHT_NAMES)):
             if event.reads & set(names):
                 readers[need].append(f"event {event.name}")
-    _check_readers(asked, readers)
+    if readers["attitude"] and not keeps_attitude:
+        what = f'given "{asked}", but {readers["attitude"][0]} reads the attitude; choose "auto"'
+        raise ConfigError(Problem("[integrator] formulation", what))
     why = {"rates": _why_rates(record)}
     left_out: list[tuple[str, str]] = []
-    formulation, reason = _attitude(scene, asked, record, readers["attitude"])
+    reason = _attitude(scene, asked, record, readers["attitude"]) if keeps_attitude else None
     torque = scene.torque_arm is not None
     if reason is None:
         no_reader = "" if torque else " and no load reads it"
-        unneeded = "the formulation is rates" if asked == "rates" else "nothing that is recorded needs it"
+        unneeded = "nothing that is recorded needs it" if keeps_attitude else f"the formulation is {asked}"
         left_out.append(("attitude", unneeded + no_reader))
         if torque:
             why["vertical"] = (
@@ -102,25 +89,19 @@ def choose_requirements(scene: Scene, loads: Sequence[Load] = ()) -> Requirement
         why["flight"] = reason
     else:
         left_out.append(("position and velocity", "neither recorded nor read by a load"))
-    return Requirements(formulation, "vertical" in why, "flight" in why, record, why, left_out)
+    return Requirements("attitude" in why, "vertical" in why, "flight" in why, record, why, left_out)
 
 
-def _attitude(
-    scene: Scene, asked: str, record: list[str] | None, readers: list[str]
-) -> tuple[str, str | None]:
-    """The formulation, and why an attitude is carried (None if it isn't)."""
-    recorded = [name for name in record or () if _takes(scene, name, "attitude")]
-    if asked == "rates":
-        return asked, None
-    if asked != "auto":
-        return asked, f'[integrator] formulation = "{asked}" asks for it'
+def _attitude(scene: Scene, asked: str, record: list[str] | None, readers: list[str]) -> str | None:
+    """Why an attitude is carried; None if it isn't."""
+    if asked != AUTO:
+        return f'[integrator] formulation = "{asked}" asks for it'
     if record is None:
-        return "quaternion", "nothing restricts what is recorded"
+        return "nothing restricts what is recorded"
     if readers:
-        return "quaternion", _read_by(readers)
-    if recorded:
-        return "quaternion", f"{', '.join(recorded)} is recorded"
-    return "rates", None
+        return _read_by(readers)
+    recorded = [name for name in record if _takes(scene, name, "attitude")]
+    return f"{', '.join(recorded)} is recorded" if recorded else None
 
 
 def _read_by(readers: list[str]) -> str:
@@ -135,16 +116,6 @@ def _flight(scene: Scene, record: list[str] | None, readers: list[str]) -> str |
     if readers:
         return f"{', '.join(readers)} reads them"
     return "the body moves, and nothing restricts what is recorded" if record is None else None
-
-
-def _check_readers(formulation: str, readers: dict[str, list[str]]) -> None:
-    if formulation == "rates" and readers["attitude"]:
-        raise ConfigError(
-            Problem(
-                "[integrator] formulation",
-                f'given "rates", but {readers["attitude"][0]} reads the attitude; choose "auto"',
-            )
-        )
 
 
 def _why_rates(record: list[str] | None) -> str:
@@ -164,11 +135,6 @@ def _check_recordable(scene: Scene, formulation: str, record: list[str] | None) 
             why = NEEDS[need].missing(scene, formulation)
             if why is not None:
                 raise ConfigError(Problem("[output] record", f'given "{name}": {why}'))
-    if formulation == "rates" and scene.free_flight and record is None:
-        raise ConfigError(
-            Problem(
-                "[integrator] formulation",
-                'given "rates" for a scene with a position; name what to record in [output] record, or '
-                'choose "auto"',
-            )
-        )
+    if not variables_named(formulation).keeps_attitude and scene.free_flight and record is None:
+        what = f'given "{formulation}" for a scene with a position; name what to record in [output] record, '
+        raise ConfigError(Problem("[integrator] formulation", what + 'or choose "auto"'))

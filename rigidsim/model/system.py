@@ -10,22 +10,19 @@ import heyoka as hy
 
 from rigidsim.model.assembly import assemble_states
 from rigidsim.model.crossings import Crossing, crossings_of
-from rigidsim.model.euler_charts import across, partner_sequence
+from rigidsim.model.formulations.formulation import Formulation, ModelPlan, Requirements
 from rigidsim.model.heyoka_expressions import to_heyoka
 from rigidsim.model.mechanics import Mechanics
-from rigidsim.model.model_plan import ModelPlan
 from rigidsim.model.numbers import Rounder
 from rigidsim.model.orbits.table_states import Pieces
 from rigidsim.model.outputs import Invariant, Recorded, drift_outputs, find_invariants, recorded_variables
-from rigidsim.model.refusals import refuse_out_of_range, refuse_singular_start
+from rigidsim.model.refusals import refuse_out_of_range
 from rigidsim.model.rotations import Symbolic
-from rigidsim.model.scaling import Scaling, largest_rates
+from rigidsim.model.scaling import Scaling
 from rigidsim.model.state_blocks import StateBlock, joined
 from rigidsim.model.state_names import carries_sign, plain_angles, state_names
-from rigidsim.model.state_selection import Requirements
 from rigidsim.scene.expressions.tree import ATTITUDE_NAMES, names_used
 from rigidsim.scene.scene import Scene
-from rigidsim.scene.tracing.numbers import largest_of
 
 
 class System:
@@ -37,6 +34,7 @@ class System:
     Attributes:
         plan: decisions made before anything was rounded.
         number: rounds an mpf once to the working precision's scalar.
+        formulation: of the rotation: the plan's, or its partner (``chart``).
         sequence: sequence of the Euler angles that are states, or that are recorded.
     """
 
@@ -45,20 +43,21 @@ class System:
         plan: ModelPlan,
         number: Rounder,
         *,
-        sequence: str | None = None,
+        chart: Formulation | None = None,
         coefficients: Rounder | None = None,
     ) -> None:
         self.plan = plan
         self.number = number
-        self.sequence = sequence or plan.scene.config.integrator.euler_sequence
-        self._asked_sequence = sequence
+        self.formulation = chart or plan.formulation
+        self.sequence = self.formulation.sequence or plan.scene.config.integrator.euler_sequence
+        self._chart = chart
         self._coefficients = coefficients
 
     # --- the same motion, rounded otherwise -----------------------------------------------------------------
 
     def rounded(self, number: Rounder) -> System:
         """The same system in another precision."""
-        return System(self.plan, number, sequence=self._asked_sequence)
+        return System(self.plan, number, chart=self._chart)
 
     def with_coefficients(self, coefficients: Rounder) -> System:
         """The same system with the coefficients of its equations rounded differently, for instance in two
@@ -79,10 +78,10 @@ class System:
         sequence, on the branch given by the parameter after the invariants' (see
         ``rigidsim.model.euler_charts``).
         """
-        if self.requirements.formulation != "euler_angles" or self._asked_sequence is not None:
+        partner = self.formulation.partner
+        if partner is None:
             return None
-        partner = partner_sequence(self.sequence)
-        return System(self.plan, self.number, sequence=partner, coefficients=self._coefficients)
+        return System(self.plan, self.number, chart=partner, coefficients=self._coefficients)
 
     # --- what was decided -----------------------------------------------------------------------------------
 
@@ -111,15 +110,13 @@ class System:
         """Upper bound (mpf, rad/s) of the absolute angular velocity; of the momentum's turning rate if
         rotations are averaged over.
         """
-        if self.plan.average is not None:
-            return self.plan.average.rate_bound
-        return largest_of(largest_rates(self.scene, self.scaling.drive))
+        return self.formulation.rate_bound(self.plan)
 
     # --- states ---------------------------------------------------------------------------------------------
 
     @cached_property
     def _assembled(self) -> tuple[Mechanics, list[StateBlock]]:
-        return assemble_states(self.plan, self.number, self._asked_sequence)
+        return assemble_states(self.plan, self.formulation, self.number)
 
     @property
     def mechanics(self) -> Mechanics:
@@ -159,7 +156,7 @@ class System:
     def equations(self) -> list[tuple[Symbolic, Symbolic]]:
         """(variable, right-hand side)."""
         if self._coefficients is not None:
-            return System(self.plan, self._coefficients, sequence=self._asked_sequence).equations
+            return System(self.plan, self._coefficients, chart=self._chart).equations
         return list(zip(self.variables, self._joined.derivatives, strict=True))
 
     @property
@@ -200,14 +197,13 @@ class System:
         recorded, outputs = recorded_variables(self.mechanics, self.requirements.record)
         drifts = drift_outputs(self.invariants, self.scene.context, self.number)
         attitude = self.mechanics.attitude
-        if attitude is not None and self._asked_sequence is not None:
+        if attitude is not None and self._chart is not None:
             # in the partner chart the angles of the requested sequence replace its own
             branch = hy.par[sum(len(invariant.expressions) for invariant in self.invariants)]
-            angles = list(hy.make_vars(*attitude.names))
             for variable in recorded:
                 if variable.continuity == "wrapped":
                     own = slice(variable.first, variable.first + variable.count)
-                    outputs[own] = across(attitude.sequence, angles, hy, branch)
+                    outputs[own] = self.formulation.asked_angles(attitude, branch)
         return recorded, outputs + drifts
 
     @property
@@ -312,9 +308,7 @@ def build_system(plan: ModelPlan, number: Rounder) -> System:
         OverflowError: numbers that neither the states nor the dataset can hold.
     """
     system = System(plan, number)
-    attitude = system.mechanics.attitude
-    if system.requirements.canonical:
-        refuse_singular_start(plan.scene, attitude)
+    system.formulation.check_start(plan.scene, system.mechanics.attitude)
     refuse_out_of_range(system.initial, [*system.recorded, *system.invariants], number)
     return system
 

@@ -16,9 +16,9 @@ from collections.abc import Iterable, Mapping, Sequence
 import heyoka as hy
 
 from rigidsim.model.capabilities import orbit_of
+from rigidsim.model.formulations.planar import ANGLE, SPIN
 from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.observables.observable import Observable, only_when_named
-from rigidsim.model.planar import ANGLE, SPIN
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.state_blocks import StateBlock, joined
 from rigidsim.model.state_names import TANGENT
@@ -36,8 +36,8 @@ _GOLDEN = (math.sqrt(5) - 1) / 2
 def own_names(m: Mechanics) -> list[str]:
     """States of the body itself that are carried: rates, attitude or vertical, position and velocity."""
     names = list(m.attitude.names) if m.attitude is not None else []
-    if m.attitude is not None and m.attitude.kind == "planar":
-        return [*names, SPIN]
+    if m.attitude is not None and m.attitude.momenta:
+        return [*names, *m.attitude.momenta]
     if m.attitude is None and m.vertical is not None:
         names = m.body.vertical
     return [*m.body.rates, *names, *([*m.body.position, *m.body.velocity] if m.velocity is not None else [])]
@@ -150,11 +150,7 @@ def _of_a_turn(m: Mechanics, names: Sequence[str], rights: Sequence[Symbolic]) -
 
 
 def _axis_of_turn(m: Mechanics) -> tuple[int, int] | None:
-    """The body axis that a planar motion turns about, and its sign; None if it is none of the three, or if
-    the motion isn't planar.
-    """
-    if m.attitude is None or m.attitude.kind != "planar":
-        return None
+    """The body axis that a planar motion turns about, and its sign; None if it is none of the three."""
     one = {hy.make_vars(SPIN): hy.expression(1.0)}
     try:
         along = [float(str(hy.subs(rate, one))) for rate in m.rates]
@@ -168,16 +164,9 @@ def _weights(m: Mechanics, names: Sequence[str]) -> list[int]:
     """Binary exponents that make offsets of states comparable: angles in rad, rates in 1 / internal time."""
     rates = dict(zip(m.body.rates, m.scaling.rates, strict=True))
     attitude = m.attitude
-    turned = attitude is not None and attitude.kind == "quaternion"
-    weights = []
-    for name in names:
-        if name == ANGLE and attitude is not None:
-            weights.append(attitude.angle_unit)
-        elif turned and attitude is not None and name in attitude.names:
-            weights.append(1)  # half angles
-        else:
-            weights.append(rates.get(name, 0))
-    return weights
+    if attitude is not None and attitude.chord is not None:
+        rates |= dict.fromkeys(attitude.names, round(math.log2(attitude.chord)))
+    return [rates.get(name, 0) for name in names]
 
 
 def _direction(m: Mechanics, names: Sequence[str]) -> dict[str, object]:
@@ -208,14 +197,14 @@ def _growth(m: Mechanics) -> list[Symbolic]:
 def _absent(m: Mechanics) -> str | None:
     """Why a scene can't have a tangent vector; None if it can."""
     integrator = m.scene.config.integrator
-    if m.attitude is not None and m.attitude.kind == "euler_angles":
+    if m.attitude is not None and m.attitude.singular_factor is not None:
         return f'formulation = "{integrator.formulation}" has singularities that the vector would feel'
     driven = any(
         orbit_of(load) is not None for load in m.loads
     )  # whose phase keeps the steps of any motion short
     if not driven and all(w == 0 for w in m.scene.angular_velocity):
         return "the body is at rest, where steps are as long as one likes; give it a small rate"
-    if not driven and m.attitude is not None and m.attitude.kind == "planar":
+    if not driven and m.attitude is not None and m.attitude.momenta:
         return 'without an orbit nothing in a plane keeps the steps short; choose formulation = "quaternion"'
     if m.tables:
         return "at the rows of a table the orbit's states are set, where variational equations end"

@@ -4,10 +4,19 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, StrictBool, StrictInt, StrictStr, WithJsonSchema, field_validator
+from pydantic import (
+    Field,
+    StrictBool,
+    StrictInt,
+    StrictStr,
+    ValidationInfo,
+    WithJsonSchema,
+    field_validator,
+)
 
 from rigidsim.scene.exact import parse_number
 from rigidsim.scene.fields import ConfigTable, Dimensionless, EulerSequence, Metre, number_schema, refuse
+from rigidsim.scene.formulations import AUTO, FORMULATIONS
 from rigidsim.scene.methods import DEFAULT_METHOD, METHODS
 from rigidsim.scene.validation_messages import nearest, shown
 
@@ -37,12 +46,11 @@ class Integrator(ConfigTable):
         examples=["auto", 1e-12],
         json_schema_extra={"x-above": 0, "x-at-most": 1},
     )
-    formulation: Literal[
-        "auto", "rates", "quaternion", "euler_angles", "rotation_matrix", "canonical", "planar"
-    ] = Field(
-        default="auto",
-        description="the variables that are integrated; canonical: Euler angles and their momenta; "
-        "planar: an angle and its rate, for a body that turns about one axis",
+    formulation: StrictStr = Field(
+        default=AUTO,
+        description="the variables that are integrated; "
+        + "; ".join(f"{name}: {known.told}" for name, known in FORMULATIONS.items() if known.told),
+        json_schema_extra=lambda schema: schema.update(enum=[AUTO, *FORMULATIONS]),
     )
     euler_sequence: EulerSequence = Field(
         default="zxz", description="axes of the intrinsic rotations, for [initial] and for recorded angles"
@@ -59,12 +67,13 @@ class Integrator(ConfigTable):
         "means false",
     )
 
-    @field_validator("method", mode="before")
+    @field_validator("method", "formulation", mode="before")
     @classmethod
-    def _known_method(cls, value: Any) -> Any:
-        if not isinstance(value, str) or value not in METHODS:
-            near = nearest(value if isinstance(value, str) else shown(value), METHODS)
-            raise refuse(f"given {shown(value)}{near}; allowed: {', '.join(METHODS)}")
+    def _known_name(cls, value: Any, info: ValidationInfo) -> Any:
+        allowed = METHODS if info.field_name == "method" else [AUTO, *FORMULATIONS]
+        if not isinstance(value, str) or value not in allowed:
+            near = nearest(value if isinstance(value, str) else shown(value), allowed)
+            raise refuse(f"given {shown(value)}{near}; allowed: {', '.join(allowed)}")
         return value
 
     @property

@@ -40,8 +40,8 @@ def advice_on(found: Diagnostics) -> tuple[Advice, ...]:
         return (found.cheaper,)
     if estimate is None or not estimate.closed_form or estimate.attitude is None:
         return ()
-    formulation, config = prepared.system.requirements.formulation, prepared.scene.config
-    if formulation != "quaternion" or config.integrator.accuracy is not None:
+    config, formulation = prepared.scene.config, prepared.system.formulation
+    if not formulation.variables.in_closed_form or config.integrator.accuracy is not None:
         return ()
     now, advice = estimate.attitude, []
     held = _HELD * prepared.law_tolerance * math.sqrt(found.progress.steps) * estimate.amplification

@@ -229,7 +229,7 @@ def root_attributes(
         config_sha256=prepared.experiment.sha256,
         config_given=prepared.experiment.given,
         config_set="\n".join(prepared.experiment.settings),
-        formulation=system.requirements.formulation,
+        formulation=system.formulation.name,
         euler_sequence=system.sequence,
         euler_partner_sequence="" if system.partner is None else system.partner.sequence,
         states=" ".join(system.states),

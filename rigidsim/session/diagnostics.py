@@ -171,7 +171,8 @@ class Diagnostics:
                 "level, or compare the directions with a run of the full model",
             )
         asked = self.prepared.scene.config.integrator.accuracy_axis
-        averaged, ended = self.prepared.system.plan.average is not None, self.progress.status.exit_code == 0
+        averaged = not self.prepared.system.formulation.resolves_rotation
+        ended = self.progress.status.exit_code == 0
         if found is None and averaged and ended and asked is not None:
             yield Caution(
                 WarningCode.NOT_CERTIFIED,

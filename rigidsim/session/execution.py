@@ -160,7 +160,7 @@ class _ActiveRun:
             found = found.estimated(trail, parts.corrected, self._wanted, self.driver.solver.errors)
             found = replace(found, cheaper=cheaper_model(found, session.tuning.advice, self._wanted))
         session.phases.next("estimate")
-        if prepared.system.plan.average is not None and self.progress.status is Status.FINISHED:
+        if not prepared.system.formulation.resolves_rotation and self.progress.status is Status.FINISHED:
             session.observer.phase("modelling")
             with self.interruption.dispensable():
                 found = found.modelled(trail, self._wanted)

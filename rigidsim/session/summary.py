@@ -37,7 +37,6 @@ from rigidsim.store.summary_parts import (
 if TYPE_CHECKING:
     from rigidsim.solve.lyapunov import LyapunovSpectrum
 
-_IN_PLANE = "; in its plane alone: whether a small push out of the plane would grow isn't examined"
 _NOT_CERTIFIED = "not certified against an independent solution"
 
 
@@ -74,7 +73,7 @@ def summarise(
         samples_planned=progress.samples,
         time_reached=time_reached,
         engine_time=progress.time,
-        formulation=system.requirements.formulation,
+        formulation=system.formulation.name,
         states=tuple(system.states),
         precision=prepared.precision.name,
         tolerance=prepared.effective_tolerance,
@@ -156,12 +155,13 @@ def _accuracy(found: Diagnostics) -> Accuracy:
             certified=None,
             how=_NOT_CERTIFIED,
         )
+    caveat = found.prepared.system.formulation.variables.caveat
     return Accuracy(
         requested=None,
         estimated_attitude_error=estimate.attitude,
         estimated_position_error=estimate.position,
         estimated_velocity_error=estimate.velocity,
-        estimated_how=estimate.how + (_IN_PLANE if found.prepared.system.requirements.planar else ""),
+        estimated_how=estimate.how + (f"; {caveat}" if caveat else ""),
         amplification=min(estimate.amplification, sys.float_info.max),
         error_growth_rate=estimate.growth_rate,
         predictable_seconds=estimate.predictable_seconds,
@@ -186,7 +186,7 @@ def _tables(found: Diagnostics) -> dict[str, TableErrors]:
 
 
 def _modelling(found: Diagnostics) -> Modelling | None:
-    average = found.prepared.system.plan.average
+    average = found.prepared.system.formulation.average
     if average is None:
         return None
     known, output = found.modelling, found.prepared.scene.config.output

@@ -18,6 +18,7 @@ from rigidsim.model.model_plan import plan_model
 from rigidsim.model.projected_invariants import conserves, projected_invariants
 from rigidsim.model.system import System, build_system
 from rigidsim.scene.config import Experiment
+from rigidsim.scene.formulations import FORMULATIONS
 from rigidsim.scene.initial_values import check_start
 from rigidsim.scene.model_table import AUTO
 from rigidsim.scene.scene import Scene, build_scene
@@ -159,7 +160,7 @@ def prepare_scene(
             what = 'given "auto", which run and plan settle by [integrator] accuracy_axis; choose a level'
             raise ConfigError(Problem("[model] level", what))
         system = build_system(plan_model(scene, loads, along=along), precision.number)
-        averaged = system.plan.average is not None and scene.bodies is None  # orbits need all digits
+        averaged = not system.formulation.resolves_rotation and scene.bodies is None  # orbits need all digits
         if averaged and asked == "auto" and tolerance is None:
             step_control = _auto_of_averages(precision)
         _refuse_spectrum(system)
@@ -176,7 +177,7 @@ def prepare_scene(
         prepared = InitialValueProblem(
             experiment, scene, precision, system, clock, step_control, algorithm, tuple(loads), late
         )
-        if system.requirements.formulation == "canonical":
+        if not system.formulation.carries_rates and system.formulation.twin != system.formulation.name:
             double_twin(prepared)  # its stability is a question of the rates, which it doesn't carry itself
     except ConfigError as error:
         raise error.at(experiment.source) from None
@@ -198,7 +199,7 @@ def _is_worth_holding(system: System) -> bool:
     """Whether ``hold_invariants = "auto"`` has any effect: not if nothing physical is conserved, nor if steps
     end on switching surfaces.
     """
-    if system.plan.average is not None:  # whose norm is no invariant that its rate would depend on
+    if not system.formulation.resolves_rotation:  # whose norm is no invariant that its rate would depend on
         return False
     if system.switches:
         return False
@@ -316,17 +317,16 @@ def double_twin(prepared: InitialValueProblem) -> System:
     """The same motion in double precision and, where an attitude is carried, in quaternions: for questions
     about the motion itself, such as its stability.
     """
-    config = prepared.scene.config
-    if prepared.system.plan.average is not None:
+    config, own = prepared.scene.config, prepared.system.formulation
+    if own.twin is None:
         return prepared.system.rounded(precision_of("double").number)
-    own = prepared.system.requirements.formulation
-    formulation = own if own in ("rates", "planar") else "quaternion"
-    record = ["angular_velocity"] if formulation == "rates" else ["quaternion"]
-    integrator = config.integrator.model_copy(update={"formulation": formulation})
+    twin = FORMULATIONS[own.twin]
+    record = ["quaternion" if twin.keeps_attitude else "angular_velocity"]
+    integrator = config.integrator.model_copy(update={"formulation": twin.name})
     output = config.output.model_copy(update={"record": record})
     plain = replace(
         prepared.scene, config=config.model_copy(update={"integrator": integrator, "output": output})
     )
-    canonical = prepared.system.requirements.canonical  # whose rates are no states and have no scales
-    scaling = None if canonical else prepared.system.scaling
+    # rates that aren't states have no scales
+    scaling = prepared.system.scaling if own.carries_rates or own.name == twin.name else None
     return build_system(plan_model(plain, prepared.python_loads, scaling), precision_of("double").number)

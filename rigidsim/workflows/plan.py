@@ -98,7 +98,7 @@ def plan(
         warnings.append(("disk_space", f"the run {room.problem}"))
     return {
         "name": prepared.scene.name,
-        "formulation": system.requirements.formulation,
+        "formulation": system.formulation.name,
         "euler_sequence": system.sequence if system.angle_states else None,
         "euler_partner_sequence": None if system.partner is None else system.partner.sequence,
         "states": system.states,
@@ -149,7 +149,7 @@ def plan(
             "timeline_bytes": room.timeline,
             "free_bytes": room.free,
             "attitude_error_rad": None
-            if system.requirements.formulation == "rates" or prepared.algorithm.own_errors
+            if not system.requirements.attitude or prepared.algorithm.own_errors
             else (held_error(prepared, int(steps), rate, duration, growth) if held else plain_error),
             "held": held,
             "amplification": growth.at(duration),
@@ -165,7 +165,7 @@ def plan(
 
 def _modelling_seconds(prepared: InitialValueProblem, levels: Sequence[Mapping[str, Any]]) -> float:
     """CPU time, s, of the full model beside an averaged run, as it was measured over the beginning."""
-    average = prepared.system.plan.average
+    average = prepared.system.formulation.average
     if average is None or not prepared.scene.config.output.estimate:
         return 0.0
     return next((row["modelling_seconds"] or 0.0 for row in levels if row["level"] == average.level), 0.0)

@@ -38,7 +38,7 @@ class RungeKutta(Algorithm):
     def of(cls, scene: Scene, system: System, *, driven: bool) -> RungeKutta:
         if scene.config.integrator.precision != "double":
             raise Unsuitable('which computes in double precision; set precision = "double"')
-        if system.requirements.formulation != "quaternion":
+        if system.formulation.name != "quaternion":
             raise Unsuitable('which tells its errors for quaternions; set formulation = "quaternion"')
         return cls()
 

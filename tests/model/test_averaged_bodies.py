@@ -115,7 +115,7 @@ def test_the_announced_error_covers_the_true_one(full: rigidsim.Run, averaged: r
 
 def test_windows_start_where_the_bodies_are(full: rigidsim.Run) -> None:
     prepared = prepare(parse(scene("spin_averaged")))
-    system, average = prepared.system, prepared.system.plan.average
+    system, average = prepared.system, prepared.system.formulation.average
     assert average is not None
     begin = 30 * DAY
     engine = hy.taylor_adaptive(

@@ -39,7 +39,7 @@ def prepared(
 
 
 def driven(problem: InitialValueProblem) -> Driven:
-    average = problem.system.plan.average
+    average = problem.system.formulation.average
     assert average is not None
     assert average.driven is not None
     return average.driven
@@ -133,7 +133,7 @@ def test_the_time_at_which_the_separatrix_comes_near_is_told() -> None:
     with pytest.raises(ConfigError, match="bring the body there after") as found:
         prepared(end="1e5", **given)  # type: ignore[arg-type]
     told = float(str(found.value).split("there after ")[1].split(" s")[0])
-    assert prepared(end=str(0.99 * told), **given).system.plan.average is not None  # type: ignore[arg-type]
+    assert prepared(end=str(0.99 * told), **given).system.formulation.average is not None  # type: ignore[arg-type]
     moments, damping = np.array(MOMENTS), np.array([1e-4, 1e-3, 1.5e-4])
     times = np.linspace(0, 1.4 * told, 8001)
 

@@ -94,7 +94,7 @@ def _keys(one: xarray.Dataset) -> tuple[str, ...]:
         keys.append(f'method = "{method}"')
     if math.isfinite(tolerance) and tolerance != default.step_tolerance:
         keys.append(f"tolerance = {tolerance:.0e}")
-    if one["formulation"].item() != "quaternion":
+    if one["formulation"].item() != default.formulation:
         keys.append(f'formulation = "{one["formulation"].item()}"')
     if one["held"].item():
         keys.append("hold_invariants = true")

@@ -11,13 +11,13 @@ from rigidsim.accuracy.motion import run_pilot
 from rigidsim.accuracy.setting import Setting
 from rigidsim.accuracy.trial import trial_scene
 from rigidsim.scene.config import Experiment
+from rigidsim.scene.formulations import FORMULATIONS
 from rigidsim.scene.scene import build_scene
 from rigidsim.solve.assembly import assemble
 from rigidsim.solve.problem import prepare_scene
 
 DEFAULT = Setting()
 """Setting that every cost is relative to."""
-FORMULATIONS = ("quaternion", "rotation_matrix", "euler_angles", "canonical")
 _TOLERANCES: dict[str, tuple[float, ...]] = {
     "double": (1e-4, 1e-6, 1e-8, 1e-10, 1e-12, 1e-14),
     "extended": (1e-12, 1e-16),
@@ -95,6 +95,8 @@ def every_setting(exact: str = "", *, full: bool = False) -> list[Setting]:
     def both(settings: list[Setting]) -> list[Setting]:
         return [replace(s, hold_invariants=held) for s in settings for held in (False, True)]
 
+    general = [name for name, variables in FORMULATIONS.items() if variables.general]
+    further = [name for name in general if name != DEFAULT.formulation]
     plain = both([Setting(p) for p in ("double", "extended", "single", "quadruple")])
     precise = [Setting(p, method=exact) for p in ("double", "extended", "quadruple")] if exact else []
     loose = both([Setting(p, tolerance) for p, some in _TOLERANCES.items() for tolerance in some])
@@ -102,21 +104,22 @@ def every_setting(exact: str = "", *, full: bool = False) -> list[Setting]:
         replace(s, formulation=f)
         for p in ("double", "single", "extended")
         for s in both([Setting(p)])
-        for f in FORMULATIONS[1:]
+        for f in further
     ]
-    few = both([Setting("double", t, f) for t in _FEW_TOLERANCES for f in FORMULATIONS[1:]])
-    rest = [replace(s, formulation=f) for s in loose if s.precision != "quadruple" for f in FORMULATIONS[1:]]
+    few = both([Setting("double", t, f) for t in _FEW_TOLERANCES for f in further])
+    rest = [replace(s, formulation=f) for s in loose if s.precision != "quadruple" for f in further]
+    peer = FORMULATIONS[DEFAULT.formulation].checked_by
     # needed to know the error of a reference, if nothing better is possible
-    others = [] if exact else [Setting(p, formulation="rotation_matrix") for p in ("double", "extended")]
+    others = [] if exact else [Setting(p, formulation=peer) for p in ("double", "extended")]
     listed = [
         *plain[:2],
         *precise,
         *plain[2:],
         *others,
         *loose,
-        *tight[:12],
+        *tight[: 4 * len(further)],
         *few,
-        *tight[12:],
+        *tight[4 * len(further) :],
         *(rest if full else []),
     ]
     return list(dict.fromkeys(listed))

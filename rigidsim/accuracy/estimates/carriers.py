@@ -10,6 +10,7 @@ import numpy as np
 from rigidsim.accuracy.estimates.course import Course
 from rigidsim.accuracy.estimates.margins import Margins
 from rigidsim.model.capabilities import Ahead, having, is_wide
+from rigidsim.model.formulations.formulation import Rounding
 from rigidsim.model.system import System
 from rigidsim.scene.moments import acts_at_moments_alone
 from rigidsim.solve.effects.angle_wrapping import STEPS_BETWEEN
@@ -39,14 +40,14 @@ def same_states(prepared: InitialValueProblem) -> bool:
     """Whether neighbours have the run's states, which they do unless a loose tolerance would run into
     singularities of these.
     """
-    return prepared.system.requirements.formulation not in ("euler_angles", "canonical")
+    return prepared.system.formulation.variables.regular
 
 
 def _by_itself(course: Course, own: TaylorStepper, part: float, tolerance: float, margins: Margins) -> bool:
     """Whether the run's own integrator carries its neighbours, at least at first."""
     if tolerance <= TIGHT or (part < 1 and not same_states(course.prepared)):
         return course.steps * part < margins.most_own_steps
-    if course.prepared.system.requirements.formulation == "canonical":
+    if course.prepared.system.formulation.rounding is Rounding.MOMENTA:
         return course.steps * part <= margins.canonical_steps
     return same_states(course.prepared) or course.steps * part < own_until(own.integrator)
 
@@ -118,14 +119,14 @@ def _pushes(course: Course, stand_in: bool, margins: Margins) -> Pushes:
         stand_in: whether quaternions take the place of the run's states.
     """
     prepared = course.prepared
-    plain, formulation = plain_pushes(prepared.system), prepared.system.requirements.formulation
+    plain, rounding = plain_pushes(prepared.system), prepared.system.formulation.rounding
     if prepared.system.stepwise and loose(prepared):
         plain = replace(
             plain, own=margins.cut_off * prepared.effective_tolerance / float(prepared.precision.epsilon)
         )
     if prepared.system.clocked and acts_at_moments_alone(prepared.scene):
         plain = replace(plain, clock=0.0)
-    if formulation not in ("euler_angles", "canonical"):
+    if rounding is Rounding.PLAIN:
         return plain
     series = margins.angle_series
     if prepared.system.clocked:
@@ -134,7 +135,7 @@ def _pushes(course: Course, stand_in: bool, margins: Margins) -> Pushes:
         turned = float(prepared.system.rate_bound) * (course.end - course.start) / max(course.steps, 1)
         series *= 2 * math.pi + STEPS_BETWEEN * math.ldexp(turned, prepared.system.scaling.time)
     angles = replace(plain, own=plain.own * margins.angles, series=series)
-    if formulation == "euler_angles":
+    if rounding is Rounding.ANGLES:
         return angles
     # momenta: the nearer the singularity, the more do they lose in passing it
     more = min(max(margins.near / max(course.nearest, 1e-150), 1.0), margins.angles)

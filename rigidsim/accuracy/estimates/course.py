@@ -41,7 +41,7 @@ class Course:
     @property
     def carried(self) -> bool:
         """Whether the run carries an attitude."""
-        return self.prepared.system.requirements.formulation != "rates"
+        return self.prepared.system.requirements.attitude
 
     @property
     def own(self) -> TaylorStepper | None:

@@ -94,7 +94,7 @@ def estimate_errors(
         None if ``go_on`` ended it.
     """
     scene, system = prepared.scene, prepared.system
-    carried = system.requirements.formulation != "rates"
+    carried = system.requirements.attitude
     if not prepared.has_steps:
         error = CLOSED_FORM * float(prepared.precision.epsilon)
         return _everywhere(prepared, error, carried, "a few roundings of the closed form")

@@ -16,6 +16,7 @@ from rigidsim.accuracy.estimates.course import Course, Followed
 from rigidsim.accuracy.estimates.growth import power_of_time
 from rigidsim.accuracy.estimates.margins import Margins
 from rigidsim.accuracy.estimates.slow_motion import power_of_slow_motion
+from rigidsim.model.formulations.formulation import Rounding
 from rigidsim.solve.compiled import interruptible
 from rigidsim.solve.effects.waypoints import Waypoint
 from rigidsim.solve.neighbours.lanes import (
@@ -109,7 +110,7 @@ def _affordable(course: Course, margins: Margins) -> float:
         return course.steps
     budget = margins.share * dearer * course.steps  # in steps of double precision
     if course.own is not None and not same_states(course.prepared):
-        canonical = course.prepared.system.requirements.formulation == "canonical"
+        canonical = course.prepared.system.formulation.rounding is Rounding.MOMENTA
         if course.steps > (margins.canonical_steps if canonical else margins.all_steps):
             # windows, which nothing else can look at
             return max(margins.own_steps, budget / (NEIGHBOURS + 1))

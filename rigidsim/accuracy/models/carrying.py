@@ -89,7 +89,7 @@ def carrying(
     """
     problem = _problem(prepared, average)
     system = problem.system
-    average = system.plan.average
+    average = system.formulation.average
     assert average is not None
     if average.resonance is not None:
         raise Unmeasured(UnmeasuredCode.AVERAGED_STOPPED, "a resonance is no motion of a direction alone")
@@ -149,7 +149,7 @@ def _lanes(problem: InitialValueProblem) -> Lanes:
     if system.stepwise:
         start, end = float(clock.start), float(clock.at(clock.count - 1))
         return StepperLanes(system, start, end, 1)
-    average = system.plan.average
+    average = system.formulation.average
     assert average is not None
     return BatchLanes(system, 0 if average.over_orbits else _STEPS_OF_SPIN)
 

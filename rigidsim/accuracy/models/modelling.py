@@ -94,7 +94,7 @@ def measure_modelling(
     Raises:
         Unmeasured: ``go_on`` ended it, or one of the models can't be followed.
     """
-    average = prepared.system.plan.average
+    average = prepared.system.formulation.average
     assert average is not None
     started = time.process_time()
     scene = prepared.scene

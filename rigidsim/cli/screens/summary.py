@@ -13,6 +13,7 @@ from rigidsim.cli.screens.page import Page, Styled, page
 from rigidsim.cli.screens.understood import understood
 from rigidsim.cli.screens.verdicts import advice_line, next_lines, verdict_line
 from rigidsim.errors import ConfigError
+from rigidsim.scene.formulations import variables_named
 from rigidsim.scene.methods import method_named
 from rigidsim.scene.readable_time import TimeWords, span_text
 from rigidsim.store.summary import Brief, Summary
@@ -108,8 +109,8 @@ def _print_ended(summary: Summary, loads: Sequence[str], on: Page) -> None:
         f"{summary.formulation}, {len(summary.states)} states ({' '.join(summary.states)}), "
         f"{summary.precision} precision, {how}",
     )
-    if summary.formulation == "planar":
-        on.line("", "whether a small push out of the plane would grow isn't examined")
+    if caveat := variables_named(summary.formulation).caveat:
+        on.line("", caveat)
     cost = summary.cost
     seconds = sum(v for k, v in cost.seconds.items() if k != ENGINE)
     on.line(

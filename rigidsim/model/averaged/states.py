@@ -13,18 +13,17 @@ from rigidsim.model.averaged.average import DIRECTION, TOLD, Average
 from rigidsim.model.averaged.driven_mechanics import AMPLITUDES, DrivenMechanics
 from rigidsim.model.averaged.mechanics import AveragedMechanics
 from rigidsim.model.averaged.resonant_mechanics import RESONANT_ANGLE, SLOW, ResonantMechanics
-from rigidsim.model.formulations import AttitudeStates
 from rigidsim.model.load import Load
 from rigidsim.model.numbers import Rounder, ScaledNumbers
 from rigidsim.model.orbits.table_states import TablePlace
 from rigidsim.model.scaling import Scaling
-from rigidsim.model.state_blocks import StateBlock
+from rigidsim.model.state_blocks import AttitudeStates, StateBlock
 from rigidsim.scene.orbit_tables.pieces import TabulatedOrbit
 from rigidsim.scene.orbits import KeplerOrbit
 from rigidsim.scene.scene import Scene
 
 _OF_FIGURE = ("figure_axis",)
-WHY = {
+_WHY = {
     "spin_averaged": "the direction of the angular momentum, under torques averaged over the body's free "
     "rotation: its size and the energy stay as they are",
     "orbit_averaged": "the direction of the angular momentum, under torques averaged over the body's free "
@@ -33,10 +32,6 @@ WHY = {
 
 _WHY_TURNED = "the direction of the angular momentum, under gravity gradients averaged over the free rotation"
 _WHY_AT_REST = "the direction of the angular momentum, which torques of the body alone don't turn on average"
-WHY_DRIVEN = (
-    "the direction of the angular momentum, and its largest components along the axis that it circles and "
-    "across it, under torques averaged over the body's free rotation"
-)
 
 
 def _resonant_states(
@@ -53,7 +48,7 @@ def _resonant_states(
     assert resonance is not None
     q = list(hy.make_vars(*SLOW[:4]))
     attitude = AttitudeStates(
-        average.level, SLOW[:4], [], initial[:4], [], q, "state",
+        SLOW[:4], [], initial[:4], [], q, "state",
         defect=("quaternion_norm", "norm of the slow quaternion", hy.sqrt(hy.sum([x * x for x in q]))),
     )  # fmt: skip
     m = ResonantMechanics(
@@ -114,7 +109,6 @@ def averaged_states(
         return _resonant_states(scene, average, loads, scaling, numbers, orbit_tags, number)
     s = list(hy.make_vars(*DIRECTION))
     attitude = AttitudeStates(
-        average.level,
         DIRECTION,
         [],
         list(average.start),
@@ -126,13 +120,14 @@ def averaged_states(
             "norm of the momentum's direction",
             hy.sqrt(hy.sum([x * x for x in s])),
         ),
+        chord=1.0,
     )
     kind = AveragedMechanics if average.driven is None else DrivenMechanics
     m = kind(
         scene, scaling, numbers, s, attitude, None, None, None, number, orbit_tags, tables=tables,
         loads=list(loads), average=average,
     )  # fmt: skip
-    why = WHY[average.level]
+    why = _WHY[average.level]
     if average.driven is not None:
         why = _WHY_TURNED if average.sources else _WHY_AT_REST
     why += told_of_resonances(average.sources)

@@ -113,13 +113,13 @@ def _along_vertical(m: Mechanics) -> list[Symbolic]:
 
 def _euler(m: Mechanics) -> list[Symbolic]:
     attitude = m.carried(m.attitude)
-    if attitude.kind == "euler_angles":  # in the partner's chart ``System`` replaces them
-        return list(hy.make_vars(*attitude.names))
+    if attitude.sequence:  # in the partner's chart ``System`` replaces them
+        return attitude.variables
     return angles_of_matrix(m)
 
 
 def _euler_poles(m: Mechanics) -> Poles | None:
-    if m.carried(m.attitude).kind == "euler_angles":
+    if m.carried(m.attitude).sequence:
         return None
     return Poles(m.scene.config.integrator.euler_sequence, squared_factor(m))
 
@@ -142,8 +142,8 @@ def mass_exponent(m: Mechanics) -> int:
     return binary_magnitude(m.scene.context, m.scene.body.mass)
 
 
-def _carried_as(kind: str) -> Callable[[Mechanics], bool]:
-    return lambda m: m.attitude is not None and m.attitude.kind == kind
+def _in_states(name: str) -> Callable[[Mechanics], bool]:
+    return lambda m: m.attitude is not None and name in m.attitude.observables
 
 
 _BUILT_IN: tuple[Observable, ...] = (
@@ -160,13 +160,13 @@ _BUILT_IN: tuple[Observable, ...] = (
     ),
     Observable(
         "euler_angles", ("euler_angle",), "rad", "intrinsic Euler angles, body to space",
-        _euler, same_unit(NO_UNIT, 3), "body to space", ("attitude",), by_default=_carried_as("euler_angles"),
-        continuity=lambda m: "wrapped" if _carried_as("euler_angles")(m) else "unwrap", poles=_euler_poles,
+        _euler, same_unit(NO_UNIT, 3), "body to space", ("attitude",), by_default=_in_states("euler_angles"),
+        continuity=lambda m: "wrapped" if _in_states("euler_angles")(m) else "unwrap", poles=_euler_poles,
     ),
     Observable(
         "rotation_matrix", ("space_axis", "body_axis"), "1", "rotation matrix, body to space",
         lambda m: [x for row in m.matrix for x in row], same_unit(NO_UNIT, 9), "body to space", ("attitude",),
-        by_default=_carried_as("rotation_matrix"),
+        by_default=_in_states("rotation_matrix"),
     ),
     Observable(
         "angular_momentum", SPACE, "kg m2 s-1", "angular momentum",

@@ -13,6 +13,7 @@ import numpy as np
 from rigidsim.errors import ConfigError
 from rigidsim.model.scaling import Drive
 from rigidsim.scene.config import Experiment
+from rigidsim.scene.formulations import variables_named
 from rigidsim.scene.methods import DEFAULT_METHOD
 from rigidsim.scene.model_table import FULL
 from rigidsim.scene.overrides import key_steps
@@ -69,7 +70,7 @@ def reason_of_experiment(experiment: Experiment) -> Alone | None:
         return Alone.METHOD
     if integrator.hold_invariants is True:
         return Alone.HELD
-    if integrator.formulation in ("euler_angles", "canonical"):
+    if not variables_named(integrator.formulation).regular:
         return Alone.CHART
     if config.model.level != FULL:
         return Alone.AVERAGED
@@ -101,12 +102,12 @@ def _reason_of_system(traced: TracedSystem) -> Alone | None:
         return Alone.MOMENT
     if system.scene.bodies is not None:
         return Alone.BODIES
-    planar = system.requirements.formulation == "planar"
-    if system.partner is not None or (system.angle_states and not planar):
+    # angles in so large a unit are never wrapped here: what follows from them is joined
+    unwrapped = bool(system.angle_states and system.angle_unit)
+    if system.partner is not None or (system.angle_states and not unwrapped):
         return Alone.CHART
-    # a planar run's angle has a unit so large that it is never wrapped here: what follows from it is joined
     joined = {r.continuity for r in system.recorded} - (
-        {"", "wrapped", "parity"} if planar else {"", "nearest"}
+        {"", "wrapped", "parity"} if unwrapped else {"", "nearest"}
     )
     return Alone.ANGLES if joined else None
 

@@ -41,9 +41,9 @@ class BatchMotion:
     ) -> None:
         self._traced, self._crossings, self._width, self._unfelt = traced, crossings, width, unfelt
         self._tangents = len(traced.system.states) > traced.moving
-        planar = traced.system.requirements.formulation == "planar"
+        unfelt_beside = traced.system.formulation.unfelt_tangents
         self._runs = 0
-        self._may_share = self._tangents and planar and not traced.system.crossings
+        self._may_share = self._tangents and unfelt_beside and not traced.system.crossings
 
     @cached_property
     def _plain(self) -> BatchEngine:

@@ -9,7 +9,7 @@ from typing import Any
 import heyoka as hy
 import numpy as np
 
-from rigidsim.model.formulations import AttitudeStates
+from rigidsim.model.state_blocks import AttitudeStates
 from rigidsim.model.state_names import TANGENT
 from rigidsim.solve.batch.lanes import BatchEngine, BatchSystem
 from rigidsim.solve.batch.tracing import TracedSystem
@@ -112,10 +112,9 @@ class NeighbourLanes:
         attitude: AttitudeStates | None = self._attitude
         if attitude is None:
             return np.zeros(states.shape[1])
-        factors = {"quaternion": 2.0, "rotation_matrix": 0.5**0.5, "planar": 2.0**attitude.angle_unit}
-        if attitude.orbital is None and attitude.kind in factors:
+        if attitude.orbital is None and attitude.chord is not None:
             chords = np.sqrt((apart[self.places["attitude"]] ** 2).sum(axis=0))
-            return np.asarray(factors[attitude.kind] * chords)
+            return np.asarray(attitude.chord * chords)
         # all at one time: a frame that turns with time doesn't change their distances
         nothing = np.zeros(states.shape[1])
         here, there = (self._quaternion(x, parameters, nothing) for x in (states, states + apart))

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rigidsim.model.formulations import AttitudeStates
+from rigidsim.model.state_blocks import AttitudeStates
 from rigidsim.model.system import System
 from rigidsim.solve.compiled import compiled_function
 
@@ -46,13 +46,10 @@ def attitude_chords(system: System) -> AttitudeChords | None:
     if attitude.quaternion and all(x in system.variables for x in attitude.quaternion):
         places = [system.variables.index(x) for x in attitude.quaternion]
         return AttitudeChords(lambda states: states[places], 2.0)
-    if system.plan.average is not None:  # a unit vector
-        axis = [names.index(name) for name in attitude.names]
-        return AttitudeChords(lambda states: states[axis], 1.0)
     held = [names.index(name) for name in attitude.names] if attitude.orbital is None else []
-    if held and attitude.kind == "rotation_matrix":
-        return AttitudeChords(lambda states: states[held], math.sqrt(0.5))
-    if held and attitude.kind == "euler_angles":
+    if held and attitude.chord is not None and not attitude.angles:
+        return AttitudeChords(lambda states: states[held], attitude.chord)
+    if held and attitude.sequence:
         return AttitudeChords(lambda states: _quaternion(attitude, states[held]), 2.0)
     compiled = compiled_function(attitude.quaternion, system.variables, compact_mode=True, opt_level=0)
 

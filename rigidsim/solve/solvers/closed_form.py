@@ -96,7 +96,7 @@ class InClosedForm(Algorithm):
             raise Unsuitable(f'but {none}; allowed here: "taylor"') from None
         if integrator.hold_invariants is True:
             raise Unsuitable("which holds its invariants by itself; set hold_invariants = false")
-        if system.requirements.formulation not in ("rates", "quaternion"):
+        if not system.formulation.variables.in_closed_form:
             given = integrator.formulation
             raise Unsuitable(f'which gives rates and quaternions, not {given}; set formulation = "auto"')
         return cls(form)

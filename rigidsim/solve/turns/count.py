@@ -93,7 +93,8 @@ def angle_rate(system: System, angles: Sequence[Recorded]) -> float:
     for Euler angles, possibly one that turns with an orbit for others.
     """
     moving = any(r.name != "euler_angles" for r in angles)
-    if system.plan.average is not None:  # the plane may move, but nothing is told of the place on an orbit
+    if not system.formulation.resolves_rotation:
+        # the plane may move, but nothing is told of the place on an orbit
         drift = plane_drift(system.scene, system.plan.loads)
         if drift is not None:
             return float(system.rate_bound + drift)
@@ -226,7 +227,7 @@ class TurnCounter:
         self._groups = [slice(end - r.count, end) for r, end in zip(self._angles, ends, strict=True)]
         squared = hy.sum([w * w for w in m.rates])
         names = system.states[:3] if m.attitude is None else m.attitude.names
-        self._two_signs = m.attitude is not None and m.attitude.kind == "quaternion"
+        self._two_signs = m.attitude is not None and m.attitude.quaternion_sign == "state"
         self._watched = [system.states.index(name) for name in names]
         self._function: CompiledFunction = compiled_function(
             [*outputs, squared], system.variables, compact_mode=True

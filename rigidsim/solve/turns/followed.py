@@ -11,13 +11,12 @@ from dataclasses import replace
 import heyoka as hy
 import numpy as np
 
-from rigidsim.model.assembly import RATES
+from rigidsim.model.body import BODY
+from rigidsim.model.formulations.quaternion import Quaternion
 from rigidsim.model.system import System
 from rigidsim.solve.compiled import CompiledFunction, interruptible
 from rigidsim.solve.precision import precision_of
 from rigidsim.solve.sample_block import SampleBlock
-
-_CHARTS = ("euler_angles", "canonical")
 
 
 class FollowedSystem:
@@ -32,9 +31,8 @@ class FollowedSystem:
         self._charts: list[CompiledFunction] = []
         self.system: System | None = system
         plan = system.plan
-        if plan.requirements.formulation in _CHARTS:
-            requirements = replace(plan.requirements, formulation="quaternion")
-            twin = System(replace(plan, requirements=requirements), system.number)
+        if not plan.formulation.variables.regular:
+            twin = System(replace(plan, formulation=Quaternion()), system.number)
             self.system = None if system.switches else twin
 
     def states(self, block: SampleBlock) -> np.ndarray:
@@ -63,5 +61,5 @@ def _twin_states(twin: System, chart: System) -> list[hy.expression]:
     attitude = m.carried(m.attitude)
     known = dict(zip(chart.states, chart.variables, strict=True))
     known |= dict(zip(m.carried(twin.mechanics.attitude).names, attitude.quaternion, strict=True))
-    known |= dict(zip(RATES, m.rate_states, strict=True))
+    known |= dict(zip(BODY.rates, m.rate_states, strict=True))
     return [known[name] for name in twin.states]

@@ -20,23 +20,23 @@ import heyoka as hy
 
 from rigidsim.model import rotations
 from rigidsim.model.capabilities import corotating_orbit_of
-from rigidsim.model.formulations import AttitudeStates, OrbitalFrame, quaternion_kinematics
+from rigidsim.model.equations import quaternion_kinematics
 from rigidsim.model.load import Load
 from rigidsim.model.numbers import Rounder
 from rigidsim.model.rotations import Symbolic, SymbolicMatrix
-from rigidsim.model.state_blocks import StateBlock
+from rigidsim.model.state_blocks import AttitudeStates, OrbitalFrame, StateBlock
 from rigidsim.model.two_part import as_factor
 from rigidsim.scene import attitude
 from rigidsim.scene.orbits import KeplerOrbit
 from rigidsim.scene.scene import Scene
 
 
-def corotating_orbit(scene: Scene, loads: Sequence[Load], formulation: str) -> KeplerOrbit | None:
-    """Orbit in whose frame the attitude is best carried: a circle in a fixed plane, if the load on it is the
-    only one that reads the attitude, which is a quaternion; None otherwise.
+def corotating_orbit(scene: Scene, loads: Sequence[Load]) -> KeplerOrbit | None:
+    """Orbit in whose frame a quaternion is best carried: a circle in a fixed plane, if the load on it is the
+    only one that reads the attitude; None otherwise.
     """
     readers = [load for load in loads if {"attitude", "vertical"} & load.reads]
-    if formulation != "quaternion" or scene.torque_arm is not None or len(readers) != 1:
+    if scene.torque_arm is not None or len(readers) != 1:
         return None
     return corotating_orbit_of(readers[0])
 
@@ -71,7 +71,6 @@ def orbital_states(
     relative = rotations.quaternion_matrix(p)
     matrix, quaternion = in_space(scene, orbit, orbital.variables, relative, p, number)
     return AttitudeStates(
-        "quaternion",
         names,
         derivatives,
         initial,
@@ -84,6 +83,7 @@ def orbital_states(
             hy.sqrt(hy.sum([component * component for component in p])),
         ),
         orbital=OrbitalFrame(direction=relative[0], normal=relative[2], states=orbital),
+        chord=2.0,
     )
 
 

@@ -18,17 +18,19 @@ from typing import Any
 
 import heyoka as hy
 
-from rigidsim.errors import ConfigError, Problem
 from rigidsim.model import rotations
 from rigidsim.model.capabilities import KeepsPlane, has_source
 from rigidsim.model.carriers import carried_beside
-from rigidsim.model.formulations import AttitudeStates
-from rigidsim.model.load import Load, Term
-from rigidsim.model.numbers import Rounder, ScaledNumbers
+from rigidsim.model.formulations.formulation import Formulation, ModelPlan, Rotation, Unsuited, formulates
+from rigidsim.model.load import Load
+from rigidsim.model.mechanics import Mechanics
+from rigidsim.model.numbers import Rounder
 from rigidsim.model.rotations import Symbolic
+from rigidsim.model.state_blocks import AttitudeStates, StateBlock
 from rigidsim.model.two_part import as_factor
 from rigidsim.scene import attitude
 from rigidsim.scene.arithmetic import Vector, apply, cross, dot, negligible, norm
+from rigidsim.scene.formulations import FORMULATIONS
 from rigidsim.scene.scene import Scene
 
 ANGLE, SPIN = "angle", "spin"
@@ -36,10 +38,6 @@ ANGLE_UNIT = 20
 """The angle is carried in units of 2**20 rad, so that it never becomes the largest state (to which step
 control is relative), however often the body has turned.
 """
-
-
-class NotPlanar(Exception):
-    """Raised with a reason if the motion leaves the plane, or can't be shown to stay in it."""
 
 
 @dataclass(frozen=True)
@@ -60,36 +58,114 @@ class PlaneOfMotion:
     angle: Any
 
 
-@dataclass(frozen=True)
-class PlanarStates:
-    """Attitude states of a planar motion (a single angle), and the angular velocity that its spin stands for.
+@formulates(FORMULATIONS["planar"])
+class Planar(Formulation):
+    """The angle and its rate.
 
-    Attributes:
-        rates: angular velocity, body axes, in units of 1/time.
-        initial_spin: spin at the start (mpf), internal units.
+    Args:
+        why: what speaks for it where it wasn't asked for.
     """
 
-    attitude: AttitudeStates
-    rates: list[Symbolic]
-    initial_spin: Any
+    carries_rates = False
+    unfelt_tangents = True
+
+    def __init__(self, plane: PlaneOfMotion, why: str = "") -> None:
+        self._plane, self.why = plane, why
+
+    @classmethod
+    def of(cls, scene: Scene, loads: Sequence[Load]) -> Planar:
+        """See ``Formulation``."""
+        try:
+            return cls(plane_of(scene, loads))
+        except Unsuited as why:
+            for_what = "it is for a body that turns about a principal axis with every torque along it"
+            raise Unsuited(f'{why}; {for_what}, such as the normal of its orbit; choose "auto"') from None
+
+    @classmethod
+    def by_gradients(cls, scene: Scene, loads: Sequence[Load]) -> Planar | None:
+        """The formulation for a motion that gravity gradients keep in a plane; None for any other."""
+        if not any(map(has_source, loads)):
+            return None
+        why = "the body turns about a principal axis, along which every torque points and stays "
+        why += '(formulation = "quaternion" carries the full motion)'
+        try:
+            return cls(plane_of(scene, loads), why)
+        except Unsuited:
+            return None
+
+    @property
+    def twin(self) -> str:
+        """See ``Formulation``."""
+        return self.name
+
+    def rotation(self, plan: ModelPlan, number: Rounder) -> Rotation:
+        """See ``Formulation``."""
+        context, plane = plan.scene.context, self._plane
+        state, spin = hy.make_vars(ANGLE, SPIN)
+        angle = 2.0**ANGLE_UNIT * state
+        axis = [as_factor(number(x)) for x in plane.axis]
+        base = [[as_factor(number(x)) for x in row] for row in attitude.rotation_matrix(plane.quaternion)]
+        about = _turn_about(plane.axis, angle, number)
+        half = 0.5 * angle
+        c, s = hy.cos(half), hy.sin(half)
+        quaternion = rotations.quaternion_product(
+            [as_factor(number(x)) for x in plane.quaternion], [c, *(x * s for x in axis)]
+        )
+        states = AttitudeStates(
+            [ANGLE],
+            [2.0**-ANGLE_UNIT * spin],
+            [context.ldexp(plane.angle, -ANGLE_UNIT)],
+            rotations.multiply(base, about),
+            quaternion,
+            "wrapping",
+            angles=(0,),
+            angle_unit=ANGLE_UNIT,
+            chord=2.0**ANGLE_UNIT,
+            momenta=(SPIN,),
+        )
+        return Rotation([x * spin for x in axis], states)
+
+    def blocks(self, m: Mechanics, plan: ModelPlan) -> list[StateBlock]:
+        """See ``Formulation``."""
+        states, axis, why = m.carried(m.attitude), self._plane.axis, plan.requirements.why["attitude"]
+        spin = m.scene.context.ldexp(dot(m.scene.angular_velocity, axis), m.scaling.time)
+        block = StateBlock(
+            [*states.names, SPIN],
+            [*states.derivatives, self._spin_equation(m)],
+            [*states.initial, spin],
+            exponents=[ANGLE_UNIT, -m.scaling.time],
+            why=why + (f"; {self.why}" if self.why else ""),
+        )
+        return [block]
+
+    def _spin_equation(self, m: Mechanics) -> Symbolic:
+        """Right-hand side of I_k spin' = torque . k, solved for spin'."""
+        axis, context = self._plane.axis, m.scene.context
+        moment = dot(axis, apply(m.numbers.inertia, axis))
+        terms = []
+        for vector, expression in m.torque:
+            along = dot(axis, vector)
+            if abs(along) > negligible(context) * norm(context, vector):
+                terms.append(m.number(along / moment) * expression)
+        return hy.sum(terms) if terms else hy.expression(0.0)
 
 
 def plane_of(scene: Scene, loads: Sequence[Load]) -> PlaneOfMotion:
     """The plane that a motion stays in.
 
     Raises:
-        NotPlanar: the motion isn't known to stay in a plane; says why.
+        Unsuited: the motion isn't known to stay in a plane; says why.
     """
     if scene.free_flight:
-        raise NotPlanar("the body has a position and flies")
+        raise Unsuited("the body has a position and flies")
     if beside := carried_beside(loads):
-        raise NotPlanar(beside)
+        raise Unsuited(beside)
     context = scene.context
     axis = _spin_axis(scene, loads)
     normal = apply(attitude.rotation_matrix(scene.quaternion), axis)
     for load in loads:
         if not _keeps(load, scene, axis, normal):
-            raise NotPlanar(f"the torque of {load.title} may turn the body out of its plane")
+            raise Unsuited(f"the torque of {load.title} may turn the body out of its plane")
     turned = _least_turn(context, axis, normal)
     # the remaining rotation is about the axis, and the scalar product gives its half angle
     w, *v = attitude.product([turned[0], *(-x for x in turned[1:])], list(scene.quaternion))
@@ -100,85 +176,6 @@ def plane_of(scene: Scene, loads: Sequence[Load]) -> PlaneOfMotion:
     elif angle <= -context.pi:
         angle, turned = angle + 2 * context.pi, [-x for x in turned]
     return PlaneOfMotion(axis, normal, turned, angle)
-
-
-def gradient_plane(scene: Scene, loads: Sequence[Load]) -> PlaneOfMotion | None:
-    """The plane of a motion under gravity gradients if it stays in one; None otherwise."""
-    if not any(map(has_source, loads)):
-        return None
-    try:
-        return plane_of(scene, loads)
-    except NotPlanar:
-        return None
-
-
-def asked_plane(scene: Scene, loads: Sequence[Load]) -> PlaneOfMotion:
-    """The plane of a motion for which ``formulation = "planar"`` is given.
-
-    Raises:
-        ConfigError: the motion stays in no plane.
-    """
-    try:
-        return plane_of(scene, loads)
-    except NotPlanar as why:
-        raise ConfigError(
-            Problem(
-                "[integrator] formulation",
-                f'given "planar", but {why}; it is for a body that turns about a principal axis with every '
-                'torque along it, such as the normal of its orbit; choose "auto"',
-            )
-        ) from None
-
-
-def planar_states(scene: Scene, plane: PlaneOfMotion, time_exponent: int, number: Rounder) -> PlanarStates:
-    """Set up the angle and the spin.
-
-    Args:
-        time_exponent: binary exponent of the internal unit of time in seconds.
-        number: from an mpf to the working precision's scalar, rounded once.
-    """
-    context = scene.context
-    state, spin = hy.make_vars(ANGLE, SPIN)
-    angle = 2.0**ANGLE_UNIT * state
-    axis = [as_factor(number(x)) for x in plane.axis]
-    base = [[as_factor(number(x)) for x in row] for row in attitude.rotation_matrix(plane.quaternion)]
-    about = _turn_about(plane.axis, angle, number)
-    half = 0.5 * angle
-    c, s = hy.cos(half), hy.sin(half)
-    quaternion = rotations.quaternion_product(
-        [as_factor(number(x)) for x in plane.quaternion], [c, *(x * s for x in axis)]
-    )
-    states = AttitudeStates(
-        "planar",
-        [ANGLE],
-        [2.0**-ANGLE_UNIT * spin],
-        [context.ldexp(plane.angle, -ANGLE_UNIT)],
-        rotations.multiply(base, about),
-        quaternion,
-        "wrapping",
-        angles=(0,),
-        angle_unit=ANGLE_UNIT,
-    )
-    rate = context.ldexp(dot(scene.angular_velocity, plane.axis), time_exponent)
-    return PlanarStates(states, [x * spin for x in axis], rate)
-
-
-def spin_equation(
-    plane: PlaneOfMotion, numbers: ScaledNumbers, torque: list[Term], number: Rounder, context: Any
-) -> Symbolic:
-    """Right-hand side of I_k spin' = torque . k, solved for spin'.
-
-    Args:
-        torque: terms of all loads, body axes, internal units.
-    """
-    moment = dot(plane.axis, apply(numbers.inertia, plane.axis))
-    tiny = negligible(context)
-    terms = []
-    for vector, expression in torque:
-        along = dot(plane.axis, vector)
-        if abs(along) > tiny * norm(context, vector):
-            terms.append(number(along / moment) * expression)
-    return hy.sum(terms) if terms else hy.expression(0.0)
 
 
 def _keeps(load: Load, scene: Scene, axis: Vector, normal: Vector) -> bool:
@@ -194,13 +191,13 @@ def _spin_axis(scene: Scene, loads: Sequence[Load]) -> Vector:
         axis = [w / size for w in rates]
         momentum = apply(scene.body.inertia, axis)
         if norm(context, cross(axis, momentum)) > tiny * max(scene.body.principal_moments):
-            raise NotPlanar("the body doesn't turn about a principal axis")
+            raise Unsuited("the body doesn't turn about a principal axis")
         return axis
     matrix = attitude.rotation_matrix(scene.quaternion)
     for axis in scene.body.principal_axes[::-1]:
         if all(_keeps(load, scene, axis, apply(matrix, axis)) for load in loads):
             return list(axis)
-    raise NotPlanar("the body is at rest, and none of its principal axes is one that every torque is along")
+    raise Unsuited("the body is at rest, and none of its principal axes is one that every torque is along")
 
 
 def _least_turn(context: Any, axis: Vector, normal: Vector) -> Vector:

@@ -1,0 +1,258 @@
+"""A formulation: the states in which the rotation of a scene is written, and what can be told of them.
+
+``Formulation`` is the protocol of all of them, ``formulates`` registers one. Everything else, from the flight
+to the invariants, is written in terms of the attitude and the angular velocity as expressions of its states.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from enum import Enum
+from typing import Any, ClassVar, TypeVar
+
+import heyoka as hy
+
+from rigidsim.model.averaged.average import Average
+from rigidsim.model.body import BODY
+from rigidsim.model.capabilities import is_wide
+from rigidsim.model.equations import rate_equations
+from rigidsim.model.kinematics import in_common_unit
+from rigidsim.model.load import Load
+from rigidsim.model.mechanics import Mechanics
+from rigidsim.model.numbers import Rounder, ScaledNumbers
+from rigidsim.model.orbits.table_states import Carried, TablePlace
+from rigidsim.model.rotations import Symbolic
+from rigidsim.model.scaling import Scaling, largest_rates
+from rigidsim.model.state_blocks import AttitudeStates, StateBlock
+from rigidsim.scene.formulations import DEFAULT_FORMULATION, FORMULATIONS, Variables
+from rigidsim.scene.orbit_tables.pieces import TabulatedOrbit
+from rigidsim.scene.orbits import KeplerOrbit
+from rigidsim.scene.scene import Scene
+from rigidsim.scene.surfaces import Surfaces
+from rigidsim.scene.tracing.numbers import largest_of
+
+
+class Unsuited(ValueError):
+    """Raised if a formulation that is asked for doesn't apply to a scene; the message goes on from
+    ``given "name", but``.
+    """
+
+
+class Rounding(Enum):
+    """How the states' rounding at each step moves the motion; the laws are in ``rigidsim.accuracy``."""
+
+    PLAIN = "relative to the states' own sizes"
+    ANGLES = "angles lose digits near their singularity"
+    MOMENTA = "angles and their momenta lose digits near their singularity, and in forming the rates"
+
+
+@dataclass(frozen=True)
+class Requirements:
+    """Which states a scene requires.
+
+    Attributes:
+        attitude: whether an attitude is carried.
+        vertical: whether the vertical is carried as three states of its own (Euler-Poisson equations).
+        flight: whether position and velocity are carried.
+        record: names asked for, or None for everything that the scene has.
+        why: reasons for what is carried: "rates", "attitude", "vertical", "flight".
+        left_out: (what, why) for groups that are not carried.
+    """
+
+    attitude: bool
+    vertical: bool
+    flight: bool
+    record: list[str] | None
+    why: Mapping[str, str]
+    left_out: Sequence[tuple[str, str]] = ()
+
+
+@dataclass(frozen=True)
+class ModelPlan:
+    """The modelling decisions from which a system of equations follows in any precision.
+
+    Attributes:
+        scene: the scene, including loads given from Python.
+        loads: all that act, with the uniform fields combined into one.
+        formulation: of the rotation.
+        orbit_tags: for each prescribed orbit, the tag that makes its state names unique.
+        surfaces: switching surfaces on which the equations change.
+        tables: positions of the states and parameters of tabulated orbits.
+        clocked: whether expressions of the time need it in two numbers (``rigidsim.model.two_part_time``).
+    """
+
+    scene: Scene
+    loads: Sequence[Load]
+    formulation: Formulation
+    requirements: Requirements
+    scaling: Scaling
+    numbers: ScaledNumbers
+    orbit_tags: Mapping[KeplerOrbit, str]
+    surfaces: Surfaces
+    tables: Mapping[TabulatedOrbit, TablePlace] = field(default_factory=dict)
+    clocked: bool = False
+
+    @property
+    def wide(self) -> bool:
+        """Whether the equations are too long to be compiled unrolled."""
+        return self.formulation.wide or any(map(is_wide, self.loads))
+
+
+@dataclass(frozen=True)
+class Rotation:
+    """The rotation as expressions of its states.
+
+    Attributes:
+        rates: angular velocity, body axes: the three states, each in its own unit, or expressions in units of
+            1/time.
+        attitude: None if none is carried.
+    """
+
+    rates: list[Symbolic]
+    attitude: AttitudeStates | None
+
+
+class Formulation:
+    """How the rotation of one scene is written in states; ``formulates`` registers a class of them.
+
+    One of your own needs an ``attitude``, whose derivatives follow from the body rates; all else has a
+    default. Numbers are exact (mpf, in the scene's arithmetic) until ``number`` rounds them once.
+
+    Attributes:
+        variables: what can be said of it for any scene.
+        carries_rates: whether the angular velocity is carried as three states with units of their own.
+        resolves_rotation: whether every rotation is followed, rather than averaged over. A motion averaged
+            over has an error of its model, which is measured beside it.
+        rounding: how the states' rounding moves the motion.
+        unfelt_tangents: whether a tangent vector beside it, however compiled, changes no bit of its steps.
+        sequence: sequence of the Euler angles that are states; empty for other states.
+        partner: the same motion in the chart that a run changes to near a singularity; None without one.
+        why: what speaks for it in this scene, besides that an attitude is needed; shown by ``plan``.
+        wide: whether its equations are too long to be compiled unrolled.
+        longitude: which longitude along a tabulated orbit it needs.
+        average: the average that replaces the motion, if it doesn't resolve rotations.
+    """
+
+    variables: ClassVar[Variables]
+    carries_rates: ClassVar[bool] = True
+    resolves_rotation: ClassVar[bool] = True
+    rounding: ClassVar[Rounding] = Rounding.PLAIN
+    unfelt_tangents: ClassVar[bool] = False
+    sequence: str = ""
+    partner: Formulation | None = None
+    why: str = ""
+    wide: bool = False
+    longitude: Carried = Carried.ECCENTRIC
+    average: Average | None = None
+
+    @classmethod
+    def of(cls, scene: Scene, loads: Sequence[Load]) -> Formulation:
+        """The formulation for a scene whose config names it.
+
+        Raises:
+            Unsuited: it doesn't apply to the scene, and why.
+        """
+        return cls()
+
+    @property
+    def name(self) -> str:
+        """Name in summaries and datasets."""
+        return self.variables.name
+
+    @property
+    def twin(self) -> str | None:
+        """Formulation in which questions about the motion itself, such as its stability, are asked in double
+        precision; None for this one.
+        """
+        return DEFAULT_FORMULATION
+
+    def attitude(self, plan: ModelPlan, rates: list[Symbolic], number: Rounder) -> AttitudeStates | None:
+        """States of the attitude, their equations and initial values; None if none is carried.
+
+        Args:
+            rates: angular velocity, body axes, in units of 1/time.
+            number: from an mpf to the working precision's scalar, rounded once.
+        """
+        raise NotImplementedError
+
+    def rotation(self, plan: ModelPlan, number: Rounder) -> Rotation:
+        """The states of the rotation; arguments as for ``attitude``."""
+        states = list(hy.make_vars(*BODY.rates))
+        rates = in_common_unit(states, plan.numbers.rate_units, number)
+        return Rotation(states, self.attitude(plan, rates, number))
+
+    def blocks(self, m: Mechanics, plan: ModelPlan) -> list[StateBlock]:
+        """The states of the rotation with their equations.
+
+        Raises:
+            ConfigError: a load that can't be written in these states.
+        """
+        why = plan.requirements.why
+        attitude = m.carried(m.attitude)
+        reason = why["attitude"] + (f"; {self.why}" if self.why else "")
+        block = StateBlock(attitude.names, attitude.derivatives, attitude.initial, why=reason)
+        return [rate_block(m, why["rates"]), block]
+
+    def assembled(self, plan: ModelPlan, number: Rounder) -> tuple[Mechanics, list[StateBlock]] | None:
+        """The mechanics and all states of a motion that isn't the full one; None for the full motion, to
+        which flight, orbits and other states are added.
+        """
+        return None
+
+    def asked_angles(self, attitude: AttitudeStates, branch: Symbolic) -> list[Symbolic]:
+        """Euler angles of the requested sequence, as expressions of the states of its partner's chart.
+
+        Args:
+            branch: see ``rigidsim.model.formulations.euler_angles.across``.
+        """
+        raise NotImplementedError
+
+    def check_start(self, scene: Scene, attitude: AttitudeStates | None) -> None:
+        """Refuse a start at which the states don't exist.
+
+        Raises:
+            ConfigError: the start is singular.
+        """
+
+    def rate_bound(self, plan: ModelPlan) -> Any:
+        """Upper bound (mpf, rad/s) of the rate at which what is carried turns."""
+        return largest_of(largest_rates(plan.scene, plan.scaling.drive))
+
+
+def rate_block(m: Mechanics, why: str) -> StateBlock:
+    """The body rates, by Euler's equations."""
+    context, scaling = m.scene.context, m.scaling
+    initial = [
+        context.ldexp(w, scaling.time - e)
+        for w, e in zip(m.scene.angular_velocity, scaling.rates, strict=True)
+    ]
+    exponents = [e - scaling.time for e in scaling.rates]
+    turning = rate_equations(m, [*m.torque, *m.inner_torque])
+    return StateBlock(BODY.rates, turning, initial, exponents=exponents, why=why)
+
+
+REGISTERED: dict[str, type[Formulation]] = {}
+"""By the names of their variables."""
+
+F = TypeVar("F", bound=type[Formulation])
+
+
+def formulates(variables: Variables) -> Callable[[F], F]:
+    """Register a formulation, so that ``[integrator] formulation`` finds it (a class decorator).
+
+    Raises:
+        ValueError: the name is taken.
+    """
+
+    def register(kind: F) -> F:
+        known = REGISTERED.get(variables.name)
+        if known is not None and known.__qualname__ != kind.__qualname__:
+            raise ValueError(
+                f'a formulation named "{variables.name}" is registered already ({known.__name__})'
+            )
+        FORMULATIONS[variables.name], REGISTERED[variables.name] = variables, kind
+        kind.variables = variables
+        return kind
+
+    return register

@@ -1,0 +1,38 @@
+"""Body rates alone, for what needs no attitude; with the vertical in body axes, if a torque reads that."""
+
+from __future__ import annotations
+
+from rigidsim.model.body import BODY
+from rigidsim.model.equations import vertical_equations
+from rigidsim.model.formulations.formulation import Formulation, ModelPlan, formulates, rate_block
+from rigidsim.model.mechanics import Mechanics
+from rigidsim.model.numbers import Rounder
+from rigidsim.model.rotations import Symbolic
+from rigidsim.model.state_blocks import StateBlock
+from rigidsim.scene.arithmetic import apply, transpose
+from rigidsim.scene.attitude import rotation_matrix
+from rigidsim.scene.formulations import FORMULATIONS
+
+
+@formulates(FORMULATIONS["rates"])
+class Rates(Formulation):
+    """Euler's equations, and Poisson's for the vertical."""
+
+    @property
+    def twin(self) -> str:
+        """See ``Formulation``."""
+        return self.name
+
+    def attitude(self, plan: ModelPlan, rates: list[Symbolic], number: Rounder) -> None:
+        """See ``Formulation``."""
+
+    def blocks(self, m: Mechanics, plan: ModelPlan) -> list[StateBlock]:
+        """See ``Formulation``."""
+        why = plan.requirements.why
+        blocks = [rate_block(m, why["rates"])]
+        if plan.requirements.vertical:
+            assert m.numbers.up is not None
+            seen = apply(transpose(rotation_matrix(m.scene.quaternion)), m.numbers.up)
+            turning = vertical_equations(m.carried(m.vertical), m.rates)
+            blocks.append(StateBlock(BODY.vertical, turning, seen, why=why["vertical"]))
+        return blocks

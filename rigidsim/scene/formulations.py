@@ -1,0 +1,70 @@
+"""Formulations of the rotation that a config can name in ``[integrator] formulation``, and what each can do.
+
+Whoever has to treat formulations differently asks for an ability here, or in ``Formulation``
+(``rigidsim.model.formulations``), which tells their states and equations: never for a name.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+AUTO = "auto"
+DEFAULT_FORMULATION = "quaternion"
+"""Regular everywhere: in it settings are tried, and questions about a motion itself are asked."""
+
+
+@dataclass(frozen=True)
+class Variables:
+    """Variables in which a rotation is integrated.
+
+    Attributes:
+        name: as in configs, summaries and datasets.
+        told: what they are, for the description of the key; empty if the name says it.
+        keeps_attitude: whether the attitude follows from them.
+        general: whether they describe any motion's attitude, so that settings can be compared in them.
+        regular: whether they have no singularity that a motion may come near. Neighbours of a motion in
+            others, and what happens between its samples, are followed in quaternions.
+        in_closed_form: whether closed forms give them.
+        checked_by: variables that round otherwise, with which their errors are checked.
+        caveat: what a motion in them can't show, told with the results.
+    """
+
+    name: str
+    told: str = ""
+    keeps_attitude: bool = True
+    general: bool = True
+    regular: bool = True
+    in_closed_form: bool = False
+    checked_by: str = DEFAULT_FORMULATION
+    caveat: str = ""
+
+
+FORMULATIONS: dict[str, Variables] = {
+    variables.name: variables
+    for variables in (
+        Variables("rates", keeps_attitude=False, general=False, in_closed_form=True),
+        Variables(DEFAULT_FORMULATION, in_closed_form=True, checked_by="rotation_matrix"),
+        Variables("rotation_matrix"),
+        Variables("euler_angles", regular=False),
+        Variables("canonical", "Euler angles and their momenta", regular=False),
+        Variables(
+            "planar",
+            "an angle and its rate, for a body that turns about one axis",
+            general=False,
+            caveat="in its plane alone: whether a small push out of the plane would grow isn't examined",
+        ),
+    )
+}
+
+
+def variables_named(name: str) -> Variables:
+    """The variables of a config, summary or dataset: quaternions stand for "auto", and those of a later
+    version, or of an averaged motion, tell an attitude.
+    """
+    return FORMULATIONS.get(DEFAULT_FORMULATION if name == AUTO else name) or Variables(name, general=False)
+
+
+def attitude_variables(asked: str) -> str:
+    """The formulation in which the attitude of a config is integrated that asks for another."""
+    variables = variables_named(asked)
+    return variables.name if variables.keeps_attitude else DEFAULT_FORMULATION
