@@ -271,7 +271,8 @@ def python_page() -> str:
         "# Python\n\nWhat `import rigidsim` offers, and what loads and observables of your own are made of. "
         "How they are used: [from Python](../howto/python.md), [a load](../howto/own_load.md), "
         "[a carrier of momentum](../howto/own_carrier.md), "
-        "[an observable](../howto/own_observable.md), [a solver](../howto/own_solver.md).",
+        "[an observable](../howto/own_observable.md), [a solver](../howto/own_solver.md), "
+        "[a formulation](../howto/own_formulation.md).",
         "## Functions\n\n"
         + "\n\n".join(_directive("autofunction", f"rigidsim.{name}") for name in functions),
         "## Runs, experiments and errors\n\n"

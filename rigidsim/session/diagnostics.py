@@ -69,8 +69,10 @@ class Diagnostics:
             told = own()
             return self if told is None else replace(self, estimate=Estimate(**vars(told)))
         if corrected is not None:
-            stepper = corrected.stepper if isinstance(corrected.stepper, TaylorStepper) else None
-            acting = [effect.registered for effect in corrected.effects if effect.registered]
+            registered = [effect for effect in corrected.effects if effect.registered]
+            alone = not any(effect.rewrites for effect in registered)  # its equations need nothing besides
+            stepper = corrected.stepper if alone and isinstance(corrected.stepper, TaylorStepper) else None
+            acting = [effect.registered for effect in registered if not effect.rewrites]
             if acting:  # which a closed form knows nothing of
                 trail, beside = None, f"; they are without the effects {', '.join(acting)}"
         found = estimate_errors(

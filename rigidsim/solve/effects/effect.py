@@ -23,11 +23,13 @@ class Effect:
         registered: name under which ``register_effect`` registered it; empty for rigidsim's own.
         version: of its memory; a checkpoint with another is refused.
         anywhere: whether it may be due within a stride, too.
+        rewrites: whether it writes the same motion in other states, rather than changing the motion.
     """
 
     registered: ClassVar[str] = ""
     version = 1
     anywhere = False
+    rewrites: ClassVar[bool] = False
 
     @classmethod
     def of(cls, system: System, precision: Precision) -> Effect | None:
