@@ -192,7 +192,7 @@ def test_plan_says_why_it_is_carried(tmp_path: Path) -> None:
 
 def test_names_that_are_not_registered_are_refused() -> None:
     with pytest.raises(
-        rigidsim.ConfigError, match='did you mean "rodrigues".*allowed: auto, .*planar, rodri'
+        rigidsim.ConfigError, match=r'did you mean "rodrigues".*allowed: auto, .*planar, rodri'
     ):
         rigidsim.parse(text("rodrigue"))
     with pytest.raises(ValueError, match='named "planar" is registered already'):
