@@ -57,7 +57,7 @@ def refuse_scene(scene: Scene, loads: Sequence[Load]) -> None:
     config, level = scene.config, scene.config.model.level
     alone = [load for load in loads if gradient_source_of(load) is None]
     integrator = config.integrator
-    against: str | None = None
+    against = ""
     if scene.free_flight:
         against = "the body has a position and flies"
     elif against := carried_beside(loads):
@@ -105,7 +105,7 @@ def refuse_scene(scene: Scene, loads: Sequence[Load]) -> None:
         if any(source is not None and source.ephemeris for source in sources):
             against = "the source of an ephemeris has no elements to average over"
             raise _refused(level, against, 'choose "spin_averaged", or give it an orbit with a node_rate')
-    if against is not None:
+    if against:
         raise _refused(level, against)
     if alone and config.model.short_period:
         what = (
