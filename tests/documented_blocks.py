@@ -169,7 +169,7 @@ def check_fragment(text: str) -> None:
     """
     import tomllib
 
-    from rigidsim.scene.config import Experiment
+    from rigidsim import Experiment
 
     given = tomllib.loads(text)
     whole: dict[str, Any] = {}

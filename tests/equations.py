@@ -9,8 +9,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 from support import config
 
-from rigidsim.model.system import System
-from rigidsim.scene.config import parse
+from rigidsim import parse
 from rigidsim.solve.problem import InitialValueProblem, prepare
 
 EPS = np.finfo(float).eps
@@ -40,19 +39,19 @@ def prepared(
     return prepare(parse(config(body, initial, loads, time, integrator, output, more)))
 
 
-def internal(system: System, state: np.ndarray) -> np.ndarray:
+def internal(system: Any, state: np.ndarray) -> np.ndarray:
     """SI to the system's own units: powers of two, nothing is rounded."""
     return np.ldexp(state, -np.array(system.state_exponents))
 
 
-def derivative(system: System, state: np.ndarray, time: float = 0.0) -> np.ndarray:
+def derivative(system: Any, state: np.ndarray, time: float = 0.0) -> np.ndarray:
     """Time derivative of the states, SI, at a state in SI and a time in seconds."""
     rhs = hy.cfunc([rhs for _, rhs in system.equations], system.variables)
     rates = rhs(internal(system, state), time=float(np.ldexp(time, -system.scaling.time)))
     return np.ldexp(rates, np.array(system.state_exponents) - system.scaling.time)
 
 
-def observed(system: System, state: np.ndarray) -> dict[str, np.ndarray]:
+def observed(system: Any, state: np.ndarray) -> dict[str, np.ndarray]:
     """All recorded variables, SI, at a state in SI."""
     count = sum(r.count for r in system.recorded)
     values = hy.cfunc(system.outputs[:count], system.variables)(internal(system, state))

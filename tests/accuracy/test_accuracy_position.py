@@ -8,8 +8,8 @@ from support import config
 from support import run_estimated as run_text
 
 import rigidsim
+from rigidsim import ConfigError
 from rigidsim.accuracy.choice import wanted
-from rigidsim.errors import ConfigError
 
 ATTRACTORS = config(
     "principal_moments = [1, 1.3, 1.6]\nmass = 1",

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from experiments.sweep_coverage import KINDS, Found, found_of
-from rigidsim.scene.config import parse
+from rigidsim import parse
 from rigidsim.scene.sweeps.sweep import Sweep
 from rigidsim.session.members import MemberResults, warning_bits
 from rigidsim.solve.batch.lanes import BatchEngine

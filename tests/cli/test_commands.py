@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import io
 import json
+import re
 import subprocess
 import sys
 from collections.abc import Callable
@@ -123,7 +125,6 @@ def test_plan_json(config: Config, rigidsim_command: Command) -> None:
     ("time", "integrator"),
     [
         ("end = 20000\nsamples = 11", ""),
-        ("end = 3000\nsamples = 3001", 'formulation = "euler_angles"'),
         ("end = 300\nsamples = 4", 'precision = "quadruple"'),
     ],
 )
@@ -465,3 +466,37 @@ def test_the_names_of_the_package_stay_functions() -> None:
 
 
 # What a terminal shows
+
+
+@pytest.mark.parametrize("width", [80, 120])
+def test_the_bar_is_one_line(width: int, config: Config) -> None:
+    """Name, bar, percentage, rate and time left, none of them cut."""
+    from rich.console import Console
+
+    from rigidsim.session.progress import TerminalObserver
+    from rigidsim.solve.problem import prepare
+    from rigidsim.solve.sampler import Progress
+
+    prepared = prepare(rigidsim.load(config("a_name_of_more_than_twenty_four_letters", time="end = 1000")))
+    screen = io.StringIO()
+    console = Console(width=width, file=screen, force_terminal=True, color_system=None)
+    now = [0.0]
+    with TerminalObserver(console, lambda: now[0]) as observer:
+        observer.started(prepared, Path("runs/x"))
+        now[0] += 3600.0
+        observer.progressed(Progress(11, steps=7_200_000_000, time=250.0))
+        observer._bar.refresh()
+        shown = re.sub(r"\x1b\[[0-9;?]*[A-Za-z]", "", screen.getvalue()).replace("\r", "\n")
+        line = next(x for x in reversed(shown.splitlines()) if "%" in x)
+        assert len(line.rstrip()) <= width
+        assert line.startswith("a_name_of_more_than_twe… ━")
+        assert " 25.0 %" in line
+        assert "2 M steps/s" in line
+        assert "3:00:00 left" in line  # three quarters at the pace of one quarter an hour
+        assert ("t = 250 s" in line) == (width >= 100)
+        observer.phase("dataset")
+        observer._bar.refresh()
+        shown = re.sub(r"\x1b\[[0-9;?]*[A-Za-z]", "", screen.getvalue()).replace("\r", "\n")
+        last = [x for x in shown.splitlines() if x.strip()][-1]
+        assert last.startswith("writing dataset.h5")
+        assert "left" not in last  # how long it takes isn't known

@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Any
 
 import click
-import numpy as np
 import pytest
 import support
 import typer
@@ -154,24 +153,6 @@ def test_a_long_line(line: str, made: Path, monkeypatch: pytest.MonkeyPatch) -> 
 
     monkeypatch.setattr(viewer, "open_viewer", closed_at_once)
     run_line(line, LONG[line], made, monkeypatch)
-
-
-def test_json_has_null_where_there_is_no_number(capsys: pytest.CaptureFixture[str]) -> None:
-    values = {
-        "none": [np.nan, float("inf"), np.float32("-inf"), np.array([np.nan, 1.5])],
-        "complex": (1 + 2j, np.complex128(complex(0, float("nan")))),
-        "numpy": [np.int64(3), np.bool_(True), np.float64(0.1), np.arange(2)],
-        "plain": {"text": "NaN", "flag": False, "nothing": None, "whole": 2**60},
-    }
-    print_json(values)
-    assert strictly(capsys.readouterr().out) == [
-        {
-            "none": [None, None, None, [None, 1.5]],
-            "complex": [[1, 2], [0, None]],
-            "numpy": [3, True, 0.1, [0, 1]],
-            "plain": {"text": "NaN", "flag": False, "nothing": None, "whole": 2**60},
-        }
-    ]
 
 
 def test_json_of_an_analysis_says_why_a_number_is_missing(

@@ -344,3 +344,24 @@ def test_events_are_tables_of_their_own(config: Config, rigidsim_command: Comman
     with rigidsim.open_run("runs/free").dataset as dataset:
         assert [float(row.split(",")[0]) for row in rows] == dataset.flip_time.values.tolist()
         assert len(rows) > 2
+
+
+def test_no_message_names_what_nobody_said(
+    config: Config, run_once: Callable[[str], None], rigidsim_command: Command
+) -> None:
+    run_once(config("plain", time="end = 2\nsamples = 9"))
+    run_once(config("sky", time=TIMED, rest=SKY))
+    refusals = {
+        ("plain",): "doesn't say what its time 0 is, which a message must: give [time] epoch in the config",
+        ("plain", "--epoch", "J2000"): "what its space axes are, which a message must: give [frame] axes",
+        ("plain", "--epoch", "2020-01-01"): '--epoch: given "2020-01-01"; a date and time with its scale',
+        ("plain", "--epoch", "J2000", "--axes", "ecliptic"): 'did you mean "ecliptic J2000"?',
+        ("plain", "--epoch", "J2000", "--axes", "EME200"): 'did you mean "EME2000"?',
+        ("sky", "--epoch", "J2000"): "given 2000-01-01T12:00:00 TDB, but time 0 of the run is 2029-04-13",
+        ("sky", "--axes", "EME2000"): 'but the run\'s axes are "ecliptic J2000"; leave the option out',
+    }
+    for (name, *options), phrase in refusals.items():
+        result = rigidsim_command("export", f"runs/{name}", "--format", "aem", *options)
+        assert result.exit_code == 2
+        assert phrase in result.output
+        assert not Path(f"{name}.aem").exists()

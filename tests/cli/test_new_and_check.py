@@ -11,9 +11,9 @@ import pytest
 import support
 
 import rigidsim
+from rigidsim import RigidsimError
 from rigidsim.cli import completion
 from rigidsim.cli.commands import COMMANDS
-from rigidsim.errors import RigidsimError
 from rigidsim.scene.methods import METHODS
 from rigidsim.workflows import templates
 

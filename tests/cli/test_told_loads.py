@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from rigidsim.scene.config import parse
+from rigidsim import parse
 from rigidsim.session.understood import told_loads
 from rigidsim.solve.problem import prepare
 

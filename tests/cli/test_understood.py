@@ -8,47 +8,8 @@ from typing import Any
 
 import pytest
 
-from rigidsim.cli.screens.understood import body_text, start_text, time_text
-from rigidsim.scene.config import parse
-from rigidsim.scene.scene import build_scene
-from rigidsim.session.understood import body_of, span_of, start_of
-
 Config = Callable[..., str]
 Command = Callable[..., Any]
-
-
-def texts(body: str, initial: str, time: str, more: str = "") -> tuple[str, str, str]:
-    text = f'name = "echo"\n{more}\n[body]\n{body}\n[initial]\n{initial}\n[time]\n{time}\n'
-    scene = build_scene(parse(text))
-    return body_text(body_of(scene)), start_text(start_of(scene)), time_text(span_of(scene))
-
-
-def test_a_planet_in_days_and_dates() -> None:
-    body, start, time = texts(
-        'preset = "earth"',
-        'angular_velocity = [0, 0, "1 turn/sidereal_day"]\nquaternion = [1, 1, 0, 0]',
-        'end = "200 yr"\nevery = "20 day"\nepoch = "2000-01-01T12:00:00 TDB"',
-        'integrator.euler_sequence = "xyz"',
-    )
-    assert body.startswith("from preset earth, mass 5.9722e+24 kg, turns about its centre of mass\n")
-    assert start.startswith("attitude xyz 90, 0, 0 deg\n")
-    assert start.endswith("(0.004178 deg/s, a turn in 23.93 h)")
-    first, dates = time.split("\n")
-    assert first == "0 to 199.973 yr, 3,653 samples, one every 20 d"
-    assert dates.startswith("2000-01-01 TDB to 2199-12-")
-
-
-def test_a_free_flight_has_its_place() -> None:
-    _, start, time = texts(
-        "principal_moments = [1, 2, 2]\nmass = 1",
-        'angular_velocity = [0, 0, 0]\nposition = ["7000 km", 0, 0]\nvelocity = [0, "7.5 km/s", 0]',
-        "start = 5\ntimes = [5, 6, 60]",
-    )
-    assert start == (
-        "attitude: body axes along space axes\nangular velocity 0, 0, 0 rad/s about x, y, z\n"
-        "position 7000, 0, 0 km, velocity 0, 7500, 0 m/s in space axes"
-    )
-    assert time == "5 s to 60 s, 3 samples, at listed times"
 
 
 @pytest.fixture

@@ -9,8 +9,8 @@ from support import config
 from support import run_estimated as run_text
 
 import rigidsim
+from rigidsim import ConfigError
 from rigidsim.accuracy.error_law import motion_growth
-from rigidsim.errors import ConfigError
 from rigidsim.solve.problem import prepare
 
 

@@ -9,7 +9,7 @@ import pytest
 
 import rigidsim
 from experiments import fuzzing
-from rigidsim.errors import RigidsimError
+from rigidsim import RigidsimError
 from rigidsim.scene.scene import build_scene
 
 TEXT = """

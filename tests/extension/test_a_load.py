@@ -17,7 +17,7 @@ from killing import killed
 from support import angle_between, config, loaded, run_text, same_bits, tried
 
 import rigidsim
-from rigidsim.errors import ConfigError
+from rigidsim import ConfigError
 from rigidsim.model.kinematics import Kinematics
 from rigidsim.model.load import Load, Term
 from rigidsim.scene.fields import Moment, Rate

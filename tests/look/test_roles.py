@@ -8,8 +8,6 @@ from pathlib import Path
 import pytest
 
 import rigidsim
-from rigidsim.look.plots import DRIFTS, plan_plots
-from rigidsim.look.roles import drifts
 from rigidsim.look.thinning import thin
 from rigidsim.store.variables import parts_in
 
@@ -25,6 +23,3 @@ def test_no_residual_is_a_variable_of_its_own(
         shown = thin(dataset, 10)
         assert {"angular_velocity", "quaternion", "energy", "energy_drift"} <= set(shown)
         assert not any("_lo" in str(name) for name in shown)
-        plotted = [series.name for plot in plan_plots(shown) for series in plot.series]
-        drifting = {str(variable.name) for variable in drifts(shown).values()}
-        assert sorted(plotted) == sorted([DRIFTS, *(set(map(str, shown)) - drifting)])

@@ -4,15 +4,13 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import pytest
 import xarray
+from scipy.spatial.transform import Rotation
 
-from rigidsim.look import surroundings
-from rigidsim.look.solids import rotation_matrix
-from rigidsim.look.stages.orbits import local_frame
-from rigidsim.look.stages.parts import Picture
 from rigidsim.look.stages.registry import build_picture
 from rigidsim.look.states import charts_of, sections_of, states_of
 
@@ -29,7 +27,7 @@ def around(dataset: xarray.Dataset, *things: dict[str, object]) -> xarray.Datase
     return dataset.assign_attrs(surroundings=json.dumps(things))
 
 
-def picture(dataset: xarray.Dataset) -> Picture:
+def picture(dataset: xarray.Dataset) -> Any:
     return build_picture(dataset)[0]
 
 
@@ -118,7 +116,7 @@ def test_a_globe_without_rotation_points_where_its_axis_does(symmetric_top: Buil
         assert found.kind == "rotation of the Earth in space"
         (stage,) = found.stages
         assert stage.quaternion is not None
-        turn = rotation_matrix(stage.quaternion[:, [3, 0, 1, 2]])
+        turn = Rotation.from_quat(stage.quaternion).as_matrix()
         np.testing.assert_allclose(turn[:, :, 2], dataset["figure_axis"].values, rtol=0, atol=1e-6)  # float32
         # about its axis it keeps to the node: the first of its axes across stays level
         assert np.abs(turn[:, 2, :2]).min(axis=1).max() < 1e-6
@@ -137,9 +135,12 @@ def test_a_satellite_without_attitude_in_space_is_turned_by_roll_pitch_and_yaw(s
     dataset["roll_pitch_yaw"] = (("time", "angle"), angles)
     stage = picture(dataset).stages[0]
     assert stage.quaternion is not None
-    shown = rotation_matrix(stage.quaternion[:, [3, 0, 1, 2]].astype(float))
-    source = surroundings.kepler_path(CIRCLE, dataset["time"].values)
-    local = local_frame(-source, surroundings.orbit_normal(CIRCLE))
+    shown = Rotation.from_quat(stage.quaternion).as_matrix()
+    along = CIRCLE["mean_anomaly"] + CIRCLE["mean_motion"] * dataset["time"].values
+    plane = Rotation.from_euler("ZX", [CIRCLE["ascending_node"], CIRCLE["inclination"]])
+    down = plane.apply(np.stack([np.cos(along), np.sin(along), 0 * along], axis=1))  # where the source is
+    right = np.tile(-plane.apply([0, 0, 1]), (len(down), 1))
+    local = np.stack([np.cross(right, down), right, down], axis=2)
     relative = np.einsum("tji,tjk->tik", local, shown)
     # 3-2-1: pitch, yaw and roll from the matrix (Diebel 2006, eq. 290)
     np.testing.assert_allclose(-np.arcsin(relative[:, 2, 0]), np.deg2rad(20), atol=1e-6)
@@ -218,3 +219,14 @@ def test_point_masses_beside_the_body_are_pointed_to(symmetric_top: Build) -> No
     moon, sun = (arrows[name].vectors[0] for name in ("to the Moon", "to the Sun"))
     np.testing.assert_allclose(moon / np.linalg.norm(moon), [0, 0, 1], atol=1e-15)
     np.testing.assert_allclose(sun / np.linalg.norm(sun), [-1, 0, 0], atol=0.01)
+
+
+def test_of_a_tumbling_body_without_attitude_the_momentum_is_shown_alone(symmetric_top: Build) -> None:
+    top = symmetric_top(count=101)
+    dataset = averaged(top, "momentum", top)
+    found, _ = build_picture(dataset)
+    assert found.kind == "axes in space"
+    (stage,) = found.stages
+    assert (stage.meshes, stage.quaternion) == ([], None)
+    (arrow,) = stage.arrows
+    np.testing.assert_allclose(arrow.vectors, 1.45 * dataset["momentum_axis"].values, rtol=1e-12)

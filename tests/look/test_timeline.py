@@ -12,7 +12,6 @@ import xarray
 pytest.importorskip("rerun")
 
 import rigidsim
-from rigidsim.look.drawing import OLDER
 from rigidsim.look.recording import CHUNK, STRETCH
 from rigidsim.look.timeline import write_timeline
 
@@ -136,10 +135,6 @@ def test_trail_joins_each_row_to_the_one_before(
     # in units of the largest semi-axis of the ellipsoid of energy, sqrt(2 T / A), with A = 1
     factor = 1 / np.sqrt(np.mean(rates**2 @ [1, 1, 2]))
     np.testing.assert_allclose(strips[:, 1], rates * factor, atol=1e-6)
-    older = read_back(tmp_path / "t.rrd", "/poinsot/body/polhode/older")
-    pieces = older["LineStrips3D:strips"].reshape(-1, OLDER + 1, 3)
-    np.testing.assert_array_equal(older["step"], np.arange(0, count, OLDER))
-    np.testing.assert_array_equal(pieces[5, 1:], strips[4 * OLDER + 1 : 5 * OLDER + 1, 1])
 
 
 def test_arrows_are_in_space_axes_and_longer_than_the_body(

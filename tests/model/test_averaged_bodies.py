@@ -4,16 +4,12 @@ from __future__ import annotations
 
 import math
 
-import heyoka as hy
 import numpy as np
 import pytest
 from support import run_text
 
 import rigidsim
-from rigidsim.accuracy.models.side_by_side import side_by_side, with_bodies
-from rigidsim.errors import ConfigError
-from rigidsim.model.loads.moving_source import MovingSource
-from rigidsim.scene.config import parse
+from rigidsim import ConfigError, parse
 from rigidsim.solve.problem import prepare
 
 AU, SUN, EARTH, MOON = 149597870700.0, 1.32712440018e20, 3.986004418e14, 4.9028e12
@@ -111,30 +107,6 @@ def test_the_announced_error_covers_the_true_one(full: rigidsim.Run, averaged: r
         full.dataset.momentum_axis.values - averaged.dataset.momentum_axis.values, axis=1
     ).max()
     assert true <= found["momentum_axis"] <= 10 * true
-
-
-def test_windows_start_where_the_bodies_are(full: rigidsim.Run) -> None:
-    prepared = prepare(parse(scene("spin_averaged")))
-    system, average = prepared.system, prepared.system.formulation.average
-    assert average is not None
-    begin = 30 * DAY
-    engine = hy.taylor_adaptive(
-        system.equations, [float(x) for x in system.initial], compact_mode=True, opt_level=0
-    )
-    engine.propagate_until(math.ldexp(begin, -system.scaling.time))
-    states = [prepared.scene.context.mpf(x) for x in engine.state]
-    there = with_bodies(prepared.scene, prepared, states)
-    assert there.bodies is not None
-    found = np.array([[float(x) for x in place] for place in there.bodies.positions])
-    expected = full.dataset.point_mass_position.sel(time=begin).values
-    rounding = 2.0**-52 * AU * 8 * math.sqrt(full.summary["cost"]["steps"])
-    np.testing.assert_allclose(found, expected, rtol=0, atol=rounding)
-    assert np.abs(found - full.dataset.point_mass_position.values[0]).max() > 1e10
-    # the torques' sources are these masses, and both models agree from there on
-    assert all(load.masses is there.bodies for load in there.loads if isinstance(load, MovingSource))
-    window = side_by_side(prepared, average, begin, begin + 6 * DAY, states, lambda: True)
-    assert window is not None
-    assert window.momentum < 2 * nodding()
 
 
 # halves the spin in the time of the run

@@ -9,7 +9,7 @@ import xarray as xr
 from support import cases, config, run_text
 
 import rigidsim
-from rigidsim.errors import ConfigError
+from rigidsim import ConfigError
 from rigidsim.solve.problem import prepare
 from rigidsim.store.variables import parts_in
 

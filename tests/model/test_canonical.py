@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from support import CONFIGS, Trial, amplification, angle_between, law, run_text, tried
+from support import CONFIGS, Trial, amplification, angle_between, cases, law, run_text, tried
 
 import rigidsim
-from rigidsim.errors import ConfigError
+from rigidsim import ConfigError
 from rigidsim.scene.fields import EULER_SEQUENCES
 from rigidsim.solve.problem import prepare
 
@@ -56,7 +56,7 @@ def agree(plain: Trial, canonical: Trial, rate: float, duration: float, growth: 
         assert drift <= 50 * 2.0**-52 * np.sqrt(steps)
 
 
-@pytest.mark.parametrize("name", STABLE)
+@pytest.mark.parametrize("name", cases(STABLE, list(STABLE)[:2]))
 def test_ready_scenes_agree_with_the_quaternion(name: str) -> None:
     text = next(path for path in CONFIGS if path.stem == name).read_text()
     samples = prepare(rigidsim.parse(text)).scene.samples
@@ -72,7 +72,7 @@ def plain() -> Trial:
     return tried(TILTED, "double", "quaternion", "time.end=2")
 
 
-@pytest.mark.parametrize("sequence", EULER_SEQUENCES)
+@pytest.mark.parametrize("sequence", EULER_SEQUENCES[::4])
 def test_every_sequence(sequence: str, plain: Trial) -> None:
     given = f'integrator.euler_sequence="{sequence}"'
     canonical = tried(TILTED, "double", "canonical", given, "time.end=2")

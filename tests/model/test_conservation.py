@@ -78,8 +78,8 @@ UNCARRIED = ["free flight in uniform gravity"]
     ("precision", "formulation"),
     [
         ("double", "quaternion"),
-        ("double", "canonical"),
-        ("extended", "quaternion"),
+        pytest.param("double", "canonical", marks=pytest.mark.slow),
+        pytest.param("extended", "quaternion", marks=pytest.mark.slow),
         pytest.param("extended", "canonical", marks=pytest.mark.slow),
     ],
 )

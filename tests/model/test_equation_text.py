@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 import rigidsim
-from rigidsim.model.equation_text import equation_texts
 from rigidsim.solve.problem import prepare
 
 SCENES = ["kovalevskaya_top", "satellite_libration", "mars_precession", "earth_precession_averaged"]
@@ -23,8 +22,9 @@ def value(text: str, known: dict[str, float]) -> float:
 
 @pytest.mark.parametrize("name", SCENES)
 def test_what_is_written_is_what_is_integrated(name: str) -> None:
-    system = prepare(rigidsim.load(f"configs/{name}.toml")).system
-    shared, lines = equation_texts(system.equations)
+    experiment = rigidsim.load(f"configs/{name}.toml")
+    system, planned = prepare(experiment).system, rigidsim.plan(experiment, pilot_seconds=0.01)
+    shared, lines = planned["shared_terms"], planned["equations"]
     variables = [variable for variable, _ in system.equations]
     state, time = np.random.default_rng(7).uniform(0.2, 1.0, len(variables)), 0.7
     function = hy.cfunc([right for _, right in system.equations], variables)

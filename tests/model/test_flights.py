@@ -11,7 +11,7 @@ from flights import MU, Flight, Flights, by_scipy, direction, in_orbit, turned_b
 from support import run_estimated, run_text, unoptimised_code
 
 import rigidsim
-from rigidsim.errors import ConfigError
+from rigidsim import ConfigError
 from rigidsim.session.verdict import Soundness, verdict_on
 from rigidsim.solve.problem import prepare
 

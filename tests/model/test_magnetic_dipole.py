@@ -14,7 +14,7 @@ from scipy.optimize import brentq
 from support import angle_between, config, law, run_text
 
 import rigidsim
-from rigidsim.errors import ConfigError
+from rigidsim import ConfigError
 from rigidsim.solve.problem import prepare
 
 BODY = "principal_moments = [1, 1.5, 2]"

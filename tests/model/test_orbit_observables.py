@@ -13,7 +13,7 @@ from mpmath import mp
 from support import EPSILON, config, loaded, run_text, wide
 
 import rigidsim
-from rigidsim.errors import ConfigError
+from rigidsim import ConfigError
 from rigidsim.model.orbits.ephemeris import source_position
 
 NAMES = 'record = ["quaternion", "roll_pitch_yaw", "libration", "nadir"{}]'

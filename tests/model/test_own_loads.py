@@ -14,9 +14,7 @@ import pytest
 from equations import CLOSE, matrix
 
 import rigidsim
-from rigidsim.accuracy.error_law import motion_growth
 from rigidsim.model.loads import LoadModel
-from rigidsim.solve.problem import prepare
 
 ROOT = Path(__file__).parents[2]
 FREE = """name = "free"
@@ -68,17 +66,6 @@ def test_the_example_of_the_readme(names: dict[str, Any]) -> None:
         assert file.attrs["python_loads"] == "Magnet"
     assert run.summary["bit_for_bit"]["claim"] is False
     assert "Python" in run.summary["bit_for_bit"]["holds_for"]
-
-
-def test_the_growth_of_errors_knows_the_load(names: dict[str, Any]) -> None:
-    """Upside down in the field, at rest: unstable only because of the load."""
-    text = FREE.replace("[0.5, 0.25, 1]", "[1e-3, 0, 0]\nquaternion = [1, 0, -1, 0]")  # body z along -X
-    text = text.replace("end = 10", "end = 40")
-    pushed = motion_growth(prepare(rigidsim.parse(text), loads=[names["Magnet"]("1")]))
-    alone = motion_growth(prepare(rigidsim.parse(text)))
-    assert pushed is not None
-    assert alone is not None
-    assert pushed.factor > 10 * alone.factor
 
 
 def test_a_load_without_a_potential_does_work(tmp_path: Path) -> None:

@@ -184,7 +184,7 @@ SCENES: dict[str, tuple[str, str, str, set[str]]] = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("name", cases(SCENES, list(SCENES)[::2]))
+@pytest.mark.parametrize("name", cases(SCENES, list(SCENES)[::4]))
 def test_they_are_found_where_they_hold_and_kept(name: str) -> None:
     body, start, loads, expected = SCENES[name]
     text = config(body, start, loads, "end = 10\nsamples = 41")

@@ -77,9 +77,15 @@ def quaternion_of(node: float, inclination: float, turns: int, flip: float, head
     """Of a body whose axis ``turns`` lies along an orbit's normal, 90 digits."""
     import mpmath
 
-    from rigidsim.scene.rotations import product
-
     with mpmath.workdps(100):
+
+        def product(p: list[mpmath.mpf], q: list[mpmath.mpf]) -> list[mpmath.mpf]:
+            (a, *v), (b, *w) = p, q
+            across = [v[1] * w[2] - v[2] * w[1], v[2] * w[0] - v[0] * w[2], v[0] * w[1] - v[1] * w[0]]
+            return [
+                a * b - mpmath.fdot(v, w),
+                *(a * y + b * x + z for x, y, z in zip(v, w, across, strict=True)),
+            ]
 
         def turn(angle: mpmath.mpf, axis: int) -> list[mpmath.mpf]:
             found = [mpmath.cos(mpmath.mpf(angle) / 2)] + [mpmath.mpf(0)] * 3

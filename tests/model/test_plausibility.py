@@ -14,7 +14,7 @@ from scipy.optimize import brentq
 import rigidsim
 from experiments.coverage.families import coverage_scene
 from experiments.random_scenes import random_scene
-from rigidsim.scene.config import parse
+from rigidsim import parse
 from rigidsim.scene.scene import build_scene
 from rigidsim.scene.sweeps.sweep import Sweep
 from rigidsim.session.understood import cautions_of

@@ -14,7 +14,7 @@ import xarray
 from support import IMPATIENT, law, run_text, same_bits
 
 import rigidsim
-from rigidsim.errors import ConfigError
+from rigidsim import ConfigError
 from rigidsim.solve.problem import prepare
 
 EPS = 2.0**-52

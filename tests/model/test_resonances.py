@@ -11,9 +11,8 @@ from equations import EPS, Random, derivative, matrix
 from support import config, run_text
 
 import rigidsim
-from rigidsim.errors import ConfigError
+from rigidsim import ConfigError, parse
 from rigidsim.model.averaged import resonance
-from rigidsim.scene.config import parse
 from rigidsim.solve.problem import InitialValueProblem, prepare
 
 MOMENTS = np.array([0.998, 0.999, 1.0])

@@ -12,7 +12,7 @@ import xarray as xr
 from support import cases, config, loaded, run_text
 
 import rigidsim
-from rigidsim.errors import ConfigError
+from rigidsim import ConfigError
 from rigidsim.solve.assembly import assemble
 from rigidsim.solve.problem import prepare
 

@@ -11,7 +11,7 @@ import xarray
 from support import IMPATIENT, law, run_text, same_bits
 
 import rigidsim
-from rigidsim.errors import ConfigError
+from rigidsim import ConfigError
 from rigidsim.solve.problem import prepare
 
 AU, SUN, DAY = 149597870700.0, 1.32712440018e20, 86400.0

@@ -13,7 +13,7 @@ from support import CONFIGS, EPSILON, config, loaded, run_text, wide
 from test_orbit_observables import cross, exactly, rotation, unit
 
 import rigidsim
-from rigidsim.errors import ConfigError
+from rigidsim import ConfigError
 
 READY = {path.stem: path for path in CONFIGS}
 NAMES = ("tilt", "precession_angle", "spin_angle", "tip")

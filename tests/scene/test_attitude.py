@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 from support import run_text
 
+from rigidsim import parse
 from rigidsim.scene import attitude
 from rigidsim.scene.arithmetic import context_for
-from rigidsim.scene.config import parse
 from rigidsim.scene.fields import EULER_SEQUENCES
 from rigidsim.solve.problem import prepare
 

@@ -10,9 +10,8 @@ import heyoka
 import pytest
 from typer.testing import CliRunner
 
+from rigidsim import ConfigError, load, parse
 from rigidsim.cli.app import app
-from rigidsim.errors import ConfigError, Problem
-from rigidsim.scene.config import load, parse
 from rigidsim.solve.problem import prepare
 
 GOOD = {
@@ -352,7 +351,7 @@ def no_integrator(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(heyoka, "taylor_adaptive", reached)
 
 
-def refused(attempt: Callable[[], Any]) -> list[Problem]:
+def refused(attempt: Callable[[], Any]) -> list[Any]:
     with pytest.raises(ConfigError) as caught:
         attempt()
     return caught.value.problems

@@ -12,10 +12,9 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
+from rigidsim import parse
 from rigidsim.scene.arithmetic import context_for, cross, diagonal, dot, eigen, multiply, transpose
-from rigidsim.scene.bodies.body import RigidBody, build_body
 from rigidsim.scene.bodies.shapes import SHAPES
-from rigidsim.scene.config import parse
 from rigidsim.scene.scene import build_scene
 from rigidsim.solve.precision import precision_of
 
@@ -25,9 +24,9 @@ LAST = CONTEXT.mpf(2) ** (16 - CONTEXT.prec)  # some tens of roundings of the co
 CLOSE = 200 * np.finfo(float).eps  # sums of some hundred terms of one sign in double
 
 
-def body(table: str, context: Any = CONTEXT) -> RigidBody:
+def body(table: str) -> Any:
     text = f'name = "body"\n[body]\n{table}\n[initial]\nangular_velocity = [0, 0, 0]\n[time]\nend = 1\n'
-    return build_body(parse(text).config.body, context)
+    return build_scene(parse(f"{text}[integrator]\nprecision = {DIGITS}\n")).body
 
 
 def numbers(matrix: Any) -> np.ndarray:
@@ -180,7 +179,7 @@ def test_rod_about_its_end() -> None:
     assert rod.center_of_mass == [0, 0, number(Fraction(35, 100))]
 
 
-def square_plate() -> tuple[RigidBody, Fraction]:
+def square_plate() -> tuple[Any, Fraction]:
     plate = body('shape = "plate"\nmass = 3\nsize = [0.7, 0.7]\nreference = "corner"')
     return plate, 3 * Fraction(49, 100)
 

@@ -8,9 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from rigidsim.errors import ConfigError
+from rigidsim import ConfigError, parse
 from rigidsim.scene.arithmetic import context_for
-from rigidsim.scene.config import parse
 from rigidsim.scene.exact import ExactNumber, parse_quantity
 from rigidsim.scene.expressions.parser import parse_expression
 from rigidsim.scene.expressions.tree import (

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import rigidsim
-from rigidsim.errors import ConfigError
+from rigidsim import ConfigError
 from rigidsim.scene.scene import Scene, build_scene
 
 FAULTS = Path(__file__).parents[1] / "data" / "faults"

@@ -12,8 +12,8 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
+from rigidsim import parse
 from rigidsim.scene.arithmetic import context_for, working_bits
-from rigidsim.scene.config import parse
 from rigidsim.scene.exact import ExactNumber, parse_number
 from rigidsim.solve.precision import precision_of
 from rigidsim.solve.problem import prepare

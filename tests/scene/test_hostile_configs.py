@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 import rigidsim
-from rigidsim.errors import ConfigError
+from rigidsim import ConfigError
 from rigidsim.solve.problem import prepare
 
 BASE = """

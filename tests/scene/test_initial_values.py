@@ -9,7 +9,7 @@ import pytest
 from support import run_text
 
 import rigidsim
-from rigidsim.errors import ConfigError
+from rigidsim import ConfigError
 from rigidsim.model.loads import LoadModel
 from rigidsim.solve.problem import prepare
 

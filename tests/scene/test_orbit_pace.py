@@ -10,8 +10,7 @@ import pytest
 from support import angle_between, run_text
 
 import rigidsim.model.loads  # noqa: F401  (kinds of loads)
-from rigidsim.errors import ConfigError
-from rigidsim.scene.config import parse
+from rigidsim import ConfigError, parse
 from rigidsim.scene.orbits import KeplerOrbit
 from rigidsim.scene.scene import build_scene
 

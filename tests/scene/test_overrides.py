@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
-from rigidsim.errors import ConfigError
-from rigidsim.scene.config import load, parse, parse_earlier
-from rigidsim.scene.overrides import apply_overrides, written
-from rigidsim.scene.toml_text import parse_toml
+from rigidsim import ConfigError, load, parse
 
 BASE = """\
 name = "base"
@@ -76,34 +72,6 @@ def test_comments_and_order_stay() -> None:
     assert experiment.text == expected
 
 
-TABLES = {
-    "out of order": BASE + "[body.more]\n",
-    "inline": BASE.replace("[time]\nend = 10", "time = {end = 10, samples = 5}").replace("[body]", "[[x]]"),
-    "dotted": 'time.end = 10\nname = "a"\n[body]\nmass = 1\n',
-    "empty": "",
-    "no line end": "[time]\nend = 10",
-    "array of tables": '[[loads]]\nkind = "a"\n\n# two\n[[loads]]\nkind = "b"\n[time]\nend = 1\n',
-}
-SETTINGS = [
-    "time.end=20",
-    "time.start=-0.10",
-    "limits.max_steps=1_000",
-    "body.mass=1e-3",
-    "name=b c",
-    'x={a="b"}',
-    "time.end = 3 # s",
-    "body.mass=2 # kg",
-]
-
-
-@pytest.mark.parametrize("setting", SETTINGS)
-@pytest.mark.parametrize("case", TABLES)
-def test_a_value_is_written_into_any_layout(case: str, setting: str) -> None:
-    table = parse_toml(TABLES[case], "")
-    apply_overrides(table, [setting])
-    assert parse_toml(written(TABLES[case], [setting], table, ""), "") == table
-
-
 @pytest.mark.parametrize(
     "text",
     [
@@ -120,16 +88,6 @@ def test_no_comment_is_executed(text: str, tmp_path: Path) -> None:
         assert experiment.config.time.end is not None
         assert experiment.config.time.end.rational == 10
         assert "#:set time.end=20" in experiment.text
-
-
-@pytest.mark.parametrize("case", EDITS)
-def test_what_earlier_versions_wrote_keeps_its_meaning(case: str) -> None:
-    override, _ = EDITS[case]
-    earlier = f"{BASE}#:set description=x\n#:set {override.strip()}\n"
-    expected = parse(BASE, overrides=["description=x", override])
-    assert parse_earlier(earlier, source="") == replace(expected, source="")
-    inside = BASE.replace('"base"', '"base"\ndescription = """\n#:set time.end=20\n"""')
-    assert parse_earlier(inside, source="").config.time.end.rational == 10
 
 
 def test_later_overrides_win_also_over_those_in_the_file(tmp_path: Path) -> None:

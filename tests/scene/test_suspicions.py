@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from rigidsim.scene.config import parse
+from rigidsim import parse
 from rigidsim.scene.scene import build_scene
-from rigidsim.scene.suspicions import suspicious_angles, suspicious_end
 from rigidsim.session.understood import cautions_of
 
 CONFIG = """
@@ -27,7 +26,7 @@ end = 1
 
 def found(angles: str = "[0, 1, 0]", inclination: str = "1", anomaly: str = "0") -> list[str]:
     text = CONFIG.format(angles=angles, inclination=inclination, anomaly=anomaly)
-    return [str(problem) for problem in suspicious_angles(parse(text).config)]
+    return [caution.text for caution in cautions_of(build_scene(parse(text)))]
 
 
 @pytest.mark.parametrize(
@@ -86,13 +85,11 @@ time.end = "1 day"
 )
 def test_an_end_meant_in_the_unit_of_times_is_pointed_out(time: str, said: str) -> None:
     text = CONFIG.format(angles="[0, 1, 0]", inclination="1", anomaly="0").replace("end = 1", time)
-    experiment = parse(text)
-    problems = [str(problem) for problem in suspicious_end(experiment.config)]
+    problems = [caution.text for caution in cautions_of(build_scene(parse(text)))]
     assert len(problems) == bool(said)
     assert all(
         problem.startswith("[time] end: given 30 without a unit") and said in problem for problem in problems
     )
-    assert [caution.text for caution in cautions_of(build_scene(experiment))] == problems
 
 
 @pytest.mark.parametrize(

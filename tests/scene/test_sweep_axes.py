@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from decimal import Decimal
 from fractions import Fraction
 from math import sqrt
 
@@ -10,13 +9,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rigidsim.errors import ConfigError
+from rigidsim import ConfigError, parse
 from rigidsim.scene.exact import decimal_text
-from rigidsim.scene.sweep_table import AxisTable
 from rigidsim.scene.sweeps.sweep import Sweep
-from rigidsim.scene.sweeps.values import axis_values
-from rigidsim.scene.sweeps.written import nearest_double
-from rigidsim.workflows.read import parse
 
 BASE = """\
 name = "box"
@@ -61,19 +56,14 @@ def test_a_linspace_is_exact_and_a_member_has_its_values() -> None:
 
 
 WAYS = {
-    "step": {"step": [Decimal("0.1"), Decimal("0.003"), None]},
-    "uniform": {"uniform": [-1, 1], "count": None},
-    "normal": {"normal": [0, Decimal("0.1")], "count": None},
+    "step": "step = [0.1, 0.003, {count}]",
+    "uniform": "uniform = [-1, 1], count = {count}",
+    "normal": "normal = [0, 0.1], count = {count}",
 }
 
 
-def axis(way: str, count: int, seed: int = 0) -> list[str]:
-    table = {
-        key: count if value is None else [count if x is None else x for x in value]
-        for key, value in WAYS[way].items()
-    }
-    found = axis_values(AxisTable.model_validate(table), "initial.angular_velocity[2]", seed, 0)
-    return [found.text(index) for index in range(found.count)]
+def axis(way: str, count: int, seed: int = 0) -> list[tuple[str, ...]]:
+    return values(swept(f"seed = {seed}\n{RATE} = {{{WAYS[way].format(count=count)}}}"))
 
 
 @settings(max_examples=30, deadline=None)
@@ -96,7 +86,7 @@ def test_draws_have_the_distribution_asked_for() -> None:
     count = 2000
     table = f'mode = "zip"\n{RATE} = {{normal = [2, 0.5], count = {count}}}\n'
     table += f'axes."time.end" = {{uniform = [3, 5], count = {count}}}'
-    normal, uniform = ([nearest_double(x) for x in column] for column in swept(table).exact(range(count)))
+    normal, uniform = ([float(x) for x in column] for column in swept(table).exact(range(count)))
     for found, mean, deviation in ((normal, 2, 0.5), (uniform, 4, sqrt(4 / 12))):
         average = sum(found) / count
         spread = sqrt(sum((x - average) ** 2 for x in found) / (count - 1))
@@ -118,8 +108,8 @@ def test_directions_lie_on_the_sphere_and_cover_it() -> None:
             square = sum(x.rational**2 for x in point)
             assert abs(square - 4) < Fraction(1, 10**37)
         for axis in range(3):  # mean 0, mean square a third
-            assert abs(sum(nearest_double(p[axis]) for p in points)) / count < 5 * 2 / sqrt(3 * count)
-            assert abs(sum(nearest_double(p[axis]) ** 2 for p in points) / count - 4 / 3) < 0.2
+            assert abs(sum(float(p[axis]) for p in points)) / count < 5 * 2 / sqrt(3 * count)
+            assert abs(sum(float(p[axis]) ** 2 for p in points) / count - 4 / 3) < 0.2
     assert len(set(values(swept(table % "grid = [20, 30]")))) == 600
     unit = swept('axes."initial.quaternion" = {sphere = 1, count = 3}')
     assert len(unit.columns) == 4

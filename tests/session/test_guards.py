@@ -14,7 +14,6 @@ from support import cases, config, loaded, run_text, same_bits
 import rigidsim
 from rigidsim.session.session import Tuning
 from rigidsim.solve.assembly import Assembly, assemble, sampler
-from rigidsim.solve.checkpoint import Position
 from rigidsim.solve.evaluate import Evaluator
 from rigidsim.solve.problem import InitialValueProblem, prepare
 from rigidsim.solve.sample_block import SampleBlock
@@ -247,7 +246,7 @@ def test_a_plunge_ends_at_the_same_step_however_it_is_driven() -> None:
     assert steps < 1000
     assert samples == int(when * 10) + 1
     parts.corrected.back_to(begin)
-    position: Position | None = None
+    position: Any = None
     most = 0
     while not most or progress.status is Status.MAX_STEPS:  # nor in how many sessions
         most += 50

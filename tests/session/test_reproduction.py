@@ -48,7 +48,7 @@ def run(text: str, out: Path) -> xarray.Dataset:
         return dataset.load()
 
 
-@pytest.mark.parametrize("setting", cases(RUNS, [RUNS[0], RUNS[1], RUNS[2], RUNS[3], RUNS[5]]), ids="-".join)
+@pytest.mark.parametrize("setting", cases(RUNS, [RUNS[0], RUNS[5]]), ids="-".join)
 def test_twice_the_same_config(
     setting: tuple[str, str], tmp_path: Path, free_body: Callable[..., str]
 ) -> None:
@@ -105,7 +105,7 @@ def driven(text: str, pacing: Pacing, stride: int) -> dict[str, np.ndarray]:
 @pytest.mark.parametrize(
     ("formulation", "grid"),
     [
-        *(("quaternion", grid) for grid in GRIDS),
+        *(("quaternion", grid) for grid in list(GRIDS)[:2]),
         ("euler_angles", "a sample per step"),
         ("euler_angles", "sparse"),
     ],
@@ -147,12 +147,8 @@ def test_the_sample_grid_does_not_change_the_motion(tmp_path: Path, free_body: C
     ("precision", "formulation", "grid"),
     [
         ('"single"', "quaternion", "dense"),
-        ('"double"', "rates", "dense"),
-        ('"double"', "quaternion", "dense"),
-        ('"double"', "quaternion", "sparse"),
         ('"double"', "quaternion", "uneven"),
         ('"double"', "rotation_matrix", "a sample per step"),
-        ('"extended"', "quaternion", "uneven"),
         ('"quadruple"', "quaternion", "sparse"),
         pytest.param("30", "rotation_matrix", "a sample per step", marks=pytest.mark.slow),
     ],

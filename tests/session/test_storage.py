@@ -9,7 +9,7 @@ import pytest
 from support import config, run_text
 
 import rigidsim
-from rigidsim.errors import RunFolderError
+from rigidsim import RunFolderError
 from rigidsim.session.storage import storage
 from rigidsim.solve.problem import prepare
 

@@ -9,7 +9,7 @@ import pytest
 from support import EPSILON, angle_between, config, run_text
 
 import rigidsim
-from rigidsim.errors import ConfigError
+from rigidsim import ConfigError
 from rigidsim.scene.scene import build_scene
 from rigidsim.session.understood import cautions_of
 from rigidsim.solve.problem import prepare

@@ -74,7 +74,7 @@ def test_a_hundred_random_bodies_agree_with_an_integration_in_forty_digits(seed:
     assert against_integration(scene_over(SPAN, **random_scene(seed), precision=40)) <= 1e-36
 
 
-@pytest.mark.parametrize("name", LIMITS)
+@pytest.mark.parametrize("name", cases(LIMITS, list(LIMITS)[::3]))
 def test_limits_agree_with_an_integration_in_forty_digits(name: str) -> None:
     assert against_integration(scene_over(SPAN, **EXTREMES[name], precision=40)) <= 1e-36
 

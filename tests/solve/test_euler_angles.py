@@ -51,26 +51,6 @@ def test_angles_grow_through_full_turns_without_a_jump() -> None:
     assert (np.einsum("ij,ij->i", q[1:], q[:-1]) > 0.9).all()
 
 
-@pytest.mark.slow
-def test_wrapping_keeps_the_accuracy_that_growing_angles_lose(monkeypatch: pytest.MonkeyPatch) -> None:
-    """heyoka's step control is relative to the largest component: unwrapped angles loosen it."""
-    from rigidsim.solve.effects.angle_wrapping import AngleWrapping
-
-    setting = ['integrator.formulation="euler_angles"', "time.end=20000", "time.samples=101"]
-    wrapped = run_text(FREE, 'name="w"', *setting)
-    with monkeypatch.context() as patch:
-        patch.setattr(AngleWrapping, "wrap", lambda self, state: None)
-        growing = run_text(FREE, 'name="g"', *setting)
-    assert growing.summary["cost"]["steps"] < 0.8 * wrapped.summary["cost"]["steps"]
-    exact = run_text(FREE, 'name="x"', "time.end=20000", "time.samples=101")
-    reference = exact.dataset["quaternion"].values
-
-    def error(run) -> float:
-        return float(angle_between(run.dataset["quaternion"].values, reference).max())
-
-    assert error(wrapped) < 0.1 * error(growing)
-
-
 @pytest.mark.parametrize("distance", ["1e-4", "1e-12", "0"])
 def test_starting_close_to_the_singularity_costs_no_digits(distance: str) -> None:
     """Theta of a wobbling top nearly reaches zero: another chart carries it, without a warning."""

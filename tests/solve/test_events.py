@@ -14,8 +14,8 @@ from rich.console import Console
 from support import EPSILON, amplification, angle_between, cases, config, law, run_text, wide
 
 import rigidsim
+from rigidsim import ConfigError
 from rigidsim.cli.screens.summary import print_summary
-from rigidsim.errors import ConfigError
 from rigidsim.session.session import Tuning
 from rigidsim.solve.sampler import Pacing
 from rigidsim.solve.solvers.taylor.ways import Ways

@@ -12,7 +12,7 @@ import pytest
 from support import IMPATIENT, angle_between, bits, cases, config, law, run_text, same_bits
 
 import rigidsim
-from rigidsim.errors import RunFolderError
+from rigidsim import RunFolderError
 from rigidsim.model.kinematics import Kinematics
 from rigidsim.model.load import Load, Term
 from rigidsim.scene.sweeps.sweep import Sweep

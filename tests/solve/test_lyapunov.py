@@ -5,10 +5,8 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
-import heyoka as hy
 import numpy as np
 import pytest
-from equations import prepared
 from support import run_text, same_bits
 
 import rigidsim
@@ -189,48 +187,3 @@ def test_what_is_carried_beside_the_motion_adds_no_exponents() -> None:
     # steps that fall elsewhere leave rounding of 1e-16 a step; over 300 s offsets of a regular motion grow by
     # some hundreds
     assert found[1]["exponents"] == pytest.approx(found[0]["exponents"], abs=1e-9)
-
-
-ECCENTRIC = "gravitational_parameter = 1\norbit = {semi_major_axis = 2, eccentricity = 0.1}"
-FALLING = "principal_moments = [1, 2, 3]\nmass = 1"
-TOP = "principal_moments = [1, 1, 2]\nmass = 1\ncenter_of_mass = [0, 0, 0.2]"
-SPIN = "angular_velocity = [0.5, 0.25, 1]"
-# body, initial, load, recorded; states of the motion, and those beside them
-SYSTEMS = {
-    "free": (FALLING, SPIN, "", '["quaternion"]', BODY, []),
-    "free, rates": (FALLING, SPIN, "", '["angular_velocity"]', BODY[:3], []),
-    "top, rates": (TOP, SPIN, 'kind = "uniform_gravity"', '["angular_velocity"]',
-                   [*BODY[:3], "gx", "gy", "gz"], []),
-    "thrown": (FALLING, f"{SPIN}\nposition = [0, 0, 0]\nvelocity = [1, 0, 0]", 'kind = "uniform_gravity"',
-               '["quaternion", "position"]', [*BODY, "x", "y", "z", "vx", "vy", "vz"], []),
-    "orbit": (FALLING, SPIN, f'kind = "gravity_gradient"\n{ECCENTRIC}', '["quaternion"]', BODY,
-              ["cos_anomaly1", "sin_anomaly1", "work"]),
-    "damped": (FALLING, SPIN, 'kind = "viscous_torque"\ncoefficients = [1, 1, 1]', '["quaternion", "energy"]',
-               BODY, ["work"]),
-}  # fmt: skip
-
-
-@pytest.mark.parametrize("case", ["orbit", "damped", "free"])
-def test_tangents_are_the_derivatives_of_the_flow(case: str) -> None:
-    body, initial, load, record, *_ = SYSTEMS[case]
-    system = prepared(body, initial, load, record).system
-    moving = lyapunov.motion_states(system)
-    states, count, end, step = len(system.states), len(moving), 3.0, 2.0**-13
-    start = np.array([float(x) for x in system.initial])
-
-    def arrival(state: np.ndarray) -> np.ndarray:
-        plain = hy.taylor_adaptive(system.equations, list(state), compact_mode=True)
-        plain.propagate_until(end)
-        return np.array(plain.state[moving])
-
-    equations = lyapunov.tangent_equations(system, moving)
-    both = hy.taylor_adaptive(equations, [*start, *np.eye(count).ravel()], compact_mode=True)
-    both.propagate_until(end)
-    tangents = both.state[states:].reshape(count, count)
-    for column, place in enumerate(moving):
-        offset = np.zeros(states)
-        offset[place] = step
-        slope = (arrival(start + offset) - arrival(start - offset)) / (2 * step)
-        # central differences: step^2 times third derivatives, which offsets of an order-one motion over three
-        # units of time make some tens, and rounding of 1e-15 over 2 steps
-        assert tangents[:, column] == pytest.approx(slope, abs=100 * step**2)

@@ -97,8 +97,8 @@ def test_times_that_matter_to_no_digit_move_no_bit() -> None:
     """An early or wide change needs no second number of the time."""
     for torque, states in (("exp(-((t - 5)/2)^2)", False), ("tanh((t - 500)/0.1)", True)):
         text = LATE.format(spin=1, torque=torque, end=1000, precision="double")
+        from rigidsim import parse
         from rigidsim.solve.problem import prepare
-        from rigidsim.workflows.read import parse
 
         assert prepare(parse(text)).system.clocked is states
 

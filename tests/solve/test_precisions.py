@@ -51,7 +51,7 @@ def summed(dataset: xarray.Dataset, name: str) -> list[list]:
         ("quadruple", 34, 113),
         (25, 25, 86),
         (50, 50, 169),
-        (100, 100, 335),
+        pytest.param(100, 100, 335, marks=pytest.mark.slow),
     ],
 )
 def test_rates_have_the_digits_of_the_precision(precision: str | int, digits: int, bits: int) -> None:

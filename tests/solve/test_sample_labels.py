@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from fractions import Fraction
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,7 +13,6 @@ from support import run_text
 
 import rigidsim
 from rigidsim.solve.problem import prepare
-from rigidsim.solve.sampling import SampleClock
 
 SPIN = """
 name = "spin"
@@ -26,12 +26,12 @@ angular_velocity = [0.5, 0.25, 1]
 PRECISIONS = {"single": 24, "double": 53, "extended": 64, "quadruple": 113, "50": 169}
 
 
-def clock_of(text: str, precision: str) -> SampleClock:
+def clock_of(text: str, precision: str) -> Any:
     asked = precision if precision.isdigit() else f'"{precision}"'
     return prepare(rigidsim.parse(SPIN + text + f"\n[integrator]\nprecision = {asked}")).clock
 
 
-def check(clock: SampleClock, wanted: list[Fraction], first: int, bits: int) -> None:
+def check(clock: Any, wanted: list[Fraction], first: int, bits: int) -> None:
     """Labels are doubles nearest to the times, and with their residuals numbers nearest in the precision."""
     times = clock.internal(first, first + len(wanted))
     parts = clock.parts(first, times)

@@ -7,7 +7,7 @@ import pytest
 from support import run_text
 
 import rigidsim
-from rigidsim.errors import ConfigError
+from rigidsim import ConfigError
 from rigidsim.solve.problem import prepare
 
 SPIN = """

@@ -26,11 +26,9 @@ TUMBLING = {
     "integrator",
     [
         'formulation = "quaternion"',
-        'formulation = "rotation_matrix"',
         'formulation = "euler_angles"',
         'method = "closed_form"',
         'precision = "single"',
-        'precision = "extended"',
     ],
 )
 def test_a_body_turns_ten_thousand_radians_between_two_samples(integrator: str) -> None:

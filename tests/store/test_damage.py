@@ -9,10 +9,10 @@ from pathlib import Path
 
 import h5py
 import pytest
-from support import same_bits
+from support import cases, same_bits
 
 import rigidsim
-from rigidsim.errors import RunFolderError
+from rigidsim import RunFolderError
 from rigidsim.session.session import Tuning
 from rigidsim.solve.sampler import Pacing
 from rigidsim.solve.solvers.taylor.ways import Ways
@@ -106,7 +106,7 @@ SAYS = {
 }
 
 
-@pytest.mark.parametrize("kind", DAMAGES)
+@pytest.mark.parametrize("kind", cases(DAMAGES, list(DAMAGES)[::2]))
 def test_a_damaged_segment(kind: str, originals: dict[str, rigidsim.Run], tmp_path: Path) -> None:
     folder = shutil.copytree(originals["begun"].folder.path, tmp_path / "d")
     damage: Callable[[Path, Path], None] = DAMAGES[kind]

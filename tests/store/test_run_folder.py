@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import rigidsim
-from rigidsim.errors import RunFolderError
+from rigidsim import RunFolderError
 
 
 @pytest.fixture

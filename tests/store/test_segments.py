@@ -15,7 +15,7 @@ import xarray
 from support import cases, same_bits
 
 import rigidsim
-from rigidsim.errors import RunFolderError
+from rigidsim import RunFolderError
 from rigidsim.session.session import Tuning
 from rigidsim.solve.sampler import Pacing
 from rigidsim.store import netcdf

@@ -11,8 +11,7 @@ from typing import Any
 import pytest
 
 import rigidsim
-from rigidsim.errors import RunFolderError
-from rigidsim.store.attributes import Use, read_attributes
+from rigidsim import RunFolderError
 from rigidsim.store.summary import Brief, read_summary
 
 # hundreds of turns between samples, of a quaternion that matrices don't carry: a warning is certain
@@ -75,27 +74,3 @@ def test_a_run_under_way_says_no_more_than_that(tmp_path: Path) -> None:
     assert type(found) is Brief
     assert found.dataset_digest is None
     assert found.as_dict() == {"status": "running"}
-
-
-def test_the_summary_repeats_attributes_of_the_dataset(run: rigidsim.Run) -> None:
-    attributes = read_attributes(run.folder.dataset)
-    assert run.summary["provenance"] == attributes.of_use(Use.REPEATED)
-    assert attributes.warnings == "\n".join(run.summary["warnings"])
-    assert attributes.steps == run.summary["cost"]["steps"]
-    other = attributes.having(tolerance=1e-9, version_numpy="1.0", title="another", method=None)
-    system = [("tolerance", attributes.tolerance, 1e-9), ("method", "taylor", None)]
-    assert list(attributes.changed(Use.SYSTEM, other)) == system
-    assert list(other.changed(Use.SYSTEM, attributes)) == [("tolerance", 1e-9, attributes.tolerance)]
-    assert list(attributes.changed(Use.PLATFORM, other)) == [
-        ("version_numpy", attributes.version_numpy, "1.0")
-    ]
-
-
-def test_a_file_that_is_no_dataset_is_named(tmp_path: Path) -> None:
-    import h5py
-
-    path = tmp_path / "dataset.h5"
-    with h5py.File(path, "w") as file:
-        file["time"] = [0.0]
-    with pytest.raises(RunFolderError, match=r"no dataset of rigidsim \(attribute 'title'"):
-        read_attributes(path)

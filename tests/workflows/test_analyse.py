@@ -15,9 +15,9 @@ from typer.testing import CliRunner
 
 import rigidsim
 from experiments.spectral_lines import Case, free
+from rigidsim import RigidsimError
 from rigidsim.analysis.result import Analysis
 from rigidsim.cli.app import app
-from rigidsim.errors import RigidsimError
 
 MOMENTS, RATES = ["3", "2", "1"], ["0.3", "0.2", "1"]
 

@@ -9,8 +9,8 @@ import pytest
 from support import config, run_text
 
 import rigidsim
+from rigidsim import ConfigError
 from rigidsim.accuracy.models.level import choose_level
-from rigidsim.errors import ConfigError
 from rigidsim.session.session import AdviceLimits, Tuning
 
 FLATTENING, SPIN, ECCENTRICITY = 0.02, 60.0, 0.2

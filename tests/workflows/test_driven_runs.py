@@ -9,7 +9,7 @@ import pytest
 from support import config, run_text
 
 import rigidsim
-from rigidsim.errors import ConfigError
+from rigidsim import ConfigError
 from rigidsim.solve.problem import prepare
 
 EPS = np.finfo(float).eps
@@ -107,3 +107,13 @@ def test_plan_says_which_states_there_are_and_why() -> None:
     states = {entry["states"]: entry["why"] for entry in planned["reasons"]}
     assert list(states) == ["sx sy sz", "axial transverse"]
     assert "viscous_torque" in states["axial transverse"]
+
+
+@pytest.mark.parametrize(
+    "loads", [viscous(4e-4), 'kind = "torque"\ncomponents = ["0", "0", "8e-4*wz"]\nframe = "body"']
+)
+def test_steps_are_forecast_as_torques_change_the_rotation(loads: str) -> None:
+    """From the beginning alone they would be half as many again, or 2/3."""
+    given = text("full", loads, 2500.0)
+    planned = rigidsim.plan(rigidsim.parse(given), pilot_seconds=0.01)["predicted"]["steps"]
+    assert planned == pytest.approx(run_text(given).summary["cost"]["steps"], rel=0.1)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import html
 import re
 import subprocess
 import sys
@@ -17,8 +18,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import rigidsim
+from rigidsim import Experiment
 from rigidsim.model.loads import Load
-from rigidsim.scene.config import Experiment
 
 TOP: dict[str, Any] = {
     "name": "top",
@@ -207,3 +208,15 @@ def test_a_run_in_memory_can_be_looked_at(monkeypatch: pytest.MonkeyPatch) -> No
     monkeypatch.setattr("rigidsim.look.viewer.open_viewer", viewer)
     assert rigidsim.run(TOP, out=None).view(web=True) == 0
     assert not seen[0].exists()
+
+
+def test_what_a_notebook_shows() -> None:
+    run = rigidsim.run({**TOP, "name": "a", "description": "<b>"}, out=None)
+    assert repr(run) == "<Run 'a' (memory): finished>"
+    shown = run._repr_html_()
+    assert "angular_momentum" in shown
+    assert "estimated error" in shown
+    experiment = Experiment.from_dict({**TOP, "description": "<b>"})
+    assert repr(experiment) == "<Experiment 'top' (config): no load, to t = 4 s, double>"
+    assert html.escape("<b>") in experiment._repr_html_()
+    assert '<b>"' not in experiment._repr_html_()

@@ -10,7 +10,7 @@ import pytest
 from support import IMPATIENT, config, loaded, same_bits
 
 import rigidsim
-from rigidsim.errors import RunFolderError
+from rigidsim import RunFolderError
 from rigidsim.store import seal
 from rigidsim.workflows.verify import embedded
 

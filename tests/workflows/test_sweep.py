@@ -22,17 +22,15 @@ import pytest
 from typer.testing import CliRunner
 
 import rigidsim
+from rigidsim import ConfigError, RunFolderError, open_sweep, parse
+from rigidsim import sweep as run_sweep
 from rigidsim.cli.app import app
-from rigidsim.errors import ConfigError, RunFolderError
 from rigidsim.look.figures.sweep_maps import drawable, sweep_figure
 from rigidsim.solve.batch.lanes import recommended_width
 from rigidsim.store.seal import seal
 from rigidsim.store.sweeps.folder import SweepFolder
-from rigidsim.store.sweeps.run import open_sweep
-from rigidsim.workflows.read import parse
 from rigidsim.workflows.sweeps.members import batches_of, run_members, sweep_of
 from rigidsim.workflows.sweeps.sweep import resume_sweep
-from rigidsim.workflows.sweeps.sweep import sweep as run_sweep
 from rigidsim.workflows.sweeps.verify import verify_sweep
 from rigidsim.workflows.sweeps.workers import Workers
 

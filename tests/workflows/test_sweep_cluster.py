@@ -15,12 +15,12 @@ import numpy as np
 import pytest
 from support import config
 
-from rigidsim.errors import RigidsimError, StoppedError
+from rigidsim import RigidsimError, parse, sweep
+from rigidsim.errors import StoppedError
 from rigidsim.scene.sweeps.sweep import Sweep
 from rigidsim.store.sweeps.folder import SweepFolder
-from rigidsim.workflows.read import parse
 from rigidsim.workflows.sweeps.cluster import Cluster
-from rigidsim.workflows.sweeps.sweep import SweepObserver, run_sweep, sweep
+from rigidsim.workflows.sweeps.sweep import SweepObserver, run_sweep
 
 distributed = pytest.importorskip("distributed")
 

@@ -12,13 +12,9 @@ import xarray
 from support import config
 from typer.testing import CliRunner, Result
 
-import rigidsim
+from rigidsim import SavedSweep, parse
+from rigidsim import sweep as run_sweep
 from rigidsim.cli.app import app
-from rigidsim.errors import RunFolderError
-from rigidsim.store.sweeps.run import SavedSweep
-from rigidsim.workflows.export import export
-from rigidsim.workflows.read import parse
-from rigidsim.workflows.sweeps.sweep import sweep as run_sweep
 
 CONFIG = config(
     initial="angular_velocity = [0.1, 1, 0.05]",
@@ -194,11 +190,3 @@ def test_what_makes_no_sense_is_refused(box: SavedSweep, tmp_path: Path) -> None
     assert list(tmp_path.iterdir()) == []
     written(box, "csv", tmp_path)
     assert "--force replaces it" in exported(box, "csv", tmp_path).output
-
-
-def test_an_unfinished_sweep_is_not_exported(box: SavedSweep, tmp_path: Path) -> None:
-    begun = SavedSweep(box.folder, {**box.summary, "status": "interrupted"})
-    with pytest.raises(RunFolderError, match=r"is interrupted; .* completes it"):
-        export(begun, "csv", tmp_path / "out.csv")
-    assert list(tmp_path.iterdir()) == []
-    assert rigidsim.open_sweep(box.place).finished

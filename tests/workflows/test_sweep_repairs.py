@@ -11,12 +11,10 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+from rigidsim import ConfigError, RunFolderError, SavedSweep, open_sweep, parse
+from rigidsim import sweep as run_sweep
 from rigidsim.cli.app import app
-from rigidsim.errors import ConfigError, RunFolderError
-from rigidsim.store.sweeps.run import SavedSweep, open_sweep
-from rigidsim.workflows.read import parse
 from rigidsim.workflows.sweeps.sweep import SweepObserver, resume_sweep
-from rigidsim.workflows.sweeps.sweep import sweep as run_sweep
 
 CONFIG = """\
 name = "box"

@@ -8,8 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from support import config
 
-from rigidsim.errors import ConfigError
-from rigidsim.scene.config import parse
+from rigidsim import ConfigError, parse
 from rigidsim.scene.sweeps.sweep import Sweep
 from rigidsim.solve.batch.family import Alone, Families, batchable
 from rigidsim.solve.batch.members import Members
