@@ -146,7 +146,7 @@ class Analysis:
 
     def figure(self) -> Figure:
         """Spectra with their lines marked and named, as a matplotlib figure."""
-        from rigidsim.look.spectrum import spectrum_figure
+        from rigidsim.look.figures.spectrum import spectrum_figure
 
         return spectrum_figure(self.dataset)
 

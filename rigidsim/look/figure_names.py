@@ -4,7 +4,7 @@ OVERVIEW = "overview"
 """The page that suits the scene."""
 
 SPECTRUM = "spectrum"
-"""Figure of a run's analysis: ``rigidsim.look.spectrum``."""
+"""Figure of a run's analysis: ``rigidsim.look.figures.spectrum``."""
 
 FIGURES: dict[str, str] = {
     OVERVIEW: "the page that suits the scene: its leading figures, drifts and a table (the default)",

@@ -23,6 +23,7 @@ NEAR_AXIS = 0.35
 """Largest polar motion (rad) shown as such; beyond it, the body tumbles."""
 _ALIKE = 1e-9  # moments nearer than this are one
 _STEADY = 1e-6  # a momentum that turns by less is fixed
+_SPREAD = 1e-5  # of the energy, up to which it counts as constant: more than rounding in single precision
 
 
 def values(dataset: Table, name: str) -> Array | None:
@@ -139,6 +140,20 @@ def figure_index(found: Array) -> int:
     return int(found.argmax())
 
 
+def energy_and_momentum(dataset: Table) -> tuple[Array, float, float] | None:
+    """Moments, twice the energy and the squared momentum of a free body; None where these aren't constant."""
+    found, rates = moments(dataset), principal_rates(dataset)
+    if found is None or rates is None:
+        return None
+    rates = finite_rows(rates)
+    twice, square = rates**2 @ found, rates**2 @ found**2
+    for table in (twice, square):
+        # loads, or axes that aren't the principal ones, change them
+        if not len(table) or table.min() <= 0 or table.max() > (1 + _SPREAD) * table.min():
+            return None
+    return found, float(twice.mean()), float(square.mean())
+
+
 def body_direction(dataset: Table, direction: Array) -> Array | None:
     """A body-fixed direction along time, (rows, 3), space axes."""
     quaternion = values(dataset, "quaternion")
@@ -195,6 +210,27 @@ def orientation(dataset: Table, axis: str) -> tuple[Array, Array] | None:
     finite = np.isfinite(longitude)
     longitude[finite] = np.unwrap(longitude[finite])
     return tilt, longitude
+
+
+def is_top(dataset: Table) -> bool:
+    """Whether the scene is a body on a fixed point under uniform gravity, or a top's angles are recorded."""
+    if "position" in dataset:
+        return False
+    on_point = "uniform_gravity" in load_kinds(dataset) and pole(dataset, "figure") is not None
+    return on_point or values(dataset, "tip") is not None
+
+
+def across(axis: Array) -> tuple[Array, Array]:
+    """Two unit vectors (3,) that complete a unit vector to a right-handed frame."""
+    first = np.cross(np.eye(3)[np.abs(axis).argmin()], axis)
+    first /= np.linalg.norm(first)
+    return first, np.cross(axis, first)
+
+
+def angle_between(directions: Array, others: Array) -> Array:
+    """Angles (rows,), rad, between directions (rows, 3) and others (rows, 3) or another (3,)."""
+    cosine = directions @ others if others.ndim == 1 else np.einsum("ti,ti->t", directions, others)
+    return np.asarray(np.arctan2(np.linalg.norm(np.cross(directions, others), axis=1), cosine))
 
 
 def load_kinds(dataset: Table) -> list[str]:

@@ -102,7 +102,7 @@ def save(analysis: Analysis, out: Path, figure: Path | None = None) -> Saved:
     Args:
         figure: PNG or SVG file; by default beside ``out``.
     """
-    from rigidsim.look.spectrum import save_spectrum
+    from rigidsim.look.figures.spectrum import save_spectrum
 
     drawn = figure or out.with_suffix(".png")
     if out.suffix.lower() in FIGURES:

@@ -158,7 +158,7 @@ def with_models(dataset: xarray.Dataset, experiment: Experiment) -> xarray.Datas
 
 def save(dataset: xarray.Dataset, folder: Path) -> None:
     """Write dataset and figure, each of which appears only when complete."""
-    from rigidsim.look.work_precision import save_work_precision
+    from rigidsim.look.figures.work_precision import save_work_precision
     from rigidsim.store import atomic
 
     try:

@@ -33,7 +33,7 @@ def plot(
 ) -> None:
     """Draw the page that suits the scene, or the figures named; of a sweep a variable over its axes."""
     from rigidsim.look.figures import available, check_name, figure_format, save_figure
-    from rigidsim.look.spectrum import save_spectrum
+    from rigidsim.look.figures.spectrum import save_spectrum
     from rigidsim.store import atomic
     from rigidsim.store.run import open_run
     from rigidsim.store.sweeps.folder import is_sweep
@@ -78,7 +78,7 @@ def plot(
 
 def _plot_sweep(run_path: Path, what: list[str] | None, out: Path | None) -> None:
     """Variables of a sweep over its axes."""
-    from rigidsim.look.figures.saving import figure_format
+    from rigidsim.look.figures import figure_format
     from rigidsim.look.figures.sweep_maps import drawable, save_sweep_figure
     from rigidsim.store import atomic
     from rigidsim.store.sweeps.run import open_sweep

@@ -1,29 +1,31 @@
 """Figures of a recorded run: from a Dataset to a matplotlib figure, or a file.
 
-Importing this package loads no matplotlib; drawing does.
+Importing this package loads matplotlib, so import it only where a figure is drawn; ``look.figure_names``
+has the names of all figures without it. A figure is an entry of ``catalogue.KINDS``: what it needs, and its
+panels (``panel.Panel``: what it finds in a dataset, and how that is drawn).
 
 | module | holds |
 | --- | --- |
-| `catalogue` | all figures by name, `figure`, and `overview`, the page that suits the scene |
-| `rigidsim.look.figure_names` | their names, and what each shows in one line |
-| `saving` | `save_figure`: to PNG or SVG |
-| `composing` | panels to a page |
-| `timelines` | panels over time |
-| `poles` | panels of where axes point: polar motion, pole path, nutation, tip, libration |
-| `polhode` | polhode, herpolhode, Poinsot's motion |
-| `flight` | the path of the centre of mass |
-| `drift` | drifts against what rounding explains |
+| `catalogue` | all figures by name; `figure`, `save_figure`, and the page that suits the scene |
+| `panel`, `composing` | what a panel is, and panels composed to a page |
+| `timelines`, `drift` | panels over time |
+| `poles`, `polhode`, `flight` | where axes point; polhode, herpolhode, Poinsot's motion; a body's path |
 | `eye` | bodies in three dimensions on plain axes |
 | `fits` | secular parts, periods and ellipses for labels |
-| `scales` | units in which axes read well |
-| `style` | colours, fonts, the page's heading, keys |
+| `scales`, `style` | units in which axes read well; colours, fonts, the page's heading, keys |
+| `spectrum`, `work_precision`, `sweep_maps`, `sweep_axes` | figures of `analyse`, `tradeoff` and `sweep` |
 """
 
 from rigidsim.look.figure_names import FIGURES, OVERVIEW
-from rigidsim.look.figures.catalogue import available, check_name, figure, overview
-from rigidsim.look.figures.saving import SUFFIXES, figure_format, save_figure
+from rigidsim.look.figures.catalogue import (
+    SUFFIXES,
+    available,
+    check_name,
+    figure,
+    figure_format,
+    save_figure,
+)
 
 __all__ = [
-    "FIGURES", "OVERVIEW", "SUFFIXES", "available", "check_name", "figure", "figure_format", "overview",
-    "save_figure",
+    "FIGURES", "OVERVIEW", "SUFFIXES", "available", "check_name", "figure", "figure_format", "save_figure",
 ]  # fmt: skip

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
+from matplotlib import rc_context
 
 from rigidsim.look import signals
 from rigidsim.look.figures import timelines
+from rigidsim.look.figures.panel import Panel
 from rigidsim.look.figures.style import GREY, INK, STYLE, blank
 from rigidsim.look.page import largest_drift, read_config
 from rigidsim.look.roles import drifts, is_averaged
@@ -31,24 +33,9 @@ _PLANES_WIDE = 5.2  # width of a plane where only planes stand side by side
 
 
 @dataclass(frozen=True)
-class Panel:
-    """A panel: what it needs (`shows`) and how it is drawn on axes (`draw`)."""
-
-    shows: Callable[[xarray.Dataset], bool]
-    draw: Callable[[Any, xarray.Dataset], None]
-    begins: bool = False
-    """For a panel over time: whether to show only the start if the whole would be a solid band."""
-
-
-@dataclass(frozen=True)
 class Shown:
-    """A dataset's rows as a figure shows them, in memory, and results from all of them.
-
-    Attributes:
-        rows: evenly strided, not too many.
-        start: as many consecutive rows from the start.
-        largest: magnitude of each invariant's drift.
-        complete: whether every sample was read for it.
+    """A dataset's rows as a figure shows them, evenly strided, in memory; as many consecutive ones from the
+    start; the largest magnitude of each invariant's drift, and whether every sample was read for it.
     """
 
     rows: xarray.Dataset
@@ -58,11 +45,7 @@ class Shown:
 
 
 def shown_rows(dataset: xarray.Dataset, most: int = ROWS, read: int = FULL_READ) -> Shown:
-    """Read what a figure needs from a dataset, possibly lazy, of any length.
-
-    Args:
-        most: largest number of rows shown.
-        read: number of samples up to which all drifts are read for their largest value.
+    """Read at most so many rows from a dataset, possibly lazy, and all drifts of up to ``read`` samples.
 
     Raises:
         ValueError: no time coordinate, or no samples.
@@ -79,10 +62,8 @@ def shown_rows(dataset: xarray.Dataset, most: int = ROWS, read: int = FULL_READ)
 
 
 def beginning(axes: Axes, shown: Shown) -> float:
-    """Seconds that hold `_CYCLES` swings of a panel's curves if the run has many more; otherwise 0.
-
-    Args:
-        axes: axes of the panel, drawn from `shown.start`.
+    """Seconds that hold `_CYCLES` swings of the curves on axes, drawn from `shown.start`, if the run has many
+    more; otherwise 0.
     """
     seconds, whole = signals.seconds(shown.start), signals.seconds(shown.rows)
     length, span = float(seconds[-1] - seconds[0]), float(whole[-1] - whole[0])
@@ -116,8 +97,6 @@ def compose(
         planes: square panels, below one another beside curves, otherwise side by side.
         facts: whether to put a table of what was run and what was conserved below the planes.
     """
-    from matplotlib import rc_context
-
     shown = shown_rows(dataset)
     curves = [panel for panel in curves if panel.shows(shown.rows)]
     planes = [panel for panel in planes if panel.shows(shown.rows)]
@@ -229,8 +208,3 @@ def _table(axes: Axes, lines: list[tuple[str, str]]) -> None:
         height = 1.0 - (row + 0.5) / (len(lines) + 1)
         axes.text(0.04, height, name, color=GREY, fontsize=9, va="center", clip_on=False)
         axes.text(0.70, height, value, color=INK, fontsize=9, va="center", clip_on=False)
-
-
-def has(*names: str) -> Callable[[xarray.Dataset], bool]:
-    """Predicate: whether a dataset has one of the variables."""
-    return lambda dataset: any(signals.values(dataset, name) is not None for name in names)

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigidsim.look import signals
+from rigidsim.look.figures.panel import panel
 from rigidsim.look.figures.style import GREY, PALETTE, key, note
 from rigidsim.look.figures.timelines import clock
 from rigidsim.look.roles import drifts, put_backs
@@ -43,14 +44,15 @@ def law(dataset: xarray.Dataset) -> Array | None:
     return tolerance * np.sqrt(np.maximum(steps * (seconds - seconds[0]) / span, 1.0))
 
 
-def drift_panel(axes: Axes, dataset: xarray.Dataset) -> None:
+@panel(lambda dataset: drifts(dataset) or None)
+def drift(axes: Axes, dataset: xarray.Dataset, found: dict[str, Variable]) -> None:
     """Magnitudes of all relative drifts on a logarithmic axis, over the band that rounding explains."""
     time, _ = clock(dataset)
-    found, projected = drifts(dataset), put_backs(dataset)
+    projected = put_backs(dataset)
     curves: list[Array] = []
     still: list[str] = []
-    for (name, drift), hue in zip(found.items(), cycle(PALETTE), strict=False):
-        shown = _magnitude(drift, len(time))
+    for (name, variable), hue in zip(found.items(), cycle(PALETTE), strict=False):
+        shown = _magnitude(variable, len(time))
         label = name.replace("_", " ")
         if not np.isfinite(shown).any():  # zero has no place on a logarithmic axis
             still.append(label)
@@ -62,9 +64,7 @@ def drift_panel(axes: Axes, dataset: xarray.Dataset) -> None:
             axes.plot(time, curves[-1], color=hue, lw=1.0, ls=(0, (4, 2)))
     band = law(dataset)
     if band is not None:
-        axes.fill_between(
-            time, TYPICAL * band, MOST * band, color="#e9edf2", lw=0, zorder=0,
-        )  # fmt: skip
+        axes.fill_between(time, TYPICAL * band, MOST * band, color="#e9edf2", lw=0, zorder=0)
         curves.append(TYPICAL * band)
     tops = [float(np.nanmax(c)) for c in curves if np.isfinite(c).any()]
     lows = [float(np.nanpercentile(c, 1)) for c in curves if np.isfinite(c).any()]
@@ -85,8 +85,8 @@ def drift_panel(axes: Axes, dataset: xarray.Dataset) -> None:
     axes.set_ylabel("relative drift")
 
 
-def _magnitude(drift: Variable, rows: int) -> Array:
+def _magnitude(variable: Variable, rows: int) -> Array:
     """The largest over the components, a gap where it is zero."""
-    table = np.abs(np.asarray(drift.transpose("time", ...).values, dtype=np.float64)).reshape(rows, -1)
+    table = np.abs(np.asarray(variable.transpose("time", ...).values, dtype=np.float64)).reshape(rows, -1)
     largest = table.max(axis=1)
     return np.where(largest > 0, largest, np.nan)

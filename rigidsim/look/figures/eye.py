@@ -5,11 +5,18 @@ A flat drawing knows where every text will be, which matplotlib's own 3D axes do
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from matplotlib.collections import PolyCollection
+from matplotlib.colors import to_rgb
+from matplotlib.patheffects import withStroke
 from numpy.typing import NDArray
+
+from rigidsim.look.figures.scales import number
+from rigidsim.look.figures.style import PALE, X, Y, Z
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -19,17 +26,12 @@ Mask = NDArray[np.bool_]
 
 _AROUND, _ALONG = 144, 72  # facets of a surface
 _LIGHT = (0.35, 0.25, 0.9)  # from where, in (right, up, towards) of the eye
+COLORS = (X, Y, Z)
 
 
 @dataclass(frozen=True)
 class Eye:
-    """A direction of view from far away.
-
-    Attributes:
-        right: (3,) unit vector to the right of the picture.
-        up: (3,) upwards.
-        toward: (3,) to the eye.
-    """
+    """A direction of view from far away: unit vectors (3,) to the right of the picture, up, to the eye."""
 
     right: Array
     up: Array
@@ -40,12 +42,10 @@ class Eye:
         return np.stack([points @ self.right, points @ self.up], axis=-1)
 
 
-def eye_at(toward: Array, up: Array = np.array([0.0, 0.0, 1.0])) -> Eye:  # noqa: B008
-    """The eye in direction `toward` (3,), with `up` (3,) upwards in the picture."""
+def eye_at(toward: Array) -> Eye:
+    """The eye in direction `toward` (3,), which isn't Z, with Z upwards in the picture."""
     forward = toward / np.linalg.norm(toward)
-    right = np.cross(up, forward)
-    if np.linalg.norm(right) < 1e-9:
-        right = np.cross(np.array([0.0, 1.0, 0.0]), forward)
+    right = np.cross(np.array([0.0, 0.0, 1.0]), forward)
     right /= np.linalg.norm(right)
     return Eye(right, np.cross(forward, right), forward)
 
@@ -63,9 +63,6 @@ def draw_ellipsoid(
     Returns:
         The covered points of the picture, (n, 2).
     """
-    from matplotlib.collections import PolyCollection
-    from matplotlib.colors import to_rgb
-
     u, v = np.meshgrid(np.linspace(0, 2 * np.pi, _AROUND + 1), np.linspace(0, np.pi, _ALONG + 1))
     points = np.stack([np.cos(u) * np.sin(v), np.sin(u) * np.sin(v), np.cos(v)], axis=-1) * radii
     corners = np.stack([points[:-1, :-1], points[1:, :-1], points[1:, 1:], points[:-1, 1:]], axis=2)
@@ -115,8 +112,6 @@ def line(axes: Axes, eye: Eye, points: Array, keep: Mask | None = None, **style:
 
 def spoke(axes: Axes, eye: Eye, start: Array, stop: Array, text: str, color: str, reach: float) -> Array:
     """Draw an axis from where it leaves a body, with a label beyond; returns the label's place (2,)."""
-    from matplotlib.patheffects import withStroke
-
     ends = eye.flat(np.stack([start, stop]))
     axes.plot(*ends.T, color=color, lw=1.6, zorder=6, solid_capstyle="butt")
     way = ends[1] - ends[0]
@@ -133,10 +128,28 @@ def spoke(axes: Axes, eye: Eye, start: Array, stop: Array, text: str, color: str
     return np.asarray(place)
 
 
+def draw_box(
+    axes: Axes, eye: Eye, points: Array, names: Sequence[str], reach: float, floors: Sequence[int]
+) -> None:
+    """Draw three axes with the ranges that points (rows, 3) cover, and shadows along some of the axes."""
+    low, high = np.nanmin(points, axis=0), np.nanmax(points, axis=0)
+    corner = low - 0.04 * reach
+    covered = [eye.flat(points)]
+    for k, name in enumerate(names):
+        stop = corner.copy()
+        stop[k] = high[k] + 0.12 * reach
+        text = f"{name}\n{number(low[k], 3)} … {number(high[k], 3)}"
+        covered.append(spoke(axes, eye, corner, stop, text, COLORS[k], reach)[None])
+        if k in floors:
+            floor = points.copy()
+            floor[:, k] = corner[k]
+            line(axes, eye, floor, color=PALE, lw=0.6, zorder=1, rasterized=len(points) > 6000)
+            covered.append(eye.flat(floor))
+    frame(axes, np.vstack(covered), aside=0.34, above=0.3)
+
+
 def frame(axes: Axes, covered: Array, *, aside: float = 0.42, above: float = 0.3) -> None:
-    """Set limits about the covered points (n, 2), with equal scales, room for labels on all sides, and no
-    frame.
-    """
+    """Set limits about the covered points (n, 2): equal scales, room for labels on all sides, no frame."""
     low, high = np.nanmin(covered, axis=0), np.nanmax(covered, axis=0)
     middle, half = (low + high) / 2, (high - low) / 2
     reach = max(float(half.max()), 1e-300)

@@ -110,10 +110,15 @@ def _peak(windowed: Array) -> float | None:
     k = int(power[1:-1].argmax()) + 1
     if k < 12 or power[k] == 0:
         return None
+    return _maximum(power, k) * (len(windowed) - 1) / padded
+
+
+def _maximum(power: Array, k: int) -> float:
+    """Place of the maximum next to index k, by the parabola through three logarithms."""
     left, mid, right = np.log(power[k - 1 : k + 2] + 1e-300)
     bend = left - 2 * mid + right
     shift = 0.5 * (left - right) / bend if bend < 0 else 0.0
-    return (k + float(np.clip(shift, -0.5, 0.5))) * (len(windowed) - 1) / padded
+    return k + float(np.clip(shift, -0.5, 0.5))
 
 
 def circulation(time: Array, plane: Array) -> float | None:
@@ -181,10 +186,7 @@ def leading_ellipse(time: Array, plane: Array) -> FittedEllipse | None:
     span = time[-1] - time[0]
     if abs(frequencies[k]) * span < 1.5 or k >= padded // 2 - 2:
         return None
-    left, mid, right = np.log(both[k - 2 : k + 1] + 1e-300)
-    bend = left - 2 * mid + right
-    shift = 0.5 * (left - right) / bend if bend < 0 else 0.0
-    rate = _TURN * (k + float(np.clip(shift, -0.5, 0.5))) / (padded * steps.mean())
+    rate = _TURN * (_maximum(both, k - 1) + 1) / (padded * steps.mean())
     wave = np.exp(1j * rate * (time - time[0]))
     basis = np.stack([wave, wave.conj(), np.ones_like(wave), middle, middle**2], axis=1)
     found, *_ = np.linalg.lstsq(basis, z, rcond=None)

@@ -7,15 +7,19 @@ without slipping on the plane w . L = 2 T, where it leaves the herpolhode.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
 from rigidsim.look import signals
 from rigidsim.look.figures import eye as eyes
+from rigidsim.look.figures.panel import panel
+from rigidsim.look.figures.poles import path_about
 from rigidsim.look.figures.scales import number, si_scale
-from rigidsim.look.figures.style import GREY, INK, PALE, PINK, X, Y, Z, joined, key, square, titled, trace
+from rigidsim.look.figures.style import GREY, PINK, Z, joined, key, titled
 from rigidsim.look.solids import rotation_matrix
 from rigidsim.look.thinning import thinned_indices
 
@@ -27,31 +31,25 @@ Array = NDArray[np.float64]
 
 ENERGY_SURFACE, MOMENTUM_SURFACE = "#b9cde6", "#f0d3ae"
 SEPARATRIX = "#4a5568"
-_COLORS = (X, Y, Z)
+_RING = "#8093ab"
 _VIEWS = [np.array(v) for v in ((0.74, 0.52, 0.43), (0.52, 0.74, 0.43), (0.45, 0.6, 0.66), (0.85, 0.3, 0.43))]
-_SPREAD = 1e-5  # of 2 T, up to which it counts as constant: more than rounding in single precision
 _CLOSE = 0.06  # rad from an axis, within which facets are too coarse for the surfaces' meeting
 
 
 def surfaces(dataset: xarray.Dataset) -> tuple[Array, Array] | None:
     """Semi-axes (3,), rad/s, of the surfaces of energy and momentum; None if the motion isn't on them."""
-    moments, rates = signals.moments(dataset), signals.principal_rates(dataset)
-    if moments is None or rates is None:
+    found = signals.energy_and_momentum(dataset)
+    if found is None:
         return None
-    rates = rates[np.isfinite(rates).all(axis=1)]
-    twice, square_ = rates**2 @ moments, rates**2 @ moments**2
-    for values in (twice, square_):
-        # loads, or axes that aren't the principal ones, move the tip off them
-        if not len(values) or values.min() <= 0 or values.max() > (1 + _SPREAD) * values.min():
-            return None
-    return np.sqrt(twice.mean() / moments), np.sqrt(square_.mean()) / moments
+    moments, twice, square = found
+    return np.sqrt(twice / moments), np.sqrt(square) / moments
 
 
 def separatrix(moments: Array, radii: Array) -> list[Array]:
     """The two circles-in-perspective (361, 3) through the intermediate axis on the ellipsoid of energy.
 
-    Where L^2 = 2 T B: the planes w_a sqrt(A (B - A)) = ± w_c sqrt(C (C - B)), A < B < C. None for a body
-    with two moments alike.
+    Where L^2 = 2 T B: the planes w_a sqrt(A (B - A)) = ± w_c sqrt(C (C - B)), A < B < C. None if two moments
+    are alike.
     """
     a, b, c = np.argsort(moments)
     small, middle, large = moments[[a, b, c]]
@@ -70,65 +68,50 @@ def separatrix(moments: Array, radii: Array) -> list[Array]:
     return curves
 
 
-def polhode_panel(axes: Axes, dataset: xarray.Dataset) -> None:
+@panel(signals.principal_rates)
+def polhode(axes: Axes, dataset: xarray.Dataset, rates: Array) -> None:
     """The tip of the angular velocity in principal axes, on the surfaces where it has some."""
-    rates, found = signals.principal_rates(dataset), surfaces(dataset)
-    assert rates is not None
-    if found is None:
-        _bare(axes, dataset, rates)
+    found, moments = surfaces(dataset), signals.moments(dataset)
+    names = [f"$ω_{name}$" for name in signals.axis_names(dataset)]
+    if found is None or moments is None:
+        _bare(axes, rates, names)
         return
-    moments = signals.moments(dataset)
-    assert moments is not None
     scale, unit = si_scale(np.concatenate(found), "rad/s")
     energy, momentum = (radii / scale for radii in found)
     points = rates / scale
-    curves = separatrix(moments, energy)
     view = _view(points, energy, moments)
     covered = eyes.draw_ellipsoid(axes, view, energy, ENERGY_SURFACE)
     for ring in eyes.sections(energy):
-        eyes.line(axes, view, ring, eyes.visible(ring, view, energy), color="#8093ab", lw=0.7)
-    for number_, ring in enumerate(curves):
+        eyes.line(axes, view, ring, eyes.visible(ring, view, energy), color=_RING, lw=0.7)
+    entries: list[Any] = [Line2D([], [], color=PINK, lw=1.9, label="ω")]
+    for ring in separatrix(moments, energy):
         front = eyes.visible(ring, view, energy)
         style = {"color": SEPARATRIX, "ls": (0, (5, 2))}
         eyes.line(axes, view, ring, ~front, lw=0.6, alpha=0.25, **style)
-        label = None if number_ else "separatrix"
-        eyes.line(axes, view, ring, front, lw=1.2, zorder=2.5, label=label, **style)
-    handles = axes.get_legend_handles_labels()[0]
+        eyes.line(axes, view, ring, front, lw=1.2, zorder=2.5, label="separatrix", **style)
+        entries[1:] = [axes.get_lines()[-1]]
+    entries.append(Patch(color=ENERGY_SURFACE, label="2T"))
+    title = "Polhode on the ellipsoid of energy"
     # About a body that spins close to an axis the surfaces meet too flatly: then the momentum's is left out.
     sizes = np.linalg.norm(points, axis=1, keepdims=True)
-    both = float(np.nanmax(np.sort(np.abs(points / sizes), axis=1)[:, 1])) > _CLOSE
-    if both:
+    if float(np.nanmax(np.sort(np.abs(points / sizes), axis=1)[:, 1])) > _CLOSE:
         outer = eyes.draw_ellipsoid(axes, view, momentum, MOMENTUM_SURFACE, outside=energy, alpha=0.42)
         covered = np.vstack([covered, outer])
         for ring in eyes.sections(momentum):
             beyond = eyes.visible(ring, view, momentum) & ((ring**2 / energy**2).sum(axis=1) > 1)
             eyes.line(axes, view, ring, beyond, color="#c0843a", lw=0.7, zorder=3)
+        entries.append(Patch(color=MOMENTUM_SURFACE, label="L²"))
+        title = "Polhode: the surfaces of energy and momentum"
     _path(axes, view, points, eyes.visible(points, view, energy))
     size = float(np.abs(covered).max())
-    for k, name in enumerate(signals.axis_names(dataset)):
-        sign = 1.0 if view.toward[k] >= 0 else -1.0
-        ends = np.zeros((2, 3))
+    for k, name in enumerate(names):
+        way = np.eye(3)[k] if view.toward[k] >= 0 else -np.eye(3)[k]
         start = max(energy[k], momentum[k])
-        ends[:, k] = sign * start, sign * (start + 0.16 * size)
-        text = f"{'' if sign > 0 else '−'}$ω_{name}$\n{number(energy[k], 3)} {unit}"
-        place = eyes.spoke(axes, view, ends[0], ends[1], text, _COLORS[k], size)
+        text = f"{'' if view.toward[k] >= 0 else '−'}{name}\n{number(energy[k], 3)} {unit}"
+        place = eyes.spoke(axes, view, start * way, (start + 0.16 * size) * way, text, eyes.COLORS[k], size)
         covered = np.vstack([covered, place])
     eyes.frame(axes, covered)
-    from matplotlib.lines import Line2D
-    from matplotlib.patches import Patch
-
-    entries = [
-        Line2D([], [], color=PINK, lw=1.9, label="ω"),
-        *handles,
-        Patch(color=ENERGY_SURFACE, label="2T"),
-    ]
-    if both:
-        entries.append(Patch(color=MOMENTUM_SURFACE, label="L²"))
-    key(
-        axes,
-        "Polhode: the surfaces of energy and momentum" if both else "Polhode on the ellipsoid of energy",
-        handles=entries,
-    )
+    key(axes, title, handles=entries)
 
 
 def _view(points: Array, radii: Array, moments: Array) -> eyes.Eye:
@@ -160,75 +143,58 @@ def _path(axes: Axes, view: eyes.Eye, points: Array, front: NDArray[np.bool_], *
     axes.plot(x, y, "o", color=PINK, ms=4.0, alpha=1.0 if front[0] else 0.35, zorder=6)
 
 
-def _bare(axes: Axes, dataset: xarray.Dataset, rates: Array) -> None:
+def _bare(axes: Axes, rates: Array, names: list[str]) -> None:
     """Draw the path without surfaces, between three axes with the ranges that it covers."""
     scale, unit = si_scale(rates, "rad/s")
     points = rates / scale
-    low, high = np.nanmin(points, axis=0), np.nanmax(points, axis=0)
-    reach = float((high - low).max())
-    reach = reach if reach > 1e-6 * np.nanmax(np.abs(points)) else float(np.nanmax(np.abs(points))) or 1.0
+    reach = float((np.nanmax(points, axis=0) - np.nanmin(points, axis=0)).max())
+    size = float(np.nanmax(np.abs(points)))
     view = eyes.eye_at(np.array([0.74, 0.52, 0.43]))
-    corner = low - 0.04 * reach
-    covered = [view.flat(points)]
-    for k, name in enumerate(signals.axis_names(dataset)):
-        start, stop = corner.copy(), corner.copy()
-        stop[k] = high[k] + 0.12 * reach
-        text = f"$ω_{name}$\n{number(low[k], 3)} … {number(high[k], 3)}"
-        covered.append(eyes.spoke(axes, view, start, stop, text, _COLORS[k], reach)[None])
-        floor = points.copy()
-        floor[:, k] = corner[k]
-        eyes.line(axes, view, floor, color=PALE, lw=0.6, zorder=1, rasterized=len(points) > 6000)
-        covered.append(view.flat(floor))
     _path(axes, view, points, np.ones(len(points), dtype=bool))
-    eyes.frame(axes, np.vstack(covered), aside=0.34, above=0.3)
+    eyes.draw_box(axes, view, points, names, reach if reach > 1e-6 * size else size or 1.0, floors=range(3))
     titled(axes, f"Path of ω in body axes [{unit}]")
 
 
-def herpolhode_panel(axes: Axes, dataset: xarray.Dataset) -> None:
-    """The tip of the angular velocity on the invariable plane, seen along the momentum."""
-    plane = herpolhode(dataset)
-    assert plane is not None
-    scale, unit = si_scale(plane, "rad/s")
-    x, y = (plane / scale).T
-    trace(axes, x, y)
-    axes.plot(0, 0, "+", color=INK, ms=9, mew=1.3)
-    square(axes, np.append(x, 0), np.append(y, 0))
-    axes.set_xlabel(f"across L [{unit}]")
-    axes.set_ylabel(f"across L [{unit}]")
-    key(axes, "Herpolhode on the invariable plane (+: L)")
-
-
-def herpolhode(dataset: xarray.Dataset) -> Array | None:
+def herpolhode_path(dataset: xarray.Dataset) -> Array | None:
     """Component of the angular velocity across the momentum (rows, 2), rad/s; None if the momentum moves."""
     along = signals.steady_momentum(dataset)
     rates, quaternion = signals.values(dataset, "angular_velocity"), signals.values(dataset, "quaternion")
     if along is None or rates is None or quaternion is None:
         return None
-    first = np.cross(np.eye(3)[np.abs(along).argmin()], along)
-    first /= np.linalg.norm(first)
+    first, second = signals.across(along)
     in_space = np.einsum("tij,tj->ti", rotation_matrix(quaternion), rates)
-    return np.stack([in_space @ first, in_space @ np.cross(along, first)], axis=1)
+    return np.stack([in_space @ first, in_space @ second], axis=1)
 
 
-def poinsot_panel(axes: Axes, dataset: xarray.Dataset) -> None:
-    """The ellipsoid of energy as it rolls on the invariable plane, at the first sample."""
-    found, quaternion = surfaces(dataset), signals.values(dataset, "quaternion")
-    plane, rates = herpolhode(dataset), signals.principal_rates(dataset)
-    along = signals.steady_momentum(dataset)
-    assert found is not None
-    assert quaternion is not None
-    assert plane is not None
-    assert rates is not None
-    assert along is not None
-    scale, _ = si_scale(found[0], "rad/s")
-    radii, points, path = found[0] / scale, rates / scale, plane / scale
+@panel(herpolhode_path)
+def herpolhode(axes: Axes, dataset: xarray.Dataset, plane: Array) -> None:
+    """The tip of the angular velocity on the invariable plane, seen along the momentum."""
+    scale, unit = si_scale(plane, "rad/s")
+    path_about(axes, plane / scale, f"across L [{unit}]", f"across L [{unit}]")
+    key(axes, "Herpolhode on the invariable plane (+: L)")
+
+
+def _rolling(dataset: xarray.Dataset) -> tuple[Array, Array, Array, Array] | None:
+    """Semi-axes (3,) of the ellipsoid of energy, herpolhode (rows, 2), angular velocity (rows, 3) along the
+    principal axes, rad/s, and the rotation (3, 3) from these to the picture's axes at the first sample.
+    """
+    found, plane, rates = surfaces(dataset), herpolhode_path(dataset), signals.principal_rates(dataset)
+    quaternion, along = signals.values(dataset, "quaternion"), signals.steady_momentum(dataset)
+    if found is None or plane is None or rates is None or quaternion is None or along is None:
+        return None
     # The picture's axes: across, across, and -L upwards, so that the plane lies below the body.
-    first = np.cross(np.eye(3)[np.abs(along).argmin()], along)
-    first /= np.linalg.norm(first)
-    second = np.cross(along, first)
+    first, second = signals.across(along)
     to_picture = np.stack([first, -second, -along])
     matrix = rotation_matrix(quaternion[:1])[0] @ signals.principal_axes(dataset).T
-    turn = to_picture @ matrix
+    return found[0], plane, rates, to_picture @ matrix
+
+
+@panel(_rolling)
+def poinsot(axes: Axes, dataset: xarray.Dataset, found: tuple[Array, Array, Array, Array]) -> None:
+    """The ellipsoid of energy as it rolls on the invariable plane, at the first sample."""
+    scale, _ = si_scale(found[0], "rad/s")
+    radii, path, points = (values / scale for values in found[:3])
+    turn = found[3]
     tip = turn @ points[0]
     depth = float(tip[2])  # the plane's height, below zero
     ring = np.column_stack([path[:, 0], -path[:, 1], np.full(len(path), depth)])
@@ -238,27 +204,20 @@ def poinsot_panel(axes: Axes, dataset: xarray.Dataset) -> None:
     angle = np.linspace(0, 2 * np.pi, 181)
     disc = np.column_stack([size * np.cos(angle), size * np.sin(angle), np.full(181, depth)])
     axes.fill(*view.flat(disc).T, color="#e9edf2", zorder=0)
-    handles = []
-    drawn = joined(ring)
-    if drawn:
+    entries = [Line2D([], [], color=PINK, lw=1.9, label="polhode")]
+    if joined(ring):
         ring = ring[thinned_indices(len(ring), 6000)]
         eyes.line(axes, view, ring, color=Z, lw=0.9, zorder=0.5, label="herpolhode")
-        handles.append(axes.get_lines()[-1])
+        entries.append(axes.get_lines()[-1])
+        eyes.line(axes, view, ring, color=Z, lw=0.6, alpha=0.25, zorder=2)  # through the body, faintly
     own = eyes.Eye(*(turn.T @ way for way in (view.right, view.up, view.toward)))  # in principal axes
     covered = eyes.draw_ellipsoid(axes, own, radii, ENERGY_SURFACE)
-    if drawn:  # through the body, faintly
-        eyes.line(axes, view, ring, color=Z, lw=0.6, alpha=0.25, zorder=2)
     for one in eyes.sections(radii):
-        eyes.line(axes, own, one, eyes.visible(one, own, radii), color="#8093ab", lw=0.7, zorder=3)
+        eyes.line(axes, own, one, eyes.visible(one, own, radii), color=_RING, lw=0.7, zorder=3)
     _path(axes, own, points, eyes.visible(points, own, radii))
-    start, stop = np.zeros(3), np.array([0.0, 0.0, 1.25 * depth])
-    axes.plot(*view.flat(np.stack([start, tip])).T, color=PINK, lw=1.3, zorder=5)
-    axes.plot(*view.flat(np.stack([start, stop])).T, color=GREY, lw=1.1, ls=(0, (4, 2)), zorder=5)
-    place = view.flat(stop)
+    place = view.flat(np.array([0.0, 0.0, 1.25 * depth]))
+    axes.plot(*np.stack([np.zeros(2), view.flat(tip)]).T, color=PINK, lw=1.3, zorder=5)
+    axes.plot(*np.stack([np.zeros(2), place]).T, color=GREY, lw=1.1, ls=(0, (4, 2)), zorder=5)
     axes.text(place[0], place[1], "L", color=GREY, ha="center", va="top", fontsize=9.5, fontweight="bold")
-    everything = np.vstack([covered, view.flat(disc), place[None]])
-    eyes.frame(axes, everything, aside=0.06, above=0.1)
-    from matplotlib.lines import Line2D
-
-    entries = [Line2D([], [], color=PINK, lw=1.9, label="polhode"), *handles]
+    eyes.frame(axes, np.vstack([covered, view.flat(disc), place[None]]), aside=0.06, above=0.1)
     key(axes, "It rolls on the invariable plane (Poinsot)", handles=entries)

@@ -1,10 +1,8 @@
-"""Style of figures: colours, fonts, the empty page with its heading, and curves with their key.
-
-Imports no matplotlib until a figure is made.
-"""
+"""Style of figures: colours, fonts, the empty page with its heading, and curves with their key."""
 
 from __future__ import annotations
 
+import io
 import itertools
 import re
 import textwrap
@@ -12,6 +10,12 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from matplotlib import colormaps
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.collections import LineCollection
+from matplotlib.figure import Figure
+from matplotlib.layout_engine import ConstrainedLayoutEngine
+from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from rigidsim.look.page import read_config, title_of
@@ -19,7 +23,6 @@ from rigidsim.look.page import read_config, title_of
 if TYPE_CHECKING:
     import xarray
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 Array = NDArray[np.float64]
 
@@ -72,18 +75,22 @@ STYLE: dict[str, Any] = {
 }
 
 
+class ShownFigure(Figure):
+    """A figure on the Agg canvas that a notebook shows by itself, with or without pyplot."""
+
+    def __init__(self, *args: Any, **options: Any) -> None:
+        super().__init__(*args, **options)
+        FigureCanvasAgg(self)
+
+    def _repr_png_(self) -> bytes:
+        """PNG picture, which IPython asks for."""
+        data = io.BytesIO()
+        self.savefig(data, format="png", dpi=100)
+        return data.getvalue()
+
+
 def blank(dataset: xarray.Dataset, width: float, height: float) -> Figure:
-    """An empty page with the run's name and description above.
-
-    Args:
-        width: width of the page, inches.
-        height: height below the heading, inches.
-    """
-    # The object-oriented interface: no pyplot, no state that outlives the call.
-    from matplotlib.layout_engine import ConstrainedLayoutEngine
-
-    from rigidsim.look.figures.shown import ShownFigure
-
+    """An empty page (inches; height below the heading) with the run's name and description above."""
     description = " ".join(str(read_config(dataset).get("description", "")).split())
     title = title_of(dataset)
     if description == title:
@@ -92,26 +99,18 @@ def blank(dataset: xarray.Dataset, width: float, height: float) -> Figure:
     whole = height + top
     engine = ConstrainedLayoutEngine(h_pad=0.09, w_pad=0.09, rect=(0.0, 0.0, 1.0, 1.0 - top / whole))
     figure = ShownFigure(figsize=(width, whole), layout=engine)
-    left = 0.14 / width
-    first = figure.text(
-        left, 1 - 0.12 / whole, title, va="top", fontsize=13.5, fontweight="bold", color=INK, gid="heading"
-    )
-    _shorten(figure, first, title, width)
-    if description:
-        second = figure.text(
-            left, 1 - (_HEADING[0] + 0.07) / whole, description, va="top", fontsize=10, color=GREY,
-            gid="heading",
-        )  # fmt: skip
-        _shorten(figure, second, description, width)
+    heading: list[tuple[str, float, dict[str, Any]]] = [
+        (title, 0.12, {"fontsize": 13.5, "fontweight": "bold", "color": INK})
+    ]
+    heading += [(description, _HEADING[0] + 0.07, {"fontsize": 10, "color": GREY})] if description else []
+    for words, down, style in heading:
+        text = figure.text(0.14 / width, 1 - down / whole, words, va="top", gid="heading", **style)
+        room = (width - 0.28) * figure.dpi
+        characters = len(words)
+        while characters > 12 and text.get_window_extent().width > room:
+            characters = min(characters - 2, int(characters * room / text.get_window_extent().width) + 1)
+            text.set_text(textwrap.shorten(words, characters, placeholder=" …") or words[:characters] + "…")
     return figure
-
-
-def _shorten(figure: Figure, text: Any, words: str, width: float) -> None:
-    room = (width - 0.28) * figure.dpi
-    characters = len(words)
-    while characters > 12 and text.get_window_extent().width > room:
-        characters = min(characters - 2, int(characters * room / text.get_window_extent().width) + 1)
-        text.set_text(textwrap.shorten(words, characters, placeholder=" …") or words[:characters] + "…")
 
 
 def titled(axes: Axes, title: str, *, rows: int = 0) -> None:
@@ -121,11 +120,7 @@ def titled(axes: Axes, title: str, *, rows: int = 0) -> None:
 
 
 def key(axes: Axes, title: str, *, handles: Sequence[Any] | None = None) -> None:
-    """Set the title, and between it and the panel the key to its curves, so that nothing is covered.
-
-    Args:
-        handles: handles of the entries; by default all curves with a label.
-    """
+    """Set the title, and between it and the panel the key to all curves with a label, or to other handles."""
     found = list(handles) if handles is not None else axes.get_legend_handles_labels()[0]
     labels = [str(handle.get_label()) for handle in found]
     if not found:
@@ -149,12 +144,9 @@ def _room(axes: Axes) -> float:
 
 
 def joined(values: Array, reach: float = IN_PLANE) -> bool:
-    """Whether samples (rows,) or (rows, n) lie close enough that lines between them show the motion.
+    """Whether neighbours of samples (rows,) or (rows, n) lie within `reach` radii of the whole.
 
     Where a quantity swings faster than it was sampled, lines would draw a pattern that isn't there.
-
-    Args:
-        reach: largest distance of neighbours, in radii of the whole.
     """
     if len(values) < 3:
         return True
@@ -168,12 +160,9 @@ def joined(values: Array, reach: float = IN_PLANE) -> bool:
 
 
 def curve(axes: Axes, x: Array, y: Array, *, in_plane: bool = False, **style: Any) -> None:
-    """Draw a curve if the samples are dense enough, otherwise its samples as points.
+    """Draw a curve over time, or in a plane; if the samples aren't dense enough, its samples as points.
 
     Long ones are drawn as pixels in an SVG, which otherwise would weigh megabytes.
-
-    Args:
-        in_plane: whether both coordinates move, and neither is the time.
     """
     style.setdefault("rasterized", len(x) > MOST_VECTOR_POINTS)
     whole = joined(np.stack([x, y], axis=1)) if in_plane else joined(y, OVER_TIME)
@@ -188,25 +177,13 @@ def trace(axes: Axes, x: Array, y: Array) -> None:
 
     The start is marked. All that stands out has a label.
     """
-    from matplotlib import colormaps
-    from matplotlib.collections import LineCollection
-
     points = np.stack([x, y], axis=1)
     many = len(x) > MOST_VECTOR_POINTS
     axes.plot(x[0], y[0], "o", color=START, ms=4.5, zorder=5, lw=0, label="start")
     if not joined(points):
         size = float(np.clip(9000 / max(len(x), 1), 1.2, 12.0))
-        axes.scatter(
-            x,
-            y,
-            c=np.linspace(0.0, 0.86, len(x)),
-            cmap="plasma",
-            vmin=0,
-            vmax=1,
-            s=size,
-            lw=0,
-            rasterized=many,
-        )
+        hues = np.linspace(0.0, 0.86, len(x))
+        axes.scatter(x, y, c=hues, cmap="plasma", vmin=0, vmax=1, s=size, lw=0, rasterized=many)
         axes.plot([], [], ".", color=colormaps["plasma"](0.6), lw=0, label=_LATER)
         return
     first, label = _first_turns(points)
@@ -244,8 +221,6 @@ def _first_turns(points: Array) -> tuple[int, str]:
 
 def square(axes: Axes, x: Array, y: Array, *, margin: float = 0.08) -> None:
     """Equal scales on both axes, about all finite points (x, y)."""
-    from matplotlib.ticker import MaxNLocator
-
     ends = []
     for values in (x, y):
         finite = values[np.isfinite(values)]

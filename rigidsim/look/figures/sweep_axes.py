@@ -1,4 +1,4 @@
-"""Axes of a sweep's figure: positions of members along them, with labels and scales."""
+"""Axes of a sweep's figure: positions of members along them, with labels and scales, and swept directions."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import math
 from typing import TYPE_CHECKING
 
 import numpy as np
+from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from rigidsim.look.plots import pretty_unit
@@ -20,12 +21,25 @@ _MOST_TOLD = 12  # values that are told at their ticks
 _CROWDED = 60  # characters side by side
 _LONGEST = 24  # characters of a text
 _DECADES = 1.5  # from which on values of one sign have a logarithmic scale
+_FEWEST = 12  # directions that make a map
+_ALIKE = 1e-9  # lengths, relative
 
 
 def axes_of(dataset: xarray.Dataset) -> list[str]:
     """Dimensions of the members."""
-    names = [str(dim) for dim in dataset["status"].dims]
-    return names
+    return [str(dim) for dim in dataset["status"].dims]
+
+
+def directions(dataset: xarray.Dataset, dim: str) -> Array | None:
+    """Unit vectors (members, 3) of an axis that sweeps directions; None for any other axis."""
+    name = f"{dim}_value"
+    if name not in dataset.coords or dataset[name].dims[0] != dim or dataset[name].shape[1:] != (3,):
+        return None
+    vectors = np.asarray(dataset[name].values, dtype=np.float64)
+    lengths = np.linalg.norm(vectors, axis=1)
+    if len(vectors) < _FEWEST or not lengths.min() > 0 or np.ptp(lengths) > _ALIKE * lengths.max():
+        return None
+    return np.asarray(vectors / lengths[:, None])
 
 
 def label_of(dataset: xarray.Dataset, dim: str, place: int) -> str:
@@ -38,7 +52,7 @@ def label_of(dataset: xarray.Dataset, dim: str, place: int) -> str:
 
 def value_text(dataset: xarray.Dataset, dim: str, place: int) -> str | None:
     """The value at one place along a dimension: a number, a text or a vector; None if there is none."""
-    name = next((name for name in (f"{dim}_value", dim) if name in dataset.coords), None)
+    name = _values_of(dataset, dim)
     if name is None:
         return None
     value = dataset[name].values[place]
@@ -49,34 +63,32 @@ def value_text(dataset: xarray.Dataset, dim: str, place: int) -> str | None:
     return str(value) if len(str(value)) <= _LONGEST else str(value)[: _LONGEST - 3] + "..."
 
 
-def along(dataset: xarray.Dataset, dim: str) -> tuple[Array, str]:
-    """Positions of an axis's values, and its label; texts and vectors are numbered."""
+def _values_of(dataset: xarray.Dataset, dim: str) -> str | None:
+    """Name of the coordinate that holds an axis's values."""
+    return next((name for name in (f"{dim}_value", dim) if name in dataset.coords), None)
+
+
+def along(dataset: xarray.Dataset, dim: str) -> tuple[Array, str, bool]:
+    """Positions of an axis's values, its label, and whether they are only numbered, as texts and vectors."""
     if dim in dataset.coords and dataset[dim].ndim == 1 and dataset[dim].dtype.kind in "fi":
-        coordinate = dataset[dim]
-        return np.asarray(coordinate.values, dtype=np.float64), named(coordinate, dim)
+        return np.asarray(dataset[dim].values, dtype=np.float64), named(dataset[dim], dim), False
     for name, coordinate in dataset.coords.items():  # a zip's axes lie along its members
         if coordinate.dims == (dim,) and coordinate.dtype.kind == "f" and "swept_key" in coordinate.attrs:
-            return np.asarray(coordinate.values, dtype=np.float64), named(coordinate, str(name))
-    return np.arange(dataset.sizes[dim], dtype=np.float64), _label(dataset, dim)
-
-
-def _label(dataset: xarray.Dataset, dim: str) -> str:
-    """Label of an axis whose values are numbered."""
-    name = next((name for name in (f"{dim}_value", dim) if name in dataset.coords), None)
-    if name is None or dataset.sizes[dim] > _MOST_TOLD:
-        return f"{dim.replace('_', ' ')}, counted from 0"
-    return named(dataset[name], dim)
+            return np.asarray(coordinate.values, dtype=np.float64), named(coordinate, str(name)), False
+    values = _values_of(dataset, dim)
+    label = f"{dim.replace('_', ' ')}, counted from 0"
+    if values is not None and dataset.sizes[dim] <= _MOST_TOLD:
+        label = named(dataset[values], dim)
+    return np.arange(dataset.sizes[dim], dtype=np.float64), label, True
 
 
 def number_ticks(axis: Axis, dataset: xarray.Dataset, dim: str, *, along_x: bool) -> None:
-    """Ticks at whole numbers where an axis's values are texts or vectors, few of them with their values."""
-    place, label = along(dataset, dim)
-    if label != _label(dataset, dim) or (dim in dataset.coords and dataset[dim].dtype.kind in "fi"):
+    """Ticks at whole numbers where an axis's values are numbered, few of them with their values."""
+    place, _, numbered = along(dataset, dim)
+    if not numbered:
         return
     texts = [value_text(dataset, dim, i) or "" for i in range(len(place))] if len(place) <= _MOST_TOLD else []
     if not any(texts):
-        from matplotlib.ticker import MaxNLocator
-
         axis.set_major_locator(MaxNLocator(8, integer=True))
         return
     axis.set_ticks(place.tolist(), texts)
@@ -95,7 +107,7 @@ def named(variable: xarray.DataArray, name: str | None = None) -> str:
     return f"{words} [{unit}]" if unit else words
 
 
-def title_of(variable: xarray.DataArray, said: str) -> str:
+def title_of(variable: xarray.DataArray, said: str = "") -> str:
     """Title: what a variable is, and where it is cut."""
     title = str(variable.attrs.get("long_name") or variable.name).replace("_", " ")
     title = title[:1].upper() + title[1:]
@@ -112,8 +124,10 @@ def spans_decades(values: Array) -> bool:
 
 
 def geometric(place: Array) -> bool:
-    """Whether values are spaced at equal ratios."""
-    ratios = np.diff(np.log(place))
+    """Whether an axis's values span decades at equal ratios, so that its scale is logarithmic."""
+    if not spans_decades(place):
+        return False
+    ratios = np.diff(np.log(np.unique(place)))
     return len(ratios) < 2 or float(np.ptp(ratios)) < 0.01 * float(ratios.mean())
 
 

@@ -12,13 +12,15 @@ from itertools import product
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from matplotlib import rc_context
+from matplotlib.colors import LogNorm
 from numpy.typing import NDArray
 
-from rigidsim.look.figures.sphere_maps import directions, on_sphere
 from rigidsim.look.figures.style import GREY, MOST_VECTOR_POINTS, PALE, PALETTE, STYLE, blank, key, titled
 from rigidsim.look.figures.sweep_axes import (
     along,
     axes_of,
+    directions,
     edges_of,
     geometric,
     label_of,
@@ -31,6 +33,7 @@ from rigidsim.look.figures.sweep_axes import (
 
 if TYPE_CHECKING:
     import xarray
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 Array = NDArray[np.float64]
@@ -49,6 +52,7 @@ _FEW = 6  # values of a second axis up to which each has a line, and there is no
 _MANY = 400  # values of which a few may lie beyond the colours
 _MOST_POINTS = 400_000
 _FLAT = 1e-9  # variation of a component, relative to the largest, that is rounding
+_FILLED = 2.0  # area of a sphere's dots over that of its map
 
 
 def drawable(dataset: xarray.Dataset) -> list[str]:
@@ -77,6 +81,12 @@ def _rank(dataset: xarray.Dataset, name: str) -> int:
     return 20 if name.endswith(_LAST) else 10
 
 
+def save_sweep_figure(dataset: xarray.Dataset, path: Any, what: str | None, *, file_format: str) -> None:
+    """Draw a sweep's figure to a file; see ``sweep_figure``."""
+    with rc_context(STYLE):  # type: ignore[arg-type]
+        sweep_figure(dataset, what).savefig(path, dpi=160, format=file_format)
+
+
 def sweep_figure(dataset: xarray.Dataset, what: str | None = None) -> Figure:
     """A sweep's page: one variable over its axes.
 
@@ -88,38 +98,28 @@ def sweep_figure(dataset: xarray.Dataset, what: str | None = None) -> Figure:
     Raises:
         ValueError: no such variable; names those there are.
     """
-    from matplotlib import rc_context
-
     names = drawable(dataset)
-    name, component = _asked(names, what)
-    variable = dataset[name]
-    with rc_context(STYLE):  # type: ignore[arg-type]
-        if any(str(dim).endswith(_SECTION) for dim in variable.dims):
-            return _points(dataset, variable)
-        axes, cut, said = _cut(dataset, variable)
-        if component is not None:
-            cut, said = _component(dataset, cut, axes, component, said)
-        if len(axes) == 1 and directions(dataset, axes[0]) is not None:
-            return _sphere(dataset, cut, axes[0], said)
-        longest = max(axes, key=lambda dim: cut.sizes[dim])
-        others = [dim for dim in axes if dim != longest]
-        if len(axes) == 1 or min(cut.sizes[dim] for dim in axes) <= _FEW < cut.sizes[longest]:
-            if others and set(map(str, cut.dims)) != set(axes):
-                cut, said = _component(dataset, cut, axes, 0, said)
-            return _lines(dataset, cut, longest, said)
-        return _map(dataset, cut, axes, said)
-
-
-def _asked(names: list[str], what: str | None) -> tuple[str, int | None]:
-    if what is None:
-        return names[0], None
-    name, bracket, index = what.partition("[")
+    name, bracket, index = (what or names[0]).partition("[")
     if name not in names or (bracket and not index.removesuffix("]").isdigit()):
         raise ValueError(
             f"{what!r} is nothing that this sweep kept; allowed: {', '.join(names)}, of a vector "
             "with [0], [1] ... for one component"
         )
-    return name, int(index.removesuffix("]")) if bracket else None
+    variable = dataset[name]
+    with rc_context(STYLE):  # type: ignore[arg-type]
+        if any(str(dim).endswith(_SECTION) for dim in variable.dims):
+            return _points(dataset, variable)
+        axes, cut, said = _cut(dataset, variable)
+        if bracket:
+            cut, said = _component(dataset, cut, axes, int(index.removesuffix("]")), said)
+        on_sphere = directions(dataset, axes[0]) if len(axes) == 1 else None
+        longest = max(axes, key=lambda dim: cut.sizes[dim])
+        lines = len(axes) == 1 or min(cut.sizes[dim] for dim in axes) <= _FEW < cut.sizes[longest]
+        if (not lines or len(axes) > 1 or on_sphere is not None) and set(map(str, cut.dims)) != set(axes):
+            cut, said = _component(dataset, cut, axes, 0, said)  # one at a time
+        if on_sphere is not None:
+            return _sphere(dataset, cut, on_sphere, said)
+        return _lines(dataset, cut, longest, said) if lines else _map(dataset, cut, axes, said)
 
 
 def _cut(dataset: xarray.Dataset, variable: xarray.DataArray) -> tuple[list[str], xarray.DataArray, str]:
@@ -150,13 +150,11 @@ def _component(
     return cut, ", ".join(words)
 
 
-# --- one axis: lines ----------------------------------------------------------------------------------------
-
-
 def _lines(dataset: xarray.Dataset, cut: xarray.DataArray, axis: str, said: str) -> Figure:
+    """Values over one axis, with a line for each component, or value of another axis."""
     figure = blank(dataset, 9.0, 4.4)
     axes = figure.add_subplot()
-    place, label = along(dataset, axis)
+    place, label, _ = along(dataset, axis)
     values = np.asarray(cut.transpose(axis, ...).values, dtype=np.float64).reshape(len(place), -1)
     extra = [str(dim) for dim in cut.dims if dim != axis]
     labels = [
@@ -177,9 +175,8 @@ def _lines(dataset: xarray.Dataset, cut: xarray.DataArray, axis: str, said: str)
         title += f" (the first {_MOST_LINES} of {values.shape[1]})"
     key(axes, title)
     number_ticks(axes.xaxis, dataset, axis, along_x=True)
-    axes.set_xlabel(label)
-    axes.set_ylabel(named(cut))
-    if spans_decades(place) and geometric(np.unique(place)):
+    axes.set(xlabel=label, ylabel=named(cut))
+    if geometric(place):
         axes.set_xscale("log")
     if spans_decades(values):
         axes.set_yscale("log")
@@ -191,28 +188,22 @@ def _ordered(dataset: xarray.Dataset, dim: str) -> bool:
     """Whether neighbours along an axis are related, which randomly drawn members aren't."""
     if dim in dataset.coords:
         return dataset[dim].dtype.kind in "fi"
-    place, _ = along(dataset, dim)
-    steps = np.diff(place)
+    steps = np.diff(along(dataset, dim)[0])
     known = any(c.dims == (dim,) and "swept_key" in c.attrs for c in dataset.coords.values())
     return known and bool((steps > 0).all() or (steps < 0).all())
 
 
-# --- two axes: a map ----------------------------------------------------------------------------------------
-
-
 def _map(dataset: xarray.Dataset, cut: xarray.DataArray, dims: list[str], said: str) -> Figure:
-    extra = [str(dim) for dim in cut.dims if dim not in dims]
-    if extra:  # one component at a time; another is asked for by its index
-        cut, said = _component(dataset, cut, dims, 0, said)
+    """Values over two axes, as colours."""
     figure = blank(dataset, 8.4, 6.0)
     axes = figure.add_subplot()
-    (x, x_label), (y, y_label) = (along(dataset, dim) for dim in dims)
+    (x, x_label, _), (y, y_label, _) = (along(dataset, dim) for dim in dims)
     values = np.asarray(cut.transpose(*dims).values, dtype=np.float64)
     values, x, y = values[np.argsort(x)][:, np.argsort(y)], np.sort(x), np.sort(y)
-    logs = [spans_decades(place) and geometric(place) for place in (x, y)]
+    logs = [geometric(place) for place in (x, y)]
     edges = [edges_of(place, log) for place, log in zip((x, y), logs, strict=True)]
-    scale = _colours(values)
     axes.set_facecolor(PALE)
+    scale, extend = _colours(values)
     mesh = axes.pcolormesh(*edges, values.T, cmap="viridis", rasterized=True, **scale)
     axes.grid(visible=False)
     for log, setting in zip(logs, (axes.set_xscale, axes.set_yscale), strict=True):
@@ -220,68 +211,65 @@ def _map(dataset: xarray.Dataset, cut: xarray.DataArray, dims: list[str], said: 
             setting("log")
     for axis, dim in zip((axes.xaxis, axes.yaxis), dims, strict=True):
         number_ticks(axis, dataset, dim, along_x=axis is axes.xaxis)
-    axes.set_xlabel(x_label)
-    axes.set_ylabel(y_label)
-    title = title_of(cut, said)
-    if not np.isfinite(values).all():
-        title += " (grey: no value)"
-    titled(axes, title)
-    bar = figure.colorbar(mesh, ax=axes, pad=0.02, aspect=30, extend=_extended(values, scale))
-    bar.set_label(named(cut))
-    bar.outline.set_visible(False)
+    axes.set(xlabel=x_label, ylabel=y_label)
+    titled(axes, title_of(cut, said) + ("" if np.isfinite(values).all() else " (grey: no value)"))
+    _colour_bar(axes, mesh, cut, extend=extend)
     return figure
 
 
-def _colours(values: Array) -> dict[str, Any]:
-    """Scale of a map's colours: logarithmic if the values span decades, diverging if both signs occur.
+def _colours(values: Array) -> tuple[dict[str, Any], str]:
+    """Scale of a map's colours, logarithmic if the values span decades, and the ends beyond which some lie.
 
     Of many, a hundredth of the values at the ends doesn't take the colours from all others.
     """
-    from matplotlib.colors import LogNorm
-
     finite = values[np.isfinite(values)]
     if not len(finite):
-        return {"vmin": 0.0, "vmax": 1.0}
+        return {"vmin": 0.0, "vmax": 1.0}, "neither"
     ends = [0.5, 99.5] if len(finite) >= _MANY else [0, 100]
-    if spans_decades(values):
-        low, high = np.percentile(finite[finite > 0], ends)
-        return {"norm": LogNorm(low, high)}
-    low, high = np.percentile(finite, ends)
-    if high - low < 0.5 * np.ptp(finite) or low == high:  # few different values: all of them
+    decades = spans_decades(values)
+    low, high = np.percentile(finite[finite > 0] if decades else finite, ends)
+    if not decades and (high - low < 0.5 * np.ptp(finite) or low == high):  # few different values
         low, high = finite.min(), finite.max()
-    return {"vmin": low, "vmax": high if high > low else low + 1.0}
+        high = high if high > low else low + 1.0
+    below, above = bool((finite < low).any()), bool((finite > high).any())
+    extend = {(True, True): "both", (True, False): "min", (False, True): "max"}.get((below, above), "neither")
+    return ({"norm": LogNorm(low, high)} if decades else {"vmin": low, "vmax": high}), extend
 
 
-def _extended(values: Array, scale: dict[str, Any]) -> str:
-    low = scale["norm"].vmin if "norm" in scale else scale["vmin"]
-    high = scale["norm"].vmax if "norm" in scale else scale["vmax"]
-    with np.errstate(invalid="ignore"):
-        below, above = bool((values < low).any()), bool((values > high).any())
-    return {(True, True): "both", (True, False): "min", (False, True): "max"}.get((below, above), "neither")
+def _colour_bar(axes: Axes, shown: Any, variable: xarray.DataArray, **options: Any) -> None:
+    bar = axes.figure.colorbar(shown, ax=axes, pad=0.02, aspect=30, **options)
+    bar.set_label(named(variable))
+    bar.outline.set_visible(False)
 
 
-def _sphere(dataset: xarray.Dataset, cut: xarray.DataArray, dim: str, said: str) -> Figure:
-    extra = [str(other) for other in cut.dims if other != dim]
-    if extra:
-        cut, said = _component(dataset, cut, [dim], 0, said)
+def _sphere(dataset: xarray.Dataset, cut: xarray.DataArray, vectors: Array, said: str) -> Figure:
+    """A Mollweide map, +z at the top and +x in the centre, with a dot for each direction, (members, 3)."""
     figure = blank(dataset, 8.4, 4.8)
     values = np.asarray(cut.values, dtype=np.float64)
-    scale = _colours(values)
-    told = directions(dataset, dim)
-    assert told is not None
-    axes, shown = on_sphere(figure, told, values, scale)
+    scale, extend = _colours(values)
+    axes = figure.add_subplot(projection="mollweide")
+    axes.set_facecolor(PALE)
+    longitude, latitude = np.arctan2(vectors[:, 1], vectors[:, 0]), np.arcsin(np.clip(vectors[:, 2], -1, 1))
+    figure.canvas.draw()  # the layout says how large the map is
+    box = axes.get_window_extent()
+    area = np.pi / 4 * box.width * box.height * (72 / figure.dpi) ** 2  # of the ellipse, square points
+    size = _FILLED * area / len(vectors)
+    shown = axes.scatter(
+        longitude, latitude, c=values, s=size, lw=0, cmap="viridis", rasterized=True, **scale
+    )
+    places = {"+x": (0, 0), "+y": (np.pi / 2, 0), "−y": (-np.pi / 2, 0), "+z": (0, 1.35), "−z": (0, -1.35)}
+    ground = {"boxstyle": "round,pad=0.2", "facecolor": "white", "alpha": 0.7, "linewidth": 0}
+    for name, place in places.items():
+        axes.annotate(name, place, ha="center", va="center", fontsize=8, bbox=ground)
+    axes.set(xticklabels=[], yticklabels=[])
+    axes.grid(visible=False)
     titled(axes, title_of(cut, said))
-    bar = figure.colorbar(shown, ax=axes, pad=0.02, aspect=30, shrink=0.7, extend=_extended(values, scale))
-    bar.set_label(named(cut))
-    bar.outline.set_visible(False)
+    _colour_bar(axes, shown, cut, shrink=0.7, extend=extend)
     return figure
 
 
-# --- sections: points ---------------------------------------------------------------------------------------
-
-
 def _points(dataset: xarray.Dataset, variable: xarray.DataArray) -> Figure:
-    """Points of all members: one component against the other, or against the axis of the members."""
+    """A section's points of all members: one component against the other, or the axis of the members."""
     members = [dim for dim in variable.dims if dim in axes_of(dataset)]
     occurrence = next(str(dim) for dim in variable.dims if str(dim).endswith(_SECTION))
     rest = [str(dim) for dim in variable.dims if dim not in members and dim != occurrence]
@@ -298,15 +286,13 @@ def _points(dataset: xarray.Dataset, variable: xarray.DataArray) -> Figure:
         one, other = _widest(rows)
         first, second = (label_of(dataset, rest[0], i) if len(rest) == 1 else str(i) for i in (one, other))
         axes.scatter(rows[:, one], rows[:, other], c=which, cmap="viridis", **style)
-        axes.set_xlabel(f"{named(variable)}, {first}")
-        axes.set_ylabel(f"{named(variable)}, {second}")
-        titled(axes, f"{title_of(variable, '')}; coloured by member")
+        axes.set(xlabel=f"{named(variable)}, {first}", ylabel=f"{named(variable)}, {second}")
+        titled(axes, f"{title_of(variable)}; coloured by member")
         return figure
-    place, label = along(dataset, str(members[0])) if len(members) == 1 else (np.arange(count), "member")
+    place, label = along(dataset, str(members[0]))[:2] if len(members) == 1 else (np.arange(count), "member")
     axes.scatter(np.asarray(place, dtype=np.float64)[which], rows[:, 0], color=GREY, **style)
-    axes.set_xlabel(label)
-    axes.set_ylabel(named(variable))
-    titled(axes, title_of(variable, ""))
+    axes.set(xlabel=label, ylabel=named(variable))
+    titled(axes, title_of(variable))
     return figure
 
 
@@ -317,14 +303,3 @@ def _widest(rows: Array) -> tuple[int, int]:
     order = np.argsort(spread <= _FLAT * np.abs(known).max(initial=0), kind="stable")
     one, other = sorted(order[:2].tolist())
     return one, other
-
-
-def save_sweep_figure(dataset: xarray.Dataset, path: Any, what: str | None, *, file_format: str) -> None:
-    """Draw a sweep's figure to a file; see ``sweep_figure``."""
-    from matplotlib import rc_context
-
-    with rc_context(STYLE):  # type: ignore[arg-type]
-        sweep_figure(dataset, what).savefig(path, dpi=160, format=file_format)
-
-
-__all__ = ["drawable", "save_sweep_figure", "sweep_figure"]

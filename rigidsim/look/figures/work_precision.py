@@ -6,6 +6,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from matplotlib import rc_context
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 
 from rigidsim.look.figures.style import STYLE
 from rigidsim.scene.methods import method_named
@@ -14,30 +18,16 @@ from rigidsim.scene.readable_time import span_text
 if TYPE_CHECKING:
     import xarray
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 _COLORS = {"single": "#8c8c8c", "double": "#2166ac", "extended": "#e08214", "quadruple": "#762a83"}
 _OTHER = "#1b9e77"
-_MARKERS = {
-    "quaternion": "o",
-    "rotation_matrix": "s",
-    "euler_angles": "^",
-    "canonical": "D",
-}
+_MARKERS = {"quaternion": "o", "rotation_matrix": "s", "euler_angles": "^", "canonical": "D"}
 _STEPLESS = "*"
 _FRONT = "#1b2733"
 
 
 def save_work_precision(dataset: xarray.Dataset, path: Path) -> Path:
-    """Draw a tradeoff dataset as a page: the plot, and beside it a key to its numbered points.
-
-    Args:
-        path: the file, PNG whatever its suffix; it is whole when this returns.
-    """
-    from matplotlib import rc_context
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
+    """Draw a tradeoff dataset as a page (PNG): the plot, and a key to its numbered points."""
     with rc_context(STYLE):  # type: ignore[arg-type]
         figure = Figure(figsize=(12, 6.4), layout="constrained")
         FigureCanvasAgg(figure)
@@ -119,8 +109,6 @@ def _look(dataset: xarray.Dataset, n: int) -> tuple[str, str]:
 
 
 def _legend(axes: Axes, dataset: xarray.Dataset, short: bool) -> None:
-    from matplotlib.lines import Line2D
-
     def handle(label: str, **options: Any) -> Line2D:
         return Line2D([], [], linestyle="none", label=label, markersize=7, **options)
 
@@ -138,9 +126,8 @@ def _legend(axes: Axes, dataset: xarray.Dataset, short: bool) -> None:
     if short:
         handles.append(handle("pale: over less of the motion", marker="o", color="#444444", alpha=0.45))
     handles.append(Line2D([], [], color=_FRONT, linewidth=1.1, label="best of all (numbered)"))
-    place: Any = (
-        "lower left" if "model" in dataset.sizes else "upper right"
-    )  # models are cheap, and not exact
+    # models are cheap, and not exact
+    place: Any = "lower left" if "model" in dataset.sizes else "upper right"
     axes.legend(handles=handles, loc=place, ncols=2, fontsize=8, frameon=True, framealpha=0.9)
 
 

@@ -8,8 +8,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from matplotlib import rc_context
 
-from rigidsim.look.figures.style import STYLE
+from rigidsim.look.figures.style import STYLE, ShownFigure
 from rigidsim.scene.readable_time import DAY, YEAR, TimeUnit, unit_for
 
 if TYPE_CHECKING:
@@ -29,18 +30,7 @@ _FAST_DECADES = 2.5  # of frequency from which on the axis is logarithmic
 
 
 def spectrum_figure(analysis: xarray.Dataset) -> Figure:
-    """Draw each signal's amplitude spectrum, its lines, and what they are.
-
-    Args:
-        analysis: dataset ``rigidsim.analyse(...).dataset``, of which the first eight signals are drawn.
-
-    Returns:
-        A figure on the Agg canvas.
-    """
-    from matplotlib import rc_context
-
-    from rigidsim.look.figures.shown import ShownFigure
-
+    """Draw amplitude spectra, lines and labels of the first eight signals of an analysis' ``.dataset``."""
     analysis = analysis.isel(signal=np.isfinite(analysis["amplitude"].values).any(axis=1))
     count = min(analysis.sizes["signal"], _MOST_SIGNALS)
     with rc_context(STYLE):  # type: ignore[arg-type]
@@ -50,26 +40,15 @@ def spectrum_figure(analysis: xarray.Dataset) -> Figure:
         for number in range(count):
             axes = figure.add_subplot(count, 1, number + 1)
             _draw(axes, analysis.isel(signal=number), float(analysis.attrs["nyquist_frequency"]))
-        title = str(analysis.attrs.get("title") or "dataset")
-        left = (
-            f", the first {count} of {analysis.sizes['signal']} signals"
-            if analysis.sizes["signal"] > count
-            else ""
-        )
-        figure.suptitle(
-            f"{title}: lines of the spectrum{left}", x=0.012, ha="left", fontsize=13, fontweight="bold"
-        )
+        title = f"{analysis.attrs.get('title') or 'dataset'}: lines of the spectrum"
+        if analysis.sizes["signal"] > count:
+            title += f", the first {count} of {analysis.sizes['signal']} signals"
+        figure.suptitle(title, x=0.012, ha="left", fontsize=13, fontweight="bold")
     return figure
 
 
 def save_spectrum(analysis: xarray.Dataset, path: Path, *, file_format: str | None = None) -> Path:
-    """Draw the spectra into a PNG or SVG file.
-
-    Returns:
-        ``path``.
-    """
-    from matplotlib import rc_context
-
+    """Draw the spectra into a PNG or SVG file; returns its path."""
     with rc_context(STYLE):  # type: ignore[arg-type]
         spectrum_figure(analysis).savefig(path, dpi=140, format=file_format)
     return path
@@ -83,9 +62,8 @@ def _draw(axes: Any, signal: xarray.Dataset, nyquist: float) -> None:
     unfolded = signal["unfolded"].values[chosen] == 1
     ambiguous = signal["ambiguous"].values[chosen] == 1
     units = str(signal["signal_units"].item())
-    scale, symbol = (
-        (_ARCSEC, "arcsec") if units == "rad" and amplitude.max(initial=0) < 0.03 else (1.0, units)
-    )
+    small = units == "rad" and amplitude.max(initial=0) < 0.03
+    scale, symbol = (_ARCSEC, "arcsec") if small else (1.0, units)
     time = _time_unit(rate)
     turns = time.seconds / (2 * math.pi)  # rad/s to turns per unit
     real = int(signal["real"].item()) == 1
@@ -118,23 +96,16 @@ def _draw(axes: Any, signal: xarray.Dataset, nyquist: float) -> None:
     per = "turns per second" if time.symbol == "s" else f"turns per {time.symbol}"
     axes.set_xlabel(f"frequency [{per}]")
     axes.set_ylabel(f"amplitude [{symbol}]" if symbol not in ("", "1") else "amplitude")
-    axes.set_title(_title(signal))
-
-
-def _title(signal: xarray.Dataset) -> str:
-    name, slope = str(signal["signal"].item()), float(signal["secular_rate"].item())
-    if math.isfinite(slope) and str(signal["signal_units"].item()) == "rad":
+    title, slope = str(signal["signal"].item()), float(signal["secular_rate"].item())
+    if math.isfinite(slope) and units == "rad":
         rate = slope / _ARCSEC * YEAR
-        if abs(rate) < 1e7:
-            return f"{name}, without its secular rate of {rate:.6g} arcsec/yr"
-        return f"{name}, without its secular rate of {slope:.6g} rad/s"
-    return name
+        told = f"{rate:.6g} arcsec/yr" if abs(rate) < 1e7 else f"{slope:.6g} rad/s"
+        title += f", without its secular rate of {told}"
+    axes.set_title(title)
 
 
 def _time_unit(rate: np.ndarray) -> TimeUnit:
-    """The shortest unit of time not shorter than the median period, so that numbers along the axis are at
-    least 1.
-    """
+    """The shortest unit of time not shorter than the median period: numbers along the axis are at least 1."""
     moving = np.abs(rate[np.abs(rate) > 0])
     if not len(moving):
         return TimeUnit("s", 1.0)
