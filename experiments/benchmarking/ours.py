@@ -24,9 +24,9 @@ def in_a_folder(config: Path, out: Path) -> dict[str, float]:
         import h5netcdf.legacyapi  # noqa: F401
         import xarray
 
-        import rigidsim.look.blueprint
-        import rigidsim.look.drawing
         import rigidsim.look.timeline
+        import rigidsim.look.timeline.blueprint
+        import rigidsim.look.timeline.drawing
 
         xarray.Variable((), 0.0)  # imports dask where it is installed
     run, parse = rigidsim.run, rigidsim.parse

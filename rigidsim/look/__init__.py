@@ -1,32 +1,18 @@
-"""Pictures of a recorded run: rerun timeline, figures, viewer.
+"""Pictures of a recorded run, from its dataset alone: rerun timeline, figures, viewer.
 
-Importing this package loads nothing heavy.
+Two folders load what draws, and are imported only where a picture is drawn: `timeline` loads rerun,
+`figures` matplotlib. All else is numbers and texts, for both.
 
 | module | holds |
 | --- | --- |
-| `timeline` | `write_timeline`: dataset to `timeline.rrd` |
-| `stages` | stages by kind of scene, as numbers: a package of its own |
-| `surroundings` | what stands around the body, from the dataset's attributes |
-| `signals` | what pictures show, recorded or worked out |
-| `states` | events and the end of a run as lanes, sections |
-| `drawn` | everything that is drawn of one run |
-| `recording` | a recording of rerun written to a file |
-| `blueprint`, `comparison_page` | the page that the viewer opens with, for one run and for several |
-| `drawing`, `plotting` | stages, and plots, planes, legend and clock, as rerun entities |
-| `comparison` | `write_comparison`: several runs side by side |
-| `live` | `follow`: a run that goes on |
-| `film` | `render`: pictures and films of a timeline |
-| `roles` | residuals, drifts and what was put back, by the variables' attributes |
-| `plots` | which variable goes into which plot |
-| `clock` | seconds to the viewer's integer timelines |
-| `page` | the summary page |
-| `figures` | figures of a run by name, dataset to matplotlib, PNG or SVG: a package of its own |
+| `timeline` | `write_timeline`, `write_comparison`: datasets to a recording of rerun; a package of its own |
+| `figures` | figures by name, dataset to matplotlib, PNG or SVG; a package of its own |
 | `figure_names` | their names, without any import |
-| `work_precision` | the figure of `rigidsim tradeoff`: error against cost |
-| `viewer` | `open_viewer`, `HeadlessViewer`, `screenshot` |
-| `symbols` | toy tops, globes, edges and meridians |
-| `coasts` | the Earth's continents |
-| `solids` | triangle meshes of bodies, from the outlines of their shapes |
-| `rows` | what pictures need of a dataset, as arrays |
-| `thinning` | reading a bounded number of rows of a dataset of any length |
+| `stages` | stages by kind of scene, as numbers; a package of its own |
+| `plots`, `page`, `states` | which variable goes into which plot; the summary page; lanes of events and sections |
+| `signals`, `roles` | what pictures show, recorded or worked out; what a dataset tells of itself |
+| `surroundings` | what stands around the body, from the dataset's attributes |
+| `solids`, `symbols`, `coasts` | meshes of bodies; toy tops, globes, edges, meridians; the Earth's continents |
+| `thinning`, `clock` | a bounded number of rows of any dataset; seconds to the viewer's integer timelines |
+| `viewer`, `live`, `film` | opening the viewer; following a run that goes on; pictures and films of a timeline |
 """

@@ -3,30 +3,16 @@
 from __future__ import annotations
 
 import re
-import tomllib
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from rigidsim.look.plots import pretty_unit
-from rigidsim.look.roles import drifts, in_words, is_averaged
+from rigidsim.look.roles import drifts, in_words, is_averaged, read_config, title_of
 from rigidsim.scene.readable_time import TimeWords
 
 if TYPE_CHECKING:
     from rigidsim.look.rows import Table, Variable
-
-
-def read_config(dataset: Table) -> dict[str, Any]:
-    """The embedded config as a dictionary; empty when there is none or it can't be read."""
-    try:
-        return tomllib.loads(str(dataset.attrs.get("config", "")))
-    except tomllib.TOMLDecodeError:
-        return {}
-
-
-def title_of(dataset: Table) -> str:
-    """Title of the run: attribute `title`, else the config's name."""
-    return str(dataset.attrs.get("title") or read_config(dataset).get("name") or "rigid body")
 
 
 def summary_page(dataset: Table, thinned: Table, kind: str = "") -> str:

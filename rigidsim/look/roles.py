@@ -1,8 +1,9 @@
-"""Roles of variables in a dataset, known from their attributes and never from their names."""
+"""What a dataset tells of itself: its config and title, and the roles of variables by their attributes."""
 
 from __future__ import annotations
 
 import re
+import tomllib
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
@@ -13,6 +14,19 @@ if TYPE_CHECKING:
 _ORBIT_NORM = re.compile(r"orbit_norm_(\d+)")
 _AVERAGED = ("spin_averaged", "orbit_averaged")
 """Model levels whose datasets have axes but no attitude."""
+
+
+def read_config(dataset: Table) -> dict[str, Any]:
+    """The embedded config as a dictionary; empty when there is none or it can't be read."""
+    try:
+        return tomllib.loads(str(dataset.attrs.get("config", "")))
+    except tomllib.TOMLDecodeError:
+        return {}
+
+
+def title_of(dataset: Table) -> str:
+    """Title of the run: attribute `title`, else the config's name."""
+    return str(dataset.attrs.get("title") or read_config(dataset).get("name") or "rigid body")
 
 
 def is_residual(variable: Variable) -> bool:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rigidsim.look.page import read_config
+from rigidsim.look.roles import read_config
 from rigidsim.look.solids import rotation_matrix
 
 if TYPE_CHECKING:

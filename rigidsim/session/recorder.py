@@ -10,7 +10,6 @@ from collections.abc import Mapping
 import numpy as np
 
 from rigidsim.errors import RunFolderError
-from rigidsim.look.thinning import KeptRows
 from rigidsim.session.dataset import dates_of, drift_name, put_back_name
 from rigidsim.session.statistics import SampleStatistics
 from rigidsim.solve.assembly import Assembly
@@ -74,7 +73,6 @@ class Recorder(SampleReceiver):
 
     Attributes:
         statistics: what the summary needs of all samples.
-        kept: rows for the timeline; None if no timeline is asked for.
 
     Args:
         checkpoints: of the run, which begins or resumes.
@@ -103,9 +101,6 @@ class Recorder(SampleReceiver):
         self._max_drift = None if guard is None else float(guard)
         self.statistics = statistics
         self.trail = trail
-        output, count = prepared.scene.config.output, prepared.clock.count
-        shown = output.timeline and isinstance(writer, SegmentWriter)
-        self.kept = KeptRows(count, output.timeline_rows) if shown else None
         self._note_lost_turns()
 
     def take(self, block: SampleBlock) -> None:
@@ -142,8 +137,6 @@ class Recorder(SampleReceiver):
         factors = self._evaluator.singular_factors(block.states, block.chart)
         if factors is not None:
             self.statistics.see_singular(factors, recorded["time"][0])
-        if self.kept is not None:
-            self.kept.take(block.first, {name: parts[0] for name, parts in recorded.items()})
         self._writer.add(recorded)
 
     def _note_lost_turns(self) -> None:

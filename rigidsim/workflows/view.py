@@ -116,7 +116,7 @@ def recording_of(named: Sequence[tuple[str, Run]]) -> Iterator[Path]:
         with named[0][1].recording() as timeline:
             yield timeline
         return
-    from rigidsim.look.comparison import write_comparison
+    from rigidsim.look.timeline.comparison import write_comparison
 
     with tempfile.TemporaryDirectory(prefix="rigidsim-view-") as scratch, ExitStack() as opened:
         datasets = [(name, opened.enter_context(run.dataset)) for name, run in named]

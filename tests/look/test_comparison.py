@@ -14,8 +14,8 @@ pytest.importorskip("rerun")
 import rerun as rr
 
 from rigidsim.look import viewer
-from rigidsim.look.comparison import MOST, write_comparison
-from rigidsim.look.live import LiveRecording
+from rigidsim.look.timeline.comparison import MOST, write_comparison
+from rigidsim.look.timeline.writing import LiveRecording
 
 Build = Callable[..., xarray.Dataset]
 Read = Callable[[Path, str], dict[str, np.ndarray]]

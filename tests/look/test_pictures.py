@@ -17,10 +17,10 @@ import pytest
 pytest.importorskip("rerun")
 
 import rigidsim
-from rigidsim.look.drawn import DrawnRun
-from rigidsim.look.recording import recording_to
 from rigidsim.look.thinning import thin, thinned_indices
 from rigidsim.look.timeline import write_timeline
+from rigidsim.look.timeline.drawn import DrawnRun
+from rigidsim.look.timeline.recording import recording_to
 from rigidsim.look.viewer import HeadlessViewer, NoGraphics, vulkan_drivers
 
 pytestmark = [

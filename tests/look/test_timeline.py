@@ -12,7 +12,7 @@ import xarray
 pytest.importorskip("rerun")
 
 import rigidsim
-from rigidsim.look.recording import CHUNK, STRETCH
+from rigidsim.look.timeline.recording import CHUNK
 from rigidsim.look.timeline import write_timeline
 
 Build = Callable[..., xarray.Dataset]
@@ -111,7 +111,7 @@ def test_only_the_rows_shown_are_read_from_a_file(symmetric_top: Build, tmp_path
 def test_chunk_borders_lose_and_double_nothing(symmetric_top: Build, read_back: Read, tmp_path: Path) -> None:
     from rerun.chunk import RrdReader
 
-    count = STRETCH + CHUNK + 1
+    count = 2 * CHUNK + 1
     dataset = symmetric_top(count=count)
     write_timeline(dataset, tmp_path / "t.rrd")
     for entity in ("/scene/body", "/plots/angular_velocity"):

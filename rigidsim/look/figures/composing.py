@@ -13,8 +13,8 @@ from rigidsim.look import signals
 from rigidsim.look.figures import timelines
 from rigidsim.look.figures.panel import Panel
 from rigidsim.look.figures.style import GREY, INK, STYLE, blank
-from rigidsim.look.page import largest_drift, read_config
-from rigidsim.look.roles import drifts, is_averaged
+from rigidsim.look.page import largest_drift
+from rigidsim.look.roles import drifts, is_averaged, read_config
 from rigidsim.look.thinning import thin
 from rigidsim.scene.readable_time import unit_for
 

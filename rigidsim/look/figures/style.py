@@ -18,7 +18,7 @@ from matplotlib.layout_engine import ConstrainedLayoutEngine
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
-from rigidsim.look.page import read_config, title_of
+from rigidsim.look.roles import read_config, title_of
 
 if TYPE_CHECKING:
     import xarray

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rigidsim.look import signals, surroundings
-from rigidsim.look.page import read_config
+from rigidsim.look.roles import read_config
 from rigidsim.look.signals import values
 from rigidsim.look.solids import Mesh, body_meshes, point_positions, rotation_matrix
 from rigidsim.look.stages.parts import (

@@ -12,8 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rigidsim.look import signals, surroundings
-from rigidsim.look.page import read_config
-from rigidsim.look.roles import is_averaged
+from rigidsim.look.roles import is_averaged, read_config
 from rigidsim.look.stages.bodies import Subject, direction_of, source_arrows
 from rigidsim.look.stages.parts import (
     FAINT,

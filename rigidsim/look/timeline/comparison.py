@@ -13,11 +13,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigidsim.look.clock import Clock, build_clock
-from rigidsim.look.drawn import DrawnRun
 from rigidsim.look.page import legible
 from rigidsim.look.plots import Plot, Series
-from rigidsim.look.recording import STRETCH, recording_to
+from rigidsim.look.signals import values
 from rigidsim.look.thinning import thin, thinned_indices
+from rigidsim.look.timeline.blueprint import build_comparison
+from rigidsim.look.timeline.drawn import DrawnRun
+from rigidsim.look.timeline.plotting import legend_of
+from rigidsim.look.timeline.recording import chunks, recording_to
 
 if TYPE_CHECKING:
     from rigidsim.look.rows import Table
@@ -56,14 +59,21 @@ def write_comparison(named: Sequence[tuple[str, Table]], path: Path, *, rows: in
         run = DrawnRun.of(dataset, table, steps, clock=_part(clock, seconds[number]))
         drawn.append(_named(run, name, number))
     apart = attitude_differences([(name, table) for name, _, table in shown])
+    blueprint = build_comparison(
+        [(run.picture.stages[0], run.clock, run.subject) for run in drawn],
+        [plot for run in drawn for plot in run.plots],
+        clock,
+        max(run.turns for run in drawn),
+        legend=legend_of(drawn[0].picture.stages),
+        pages={f"run{number}_summary": legible(name) for number, (name, _) in enumerate(named)},
+        difference=apart,
+    )
     with recording_to(path, " and ".join(name for name, _ in named), sum(map(len, seconds))) as recording:
-        from rigidsim.look.comparison_page import build_comparison
-
-        recording.start(build_comparison(drawn, clock, apart))
+        recording.start(blueprint)
         for run in drawn:
             run.draw_static(recording.stream, legend=run is drawn[0])
-            for start in range(0, len(run.seconds), STRETCH):
-                run.draw_rows(recording.stream, slice(start, min(start + STRETCH, len(run.seconds))))
+            for part in chunks(0, len(run.seconds)):
+                run.draw_rows(recording.stream, part)
         if apart is not None:
             drawn[0].draw_plots(recording.stream, [apart])
     return sum(map(len, seconds))
@@ -121,8 +131,6 @@ def attitude_differences(named: Sequence[tuple[str, Table]]) -> Plot | None:
     Between the samples of another run its quaternions are interpolated on the arc. None if the first has
     no attitude, or no other has one at its times.
     """
-    from rigidsim.look.signals import values
-
     (first_name, first), *others = named
     base = values(first, "quaternion")
     if base is None:

@@ -1,6 +1,6 @@
 """Stages as rerun entities: static parts, and columns of what changes.
 
-Imports rerun when it is loaded, so load it only where a timeline is written. Meshes are given no normals:
+Meshes are given no normals:
 the viewer then shows their own colours from all sides, and edges tell the faces apart.
 """
 

@@ -1,18 +1,15 @@
-"""Plots, plane figures, states, the legend and the clock as rerun entities.
-
-Imports rerun when it is loaded, so load it only where a timeline is written.
-"""
+"""Plots, plane figures, states, the legend and the clock as rerun entities."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import rerun as rr
 from numpy.typing import NDArray
 
-from rigidsim.look.plots import Plot, Series
-from rigidsim.look.sending import send
+from rigidsim.look.plots import Plot
 from rigidsim.look.stages.parts import Arrow, Color, Line, Plane, Stage, Trail, Vector
 from rigidsim.look.states import States
 
@@ -41,22 +38,17 @@ def draw_plot_styles(recording: rr.RecordingStream, plots: Sequence[Plot]) -> No
     """Names and colours of the curves."""
     for plot in plots:
         for series in plot.series:
-            if series.error is not None:
-                style = rr.Measurements.from_fields(
-                    names=series.labels, colors=series.colors, widths=[1.5] * len(series.labels)
-                )
-                recording.log(plot_path(plot, series.name), style, static=True)
-            else:
-                recording.log(
-                    plot_path(plot, series.name),
-                    rr.SeriesLines(
-                        names=series.labels,
-                        colors=series.colors,
-                        widths=[1.5] * len(series.labels),
-                        aggregation_policy=aggregation(plot, series.values),
-                    ),
-                    static=True,
-                )
+            style: dict[str, Any] = {
+                "names": series.labels,
+                "colors": series.colors,
+                "widths": [1.5] * len(series.labels),
+            }
+            look = (
+                rr.SeriesLines(**style, aggregation_policy=aggregation(plot, series.values))
+                if series.error is None
+                else rr.Measurements.from_fields(**style)
+            )
+            recording.log(plot_path(plot, series.name), look, static=True)
 
 
 def draw_plot_rows(
@@ -65,20 +57,20 @@ def draw_plot_rows(
     """The curves, for the rows of one chunk."""
     for plot in plots:
         for series in plot.series:
-            path = plot_path(plot, series.name)
+            values = series.values[rows]
             if series.error is None:
-                columns = rr.Scalars.columns(scalars=series.values[rows])
-            else:
-                columns = _measured(series, rows)
-            send(recording, path, times, columns)
+                columns = rr.Scalars.columns(scalars=values)
+            else:  # with a band of their uncertainty: the viewer draws the root of a variance
+                count = values.shape[1]
+                variances = np.repeat(series.error[rows] ** 2, count)
+                columns = rr.Measurements.columns(values=values.ravel(), variances=variances).partition(
+                    [count] * len(values)
+                )
+            recording.send_columns(plot_path(plot, series.name), indexes=times, columns=columns)
 
 
 def draw_levels(recording: rr.RecordingStream, plots: Sequence[Plot], ends: list[rr.TimeColumn]) -> None:
-    """Values that hold for the whole run, as level lines.
-
-    Args:
-        ends: times of the first and the last row.
-    """
+    """Values that hold for the whole run, as level lines from the first to the last row's time."""
     for plot in plots:
         for level in plot.levels:
             path = plot_path(plot, level.key)
@@ -86,16 +78,6 @@ def draw_levels(recording: rr.RecordingStream, plots: Sequence[Plot], ends: list
             recording.log(path, style, static=True)
             columns = rr.Scalars.columns(scalars=[level.value, level.value])
             recording.send_columns(path, indexes=ends, columns=columns)
-
-
-def _measured(series: Series, rows: slice) -> rr.ComponentColumnList:
-    """Values with a band of their uncertainty to both sides (the viewer draws the root of a variance)."""
-    assert series.error is not None
-    values = series.values[rows]
-    count = values.shape[1]
-    return rr.Measurements.columns(
-        values=values.ravel(), variances=np.repeat(series.error[rows] ** 2, count)
-    ).partition([count] * len(values))
 
 
 def aggregation(plot: Plot, values: NDArray[np.float64]) -> rr.components.AggregationPolicy:
@@ -120,51 +102,42 @@ def aggregation(plot: Plot, values: NDArray[np.float64]) -> rr.components.Aggreg
 
 def draw_planes(recording: rr.RecordingStream, planes: Sequence[Plane]) -> None:
     """Draw the static parts of plane figures: the whole path, circles, axes."""
+    angle = np.linspace(0, 2 * np.pi, 121)
     for plane in planes:
-        path = plane_path(plane)
+
+        def log(name: str, part: rr.AsComponents, path: str = plane_path(plane)) -> None:
+            recording.log(f"{path}/{name}", part, static=True)
+
         points = flipped(plane.points)
         finite = points[np.isfinite(points).all(axis=1)]
         whole = finite[:: max(len(finite) // 4000, 1)]
         dim: Color = tuple(round(0.5 * x) for x in plane.color)  # type: ignore[assignment]
         if len(whole) > 1 and plane.moves and _dense(whole):
-            curve: rr.LineStrips2D | rr.Points2D = rr.LineStrips2D(
-                [whole], colors=[dim], radii=rr.Radius.ui_points(0.9), draw_order=1.0
-            )
+            log("whole", _faint([whole], color=dim, width=0.9, order=1.0))
         else:
-            curve = rr.Points2D(
-                whole, colors=[dim if plane.moves else plane.color], radii=rr.Radius.ui_points(1.6)
-            )
-        recording.log(f"{path}/whole", curve, static=True)
-        size = plane_reach(plane)
-        low, high = np.min(whole, axis=0, initial=0.0), np.max(whole, axis=0, initial=0.0)
-        cross = [[(low[0] - size * 0.1, 0), (high[0] + size * 0.1, 0)],
-                 [(0, low[1] - size * 0.1), (0, high[1] + size * 0.1)]]  # fmt: skip
-        recording.log(
-            f"{path}/axes",
-            rr.LineStrips2D(cross, colors=[_FAINT], radii=rr.Radius.ui_points(0.5), draw_order=-1.0),
-            static=True,
-        )
+            color = dim if plane.moves else plane.color
+            log("whole", rr.Points2D(whole, colors=[color], radii=rr.Radius.ui_points(1.6)))
+        margin = 0.1 * plane_reach(plane)
+        left, top = np.min(whole, axis=0, initial=0.0) - margin
+        right, bottom = np.max(whole, axis=0, initial=0.0) + margin
+        log("axes", _faint([[(left, 0), (right, 0)], [(0, top), (0, bottom)]]))
         if any(plane.names):
-            ends = [(high[0] + size * 0.1, 0), (0, low[1] - size * 0.1)]
-            labels = rr.Points2D(ends, labels=list(plane.names), colors=[_INK], radii=0.0, show_labels=True)
-            recording.log(f"{path}/axes/names", labels, static=True)
-        angle = np.linspace(0, 2 * np.pi, 121)
+            log("axes/names", _texts([(right, 0), (0, top)], list(plane.names)))
         for number, (radius, label) in enumerate(plane.rings):
-            ring = radius * np.stack([np.cos(angle), np.sin(angle)], axis=1)
-            recording.log(
-                f"{path}/rings/{number}",
-                rr.LineStrips2D([ring], colors=[_FAINT], radii=rr.Radius.ui_points(0.5), draw_order=-1.0),
-                static=True,
-            )
+            log(f"rings/{number}", _faint([radius * np.stack([np.cos(angle), np.sin(angle)], axis=1)]))
             at = 0.9 - 0.35 * (number % 2)  # neighbours' labels lie apart
-            place = [(radius * np.cos(at), radius * np.sin(at))]
-            text = rr.Points2D(place, labels=[label], colors=[_INK], radii=0.0, show_labels=True)
-            recording.log(f"{path}/rings/{number}/label", text, static=True)
+            log(f"rings/{number}/label", _texts([(radius * np.cos(at), radius * np.sin(at))], [label]))
         if plane.moves:
-            head = rr.Points2D.from_fields(
-                colors=[plane.color], radii=rr.Radius.ui_points(5.0), draw_order=3.0
-            )
-            recording.log(f"{path}/now", head, static=True)
+            size = rr.Radius.ui_points(5.0)
+            log("now", rr.Points2D.from_fields(colors=[plane.color], radii=size, draw_order=3.0))
+
+
+def _faint(strips: Any, *, color: Color = _FAINT, width: float = 0.5, order: float = -1.0) -> rr.LineStrips2D:
+    return rr.LineStrips2D(strips, colors=[color], radii=rr.Radius.ui_points(width), draw_order=order)
+
+
+def _texts(places: Any, labels: list[str]) -> rr.Points2D:
+    return rr.Points2D(places, labels=labels, colors=[_INK], radii=0.0, show_labels=True)
 
 
 def draw_plane_rows(
@@ -174,14 +147,14 @@ def draw_plane_rows(
     for plane in planes:
         if plane.moves:
             places = flipped(plane.points[rows]).astype(np.float32)
-            send(recording, f"{plane_path(plane)}/now", times, rr.Points2D.columns(positions=places))
+            columns = rr.Points2D.columns(positions=places)
+            recording.send_columns(f"{plane_path(plane)}/now", indexes=times, columns=columns)
 
 
 def plane_reach(plane: Plane) -> float:
     """Extent of what is drawn of a plane figure, from its origin."""
     finite = plane.points[np.isfinite(plane.points).all(axis=1)]
-    size = float(np.abs(finite).max(initial=0.0))
-    return size or 1.0
+    return float(np.abs(finite).max(initial=0.0)) or 1.0
 
 
 def flipped(points: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -199,12 +172,8 @@ def legend_of(stages: Sequence[Stage]) -> list[tuple[str, Color]]:
     """Meaning of each colour, once."""
     found: dict[str, Color] = {}
     for stage in stages:
-        parts: list[Arrow | Vector | Trail | Line] = [
-            *stage.arrows,
-            *stage.vectors,
-            *stage.trails,
-            *stage.lines,
-        ]
+        parts: list[Arrow | Vector | Trail | Line]
+        parts = [*stage.arrows, *stage.vectors, *stage.trails, *stage.lines]
         for part in parts:
             if part.words:
                 found.setdefault(part.words, part.color)
@@ -216,16 +185,25 @@ def legend_lines(entries: Sequence[tuple[str, Color]]) -> int:
     return -(-(1 + len(entries)) // LEGEND_COLUMNS)
 
 
-def draw_legend(recording: rr.RecordingStream, entries: Sequence[tuple[str, Color]]) -> None:
-    """Draw the legend as a plane figure, 30 units wide and one per line, the clock first."""
+def draw_legend(
+    recording: rr.RecordingStream,
+    entries: Sequence[tuple[str, Color]],
+    clock: list[str],
+    times: list[rr.TimeColumn],
+) -> None:
+    """Draw the legend as a plane figure, 30 units wide and one per line; first the scene's time in words, for
+    some of the rows.
+    """
     if entries:
         words = [f"■ {words}" for words, _ in entries]
         places = [_legend_place(number + 1) for number in range(len(entries))]
         colors = [color for _, color in entries]
         text = rr.Points2D(places, labels=words, colors=colors, radii=0.0, show_labels=True)
         recording.log("/legend/words", text, static=True)
-    clock = rr.Points2D.from_fields(colors=[_INK], radii=[0.0], show_labels=True)
-    recording.log("/legend/clock", clock, static=True)
+    style = rr.Points2D.from_fields(colors=[_INK], radii=[0.0], show_labels=True)
+    recording.log("/legend/clock", style, static=True)
+    columns = rr.Points2D.columns(positions=[_legend_place(0)] * len(clock), labels=clock)
+    recording.send_columns("/legend/clock", indexes=times, columns=columns)
 
 
 def _legend_place(number: int) -> tuple[float, float]:
@@ -233,23 +211,10 @@ def _legend_place(number: int) -> tuple[float, float]:
     return width * (number % LEGEND_COLUMNS + 0.5), LEGEND_LINE * (number // LEGEND_COLUMNS + 0.06)
 
 
-def draw_clock(recording: rr.RecordingStream, words: list[str], times: list[rr.TimeColumn]) -> None:
-    """Draw the scene's time in words, for some of the rows."""
-    places = [_legend_place(0)] * len(words)
-    columns = rr.Points2D.columns(positions=places, labels=words)
-    recording.send_columns("/legend/clock", indexes=times, columns=columns)
-
-
-def draw_states(
-    recording: rr.RecordingStream, states: Sequence[States], times: list[list[rr.TimeColumn]]
-) -> None:
-    """Draw lanes of states over time."""
-    for lane, indexes in zip(states, times, strict=True):
-        path = f"/states/{rr.escape_entity_path_part(lane.name)}"
-        values = sorted(set(lane.values))
-        recording.log(
-            path,
-            rr.StateConfiguration(values=values, labels=values, colors=[lane.colors[v] for v in values]),
-            static=True,
-        )
-        recording.send_columns(path, indexes=indexes, columns=rr.StateChange.columns(state=lane.values))
+def draw_states(recording: rr.RecordingStream, lane: States, times: list[rr.TimeColumn]) -> None:
+    """Draw a lane of states over time."""
+    path = f"/states/{rr.escape_entity_path_part(lane.name)}"
+    values = sorted(set(lane.values))
+    colors = [lane.colors[value] for value in values]
+    recording.log(path, rr.StateConfiguration(values=values, labels=values, colors=colors), static=True)
+    recording.send_columns(path, indexes=times, columns=rr.StateChange.columns(state=lane.values))

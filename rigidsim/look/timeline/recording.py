@@ -8,29 +8,32 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+
+import rerun as rr
+import rerun.blueprint as rrb
+from rerun.error_utils import set_strict_mode, strict_mode
 
 from rigidsim.look.page import legible
 
 CHUNK = 4096  # rows per chunk: larger ones make the viewer slow, smaller ones heavy
-STRETCH = 16 * CHUNK  # rows that are made ready for rerun at once: what a call costs is shared by them
 _ROW_BYTES = 600  # at most: some twenty variables
 _FIRST_BYTES = 1024 * _ROW_BYTES  # bodies, layout, page
 
 
+def chunks(first: int, count: int) -> Iterator[slice]:
+    """The rows from the first to the last, ``CHUNK`` at a time."""
+    return (slice(start, min(start + CHUNK, count)) for start in range(first, count, CHUNK))
+
+
 @dataclass
 class Recording:
-    """A recording being written.
+    """A recording of this name that is written to a file."""
 
-    Attributes:
-        stream: recording stream of rerun.
-    """
-
-    stream: Any
+    stream: rr.RecordingStream
     path: Path
     name: str
 
-    def start(self, blueprint: Any) -> None:
+    def start(self, blueprint: rrb.Blueprint) -> None:
         """Open the file and send its layout."""
         self.stream.save(self.path, default_blueprint=blueprint)
         self.stream.send_recording_name(legible(self.name))
@@ -38,17 +41,12 @@ class Recording:
 
 @contextmanager
 def recording_to(path: Path, name: str, rows: int) -> Iterator[Recording]:
-    """A recording that is whole when the block ends.
-
-    Args:
-        rows: largest number of rows that will be written.
+    """A recording of at most so many rows that is whole when the block ends.
 
     Raises:
         RuntimeError: the environment variable RERUN switches recording off.
         OSError: there is no room for it.
     """
-    import rerun as rr
-
     check_room(path, rows)
     with strict():
         # The context manager finishes the file: without it there is no footer.
@@ -64,8 +62,6 @@ def strict() -> Iterator[None]:
 
     Otherwise wrong lengths, shapes and times are dropped with a warning.
     """
-    from rerun.error_utils import set_strict_mode, strict_mode
-
     before = strict_mode()
     set_strict_mode(True)
     try:

@@ -1,24 +1,21 @@
-"""The page that the viewer opens with: scene, legend, plots, and summary.
-
-Imports rerun when it is loaded, so load it only where a timeline is written.
-"""
+"""The page that the viewer opens with: scene, legend, plots, and summary; of several runs side by side."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
-import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 from rerun.blueprint.components import LinkAxis
 
 from rigidsim.look.clock import Clock
-from rigidsim.look.drawing import OLDER, fades, trail_path, trail_stride
 from rigidsim.look.plots import Plot
-from rigidsim.look.plotting import LEGEND_LINE, legend_lines, plane_path, plane_reach, plot_path
 from rigidsim.look.stages.bodies import Subject, camera
 from rigidsim.look.stages.parts import Color, Plane, Stage
+from rigidsim.look.timeline.drawing import OLDER, fades, trail_path, trail_stride
+from rigidsim.look.timeline.plotting import LEGEND_LINE, legend_lines, plane_path, plane_reach, plot_path
 
 SCREEN_SECONDS = 60.0  # the longest that playing a whole run may take
 TURN_SECONDS = 3.0  # per turn of the body, when the run has few enough turns for it
@@ -41,56 +38,113 @@ def build_blueprint(
     pages: Sequence[str] = ("Summary",),
     following: bool = False,
 ) -> rrb.Blueprint:
-    """The layout for stages and plots.
+    """The layout for a run.
 
     Args:
         stages: the first is the body's.
-        plots: as from `plots.plan_plots`.
         clock: timeline that the page opens on, at its start, and plays.
         turns: how often the body turns during the run, for the playback speed.
         planes: plane figures beside the stages.
         subject: the body, for the eye's place.
         states: whether there are lanes of states.
-        pages: text pages by name.
+        pages: names of text pages.
         following: stay at the end of a run that goes on.
     """
     narrow = len(stages) > 1
     spaces: list[rrb.View | rrb.Container] = [
         space_view(stage, clock, narrow=narrow, subject=subject) for stage in stages
     ]
-    figures = [plane_view(plane) for plane in planes]
-    beside = [tabs(figures)] if figures else []
+    beside = [tabs([plane_view(plane) for plane in planes])] if planes else []
     shares = [3.0] * len(spaces) + [1.6] * len(beside)
     scene = spaces[0] if len(shares) == 1 else rrb.Horizontal(*spaces, *beside, column_shares=shares)
-    texts: list[rrb.View] = [rrb.TextDocumentView(origin=f"/{page.lower()}", name=page) for page in pages]
-    more = [plot_view(plot) for plot in plots if plot.place == "more"]
-    height = 30.0 + 24.0 * legend_lines(legend)
-    left = rrb.Vertical(
-        scene,
-        legend_view(legend),
-        tabs(texts),
-        row_shares=[PIXELS * 0.7 - height, height, PIXELS * 0.3],
-    )
-    right: list[rrb.View | rrb.Container] = [plot_view(plot) for plot in plots if plot.place == "leading"]
+    left = left_side(scene, legend, {page.lower(): page for page in pages})
+    views = {
+        place: [plot_view(plot) for plot in plots if plot.place == place]
+        for place in ("leading", "drift", "more")
+    }
+    right: list[rrb.View | rrb.Container] = [*views["leading"]]
     heights = [3.0 if len(right) < 3 else 2.2] * len(right)
-    small = [plot_view(plot) for plot in plots if plot.place == "drift"]
-    if small or more:
-        right.append(tabs([*small, *more]))
+    if views["drift"] or views["more"]:
+        right.append(tabs([*views["drift"], *views["more"]]))
         heights.append(1.8)
     if states:
         right.append(rrb.StateTimelineView(origin="/states", name="Events"))
         heights.append(1.2)
-    content = (
-        rrb.Horizontal(left, rrb.Vertical(*right, row_shares=heights), column_shares=[5, 3.4])
-        if right
-        else left
+    return page_of(left, right, time_panel(clock, turns, following=following), heights)
+
+
+def build_comparison(
+    spaces: Sequence[tuple[Stage, Clock, Subject]],
+    plots: Sequence[Plot],
+    clock: Clock,
+    turns: float,
+    *,
+    legend: Sequence[tuple[str, Color]],
+    pages: Mapping[str, str],
+    difference: Plot | None,
+) -> rrb.Blueprint:
+    """The layout for runs side by side.
+
+    Args:
+        spaces: the stage of each run, under names of its own, its part of the common clock, and its body.
+        plots: plots of all runs, of which those with the same key are drawn as one.
+        clock: clock of all times.
+        turns: turns of the body that turns most.
+        pages: names of text pages by their entities.
+        difference: distances between the runs' attitudes, if known.
+    """
+    eyes = [space_view(stage, own, narrow=True, subject=subject) for stage, own, subject in spaces]
+    half = -(-len(eyes) // 2)
+    scene = (
+        rrb.Horizontal(*eyes)
+        if len(eyes) <= 3
+        else rrb.Vertical(rrb.Horizontal(*eyes[:half]), rrb.Horizontal(*eyes[half:]))
     )
+    common: dict[str, Plot] = {}
+    for plot in plots:
+        found = common.get(plot.key)
+        series, levels = (found.series, found.levels) if found else ([], [])
+        common[plot.key] = replace(
+            found or plot, series=[*series, *plot.series], levels=[*levels, *plot.levels]
+        )
+    views = [] if difference is None else [plot_view(difference)]
+    views += [plot_view(plot) for plot in common.values() if plot.place == "leading"][: 4 - len(views)]
+    views += [plot_view(plot) for plot in common.values() if plot.place == "drift"]
+    return page_of(left_side(scene, legend, pages), views, time_panel(clock, turns, following=False))
+
+
+def page_of(
+    left: rrb.Container,
+    right: Sequence[rrb.View | rrb.Container],
+    panel: rrb.TimePanel,
+    heights: Sequence[float] | None = None,
+) -> rrb.Blueprint:
+    """The scene with plots beside it, if there are any."""
+    content = left
+    if right:
+        content = rrb.Horizontal(left, rrb.Vertical(*right, row_shares=heights), column_shares=[5, 3.4])
     return rrb.Blueprint(
-        content,
-        rrb.BlueprintPanel(state="collapsed"),
-        rrb.SelectionPanel(state="collapsed"),
-        time_panel(clock, turns, following=following),
+        content, rrb.BlueprintPanel(state="collapsed"), rrb.SelectionPanel(state="collapsed"), panel
     )
+
+
+def left_side(
+    scene: rrb.View | rrb.Container, legend: Sequence[tuple[str, Color]], pages: Mapping[str, str]
+) -> rrb.Container:
+    """The scene above its legend and the text pages, by their entities."""
+    height = 30.0 + 24.0 * legend_lines(legend)
+    key = rrb.Spatial2DView(
+        origin="/legend",
+        name="What is shown",
+        background=_DARK,
+        visual_bounds=rrb.VisualBounds2D(
+            x_range=(0.0, 30.0), y_range=(0.0, LEGEND_LINE * legend_lines(legend))
+        ),
+    )
+    texts: list[rrb.View] = [
+        rrb.TextDocumentView(origin=f"/{entity}", name=name) for entity, name in pages.items()
+    ]
+    return rrb.Vertical(scene, key, tabs(texts), row_shares=[PIXELS * 0.7 - height, height, PIXELS * 0.3])
 
 
 def tabs(views: Sequence[rrb.View]) -> rrb.View | rrb.Container:
@@ -125,10 +179,10 @@ def space_view(stage: Stage, clock: Clock, *, narrow: bool, subject: Subject | N
         stride = trail_stride(trail)
         fading = fades(trail, stride)
         shown = round(RECENT * rows) if fading else rows
-        overrides[f"{path}/recent"] = rrb.VisibleTimeRanges(_window(clock, shown, 0))
+        overrides[f"{path}/recent"] = rrb.VisibleTimeRanges(_window(clock, shown))
         if fading:
             piece = OLDER * stride
-            overrides[f"{path}/older"] = rrb.VisibleTimeRanges(_window(clock, max(rows, 2 * piece), 0))
+            overrides[f"{path}/older"] = rrb.VisibleTimeRanges(_window(clock, max(rows, 2 * piece)))
     origin = f"/{stage.root}/{stage.looked_from}" if stage.looked_from else f"/{stage.root}"
     return rrb.Spatial3DView(
         origin=origin,
@@ -143,14 +197,14 @@ def space_view(stage: Stage, clock: Clock, *, narrow: bool, subject: Subject | N
     )
 
 
-def _window(clock: Clock, rows: int, until: int) -> list[rr.VisibleTimeRange]:
-    """The rows shown, from ``rows`` to ``until`` before the cursor."""
+def _window(clock: Clock, rows: int) -> list[rr.VisibleTimeRange]:
+    """So many rows before the cursor."""
     per_row = float(abs(clock.ticks[-1] - clock.ticks[0])) / max(len(clock.ticks) - 1, 1)
     return [
         rr.VisibleTimeRange(
             name,
             start=rr.TimeRangeBoundary.cursor_relative(seq=-round(rows * size)),
-            end=rr.TimeRangeBoundary.cursor_relative(seq=-round(until * size)),
+            end=rr.TimeRangeBoundary.cursor_relative(seq=0),
         )
         for name, size in ((clock.name, per_row), ("step", 1.0))
     ]
@@ -159,25 +213,11 @@ def _window(clock: Clock, rows: int, until: int) -> list[rr.VisibleTimeRange]:
 def plane_view(plane: Plane) -> rrb.Spatial2DView:
     """A view of one plane figure."""
     size = 1.35 * plane_reach(plane)
-    middle = np.zeros(2)
     return rrb.Spatial2DView(
         origin=plane_path(plane),
         name=plane.title,
         background=_DARK,
-        visual_bounds=rrb.VisualBounds2D(
-            x_range=(middle[0] - size, middle[0] + size), y_range=(middle[1] - size, middle[1] + size)
-        ),
-    )
-
-
-def legend_view(legend: Sequence[tuple[str, Color]]) -> rrb.Spatial2DView:
-    """A view of the legend."""
-    lines = legend_lines(legend)
-    return rrb.Spatial2DView(
-        origin="/legend",
-        name="What is shown",
-        background=_DARK,
-        visual_bounds=rrb.VisualBounds2D(x_range=(0.0, 30.0), y_range=(0.0, LEGEND_LINE * lines)),
+        visual_bounds=rrb.VisualBounds2D(x_range=(-size, size), y_range=(-size, size)),
     )
 
 

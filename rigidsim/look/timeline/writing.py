@@ -1,0 +1,110 @@
+"""Writing a run's timeline, whole or as the run goes on."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+import rerun as rr
+
+from rigidsim.look.page import legible
+from rigidsim.look.roles import title_of
+from rigidsim.look.thinning import thin, thinned_indices
+from rigidsim.look.timeline.drawn import DrawnRun
+from rigidsim.look.timeline.recording import check_room, chunks, recording_to, strict
+
+if TYPE_CHECKING:
+    import xarray
+
+LIVE_ROWS = 100_000
+
+
+def write_timeline(dataset: xarray.Dataset, path: Path, *, rows: int = 100_000) -> int:
+    """Write a dataset as a rerun recording with its own layout.
+
+    Args:
+        dataset: dataset of a run, or any part of it: what is missing isn't shown, every other numeric
+            variable along time gets a plot. It may be lazy: only the rows shown are read.
+        path: the file; it is whole when this returns.
+        rows: at most so many rows are shown, evenly strided, with the first and the last.
+
+    Returns:
+        The number of rows written.
+
+    Raises:
+        ValueError: no samples, a time that isn't finite, `rows` < 2 or an unreadable `drawing`.
+        RuntimeError: the environment variable RERUN switches recording off.
+        OSError: the file can't be written, or there is no room for it.
+
+    The viewer draws in float32: the picture is for looking, the dataset for measuring.
+    """
+    shown = thin(dataset, rows)
+    count = shown.sizes["time"]
+    run = DrawnRun.of(dataset, shown, thinned_indices(dataset.sizes["time"], rows))
+    with recording_to(path, title_of(dataset), count) as recording:
+        recording.start(run.blueprint())
+        run.draw_static(recording.stream)
+        for part in chunks(0, count):
+            check_room(path, count - part.start)
+            run.draw_rows(recording.stream, part)
+    return count
+
+
+class LiveRecording:
+    """A recording that grows with a run, on a stream that is connected to a viewer or a file.
+
+    Attributes:
+        rows: number of rows sent so far.
+    """
+
+    def __init__(self, stream: rr.RecordingStream) -> None:
+        self._stream = stream
+        self._scales: tuple[object, ...] = ()
+        self._last = -1
+        self.rows = 0
+
+    def update(self, dataset: xarray.Dataset) -> None:
+        """Send the new rows of a dataset that has all samples so far.
+
+        Where the scales of the picture have changed with the new samples, everything is sent again.
+        """
+        if not dataset.sizes["time"]:
+            return
+        steps = thinned_indices(dataset.sizes["time"], LIVE_ROWS)
+        if steps[-1] == self._last:
+            return
+        run = DrawnRun.of(dataset, thin(dataset, LIVE_ROWS), steps)
+        with strict():
+            scales = _scales_of(run)
+            if scales != self._scales:
+                self._scales, self._last = scales, -1
+                self._stream.send_blueprint(run.blueprint(following=True))
+                self._stream.send_recording_name(legible(title_of(dataset)))
+            run.draw_static(self._stream)
+            first = int(np.searchsorted(steps, self._last, side="right"))
+            for part in chunks(first, len(steps)):
+                run.draw_rows(self._stream, part)
+            self.rows += len(steps) - first
+        self._last = int(steps[-1])
+        self._stream.flush()
+
+
+def _scales_of(run: DrawnRun) -> tuple[object, ...]:
+    """What earlier rows were drawn with: equal for two parts of a run whose rows fit together."""
+    picture = run.picture
+    arrows = [(s.root, a.name, *np.round(a.vectors[0], 4)) for s in picture.stages for a in s.arrows]
+    trails = [(s.root, t.name, t.line, *np.round(t.points[0], 4)) for s in picture.stages for t in s.trails]
+    plots = [(p.title, p.place, len(p.series)) for p in run.plots]
+    stages = [(s.root, s.title, s.unit, len(s.lines)) for s in picture.stages]
+    return (run.clock.name, *stages, *arrows, *trails, *plots)
+
+
+@contextmanager
+def live_recording(address: str) -> Iterator[LiveRecording]:
+    """A recording that grows in a viewer which listens at an address."""
+    with rr.RecordingStream("rigidsim") as stream:
+        stream.connect_grpc(address)
+        yield LiveRecording(stream)
