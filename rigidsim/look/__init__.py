@@ -9,10 +9,10 @@ Two folders load what draws, and are imported only where a picture is drawn: `ti
 | `figures` | figures by name, dataset to matplotlib, PNG or SVG; a package of its own |
 | `figure_names` | their names, without any import |
 | `stages` | stages by kind of scene, as numbers; a package of its own |
-| `plots`, `page`, `states` | which variable goes into which plot; the summary page; lanes of events and sections |
+| `plots`, `page`, `states` | variables to plots; the summary page; lanes of events, and sections |
 | `signals`, `roles` | what pictures show, recorded or worked out; what a dataset tells of itself |
 | `surroundings` | what stands around the body, from the dataset's attributes |
-| `solids`, `symbols`, `coasts` | meshes of bodies; toy tops, globes, edges, meridians; the Earth's continents |
+| `solids`, `symbols`, `coasts` | meshes of bodies; toy tops, globes and edges; the Earth's continents |
 | `thinning`, `clock` | a bounded number of rows of any dataset; seconds to the viewer's integer timelines |
-| `viewer`, `live`, `film` | opening the viewer; following a run that goes on; pictures and films of a timeline |
+| `viewer`, `live`, `film` | the viewer; following a run that goes on; pictures and films of a timeline |
 """

@@ -9,7 +9,6 @@ from dataclasses import replace
 from pathlib import Path
 
 from rigidsim.errors import VIEW, StoppedWritingError
-from rigidsim.look.thinning import KeptRows
 from rigidsim.scene.schema import Output
 from rigidsim.session import dataset, lyapunov
 from rigidsim.session.advice import cheaper_model
@@ -228,7 +227,7 @@ def _completed(
         writer.complete(folder.dataset, attributes, extras, unused=unused, checkpoint=last, conclude=conclude)
         session.phases.next("dataset")
         output = run.prepared.scene.config.output
-        summary = with_timeline(summary, folder, output, session.observer, run.recorder.kept)
+        summary = with_timeline(summary, folder, output, session.observer)
         if summary.timeline_sha256 is not None:
             session.phases.next("timeline")
     except KeyboardInterrupt:
@@ -244,14 +243,8 @@ def _completed(
     return summary
 
 
-def with_timeline(
-    summary: Summary, folder: RunFolder, output: Output, observer: Observer, kept: KeptRows | None = None
-) -> Summary:
-    """Draw a complete dataset's timeline, if requested; returns the summary with its digest.
-
-    Args:
-        kept: the timeline's rows, if they were kept.
-    """
+def with_timeline(summary: Summary, folder: RunFolder, output: Output, observer: Observer) -> Summary:
+    """Draw a complete dataset's timeline, if requested; returns the summary with its digest."""
     if not output.timeline or not summary.samples:
         return summary
     from rigidsim.look.timeline import write_timeline
@@ -261,7 +254,7 @@ def with_timeline(
     observer.phase("timeline")
     try:
         with open_dataset(folder.dataset, indexed=False) as found:
-            write_timeline(found, path, rows=output.timeline_rows, kept=kept)
+            write_timeline(found, path, rows=output.timeline_rows)
     except (OSError, RuntimeError) as error:  # rerun raises its own on a full disk
         why = error.strerror if isinstance(error, OSError) else None
         raise StoppedWritingError(

@@ -11,9 +11,8 @@ import xarray
 
 pytest.importorskip("rerun")
 
-import rigidsim
-from rigidsim.look.timeline.recording import CHUNK
 from rigidsim.look.timeline import write_timeline
+from rigidsim.look.timeline.recording import CHUNK
 
 Build = Callable[..., xarray.Dataset]
 Read = Callable[[Path, str], dict[str, np.ndarray]]
@@ -35,25 +34,6 @@ def component(path: Path, entity: str, name: str) -> list[object]:
 
 def page(path: Path, name: str = "summary") -> str:
     return str(component(path, f"/{name}", "TextDocument:text")[0])
-
-
-def test_a_run_draws_what_it_kept(tmp_path: Path, read_back: Read) -> None:
-    """And what is drawn from its dataset later is the same."""
-    text = """
-        name = "kept"
-        body.principal_moments = [1, 2, 2.5]
-        initial.angular_velocity = [0.1, 1, 0.05]
-        time = {end = 20, samples = 20_003}
-        output.timeline_rows = 300
-    """
-    run = rigidsim.run(rigidsim.parse(text), out=tmp_path)
-    with run.dataset as dataset:
-        assert write_timeline(dataset, tmp_path / "later.rrd", rows=300) == 300
-    for entity in ("/scene/body", "/plots/angular_momentum", "/plots/drift/all"):
-        drawn, later = (read_back(path, entity) for path in (run.folder.timeline, tmp_path / "later.rrd"))
-        assert drawn.keys() == later.keys()
-        for name in drawn:
-            np.testing.assert_array_equal(drawn[name], later[name])
 
 
 def test_attitude_is_the_datasets_to_float32(symmetric_top: Build, read_back: Read, tmp_path: Path) -> None:
