@@ -405,7 +405,7 @@ UNUSED = (
     "{'rerun', 'xarray', 'pandas', 'matplotlib', 'dask', 'pyarrow', 'scipy', 'tomlkit', 'h5netcdf', "
     "'email.parser'}"
 )
-OWN_MODULES = 310
+OWN_MODULES = 330
 """That a short run loads, at 0.3 ms each: what few scenes need is loaded where it is used."""
 
 
