@@ -21,6 +21,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any, Protocol, runtime_checkable
 
+import heyoka as hy
+
 from rigidsim.model.kinematics import Kinematics
 from rigidsim.model.load import Load, Term
 from rigidsim.model.numbers import unit_vectors
@@ -60,7 +62,7 @@ def carried_beside(loads: Iterable[Load]) -> str:
 def momentum_terms(carriers: Iterable[Carrier], m: Kinematics) -> list[Term]:
     """Momentum of all carriers beside the body; what is zero for good is left out."""
     terms = (term for carrier in carriers for term in carrier.carried_momentum(m))
-    return [(vector, expression) for vector, expression in terms if any(x != 0 for x in vector)]
+    return [(vector, hy.expression(part)) for vector, part in terms if any(x != 0 for x in vector)]
 
 
 def inner_torque(carriers: Iterable[Carrier], m: Kinematics) -> list[Term]:
@@ -71,4 +73,5 @@ def inner_torque(carriers: Iterable[Carrier], m: Kinematics) -> list[Term]:
             unit_vectors(m.scene.context), m.numbers.rate_units, m.rate_states, strict=True
         ):
             found.append(([x * unit for x in cross(vector, axis)], expression * rate))
-    return found + [term for carrier in carriers for term in carrier.exerted_torque(m)]
+    exerted = (term for carrier in carriers for term in carrier.exerted_torque(m))
+    return found + [(vector, hy.expression(part)) for vector, part in exerted]

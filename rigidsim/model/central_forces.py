@@ -20,7 +20,7 @@ def _points(m: Mechanics) -> list[Vector]:
 def one_point(m: Mechanics) -> bool:
     """Whether all loads attract to one common point, and there is at least one."""
     points = _points(m)
-    return bool(points) and len(points) == len(m.loads) and all(point == points[0] for point in points)
+    return bool(points) and len(points) == len(m.acting) and all(point == points[0] for point in points)
 
 
 def line(m: Mechanics) -> Vector | None:

@@ -126,6 +126,12 @@ class Mechanics(Kinematics):
         """The loads that exert a torque."""
         return [load for load, terms in zip(self.loads, self._torques, strict=True) if terms]
 
+    @property
+    def acting(self) -> list[Load]:
+        """The loads but for those that only carry momentum."""
+        turning = self.turning
+        return [x for x in self.loads if not isinstance(x, Carrier) or x in turning or x.force(self)]
+
     @cached_property
     def force(self) -> list[Term]:
         """Terms of the centre of mass's total acceleration, space axes."""

@@ -66,7 +66,7 @@ def _rests_in_orbit(m: Mechanics) -> str:
 def _central(m: Mechanics) -> str | None:
     if not central_forces.one_point(m):
         return None
-    return "the only load is a central force" if len(m.loads) == 1 else "all loads are forces to one point"
+    return "the only load is a central force" if len(m.acting) == 1 else "all loads are forces to one point"
 
 
 def total_momentum(m: Mechanics) -> list[Symbolic]:

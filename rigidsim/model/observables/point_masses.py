@@ -111,7 +111,7 @@ def _energy(m: Mechanics) -> list[Symbolic]:
     if masses.full:
         own = m.number(context.ldexp(context.one, scaling.energy - unit))
         terms.append(own * m.rotational_energy)
-        terms += [own * m.carried(load.potential(m)) for load in m.loads]
+        terms += [own * m.carried(load.potential(m)) for load in m.acting]
     return [hy.sum(terms)]
 
 
@@ -149,7 +149,7 @@ def _flat(vectors: Sequence[list[Symbolic]]) -> list[Symbolic]:
 def _kept(m: Mechanics) -> str | None:
     if not _masses(m).full:
         return "the point masses feel each other's gravity alone"
-    if any(not isinstance(load, Reacting) for load in m.loads):
+    if m.driven_within or any(not isinstance(load, Reacting) for load in m.acting):
         return None
     return "all forces are those of the bodies on each other"
 
