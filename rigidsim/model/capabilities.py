@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any, Protocol, TypeVar, runtime_checkable
 
-from rigidsim.model.gradient_source import GradientSource
+from rigidsim.model.gradient import GradientSource
 from rigidsim.model.kinematics import Kinematics
 from rigidsim.model.orbit_planes import FlightPlane, KeplerPlane, OrbitPlane, TablePlane
 from rigidsim.model.rotations import Symbolic
@@ -134,13 +134,6 @@ class KeepsPlane(Protocol):
 
     def keeps_plane(self, scene: Scene, axis: Vector, normal: Vector) -> bool:
         """Whether it does along a unit ``axis`` in body axes (mpf), which is ``normal`` in space axes."""
-
-
-@runtime_checkable
-class SparesVertical(Protocol):
-    """``about_vertical`` is False for a load that never has a torque about the direction of gravity."""
-
-    about_vertical: bool
 
 
 @runtime_checkable

@@ -15,7 +15,6 @@ from typing import Any
 
 import heyoka as hy
 
-from rigidsim.model.fixed_axes import about_vertical
 from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.rotations import Symbolic
 from rigidsim.scene import attitude
@@ -44,7 +43,7 @@ def equatorial_top(m: Mechanics) -> EquatorialTop | None:
     axis, arm = m.symmetry_direction, scene.torque_arm
     if m.vertical is None or axis is None or arm is None or scene.gravity is None or m.carriers:
         return None
-    if any(about_vertical(load) and load.torque(m) for load in m.loads):
+    if any(load.uniform_field is None for load in m.turning):
         return None
     tiny = negligible(context)
     length = norm(context, arm)

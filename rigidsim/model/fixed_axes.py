@@ -29,7 +29,6 @@ from typing import Any
 import heyoka as hy
 
 from rigidsim.model.capabilities import (
-    SparesVertical,
     TurnsAbout,
     fixed_source_of,
     linear_potential_of,
@@ -96,17 +95,12 @@ def keeps(m: Mechanics, axis: Vector, loads: Sequence[Load] | None = None) -> bo
     )
 
 
-def about_vertical(load: Load) -> bool:
-    """Whether it may have a torque about the direction of gravity."""
-    return not isinstance(load, SparesVertical) or load.about_vertical
-
-
 def _turns_about(m: Mechanics, load: Load, axis: Vector) -> bool:
     """Whether it may have a torque about a unit axis in space."""
     if isinstance(load, TurnsAbout):
         return load.turns_about(m, axis)
     up = m.numbers.up
-    return about_vertical(load) or up is None or norm(m.scene.context, cross(up, axis)) != 0
+    return getattr(load, "about_vertical", True) or up is None or norm(m.scene.context, cross(up, axis)) != 0
 
 
 def field_axis(m: Mechanics) -> Vector | None:

@@ -1,16 +1,23 @@
-"""The torque of a gravity gradient (MacCullagh), whatever its source, and the range of its potential
-energy.
-"""
+"""The gravity gradient of a distant body (MacCullagh): torque, range of the potential energy, and source."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
+
+import heyoka as hy
 
 from rigidsim.model.kinematics import Kinematics
 from rigidsim.model.load import Term
 from rigidsim.model.numbers import unit_vectors
+from rigidsim.model.orbits.ephemeris import MEAN_DISTANCE, SourcePosition, source_position
+from rigidsim.model.orbits.point_mass_pair import PointMassPair
 from rigidsim.model.rotations import Symbolic, transpose
-from rigidsim.scene.arithmetic import cross
+from rigidsim.scene.arithmetic import Vector, cross, norm
+from rigidsim.scene.epochs import J2000, Epoch
+from rigidsim.scene.exact import ExactNumber
+from rigidsim.scene.orbit_tables.pieces import TabulatedOrbit
+from rigidsim.scene.orbits import KeplerOrbit
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.tracing.numbers import largest_of, smallest_of
 
@@ -44,3 +51,50 @@ def gradient_terms(
                 scaled = [3 * strength * x for x in vector]
                 terms.append((scaled, product if factor is None else factor * product))
     return terms
+
+
+@dataclass(frozen=True)
+class GradientSource:
+    """Position of a distant attracting body; exactly one of the five ways to give it is used.
+
+    Attributes:
+        gravitational_parameter: m^3/s^2 (mpf).
+        orbit: Kepler orbit on which it moves.
+        table: tabulated orbit on which it moves.
+        position: fixed position, space axes, m (mpf).
+        ephemeris: name of its analytic series.
+        epoch: date of the scene's time 0, for the series.
+        pair: the point mass that it is, and the one that the body is.
+    """
+
+    gravitational_parameter: Any
+    orbit: KeplerOrbit | None = None
+    table: TabulatedOrbit | None = None
+    position: Vector | None = None
+    ephemeris: str | None = None
+    epoch: Epoch | None = None
+    pair: PointMassPair | None = None
+
+    def distance(self, context: Any) -> Any:
+        """Semi-major axis (that of the start for a point mass, or else the least distance of one that isn't
+        bound), distance of a source at rest, or mean distance of the series, m (mpf).
+        """
+        if self.orbit is not None:
+            return self.orbit.semi_major_axis
+        if self.table is not None:
+            return self.table.semi_major_axis
+        if self.ephemeris is not None:
+            return context.mpf(MEAN_DISTANCE[self.ephemeris])
+        if self.pair is not None:
+            axis = self.pair.semi_major_axis(context)
+            return self.pair.encounter(context)[0] if axis is None else axis
+        assert self.position is not None
+        return norm(context, self.position)
+
+    def of_series(self, m: Kinematics) -> SourcePosition:
+        """Where its series says that it is."""
+        assert self.ephemeris is not None
+        time = m.number(m.scene.context.ldexp(m.scene.context.one, m.scaling.time)) * hy.time
+        if self.epoch is not None and self.epoch != J2000:
+            time = time + m.number(ExactNumber(self.epoch.since_j2000()).at(m.scene.context))
+        return source_position(self.ephemeris, time)

@@ -99,12 +99,17 @@ class Kinematics:
         """Unit direction in space axes from a fixed point (mpf, m, space axes) to the body in flight, and the
         inverse distance (1/length).
         """
-        context, offset = self.scene.context, []
-        for x, a in zip(self.carried(self.position), point, strict=True):
-            shift = context.ldexp(a, -self.scaling.length)
-            offset.append(x - self.number(shift) if shift != 0 else x)
+        offset = self.offset_from(point)
         inverse = 1.0 / hy.sqrt(hy.sum([x * x for x in offset]))
         return [x * inverse for x in offset], inverse
+
+    def offset_from(self, point: Vector) -> list[Symbolic]:
+        """Vector from a fixed point (mpf, m) to the body in flight, space axes, units of length."""
+        offset = []
+        for x, a in zip(self.carried(self.position), point, strict=True):
+            shift = self.scene.context.ldexp(a, -self.scaling.length)
+            offset.append(x - self.number(shift) if shift != 0 else x)
+        return offset
 
     def seen(self, space: list[Symbolic]) -> list[Symbolic]:
         """A vector of space axes that doesn't depend on how the body turns, in body axes."""

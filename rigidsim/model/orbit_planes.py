@@ -1,8 +1,9 @@
+# ruff: noqa: D102 (methods are those of OrbitPlane)
 """Orbital planes of sources or of the body itself: normals as expressions and at the start, and their drift.
 
-A load says which it has (``Load.plane``). The mean ecliptic of date: its pole is (P, -Q, sqrt(1 - P^2 - Q^2))
-in the ecliptic and equinox of J2000, with P = sin(pi_A) sin(Pi_A) and Q = sin(pi_A) cos(Pi_A) from Capitaine,
-Wallace & Chapront 2003 (A&A 412, 567: the precession of the ecliptic of IAU 2006).
+``rigidsim.model.capabilities.plane_of`` says which a load has. The mean ecliptic of date has its pole at
+(P, -Q, sqrt(1 - P^2 - Q^2)) in the ecliptic and equinox of J2000, with P = sin(pi_A) sin(Pi_A) and
+Q = sin(pi_A) cos(Pi_A) from Capitaine, Wallace & Chapront 2003 (A&A 412, 567: the ecliptic of IAU 2006).
 """
 
 from __future__ import annotations
@@ -73,28 +74,22 @@ class KeplerPlane(OrbitPlane):
 
     @property
     def described(self) -> str:  # type: ignore[override]
-        """Which plane it is."""
         return "plane of the source's orbit" + (", whose node moves" if self.orbit.node_rate != 0 else "")
 
     def normal(self, m: Kinematics) -> list[Symbolic]:
-        """See ``OrbitPlane``."""
         return m.orbit(self.orbit).normal
 
     def at_start(self, scene: Scene) -> Vector:
-        """See ``OrbitPlane``."""
         return self._at(scene.context, self.orbit.ascending_node + self.orbit.node_rate * scene.start)
 
     def fixed(self, scene: Scene) -> Vector | None:
-        """See ``OrbitPlane``."""
         moves = self.orbit.node_rate != 0
         return None if moves else self._at(scene.context, self.orbit.ascending_node)
 
     def drift(self, scene: Scene) -> Any:
-        """Rate of the node, rad/s."""
         return abs(self.orbit.node_rate)
 
     def rate(self, scene: Scene) -> Any:
-        """Mean motion, rad/s."""
         return abs(self.orbit.mean_motion)
 
     def _at(self, context: Any, node: Any) -> Vector:
@@ -111,20 +106,15 @@ class TablePlane(OrbitPlane):
     called = "normal of its orbit, by its table"
 
     def normal(self, m: Kinematics) -> list[Symbolic]:
-        """See ``OrbitPlane``."""
         return m.table(self.table).normal
 
     def at_start(self, scene: Scene) -> Vector:
-        """See ``OrbitPlane``."""
-        found: Vector = self.table.normal(scene.start)
-        return found
+        return list(self.table.normal(scene.start))
 
     def drift(self, scene: Scene) -> Any:
-        """Bound from the differences of neighbouring rows, rad/s."""
         return self.table.normal_drift
 
     def rate(self, scene: Scene) -> Any:
-        """Mean motion, rad/s."""
         return abs(self.table.mean_motion)
 
 
@@ -138,28 +128,19 @@ class FlightPlane(OrbitPlane):
     flown = True
 
     def normal(self, m: Kinematics) -> list[Symbolic]:
-        """See ``OrbitPlane``."""
-        context, scaling = m.scene.context, m.scaling
-        offset = []
-        for x, a in zip(m.carried(m.position), self.point, strict=True):
-            shift = context.ldexp(a, -scaling.length)
-            offset.append(x - m.number(shift) if shift != 0 else x)
-        found = cross(offset, m.carried(m.velocity))
+        found = cross(m.offset_from(self.point), m.carried(m.velocity))
         size = hy.sqrt(hy.sum([c * c for c in found]))
         return [c / size for c in found]
 
     def at_start(self, scene: Scene) -> Vector:
-        """See ``OrbitPlane``."""
         if scene.position is None or scene.velocity is None:
             return [scene.context.zero, scene.context.zero, scene.context.one]
         return cross(self._offset(scene.position), scene.velocity)
 
     def drift(self, scene: Scene) -> None:
-        """None: no bound is known."""
         return None
 
     def rate(self, scene: Scene) -> Any | None:
-        """Angular rate at the start, rad/s."""
         if scene.position is None or scene.velocity is None:
             return None
         place = self._offset(scene.position)
@@ -175,7 +156,6 @@ class EclipticPlane(OrbitPlane):
     described = "mean ecliptic of date (IAU 2006)"
 
     def normal(self, m: Kinematics) -> list[Symbolic]:
-        """See ``OrbitPlane``."""
         context, epoch = m.scene.context, m.scene.epoch
         since = seconds(m)
         if epoch is not None:
@@ -193,9 +173,7 @@ class EclipticPlane(OrbitPlane):
         return [p, -q, hy.sqrt(1.0 - p * p - q * q)]
 
     def at_start(self, scene: Scene) -> Vector:
-        """The Z axis."""
         return [scene.context.zero, scene.context.zero, scene.context.one]
 
     def drift(self, scene: Scene) -> Any:
-        """Bound for the ecliptic, rad/s."""
         return scene.context.mpf(_ECLIPTIC_DRIFT)

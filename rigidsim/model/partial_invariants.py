@@ -18,12 +18,12 @@ from rigidsim.model.observables.observable import (
     SPACE,
     Observable,
     only_when_named,
+    register_all,
     same_unit,
 )
 from rigidsim.model.rotations import Symbolic
 from rigidsim.scene import attitude
 from rigidsim.scene.arithmetic import Vector, apply, norm
-from rigidsim.scene.registry import register_observable
 
 
 def _total_momentum_along(m: Mechanics) -> list[Symbolic]:
@@ -66,7 +66,7 @@ def _bogoyavlensky_scale(m: Mechanics) -> tuple[Any, str]:
     return value, "sum of 3 G M / R^3 times the scale of Brun's constant"
 
 
-_BUILT_IN: tuple[Observable, ...] = (
+BUILT_IN: tuple[Observable, ...] = (
     Observable(
         "angular_momentum_source", (), "kg m2 s-1", "angular momentum along the axis of the fixed sources",
         _along(fixed_axes.kept_source_axis), same_unit(MOMENTUM, 1), "space axes", ("source_axis",),
@@ -116,5 +116,4 @@ _BUILT_IN: tuple[Observable, ...] = (
     ),
 )  # fmt: skip
 
-for _observable in _BUILT_IN:
-    register_observable(_observable)
+register_all(*BUILT_IN)

@@ -1,5 +1,5 @@
-"""Values of loads that are allowed, but implausible: lengths meant in km, orbits below a surface, and periods
-that contradict Kepler's third law.
+"""Values of loads that are allowed, but implausible: lengths meant in km, orbits below a surface, periods
+that contradict Kepler's third law, spins in deg/s, and spins that just miss a resonance.
 
 Only about the Sun, the planets and the Moon, recognised by their gravitational parameters, anything is
 implausible: scenes without units are free.
@@ -9,13 +9,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from fractions import Fraction
 
+from rigidsim.model.averaged.hansen import hansen
 from rigidsim.model.load_words import ASTRONOMICAL_UNIT, length_text, span_words
-from rigidsim.scene.arithmetic import Vector, norm
+from rigidsim.scene import attitude
+from rigidsim.scene.arithmetic import Vector, apply, dot, norm
 from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.known_bodies import KNOWN, KnownBody, known_body
 from rigidsim.scene.orbits import PACES, KeplerOrbit, Orbit
 from rigidsim.scene.point_masses import GRAVITATIONAL_CONSTANT
+from rigidsim.scene.readable_time import span_text
 from rigidsim.scene.scene import Scene
 from rigidsim.store.summary_parts import Caution, WarningCode
 
@@ -32,11 +36,22 @@ inner moons of Saturn by its flattening 0.025.
 _SLOW = 0.05  # of the circular speed: a slower body falls almost straight down
 _UNBOUND = math.sqrt(2.0)  # of the circular speed
 _UNITS = (("km", 1e3), ("au", ASTRONOMICAL_UNIT))
+_RESONANCES = (Fraction(1), Fraction(3, 2), Fraction(1, 2), Fraction(2))
+_MISSED = 0.01  # of the resonant spin; one farther off wasn't meant to be there
+_FEEBLE = 1e-6  # of the mean motion: a narrower resonance holds nothing
+_UPRIGHT = math.cos(0.5)  # of the angle between the spin and the orbit's normal
+_STEADY = math.cos(0.1)  # of the angle between the spin and a principal axis
+_NOTICED = 0.1  # of a resonance's width: a start so far off librates by 0.1 rad
+_SAME = 0.05  # of the miss, by which the spin and a multiple of the mean motion may differ
+_ALIKE = 2e-3  # relative difference of a spin from the orbit's rate, as far as three digits tell
 
 
 def implied_strength(orbit: KeplerOrbit) -> float:
     """G M of Kepler's third law for an orbit's size and mean motion, m^3/s^2."""
     return float(orbit.mean_motion**2 * orbit.semi_major_axis**3)
+
+
+# --- attracting bodies --------------------------------------------------------------------------------------
 
 
 def about_strength(given: ExactNumber, distance: float, where: str) -> Iterator[Caution]:
@@ -47,16 +62,16 @@ def about_strength(given: ExactNumber, distance: float, where: str) -> Iterator[
     """
     body = _in_kilometres(float(given), distance) if given.assumed else None
     if body is not None:
-        value = _number(given)
-        yield Caution(
-            WarningCode.LENGTH_WITHOUT_UNIT,
-            f"{where} gravitational_parameter: given {value} without a unit, which is taken as m^3/s^2, "
-            f"while {body.owner} is {body.gravitational_parameter / _CUBIC_KILOMETRE:.6g} km^3/s^2; write "
-            f'"{value} km^3/s^2" if that is meant, "{value} m^3/s^2" if not',
-        )
+        known = f"{body.owner} is {body.gravitational_parameter / _CUBIC_KILOMETRE:.6g} km^3/s^2"
+        yield _without_unit(f"{where} gravitational_parameter", given, "m^3/s^2", known, "km^3/s^2")
 
 
-def meant_body(given: ExactNumber) -> KnownBody | None:
+def attracting(given: ExactNumber, distance: float) -> KnownBody | None:
+    """The known body that a gravitational parameter means, possibly by a number in km^3/s^2."""
+    return _meant_body(given) or (_in_kilometres(float(given), distance) if given.assumed else None)
+
+
+def _meant_body(given: ExactNumber) -> KnownBody | None:
     """The known body whose gravitational parameter is given, as far as the number's own digits tell: ``4e14``
     is the Earth's, 4.001736482e14 isn't.
     """
@@ -70,22 +85,32 @@ def meant_body(given: ExactNumber) -> KnownBody | None:
     return body if close else None
 
 
-def attracting(given: ExactNumber, distance: float) -> KnownBody | None:
-    """The known body that a gravitational parameter means, possibly by a number in km^3/s^2."""
-    return meant_body(given) or (_in_kilometres(float(given), distance) if given.assumed else None)
+def _in_kilometres(strength: float, distance: float) -> KnownBody | None:
+    """The known body whose G M in km^3/s^2 is a number, if a distance suits it in m or in km."""
+    body = _alike(strength * _CUBIC_KILOMETRE)
+    if body is None:
+        return None
+    near = (_SURFACE * body.radius <= size * distance <= _FARTHEST * body.radius for size in (1.0, 1e3))
+    return body if any(near) else None
+
+
+def _alike(strength: float) -> KnownBody | None:
+    body = known_body(strength)
+    close = body is not None and abs(strength / body.gravitational_parameter - 1) < _AS_PUBLISHED
+    return body if close else None
+
+
+# --- places and orbits --------------------------------------------------------------------------------------
 
 
 def about_distance(
     body: KnownBody | None, distance: float, given: Sequence[ExactNumber], where: str
 ) -> Iterator[Caution]:
-    """A distance (m) from the centre of a body that lies within it.
-
-    Args:
-        given: the numbers that say it.
-    """
+    """A distance (m), said by the given numbers, from the centre of a body that lies within it."""
     if body is None or distance >= _SURFACE * body.radius:
         return
-    below = f"{length_text(distance)} from the centre of {body.called}, below its surface at {_radius(body)}"
+    below = f"{length_text(distance)} from the centre of {body.called}, below its surface at "
+    below += length_text(body.radius)
     height = "; to an altitude, add the radius" if distance >= _HEIGHT else ""
     meant = [unit for unit, size in _UNITS if body.radius <= distance * size <= _FARTHEST * body.radius]
     if meant and _bare(given):
@@ -94,8 +119,7 @@ def about_distance(
         text += f'"{first} {meant[0]}" if that is meant{height}'
         yield Caution(WarningCode.LENGTH_WITHOUT_UNIT, f"{where}: {text}")
     elif distance >= _DEEP * body.radius:
-        text = f"given {_numbers(given)} m: {below}"
-        yield Caution(WarningCode.BELOW_SURFACE, f"{where}: {text}{height}")
+        yield Caution(WarningCode.BELOW_SURFACE, f"{where}: given {_numbers(given)} m: {below}{height}")
 
 
 def about_start(scene: Scene, body: KnownBody | None, place: Vector, velocity: Vector) -> Iterator[Caution]:
@@ -109,13 +133,8 @@ def about_start(scene: Scene, body: KnownBody | None, place: Vector, velocity: V
         return
     circular = math.sqrt(body.gravitational_parameter / distance)
     if 0 < speed < _SLOW * circular and _SLOW * circular < 1e3 * speed < _UNBOUND * circular:
-        first = next(_number(x) for x in given.velocity if x.sign)
-        yield Caution(
-            WarningCode.LENGTH_WITHOUT_UNIT,
-            f"[initial] velocity: given {_numbers(given.velocity)} without a unit, which is taken as m/s, "
-            f'while a circular orbit there has {circular:.4g} m/s; write "{first} km/s" if that is meant, '
-            f'"{first} m/s" if not',
-        )
+        known = f"a circular orbit there has {circular:.4g} m/s"
+        yield _without_unit("[initial] velocity", given.velocity, "m/s", known, "km/s")
 
 
 def about_orbit(
@@ -139,7 +158,7 @@ def about_orbit(
     yield from low
     if body is None and given.assumed:
         yield from _familiar_axis(given, at)
-    if strength is not None and not low and meant_body(strength) is not None:
+    if strength is not None and not low and _meant_body(strength) is not None:
         yield from _about_rates(table, orbit, float(strength), where)
         yield from _about_period(table, orbit, strength, where, scene)
 
@@ -175,8 +194,8 @@ def _about_period(
     table: Orbit, orbit: KeplerOrbit, strength: ExactNumber, where: str, scene: Scene
 ) -> Iterator[Caution]:
     """A pace that no mass explains: that of the source, and the body's as far as it is known."""
-    pace = next(((key, getattr(table, key)) for key in PACES if getattr(table, key) is not None), None)
-    if pace is None or orbit.mean_motion == 0:
+    key = next((key for key in PACES if getattr(table, key) is not None), None)
+    if key is None or orbit.mean_motion == 0:
         return
     needed, least = implied_strength(orbit), float(strength)
     own = scene.body.mass
@@ -186,7 +205,7 @@ def _about_period(
     )
     if least * (1 - _PERTURBED) <= needed <= most * (1 + _PERTURBED) or other:
         return
-    axis, key = orbit.semi_major_axis, pace[0]
+    axis = orbit.semi_major_axis
     kepler = span_words(2 * math.pi * math.sqrt(axis**3 / most))
     yield Caution(
         WarningCode.PERIOD_CONTRADICTS,
@@ -196,28 +215,110 @@ def _about_period(
     )
 
 
-def _in_kilometres(strength: float, distance: float) -> KnownBody | None:
-    """The known body whose G M in km^3/s^2 is a number, if a distance suits it in m or in km."""
-    body = _alike(strength * _CUBIC_KILOMETRE)
-    if body is None:
+# --- spins beside an orbit ----------------------------------------------------------------------------------
+
+
+def about_spin(
+    table: Orbit, orbit: KeplerOrbit, strength: ExactNumber, where: str, scene: Scene
+) -> Iterator[Caution]:
+    """A spin about a principal axis along the normal of an orbit.
+
+    Args:
+        table, strength: the orbit and G M as given.
+    """
+    found, motion = _spin(scene, orbit), float(orbit.mean_motion)
+    if found is None or not motion > 0:
+        return
+    spin, known = found[0], _meant_body(strength) is not None
+    given = scene.config.initial.angular_velocity
+    if known and given is not None and _bare(given) and abs(spin / math.degrees(motion) - 1) < _ALIKE:
+        value = f"{spin:.6g}"
+        rate = f"the orbit of {where} has {math.degrees(motion):.6g} deg/s"
+        yield _taken("[initial] angular_velocity", value, value, "rad/s", rate, "deg/s")
+    yield from _near_resonance(*found, table, orbit, where, scene, known=known)
+
+
+def _near_resonance(
+    spin: float, asymmetry: float, table: Orbit, orbit: KeplerOrbit, where: str, scene: Scene, *, known: bool
+) -> Iterator[Caution]:
+    """A spin within a per cent of 1:1, 3:2, 1:2 or 2:1 with the orbit that just misses the resonance.
+
+    It is told if it is outside the libration and the attracting body is a known one, or if the spin is a
+    multiple of the mean anomaly's rate while the resonance is with the mean longitude: then a sidereal period
+    was given as the anomalistic one (about a known body also within the libration, which it makes large).
+
+    The resonance p of a body that turns about its principal axis C holds rates within
+    n sqrt(3 (B - A) |H| / C) of (p - 1) n + d(mean longitude)/dt, with H(p, e) of Goldreich & Peale 1966
+    (Astronomical Journal 71, 425).
+    """
+    motion = float(orbit.mean_motion)
+    longitude = motion + float(orbit.periapsis_rate) + float(orbit.node_rate)
+    for p in _RESONANCES:
+        expected = float(p - 1) * motion + longitude
+        miss = spin - expected
+        if longitude <= 0 or abs(miss) > _MISSED * abs(expected):
+            continue
+        size = hansen(scene.context, orbit.eccentricity, int(2 * p), 2)
+        width = motion * math.sqrt(3 * asymmetry * abs(float(size)))
+        confused = abs(spin - float(p) * motion) < _SAME * abs(miss)
+        outside = width < abs(miss) and (known or confused)
+        librating = abs(miss) > _NOTICED * width and known and confused
+        if width < _FEEBLE * motion or not (outside or librating):
+            continue
+        text = (
+            f"[initial] angular_velocity: a turn takes {_turn(spin)}, {100 * abs(miss) / expected:.2g} % "
+            f"{'faster' if miss > 0 else 'slower'} than the {p.numerator}:{p.denominator} resonance with the "
+            f"orbit of {where} ({_turn(expected)}), which holds {100 * width / expected:.2g} %; the mean "
+            f"anomaly returns after {_turn(motion)}, the mean longitude after {_turn(longitude)}"
+        )
+        pace = next((key for key in PACES if getattr(table, key) is not None), "")
+        if pace in ("", "period"):
+            told = "period" if pace else "the one of Kepler's third law"
+            text += f": {told} is anomalistic; give sidereal_period if a sidereal month or year is meant"
+        yield Caution(WarningCode.NEAR_RESONANCE, text)
+
+
+def _spin(scene: Scene, orbit: KeplerOrbit) -> tuple[float, float] | None:
+    """Rate (rad/s) of a body that turns forwards about a principal axis C along the orbit's normal, and
+    (B - A)/C; None for any other motion.
+    """
+    context, body, rates = scene.context, scene.body, scene.angular_velocity
+    size = norm(context, rates)
+    if size == 0:
         return None
-    near = (_SURFACE * body.radius <= size * distance <= _FARTHEST * body.radius for size in (1.0, 1e3))
-    return body if any(near) else None
+    axis = max(range(3), key=lambda i: abs(dot(body.principal_axes[i], rates)))
+    if abs(dot(body.principal_axes[axis], rates)) < _STEADY * size or body.principal_moments[axis] == 0:
+        return None
+    space = apply(attitude.rotation_matrix(scene.quaternion), rates)
+    if dot(space, orbit.normal(context)) < _UPRIGHT * size:
+        return None
+    a, b = (body.principal_moments[i] for i in range(3) if i != axis)
+    return float(size), float(abs(b - a) / body.principal_moments[axis])
 
 
-def _alike(strength: float) -> KnownBody | None:
-    body = known_body(strength)
-    close = body is not None and abs(strength / body.gravitational_parameter - 1) < _AS_PUBLISHED
-    return body if close else None
+# --- words --------------------------------------------------------------------------------------------------
+
+
+def _without_unit(
+    where: str, given: ExactNumber | Sequence[ExactNumber], taken: str, known: str, meant: str
+) -> Caution:
+    numbers = [given] if isinstance(given, ExactNumber) else given
+    first = next(_number(x) for x in numbers if x.sign)
+    return _taken(where, _numbers(numbers), first, taken, known, meant)
+
+
+def _taken(where: str, given: str, first: str, taken: str, known: str, meant: str) -> Caution:
+    angle = taken == "rad/s"
+    return Caution(
+        WarningCode.ANGLE_WITHOUT_UNIT if angle else WarningCode.LENGTH_WITHOUT_UNIT,
+        f"{where}: given {given} without a unit, which is taken as {taken}, while {known}; write "
+        f'"{first} {meant}" if that is meant, "{first} {taken}" if not',
+    )
 
 
 def _bare(given: Sequence[ExactNumber]) -> bool:
     """Whether no unit was written with any of the numbers that aren't zero."""
     return all(x.assumed for x in given if x.sign)
-
-
-def _radius(body: KnownBody) -> str:
-    return length_text(body.radius)
 
 
 def _number(value: ExactNumber) -> str:
@@ -226,3 +327,7 @@ def _number(value: ExactNumber) -> str:
 
 def _numbers(given: Sequence[ExactNumber]) -> str:
     return ", ".join(map(_number, given))
+
+
+def _turn(rate: float) -> str:
+    return span_text(2 * math.pi / rate, 8)

@@ -15,6 +15,7 @@ import heyoka as hy
 
 from rigidsim.errors import ConfigError, Problem
 from rigidsim.model.mechanics import Mechanics
+from rigidsim.model.partial_invariants import BUILT_IN
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.system import System
 
@@ -42,21 +43,7 @@ _FOLLOWS = {
 _WATCHED = "it is watched alone: what is projected is a set that keeps the numbers of earlier runs"
 _NEVER = {
     "energy_balance": "it checks a work that is integrated beside the motion and doesn't act on it",
-    **dict.fromkeys(
-        (
-            "angular_momentum_source",
-            "angular_momentum_field",
-            "angular_momentum_x",
-            "angular_momentum_y",
-            "angular_momentum_z",
-            "angular_momentum_across",
-            "brun_constant",
-            "bogoyavlensky_constant",
-            "total_angular_momentum_axial",
-            "linear_momentum_horizontal",
-        ),
-        _WATCHED,
-    ),
+    **{observable.name: _WATCHED for observable in BUILT_IN},
 }
 
 

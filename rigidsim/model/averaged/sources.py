@@ -20,7 +20,7 @@ from rigidsim.model.averaged.orbit_terms import (
 )
 from rigidsim.model.averaged.spectrum import orbit_harmonics
 from rigidsim.model.capabilities import gradient_source_of
-from rigidsim.model.gradient_source import GradientSource
+from rigidsim.model.gradient import GradientSource
 from rigidsim.model.load import Load
 from rigidsim.model.orbits.point_mass_pair import PointMassPair
 from rigidsim.scene.arithmetic import Vector, norm

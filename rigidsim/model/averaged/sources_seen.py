@@ -14,16 +14,12 @@ from rigidsim.model.averaged.average import Average
 from rigidsim.model.averaged.orbit_terms import OrbitPlace, plane_vectors
 from rigidsim.model.averaged.sources import Source
 from rigidsim.model.averaged.table_terms import TableTerms
-from rigidsim.model.kinematics import seconds
 from rigidsim.model.mechanics import Mechanics
-from rigidsim.model.orbits.ephemeris import source_position
 from rigidsim.model.orbits.kepler_states import OrbitStates
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.state_blocks import StateBlock
 from rigidsim.model.two_part import as_factor
 from rigidsim.scene.arithmetic import dot
-from rigidsim.scene.epochs import J2000
-from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.orbit_tables.pieces import TabulatedOrbit
 from rigidsim.scene.orbits import KeplerOrbit
 
@@ -126,10 +122,7 @@ class SourcesSeen(Mechanics):
             length = context.sqrt(dot(of.position, of.position))
             return [as_factor(self.number(x / length)) for x in of.position], None
         if of.ephemeris is not None:
-            time = seconds(self)
-            if of.epoch is not None and of.epoch != J2000:
-                time = time + self.number(ExactNumber(of.epoch.since_j2000()).at(context))
-            place = source_position(of.ephemeris, time)
+            place = of.of_series(self)
             return place.direction, place.inverse_distance
         if source.table is not None:
             by_table = self.table(source.table)

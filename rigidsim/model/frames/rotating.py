@@ -17,33 +17,25 @@ from rigidsim.model.fixed_axes import keeps, parallel
 from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.two_part import as_factor
-from rigidsim.scene.arithmetic import Vector
 from rigidsim.scene.orbits import KeplerOrbit
-
-
-def _normal(m: Mechanics, orbit: KeplerOrbit) -> Vector:
-    context = m.scene.context
-    sin_i, cos_i = context.sin(orbit.inclination), context.cos(orbit.inclination)
-    return [
-        sin_i * context.sin(orbit.ascending_node),
-        -sin_i * context.cos(orbit.ascending_node),
-        cos_i,
-    ]
-
-
-def _same_frame(m: Mechanics, a: KeplerOrbit, b: KeplerOrbit) -> bool:
-    return bool(a.mean_motion == b.mean_motion) and parallel(m.scene.context, _normal(m, a), _normal(m, b))
 
 
 def rotating_orbit(m: Mechanics) -> KeplerOrbit | None:
     """An orbit with whose frame all potentials turn; None if there is none."""
     orbits = [orbit for load in m.turning if (orbit := corotating_orbit_of(load)) is not None]
-    if not orbits or m.driven_within or not all(_same_frame(m, orbits[0], orbit) for orbit in orbits[1:]):
+    if not orbits or m.driven_within:
+        return None
+    context, first = m.scene.context, orbits[0]
+    normal = first.normal(context)
+    if not all(
+        orbit.mean_motion == first.mean_motion and parallel(context, normal, orbit.normal(context))
+        for orbit in orbits[1:]
+    ):
         return None
     others = [load for load in m.turning if corotating_orbit_of(load) is None]
-    if not all(load.conservative for load in others) or not keeps(m, _normal(m, orbits[0]), others):
+    if not all(load.conservative for load in others) or not keeps(m, normal, others):
         return None
-    return orbits[0]
+    return first
 
 
 def jacobi_constant(m: Mechanics) -> Symbolic:
@@ -55,7 +47,7 @@ def jacobi_constant(m: Mechanics) -> Symbolic:
         normal_body = m.attitude.orbital.normal
         carried = [factor * (o * x) for o, x in zip(normal_body, m.momentum_body, strict=True)]
     else:
-        pairs = zip(_normal(m, orbit), m.momentum_space, strict=True)
+        pairs = zip(orbit.normal(context), m.momentum_space, strict=True)
         carried = [m.number(motion * o) * x for o, x in pairs if o != 0]
     potentials = [m.carried(load.potential(m)) for load in m.turning]
     return m.rotational_energy - hy.sum(carried) + reduce(add, potentials)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from decimal import Decimal
 from typing import Annotated, Any, ClassVar, Literal
@@ -122,7 +122,6 @@ class Applied(Load):
         return cls((first, second, third), fields.frame, arm, pushes, around.number)
 
     def acts(self) -> bool:
-        """Whether any component isn't zero."""
         return not all(_vanishes(component) for component in self.components)
 
     def formulas(self) -> Iterator[tuple[str, Expression]]:
@@ -136,7 +135,6 @@ class Applied(Load):
 
     @property
     def reads(self) -> frozenset[str]:  # type: ignore[override]
-        """States that the expressions name, and those that rotate the components."""
         turns = self.title == "torque" or any(x != 0 for x in self.arm)
         crosses = (turns and self.frame == "space") or (self.pushes and self.frame == "body")
         attitude = {"attitude"} if crosses or self.names & set(ATTITUDE_NAMES) else set()
@@ -161,10 +159,8 @@ class Applied(Load):
         """What a torque or force of this size at the start would do, in words."""
         context = scene.context
         turning = found if self.title == "torque" else self._moment(scene, found)
-        size, momentum = (
-            norm(context, turning),
-            norm(context, apply_numbers(scene.body.inertia, scene.angular_velocity)),
-        )
+        size = norm(context, turning)
+        momentum = norm(context, apply_numbers(scene.body.inertia, scene.angular_velocity))
         said = ""
         if self.pushes:
             said = f", {value_text(norm(context, found) / scene.body.mass, 'm/s^2')}"
@@ -180,13 +176,8 @@ class Applied(Load):
             force = apply_numbers(transposed(rotation_matrix(scene.quaternion)), force)
         return cross(self.arm, force)
 
-    def _components(self, m: Kinematics) -> list[Symbolic]:
-        variables = state_names(m, self.names)
-        context = m.scene.context
-        return [to_heyoka(c, variables, m.number, context, m.sides) for c in self.components]
-
     def _in_body(self, m: Kinematics) -> list[Symbolic]:
-        found = self._components(m)
+        found = self._heyoka(m, self.components)
         return apply(transpose(m.matrix), found) if self.frame == "space" else found
 
     def linear_potential(self, scene: Scene) -> tuple[Vector, Vector] | None:
@@ -210,16 +201,18 @@ class Applied(Load):
         return any(a and abs(n) != 1 for a, n in zip(acting, axis, strict=True))
 
     def narrow(self, m: Kinematics) -> list[Symbolic]:
-        """Arguments of pulses and switches in the components."""
-        variables = state_names(m, self.names)
-        parts = {part.root: part for c in self.components for part in narrow_parts(c)}
-        return [to_heyoka(p, variables, m.number, m.scene.context, m.sides) for p in parts.values()]
+        return self._parts(m, narrow_parts)
 
     def roots(self, m: Kinematics) -> list[Symbolic]:
-        """Radicands in the components."""
+        return self._parts(m, root_parts)
+
+    def _parts(self, m: Kinematics, of: Callable[[Expression], Iterable[Expression]]) -> list[Symbolic]:
+        parts = {part.root: part for c in self.components for part in of(c)}
+        return self._heyoka(m, parts.values())
+
+    def _heyoka(self, m: Kinematics, expressions: Iterable[Expression]) -> list[Symbolic]:
         variables = state_names(m, self.names)
-        parts = {part.root: part for c in self.components for part in root_parts(c)}
-        return [to_heyoka(p, variables, m.number, m.scene.context, m.sides) for p in parts.values()]
+        return [to_heyoka(x, variables, m.number, m.scene.context, m.sides) for x in expressions]
 
 
 def _brief(text: str) -> str:
@@ -272,7 +265,7 @@ class Force(Applied):
         if m.velocity is None:
             return []
         context = m.scene.context
-        found = self._components(m)
+        found = self._heyoka(m, self.components)
         if self.frame == "body":
             found = apply(m.matrix, found)
         size = context.ldexp(1 / m.carried(m.scene.body.mass), m.scaling.time - m.scaling.speed)

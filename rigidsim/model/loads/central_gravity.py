@@ -78,13 +78,11 @@ class CentralGravity(PointAttraction):
         return cls(strength, [x.at(around.context) for x in fields.position])
 
     def pictured(self) -> dict[str, Any]:
-        """The attracting point, for drawing."""
         place = [float(x) for x in self.position]
         strength = float(self.gravitational_parameter)
         return {"what": "attractor", "gravitational_parameter": strength, "position": place}
 
     def check(self, number: int, position: Vector | None) -> None:
-        """Require that the body has a position and doesn't start at the point."""
         where = f"[[loads]] number {number + 1} kind"
         if position is None:
             raise ConfigError(
@@ -99,7 +97,6 @@ class CentralGravity(PointAttraction):
 
     @property
     def attracting_point(self) -> Vector:
-        """The point to which the force points, except for the effect of the body's own shape."""
         return self.position
 
     @property
@@ -140,11 +137,9 @@ class CentralGravity(PointAttraction):
         return max(min(pericentre, distance), distance / 1000)
 
     def amplitude(self, scene: Scene) -> Any:
-        """``tidal_range`` at the nearest approach, J."""
         return tidal_range(scene, self.gravitational_parameter, self.nearest_approach(scene))
 
     def fastest_rate(self, scene: Scene) -> Any:
-        """Angular rate at the nearest approach, rad/s."""
         offset, _ = self._relative(scene)
         assert scene.velocity is not None
         momentum = norm(scene.context, cross(offset, scene.velocity))

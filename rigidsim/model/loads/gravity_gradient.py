@@ -8,22 +8,20 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, Literal
 
-import heyoka as hy
 from pydantic import Field
 
 from rigidsim.errors import ConfigError, Problem
-from rigidsim.model.gradient import gradient_terms, tidal_range
-from rigidsim.model.gradient_source import GradientSource
+from rigidsim.model.gradient import GradientSource, gradient_terms, tidal_range
 from rigidsim.model.kinematics import Kinematics, quadratic_form
 from rigidsim.model.load import Load, Term
 from rigidsim.model.load_words import orbit_text, reach_text, source_text, value_text
 from rigidsim.model.loads.moving_source import MovingGradient
 from rigidsim.model.loads.point_attraction import positive_strength
 from rigidsim.model.orbit_planes import EclipticPlane, OrbitPlane
-from rigidsim.model.orbits.ephemeris import SourcePosition, source_position
-from rigidsim.model.plausibility import about_distance, about_orbit, about_strength, attracting
+from rigidsim.model.orbits.ephemeris import SourcePosition
+from rigidsim.model.orbits.kepler_states import OrbitStates
+from rigidsim.model.plausibility import about_distance, about_orbit, about_spin, about_strength, attracting
 from rigidsim.model.rotations import Symbolic
-from rigidsim.model.spin_plausibility import about_spin
 from rigidsim.model.two_part import as_factor
 from rigidsim.scene.arithmetic import Vector, dot, negligible, norm, parallel
 from rigidsim.scene.epochs import J2000, Epoch
@@ -114,7 +112,6 @@ class GravityGradient(Load):
         return cls(strength, position=position)
 
     def pictured(self) -> dict[str, Any]:
-        """The source's kind and position, for drawing."""
         strength = float(self.gravitational_parameter)
         shown: dict[str, Any] = {"what": "source", "gravitational_parameter": strength}
         if self.orbit is not None:
@@ -128,30 +125,25 @@ class GravityGradient(Load):
 
     @property
     def gradient_source(self) -> GradientSource:
-        """The source of this gradient."""
         return GradientSource(
             self.gravitational_parameter, self.orbit, self.table, self.position, self.ephemeris, self.epoch
         )
 
     @property
     def conservative(self) -> bool:  # type: ignore[override]
-        """Whether the source is at rest."""
         return self.position is not None
 
     @property
     def wide(self) -> bool:
-        """Whether an analytic series, which has thousands of terms, gives the source's position."""
         return self.ephemeris is not None
 
     @property
     def corotating_orbit(self) -> KeplerOrbit | None:
-        """The source's orbit, if it is circular and in a fixed plane."""
         orbit = self.orbit
         return orbit if orbit is not None and orbit.circular and orbit.fixed_plane else None
 
     @property
     def plane(self) -> OrbitPlane | None:
-        """The ecliptic for the Sun's series."""
         return EclipticPlane() if self.ephemeris == "sun" else None
 
     @property
@@ -165,47 +157,34 @@ class GravityGradient(Load):
             return 0.0
         return float(ExactNumber(self.epoch.since_j2000()))
 
-    def _source(self, m: Kinematics) -> SourcePosition:
-        assert self.ephemeris is not None
-        context = m.scene.context
-        time = m.number(context.ldexp(context.one, m.scaling.time)) * hy.time
-        if self.epoch is not None and self.epoch != J2000:
-            time = time + m.number(ExactNumber(self.epoch.since_j2000()).at(context))
-        return source_position(self.ephemeris, time)
-
     def source_direction(self, m: Kinematics) -> list[Symbolic]:
-        """Unit vector towards the attracting body, body axes."""
         if m.attitude is not None and m.attitude.orbital is not None:
             return m.attitude.orbital.direction
-        if self.orbit is not None:
-            return m.seen(m.orbit(self.orbit).direction)
-        if self.table is not None:
-            return m.seen(m.table(self.table).direction)
-        if self.ephemeris is not None:
-            return m.seen(self._source(m).direction)
+        moving = self._moving(m)
+        if moving is not None:
+            return m.seen(moving.direction)
         assert self.position is not None
         length = norm(m.scene.context, self.position)
-        fixed = [as_factor(m.number(x / length)) for x in self.position]
-        return m.seen(fixed)
+        return m.seen([as_factor(m.number(x / length)) for x in self.position])
 
     def strength(self, m: Kinematics) -> tuple[Any, Symbolic | None]:
         """G M / R^3 in internal units: the value at a constant distance (mpf), and the factor by which it
         varies.
         """
-        context = m.scene.context
-        factor = None
-        if self.orbit is not None:
-            factor = m.orbit(self.orbit).inverse_distance ** 3
-        elif self.table is not None:
-            factor = m.table(self.table).inverse_distance ** 3
-        elif self.ephemeris is not None:
-            factor = self._source(m).inverse_distance ** 3
+        context, moving = m.scene.context, self._moving(m)
         distance = self.gradient_source.distance(context)
         value = context.ldexp(self.gravitational_parameter / distance**3, 2 * m.scaling.time)
-        return value, factor
+        return value, None if moving is None else moving.inverse_distance**3
+
+    def _moving(self, m: Kinematics) -> OrbitStates | SourcePosition | None:
+        """Direction and inverse distance of a source that moves."""
+        if self.orbit is not None:
+            return m.orbit(self.orbit)
+        if self.table is not None:
+            return m.table(self.table)
+        return None if self.ephemeris is None else self.gradient_source.of_series(m)
 
     def torque(self, m: Kinematics) -> list[Term]:
-        """Torque (3 G M / R^3) c x (I c)."""
         return gradient_terms(m, self.source_direction(m), *self.strength(m))
 
     def potential(self, m: Kinematics) -> Symbolic | None:
@@ -239,17 +218,11 @@ class GravityGradient(Load):
         return 3 * self.gravitational_parameter / distance**3, [x / distance for x in self.position]
 
     def amplitude(self, scene: Scene) -> Any:
-        """``tidal_range`` at the least distance, J."""
-        if self.orbit is not None:
-            distance = self.orbit.pericentre
-        elif self.table is not None:
-            distance = self.table.pericentre
-        else:
-            distance = self.gradient_source.distance(scene.context)
+        path = self.orbit or self.table
+        distance = self.gradient_source.distance(scene.context) if path is None else path.pericentre
         return tidal_range(scene, self.gravitational_parameter, distance)
 
     def fastest_rate(self, scene: Scene) -> Any:
-        """Angular rate at pericentre, rad/s."""
         if self.table is not None:
             return self.table.fastest_rate()
         return scene.context.zero if self.orbit is None else self.orbit.fastest_rate(scene.context)

@@ -17,10 +17,11 @@ from rigidsim.model.kinematics import Kinematics
 from rigidsim.model.load import Load, Term, loads_of
 from rigidsim.model.load_words import length_text, orbit_text, value_text
 from rigidsim.model.loads.central_gravity import CentralGravity
+from rigidsim.model.numbers import unit_vectors
 from rigidsim.model.plausibility import about_orbit, implied_strength
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.two_part import as_factor
-from rigidsim.scene.arithmetic import Vector, cross, diagonal, dot, negligible, norm
+from rigidsim.scene.arithmetic import Vector, cross, dot, negligible, norm
 from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.fields import GravitationalParameter, Metre, Triple, quantity
 from rigidsim.scene.orbits import KeplerOrbit, Orbit, resolve_orbit
@@ -108,28 +109,23 @@ class MagneticDipole(Load):
         if fields.orbit is None:
             return cls(moment, _numbers(fields.field or [], around))
         motion = None if strength is None else strength.at(around.context)
-        if fields.orbit.body is not None:
-            what = "given for a magnetic_dipole, which takes elements alone; gravity_gradient takes a body"
-            raise around.fault("orbit.body", what)
-        if fields.orbit.table is not None:
-            what = "given for a magnetic_dipole, which takes elements alone; gravity_gradient takes a table"
-            raise around.fault("orbit.table", what)
+        for key in ("body", "table"):
+            if getattr(fields.orbit, key) is not None:
+                what = "given for a magnetic_dipole, which takes elements alone; gravity_gradient takes a "
+                raise around.fault(f"orbit.{key}", what + key)
         orbit = resolve_orbit(fields.orbit, motion, around)
         return cls(moment, _numbers(fields.source_moment or [], around), orbit)
 
     def acts(self) -> bool:
-        """Whether both moment and field are nonzero."""
         return any(x != 0 for x in self.moment) and any(x != 0 for x in self.source)
 
     def check(self, number: int, position: Vector | None) -> None:
-        """Require that the body doesn't start at the dipole."""
         if self.place and self.place == position:
             what = "the body starts at the dipole; start it elsewhere"
             raise ConfigError(Problem(f"[[loads]] number {number + 1} position", what))
 
     @property
     def reads(self) -> frozenset[str]:  # type: ignore[override]
-        """The attitude, and in flight the position."""
         return frozenset({"attitude"} if self.place is None else {"attitude", "flight"})
 
     @property
@@ -144,11 +140,9 @@ class MagneticDipole(Load):
 
     @property
     def has_source(self) -> bool:
-        """Whether the body moves along an orbit about the dipole."""
         return self.orbit is not None
 
     def source_direction(self, m: Kinematics) -> list[Symbolic] | None:
-        """Unit vector to the centred dipole, body axes."""
         return None if self.orbit is None else m.seen(m.orbit(self.orbit).direction)
 
     def _size(self, scene: Scene) -> Any:
@@ -203,31 +197,24 @@ class MagneticDipole(Load):
 
     def _moment(self, m: Kinematics) -> Vector:
         """m times the field's size, internal units of energy."""
-        size = self._size(m.scene)
-        return [m.scene.context.ldexp(x * size, -m.scaling.energy) for x in self.moment]
+        size, exponent = self._size(m.scene), -m.scaling.energy
+        return [m.scene.context.ldexp(x * size, exponent) for x in self.moment]
 
     def torque(self, m: Kinematics) -> list[Term]:
-        """Torque m x B."""
-        moment = self._moment(m)
-        axes = diagonal([m.scene.context.one] * 3)
+        moment, axes = self._moment(m), unit_vectors(m.scene.context)
         return [(cross(moment, axis), b) for axis, b in zip(axes, self._field(m), strict=True)]
 
     def keeps_plane(self, scene: Scene, axis: Vector, normal: Vector) -> bool:
         """Whether moment and field are both perpendicular to the axis, in a uniform field."""
-        context = scene.context
-        if not self.uniform:
-            return False
-        tiny = negligible(context)
-        across = abs(dot(self.moment, axis)) <= tiny * norm(context, self.moment)
-        return bool(across and abs(dot(self.source, normal)) <= tiny * norm(context, self.source))
+        pairs = ((self.moment, axis), (self.source, normal))
+        tiny, context = negligible(scene.context), scene.context
+        return self.uniform and all(abs(dot(v, n)) <= tiny * norm(context, v) for v, n in pairs)
 
     def potential(self, m: Kinematics) -> Symbolic | None:
-        """Potential energy -m . B."""
         pairs = zip(self._moment(m), self._field(m), strict=True)
         return -hy.sum([m.number(x) * b for x, b in pairs if x != 0])
 
     def linear_potential(self, scene: Scene) -> tuple[Vector, Vector] | None:
-        """Moment m and field B, if the field is uniform."""
         return (self.moment, self.source) if self.uniform else None
 
     def amplitude(self, scene: Scene) -> Any:

@@ -13,8 +13,7 @@ from typing import Any
 import heyoka as hy
 
 from rigidsim.errors import ConfigError, Problem
-from rigidsim.model.gradient import tidal_range
-from rigidsim.model.gradient_source import GradientSource
+from rigidsim.model.gradient import GradientSource, tidal_range
 from rigidsim.model.kinematics import Kinematics
 from rigidsim.model.load import Term
 from rigidsim.model.load_words import reach_text, source_text, value_text

@@ -60,7 +60,6 @@ class UniformGravity(Load):
     Fields = UniformGravityFields
     title = "uniform_gravity"
     conservative = True
-    about_vertical = False
 
     @classmethod
     def resolve(cls, fields: UniformGravityFields, around: Surroundings) -> UniformGravity:
@@ -73,12 +72,10 @@ class UniformGravity(Load):
 
     @property
     def uniform_field(self) -> Vector:  # type: ignore[override]
-        """Gravitational acceleration, space axes, m/s^2."""
         return self.acceleration
 
     @property
     def reads(self) -> frozenset[str]:  # type: ignore[override]
-        """The vertical about a fixed point; nothing in free fall."""
         return frozenset({"vertical"} if self.pivoted else ())
 
     def amplitude(self, scene: Scene) -> Any:

@@ -46,7 +46,6 @@ class ViscousTorque(Load):
         return cls([c.at(around.context) for c in fields.coefficients])
 
     def acts(self) -> bool:
-        """Whether any coefficient is nonzero."""
         return any(c != 0 for c in self.coefficients)
 
     def damping(self) -> Vector | None:
@@ -58,11 +57,9 @@ class ViscousTorque(Load):
         return bool(norm(context, cross(damped, axis)) <= negligible(context) * max(self.coefficients))
 
     def amplitude(self, scene: Scene) -> Any:
-        """Zero: damping only removes energy."""
-        return scene.context.zero
+        return scene.context.zero  # it only removes energy
 
     def torque(self, m: Kinematics) -> list[Term]:
-        """One torque term for each damped axis."""
         context = m.scene.context
         terms: list[Term] = []
         for i, coefficient in enumerate(self.coefficients):

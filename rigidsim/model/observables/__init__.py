@@ -4,7 +4,7 @@ One module per subject. Importing this package registers the observables in the 
 """
 
 from rigidsim.model.observables import mechanical  # noqa: F401, I001  (enters what it defines)
-from rigidsim.model.observables import axes, rotation, wobble, orbit, top, point_masses, resonance  # noqa: F401
+from rigidsim.model.observables import axes, rotation, wobble, orbit, top, point_masses  # noqa: F401
 from rigidsim.model.observables.observable import (
     Angle as Angle,
     Observable as Observable,
@@ -12,4 +12,7 @@ from rigidsim.model.observables.observable import (
     always as always,
     continuous_angles as continuous_angles,
     only_when_named as only_when_named,
+    register_all,
 )
+
+register_all(orbit.RESONANT_ANGLE)  # the last of the dataset

@@ -25,14 +25,13 @@ from rigidsim.model.observables.observable import (
     Observable,
     continuous_angles,
     only_when_named,
+    register_all,
     same_unit,
 )
-from rigidsim.model.observables.scene_subject import is_planet
-from rigidsim.model.observables.steadiness import steady_directions
+from rigidsim.model.observables.steadiness import is_planet, steady_directions
 from rigidsim.model.observables.vectors import figure_told, plane_told, unit
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.two_part import as_factor
-from rigidsim.scene.registry import register_observable
 from rigidsim.scene.space_axes import ECLIPTIC, OBLIQUITY
 
 AXIS = ("axis",)
@@ -133,7 +132,7 @@ def _sky(convention: str) -> Callable[[Mechanics], Mapping[str, Any]]:
 
 _AT_REST = "unit vector; NaN where the body is at rest"
 
-_OBSERVABLES: tuple[Observable, ...] = (
+register_all(
     Observable(
         "figure_axis", SPACE, "1", "direction of the figure axis", figure_axis, same_unit(NO_UNIT, 3),
         "space axes", ("attitude",), by_default=is_planet,
@@ -175,6 +174,3 @@ _OBSERVABLES: tuple[Observable, ...] = (
         ),
     ),
 )  # fmt: skip
-
-for _observable in _OBSERVABLES:
-    register_observable(_observable)

@@ -25,10 +25,11 @@ from rigidsim.model.observables.observable import (
     NO_UNIT,
     SPACE,
     Observable,
+    register_all,
     same_unit,
 )
 from rigidsim.model.rotations import Symbolic
-from rigidsim.scene.registry import register_observable
+from rigidsim.scene.arithmetic import cross
 from rigidsim.scene.tracing.whole import binary_magnitude
 
 WORK = "work"
@@ -71,15 +72,9 @@ def _central(m: Mechanics) -> str | None:
 
 def total_momentum(m: Mechanics) -> list[Symbolic]:
     """Total angular momentum M r x v + R I w about the (first) attracting point."""
-    context, scaling = m.scene.context, m.scaling
-    offset = []
-    for x, a in zip(m.carried(m.position), attracting_point(m), strict=True):
-        shift = context.ldexp(a, -scaling.length)
-        offset.append(x - m.number(shift) if shift != 0 else x)
-    scale = m.number(context.ldexp(m.scene.body.mass, scaling.length + scaling.speed - scaling.momentum))
-    x, y, z = offset
-    u, v, w = m.carried(m.velocity)
-    orbital = [y * w - z * v, z * u - x * w, x * v - y * u]
+    exponent = m.scaling.length + m.scaling.speed - m.scaling.momentum
+    scale = m.number(m.scene.context.ldexp(m.scene.body.mass, exponent))
+    orbital = cross(m.offset_from(attracting_point(m)), m.carried(m.velocity))
     return [scale * a + b for a, b in zip(orbital, m.momentum_space, strict=True)]
 
 
@@ -146,7 +141,7 @@ def _in_states(name: str) -> Callable[[Mechanics], bool]:
     return lambda m: m.attitude is not None and name in m.attitude.observables
 
 
-_BUILT_IN: tuple[Observable, ...] = (
+register_all(
     Observable(
         "angular_velocity", BODY, "rad s-1", "angular velocity", lambda m: m.rate_states,
         lambda m: [e - m.scaling.time for e in m.scaling.rates], "body axes",
@@ -250,6 +245,3 @@ _BUILT_IN: tuple[Observable, ...] = (
         _linear, linear_momentum_scale,
     ),
 )  # fmt: skip
-
-for _observable in _BUILT_IN:
-    register_observable(_observable)

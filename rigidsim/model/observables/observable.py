@@ -17,26 +17,19 @@ from rigidsim.model.euler_poles import Poles
 from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.needs import NEEDS
 from rigidsim.model.rotations import Symbolic
+from rigidsim.scene.registry import register_observable
 
 Dims = tuple[str, ...]
 BODY: Dims = ("body_axis",)
 SPACE: Dims = ("space_axis",)
 
 
-def _never(_: Mechanics) -> str | None:
+def _without(_: Mechanics) -> None:
     return None
-
-
-def _as_it_is(_: Mechanics) -> str:
-    return ""
 
 
 def _nothing(_: Mechanics) -> Mapping[str, str]:
     return {}
-
-
-def _without(_: Mechanics) -> None:
-    return None
 
 
 def always(_: Mechanics) -> bool:
@@ -88,10 +81,6 @@ class Steady:
     excursion: float
 
 
-def _unsteady(_: Mechanics) -> Steady | None:
-    return None
-
-
 @dataclass(frozen=True)
 class Observable:
     """One recordable quantity; register your own with ``rigidsim.scene.registry.register_observable``.
@@ -124,15 +113,15 @@ class Observable:
     exponents: Callable[[Mechanics], list[int]] | None = None
     frame: str = ""
     needs: tuple[str, ...] = ()
-    conserved: Callable[[Mechanics], str | None] = _never
+    conserved: Callable[[Mechanics], str | None] = _without
     drift_scale: Callable[[Mechanics], tuple[Any, str]] | None = None
     by_default: Callable[[Mechanics], bool] = always
-    continuity: Callable[[Mechanics], str] = _as_it_is
+    continuity: Callable[[Mechanics], str] = lambda _: ""
     angles: Callable[[Mechanics], list[Angle]] | None = None
     poles: Callable[[Mechanics], Poles | None] = _without
-    steady: Callable[[Mechanics], Steady | None] = _unsteady
+    steady: Callable[[Mechanics], Steady | None] = _without
     attributes: Callable[[Mechanics], Mapping[str, str]] = _nothing
-    absent: Callable[[Mechanics], str | None] = _never
+    absent: Callable[[Mechanics], str | None] = _without
 
     def available(self, m: Mechanics) -> bool:
         """Whether the scene meets all needs and nothing else makes the quantity absent."""
@@ -153,35 +142,27 @@ def continuous_angles(
     long_name: str,
     angles: Callable[[Mechanics], list[Angle]],
     *,
-    frame: str = "",
-    needs: tuple[str, ...] = (),
     by_default: Callable[[Mechanics], bool] = only_when_named,
-    steady: Callable[[Mechanics], Steady | None] = _unsteady,
-    attributes: Callable[[Mechanics], Mapping[str, str]] = _nothing,
-    absent: Callable[[Mechanics], str | None] = _never,
+    **more: Any,
 ) -> Observable:
     """An observable of angles, in rad, whose full turns are counted along the motion, however far apart the
     samples are.
 
     Args:
         angles: one for each component.
-        steady: how they advance, if known well enough to tell turns between sparse samples.
+        more: ``frame``, ``needs``, ``steady``, ``attributes`` and ``absent`` of ``Observable``.
     """
+    values = lambda m: [angle.value for angle in angles(m)]  # noqa: E731
     return Observable(
-        name,
-        dims,
-        "rad",
-        long_name,
-        lambda m: [angle.value for angle in angles(m)],
-        frame=frame,
-        needs=needs,
-        by_default=by_default,
-        continuity=lambda m: "unwrap",
-        angles=angles,
-        steady=steady,
-        attributes=attributes,
-        absent=absent,
-    )
+        name, dims, "rad", long_name, values, continuity=lambda m: "unwrap", angles=angles,
+        by_default=by_default, **more,
+    )  # fmt: skip
+
+
+def register_all(*observables: Observable) -> None:
+    """Register observables in the order of the dataset."""
+    for observable in observables:
+        register_observable(observable)
 
 
 def same_unit(exponent: Callable[[Mechanics], int], count: int) -> Callable[[Mechanics], list[int]]:

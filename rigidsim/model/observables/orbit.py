@@ -26,12 +26,12 @@ from rigidsim.model.observables.observable import (
     Angle,
     Observable,
     continuous_angles,
+    register_all,
     same_unit,
 )
 from rigidsim.model.observables.vectors import along, in_body
 from rigidsim.model.rotations import Symbolic
 from rigidsim.scene.frame import smallest_axis
-from rigidsim.scene.registry import register_observable
 
 ROLL_PITCH_YAW = ("roll_pitch_yaw_component",)
 LIBRATION = ("libration_angle",)
@@ -70,7 +70,7 @@ def _told(convention: str) -> Callable[[Mechanics], Mapping[str, str]]:
 
 _NEEDS = ("attitude", "source")
 
-for _observable in (
+register_all(
     continuous_angles(
         "roll_pitch_yaw", ROLL_PITCH_YAW, "roll, pitch and yaw", roll_pitch_yaw,
         frame="local frame to body axes", needs=_NEEDS, by_default=moves_slowly_in_orbit,
@@ -92,5 +92,24 @@ for _observable in (
         "nadir", BODY, "1", "direction to the source", nadir, same_unit(NO_UNIT, 3), "body axes", _NEEDS,
         by_default=moves_slowly_in_orbit, attributes=_told("unit vector"),
     ),
-):  # fmt: skip
-    register_observable(_observable)
+)  # fmt: skip
+
+
+# --- the angle that a resonance keeps, in motions averaged over rotation and orbit --------------------------
+
+
+def _no_resonance(m: Mechanics) -> str | None:
+    if m.commensurable_angle is not None:
+        return None
+    return 'is of [model] level = "orbit_averaged" where the body keeps pace with its source; leave it out'
+
+
+RESONANT_ANGLE = continuous_angles(
+    "resonant_angle", (), "angle that the rotation keeps with the orbit",
+    lambda m: [Angle(*m.carried(m.commensurable_angle))], needs=("attitude",),
+    by_default=lambda m: m.commensurable_angle is not None, absent=_no_resonance,
+    attributes=lambda m: {
+        "convention": "about the angular momentum, at the pericentre: from the direction of the pericentre "
+        "to the axis of least moment; 0 or pi where that points at the source there"
+    },
+)  # fmt: skip

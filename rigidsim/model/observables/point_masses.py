@@ -15,12 +15,11 @@ import heyoka as hy
 from rigidsim.model.capabilities import Reacting
 from rigidsim.model.drift_scales import rotational_scale
 from rigidsim.model.mechanics import Mechanics
-from rigidsim.model.observables.observable import SPACE, Observable, same_unit
+from rigidsim.model.observables.observable import SPACE, Observable, register_all, same_unit
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.scaling import exponent
 from rigidsim.scene.arithmetic import Vector, cross, norm
 from rigidsim.scene.point_masses import PointMasses
-from rigidsim.scene.registry import register_observable
 
 EACH = ("point_mass", *SPACE)
 
@@ -166,7 +165,7 @@ def _whole(m: Mechanics) -> str | None:
 
 _POINTS = ("point_masses",)
 _WITH_BODY = ("point_masses", "attitude", "place")
-for _observable in (
+register_all(
     Observable(
         "point_mass_position", EACH, "m", "positions of the point masses",
         lambda m: _flat(m.carried(m.point_masses).positions),
@@ -193,5 +192,4 @@ for _observable in (
             ("linear_momentum", SPACE, "kg m s-1", f"linear momentum {of}", _linear, _LINEAR, _linear_scale),
         )
     ),
-):  # fmt: skip
-    register_observable(_observable)
+)  # fmt: skip

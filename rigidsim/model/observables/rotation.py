@@ -21,16 +21,15 @@ from rigidsim.model.observables.observable import (
     Observable,
     continuous_angles,
     only_when_named,
+    register_all,
     same_unit,
 )
-from rigidsim.model.observables.scene_subject import is_nearly_axial
-from rigidsim.model.observables.steadiness import steady_rotation
+from rigidsim.model.observables.steadiness import is_nearly_axial, steady_rotation
 from rigidsim.model.observables.vectors import along, figure_told, in_body, length, plane_told, unit
 from rigidsim.model.rotations import Symbolic, apply
 from rigidsim.scene import attitude
 from rigidsim.scene.arithmetic import apply as apply_numbers
 from rigidsim.scene.arithmetic import cross, dot
-from rigidsim.scene.registry import register_observable
 
 
 def _andoyer_momenta(m: Mechanics) -> list[Symbolic]:
@@ -101,7 +100,7 @@ def _told(convention: str) -> dict[str, str]:
     return {"convention": convention}
 
 
-_OBSERVABLES = (
+register_all(
     continuous_angles(
         "rotation_angle", (), "angle of rotation about the angular momentum", _rotation_angle,
         frame="space axes", needs=("attitude", "plane"), by_default=is_nearly_axial, steady=steady_rotation,
@@ -137,6 +136,3 @@ _OBSERVABLES = (
         ) | figure_told(m) | plane_told(m),
     ),
 )  # fmt: skip
-
-for _observable in _OBSERVABLES:
-    register_observable(_observable)

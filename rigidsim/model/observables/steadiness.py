@@ -1,4 +1,8 @@
-"""How steadily a body turns between sparse samples, where that tells its turns without following the motion.
+"""The kind of rotation: whether a body is a planet or a nearly axial rotator, and how steadily it turns.
+
+The kind decides what is recorded by default: a planet that precesses has directions and their angles; a body
+that turns nearly about its figure axis has polar motion, wobble and a rotation angle; other bodies have
+neither. How steadily it turns tells the full turns between sparse samples without following the motion.
 
 A body whose momentum keeps near a principal axis of extreme moment, free of torques or a planet under gravity
 gradients, advances from sample to sample by its momentary rate times the time between, but for
@@ -19,17 +23,67 @@ from typing import Any
 
 import heyoka as hy
 
+from rigidsim.model.capabilities import Reacting, gradient_source_of, orbit_of, table_of
 from rigidsim.model.frames.reference_plane import plane_drift
+from rigidsim.model.load import Load
 from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.observables.observable import Steady
-from rigidsim.model.observables.scene_subject import is_planet
 from rigidsim.model.observables.vectors import along, in_body, length
 from rigidsim.model.rotations import constant
-from rigidsim.model.scaling import loads_amplitude
+from rigidsim.model.scaling import loads_amplitude, source_rate
 from rigidsim.scene.arithmetic import apply, cross, dot, norm
 
 _FORCED = 10
 _SPARE = 4
+
+
+_AXIAL = 0.1
+"""Angle (rad) between spin and figure axis up to which a body turns nearly about it."""
+_FAST = 10
+"""Ratio of a planet's spin to its sources' rates; a slower body librates or tumbles with its source."""
+
+
+def _turns_about_its_figure(m: Mechanics) -> bool:
+    """Whether the body starts turning nearly about its figure axis (that of largest moment, or of
+    symmetry).
+    """
+    scene, context = m.scene, m.scene.context
+    spin, pole = scene.angular_velocity, scene.figure.pole
+    if all(w == 0 for w in spin):
+        return False
+    aligned, across = abs(dot(spin, pole)), norm(context, cross(pole, spin))
+    turned = apply(scene.body.inertia, pole)
+    principal = norm(context, cross(turned, pole)) <= norm(context, turned) * 1e-12
+    return bool(across <= _AXIAL * aligned) and principal
+
+
+def _moves(load: Load) -> bool:
+    source = gradient_source_of(load)
+    series = source is not None and source.ephemeris
+    return bool(orbit_of(load) or table_of(load) or series or isinstance(load, Reacting))
+
+
+def is_planet(m: Mechanics) -> bool:
+    """Whether the scene is a fast spin that precesses under the gravity gradient of an orbiting or ephemeris
+    body.
+    """
+    if m.attitude is None or not m.turning:
+        return False
+    distant = [x for x in m.turning if _moves(x)]
+    fast = norm(m.scene.context, m.scene.angular_velocity) >= _FAST * source_rate(m.scene)
+    return len(distant) == len(m.turning) and bool(fast) and _turns_about_its_figure(m)
+
+
+def is_nearly_axial(m: Mechanics) -> bool:
+    """Whether a torque-free body or a planet turns nearly, but not exactly, about its figure axis."""
+    if m.carriers or (m.torque and not is_planet(m)):
+        return False
+    scene, pole = m.scene, m.scene.figure.pole
+    wobbles = norm(scene.context, cross(pole, scene.angular_velocity)) != 0
+    return _turns_about_its_figure(m) and (bool(wobbles) or bool(m.torque))
+
+
+# --- how steadily it turns ----------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)

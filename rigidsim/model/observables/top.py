@@ -25,12 +25,12 @@ from rigidsim.model.observables.observable import (
     Angle,
     Observable,
     continuous_angles,
+    register_all,
     same_unit,
 )
 from rigidsim.model.observables.vectors import along, figure_told, in_body
 from rigidsim.model.rotations import Symbolic, apply
 from rigidsim.scene.arithmetic import Vector
-from rigidsim.scene.registry import register_observable
 
 
 def _vertical(m: Mechanics) -> list[Symbolic]:
@@ -108,7 +108,7 @@ def _tip_told(m: Mechanics) -> dict[str, str]:
     return {"point": f"[{told}] m in body axes"}
 
 
-for _observable in (
+register_all(
     Observable(
         "tilt", (), "rad", "angle of the figure axis from the upward vertical", tilt, same_unit(NO_UNIT, 1),
         "", ("vertical",), by_default=_is_top, attributes=_told("from 0, upright, to pi, hanging"),
@@ -132,5 +132,4 @@ for _observable in (
         "tip", SPACE, "m", "path of a point of the body", tip, same_unit(_tip_exponent, 3), "space axes",
         ("attitude", "place"), by_default=_traced, attributes=_tip_told, absent=_no_tip,
     ),
-):  # fmt: skip
-    register_observable(_observable)
+)  # fmt: skip

@@ -11,13 +11,12 @@ from collections.abc import Mapping
 import heyoka as hy
 
 from rigidsim.model.mechanics import Mechanics
-from rigidsim.model.observables.observable import NO_UNIT, Observable, same_unit
-from rigidsim.model.observables.scene_subject import is_nearly_axial
+from rigidsim.model.observables.observable import NO_UNIT, Observable, register_all, same_unit
+from rigidsim.model.observables.steadiness import is_nearly_axial
 from rigidsim.model.observables.vectors import angle_between, figure_told, in_body
 from rigidsim.model.rotations import Symbolic
 from rigidsim.scene.arithmetic import dot, norm
 from rigidsim.scene.frame import largest_axis
-from rigidsim.scene.registry import register_observable
 
 
 def _polar_motion(m: Mechanics) -> list[Symbolic]:
@@ -78,7 +77,7 @@ def _polar_told(m: Mechanics) -> Mapping[str, str]:
     } | figure_told(m)
 
 
-_OBSERVABLES = (
+register_all(
     Observable(
         "polar_motion", ("polar_motion_component",), "rad", "polar motion", _polar_motion,
         same_unit(NO_UNIT, 2), "body axes", by_default=is_nearly_axial, attributes=_polar_told,
@@ -95,6 +94,3 @@ _OBSERVABLES = (
         attributes=lambda m: {"convention": "0 to pi; NaN where the body is at rest"} | figure_told(m),
     ),
 )  # fmt: skip
-
-for _observable in _OBSERVABLES:
-    register_observable(_observable)
