@@ -8,7 +8,6 @@ import heyoka as hy
 
 from rigidsim.model.body import BODY
 from rigidsim.model.capabilities import Reacting, having, orbit_of, table_of
-from rigidsim.model.equations import flight_equations, vertical_from_attitude
 from rigidsim.model.formulations.formulation import Formulation, ModelPlan
 from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.needs import work_is_needed
@@ -40,7 +39,7 @@ def assemble_states(
     rotation = formulation.rotation(plan, number)
     attitude, vertical = rotation.attitude, None
     if attitude is not None and numbers.arm is not None:
-        vertical = vertical_from_attitude(attitude.matrix, numbers, number)
+        vertical = numbers.vertical_of(attitude.matrix, number)
     elif requirements.vertical:
         vertical = list(hy.make_vars(*BODY.vertical))
     flies = requirements.flight
@@ -74,13 +73,18 @@ def assemble_states(
 
 
 def _flight_block(m: Mechanics, plan: ModelPlan) -> StateBlock:
+    """x' = v and v' = force over mass, in the units of position and speed."""
     context, scaling = m.scene.context, m.scaling
-    x_rates, v_rates = flight_equations(m, m.force)
+    ratio = m.number(context.ldexp(context.one, scaling.speed + scaling.time - scaling.length))
+    accelerations = []
+    for i in range(3):
+        terms = [m.number(vector[i]) * expression for vector, expression in m.force if vector[i] != 0]
+        accelerations.append(hy.sum(terms) if terms else hy.expression(0.0))
     initial = [context.ldexp(x, -scaling.length) for x in m.carried(m.scene.position)]
     initial += [context.ldexp(v, -scaling.speed) for v in m.carried(m.scene.velocity)]
     return StateBlock(
         [*BODY.position, *BODY.velocity],
-        [*x_rates, *v_rates],
+        [*(ratio * v for v in m.carried(m.velocity)), *accelerations],
         initial,
         exponents=[scaling.length] * 3 + [scaling.speed] * 3,
         why=plan.requirements.why["flight"],

@@ -44,7 +44,7 @@ class Kinematics:
         orbit_tags: for each prescribed orbit, the tag that makes its state names unique.
         surfaces: switching surfaces, between which expressions are smooth.
         tables: positions of the states and parameters of tabulated orbits.
-        clocked: whether expressions of the time need it in two numbers (``rigidsim.model.two_part_time``).
+        clocked: whether expressions of the time need it in two numbers (``rigidsim.model.two_part``).
         body: names the states of the body.
     """
 

@@ -19,17 +19,15 @@ import numpy as np
 from rigidsim.model.body import BODY
 from rigidsim.model.capabilities import Narrow, having
 from rigidsim.model.carriers import Carrier
-from rigidsim.model.equations import vertical_from_attitude
 from rigidsim.model.formulations.formulation import Requirements
 from rigidsim.model.formulations.quaternion import quaternion_states
-from rigidsim.model.heyoka_expressions import to_heyoka
+from rigidsim.model.heyoka_expressions import state_names, to_heyoka
 from rigidsim.model.kinematics import in_common_unit
 from rigidsim.model.load import Load, Term, force_terms, torque_terms
 from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.numbers import scaled_numbers
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.scaling import Drive, choose_scaling
-from rigidsim.model.state_names import state_names
 from rigidsim.scene import attitude as numeric
 from rigidsim.scene.arithmetic import apply, transpose
 from rigidsim.scene.expressions.tree import names_used
@@ -114,7 +112,7 @@ def probe(scene: Scene, requirements: Requirements, loads: Sequence[Load]) -> Me
     attitude = quaternion_states(scene, rates) if requirements.attitude else None
     vertical = list(hy.make_vars(*BODY.vertical)) if requirements.vertical else None
     if attitude is not None and numbers.arm is not None:
-        vertical = vertical_from_attitude(attitude.matrix, numbers, float)
+        vertical = numbers.vertical_of(attitude.matrix, float)
     position = list(hy.make_vars(*BODY.position)) if requirements.flight else None
     velocity = list(hy.make_vars(*BODY.velocity)) if requirements.flight else None
     return Mechanics(

@@ -1,4 +1,7 @@
-"""Decisions about a scene's equations made before any number is rounded: loads, states, units, orbits."""
+"""Decisions about a scene's equations made before any number is rounded: loads, states, units, orbits.
+
+States are those that something needs, beginning with what is recorded and what the loads read.
+"""
 
 from __future__ import annotations
 
@@ -8,18 +11,32 @@ from dataclasses import replace
 from rigidsim.errors import ConfigError, Problem
 from rigidsim.model.averaged.average import Average
 from rigidsim.model.capabilities import orbit_of, table_of
-from rigidsim.model.formulations.formulation import ModelPlan
+from rigidsim.model.formulations.averaged import Averaged
+from rigidsim.model.formulations.formulation import (
+    REGISTERED,
+    Formulation,
+    ModelPlan,
+    Requirements,
+    Unsuited,
+)
+from rigidsim.model.formulations.planar import Planar
+from rigidsim.model.formulations.quaternion import Quaternion
+from rigidsim.model.formulations.rates import Rates
+from rigidsim.model.frames.reference_plane import refuse_without_plane
 from rigidsim.model.load import Load, loads_of
 from rigidsim.model.load_estimate import estimate_drive
 from rigidsim.model.loads.uniform_gravity import UniformGravity
+from rigidsim.model.needs import NEEDS
 from rigidsim.model.numbers import scaled_numbers
 from rigidsim.model.orbits.table_states import Carried, TablePlace, places_of
 from rigidsim.model.refusals import refuse_odd_loads, refuse_second_orbits
 from rigidsim.model.scaling import Scaling, amplitude_of, choose_scaling
-from rigidsim.model.state_selection import choose_formulation
+from rigidsim.scene.expressions.tree import ATTITUDE_NAMES, FLIGHT_NAMES
+from rigidsim.scene.formulations import AUTO, variables_named
 from rigidsim.scene.moments import happens_at_a_moment
 from rigidsim.scene.orbit_tables.pieces import TabulatedOrbit
 from rigidsim.scene.orbits import KeplerOrbit
+from rigidsim.scene.registry import OBSERVABLES
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.surfaces import surfaces_of
 
@@ -41,15 +58,15 @@ def plan_model(
         along: the average, already chosen, of a motion that this scene is a part of.
 
     Raises:
-        ConfigError: a record that the scene or the formulation can't give, or a load that depends on the
-            quaternion's sign.
+        ConfigError: a record that the scene or the formulation can't give, a formulation that doesn't apply,
+            or a load that depends on the quaternion's sign.
     """
     if extra_loads:
         scene = replace(scene, loads=(*scene.loads, *extra_loads))
     loads: list[Load] = [*UniformGravity.of(scene), *loads_of(scene)]
     if like is None:
         refuse_second_orbits(scene, loads)
-    formulation, requirements = choose_formulation(scene, loads, along)
+    formulation, requirements = _choose_formulation(scene, loads, along)
     if scaling is None and like is not None:
         scaling = choose_scaling(scene, like.scaling.drive)
     elif scaling is None:
@@ -85,8 +102,112 @@ def _tables(scene: Scene, longitude: Carried) -> dict[TabulatedOrbit, TablePlace
 
 
 def _orbit_tags(scene: Scene) -> dict[KeplerOrbit, str]:
-    tags: dict[KeplerOrbit, str] = {}
-    for number, load in enumerate(loads_of(scene), start=1):
-        if (orbit := orbit_of(load)) is not None:
-            tags.setdefault(orbit, str(number))
-    return tags
+    found = [(orbit_of(load), str(number)) for number, load in enumerate(loads_of(scene), start=1)]
+    return {orbit: tag for orbit, tag in reversed(found) if orbit is not None}  # the first load's tag
+
+
+# --- which states -------------------------------------------------------------------------------------------
+
+
+def _choose_formulation(
+    scene: Scene, loads: Sequence[Load], along: Average | None = None
+) -> tuple[Formulation, Requirements]:
+    """How the rotation is written, and which states are carried besides."""
+    if scene.config.model.reduced:
+        averaged = Averaged.along(scene, loads, along)
+        return averaged, averaged.requirements(scene)
+    requirements = _choose_requirements(scene, loads)
+    asked = scene.config.integrator.formulation
+    if asked == AUTO:
+        if not requirements.attitude:
+            return Rates(), requirements
+        return Planar.by_gradients(scene, loads) or Quaternion.of(scene, loads), requirements
+    try:
+        return REGISTERED[asked].of(scene, loads), requirements
+    except Unsuited as why:
+        raise ConfigError(Problem("[integrator] formulation", f'given "{asked}", but {why}')) from None
+
+
+def _choose_requirements(scene: Scene, loads: Sequence[Load]) -> Requirements:
+    """Which states a full motion takes, and why."""
+    asked = scene.config.integrator.formulation
+    keeps_attitude = variables_named(asked).keeps_attitude
+    record = scene.config.output.record
+    _check_recordable(scene, asked, record)
+    refuse_without_plane(scene, loads)
+    readers = {need: [load.title for load in loads if need in load.reads] for need in ("attitude", "flight")}
+    for event in scene.events:
+        for need, names in (("attitude", ATTITUDE_NAMES), ("flight", FLIGHT_NAMES)):
+            if event.reads & set(names):
+                readers[need].append(f"event {event.name}")
+    if readers["attitude"] and not keeps_attitude:
+        what = f'given "{asked}", but {readers["attitude"][0]} reads the attitude; choose "auto"'
+        raise ConfigError(Problem("[integrator] formulation", what))
+    rates = "everything else is a function of the rates"
+    if record is None or "angular_velocity" in record:
+        rates = "angular_velocity is recorded"
+    why, left_out = {"rates": f"Euler's equations; {rates}"}, []
+    reason = _attitude(scene, asked, record, readers["attitude"]) if keeps_attitude else None
+    torque = scene.torque_arm is not None
+    if reason is None:
+        no_reader = "" if torque else " and no load reads it"
+        unneeded = "nothing that is recorded needs it" if keeps_attitude else f"the formulation is {asked}"
+        left_out.append(("attitude", unneeded + no_reader))
+        if torque:
+            why["vertical"] = (
+                "gravity's torque reads the vertical in body axes; no load reads more of the attitude "
+                "(Euler-Poisson equations)"
+            )
+    else:
+        why["attitude"] = reason + ("; gravity's torque reads it" if torque else "")
+        if readers["attitude"] and reason != _read_by(readers["attitude"]):
+            why["attitude"] += f"; {_read_by(readers['attitude'])}"
+    if not scene.free_flight:
+        left_out.append(("position and velocity", "[initial] has neither"))
+    elif (reason := _flight(scene, record, readers["flight"])) is not None:
+        why["flight"] = reason
+    else:
+        left_out.append(("position and velocity", "neither recorded nor read by a load"))
+    return Requirements("attitude" in why, "vertical" in why, "flight" in why, record, why, left_out)
+
+
+def _attitude(scene: Scene, asked: str, record: list[str] | None, readers: list[str]) -> str | None:
+    """Why an attitude is carried; None if it isn't."""
+    if asked != AUTO:
+        return f'[integrator] formulation = "{asked}" asks for it'
+    if record is None:
+        return "nothing restricts what is recorded"
+    if readers:
+        return _read_by(readers)
+    recorded = [name for name in record if _takes(scene, name, "attitude")]
+    return f"{', '.join(recorded)} is recorded" if recorded else None
+
+
+def _read_by(readers: list[str]) -> str:
+    return f"{', '.join(readers)} reads it"
+
+
+def _flight(scene: Scene, record: list[str] | None, readers: list[str]) -> str | None:
+    """Why position and velocity are carried; None if they aren't."""
+    recorded = [name for name in record or () if _takes(scene, name, "flight")]
+    if recorded:
+        return f"{', '.join(recorded)} is recorded"
+    if readers:
+        return f"{', '.join(readers)} reads them"
+    return "the body moves, and nothing restricts what is recorded" if record is None else None
+
+
+def _takes(scene: Scene, name: str, states: str) -> bool:
+    """Whether recording an observable requires these states."""
+    return any(NEEDS[need].states(scene) == states for need in OBSERVABLES[name].needs)
+
+
+def _check_recordable(scene: Scene, formulation: str, record: list[str] | None) -> None:
+    for name in record or ():
+        for need in OBSERVABLES[name].needs:
+            why = NEEDS[need].missing(scene, formulation)
+            if why is not None:
+                raise ConfigError(Problem("[output] record", f'given "{name}": {why}'))
+    if not variables_named(formulation).keeps_attitude and scene.free_flight and record is None:
+        what = f'given "{formulation}" for a scene with a position; name what to record in [output] record, '
+        raise ConfigError(Problem("[integrator] formulation", what + 'or choose "auto"'))

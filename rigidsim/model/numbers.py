@@ -9,6 +9,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
+import heyoka as hy
+
+from rigidsim.model.rotations import Symbolic, SymbolicMatrix
 from rigidsim.model.scaling import Scaling
 from rigidsim.scene.arithmetic import Matrix, Vector, norm
 from rigidsim.scene.scene import Scene
@@ -33,6 +36,12 @@ class ScaledNumbers:
     rate_units: Vector
     arm: Vector | None
     up: Vector | None
+
+    def vertical_of(self, matrix: SymbolicMatrix, number: Rounder) -> list[Symbolic]:
+        """Unit vector against gravity in body axes, R^T up."""
+        assert self.up is not None
+        terms = [[number(u) * matrix[i][k] for i, u in enumerate(self.up) if u != 0] for k in range(3)]
+        return [hy.sum(column) for column in terms]
 
 
 def scaled_numbers(scene: Scene, scaling: Scaling) -> ScaledNumbers:

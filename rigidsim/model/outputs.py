@@ -15,7 +15,7 @@ from rigidsim.errors import ConfigError, Problem
 from rigidsim.model.euler_poles import Poles
 from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.numbers import Rounder
-from rigidsim.model.observables import Observable, Steady
+from rigidsim.model.observables import Steady
 from rigidsim.model.rotations import Symbolic
 from rigidsim.scene.registry import OBSERVABLES
 
@@ -86,7 +86,7 @@ def recorded_variables(m: Mechanics, record: Sequence[str] | None) -> tuple[list
     """
     recorded: list[Recorded] = []
     outputs: list[Symbolic] = []
-    for observable in _observables():
+    for observable in OBSERVABLES.values():
         wanted = observable.by_default(m) if record is None else observable.name in record
         if not wanted:
             continue
@@ -119,10 +119,6 @@ def recorded_variables(m: Mechanics, record: Sequence[str] | None) -> tuple[list
     return recorded, outputs
 
 
-def _observables() -> list[Observable]:
-    return list(OBSERVABLES.values())
-
-
 _UNIT = "1 by definition: any drift is rounding"
 _WATCHED = {"orthogonality_defect": "0 by definition: any drift is rounding"}
 
@@ -134,7 +130,7 @@ def find_invariants(m: Mechanics, norms: list[Symbolic]) -> list[Invariant]:
         norms: expressions that stay 1 by construction (of orbits carried as states).
     """
     found = []
-    for observable in _observables():
+    for observable in OBSERVABLES.values():
         if observable.drift_scale is None or not observable.available(m):
             continue
         why = observable.conserved(m)

@@ -1,7 +1,6 @@
-"""What keeps a system from being integrated or recorded: numbers out of range, and loads that are no
-functions of the attitude.
+"""Loads that are refused: those that would act twice, and those that are no functions of the attitude.
 
-These must be the same for a quaternion q and for -q, which are one attitude. A load that is odd in the
+The latter must be the same for a quaternion q and for -q, which are one attitude. A load that is odd in the
 quaternion would depend on the formulation: on whether its attitude has a sign at all, and on how that was
 continued.
 """
@@ -20,34 +19,12 @@ from rigidsim.model.capabilities import GradientAlone, Reacting
 from rigidsim.model.formulations.formulation import Requirements
 from rigidsim.model.load import Load, force_terms, torque_terms
 from rigidsim.model.load_estimate import probe, start_of
-from rigidsim.model.numbers import Rounder
-from rigidsim.model.outputs import Invariant, Recorded
 from rigidsim.scene.scene import Scene
 
-_LARGEST_EXPONENT = 1000
-"""Largest binary exponent of a recorded variable in SI: float64 ends at 2^1024, and sizes are known only
-roughly.
-"""
 _SAME_BODY = 1e-3
 """Relative difference of gravitational parameters below which two sources are taken to be one."""
 _STATES = 16
 _NOISE = 1e-9  # of the largest component: far above rounding, far below any load that means its sign
-
-
-def refuse_out_of_range(
-    initial: list[Any], variables: Sequence[Recorded | Invariant], number: Rounder
-) -> None:
-    """Refuse numbers that the states or the dataset's float64 can't hold.
-
-    Raises:
-        OverflowError: a number is out of range.
-    """
-    for value in initial:
-        number(value)
-    for variable in variables:
-        for exponent in variable.exponents:
-            if abs(exponent) > _LARGEST_EXPONENT:
-                raise OverflowError(f"{variable.name} would be about 2^{exponent} {variable.units}")
 
 
 def refuse_odd_loads(scene: Scene, requirements: Requirements, loads: Sequence[Load]) -> None:

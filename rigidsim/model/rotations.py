@@ -66,3 +66,15 @@ def quaternion_from_matrix(r: SymbolicMatrix, *, differentiable: bool = False) -
         result = [hy.select(larger, new, old) for new, old in zip(branches[n], result, strict=True)]
         best = hy.select(larger, squares[n], best)
     return result
+
+
+def quaternion_kinematics(q: list[Symbolic], rates: list[Symbolic]) -> list[Symbolic]:
+    """q (0, w) / 2 for a quaternion [w, x, y, z] and rates in body axes."""
+    w, x, y, z = q
+    p, r, s = rates
+    return [
+        0.5 * (-x * p - y * r - z * s),
+        0.5 * (w * p + y * s - z * r),
+        0.5 * (w * r + z * p - x * s),
+        0.5 * (w * s + x * r - y * p),
+    ]

@@ -26,10 +26,9 @@ import heyoka as hy
 
 from rigidsim.model.capabilities import Narrow, Rooted
 from rigidsim.model.euler_poles import components_of_factor, starts_in_pole
-from rigidsim.model.heyoka_expressions import to_heyoka
+from rigidsim.model.heyoka_expressions import state_names, to_heyoka
 from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.rotations import Symbolic
-from rigidsim.model.state_names import state_names
 from rigidsim.scene.expressions.tree import ATTITUDE_NAMES
 from rigidsim.scene.transitions import WIDE, narrow_parts
 

@@ -3,33 +3,46 @@
 from __future__ import annotations
 
 import copy
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
 import heyoka as hy
 
 from rigidsim.model.assembly import assemble_states
-from rigidsim.model.crossings import Crossing, crossings_of
 from rigidsim.model.formulations.formulation import Formulation, ModelPlan, Requirements
-from rigidsim.model.heyoka_expressions import to_heyoka
+from rigidsim.model.heyoka_expressions import carries_sign, plain_angles, state_names, to_heyoka
 from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.numbers import Rounder
 from rigidsim.model.orbits.table_states import Pieces
 from rigidsim.model.outputs import Invariant, Recorded, drift_outputs, find_invariants, recorded_variables
-from rigidsim.model.refusals import refuse_out_of_range
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.scaling import Scaling
 from rigidsim.model.state_blocks import StateBlock, joined
-from rigidsim.model.state_names import carries_sign, plain_angles, state_names
 from rigidsim.scene.expressions.tree import ATTITUDE_NAMES, names_used
 from rigidsim.scene.scene import Scene
+
+_LARGEST_EXPONENT = 1000
+"""Largest binary exponent of a recorded variable in SI: float64 ends at 2^1024, and sizes are known only
+roughly.
+"""
+_DIRECTIONS = {"any": 0, "up": 1, "down": -1}
+
+
+@dataclass(frozen=True)
+class Crossing:
+    """An event as an expression of the states; ``direction`` is -1, 0 (any) or 1."""
+
+    name: str
+    expression: Symbolic
+    direction: int
+    stop: bool
 
 
 class System:
     """First-order equations with scaled states, and everything recorded as expressions of them.
 
-    Each part is worked out once, when it is first needed: a projection reads the invariants alone,
-    two-part coefficients change the equations alone, and a partner chart is built when it is entered.
+    Each part is worked out once, when it is first needed.
 
     Attributes:
         plan: decisions made before anything was rounded.
@@ -60,9 +73,7 @@ class System:
         return System(self.plan, number, chart=self._chart)
 
     def with_coefficients(self, coefficients: Rounder) -> System:
-        """The same system with the coefficients of its equations rounded differently, for instance in two
-        parts.
-        """
+        """The same system with the coefficients of its equations rounded otherwise, as in two parts."""
         other = copy.copy(self)  # keeps everything already worked out except what the coefficients change
         other._coefficients = coefficients
         other.__dict__.pop("equations", None)
@@ -107,9 +118,7 @@ class System:
 
     @cached_property
     def rate_bound(self) -> Any:
-        """Upper bound (mpf, rad/s) of the absolute angular velocity; of the momentum's turning rate if
-        rotations are averaged over.
-        """
+        """See ``Formulation.rate_bound``."""
         return self.formulation.rate_bound(self.plan)
 
     # --- states ---------------------------------------------------------------------------------------------
@@ -120,7 +129,7 @@ class System:
 
     @property
     def mechanics(self) -> Mechanics:
-        """The quantities in terms of which outputs and invariants are written."""
+        """What outputs and invariants are written in."""
         return self._assembled[0]
 
     @property
@@ -220,13 +229,20 @@ class System:
 
     @cached_property
     def invariants(self) -> list[Invariant]:
-        """All that the scene conserves."""
+        """All that is conserved."""
         return find_invariants(self.mechanics, list(self._joined.norms))
 
     @cached_property
     def crossings(self) -> list[Crossing]:
-        """Events to be located along the motion."""
-        return crossings_of(self.mechanics)
+        """Events to be located along the motion; their times are single numbers, and so is the time that they
+        read.
+        """
+        m, found = self.mechanics, []
+        for event in self.scene.events:
+            names = state_names(m, event.reads, clocked=False)
+            expression = to_heyoka(event.expression, names, m.number, m.scene.context, m.sides)
+            found.append(Crossing(event.name, expression, _DIRECTIONS[event.direction], event.stop))
+        return found
 
     # --- what changes at given times ------------------------------------------------------------------------
 
@@ -290,18 +306,12 @@ class System:
 
     @property
     def switches(self) -> bool:
-        """Whether there are any switching surfaces, or angles or a quaternion that are continued from step to
-        step.
-        """
+        """Whether there are switching surfaces, or angles or a quaternion continued from step to step."""
         return self.parameters > self.clocked
 
 
 def build_system(plan: ModelPlan, number: Rounder) -> System:
     """Build the least system that a scene needs.
-
-    Args:
-        plan: from ``plan_model``.
-        number: rounds an mpf once to the working precision's scalar.
 
     Raises:
         ConfigError: a record that the scene or the formulation can't give, or a start in a singularity.
@@ -309,7 +319,13 @@ def build_system(plan: ModelPlan, number: Rounder) -> System:
     """
     system = System(plan, number)
     system.formulation.check_start(plan.scene, system.mechanics.attitude)
-    refuse_out_of_range(system.initial, [*system.recorded, *system.invariants], number)
+    for value in system.initial:
+        number(value)
+    variables: list[Recorded | Invariant] = [*system.recorded, *system.invariants]
+    for variable in variables:
+        for exponent in variable.exponents:
+            if abs(exponent) > _LARGEST_EXPONENT:
+                raise OverflowError(f"{variable.name} would be about 2^{exponent} {variable.units}")
     return system
 
 

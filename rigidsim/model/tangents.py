@@ -17,11 +17,11 @@ import heyoka as hy
 
 from rigidsim.model.capabilities import orbit_of
 from rigidsim.model.formulations.planar import ANGLE, SPIN
+from rigidsim.model.heyoka_expressions import TANGENT
 from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.observables.observable import Observable, only_when_named
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.state_blocks import StateBlock, joined
-from rigidsim.model.state_names import TANGENT
 from rigidsim.scene.methods import DEFAULT_METHOD
 from rigidsim.scene.registry import register_observable
 

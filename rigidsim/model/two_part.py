@@ -1,4 +1,4 @@
-"""Coefficients in two parts, which keep the digits that the working precision can't hold.
+"""Coefficients and times in two parts, which keep the digits that the working precision can't hold.
 
 A coefficient rounded once has a fixed error, and so have the motion's frequencies: its phase errs by eps t.
 Where invariants are projected nothing else grows as fast, so there each product c x becomes hi x + lo x.
@@ -6,6 +6,13 @@ Where invariants are projected nothing else grows as fast, so there each product
 ``hi`` has half the digits, not all: beside a product rounded to the last bit a part below half of that bit
 would always be rounded away again. With half the digits lo x reaches well into the sum, hi + lo is c to half
 as many digits again as the working precision has, and what is rounded is the product alone, to either side.
+
+heyoka's time is a sum of two numbers, of which equations see the first alone. Where something abrupt happens
+at a moment c, the second is a parameter, and slope (t - c) becomes
+
+    slope ((time - c_high) + (low - c_low)),
+
+whose first difference is exact near c: the closer to the moment, the smaller is the error.
 """
 
 from __future__ import annotations
@@ -17,6 +24,9 @@ from typing import Any
 import heyoka as hy
 
 from rigidsim.scene.arithmetic import negligible
+from rigidsim.scene.expressions.lines import LineInTime
+
+_MOST_PARTS = 64  # doubles in a number of any precision that is in use
 
 
 @dataclass(frozen=True)
@@ -87,3 +97,55 @@ def in_two_parts(
         return TwoPart(number(high), number(value - high), single)
 
     return split
+
+
+# --- time ---------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class TwoPartTime:
+    """The scene's time in two numbers.
+
+    Attributes:
+        unit: internal unit of time, s (mpf).
+        low: the parameter that holds what the engine's time leaves out, internal units.
+    """
+
+    unit: Any
+    low: Any
+
+    def expression(self, line: LineInTime, number: Callable[[Any], Any], context: Any) -> Any:
+        """A line as an expression of the engine's time.
+
+        Args:
+            number: rounds an mpf once to the working precision's scalar.
+        """
+        slope = rounded(number(line.slope * self.unit))
+        if line.offset == 0:
+            return slope * hy.time
+        zero = line.zero / self.unit
+        high, low = in_two_numbers(zero, number, context)
+        # heyoka adds constants within a sum up: a product keeps the two sums apart
+        if isinstance(slope, hy.expression) or slope != 1:
+            return hy.sum([slope * (hy.time - high), slope * (self.low - low)])
+        half = rounded(number(context.one / 2))
+        return hy.sum([2.0 * (half * hy.time - half * high), 2.0 * (half * self.low - half * low)])
+
+
+def in_two_numbers(value: Any, number: Callable[[Any], Any], context: Any) -> tuple[Any, Any]:
+    """The nearest scalar to an mpf and the one nearest to the rest; a swept number has no rest."""
+    high = rounded(number(value))
+    if isinstance(high, hy.expression):
+        return high, hy.expression(0.0)
+    return high, rounded(number(value - exactly(high, context)))
+
+
+def exactly(scalar: Any, context: Any) -> Any:
+    """A scalar of any precision as an mpf, in doubles from the largest on."""
+    total, rest = context.zero, scalar
+    for _ in range(_MOST_PARTS):
+        part = float(rest)
+        if part == 0:
+            break
+        total, rest = total + context.mpf(part), rest - part
+    return total

@@ -21,8 +21,7 @@ from rigidsim.model.averaged.average import TOLD
 from rigidsim.model.averaged.mechanics import AveragedMechanics
 from rigidsim.model.averaged.orbit_terms import Ellipse, plane_vectors
 from rigidsim.model.averaged.resonance import Resonance
-from rigidsim.model.equations import quaternion_kinematics
-from rigidsim.model.rotations import Symbolic, apply, quaternion_matrix
+from rigidsim.model.rotations import Symbolic, apply, quaternion_kinematics, quaternion_matrix
 from rigidsim.model.two_part import as_factor
 from rigidsim.scene.arithmetic import cross, dot, transpose
 

@@ -20,7 +20,6 @@ import heyoka as hy
 
 from rigidsim.model import rotations
 from rigidsim.model.capabilities import corotating_orbit_of
-from rigidsim.model.equations import quaternion_kinematics
 from rigidsim.model.load import Load
 from rigidsim.model.numbers import Rounder
 from rigidsim.model.rotations import Symbolic, SymbolicMatrix
@@ -64,7 +63,7 @@ def orbital_states(
     carried_along = [z, y, -x, -w]
     derivatives = [
         turning + half_motion * along
-        for turning, along in zip(quaternion_kinematics(p, rates), carried_along, strict=True)
+        for turning, along in zip(rotations.quaternion_kinematics(p, rates), carried_along, strict=True)
     ]
     initial = relative_attitude(scene, orbit)
     orbital = half_turn(scene, orbit, tag, time_unit, number)

@@ -8,7 +8,6 @@ import heyoka as hy
 
 from rigidsim.model import rotations
 from rigidsim.model.body import BODY
-from rigidsim.model.equations import quaternion_kinematics
 from rigidsim.model.formulations.formulation import Formulation, ModelPlan, formulates
 from rigidsim.model.formulations.orbital_frame import corotating_orbit, orbital_states
 from rigidsim.model.load import Load
@@ -57,7 +56,7 @@ def quaternion_states(scene: Scene, rates: list[Symbolic]) -> AttitudeStates:
     squared = hy.sum([c * c for c in q])
     return AttitudeStates(
         names,
-        quaternion_kinematics(q, rates),
+        rotations.quaternion_kinematics(q, rates),
         list(scene.quaternion),
         rotations.quaternion_matrix(q),
         q,

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from rigidsim.model.body import BODY
-from rigidsim.model.equations import vertical_equations
 from rigidsim.model.formulations.formulation import Formulation, ModelPlan, formulates, rate_block
 from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.numbers import Rounder
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.state_blocks import StateBlock
-from rigidsim.scene.arithmetic import apply, transpose
+from rigidsim.scene.arithmetic import apply, cross, transpose
 from rigidsim.scene.attitude import rotation_matrix
 from rigidsim.scene.formulations import FORMULATIONS
 
@@ -33,6 +32,6 @@ class Rates(Formulation):
         if plan.requirements.vertical:
             assert m.numbers.up is not None
             seen = apply(transpose(rotation_matrix(m.scene.quaternion)), m.numbers.up)
-            turning = vertical_equations(m.carried(m.vertical), m.rates)
+            turning = cross(m.carried(m.vertical), m.rates)  # Poisson's g' = g x w
             blocks.append(StateBlock(BODY.vertical, turning, seen, why=why["vertical"]))
         return blocks

@@ -9,12 +9,11 @@ from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import Field, PlainValidator, WithJsonSchema
 
-from rigidsim.model.heyoka_expressions import to_heyoka
+from rigidsim.model.heyoka_expressions import state_names, to_heyoka
 from rigidsim.model.kinematics import Kinematics
 from rigidsim.model.load import Load, Term
 from rigidsim.model.load_words import span_words, value_text
 from rigidsim.model.rotations import Symbolic, apply, transpose
-from rigidsim.model.state_names import state_names
 from rigidsim.scene.arithmetic import Vector, cross, diagonal, norm, parallel
 from rigidsim.scene.arithmetic import apply as apply_numbers
 from rigidsim.scene.arithmetic import transpose as transposed

@@ -9,8 +9,8 @@ from typing import Any
 import heyoka as hy
 import numpy as np
 
+from rigidsim.model.heyoka_expressions import TANGENT
 from rigidsim.model.state_blocks import AttitudeStates
-from rigidsim.model.state_names import TANGENT
 from rigidsim.solve.batch.lanes import BatchEngine, BatchSystem
 from rigidsim.solve.batch.tracing import TracedSystem
 from rigidsim.solve.compiled import compiled_function

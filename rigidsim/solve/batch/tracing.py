@@ -9,9 +9,9 @@ from typing import Any
 
 import heyoka as hy
 
+from rigidsim.model.heyoka_expressions import TANGENT
 from rigidsim.model.model_plan import plan_model
 from rigidsim.model.scaling import Drive
-from rigidsim.model.state_names import TANGENT
 from rigidsim.model.system import System
 from rigidsim.scene.arithmetic import context_for
 from rigidsim.scene.config import Experiment

@@ -14,8 +14,8 @@ from typing import Any, Protocol
 import heyoka as hy
 import numpy as np
 
+from rigidsim.model.heyoka_expressions import TANGENT
 from rigidsim.model.observables.mechanical import WORK
-from rigidsim.model.state_names import TANGENT
 from rigidsim.model.system import System
 from rigidsim.solve.compiled import TaylorEngine
 from rigidsim.solve.precision import precision_of

@@ -19,7 +19,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rigidsim.model.state_names import TANGENT
+from rigidsim.model.heyoka_expressions import TANGENT
 from rigidsim.model.system import System
 from rigidsim.solve.neighbours.chords import attitude_chords
 from rigidsim.solve.neighbours.lanes import NEIGHBOURS, Lanes, SeriesErrors

@@ -10,7 +10,7 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from rigidsim.model.system import System
-from rigidsim.model.two_part_time import exactly, in_two_numbers
+from rigidsim.model.two_part import exactly, in_two_numbers
 from rigidsim.scene.expressions.lines import as_line, lines_in
 from rigidsim.scene.expressions.piecewise import on_sides
 from rigidsim.scene.expressions.tree import Expression, ExpressionError, evaluate, names_used
