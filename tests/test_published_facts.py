@@ -46,15 +46,6 @@ def test_rigid_earth_nutates_in_304_days_and_not_in_chandlers_430(runs: Path) ->
     assert not 427 < period < 435  # Chandler 1891, Gross 2007: the elastic Earth
 
 
-def test_rigid_earth_from_its_axes_nutates_in_about_300_days(runs: Path) -> None:
-    run = ready("earth_free_nutation_axes", runs)
-    period = 2 * math.pi / body_frequency(run) / 86400
-    a, c = 6378.0, 6357.0
-    expected = (a**2 + c**2) / (a**2 - c**2) * 2 * math.pi / 7.292115e-5 / 86400
-    assert period == pytest.approx(expected, rel=1e-9)
-    assert 295 < period < 310
-
-
 def test_symmetric_top_follows_its_closed_form(runs: Path) -> None:
     """R(t) = exp(t [L/A]x) R0 exp(t (A-C)/A w3 [z]x): Landau & Lifshitz, Mechanics, section 33."""
     run = ready("free_symmetric_top", runs, "time.samples=51")

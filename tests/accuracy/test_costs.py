@@ -88,18 +88,6 @@ def test_choosing_and_certifying_are_in_the_cpu_seconds(tmp_path: Path) -> None:
     assert any(told.startswith("extended") for told in slow.told[slow.told.index("certify") :])
 
 
-def test_a_plain_run_has_neither(tmp_path: Path) -> None:
-    slow = Slow(0.5)
-    run = rigidsim.run(scene(), out=tmp_path, observer=slow)
-    assert list(run.summary["cost"]["cpu_by_phase"]) == [
-        "build",
-        "integrate_and_record",
-        "estimate",
-        "dataset",
-    ]
-    assert slow.told == ["integrate", "estimate", "dataset"]
-
-
 def test_the_summary_table_tells_of_each_phase(tmp_path: Path) -> None:
     run = rigidsim.run(scene("integrator.accuracy=1e-9"), out=tmp_path)
     out = io.StringIO()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import mpmath
@@ -12,6 +13,7 @@ import xarray
 import rigidsim
 from rigidsim.analysis.decomposition import Decomposition, decompose
 from rigidsim.analysis.exponentials import Sum
+from rigidsim.analysis.labels import Known, Label, label
 from rigidsim.analysis.refinement import SignalSamples
 
 CONTEXT = mpmath.MPContext()
@@ -182,3 +184,37 @@ def test_a_secular_rate_has_an_honest_error() -> None:
     clean = decompose(SignalSamples(((values - slow, 0 * values),), True, 53, CONTEXT), 6, 1, 1e-12)
     assert abs(float(clean.sum.polynomial[1].real) - rate) < 1e-13
     assert found.polynomial_errors[1] > 1e6 * clean.polynomial_errors[1]
+
+
+# ---- lines are called what they are: in band, folded, ambiguous, and not at all where nothing fits
+
+YEAR, MONTH, NODE = 2 * math.pi / 365.25, 2 * math.pi / 27.3217, -2 * math.pi / 6798.38
+KNOWN = [Known("year", YEAR), Known("month", MONTH), Known("node", NODE)]
+
+
+def folded(frequency: float, nyquist: float) -> float:
+    return frequency - 2 * nyquist * round(frequency / (2 * nyquist))
+
+
+@pytest.mark.parametrize("real", [False, True])
+def test_a_line_in_band_is_its_simplest_combination(real: bool) -> None:
+    found = label(2 * MONTH + NODE, 1e-12, KNOWN, math.pi, real=real)
+    assert found == Label((0, 2, 1), "2 month + node", 0, ())
+
+
+@pytest.mark.parametrize("real", [False, True])
+def test_a_folded_line_is_unfolded_through_the_known_frequencies(real: bool) -> None:
+    nyquist = math.pi / 20
+    seen = folded(2 * MONTH, nyquist)
+    found = label(abs(seen) if real else seen, 1e-12, KNOWN, nyquist, real=real)
+    sign = -1 if real and seen < 0 else 1
+    assert found.multipliers == (0, 2 * sign, 0)
+    assert found.folds * 2 * nyquist + (abs(seen) if real else seen) == pytest.approx(
+        2 * MONTH * sign, rel=1e-12
+    )
+
+
+def test_signals_in_space_know_nothing_of_a_spin_about_an_axis_of_symmetry() -> None:
+    spin = Known("spin", 2 * math.pi + YEAR, where="body")
+    assert not label(YEAR, 1e-9, [KNOWN[0], spin], math.pi, real=False).doubtful
+    assert label(YEAR, 1e-9, [KNOWN[0], spin], math.pi, real=False, in_body=True).doubtful == ("spin",)

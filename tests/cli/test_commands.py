@@ -57,19 +57,6 @@ def test_run_writes_a_folder_and_prints_a_table(config: Config, rigidsim_command
     assert "integrating into" not in result.stdout
 
 
-def test_run_draws_the_timeline_when_asked(config: Config, rigidsim_command: Command) -> None:
-    result = rigidsim_command("run", config(), "--set", "output.timeline=true")
-    assert result.exit_code == 0, result.output
-    assert files("runs/free") == [
-        "checkpoint.h5",
-        "config.toml",
-        "dataset.h5",
-        "summary.json",
-        "timeline.rrd",
-    ]
-    assert "timeline" in read("runs/free")["cost"]["seconds"]
-
-
 def test_run_refuses_all_before_it_starts_any(config: Config, rigidsim_command: Command) -> None:
     bad = config("bad", time="end = 3\nsamples = 49\ntypo = 1")
     result = rigidsim_command("run", config("good"), bad)
@@ -92,17 +79,6 @@ def test_comments_of_an_earlier_version_are_told_of(config: Config, rigidsim_com
 
 
 # plan
-
-
-def test_plan_explains_and_writes_nothing(config: Config, rigidsim_command: Command) -> None:
-    name = config(rest='record = ["angular_velocity"]')
-    before = files()
-    result = rigidsim_command("plan", name)
-    assert result.exit_code == 0, result.output
-    assert files() == before
-    assert "free  3 states, rates" in result.stdout
-    for text in ("Euler's equations", "no attitude", "wx' = ", "no torque acts", "forecast", "order 20"):
-        assert text in result.stdout
 
 
 def test_plan_json(config: Config, rigidsim_command: Command) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import signal
 import subprocess
 import time
@@ -17,6 +16,7 @@ import xarray
 from support import OFTEN, cases, same_bits
 
 import rigidsim
+from rigidsim.cli.ending import exit_code
 
 pytestmark = pytest.mark.optimised  # as the processes that these are held against
 
@@ -96,56 +96,6 @@ def test_an_interrupted_run_keeps_what_it_has(case: str, config: Config, start: 
         np.testing.assert_array_equal(partial.time, np.arange(partial.sizes["time"]) * spacing)
         assert partial.attrs["status"] == "interrupted"
         assert assert_first_samples(partial, whole) > 1
-
-
-# samples, precision, method
-CROWDED = {
-    "double": (10**10, '"double"', "taylor"),
-    "80 bits": (10**9, '"extended"', "taylor"),
-    "50 digits": (10**10, "50", "taylor"),
-    "closed form": (10**10, '"double"', "closed_form"),
-}
-MEMORY = 400e6  # bytes; measured are 170 to 270 MB, most of them libraries and compiled code
-
-
-@pytest.mark.parametrize("case", cases(CROWDED, ("double",)))
-def test_any_number_of_samples_in_a_step(case: str, config: Config, start: Start) -> None:
-    """Billions of them: a run keeps to its memory, answers Ctrl-C at once, and keeps what it has."""
-    samples, precision, method = CROWDED[case]
-    name = config(
-        time=f"end = 10\nsamples = {samples + 1}",
-        integrator=f'precision = {precision}\nmethod = "{method}"',
-        rest=GUARDED,
-    )
-    process = start("run", name)
-    integrating(process)
-    time.sleep(0.8)
-    before = cpu_seconds(process.pid)
-    peak = memory(process.pid)
-    process.send_signal(signal.SIGINT)
-    _, err = process.communicate(timeout=60)
-    assert process.returncode == 130, err
-    assert peak < MEMORY
-    run = rigidsim.open_run("runs/free")
-    assert run.status == "interrupted"
-    assert run.summary["cost"]["steps"] < 10
-    assert run.summary["samples"] > 100
-    # all work after the signal; of the whole process, less what it had worked before
-    assert run.summary["cost"]["cpu_seconds"] < before + PATIENCE
-    with run.dataset as dataset:
-        np.testing.assert_array_equal(dataset.time[:3], np.arange(3) * 10 / samples)
-
-
-def cpu_seconds(pid: int) -> float:
-    """User and system time of a process so far."""
-    fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
-    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
-
-
-def memory(pid: int) -> float:
-    """The most that a process has had so far, bytes."""
-    status = Path(f"/proc/{pid}/status").read_text()
-    return 1024.0 * int(status.split("VmHWM:")[1].split()[0])
 
 
 def test_ctrl_c_while_the_engine_is_compiled(config: Config, start: Start) -> None:
@@ -242,3 +192,32 @@ def test_ctrl_c_after_the_integration(phase: str, config: Config, monkeypatch: p
     assert said[phase] in run.summary["message"]
     with run.dataset as dataset:
         assert dataset.sizes["time"] == 49
+
+
+# ---- exit codes of commands that Ctrl-C ends, wherever it finds them
+
+
+def interrupted_as(kind: type[Exception]) -> int:
+    """What a library does to Ctrl-C that comes while it works."""
+    try:
+        raise KeyboardInterrupt
+    except KeyboardInterrupt as signal:
+        raise kind("initialization failed") from signal
+
+
+def test_an_import_that_was_interrupted_is_an_interruption(capsys: pytest.CaptureFixture[str]) -> None:
+    assert exit_code(lambda: interrupted_as(ImportError)) == 130
+    assert capsys.readouterr().err == "rigidsim: interrupted\n"
+
+
+def test_what_goes_wrong_after_an_interruption_is_not_hidden() -> None:
+    with pytest.raises(ValueError, match="initialization failed"):
+        exit_code(lambda: interrupted_as(ValueError))
+
+
+def test_a_library_that_cannot_be_loaded_is_not_an_interruption() -> None:
+    def command() -> int:
+        raise ImportError("no such library")
+
+    with pytest.raises(ImportError, match="no such library"):
+        exit_code(command)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
 from typing import Any
 
@@ -64,3 +65,33 @@ def test_every_code_has_its_words_and_others_none() -> None:
         assert "1e-12" in line
         assert ("1.0e-08" in line) == (code is not AdviceCode.AVERAGED)  # an error of axes, not of attitudes
     assert advice_line(Advice(code="of a later version", now=1e-8, then=1e-12)) is None
+
+
+# ---- what was understood of a config is echoed in units that show a mistake at once
+
+Config = Callable[..., str]
+Command = Callable[..., Any]
+
+
+@pytest.fixture
+def degrees(config: Config) -> str:
+    return config(initial="angular_velocity = [0.1, 1, 0.05]\neuler_angles = [40, 60, 30]")
+
+
+def test_run_and_info_and_plan_say_it(degrees: str, rigidsim_command: Command) -> None:
+    ran = rigidsim_command("run", degrees)
+    assert "rigidsim: warning: free.toml: [initial] euler_angles: given 40, 60, 30" in ran.stderr
+    info = rigidsim_command("info", "runs/free")
+    plan = rigidsim_command("plan", degrees)
+    for shown in (ran.stdout, info.stdout, plan.stdout):
+        assert "start    attitude zxz 2291.83, 3437.75, 1718.87 deg" in shown
+        assert '"40 deg" if degrees' in " ".join(shown.split())
+    of_run = json.loads(rigidsim_command("info", "runs/free", "--json").stdout)
+    of_plan = json.loads(rigidsim_command("plan", degrees, "--json").stdout)
+    assert of_run["start"] == of_plan["start"]
+    assert of_run["start"]["euler_angles_deg"] == pytest.approx([2291.8311805, 3437.7467708, 1718.8733854])
+    assert of_run["body"] == of_plan["body"]
+    assert of_run["time"] == of_plan["time"] == {
+        "start_s": 0.0, "end_s": 3.0, "samples": 49, "every_s": 0.0625, "epoch": "", "unit": ""
+    }  # fmt: skip
+    assert of_run["warning_codes"][0] == of_plan["warning_codes"][0] == "angle_without_unit"

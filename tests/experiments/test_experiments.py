@@ -3,14 +3,25 @@
 from __future__ import annotations
 
 import functools
+import json
+import math
+import re
 import subprocess
 import sys
 from pathlib import Path
 
 import mpmath
+import numpy as np
 import pytest
+import xarray
 from matplotlib.image import imread
 from test_documented_outputs import differences, shown_in
+
+from experiments import benchmark, long_horizon, peer_comparison, precision_tradeoff
+from experiments.benchmarking.rows import rows
+from experiments.peers import ADAPTERS, campaign
+from experiments.peers.scenes import SCENES
+from rigidsim.accuracy.setting import Setting
 
 ROOT = Path(__file__).parents[2]
 
@@ -162,3 +173,184 @@ def test_closed_forms_agree_with_quadrature() -> None:
             assert abs(energy - start) < mpmath.mpf("1e-25")
         quarter = mpmath.ellipk(heavy.m)
         assert abs(mpmath.quad(azimuth, [0, quarter]) / quarter - heavy.precession) < mpmath.mpf("1e-20")
+
+
+# ---- the benchmark gives a number in every row, and the scripts that runs are held against do the same work
+
+_PEERS = "left out"
+_PLAIN = ("sparse", "dense", "timeline", "extended", "extended_alike", "warm")
+
+
+@pytest.mark.slow(100)
+def test_every_row_gives_a_number(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    arguments = ["--quick", "--pairs", "1", "--out", str(tmp_path), "--scratch", str(tmp_path)]
+    assert benchmark.main(arguments) == 0
+    said = capsys.readouterr().out
+    found = {result["key"]: result for result in json.loads((tmp_path / "benchmark.json").read_text())}
+    assert [*found][:-2] == [row.key for row in rows(quick=True)]
+    assert said.count("| not judged |") == sum(result["ratio"] is not None for result in found.values())
+    for key, result in found.items():
+        if key.startswith("satellite") and _PEERS in result["note"]:
+            continue
+        assert 0.01 < result["ratio"] < 100, key
+        assert bool(result["estimated"]) == (key in _PLAIN)
+    # a thousand seconds near the intermediate axis: errors grow to some thousand roundings (bounds: 2^16)
+    for key, epsilon in (("dense", 2.0**-52), ("extended", 2.0**-63)):
+        differences = found[key]["differences"]
+        assert {"time", "quaternion", "angular_momentum", "energy_drift"} <= set(differences)
+        assert max(differences.values()) < 2**16 * epsilon
+        assert differences["time"] <= 1000 * epsilon
+        assert set(found[key]["readers"].values()) <= {"the same numbers", "not installed"}
+        assert found[key]["readers"]["h5py"] == found[key]["readers"]["xarray"] == "the same numbers"
+        ours, bare = found[key]["size"]
+        assert 0.5 < ours / bare < 2
+    assert re.search(r"figure: .*benchmark\.png", said)
+    assert (tmp_path / "benchmark.png").stat().st_size > 10_000
+
+
+# ---- every peer integrates the same motion; costs are read off curves rightly; absence is said, not hidden
+
+SHORT = [(name, 16.0) for name in SCENES]
+
+
+@pytest.fixture(scope="module")
+def reports() -> dict[str, campaign.Measured]:
+    """A few settings of each peer over 16 s, as far as they are installed."""
+    return {}
+
+
+def short_runs(reports: dict[str, campaign.Measured], peer: str) -> campaign.Measured:
+    if peer not in reports:
+        reports[peer] = campaign.measure(
+            [peer], SHORT, repeats=1, stride=20 if peer == "rigidsim" else 6, fill=0.0, fewest=1, cap=0.5
+        )
+    return reports[peer]
+
+
+@pytest.mark.parametrize(
+    "peer", [pytest.param(p, marks=pytest.mark.slow if p in ("rigidsim", "heyoka") else ()) for p in ADAPTERS]
+)
+def test_errors_against_128_bits_vanish_as_the_setting_gets_tighter(
+    peer: str, reports: dict[str, campaign.Measured]
+) -> None:
+    measured = short_runs(reports, peer)
+    if peer not in measured.imports:
+        assert any(f"{peer} left out" in note and "pip install" in note for note in measured.notes)
+        pytest.skip(measured.notes[0])
+    assert not [note for note in measured.notes if "broke down" in note]
+    curves = {(p.scene, p.title) for p in measured.points.values()}
+    assert curves
+    for scene, title in curves:
+        curve = [p for p in measured.points.values() if (p.scene, p.title) == (scene, title)]
+        loose, tight = curve[0], curve[-1]
+        if title == "MuJoCo implicit":  # first order: 2^8 times smaller steps, as much smaller errors
+            assert tight.error < loose.error * (tight.knob / loose.knob) ** 0.8
+        else:
+            # another motion would be off by radians; nine digits are within reach of each in these 16 s
+            assert tight.error < (1e-5 if peer == "mujoco" else 1e-9), (scene, title)
+            assert tight.error <= max(loose.error, 2.0**-51)  # of two at a double's end either may win
+
+
+@pytest.mark.slow
+def test_rigidsim_and_bare_heyoka_agree_to_round_off(reports: dict[str, campaign.Measured]) -> None:
+    measured = short_runs(reports, "heyoka"), short_runs(reports, "rigidsim")
+    for scene, end in SHORT:
+        # three times the round-off law at tolerance eps, (eps/2) sqrt(steps) |w| t / sqrt 3 (Brouwer 1937);
+        # steps of a third of a radian and more; the last bits of the quaternion itself
+        turned = SCENES[scene].rate * end
+        law = 3 * 2.0**-53 * math.sqrt(3 * turned) * turned / math.sqrt(3) + 2.0**-51
+        for report, title in zip(measured, ("bare heyoka, double", "rigidsim, quaternion"), strict=True):
+            points = [p for p in report.points.values() if p.scene == scene and p.title == title]
+            assert points[-1].knob == 2.0**-52
+            assert points[-1].error < law
+
+
+@pytest.mark.slow
+def test_the_command_prints_ratios_and_draws(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    arguments = ["--short", "--scenes", "free_top", "--peers", "heyoka,scipy", "--repeats", "1"]
+    assert peer_comparison.main([*arguments, "--cap", "0.1", "--out", str(tmp_path)]) == 0
+    printed = capsys.readouterr().out
+    assert "| scene, horizon | error, rad | bare heyoka, CPU ms | scipy |" in printed
+    # a compiled Taylor method against a step loop in Python: far more than any noise of the machine
+    row = next(line for line in printed.splitlines() if "| 1e-06 |" in line)
+    assert float(row.split("|")[4]) > 5
+    pixels = imread(tmp_path / "peer_comparison.png")[:, :, :3]
+    assert 0.01 < (pixels < 0.9).any(axis=2).mean() < 0.9
+
+
+# ---- the study of what accuracy costs: its choices are right, and one of its scenes is measured
+
+A, B, C = Setting("single"), Setting("double"), Setting("extended")
+
+
+@pytest.fixture(scope="module")
+def points() -> precision_tradeoff.Points:
+    return precision_tradeoff.measure_scene("asymmetric_top", to=1e3, processes=1)
+
+
+@pytest.mark.slow(29)
+def test_a_scene_is_measured_at_each_horizon(points: precision_tradeoff.Points) -> None:
+    assert list(points) == [1e2, 1e3]
+    short, long = ({p.setting: p for p in points[h]} for h in (1e2, 1e3))
+    assert Setting("quadruple") in short
+    assert Setting("quadruple") not in long  # not measured so far, and not extrapolated
+    default = precision_tradeoff.DEFAULT
+    assert short[default].cost == long[default].cost == 1.0
+    assert all(long[s].error >= short[s].error for s in long)  # the largest so far
+    closed = Setting("double", method="closed_form")
+    assert long[closed].cost == pytest.approx(short[closed].cost / 10)  # as many samples in ten times the run
+    assert long[closed].error < 1e-14  # it doesn't grow: some eps
+    assert all(check.passed for check in precision_tradeoff.checks({"asymmetric_top": points}))
+
+
+# ---- the study of long runs: its fit knows the laws, and its measurement the closed form
+
+HORIZON = 3e3
+
+
+def made_up(walk: float, drift: float, starts: int = 400, horizon: float = 1e7) -> xarray.Dataset:
+    """Random walks of a rate, which tilt a phase, with a constant drift of the rate beside them."""
+    moments = np.array(long_horizon.times(horizon)[1:])
+    generator = np.random.default_rng(1)
+    steps = np.diff(moments, prepend=0.0)
+    rate = walk * np.cumsum(generator.standard_normal((starts, len(moments))) * np.sqrt(steps), axis=1)
+    rate += drift * moments
+    phase = np.cumsum(rate * steps, axis=1)
+    errors = np.abs(np.array([rate, rate, phase]))
+    return xarray.Dataset(
+        {"error": (("quantity", "start", "time"), errors), "cpu_seconds": ("start", np.zeros(starts))},
+        coords={"quantity": list(long_horizon.QUANTITIES), "time": moments},
+        attrs={"body": "free asymmetric body", "precision": "double", "held": 0},
+    )
+
+
+def test_a_random_walk_has_the_exponents_of_brouwer() -> None:
+    data = made_up(1e-17, 0.0)
+    for quantity in long_horizon.QUANTITIES:
+        fitted = long_horizon.fit(data, quantity)
+        assert fitted is not None
+        # four times the uncertainty that the fit itself claims, over 400 walks of some per cent
+        assert abs(fitted.exponent - long_horizon.LAW[quantity]) < 4 * fitted.sigma + 0.02
+        assert fitted.sigma < 0.05
+    assert all(check.passed for check in long_horizon.checks([data]))
+
+
+@pytest.fixture(scope="module")
+def measured() -> dict[tuple[str, bool], xarray.Dataset]:
+    return {
+        (body, held): long_horizon.measure(body, "double", held, HORIZON, starts=3)
+        for body in long_horizon.BODIES
+        for held in (False, True)
+    }
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("body", long_horizon.BODIES)
+def test_errors_stay_within_the_law(body: str, measured: dict[tuple[str, bool], xarray.Dataset]) -> None:
+    plain, held = (measured[body, h]["error"].sel(quantity="attitude") for h in (False, True))
+    # five times (eps/2) sqrt(steps) t / sqrt 3 with at most 4 steps to a radian: five sigma of a random walk
+    law = 5 * 2.0**-53 * (4 * HORIZON) ** 0.5 * HORIZON * 1.5 / 3**0.5
+    assert plain.max() < law
+    assert (plain > 0).all()
+    # held: no more than some eps to a radian is left
+    assert held.max() < 8 * 2.0**-52 * HORIZON

@@ -107,13 +107,3 @@ def test_numbers_beyond_single_precision_are_refused_there(rate: str) -> None:
     prepare(rigidsim.parse(text.replace("{}", "double")))
     with pytest.raises(ConfigError, match="span more than single precision can hold"):
         prepare(rigidsim.parse(text.replace("{}", "single")))
-
-
-@pytest.mark.parametrize("power", [-200, 200])
-def test_the_unit_of_inertia_changes_no_bit(power: int) -> None:
-    """Powers of two: scaling rounds nothing."""
-    plain = run_text(scene()).dataset
-    moments = [f'"{m * 2 ** abs(power)}"' if power > 0 else f'"{m}/{2 ** abs(power)}"' for m in (1, 2, 3)]
-    scaled = run_text(scene(f"[{', '.join(moments)}]")).dataset
-    with plain, scaled:
-        assert (plain["quaternion"].values == scaled["quaternion"].values).all()

@@ -13,9 +13,12 @@ import pytest
 import xarray
 
 pytest.importorskip("rerun")
+import rerun as rr
 
 from rigidsim.look import viewer
 from rigidsim.look.timeline import write_timeline
+from rigidsim.look.timeline.comparison import MOST, write_comparison
+from rigidsim.look.timeline.writing import LiveRecording
 
 Build = Callable[..., xarray.Dataset]
 
@@ -91,8 +94,76 @@ def test_no_driver_is_said_plainly(
 
 def test_importing_the_package_loads_neither_rerun_nor_matplotlib() -> None:
     code = (
-        "import sys, rigidsim.look.viewer, rigidsim.look.live, rigidsim.look.figure_names; "
+        "import sys, rigidsim.look.viewer, rigidsim.look.timeline.writing, rigidsim.look.figure_names; "
         "print(sorted({'rerun', 'matplotlib', 'xarray', 'pyarrow'} & set(sys.modules)))"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"
+
+
+# ---- several runs in one recording, and a run that grows while it is looked at
+
+Read = Callable[[Path, str], dict[str, np.ndarray]]
+
+
+def test_runs_side_by_side_share_a_clock_and_show_how_far_they_are_apart(
+    symmetric_top: Build, read_back: Read, tmp_path: Path
+) -> None:
+    one, other = symmetric_top(count=1001), symmetric_top(count=501)  # each second time of the first
+    apart = 1e-9
+    turned = other["quaternion"].values @ _turn_about_z(apart).T
+    other = other.assign(quaternion=(("time", "quaternion_component"), turned))
+    assert write_comparison([("a", one), ("b", other)], tmp_path / "t.rrd") == 1502
+    first, second = (read_back(tmp_path / "t.rrd", f"/run{k}/scene/body") for k in (0, 1))
+    assert (len(first["time"]), len(second["time"])) == (1001, 501)
+    np.testing.assert_array_equal(first["time"][::2], second["time"])
+    difference = read_back(tmp_path / "t.rrd", r"/plots/drift/difference\ 1")["Scalars:scalars"]
+    at_samples = 10 ** difference[::2]
+    # a chord of unit quaternions is known to a few units in the last place of 1
+    np.testing.assert_allclose(at_samples, apart, rtol=0, atol=1e-14)
+    # between samples the other's is interpolated: the arc misses by (rate dt)^2 / 8 of a turn at most
+    assert (10 ** difference[1::2]).max() < (2 * 0.04) ** 2 / 8
+
+
+def _turn_about_z(angle: float) -> np.ndarray:
+    """What a quaternion w x y z becomes with a rotation about Z after it."""
+    c, s = np.cos(angle / 2), np.sin(angle / 2)
+    return np.array([[c, 0, 0, -s], [0, c, -s, 0], [0, s, c, 0], [s, 0, 0, c]])
+
+
+@pytest.mark.parametrize("count", [1, MOST + 1])
+def test_too_few_and_too_many_runs_are_refused(symmetric_top: Build, tmp_path: Path, count: int) -> None:
+    runs = [(str(k), symmetric_top(count=11)) for k in range(count)]
+    with pytest.raises(ValueError, match=f"given {count} runs; 2 to {MOST}"):
+        write_comparison(runs, tmp_path / "t.rrd")
+    assert not (tmp_path / "t.rrd").exists()
+
+
+def test_a_run_that_goes_on_is_sent_once_and_as_a_whole(
+    symmetric_top: Build, read_back: Read, tmp_path: Path
+) -> None:
+    whole = symmetric_top(count=901)
+    with rr.RecordingStream("rigidsim") as stream:
+        stream.save(tmp_path / "t.rrd")
+        recording = LiveRecording(stream)
+        recording.update(whole.isel(time=slice(0, 0)))
+        assert recording.rows == 0
+        for end in (300, 300, 640, 901):
+            recording.update(whole.isel(time=slice(0, end)))
+            assert recording.rows == end  # none twice: the scales of this motion never change
+    rows = read_back(tmp_path / "t.rrd", "/scene/body")
+    np.testing.assert_array_equal(rows["step"], np.arange(901))
+    wanted = whole["quaternion"].values[:, [1, 2, 3, 0]]
+    np.testing.assert_allclose(rows["Transform3D:quaternion"], wanted, rtol=0, atol=2.0**-25)
+
+
+def test_without_a_display_it_is_said_what_to_do(
+    symmetric_top: Build, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "t.rrd").write_bytes(b"")
+    monkeypatch.setattr(viewer, "has_display", lambda: False)
+    said = r"--web serves .* --png, --gif or --mp4 FILE"
+    with pytest.raises(viewer.NoDisplay, match=said):
+        viewer.open_viewer(tmp_path / "t.rrd")
+    with pytest.raises(viewer.NoDisplay, match=said), viewer.empty_viewer():
+        pass

@@ -59,17 +59,6 @@ def test_gravity_about_a_fixed_point(seed: int, formulation: str) -> None:
         np.testing.assert_allclose(got[3:], np.cross(up, w), rtol=0, atol=CLOSE)
 
 
-def test_two_loads_of_gravity_add_up() -> None:
-    scene = prepared(
-        "principal_moments = [1, 2, 2.5]\nmass = 1\ncenter_of_mass = [0, 0, 1]",
-        "angular_velocity = [0.1, 0.2, 0.3]",
-        GRAVITY + "acceleration = [0, 3, 0]\n[[loads]]\n" + GRAVITY + "acceleration = [0, 0, -4]",
-    )
-    assert scene.scene.gravity == [0, 3, -4]
-    got = derivative(scene.system, np.array([0, 0, 0, 1.0, 0, 0, 0]))
-    np.testing.assert_allclose(got[:3], [-3.0, 0, 0], atol=CLOSE)  # com x g = (-3, 0, 0) over I = 1
-
-
 def test_a_rod_gains_no_spin() -> None:
     system = prepared(
         'shape = "rod"\nmass = 1\nlength = 1\nreference = "end"',
@@ -119,23 +108,6 @@ def test_euler_kinematics(sequence: str) -> None:
             expected = attitude(0) * mpmath.matrix(skew(w).tolist())
             # the rates' own rounding, times 1/sin or 1/cos of the middle angle, at most 3.4
             assert mpmath.mnorm(change - expected, mpmath.inf) <= 4 * CLOSE
-
-
-def test_free_flight() -> None:
-    """x' = v, v' = g, and gravity doesn't turn the body."""
-    random = Random(11)
-    pull, tensor = random.vector(9), random.tensor()
-    system = prepared(
-        general_body(tensor, 3.0),
-        "angular_velocity = [1, 2, 3]\nposition = [1e6, 2, 3]\nvelocity = [1e-3, 5, 0]",
-        GRAVITY + f"acceleration = {array(pull)}",
-    ).system
-    w, q, x, v = random.vector(), random.quaternion(), random.vector(1e6), random.vector(5)
-    got = derivative(system, np.concatenate([w, q, x, v]))
-    np.testing.assert_allclose(got[7:10], v, rtol=4 * EPS)
-    np.testing.assert_allclose(got[10:13], pull, rtol=4 * EPS)
-    expected = np.linalg.solve(tensor, np.cross(tensor @ w, w))
-    np.testing.assert_allclose(got[:3], expected, rtol=0, atol=CLOSE * np.linalg.cond(tensor))
 
 
 # ---- (d) observables --------------------------------------------------------------------------------------

@@ -140,47 +140,6 @@ def test_eccentric_anomaly_solves_keplers_equation() -> None:
             assert abs(residual) < 1e-18
 
 
-def test_several_sources_add_up() -> None:
-    random = Random(1100)
-    tensor, w, q = random.tensor(), random.vector(), random.quaternion()
-    places = [random.vector(3) + np.full(3, 2.0), random.vector(3) - np.full(3, 3.0)]
-    orbit = {"semi_major_axis": 1.5, "eccentricity": 0.2, "mean_anomaly": 0.7, "inclination": 0.3}
-    system = prepared(
-        general_body(tensor),
-        f"angular_velocity = {array(w)}\nquaternion = {array(q)}",
-        "[[loads]]\n".join(
-            [fixed_source(3.0, places[0]), fixed_source(5.0, places[1]), gradient(2.0, orbit)]
-        ),
-    ).system
-    torque = sum(
-        gradient_torque(tensor, matrix(q), place, strength)
-        for place, strength in zip([*places, source_at(orbit, 2.0, 0.0)], [3.0, 5.0, 2.0], strict=True)
-    )
-    state = travel(system, [0.0])[0]
-    size = np.linalg.norm(np.linalg.inv(tensor)) * np.linalg.norm(tensor) * 20
-    np.testing.assert_allclose(
-        derivative(system, state)[:3], turning(tensor, w, torque), rtol=0, atol=CLOSE * size
-    )
-
-
-def test_fixed_source_keeps_energy() -> None:
-    text = f"""name = "fixed"
-[body]
-principal_moments = [1, 1.75, 2]
-[initial]
-angular_velocity = [0.1, 0.9, 0.2]
-[[loads]]
-{fixed_source(8.0, [1.0, 1.5, 0.5])}[time]
-end = 200
-"""
-    run = run_text(text)
-    row = run.summary["invariants"]["energy"]
-    assert 0 < row["largest_drift"] <= row["bound"]
-    potential = run.dataset["potential_energy"].values
-    assert np.ptp(potential) > 0.1  # it is fed from, so it isn't kinetic energy alone that stays
-    assert "angular_momentum" not in run.summary["invariants"]
-
-
 # ---- (b) a circular orbit ---------------------------------------------------------------------------------
 
 CIRCULATING = """name = "circulating"

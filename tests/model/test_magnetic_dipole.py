@@ -111,17 +111,6 @@ def test_along_an_orbit_it_agrees_with_another_integrator_of_the_plain_equations
     assert angle_between(run.dataset["quaternion"].values, there).max() <= 1e-8
 
 
-def test_loads_of_one_orbit_share_its_states() -> None:
-    gradient = f'[[loads]]\nkind = "gravity_gradient"\ngravitational_parameter = 1e20\n{ORBIT}\n'
-    load = f"moment = [1, 2, 3]\n{ORBIT}\nsource_moment = {array(SOURCE)}"
-    plan = rigidsim.plan(rigidsim.parse(text(load, extra=gradient)))
-    assert sorted(s for s in plan["states"] if "anomaly" in s) == ["cos_anomaly1", "sin_anomaly1"]
-    (shared,) = (r for r in plan["reasons"] if "anomaly" in r["states"])
-    assert shared["why"] == "magnetic_dipole, gravity_gradient: where its source is"
-    apart = gradient.replace("mean_anomaly = 0.7", "mean_anomaly = 0.8")
-    assert len(rigidsim.plan(rigidsim.parse(text(load, extra=apart)))["states"]) == plan["state_count"] + 4
-
-
 @pytest.mark.parametrize(
     ("load", "message"),
     [

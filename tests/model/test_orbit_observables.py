@@ -212,13 +212,3 @@ def test_what_a_scene_lacks_is_said(tmp_path: Path) -> None:
     orbit = GRADIENT + ORBIT.format(e=0, node=0, periapsis=0)
     assert "no load has a source" in refused("", name="nadir")
     assert "no single axis of smallest moment" in refused(orbit, "principal_moments = [1, 1, 2]")
-
-
-def test_a_planet_is_no_satellite(runs: Path) -> None:
-    """A spin of many turns per revolution: nobody asks for its roll."""
-    orbit = GRADIENT + ORBIT.format(e=0, node=0, periapsis=0)
-    start = "angular_velocity = [0, 0, {}]"
-    for spin, there in ((2, True), (2.01, False)):
-        dataset = ran(runs, orbit, initial=start.format(spin), output="", time="end = 0.1\nsamples = 2")
-        assert ("nadir" in dataset) is there
-        assert ("roll_pitch_yaw" in dataset) is there

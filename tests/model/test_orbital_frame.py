@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from equations import EPS, derivative, prepared
+from equations import derivative, prepared
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from support import law, run_text, tried
@@ -87,17 +87,6 @@ def test_at_rest_in_the_orbital_frame_it_stays_bit_for_bit() -> None:
     carried = dict(zip(system.states, moving, strict=True))
     assert [carried[name] for name in ("wx", "wy", "wz", "pw", "px", "py", "pz")] == [0.0] * 7
     assert carried["sin_half_anomaly1"] == 0.5
-
-
-def test_the_dataset_starts_with_the_attitude_that_was_given() -> None:
-    """Rounding of a product of two rotations: a few units in the last place of 1."""
-    text = TEXT.format(
-        rates=[0.1, 0.2, 0.3], quaternion=[0.5, -0.5, 0.5, 0.5], strength=1, start=0, end=4, more="",
-        orbit="inclination = 0.7, ascending_node = 2, mean_anomaly = 1", formulation="auto",
-        precision="double",
-    )  # fmt: skip
-    first = run_text(text).dataset["quaternion"].values[0]
-    np.testing.assert_allclose(first, [0.5, -0.5, 0.5, 0.5], rtol=0, atol=4 * EPS)
 
 
 def test_events_read_the_attitude_in_space() -> None:

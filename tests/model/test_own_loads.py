@@ -13,20 +13,7 @@ import numpy as np
 import pytest
 from equations import CLOSE, matrix
 
-import rigidsim
-from rigidsim.model.loads import LoadModel
-
 ROOT = Path(__file__).parents[2]
-FREE = """name = "free"
-[body]
-principal_moments = [1, 2, 3]
-[initial]
-angular_velocity = [0.5, 0.25, 1]
-[time]
-end = 10
-[output]
-timeline = false
-"""
 
 
 def example() -> str:
@@ -66,26 +53,3 @@ def test_the_example_of_the_readme(names: dict[str, Any]) -> None:
         assert file.attrs["python_loads"] == "Magnet"
     assert run.summary["bit_for_bit"]["claim"] is False
     assert "Python" in run.summary["bit_for_bit"]["holds_for"]
-
-
-def test_a_load_without_a_potential_does_work(tmp_path: Path) -> None:
-    """Two loads at once; one that takes energy makes its balance the invariant."""
-
-    class Drag(LoadModel):
-        title = "drag"
-
-        def torque(self, m: Any) -> list[Any]:
-            size = m.scene.context.ldexp(m.scene.context.mpf(-1) / 8, -m.scaling.momentum)
-            return [([size if i == j else 0 for j in range(3)], m.rates[i]) for i in range(3)]
-
-    run = rigidsim.run(rigidsim.parse(FREE), out=tmp_path, loads=[Drag(), Drag()])
-    names = {name for name, row in run.summary["invariants"].items() if not row["numerical"]}
-    assert names == {"energy_balance"}
-    row = run.summary["invariants"]["energy_balance"]
-    assert 0 < row["largest_drift"] <= row["bound"]
-    dataset = run.dataset
-    slope = np.gradient(dataset["energy"].values, dataset["time"].values, edge_order=2)
-    power = -0.25 * (dataset["angular_velocity"].values ** 2).sum(axis=1)
-    np.testing.assert_allclose(slope, power, rtol=0, atol=1e-3)  # differences of second order at 0.01 s
-    with h5py.File(run.folder.dataset) as file:
-        assert file.attrs["python_loads"] == "Drag Drag"

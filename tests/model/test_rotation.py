@@ -122,22 +122,6 @@ def test_polar_motion_is_absent_where_the_spin_has_left_the_figure_axis() -> Non
     )
 
 
-def test_what_is_recorded_by_default() -> None:
-    def names(body: str, start: str, load: str = "") -> set[str]:
-        system = prepare(rigidsim.parse(config(body, start, load))).system
-        return {r.name for r in system.recorded}
-
-    axial = {"polar_motion", "wobble_angle", "nutation_angle", "rotation_angle"}
-    planet = {"figure_axis", "obliquity", "node_longitude"}
-    body, start = "principal_moments = [1, 1, 1.01]", "angular_velocity = [0.001, 0, 1]"
-    sun = 'kind = "gravity_gradient"\ngravitational_parameter = 1\norbit = {semi_major_axis = 100}'
-    assert names(body, start) & (axial | planet) == axial
-    assert names(body, start, sun) & (axial | planet) == axial | planet
-    assert not names(body, "angular_velocity = [0.5, 0, 1]") & (axial | planet)
-    assert not names(body, "angular_velocity = [0, 0, 1]") & (axial | planet)
-    assert not names(body, "angular_velocity = [0, 0, 0.001]", sun) & (axial | planet)
-
-
 def test_turns_go_on_where_a_run_is_resumed(runs: Path) -> None:
     """Told by rates, and counted along the motion: the same bits as in one go."""
     body, start = "principal_moments = [1, 1.02, 1.04]", 'angular_velocity = ["0.01", 0, 1]'

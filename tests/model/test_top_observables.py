@@ -125,13 +125,3 @@ def test_the_tip_is_the_point_that_is_given(tmp_path: Path) -> None:
             rigidsim.run(rigidsim.parse(config(output=output)), out=tmp_path)
         for word in words:
             assert word in str(raised.value)
-
-
-def test_a_top_without_an_attitude_still_has_its_tilt() -> None:
-    """Rates and the vertical are enough for it; precession needs more, and no state is added for it."""
-    text = config(TOP, loads='kind = "uniform_gravity"', integrator='formulation = "rates"')
-    dataset = loaded(run_text(text))
-    assert "tilt" in dataset
-    assert not {"precession_angle", "spin_angle", "tip", "quaternion"} & set(dataset)
-    whole = loaded(run_text(config(TOP, loads='kind = "uniform_gravity"')))
-    assert np.abs(dataset["tilt"].values - whole["tilt"].values).max() < 1e-13

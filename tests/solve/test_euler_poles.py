@@ -13,7 +13,7 @@ import mpmath
 import numpy as np
 import pytest
 import xarray
-from support import config, run_text
+from support import angle_between, cases, config, law, run_text
 
 from rigidsim.scene import attitude
 from rigidsim.scene.fields import EULER_SEQUENCES
@@ -165,3 +165,37 @@ def test_angles_mean_the_quaternion_in_every_sequence_formulation_and_precision(
         text, sequence, precision = relative(n, chance)
         found = run_text(text, f'name="p{n}"').dataset
         assert worst_error(found, sequence, BITS[precision]) <= 1, text
+
+
+# ---- euler angles as states: small inside, continuous outside, the same attitude as the quaternion
+
+FREE = """
+name = "free"
+[body]
+principal_moments = [1, 1, 1.5]
+[initial]
+angular_velocity = [0.1, 0.15, 2]
+quaternion = [0.7, 0.4, 0.5, 0.3]
+[time]
+end = 60
+samples = 1201
+"""
+
+
+@pytest.mark.parametrize("sequence", cases(EULER_SEQUENCES, ("zxz", "xyx", "zyx", "yzx")))
+def test_each_sequence_gives_the_attitude_of_the_quaternion(sequence: str) -> None:
+    record = 'output.record=["angular_velocity", "quaternion", "euler_angles"]'
+    common = [record, f'integrator.euler_sequence="{sequence}"']
+    plain = run_text(FREE, 'name="q"', *common)
+    angles = run_text(FREE, 'name="e"', 'integrator.formulation="euler_angles"', *common)
+    error = angle_between(plain.dataset["quaternion"].values, angles.dataset["quaternion"].values)
+    # both formulations within three times the law, the angles' own with the amplification of their chart:
+    # an error of the outer angles grows like 1/|singular factor|, whose smallest value the sample shows
+    middle = angles.dataset["euler_angles"].values[:, 1]
+    factor = np.abs(np.sin(middle) if sequence[0] == sequence[2] else np.cos(middle)).min()
+    steps = angles.summary["cost"]["steps"]
+    assert error.max() <= 3 * law(2.0**-52, steps, 2.01, 60) * (1 + 1 / factor)
+    # angles found from the quaternion agree with those integrated, full turns included
+    difference = plain.dataset["euler_angles"].values - angles.dataset["euler_angles"].values
+    difference -= difference[0]  # the charts may start on different branches
+    assert np.abs(difference).max() <= 6 * law(2.0**-52, steps, 2.01, 60) * (1 + 1 / factor**2)

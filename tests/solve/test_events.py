@@ -81,15 +81,6 @@ def test_directions_alternate() -> None:
     assert np.array_equal(run.dataset["down_time"], run.dataset["flip_time"][::2])
 
 
-def test_events_change_the_motion_by_rounding_alone() -> None:
-    """Their expressions take part in heyoka's choice of steps."""
-    plain = run_text(FLIPS.format(samples=2001), 'name="plain"').dataset
-    watched = run_text(FLIPS.format(samples=2001) + FLIP, 'name="watched"').dataset
-    difference = np.abs(plain["quaternion"].values - watched["quaternion"].values).max()
-    # rounding of some hundred steps, amplified by the inverse square of the offset 1/16
-    assert difference < 100 * 2.0**-52 * 16**2
-
-
 @pytest.mark.parametrize("formulation", ["quaternion", "euler_angles", "rotation_matrix"])
 def test_events_do_not_depend_on_the_samples_or_on_how_the_run_is_driven(formulation: str) -> None:
     setting = f'integrator.formulation="{formulation}"'

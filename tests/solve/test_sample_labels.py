@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+import math
 from fractions import Fraction
 from typing import Any
 
+import mpmath
 import numpy as np
 import pytest
+import xarray
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from support import run_text
 
 import rigidsim
+from rigidsim import ConfigError
 from rigidsim.solve.problem import prepare
+from rigidsim.store.variables import parts_in
 
 SPIN = """
 name = "spin"
@@ -99,3 +104,129 @@ def test_a_list_has_exact_labels_in_single_precision_too() -> None:
     assert dataset["time"].values.tolist() == [0, 0.1, 1 / 3]
     narrow = np.array([0, 0.1, 1 / 3], dtype=np.float32).astype(float)
     np.testing.assert_array_equal(dataset["time"].values + dataset["time_lo"].values, narrow)
+
+
+# ---- samples lie where they were asked for, however they are asked for
+
+
+def times(text: str, precision: str = "double") -> np.ndarray:
+    prepared = prepare(rigidsim.parse(SPIN + text + f'\n[integrator]\nprecision = "{precision}"'))
+    clock = prepared.clock
+    return np.ldexp(clock.internal(0, clock.count).astype(float), clock.exponent)
+
+
+def test_every_and_samples_mean_the_same_grid() -> None:
+    assert np.array_equal(times("end = 100\nevery = 0.1"), times("end = 100\nsamples = 1001"))
+    assert times("end = 1.05\nevery = 0.1")[-1] == 1.0  # an end off the grid isn't sampled
+
+
+def test_a_list_is_kept_as_written() -> None:
+    assert times("times = [0, 0.1, 0.25, 7]").tolist() == [0, 0.1, 0.25, 7]
+    assert times('times = ["1 h", "1 d"]').tolist() == [3600, 86400]
+
+
+@pytest.mark.parametrize("start", ["0", "1e6", "-50"])
+def test_the_motion_begins_at_start(start: str) -> None:
+    text = SPIN + f"start = {start}\nend = {float(start) + 10}\nsamples = 11"
+    ours = run_text(text, 'name="a"').dataset
+    plain = run_text(SPIN + "start = 0\nend = 10\nsamples = 11", 'name="b"').dataset
+    # an autonomous scene doesn't care; sample times of 1e6 s are rounded to 1e-10 s
+    assert np.abs(ours["quaternion"].values - plain["quaternion"].values).max() < 1e-9
+    assert float(ours["time"][0]) == float(start)
+
+
+def test_samples_that_a_precision_can_not_tell_apart_are_refused() -> None:
+    with pytest.raises(ConfigError, match=r"\[time\].*samples .* are closer together than single"):
+        times("start = 1e6\nend = 1000001\nevery = 0.01", "single")
+    assert len(times("start = 1e6\nend = 1000001\nevery = 0.01", "double")) == 101
+
+
+@pytest.mark.parametrize("integrator", ["", 'method = "closed_form"', "hold_invariants = true"])
+def test_the_motion_begins_at_start_and_not_at_the_first_sample(integrator: str) -> None:
+    text = SPIN + "{}\n[integrator]\n" + integrator
+    late = run_text(text.format("times = [12.5, 25]"), 'name="a"').dataset
+    grid = run_text(text.format("end = 25\nsamples = 3"), 'name="b"').dataset
+    np.testing.assert_array_equal(late["quaternion"], grid["quaternion"][1:])
+    before = run_text(text.format("start = -12.5\ntimes = [0, 12.5]"), 'name="c"').dataset
+    # the same motion on a clock that is 12.5 s behind: times are exact in both
+    assert np.abs(before["quaternion"].values - grid["quaternion"].values[1:]).max() < 1e-14
+
+
+def test_one_sample_only() -> None:
+    run = run_text(SPIN + "times = [5]")
+    assert run.dataset.sizes["time"] == 1
+    assert run.status == "finished"
+
+
+# ---- digits: what a precision promises is what the dataset holds
+
+TOP = """
+name = "top"
+[body]
+principal_moments = [2, 2, 3]
+[initial]
+angular_velocity = [0.1, 0, 0.7]
+[time]
+end = 20
+samples = 5
+"""
+
+
+def exact_rates(digits: int, times: list) -> list[list]:
+    """Rates of the free symmetric top: w1 = 0.1 cos(0.35 t), w2 = 0.1 sin(0.35 t), exactly."""
+    with mpmath.workdps(digits + 20):
+        rate = mpmath.mpf(7) / 20
+        return [[mpmath.cos(rate * t) / 10, mpmath.sin(rate * t) / 10, mpmath.mpf(7) / 10] for t in times]
+
+
+def summed(dataset: xarray.Dataset, name: str) -> list[list]:
+    """All parts of a variable, smallest first, as mpf."""
+    parts = [dataset[part].values for part in parts_in(dataset, name)]
+    rows = []
+    with mpmath.workprec(4000):
+        for i in range(parts[0].shape[0]):
+            rows.append(
+                [sum(mpmath.mpf(float(p[i, k])) for p in reversed(parts)) for k in range(parts[0].shape[1])]
+            )
+    return rows
+
+
+@pytest.mark.parametrize(
+    ("precision", "digits", "bits"),
+    [
+        ("double", 16, 53),
+        ("extended", 19, 64),
+        ("quadruple", 34, 113),
+        (25, 25, 86),
+        (50, 50, 169),
+        pytest.param(100, 100, 335, marks=pytest.mark.slow),
+    ],
+)
+def test_rates_have_the_digits_of_the_precision(precision: str | int, digits: int, bits: int) -> None:
+    """0.1 and 0.7 are no binary numbers: a double anywhere on the way would cost all digits past 16."""
+    setting = precision if isinstance(precision, int) else f'"{precision}"'
+    run = run_text(TOP, f"integrator.precision={setting}")
+    exact = exact_rates(digits, [0, 5, 10, 15, 20])
+    with mpmath.workprec(4000):
+        error = max(
+            abs(a - b) for x, y in zip(summed(run.dataset, "angular_velocity"), exact, strict=True)
+            for a, b in zip(x, y, strict=True)
+        )  # fmt: skip
+        steps = run.summary["cost"]["steps"]
+        # the rounding of amplitude 0.1 at each step, as a random walk, three standard deviations
+        assert error <= 3 * 0.1 * mpmath.mpf(2) ** (1 - bits) * math.sqrt(steps)
+
+
+def test_tolerance_is_what_the_steps_obey() -> None:
+    """A looser tolerance takes a lower order and gives a larger error, as asked."""
+    errors, orders = [], []
+    for tolerance in ("1e-6", "1e-9", "1e-12"):
+        run = run_text(TOP, f"integrator.tolerance={tolerance}", "time.end=200")
+        rates = run.dataset["angular_velocity"].values
+        exact = np.array(exact_rates(20, list(run.dataset["time"].values)), dtype=float)
+        errors.append(np.abs(rates - exact).max())
+        orders.append(run.dataset.attrs["taylor_order"])
+        # steps of local error tolerance, at worst all of one sign
+        assert errors[-1] <= float(tolerance) * run.summary["cost"]["steps"]
+    assert errors[0] > errors[1] > errors[2]
+    assert orders == [8, 12, 15]

@@ -23,11 +23,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import rigidsim
-from rigidsim.solve.assembly import assemble, sampler
 from rigidsim.solve.precision import Precision, precision_of
-from rigidsim.solve.problem import InitialValueProblem, prepare
-from rigidsim.solve.sample_block import SampleBlock
-from rigidsim.solve.sampler import SampleReceiver
 
 PRECISIONS = ['"single"', '"double"', '"extended"', '"quadruple"', "50"]
 
@@ -222,52 +218,7 @@ def test_the_summary_knows_the_dataset(free: tuple[str, rigidsim.Run]) -> None:
 # Times
 
 
-def _exact(dataset: xarray.Dataset, name: str) -> list[Fraction]:
-    """Exact values of a flattened variable: the sum of its parts, as the file's attribute says."""
-    parts = [name + suffix for suffix in ("", "_lo", "_lo2", "_lo3") if name + suffix in dataset]
-    columns = [dataset[part].values.ravel() for part in parts]
-    return [sum((Fraction(float(x)) for x in row), Fraction(0)) for row in zip(*columns, strict=True)]
-
-
 # Every digit
-
-
-def _states(prepared: InitialValueProblem) -> np.ndarray:
-    """The states at the samples, integrated again."""
-    pieces = []
-
-    class Collected(SampleReceiver):
-        def take(self, block: SampleBlock) -> None:
-            pieces.append(block.states)
-
-    sampler(prepared, assemble(prepared), Collected()).run()
-    return np.concatenate(pieces)
-
-
-def _value(number: Any, bits: int) -> Fraction:
-    """Exact value of a heyoka scalar by way of its decimal digits, which are enough to come back."""
-    if isinstance(number, (float, np.float32)):
-        return Fraction(float(number))
-    if isinstance(number, np.longdouble):
-        mantissa, exponent = np.frexp(number)
-        return Fraction(int(np.ldexp(mantissa, 64))) * Fraction(2) ** (int(exponent) - 64)
-    with mpmath.workprec(bits):
-        sign, mantissa, exponent, _ = mpmath.mpf(str(number))._mpf_
-    return (-1) ** sign * Fraction(int(mantissa)) * Fraction(2) ** int(exponent)
-
-
-def test_the_parts_add_up_to_the_state(free: tuple[str, rigidsim.Run]) -> None:
-    prepared = prepare(rigidsim.load(free[1].folder.config))
-    states = _states(prepared)
-    bits = prepared.precision.bits
-    units = [Fraction(2) ** e for e in prepared.system.state_exponents]
-    expected = [[_value(x, bits) * u for x, u in zip(row, units, strict=True)] for row in states]
-    with free[1].dataset as dataset:
-        rates, quaternions = _exact(dataset, "angular_velocity"), _exact(dataset, "quaternion")
-    assert rates == [x for row in expected for x in row[:3]]
-    assert quaternions == [x for row in expected for x in row[3:]]
-    if bits > 53:  # and the residuals do say something that a double doesn't
-        assert sum(Fraction(float(x)) != x for x in quaternions) > len(quaternions) // 2
 
 
 NAMES: list[str | int] = ["single", "double", "extended", "quadruple", 20, 50, 100, 250]

@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 import xarray
 
-from rigidsim.store import netcdf
 from rigidsim.store.netcdf_file import NetcdfFile, write_rows, writing
 
 VALUES = np.arange(30.0).reshape(10, 3)
@@ -89,20 +88,6 @@ def test_it_is_what_h5netcdf_writes(path: Path, tmp_path: Path) -> None:
     assert sorted(found) == sorted(expected)
     for name in set(expected) - {"nothing"}:  # h5netcdf gives it no _Netcdf4Dimid, netCDF's own library does
         assert found[name] == expected[name], name
-
-
-def test_groups_hold_plain_arrays(tmp_path: Path) -> None:
-    arrays = {"counts": np.array([1, 2, 3]), "state_0": np.array([[0.1, -0.0]]), "scalar": np.array(2.5)}
-    made = tmp_path / "made.h5"
-    made.write_bytes(
-        netcdf.image([], None, {"title": "t"}, {"checkpoint": {**arrays, "no": np.empty(0)}}).getvalue()
-    )
-    read = netcdf.read_group(made, "checkpoint")
-    assert sorted(read) == sorted(arrays)
-    for name, values in arrays.items():
-        np.testing.assert_array_equal(read[name], values, strict=True)
-    with netCDF4.Dataset(made) as data:
-        np.testing.assert_array_equal(data["checkpoint"]["state_0"][:], arrays["state_0"])
 
 
 def structure(path: Path) -> dict[str, Any]:

@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 import rigidsim
 from rigidsim import RunFolderError
+from rigidsim.store.atomic import replacing, replacing_folder
+from rigidsim.store.summary import read_summary
 
 
 @pytest.fixture
@@ -147,3 +152,101 @@ def test_a_run_without_a_summary_was_killed(finished: rigidsim.Run) -> None:
     assert "killed" in opened.summary["message"]
     with pytest.raises(RunFolderError, match="nothing was saved"):
         _ = opened.dataset
+
+
+# ---- ``summary.json``: what is written is what is read; what isn't a summary is refused
+
+# hundreds of turns between samples, of a quaternion that matrices don't carry: a warning is certain
+BLURRED = (
+    "[body]\nprincipal_moments = [1, 2, 2.5]\n[initial]\nangular_velocity = [0.3, 1.0, 0.5]\n"
+    '[time]\nend = 3000\nsamples = 3\n[output]\ntimeline = false\nrecord = ["quaternion"]\n'
+    '[integrator]\nformulation = "rotation_matrix"\n'
+)
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory: pytest.TempPathFactory) -> rigidsim.Run:
+    text = 'name = "blurred"\n' + BLURRED
+    return rigidsim.run(rigidsim.parse(text), out=tmp_path_factory.mktemp("runs"))
+
+
+def test_what_a_run_returns_is_what_it_wrote(run: rigidsim.Run) -> None:
+    written = json.loads(run.folder.summary.read_text())
+    assert run.summary == written
+    assert list(run.summary) == list(written)
+    opened = rigidsim.open_run(run.folder.path)
+    assert opened.summary == written
+    assert opened.outcome == run.outcome
+
+
+def test_an_older_summary_is_read_and_written_again_as_it_is(run: rigidsim.Run, tmp_path: Path) -> None:
+    older = {**run.summary, "of_another_version": [1, {"x": 2.5}]}
+    for key in ("warning_codes", "method", "hold_invariants", "lyapunov", "events", "chart_changes"):
+        older.pop(key)
+    path = tmp_path / "summary.json"
+    path.write_text(json.dumps(older))
+    assert read_summary(path).as_dict() == older
+
+
+DAMAGES: dict[str, tuple[Callable[[dict[str, Any]], Any], str]] = {
+    "a text for a number": (lambda s: s["cost"].update(steps="7"), "'cost.steps': Input should be"),
+    "no number": (lambda s: s["invariants"]["energy"].update(scale=math.nan), "invariants.energy.scale"),
+    "nothing": (lambda s: s.pop("invariants"), "'invariants': Field required"),
+    "no seconds": (lambda s: s["cost"]["seconds"].pop("engine"), "'cost.seconds': "),
+    "a digest": (lambda s: s.update(dataset_sha256="x"), "'dataset_sha256': "),
+    "a status": (lambda s: s.update(status="\x1b[31m"), "'status': "),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("what", DAMAGES)
+def test_a_damaged_one_is_refused_by_its_place(what: str, run: rigidsim.Run, tmp_path: Path) -> None:
+    content = json.loads(json.dumps(run.summary))
+    DAMAGES[what][0](content)
+    path = tmp_path / "summary.json"
+    path.write_text(json.dumps(content))
+    with pytest.raises(RunFolderError, match="is damaged or no summary of rigidsim") as refusal:
+        read_summary(path)
+    assert DAMAGES[what][1] in str(refusal.value)
+
+
+# ---- what takes the place of a file or folder is whole, or nothing changes
+
+
+class Cut(Exception):
+    """Where a test breaks off."""
+
+
+def test_a_file_that_fails_leaves_the_old_one_and_no_remains(tmp_path: Path) -> None:
+    place = tmp_path / "file"
+    with replacing(place) as new:
+        new.write_text("old")
+    with suppress(Cut), replacing(place) as new:
+        new.write_text("torn")
+        raise Cut
+    assert place.read_text() == "old"
+    with replacing(place) as new, replacing(tmp_path / "other") as other:
+        assert other != new
+        new.write_text("new")
+        other.write_text("")
+        assert place.read_text() == "old"
+    assert place.read_text() == "new"
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["file", "other"]
+
+
+def test_a_file_that_was_not_written_is_an_error(tmp_path: Path) -> None:
+    with pytest.raises(FileNotFoundError), replacing(tmp_path / "file"):
+        pass
+
+
+def test_a_folder_that_fails_leaves_the_old_one_and_no_remains(tmp_path: Path) -> None:
+    place = tmp_path / "folder"
+    for text in ("old", "new"):
+        with replacing_folder(place) as new:
+            new.mkdir()
+            (new / text).write_text(text)
+        assert [path.name for path in place.iterdir()] == [text]
+    with suppress(Cut), replacing_folder(place) as new:
+        new.mkdir()
+        raise Cut
+    assert [path.name for path in place.iterdir()] == ["new"]
+    assert list(tmp_path.iterdir()) == [place]

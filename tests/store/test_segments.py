@@ -76,23 +76,6 @@ def test_each_segment_is_a_dataset_of_its_own(tmp_path: Path) -> None:
             np.testing.assert_array_equal(segment.energy_drift, expected["energy_drift"][0][:, 0])
 
 
-def test_a_segment_without_samples_still_has_a_checkpoint(tmp_path: Path) -> None:
-    """A slow run between two samples has something to lose, too."""
-    w = writer(tmp_path / "s")
-    w.add(block(0, 0))
-    w.flush(CHECKPOINT, {})
-    w.add(block(0, 3))
-    w.flush(CHECKPOINT, {})
-    chain = read_chain(tmp_path / "s")
-    assert (len(chain.paths), chain.rows, chain.damage) == (2, 3, None)
-    saved = netcdf.read_group(chain.paths[0], "checkpoint")
-    assert {name: values.tolist() for name, values in saved.items()} == {
-        "counts": [1, 2, 3],
-        "state_parts": [[0.1, 0.2]],
-    }
-    assert w.complete(tmp_path / "d.h5", {}) == 3
-
-
 def full_disk(*_: Any, **__: Any) -> None:
     raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 

@@ -1,0 +1,222 @@
+"""The campaign of kills, full disks and damages: it can fail, tells on the way, and finds nothing lost."""
+
+from __future__ import annotations
+
+import random
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+import rigidsim
+from experiments import accuracy_certificates as study
+from experiments import error_coverage, interruptions, kill_campaign
+from experiments.certificates.examining import examine
+from experiments.certificates.ledger import Ledger, code_version
+from experiments.coverage.families import FAMILIES, coverage_scene
+from experiments.coverage.judging import Judged
+from experiments.durability.judging import Tally, check_after, check_complete, saved_rows
+from experiments.durability.scenes import same, text_of
+from experiments.extremes import judging
+from experiments.extremes.random_scenes import random_case
+from experiments.interruptions import Ending, interrupted, scenes, situations
+from experiments.random_scenes import KINDS, random_scene
+from experiments.same_bits import ROOT, Scene, Version, compared
+from experiments.sweep_kill_campaign import WAYS, campaign
+from rigidsim.accuracy.certificate import Certificate, certify
+from rigidsim.store.folder import RunFolder
+
+SHORT = text_of("double_driven").replace("end = 3000", "end = 30").replace("3001", "31")
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory: pytest.TempPathFactory) -> RunFolder:
+    return rigidsim.run(rigidsim.parse(SHORT), out=tmp_path_factory.mktemp("runs")).folder
+
+
+def test_lost_rows_and_changed_bits_are_failures(finished: RunFolder) -> None:
+    tally = Tally()
+    with rigidsim.open_run(finished.path).dataset as dataset:
+        whole = dataset.load()
+    assert saved_rows(finished.path) == -1
+    check_after(tally, finished.path, whole, 31, "whole")
+    check_complete(tally, finished.path, whole, "whole")
+    assert (tally.failures, tally.counts["completed runs identical"]) == ([], 1)
+    check_after(tally, finished.path, whole, 32, "short")
+    assert tally.failures == ["short: 31 rows, 32 acknowledged"]
+    changed = whole.copy(deep=True)
+    changed["energy"].values[30] = np.nextafter(changed["energy"].values[30], 9)
+    assert same(whole, changed) == "energy"
+    assert same(whole, changed, rows=30) == ""
+    check_after(tally, finished.path, changed, 31, "changed")
+    check_complete(tally, finished.path, changed, "changed")
+    assert tally.failures[1:] == ["changed: energy differs", "changed: energy"]
+
+
+@pytest.mark.slow(40)
+def test_a_small_campaign(capfd: pytest.CaptureFixture[str]) -> None:
+    arguments = "--kills 8 --full-disks 2 --read-only 2 --damages 16 --seconds 240"  # seconds at most
+    assert kill_campaign.main(arguments.split()) == 0
+    told = capfd.readouterr().out
+    assert "kills: 8 of 8" in told
+    assert "damages: 16 of 16; failures so far: 0" in told
+
+
+# ---- the campaign of kills over sweeps, shortened
+
+
+@pytest.mark.slow  # a sweep for each kill
+def test_a_few_disturbances_of_each_kind_lose_nothing(tmp_path: Path) -> None:
+    tally = Tally()
+    campaign(tally, 4, random.Random(3), tmp_path, 600)
+    assert tally.failures == []
+    assert sum(tally.counts[way] for way in WAYS) >= 4
+
+
+# ---- the comparison of two versions of the code, on as little as shows that it can fail
+
+TEXT = (
+    'name = "scene"\n[body]\nprincipal_moments = [1, 2, 2.5]\n[initial]\nangular_velocity = [0.3, 1, 0.5]\n'
+    "[time]\nend = 20\nsamples = 9\n"
+)
+
+
+class Changed(Version):
+    """A version whose middle moment of inertia is off by 4e-16."""
+
+    def run(self, scene: Scene, *args: Any, **options: Any) -> Any:
+        job = {"text": scene.job["text"].replace("[1, 2, 2.5]", "[1, 2.0000000000000004, 2.5]")}
+        return super().run(Scene(scene.kind, scene.name, job), *args, **options)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("other", "found"), [(Version, ("same", "same")), (Changed, ("differs", ""))])
+def test_one_bit_is_seen(other: type[Version], found: tuple[str, str]) -> None:
+    whole, resumed = compared(
+        Scene("free", "free", {"text": TEXT}), Version(ROOT), other(Path(ROOT)), random.Random(0)
+    )
+    assert (whole.split(":")[0], resumed) == found
+
+
+# ---- the coverage campaign: it goes on where it stopped, and a share of it keeps what estimates promise
+
+
+def judged(true: float, announced: float, *, gone: bool = False, number: int = 0) -> Judged:
+    return Judged(number, "free body", "quaternion", "finished", true=true, announced=announced, gone=gone)
+
+
+def test_broken_promises_are_found() -> None:
+    kept = [judged(1e-12, 1e-12, number=n) for n in range(200)]
+    assert not error_coverage.broken_promises(kept)
+    silent = error_coverage.broken_promises([*kept, judged(1e-10, 1e-12, number=200)])
+    assert any("without a warning: [200]" in line for line in silent)
+    alarmed = error_coverage.broken_promises([*kept, judged(1e-6, 0.1, gone=True, number=201)])
+    assert any("digits said to be gone" in line and "[201]" in line for line in alarmed)
+    wide = [judged(1e-12, 1e-9, number=n) for n in range(200)]
+    assert any("median announced over true" in line for line in error_coverage.broken_promises(wide))
+
+
+def test_families_take_turns_and_scenes_are_reproducible() -> None:
+    names = [coverage_scene(n).family for n in range(len(FAMILIES))]
+    assert names == list(FAMILIES)
+    assert coverage_scene(5) == coverage_scene(5) != coverage_scene(5, seed=2)
+
+
+@pytest.mark.slow(80)
+def test_a_share_of_the_campaign(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    numbers = range(2 * len(FAMILIES))
+    first = error_coverage.campaign(numbers, 1, tmp_path)
+    assert not error_coverage.broken_promises(first)
+    capsys.readouterr()
+    again = error_coverage.campaign(numbers, 1, tmp_path)
+    assert [one.true for one in again if one.true == one.true] == [o.true for o in first if o.true == o.true]
+    assert not capsys.readouterr().out  # nothing was judged once more
+
+
+# ---- the campaign of interruptions, on as little as shows that it can fail
+
+
+def test_what_is_late_is_told() -> None:
+    assert Ending(130, 0.4, 3.0, "").prompt
+    assert Ending(0, None, 3.0, "").prompt  # it came to its end before
+    assert not Ending(130, 0.6, 0.6, "").prompt
+    assert not Ending(2, 0.1, 0.1, "it holds no finished dataset").prompt
+
+
+@pytest.mark.slow
+def test_commands_and_scenes_end_in_time(capsys: pytest.CaptureFixture[str]) -> None:
+    assert situations("verify") == []
+    assert scenes([1], 1) == []  # its turns are counted by an engine that takes seconds to compile
+    assert "2 interruptions" in capsys.readouterr().out
+
+
+@pytest.mark.slow
+def test_what_heeds_no_signal_is_late(tmp_path: Path) -> None:
+    """A promise that can't be kept is found to be broken."""
+    situation = interruptions.SITUATIONS['"double", dense']
+    (tmp_path / "scene.toml").write_text(f'name = "scene"\n{situation.text}')
+    found = interrupted(["run", "scene.toml"], tmp_path, situation.line, situation.seconds)
+    assert found.code == 130
+    assert not found.within(0.0)
+
+
+# ---- the study of extremes: random scenes are never wrong in silence, and it sees one that is
+
+
+@pytest.mark.slow
+@settings(max_examples=15, derandomize=True, deadline=None, suppress_health_check=list(HealthCheck))
+@given(data=st.data())
+def test_random_extremes_are_never_wrong_in_silence(data: st.DataObject) -> None:
+    def uniform(low: float, high: float) -> float:
+        return data.draw(st.floats(low, high))
+
+    scene, column, precision, hold = random_case(uniform)
+    verdict = judging.judge(scene, column, precision, hold=hold)
+    assert verdict.kind in ("right", "announced", "refused"), verdict.line
+
+
+# ---- the certificates' study finds what it should, and would find a certificate that lies
+
+
+def test_scenes_are_the_same_each_time_and_of_every_kind() -> None:
+    scenes = [random_scene(number) for number in range(len(KINDS))]
+    assert scenes == [random_scene(number) for number in range(len(KINDS))]
+    assert {scene.kind for scene in scenes} == set(KINDS)
+    assert scenes[0].text != random_scene(0, seed=1).text
+    for scene in scenes:
+        rigidsim.parse(scene.text)
+
+
+@pytest.mark.slow
+def test_a_scene_that_keeps_its_word() -> None:
+    outcome = examine(random_scene(3))
+    assert 0 < outcome.true <= outcome.certified <= outcome.asked
+    assert outcome.kept
+    assert not outcome.violated
+    assert 1 <= outcome.ratio <= 2  # the run's own setting is one of those searched
+    assert outcome.choose_seconds + outcome.certify_seconds < outcome.run_seconds < outcome.cpu_seconds
+
+
+def lying(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Certificates a hundred times too small from now on."""
+
+    def small(*given: Any, **more: Any) -> Any:
+        found = certify(*given, **more)
+        assert found is not None
+        return Certificate(found.error / 100, found.end, found.how, found.times)
+
+    monkeypatch.setattr("rigidsim.workflows.certify.certify", small)
+
+
+@pytest.mark.slow
+def test_a_certificate_that_lies_fails_the_study(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    lying(monkeypatch)
+    assert study.main(["--out", str(tmp_path), "--first", "7", "--count", "1"]) == 1
+    (outcome,) = Ledger(tmp_path / f"{study.NAME}.jsonl", study.SEED, code_version()).outcomes.values()
+    assert outcome.violated
+    assert "VIOLATION" in outcome.line
+    (check,) = [c for c in study.checks([outcome]) if "exceeds the certificate" in c.name]
+    assert not check.passed
