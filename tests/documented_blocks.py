@@ -132,7 +132,7 @@ def run_command(words: list[str], expected: int) -> None:
     Raises:
         AssertionError: it isn't one of rigidsim, or has another exit code.
     """
-    from rigidsim.cli.app import program
+    from rigidsim.cli.app import app
 
     assert words[0] == "rigidsim", f"{words}: mark a block that isn't run with <!-- not run: WHY -->"
     into = words.index(">") if ">" in words else None
@@ -140,7 +140,7 @@ def run_command(words: list[str], expected: int) -> None:
     said = io.StringIO()
     with contextlib.redirect_stdout(said) if into else contextlib.nullcontext():
         try:
-            code = program(given[:1])(given, prog_name="rigidsim")
+            code = app(given, prog_name="rigidsim")
         except SystemExit as ended:
             code = ended.code
     if into:

@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 
 import pytest
+import typer
 
 ROOT = Path(__file__).parents[1]
 sys.path.insert(0, str(ROOT / "docs" / "builder"))
@@ -61,7 +62,7 @@ def test_a_built_site_is_checked_as_a_reader_finds_it(page: str, fault: list[str
 
 
 def test_the_reference_has_every_key_command_and_variable(pages: Path) -> None:
-    from rigidsim.cli.commands import COMMANDS
+    from rigidsim.cli.app import app
     from rigidsim.scene.editor_schema import editor_schema
     from rigidsim.scene.registry import OBSERVABLES
 
@@ -72,7 +73,8 @@ def test_the_reference_has_every_key_command_and_variable(pages: Path) -> None:
     schema = editor_schema()
     keys = {key for table in [schema, *schema["$defs"].values()] for key in table["properties"]}
     assert {key for key in keys if f"`{key}`" not in config} == set()
-    assert {name for name in COMMANDS if f"## rigidsim {name}\n" not in commands} == set()
+    names = typer.main.get_command(app).commands  # type: ignore[attr-defined]
+    assert {name for name in names if f"## rigidsim {name}\n" not in commands} == set()
     assert {name for name in OBSERVABLES if f"| `{name}` |" not in dataset} == set()
 
 

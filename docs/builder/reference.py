@@ -181,9 +181,9 @@ def commands_page() -> str:
     """Every command with its options, from the program itself."""
     import typer
 
-    from rigidsim.cli.app import program
+    from rigidsim.cli.app import app
 
-    whole: Any = typer.main.get_command(program())
+    whole: Any = typer.main.get_command(app)
     parts = [
         "# Commands\n\n`rigidsim COMMAND -h` shows the same in a terminal. Progress goes to stderr, results "
         "to stdout. Exit codes: 0 done; 1 the check asked for failed (`verify`); 2 bad usage or bad "

@@ -1,58 +1,332 @@
-"""The command line: all commands as one program."""
+"""The command line: every command with its arguments and options.
+
+A command is declared here, with its arguments and help, and does its work in a module of
+``rigidsim.cli.commands`` that is imported when it is invoked: help and completion load little but this.
+"""
 
 from __future__ import annotations
 
 import gc
-import os
-import sys
-from collections.abc import Iterable
+from collections.abc import Callable
+from functools import wraps
 from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from inspect import cleandoc
+from pathlib import Path
+from typing import Annotated, Any
 
-from rigidsim.cli.commands import COMMANDS
+import typer
 
-if TYPE_CHECKING:
-    import typer
+from rigidsim import __version__
+from rigidsim.cli.ending import exit_code
+from rigidsim.cli.options import (
+    AnalysisOption,
+    AngleUnitOption,
+    AnyConfigs,
+    AxesOption,
+    ConfigPath,
+    Configs,
+    EpochOption,
+    FigureOption,
+    FormatOption,
+    FromOption,
+    GuardOption,
+    JsonOption,
+    MemberOption,
+    MembersOption,
+    NameArgument,
+    OutOption,
+    ResumeWorkersOption,
+    RunPath,
+    RunPaths,
+    ScanOption,
+    SceneArgument,
+    SchedulerOption,
+    SetOption,
+    TilesOption,
+    UntilOption,
+    VariableOption,
+    WhatOption,
+    WorkersOption,
+)
+from rigidsim.look.figure_names import FIGURES
 
-    app: typer.Typer
-    """All commands."""
+app = typer.Typer(
+    name="rigidsim",
+    help="High-precision experiments on rotating rigid bodies: one TOML file is one experiment.",
+    no_args_is_help=True,
+    context_settings={"help_option_names": ["-h", "--help"]},
+    pretty_exceptions_enable=False,
+    rich_markup_mode="rich",
+)
 
 
 def main() -> None:
-    """Entry point of ``rigidsim``: its arguments decide which command has to be loaded."""
-    # hundreds of modules are about to be imported, without garbage worth a search every 700 objects
-    gc.set_threshold(400_000, 20, 20)
-    # pydantic would read the metadata of every installed package to find plugins that nothing here uses
-    os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
-    named = sys.argv[1:2]
+    """Entry point of ``rigidsim``."""
     try:
-        program(named if set(named) <= set(COMMANDS) and named else COMMANDS)(prog_name="rigidsim")
+        app(prog_name="rigidsim")
     finally:
-        gc.freeze()  # the rest is freed with the process and needn't be searched for garbage
+        gc.freeze()  # what is freed with the process isn't searched for garbage: a fifth of a tiny run
 
 
-def program(names: Iterable[str] = COMMANDS) -> typer.Typer:
-    """A program with the given commands."""
-    import typer
+def _command(module: str, more: str = "") -> Callable[[Callable[..., None]], Callable[..., None]]:
+    """Make a function's arguments and docstring a command.
 
-    from rigidsim.cli.options import user_errors, version
+    Args:
+        module: module of ``rigidsim.cli.commands`` whose function of the same name does the work, and returns
+            the exit code, or None for 0.
+        more: end of its help.
+    """
 
-    made = typer.Typer(
-        name="rigidsim",
-        help="High-precision experiments on rotating rigid bodies: one TOML file is one experiment.",
-        no_args_is_help=True,
-        context_settings={"help_option_names": ["-h", "--help"]},
-        pretty_exceptions_enable=False,
-        rich_markup_mode="rich",
-    )
-    made.callback()(version)
-    for name in names:
-        made.command()(user_errors(getattr(import_module(f"rigidsim.cli.commands.{name}"), name)))
-    return made
+    def declared(function: Callable[..., None]) -> Callable[..., None]:
+        name = function.__name__
+
+        def work(given: dict[str, Any]) -> int:
+            code: int | None = getattr(import_module(f"rigidsim.cli.commands.{module}"), name)(**given)
+            return code or 0
+
+        @wraps(function)
+        def invoked(**given: Any) -> None:
+            raise typer.Exit(exit_code(lambda: work(given)))
+
+        app.command(help=f"{cleandoc(function.__doc__ or '')}{more}")(invoked)
+        return function
+
+    return declared
 
 
-def __getattr__(name: str) -> Any:
-    if name != "app":
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    globals()["app"] = whole = program()
-    return whole
+def _print_version(wanted: bool) -> None:
+    if wanted:
+        print(f"rigidsim {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def _program(
+    version: Annotated[
+        bool,
+        typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version."),
+    ] = False,
+) -> None:
+    """High-precision experiments on rotating rigid bodies: one TOML file is one experiment."""
+
+
+@_command("new")
+def new(
+    scene: SceneArgument = None,
+    name: NameArgument = None,
+) -> None:
+    """Write a commented config to start from; alone, list the scenes there are.
+
+    An existing file is never replaced.
+
+    Example: rigidsim new coin my_coin
+    """
+
+
+@_command("configs")
+def check(configs: Configs, overrides: SetOption = None, as_json: JsonOption = False) -> None:
+    """Validate configs, and show what was understood of them; nothing is run.
+
+    The exit code is 2 where one of them can't be run.
+
+    Example: rigidsim check configs/heavy_top_nutating.toml
+    """
+
+
+@_command("run")
+def run(
+    configs: AnyConfigs = None,
+    dataset: FromOption = None,
+    out: OutOption = Path("runs"),
+    overrides: SetOption = None,
+    scan: ScanOption = None,
+    member: MemberOption = None,
+    force: Annotated[bool, typer.Option("--force", help="Replace a run of the same name.")] = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Integrate, write the run folder, print a summary of invariants and cost.
+
+    Example: rigidsim run configs/intermediate_axis.toml --set time.end=100
+    """
+
+
+@_command("sweep")
+def sweep(
+    config: ConfigPath,
+    out: OutOption = Path("runs"),
+    overrides: SetOption = None,
+    workers: WorkersOption = 1,
+    scheduler: SchedulerOption = None,
+    tiles: TilesOption = None,
+    force: Annotated[bool, typer.Option("--force", help="Replace what lies there.")] = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Run all members, and write one labelled dataset; what is there already isn't computed again.
+
+    Give the command again to go on after an interruption, or with a config whose axes are longer.
+
+    Example: rigidsim sweep configs/sweeps/first_flip.toml --workers 2
+    """
+
+
+@_command("saved_runs")
+def resume(
+    run_path: RunPath,
+    until: UntilOption = None,
+    overrides: GuardOption = None,
+    workers: ResumeWorkersOption = 1,
+    as_json: JsonOption = False,
+) -> None:
+    """Go on with an interrupted, killed or guarded run; the result is bit for bit the uninterrupted one.
+
+    On a run that is complete it says so and does nothing: a script can call it until the exit code is 0.
+
+    Example: rigidsim resume runs/intermediate_axis
+    """
+
+
+@_command("saved_runs")
+def verify(
+    run_path: RunPath,
+    members: MembersOption = 100,
+    as_json: JsonOption = False,
+) -> None:
+    """Integrate the embedded config again and compare: identical, or what differs first. Exit code 1 then.
+
+    Example: rigidsim verify runs/intermediate_axis
+    """
+
+
+@_command("configs")
+def plan(
+    config: ConfigPath,
+    overrides: SetOption = None,
+    out: OutOption = Path("runs"),
+    as_json: JsonOption = False,
+) -> None:
+    """Explain what would be integrated and why; predict steps, time, memory and file sizes.
+
+    Example: rigidsim plan configs/heavy_top_nutating.toml
+    """
+
+
+@_command("info")
+def info(run_path: RunPath, as_json: JsonOption = False) -> None:
+    """Summary of a run, finished or partial; exit code 2 if its dataset is damaged or was edited.
+
+    Example: rigidsim info runs/intermediate_axis
+    """
+
+
+@_command("results")
+def view(
+    run_paths: RunPaths,
+    web: Annotated[bool, typer.Option("--web", help="In the browser, served on loopback only.")] = False,
+    png: Annotated[
+        Path | None, typer.Option("--png", metavar="FILE", help="Draw a picture, without a display.")
+    ] = None,
+    gif: Annotated[
+        Path | None, typer.Option("--gif", metavar="FILE", help="Draw a film, without a display.")
+    ] = None,
+    mp4: Annotated[
+        Path | None, typer.Option("--mp4", metavar="FILE", help="The same; needs rigidsim\\[film].")
+    ] = None,
+    seconds: Annotated[
+        float | None, typer.Option("--seconds", min=0.5, max=120.0, help="That a film lasts; default 6.")
+    ] = None,
+    member: Annotated[
+        list[int] | None,
+        typer.Option("--member", metavar="N", min=0, help="Of a sweep: member N, from 0; repeatable."),
+    ] = None,
+) -> None:
+    """Open timelines in the rerun viewer (drawn first, where a run has none), or draw them to a file.
+
+    A run that another process is working on is followed while it goes on.
+
+    Example: rigidsim view runs/intermediate_axis
+    """
+
+
+_EACH_FIGURE = "\n".join(f"{name:14}{told}" for name, told in FIGURES.items())
+
+
+@_command("results", f"\n\n\b\nFigures:\n{_EACH_FIGURE}")
+def plot(
+    run_path: RunPath,
+    what: WhatOption = None,
+    out: FigureOption = None,
+) -> None:
+    """Draw the page that suits the scene, or the figures named; of a sweep a variable over its axes.
+
+    Example: rigidsim plot runs/intermediate_axis --what polhode --out flip.svg
+    """
+
+
+@_command("configs")
+def tradeoff(
+    config: ConfigPath,
+    overrides: SetOption = None,
+    out: OutOption = Path("runs"),
+    budget: Annotated[
+        float, typer.Option("--budget", metavar="SECONDS", help="Time that it may take, roughly.")
+    ] = 90.0,
+    repeats: Annotated[
+        int, typer.Option("--repeats", metavar="N", help="Fresh processes in which speeds are taken.")
+    ] = 3,
+    full: Annotated[
+        bool, typer.Option("--full", help="Every tolerance in every formulation; needs a larger budget.")
+    ] = False,
+    force: Annotated[bool, typer.Option("--force", help="Replace an earlier measurement.")] = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Measure speed against accuracy of a scene: what to use for which accuracy. Dataset and figure in
+    NAME_tradeoff.
+
+    Example: rigidsim tradeoff configs/asymmetric_top.toml
+    """
+
+
+@_command("results")
+def export(
+    run_path: RunPath,
+    file_format: FormatOption,
+    out: Annotated[
+        Path | None, typer.Option("--out", metavar="PATH", help="Default NAME.FORMAT in this folder.")
+    ] = None,
+    force: Annotated[bool, typer.Option("--force", help="Replace what is there.")] = False,
+    angle_unit: AngleUnitOption = None,
+    epoch: EpochOption = None,
+    axes: AxesOption = None,
+    object_name: Annotated[
+        str | None, typer.Option("--object-name", metavar="NAME", help="For aem and oem.")
+    ] = None,
+) -> None:
+    """Write a run for other tools: tables with every digit, or CCSDS attitude and orbit messages.
+
+    Of a sweep csv and parquet hold a row per member, and zarr its dataset.
+
+    Example: rigidsim export runs/intermediate_axis --format csv
+    """
+
+
+@_command("results")
+def analyse(
+    run_path: RunPath,
+    variable: VariableOption = None,
+    lines: Annotated[int, typer.Option("--lines", metavar="N", help="Of each signal at most.")] = 20,
+    out: AnalysisOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Secular rates and spectral lines, labelled with the scene's frequencies: table, dataset and figure.
+
+    Example: rigidsim analyse runs/earth_free_nutation --lines 5
+    """
+
+
+@_command("configs")
+def schema() -> None:
+    """Print the config's JSON schema, for editors.
+
+    Example: rigidsim schema > rigidsim.schema.json; editors read the config's first line
+    "#:schema rigidsim.schema.json"
+    """

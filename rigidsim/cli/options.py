@@ -1,22 +1,33 @@
-"""Shared parts of commands: arguments, and the handling of errors."""
+"""Arguments and options that several commands share, and what the shell offers for them on Tab."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import wraps
+from importlib import import_module
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
-from rigidsim.cli import completion
-from rigidsim.cli.ending import exit_code
+from rigidsim.formats import FORMATS
 
+
+def offered(what: str) -> Callable[[str], list[Any]]:
+    """A function of ``rigidsim.cli.completion``, which is imported when the shell asks it."""
+
+    def complete(incomplete: str) -> list[Any]:
+        found: list[Any] = getattr(import_module("rigidsim.cli.completion"), what)(incomplete)
+        return found
+
+    return complete
+
+
+Configs = Annotated[list[Path], typer.Argument(metavar="CONFIG...", help="TOML files.")]
 ConfigPath = Annotated[Path, typer.Argument(metavar="CONFIG", help="TOML file of the experiment.")]
 RunPath = Annotated[
     Path,
     typer.Argument(
-        metavar="RUN", help="Run folder (runs/NAME) or its dataset.h5.", autocompletion=completion.runs
+        metavar="RUN", help="Run folder (runs/NAME) or its dataset.h5.", autocompletion=offered("runs")
     ),
 ]
 SetOption = Annotated[
@@ -25,44 +36,137 @@ SetOption = Annotated[
         "--set",
         metavar="KEY=VALUE",
         help="Replace a value, such as time.end=10; nothing after = removes the key; repeatable.",
-        autocompletion=completion.settings,
+        autocompletion=offered("settings"),
     ),
 ]
 OutOption = Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder of the run folders.")]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON for machines.")]
 
-
-def _print_version(wanted: bool) -> None:
-    if wanted:
-        from rigidsim import __version__
-
-        print(f"rigidsim {__version__}")
-        raise typer.Exit
-
-
-def version(
-    wanted: Annotated[
-        bool,
-        typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version."),
-    ] = False,
-) -> None:
-    """High-precision experiments on rotating rigid bodies: one TOML file is one experiment."""
-
-
-def user_errors(command: Callable[..., None]) -> Callable[..., None]:
-    """Let errors meant for the user end the program with their message and exit code, without a traceback."""
-
-    @wraps(command)
-    def guarded(*args: Any, **kwargs: Any) -> None:
-        def called() -> int:
-            try:
-                command(*args, **kwargs)
-            except typer.Exit as ended:
-                return ended.exit_code
-            return 0
-
-        code = exit_code(called)
-        if code:
-            raise typer.Exit(code)
-
-    return guarded
+SceneArgument = Annotated[
+    str | None,
+    typer.Argument(
+        metavar="[SCENE]",
+        help="Which kind of scene.",
+        autocompletion=offered("scenes"),
+        show_default=False,
+    ),
+]
+NameArgument = Annotated[
+    str | None,
+    typer.Argument(metavar="[NAME]", help="Of the experiment and its file NAME.toml; default SCENE."),
+]
+AnyConfigs = Annotated[
+    list[Path] | None, typer.Argument(metavar="CONFIG...", help="TOML files.", show_default=False)
+]
+FromOption = Annotated[
+    Path | None,
+    typer.Option("--from", metavar="DATASET", help="Run the config that a dataset embeds."),
+]
+ScanOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--sweep",
+        metavar="KEY=SPEC",
+        help="Run once for each value of a key, time.end=[1,2] or KEY=linspace(0,1,11); repeatable.",
+    ),
+]
+MemberOption = Annotated[
+    int | None,
+    typer.Option("--member", metavar="N", min=0, help="Of a sweep: member N by itself, counted from 0."),
+]
+WorkersOption = Annotated[
+    int, typer.Option("--workers", metavar="N", min=1, help="Processes of this machine that run members.")
+]
+SchedulerOption = Annotated[
+    str | None,
+    typer.Option(
+        "--scheduler",
+        metavar="ADDRESS",
+        help="Dask scheduler whose workers run members (rigidsim\\[cluster]).",
+    ),
+]
+TilesOption = Annotated[
+    str | None,
+    typer.Option("--tiles", metavar="A:B", help="Only tiles A to B-1: a share, for job arrays."),
+]
+UntilOption = Annotated[
+    str | None, typer.Option("--until", metavar="END", help='A later end, such as "2 h" or 5000.')
+]
+GuardOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set", metavar="KEY=VALUE", help="A guard of this session, such as limits.max_steps=1000000."
+    ),
+]
+ResumeWorkersOption = Annotated[
+    int, typer.Option("--workers", metavar="N", min=1, help="Of a sweep: processes that run members.")
+]
+MembersOption = Annotated[
+    int, typer.Option("--members", metavar="N", help="Of a sweep: how many members, drawn at random.")
+]
+RunPaths = Annotated[
+    list[Path],
+    typer.Argument(
+        metavar="RUN...",
+        help="Run folders (runs/NAME) or their dataset.h5; several are shown side by side.",
+        autocompletion=offered("runs"),
+    ),
+]
+WhatOption = Annotated[
+    list[str] | None,
+    typer.Option("--what", metavar="NAME", help="Figure to draw; repeatable. all: every one the run has."),
+]
+FigureOption = Annotated[
+    Path | None,
+    typer.Option(
+        "--out",
+        metavar="FILE",
+        help="PNG or SVG, or a folder for several; default figure.png or figure_NAME.png in the run.",
+    ),
+]
+FormatOption = Annotated[
+    str, typer.Option("--format", metavar="FORMAT", help=f"{', '.join(FORMATS[:-1])} or {FORMATS[-1]}.")
+]
+AngleUnitOption = Annotated[
+    str | None,
+    typer.Option(
+        "--angle-unit",
+        metavar="UNIT",
+        help="For csv, parquet and zarr: rad, turns, deg, arcsec or mas; columns are named by it.",
+    ),
+]
+EpochOption = Annotated[
+    str | None,
+    typer.Option(
+        "--epoch",
+        metavar="TIME",
+        help="What time 0 is, where the config doesn't say, for aem, oem and the dates of csv: "
+        '"2029-04-13T21:46:00 TDB".',
+    ),
+]
+AxesOption = Annotated[
+    str | None,
+    typer.Option(
+        "--axes",
+        "--frame",
+        metavar="NAME",
+        help="For aem and oem: what the space axes are, where the config doesn't say: ICRF, EME2000, ...",
+    ),
+]
+VariableOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--variable",
+        metavar="NAME",
+        help="A variable (obliquity) or one of its signals (obliquity.figure); repeatable. Default: "
+        "those that the scene is about.",
+    ),
+]
+AnalysisOption = Annotated[
+    Path | None,
+    typer.Option(
+        "--out",
+        metavar="FILE",
+        help="Dataset; default analysis.h5 in the run. The figure goes beside it.",
+    ),
+]

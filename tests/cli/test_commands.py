@@ -378,7 +378,7 @@ def test_help_loads_nothing_heavy() -> None:
 
 
 UNUSED = (
-    "{'rerun', 'xarray', 'pandas', 'matplotlib', 'dask', 'pyarrow', 'scipy', 'tomlkit', 'h5netcdf', "
+    "{'rerun', 'xarray', 'pandas', 'matplotlib', 'dask', 'pyarrow', 'scipy', 'h5netcdf', "
     "'email.parser'}"
 )
 OWN_MODULES = 330

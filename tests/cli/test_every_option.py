@@ -17,7 +17,7 @@ from typer.testing import CliRunner
 
 import rigidsim
 from rigidsim.cli.app import app
-from rigidsim.cli.machine import print_json
+from rigidsim.cli.screens.page import print_json
 from rigidsim.look import viewer
 
 # a line of the command's arguments, and the code it ends with

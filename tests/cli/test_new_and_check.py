@@ -9,11 +9,12 @@ from typing import Any
 
 import pytest
 import support
+import typer
 
 import rigidsim
 from rigidsim import RigidsimError
 from rigidsim.cli import completion
-from rigidsim.cli.commands import COMMANDS
+from rigidsim.cli.app import app
 from rigidsim.scene.methods import METHODS
 from rigidsim.workflows import templates
 
@@ -120,7 +121,7 @@ def test_a_new_user_is_shown_the_way(
 
 def test_h_is_help_everywhere(rigidsim_command: Command) -> None:
     assert rigidsim_command("-h").stdout == rigidsim_command("--help").stdout
-    for name in COMMANDS:
+    for name in typer.main.get_command(app).commands:
         shown = rigidsim_command(name, "-h")
         assert shown.exit_code == 0
         assert "Example: rigidsim" in shown.stdout

@@ -1,44 +1,75 @@
-"""``rigidsim run``: integrate configs."""
+"""``rigidsim run``: integrate configs, and print how each run ended."""
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
-from typing import Annotated
 
-import typer
-
-from rigidsim.cli.options import JsonOption, OutOption, SetOption
+import rigidsim.workflows.run as workflow
+from rigidsim.cli.screens.page import print_json
+from rigidsim.cli.screens.summary import print_summary
+from rigidsim.errors import RigidsimError
+from rigidsim.scene.config import Experiment, has_earlier_settings
+from rigidsim.scene.scene import build_scene
+from rigidsim.session import progress
+from rigidsim.session.understood import cautions_about, cautions_of
+from rigidsim.store.run import Run
+from rigidsim.workflows.read import load
+from rigidsim.workflows.verify import embedded
 
 
 def run(
-    configs: Annotated[
-        list[Path] | None, typer.Argument(metavar="CONFIG...", help="TOML files.", show_default=False)
-    ] = None,
-    dataset: Annotated[
-        Path | None,
-        typer.Option("--from", metavar="DATASET", help="Run the config that a dataset embeds."),
-    ] = None,
-    out: OutOption = Path("runs"),
-    overrides: SetOption = None,
-    scan: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--sweep",
-            metavar="KEY=SPEC",
-            help="Run once for each value of a key, time.end=[1,2] or KEY=linspace(0,1,11); repeatable.",
-        ),
-    ] = None,
-    member: Annotated[
-        int | None,
-        typer.Option("--member", metavar="N", min=0, help="Of a sweep: member N by itself, counted from 0."),
-    ] = None,
-    force: Annotated[bool, typer.Option("--force", help="Replace a run of the same name.")] = False,
-    as_json: JsonOption = False,
-) -> None:
-    """Integrate, write the run folder, print a summary of invariants and cost.
+    configs: list[Path] | None, dataset: Path | None, out: Path, overrides: list[str] | None,
+    scan: list[str] | None, member: int | None, force: bool, as_json: bool,
+) -> int:  # fmt: skip
+    """Read every config before any of them is run; the exit code is that of the first that didn't finish."""
+    experiments = [load(path, overrides=overrides or []) for path in configs or []]
+    if dataset is not None:
+        experiments.append(embedded(dataset, overrides=overrides or []))
+    if scan and member is not None:
+        raise RigidsimError("run: --member is one of a config's [sweep], --sweep makes another: give one")
+    if scan or member is not None:
+        from rigidsim.cli.commands import sweep as sweeps  # a room of its own
 
-    Example: rigidsim run configs/intermediate_axis.toml --set time.end=100
-    """
-    from rigidsim.cli.running import run_all
+        if scan:
+            return sweeps.run_scanned(experiments, scan, out, force=force, as_json=as_json)
+        experiments = [sweeps.single_member(experiment, member or 0) for experiment in experiments]
+    if not experiments:
+        raise RigidsimError("run: give a CONFIG, or --from a dataset; rigidsim run --help shows an example")
+    for experiment in experiments:
+        if has_earlier_settings(experiment.given):
+            print(
+                f"rigidsim: {experiment.source}: #:set comments at its end set nothing (an earlier version "
+                "kept there what --set had replaced); write the values where their keys stand",
+                file=sys.stderr,
+            )
+    worst = 0
+    for experiment in experiments:
+        _warn(experiment)
+        with progress.observer() as observer:
+            result = workflow.run(experiment, out=out, force=force, observer=observer)
+        code = print_run(result, as_json)
+        worst = worst or code
+        if code == 130:
+            break
+    return worst
 
-    raise typer.Exit(run_all(configs, dataset, out, overrides, scan, member, force, as_json))
+
+def _warn(experiment: Experiment) -> None:
+    """Say what in a config may mean something else, before time is spent on it."""
+    config = experiment.config
+    acting = bool(config.loads or config.events) and config.sweep is None  # a sweep is refused later
+    for caution in cautions_of(build_scene(experiment)) if acting else cautions_about(config):
+        print(f"rigidsim: warning: {experiment.source}: {caution.text}", file=sys.stderr)
+
+
+def print_run(result: Run, as_json: bool) -> int:
+    """Print a run's summary; returns its exit code."""
+    if as_json:
+        print_json(result.summary)
+    else:
+        print_summary(result.outcome, result.place)
+    code = result.outcome.exit_code
+    if code:
+        print(f"rigidsim: {result.outcome.message}", file=sys.stderr)
+    return code

@@ -1,68 +1,75 @@
-"""``rigidsim sweep``: run every member of a config's ``[sweep]``."""
+"""``rigidsim sweep``: run every member of a config's ``[sweep]``; and what other commands do with sweeps."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated
 
-import typer
-
-from rigidsim.cli.machine import print_json
-from rigidsim.cli.options import ConfigPath, JsonOption, OutOption, SetOption
+import rigidsim.workflows.sweeps.sweep as workflow
+from rigidsim.cli.screens.page import print_json
+from rigidsim.cli.screens.sweeps import observer, print_sweep
 from rigidsim.errors import RigidsimError
+from rigidsim.scene.config import Experiment
+from rigidsim.store.sweeps.run import SavedSweep, open_sweep
+from rigidsim.workflows.read import load
+from rigidsim.workflows.sweeps.members import single_member
+from rigidsim.workflows.sweeps.scan import scanned
+from rigidsim.workflows.sweeps.verify import verify_sweep
 
-WorkersOption = Annotated[
-    int, typer.Option("--workers", metavar="N", min=1, help="Processes of this machine that run members.")
-]
-SchedulerOption = Annotated[
-    str | None,
-    typer.Option(
-        "--scheduler",
-        metavar="ADDRESS",
-        help="Dask scheduler whose workers run members (rigidsim\\[cluster]).",
-    ),
-]
+__all__ = ["info", "resume", "run_scanned", "single_member", "sweep", "verify_sweep"]
 
 
 def sweep(
-    config: ConfigPath,
-    out: OutOption = Path("runs"),
-    overrides: SetOption = None,
-    workers: WorkersOption = 1,
-    scheduler: SchedulerOption = None,
-    tiles: Annotated[
-        str | None,
-        typer.Option("--tiles", metavar="A:B", help="Only tiles A to B-1: a share, for job arrays."),
-    ] = None,
-    force: Annotated[bool, typer.Option("--force", help="Replace what lies there.")] = False,
-    as_json: JsonOption = False,
-) -> None:
-    """Run all members, and write one labelled dataset; what is there already isn't computed again.
-
-    Give the command again to go on after an interruption, or with a config whose axes are longer.
-
-    Example: rigidsim sweep configs/sweeps/first_flip.toml --workers 2
-    """
+    config: Path, out: Path, overrides: list[str] | None, workers: int, scheduler: str | None,
+    tiles: str | None, force: bool, as_json: bool,
+) -> int:  # fmt: skip
+    """Run all members, or a share of them."""
     share = None if tiles is None else _share(tiles)
     if scheduler is not None and workers > 1:
         raise RigidsimError("--workers are processes of this machine, --scheduler has its own: give one")
-    from rigidsim.workflows.sweeps.workers import started
+    experiment = load(config, overrides=overrides or [])
+    with observer() as watching:
+        result = workflow.sweep(
+            experiment, out=out, force=force, workers=workers, scheduler=scheduler, tiles=share,
+            observer=watching,
+        )  # fmt: skip
+    code = _print(result, as_json)
+    return 0 if result.finished or share is not None else code
 
-    with started(workers) as processes:  # import while this one does
-        from rigidsim.cli.screens.sweeps import observer, print_sweep
-        from rigidsim.workflows.read import load
-        from rigidsim.workflows.sweeps.sweep import sweep as run_all
 
+def run_scanned(
+    experiments: Sequence[Experiment], scan: list[str], out: Path, *, force: bool, as_json: bool
+) -> int:
+    """Sweep each config over the axes of ``run --sweep``."""
+    worst = 0
+    for experiment in experiments:
         with observer() as watching:
-            result = run_all(
-                load(config, overrides=overrides or []), out=out, force=force, workers=processes,
-                scheduler=scheduler, tiles=share, observer=watching,
-            )  # fmt: skip
+            result = workflow.sweep(scanned(experiment, scan), out=out, force=force, observer=watching)
+        worst = worst or _print(result, as_json)
+    return worst
+
+
+def resume(path: Path, workers: int, as_json: bool) -> int:
+    """Go on with a sweep."""
+    with observer() as watching:
+        result = workflow.resume_sweep(path, workers=workers, observer=watching)
+    return _print(result, as_json)
+
+
+def info(path: Path, as_json: bool) -> None:
+    """Print how a sweep's members ended."""
+    found = open_sweep(path)
+    _print(found, as_json)
+    found.refuse_damaged()
+
+
+def _print(result: SavedSweep, as_json: bool) -> int:
+    """Print a sweep; returns its exit code."""
     if as_json:
         print_json(result.summary)
     else:
         print_sweep(result)
-    raise typer.Exit(0 if result.finished or share is not None else int(result.summary["exit_code"]))
+    return int(result.summary.get("exit_code", 0))
 
 
 def _share(text: str) -> tuple[int, int]:

@@ -12,7 +12,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from rigidsim.cli.screens.page import console
+from rigidsim.cli.screens.page import Page
 from rigidsim.scene.readable_time import YEAR, span_text, unit_for
 
 if TYPE_CHECKING:
@@ -54,7 +54,7 @@ def justified(value: Any, error: float, most: int) -> str:
 
 def print_analysis(analysis: Analysis, saved: Saved | None = None, out: Console | None = None) -> None:
     """Print a table for each signal, with remarks."""
-    out = out or console()
+    out = Page(out).console
     nyquist = 2 * math.pi / analysis.nyquist
     out.print(
         Text.assemble(

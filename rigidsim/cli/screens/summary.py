@@ -7,9 +7,11 @@ import sys
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
+from rich.console import Console
+
 from rigidsim.cli.screens.equations import print_equations
 from rigidsim.cli.screens.models import interpolated, print_levels, print_modelling
-from rigidsim.cli.screens.page import Page, Styled, page
+from rigidsim.cli.screens.page import Page, Styled
 from rigidsim.cli.screens.understood import understood
 from rigidsim.cli.screens.verdicts import advice_line, next_lines, verdict_line
 from rigidsim.errors import ConfigError
@@ -21,8 +23,6 @@ from rigidsim.store.summary_parts import ENGINE, Accuracy, InvariantDrift
 from rigidsim.store.understood import Span, Start, UnderstoodBody
 
 if TYPE_CHECKING:
-    from rich.console import Console
-
     from rigidsim.workflows.check import Checked
 
 
@@ -60,7 +60,7 @@ def print_summary(summary: Brief, folder: str, out: Console | None = None, *, lo
     Args:
         loads: whether it says what acts on the body.
     """
-    on = page(out)
+    on = Page(out)
     color = "green" if summary.status == "finished" else "yellow"
     on.say((summary.name, "bold"), "  ", (summary.status, f"bold {color}"))
     if summary.description:
@@ -78,16 +78,10 @@ def print_understood(
     body: UnderstoodBody | None,
     start: Start | None,
     time: Span | None,
-    out: Console,
+    on: Page,
     loads: Sequence[str] = (),
 ) -> None:
     """Print body, start, time and loads as they were understood."""
-    _print_understood(body, start, time, loads, page(out))
-
-
-def _print_understood(
-    body: UnderstoodBody | None, start: Start | None, time: Span | None, loads: Sequence[str], on: Page
-) -> None:
     for label, text in understood(body, start, time, loads):
         on.line(label, text)
 
@@ -97,7 +91,7 @@ def _from_step(step: int | None) -> str:
 
 
 def _print_ended(summary: Summary, loads: Sequence[str], on: Page) -> None:
-    _print_understood(summary.body, summary.start, summary.time, loads, on)
+    print_understood(summary.body, summary.start, summary.time, on, loads)
     how = f"tolerance {summary.tolerance:.3g}"
     method = method_named(summary.method)
     if not method.has_steps:
@@ -225,10 +219,10 @@ def _print_accuracy(accuracy: Accuracy, on: Page, what: str) -> None:
 
 def print_plan(plan: dict[str, Any], out: Console | None = None) -> None:
     """Print the result of ``rigidsim plan``."""
-    on = page(out)
+    on = Page(out)
     on.say((plan["name"], "bold"), f"  {plan['state_count']} states, {plan['formulation']}")
     parts = UnderstoodBody(**plan["body"]), Start(**plan["start"]), Span(**plan["time"])
-    _print_understood(*parts, plan["loads"], on)
+    print_understood(*parts, on, plan["loads"])
     for surface in plan["switching"]:
         where = f"steps end on the kinks and jumps of {surface['surface']} ({surface['where']})"
         on.say("  " + where)
@@ -285,28 +279,21 @@ def print_plan(plan: dict[str, Any], out: Console | None = None) -> None:
             )
 
 
-def print_scenes(described: dict[str, str]) -> None:
-    """Print the templates that ``rigidsim new`` can write."""
-    on = page()
-    on.table(["scene", "what it is"], described.items())
-    on.say("rigidsim new SCENE [NAME] writes NAME.toml")
-
-
 def print_checked(found: Checked) -> None:
     """Print the result of a check; errors go to stderr, as for all commands."""
     if not found.valid:
         print(f"rigidsim: {ConfigError(found.problems, found.source).for_command_line()}", file=sys.stderr)
         return
-    on = page()
+    on = Page()
     on.say((found.source, "bold"), "  ", ("valid", "bold green"))
-    _print_understood(found.body, found.start, found.time, found.loads, on)
+    print_understood(found.body, found.start, found.time, on, found.loads)
     for caution in found.cautions:
         on.line("warning", caution.text, "bold red")
 
 
 def print_verdict(verdict: dict[str, Any], what: str = "sample") -> None:
     """Print a verification in words, from ``Verdict.as_dict``; ``what`` names the things compared."""
-    on = page()
+    on = Page()
     if verdict["identical"]:
         on.say(f"identical: {verdict['samples']:,} {what}s, every variable, every bit")
     else:

@@ -13,7 +13,7 @@ from rich.markup import escape
 from rich.progress import BarColumn, Progress, TextColumn
 from rich.table import Table
 
-from rigidsim.cli.screens.page import console
+from rigidsim.cli.screens.page import Page
 from rigidsim.scene.sweeps.sweep import Sweep
 from rigidsim.store.sweeps.run import SavedSweep
 from rigidsim.workflows.sweeps.sweep import SweepObserver
@@ -120,7 +120,7 @@ def _of_errors(cost: dict[str, Any]) -> str:
 
 def print_sweep(result: SavedSweep) -> None:
     """Print how a sweep's members ended."""
-    told, screen = result.summary, console()
+    told, screen = result.summary, Page().console
     screen.print(f"[bold]{told.get('name', '')}[/] ({result.place}): {told['message']}", highlight=False)
     if not result.finished:
         rate = told.get("members_per_second")
@@ -170,7 +170,7 @@ def print_sweep(result: SavedSweep) -> None:
 
 def print_sweep_plan(made: dict[str, Any]) -> None:
     """Print what a sweep would run, and what it would cost."""
-    screen = console()
+    screen = Page().console
     screen.print(f"[bold]{made['name']}[/]: {made['members']:,} members ({made['mode']})", highlight=False)
     table = Table("axis", "key", "values", "from", "to", box=None, pad_edge=False)
     for axis in made["axes"]:

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from typing import Any
 
-from rigidsim.cli.screens.page import Page, page
+from rigidsim.cli.screens.page import Page
 from rigidsim.scene.readable_time import span_text
 
 
 def print_tradeoff(result: dict[str, Any]) -> None:
     """Print the result of ``rigidsim tradeoff``, from ``Tradeoff.as_dict``."""
-    on = page()
+    on = Page()
     on.say((result["name"], "bold"), "  for this accuracy, use this")
     rows = []
     over = result["measured_seconds"]

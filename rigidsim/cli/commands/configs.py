@@ -1,0 +1,68 @@
+"""Commands that look at a config: ``check``, ``plan``, ``tradeoff``, ``schema``."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import rigidsim.workflows.check as validation
+import rigidsim.workflows.plan as planning
+import rigidsim.workflows.tradeoff as measuring
+from rigidsim.cli.screens.page import print_json
+from rigidsim.cli.screens.summary import print_checked, print_plan
+from rigidsim.cli.screens.sweeps import print_sweep_plan
+from rigidsim.cli.screens.tradeoff import print_tradeoff
+from rigidsim.scene.editor_schema import editor_schema
+from rigidsim.scene.sweeps.sweep import Sweep
+from rigidsim.workflows.read import load
+from rigidsim.workflows.sweeps.plan import plan_sweep
+
+
+def check(configs: list[Path], overrides: list[str] | None, as_json: bool) -> int:
+    """Validate configs, and show what was understood of them."""
+    valid = True
+    for path in configs:
+        found = validation.check(path, overrides=overrides or [])
+        valid = valid and found.valid
+        if as_json:
+            print_json(found.as_dict())
+        else:
+            print_checked(found)
+    return 0 if valid else 2
+
+
+def plan(config: Path, overrides: list[str] | None, out: Path, as_json: bool) -> None:
+    """Say what would be integrated, of a sweep what one member of it would."""
+    experiment = load(config, overrides=overrides or [])
+    swept = experiment.config.sweep is not None
+    made = plan_sweep(Sweep.of(experiment)) if swept else planning.plan(experiment, out=out)
+    if as_json:
+        print_json(made)
+        return
+    if swept:
+        print_sweep_plan(made)
+    print_plan(made["member"] if swept else made)
+
+
+def tradeoff(
+    config: Path, overrides: list[str] | None, out: Path, budget: float, repeats: int, full: bool,
+    force: bool, as_json: bool,
+) -> None:  # fmt: skip
+    """Measure speed against accuracy of a scene."""
+    experiment = load(config, overrides=overrides or [])
+
+    def told(text: str) -> None:
+        print(f"{experiment.config.name}: {text}", file=sys.stderr, flush=True)
+
+    result = measuring.tradeoff(
+        experiment, out=out, budget=budget, repeats=repeats, full=full, force=force, told=told
+    ).as_dict()
+    if as_json:
+        print_json(result)
+    else:
+        print_tradeoff(result)
+
+
+def schema() -> None:
+    """Print the config's JSON schema; ``rigidsim.workflows.read`` registers every kind of load."""
+    print_json(editor_schema(), indent=2)

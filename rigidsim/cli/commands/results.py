@@ -1,0 +1,130 @@
+"""Commands on the results of a run or a sweep: ``analyse``, ``export``, ``plot``, ``view``."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import rigidsim.workflows.analyse as analysing
+import rigidsim.workflows.export as exporting
+from rigidsim.cli.screens.analysis import print_analysis
+from rigidsim.cli.screens.page import print_json
+from rigidsim.errors import RigidsimError
+from rigidsim.formats.naming import Naming
+from rigidsim.look.figure_names import OVERVIEW, SPECTRUM
+from rigidsim.look.figures import available, check_name, figure_format, save_figure
+from rigidsim.look.figures.sweep_maps import drawable, save_sweep_figure
+from rigidsim.look.figures.spectrum import save_spectrum
+from rigidsim.store import atomic
+from rigidsim.store.run import open_run
+from rigidsim.store.sweeps.folder import is_sweep
+from rigidsim.store.sweeps.run import SavedSweep, open_sweep
+from rigidsim.workflows.view import render, runs_of, show
+
+ALL = "all"
+
+
+def analyse(run_path: Path, variable: list[str] | None, lines: int, out: Path | None, as_json: bool) -> None:
+    """Find lines, save them, print them."""
+    opened = open_run(run_path)
+    analysis = analysing.analyse(opened, variable or (), lines=lines)
+    saved = analysing.save(analysis, out or opened.folder.analysis)
+    if as_json:
+        print_json(analysis.as_dict())
+    else:
+        print_analysis(analysis, saved)
+
+
+def export(
+    run_path: Path, file_format: str, out: Path | None, force: bool, angle_unit: str | None,
+    epoch: str | None, axes: str | None, object_name: str | None,
+) -> None:  # fmt: skip
+    """Write a run or a sweep for other tools."""
+    given = {"epoch": epoch, "axes": axes, "object_name": object_name}
+    naming = Naming(**{key: value for key, value in given.items() if value is not None})
+    saved = open_sweep(run_path) if is_sweep(run_path) else open_run(run_path)
+    written = exporting.export(saved, file_format, out, force=force, naming=naming, angle_unit=angle_unit)
+    for path in written:
+        print(path)
+
+
+def plot(run_path: Path, what: list[str] | None, out: Path | None) -> None:
+    """Draw figures of a run, or maps of a sweep."""
+    swept = is_sweep(run_path)
+    saved = open_sweep(run_path) if swept else open_run(run_path)
+    wanted = list(dict.fromkeys(what or []))
+    if not swept:
+        _check_names(wanted)
+    several = len(wanted) > 1 or ALL in wanted
+    if several and out is not None and not out.is_dir():
+        raise RigidsimError(f"{out}: several figures need a folder that is there; give one as --out, or none")
+    with saved.dataset as dataset:
+        if ALL in wanted:
+            wanted = [*(drawable(dataset) if swept else available(dataset))]
+        for name in wanted or [OVERVIEW]:
+            own = "" if name == OVERVIEW else "_" + name.replace("[", "_").replace("]", "")
+            folder = saved.folder.path if out is None else out
+            target = folder / f"figure{own}.png" if several or out is None else out
+            with _told(target, swept):
+                kind = figure_format(target)
+                with atomic.replacing(target) as new:
+                    if isinstance(saved, SavedSweep):
+                        save_sweep_figure(dataset, new, None if name == OVERVIEW else name, file_format=kind)
+                    elif name == SPECTRUM:
+                        save_spectrum(analysing.analyse(saved).dataset, new, file_format=kind)
+                    else:
+                        save_figure(dataset, new, name, file_format=kind)
+            print(target)
+
+
+def _check_names(wanted: list[str]) -> None:
+    try:
+        for name in wanted:
+            if name != ALL:
+                check_name(name)
+    except ValueError as error:
+        raise RigidsimError(f"--what: {error}, {ALL}") from None
+
+
+@contextmanager
+def _told(target: Path, swept: bool) -> Iterator[None]:
+    """Make a figure's errors those of the command."""
+    try:
+        yield
+    except ValueError as error:
+        raise RigidsimError(f"plot: {error}" if swept else str(error)) from None
+    except OSError as error:
+        why = error.strerror or error
+        raise RigidsimError(f"{target}: can't be written: {why}; choose another --out") from None
+
+
+def view(
+    run_paths: list[Path], web: bool, png: Path | None, gif: Path | None, mp4: Path | None,
+    seconds: float | None, member: list[int] | None,
+) -> int:  # fmt: skip
+    """Open the viewer, or draw to files."""
+    targets = {".png": png, ".gif": gif, ".mp4": mp4}
+    asked = {suffix: target for suffix, target in targets.items() if target is not None}
+    for suffix, target in asked.items():
+        if target.suffix.lower() != suffix:
+            raise RigidsimError(f"--{suffix[1:]}: given {target}; a name that ends in {suffix} is allowed")
+        if not target.absolute().parent.is_dir():
+            raise RigidsimError(
+                f"--{suffix[1:]}: given {target}, in a folder that isn't there; make it first"
+            )
+    if asked and web:
+        raise RigidsimError("view: --web opens the viewer, --png, --gif and --mp4 draw to a file: give one")
+    if seconds is not None and not {".gif", ".mp4"} & set(asked):
+        raise RigidsimError("view: --seconds is for --gif and --mp4: give one of them, too")
+    named = runs_of(run_paths, member or ())
+    for target in asked.values():
+        render(named, target, seconds=seconds, told=_tell if sys.stderr.isatty() else None)
+        print(target)
+    return 0 if asked else show(named, web=web)
+
+
+def _tell(done: int, count: int) -> None:
+    end = "\n" if done == count else ""
+    print(f"\r{done} of {count} frames", end=end, file=sys.stderr, flush=True)

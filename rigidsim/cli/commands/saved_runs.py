@@ -1,0 +1,53 @@
+"""Commands on saved runs and sweeps: ``resume``, ``verify``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from types import ModuleType
+
+import rigidsim.workflows.resume as resuming
+import rigidsim.workflows.verify as verifying
+from rigidsim.cli.commands.run import print_run
+from rigidsim.cli.screens.page import print_json
+from rigidsim.cli.screens.summary import print_verdict
+from rigidsim.errors import RigidsimError
+from rigidsim.session import progress
+from rigidsim.store.sweeps.folder import is_sweep
+
+
+def _sweeps() -> ModuleType:
+    """What is done with sweeps, a room of its own."""
+    from rigidsim.cli.commands import sweep
+
+    return sweep
+
+
+def resume(
+    run_path: Path, until: str | None, overrides: list[str] | None, workers: int, as_json: bool
+) -> int:
+    """Go on with a run or a sweep."""
+    if not is_sweep(run_path):
+        with progress.observer() as observer:
+            result = resuming.resume(run_path, until=until, overrides=overrides or [], observer=observer)
+        return print_run(result, as_json)
+    if until is not None or overrides:
+        raise RigidsimError(
+            "resume: --until and --set are for single runs; change the config of a sweep and give rigidsim "
+            "sweep CONFIG again, which computes only what is new"
+        )
+    code: int = _sweeps().resume(run_path, workers, as_json)
+    return code
+
+
+def verify(run_path: Path, members: int, as_json: bool) -> int:
+    """Integrate again and compare."""
+    if is_sweep(run_path):
+        verdict, what = _sweeps().verify_sweep(run_path, members=members), "member"
+    else:
+        with progress.observer() as observer:
+            verdict, what = verifying.verify(run_path, observer=observer), "sample"
+    if as_json:
+        print_json(verdict.as_dict())
+    else:
+        print_verdict(verdict.as_dict(), what)
+    return 0 if verdict.identical else 1
