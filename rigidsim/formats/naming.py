@@ -17,8 +17,8 @@ from rigidsim.errors import RigidsimError
 from rigidsim.scene.arithmetic import apply
 from rigidsim.scene.epochs import Epoch, parse_epoch
 from rigidsim.scene.exact import ExactNumber
+from rigidsim.scene.frame import ECLIPTIC, EQUATOR, OBLIQUITY, SpaceAxes
 from rigidsim.scene.rotations import AXES, Rotations, product
-from rigidsim.scene.space_axes import ECLIPTIC, EQUATOR, OBLIQUITY, SpaceAxes
 from rigidsim.scene.validation_messages import nearest, shown
 
 _BITS = 160  # far beyond the 16 digits of a message

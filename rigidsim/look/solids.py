@@ -15,8 +15,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigidsim.scene import rotations
-from rigidsim.scene.bodies.outlines import THINNESS, Arc, Box, Ellipsoid, Outline, Revolved, StraightPiece
-from rigidsim.scene.bodies.shapes import SHAPES
+from rigidsim.scene.bodies.shapes import (
+    SHAPES,
+    THINNESS,
+    Arc,
+    Box,
+    Ellipsoid,
+    Outline,
+    Revolved,
+    StraightPiece,
+)
 
 Array = NDArray[np.float64]
 

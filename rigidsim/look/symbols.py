@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigidsim.look.solids import MINOR_SEGMENTS, Mesh, ball, revolved
-from rigidsim.scene.bodies.outlines import StraightPiece
+from rigidsim.scene.bodies.shapes import StraightPiece
 
 Array = NDArray[np.float64]
 Color = tuple[int, int, int]

@@ -33,12 +33,12 @@ from rigidsim.model.refusals import refuse_odd_loads, refuse_second_orbits
 from rigidsim.model.scaling import Scaling, amplitude_of, choose_scaling
 from rigidsim.scene.expressions.tree import ATTITUDE_NAMES, FLIGHT_NAMES
 from rigidsim.scene.formulations import AUTO, variables_named
-from rigidsim.scene.moments import happens_at_a_moment
 from rigidsim.scene.orbit_tables.pieces import TabulatedOrbit
 from rigidsim.scene.orbits import KeplerOrbit
 from rigidsim.scene.registry import OBSERVABLES
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.surfaces import surfaces_of
+from rigidsim.scene.transitions import happens_at_a_moment
 
 
 def plan_model(

@@ -11,6 +11,8 @@ from typing import Any
 
 import mpmath
 
+from rigidsim.scene.tracing.numbers import called
+
 WORKING_BITS = {"single": 24, "double": 53, "extended": 64, "quadruple": 113}
 # Enough that cancellation in a derived constant (a difference of moments of 1e-15) still leaves every bit.
 GUARD_BITS = 128
@@ -125,3 +127,19 @@ def eigen(context: Any, matrix: Matrix) -> tuple[Vector, Matrix]:
         axes.append([x / length if largest > 0 else -x / length for x in axis])
     axes.append(cross(axes[0], axes[1]))
     return [values[k] * scale for k in range(3)], axes
+
+
+def eccentric_anomaly(context: Any, mean: Any, eccentricity: Any) -> Any:
+    """Solution of Kepler's equation M = E - e sin E, to the context's precision."""
+    return called(_kepler, context, mean, eccentricity)
+
+
+def _kepler(context: Any, mean: Any, e: Any) -> Any:
+    anomaly = mean + e * context.sin(mean)
+    # Newton converges quadratically; the count covers any precision from a start that is good to e^2
+    for _ in range(12 + int(context.prec).bit_length()):
+        step = (anomaly - e * context.sin(anomaly) - mean) / (1 - e * context.cos(anomaly))
+        anomaly -= step
+        if abs(step) <= context.ldexp(1, -context.prec // 2 - 2):
+            break
+    return anomaly

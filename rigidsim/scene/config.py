@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping, Sequence
+import html
+import json
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from dataclasses import replace as exchanged
 from pathlib import Path
@@ -14,17 +16,17 @@ from pydantic import ValidationError
 from rigidsim.errors import ConfigError, Problem
 from rigidsim.scene import validation_messages as messages
 from rigidsim.scene.bodies.table import POINT_OR_NAME
-from rigidsim.scene.frame_table import PLANE_OR_NORMAL
+from rigidsim.scene.frame import PLANE_OR_NORMAL
 from rigidsim.scene.overrides import FLAG, apply_overrides, written
 from rigidsim.scene.python_values import assignments_of, toml_text
 from rigidsim.scene.registry import LOAD_KINDS
 from rigidsim.scene.schema import Config, config_model
-from rigidsim.scene.table_files import table_sections
 from rigidsim.scene.toml_text import long_integers, parse_toml
 
 Overrides = Sequence[str] | Mapping[str, Any]
 """Values to replace: ``KEY=VALUE`` texts, or dotted keys with Python values."""
 NEW = "the command rigidsim new lists commented ones to start from"
+_LARGEST_TABLE = 3_000_000  # bytes
 _LARGEST_FILE = 4_000_000  # bytes; a body of tens of thousands of points still fits
 _EARLIER_MARK = "#:set "
 
@@ -107,8 +109,6 @@ class Experiment:
         return f"<Experiment {self.config.name!r} ({self.source}): {loads}{until}, {precision}>"
 
     def _repr_html_(self) -> str:
-        import html
-
         return f"<b>{html.escape(self.config.name)}</b><pre>{html.escape(self.text)}</pre>"
 
 
@@ -191,7 +191,7 @@ def load(path: str | Path, *, overrides: Overrides = ()) -> Experiment:
 def _with_tables(experiment: Experiment, folder: Path) -> Experiment:
     """The experiment with the texts of the tables that it names, so that it depends on no other file."""
     try:
-        added = table_sections(experiment.config, folder)
+        added = _table_sections(experiment.config, folder)
     except ConfigError as error:
         raise error.at(experiment.source) from None
     if not added:
@@ -199,6 +199,58 @@ def _with_tables(experiment: Experiment, folder: Path) -> Experiment:
     text, given = (f"{x.rstrip()}\n{added}" for x in (experiment.text, experiment.given))
     config = validated(parse_toml(text, experiment.source), experiment.source)
     return exchanged(experiment, text=text, given=given, config=config)
+
+
+def _table_sections(config: Config, folder: Path) -> str:
+    """TOML text, to be appended to the config, with the tables that loads name and the config doesn't
+    contain.
+
+    Args:
+        folder: folder to which relative names refer.
+
+    Raises:
+        ConfigError: a file can't be read, or can't be part of a TOML text.
+    """
+    found: dict[str, str] = {}
+    for where, name in _named(config):
+        if name not in found and name not in config.tables:
+            found[name] = _section(name, _text(where, name, folder / name))
+    return "".join(found.values())
+
+
+def _named(config: Config) -> Iterator[tuple[str, str]]:
+    """Tables that loads name, with the place of each name in the config."""
+    for number, load in enumerate(config.loads, 1):
+        name = getattr(getattr(load, "orbit", None), "table", None)
+        if name is not None:
+            yield f"[[loads]] number {number} orbit.table", name
+
+
+def _text(where: str, name: str, path: Path) -> str:
+    try:
+        size = path.stat().st_size
+        if size > _LARGEST_TABLE:
+            what = f'given "{name}" of {size} bytes; a table has at most {_LARGEST_TABLE}: keep the rows and '
+            raise ConfigError(Problem(where, what + "digits that the run needs"))
+        text = path.read_text(encoding="utf-8-sig")
+    except OSError as error:
+        what = (
+            f'given "{name}", which can\'t be read ({error.strerror or error}): {path} is looked for, beside '
+        )
+        raise ConfigError(Problem(where, what + "the config")) from None
+    except (UnicodeDecodeError, ValueError):
+        raise ConfigError(
+            Problem(where, f'given "{name}", which is not UTF-8 text; save it as CSV')
+        ) from None
+    text = text.replace("\r\n", "\n").replace("\r", "\n")
+    if "'''" in text or any((ord(c) < 32 and c not in "\n\t") or ord(c) == 127 for c in text):
+        what = f'given "{name}", which holds characters that no table has; save it as plain CSV'
+        raise ConfigError(Problem(where, what))
+    return text
+
+
+def _section(name: str, text: str) -> str:
+    return f"\n[tables.{json.dumps(name)}]\ntext = '''\n{text.rstrip()}\n'''\n"
 
 
 def parse_earlier(text: str, *, source: str, overrides: Overrides = ()) -> Experiment:

@@ -11,12 +11,7 @@ from collections.abc import Mapping
 from fractions import Fraction
 from typing import Any
 
-from pydantic import TypeAdapter
-from pydantic.json_schema import GenerateJsonSchema
-
 from rigidsim.scene.exact import ExactNumber
-from rigidsim.scene.fields import BUILT_LATER
-from rigidsim.scene.registry import OBSERVABLES
 from rigidsim.scene.schema import Config, config_model
 
 DRAFT = "http://json-schema.org/draft-07/schema#"
@@ -34,25 +29,8 @@ def editor_schema(model: type[Config] | None = None) -> dict[str, Any]:
         stands alone as ``x-unit`` too ("" for a number in any unit), and where there are such, ``default``
         and ``examples`` as a user would write them.
     """
-    made = python_schema(model or config_model())
+    made = (model or config_model()).model_json_schema()
     return {"$schema": DRAFT, **_table(made), "title": "rigidsim config"}
-
-
-def python_schema(model: type[Config]) -> dict[str, Any]:
-    """pydantic's own schema of a config with all its tables."""
-    return model.model_json_schema(schema_generator=_WithTables)
-
-
-class _WithTables(GenerateJsonSchema):
-    """Follows tables whose validators are built later (see ``rigidsim.scene.fields.Later``)."""
-
-    def generate_inner(self, schema: Any) -> dict[str, Any]:
-        """Schema of a table built later, as a definition under its name."""
-        table = schema.get("metadata", {}).get(BUILT_LATER)
-        if table is not None:
-            name = f"{table.__module__}.{table.__qualname__}:{id(table)}"
-            schema = {**TypeAdapter(table).core_schema, "ref": name}
-        return super().generate_inner(schema)
 
 
 def _table(node: Mapping[str, Any]) -> dict[str, Any]:
@@ -73,8 +51,8 @@ def _table(node: Mapping[str, Any]) -> dict[str, Any]:
 def _key(node: Mapping[str, Any]) -> dict[str, Any]:
     """One key of a table."""
     key = _without_null({name: value for name, value in node.items() if name != "title"})
-    if key.pop("x-items", None) == "observables":
-        key["items"] = {"type": "string", "enum": list(OBSERVABLES)}
+    if "description" in key:
+        key["description"] = " ".join(key["description"].split())
     units = _units(key)
     if len(units) == 1:
         (unit,) = units

@@ -2,9 +2,15 @@
 
 from __future__ import annotations
 
+import re
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Literal
+
+from pydantic import Field, StrictStr, field_validator
 
 from rigidsim.errors import ConfigError, Problem
+from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.expressions.parser import parse_expression
 from rigidsim.scene.expressions.tree import (
     ATTITUDE_NAMES,
@@ -14,7 +20,32 @@ from rigidsim.scene.expressions.tree import (
     ExpressionError,
     names_used,
 )
-from rigidsim.scene.schema import Config
+from rigidsim.scene.fields import ConfigTable, refuse
+from rigidsim.scene.validation_messages import shown
+
+
+class EventTable(ConfigTable):
+    """``[[events]]``: where an expression of time and the state crosses zero."""
+
+    name: StrictStr = Field(examples=["flip"])
+    """prefix of the dataset's variables: NAME_time, NAME_quaternion, ..."""
+    expression: StrictStr = Field(examples=["wy", "theta - pi/2"])
+    """expression of t, the states (wx wy wz, qw qx qy qz, phi theta psi, x y z, vx vy vz) and [parameters],
+    in SI; the event is its crossing of zero
+    """
+    direction: Literal["any", "up", "down"] = "any"
+    """direction of the crossing"""
+    action: Literal["record", "stop"] = "record"
+    """record the event, or stop the run at it"""
+
+    @field_validator("name")
+    @classmethod
+    def _variable_name(cls, value: str) -> str:
+        if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]{0,40}", value):
+            raise refuse(
+                f"given {shown(value)}; allowed: letters, digits and underscores, beginning with a letter"
+            )
+        return value
 
 
 @dataclass(frozen=True)
@@ -37,7 +68,9 @@ class Event:
         return names_used(self.expression)
 
 
-def resolve_events(config: Config, *, free_flight: bool) -> tuple[Event, ...]:
+def resolve_events(
+    tables: Sequence[EventTable], parameters: Mapping[str, ExactNumber], *, free_flight: bool
+) -> tuple[Event, ...]:
     """Read the expressions of ``[[events]]``.
 
     Raises:
@@ -45,10 +78,10 @@ def resolve_events(config: Config, *, free_flight: bool) -> tuple[Event, ...]:
     """
     names = ("t", *RATE_NAMES, *ATTITUDE_NAMES, *(FLIGHT_NAMES if free_flight else ()))
     found = []
-    for number, table in enumerate(config.events):
+    for number, table in enumerate(tables):
         where = f"[[events]] number {number + 1} expression"
         try:
-            expression = parse_expression(table.expression, names, parameters=config.parameters, jumps=False)
+            expression = parse_expression(table.expression, names, parameters=parameters, jumps=False)
         except ExpressionError as error:
             raise ConfigError(Problem(where, str(error))) from None
         if not names_used(expression):

@@ -1,9 +1,11 @@
-"""The building blocks of the config's schema: exact quantities with units, vectors, and tables."""
+"""The building blocks of the config's schema: tables, exact quantities with units, vectors, and names."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, Any, TypeAlias, TypeVar
+from itertools import product
+from typing import Annotated, Any, TypeVar
 
 from pydantic import (
     AfterValidator,
@@ -12,7 +14,6 @@ from pydantic import (
     ConfigDict,
     Field,
     PlainValidator,
-    StrictStr,
     WithJsonSchema,
 )
 from pydantic_core import PydanticCustomError, core_schema
@@ -20,10 +21,25 @@ from pydantic_core import PydanticCustomError, core_schema
 from rigidsim.scene.epochs import Epoch, parse_epoch
 from rigidsim.scene.exact import ExactNumber, parse_number, parse_quantity
 from rigidsim.scene.units import UnitError, time_unit
-from rigidsim.scene.validation_messages import shown
+from rigidsim.scene.validation_messages import nearest, shown
 
 _NUMBER_TEXT = r"^\s*[-+]?(\d|\.\d|pi)"
 """Beginning of any text of a number; the unit after it is left to ``parse_number``."""
+T = TypeVar("T")
+
+
+class ConfigTable(BaseModel):
+    """A TOML table: unknown keys are errors, values never change after reading, and the text below a key
+    describes it.
+    """
+
+    model_config = ConfigDict(
+        extra="forbid",
+        frozen=True,
+        arbitrary_types_allowed=True,
+        defer_build=True,
+        use_attribute_docstrings=True,
+    )
 
 
 def refuse(text: str) -> PydanticCustomError:
@@ -31,16 +47,16 @@ def refuse(text: str) -> PydanticCustomError:
     return PydanticCustomError("rigidsim", "{text}", {"text": text})
 
 
-def quantity(unit: str) -> Any:
-    """Annotated type of a number in the SI unit ``unit`` (see ``parse_number``)."""
+def reading(parse: Callable[[Any], Any]) -> PlainValidator:
+    """A validator that reads values with a function, which refuses by ``ValueError``."""
 
-    def validate(value: Any) -> ExactNumber:
+    def read(value: Any) -> Any:
         try:
-            return parse_number(value, unit)
+            return parse(value)
         except ValueError as error:
             raise refuse(str(error)) from None
 
-    return Annotated[ExactNumber, PlainValidator(validate), WithJsonSchema(number_schema(unit))]
+    return PlainValidator(read)
 
 
 def number_schema(unit: str) -> dict[str, Any]:
@@ -49,9 +65,42 @@ def number_schema(unit: str) -> dict[str, Any]:
     return {"anyOf": [{"type": "number"}, text], "x-unit": unit}
 
 
+@dataclass(frozen=True)
+class InUnit:
+    """Annotation of an ``ExactNumber`` in an SI unit (see ``parse_number``), or with "" in any unit."""
+
+    unit: str
+
+    def _parse(self, value: Any) -> ExactNumber:
+        return parse_number(value, self.unit) if self.unit else parse_quantity(value)
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> Any:
+        return reading(self._parse).__get_pydantic_core_schema__(source, handler)
+
+    def __get_pydantic_json_schema__(self, schema: Any, handler: Any) -> dict[str, Any]:
+        return number_schema(self.unit)
+
+
+Dimensionless = Annotated[ExactNumber, InUnit("1")]
+Metre = Annotated[ExactNumber, InUnit("m")]
+Kilogram = Annotated[ExactNumber, InUnit("kg")]
+Second = Annotated[ExactNumber, InUnit("s")]
+Moment = Annotated[ExactNumber, InUnit("kg m^2")]
+Rate = Annotated[ExactNumber, InUnit("rad/s")]
+Angle = Annotated[ExactNumber, InUnit("rad")]
+Momentum = Annotated[ExactNumber, InUnit("kg m^2/s")]
+Speed = Annotated[ExactNumber, InUnit("m/s")]
+Acceleration = Annotated[ExactNumber, InUnit("m/s^2")]
+GravitationalParameter = Annotated[ExactNumber, InUnit("m^3/s^2")]
+Damping = Annotated[ExactNumber, InUnit("kg m^2/s")]
+AnyQuantity = Annotated[ExactNumber, InUnit("")]
+
+
 def _exactly(count: int) -> BeforeValidator:
     def validate(value: Any) -> Any:
-        if isinstance(value, list) and len(value) != count:
+        if not isinstance(value, list):
+            raise refuse(f"given {shown(value)}; an array of {count} is allowed")
+        if len(value) != count:
             raise refuse(f"given {len(value)} {'entry' if len(value) == 1 else 'entries'}; "
                           f"exactly {count} are needed")  # fmt: skip
         return value
@@ -59,134 +108,64 @@ def _exactly(count: int) -> BeforeValidator:
     return BeforeValidator(validate)
 
 
-T = TypeVar("T")
+Pair = Annotated[list[T], Field(min_length=2, max_length=2), _exactly(2)]
 Triple = Annotated[list[T], Field(min_length=3, max_length=3), _exactly(3)]
 """A vector of three components."""
 Four = Annotated[list[T], Field(min_length=4, max_length=4), _exactly(4)]
 """A quaternion's four components."""
 
 
-if TYPE_CHECKING:
-    Dimensionless: TypeAlias = ExactNumber
-    Metre: TypeAlias = ExactNumber
-    Kilogram: TypeAlias = ExactNumber
-    Second: TypeAlias = ExactNumber
-    Moment: TypeAlias = ExactNumber
-    Rate: TypeAlias = ExactNumber
-    Angle: TypeAlias = ExactNumber
-    Momentum: TypeAlias = ExactNumber
-    Speed: TypeAlias = ExactNumber
-    Acceleration: TypeAlias = ExactNumber
-    GravitationalParameter: TypeAlias = ExactNumber
-    Damping: TypeAlias = ExactNumber
-else:
-    Dimensionless = quantity("1")
-    Metre = quantity("m")
-    Kilogram = quantity("kg")
-    Second = quantity("s")
-    Moment = quantity("kg m^2")
-    Rate = quantity("rad/s")
-    Angle = quantity("rad")
-    Momentum = quantity("kg m^2/s")
-    Speed = quantity("m/s")
-    Acceleration = quantity("m/s^2")
-    GravitationalParameter = quantity("m^3/s^2")
-    Damping = quantity("kg m^2/s")
+@dataclass(frozen=True, eq=False)
+class OneOf:
+    """Annotation of a text that is one of some names, which may be registered later."""
+
+    names: Iterable[str]
+
+    def _known(self, value: Any) -> str:
+        if isinstance(value, str) and value in self.names:
+            return value
+        near = nearest(value if isinstance(value, str) else shown(value), self.names)
+        raise refuse(f"given {shown(value)}{near}; allowed: {', '.join(self.names)}")
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> Any:
+        return core_schema.no_info_plain_validator_function(self._known)
+
+    def __get_pydantic_json_schema__(self, schema: Any, handler: Any) -> dict[str, Any]:
+        return {"type": "string", "enum": list(self.names)}
 
 
-def _any_quantity(value: Any) -> ExactNumber:
-    try:
-        return parse_quantity(value)
-    except ValueError as error:
-        raise refuse(str(error)) from None
+def _each_once(value: list[str]) -> list[str]:
+    if len(set(value)) < len(value):
+        raise refuse("something is named twice; name each once")
+    return value
 
 
-AnyQuantity = Annotated[
-    ExactNumber,
-    PlainValidator(_any_quantity),
-    WithJsonSchema(number_schema("")),
-]
-"""A number with any unit written after it."""
+EachOnce = Annotated[list[T], AfterValidator(_each_once)]
+"""An array of different names."""
 
 
 def _instant(value: Any) -> Epoch:
     if not isinstance(value, str):
-        raise refuse(f'given {shown(value)}; a string such as "2029-04-13T21:46:00 TDB" is allowed')
-    try:
-        return parse_epoch(value)
-    except ValueError as error:
-        raise refuse(str(error)) from None
+        raise ValueError(f'given {shown(value)}; a string such as "2029-04-13T21:46:00 TDB" is allowed')
+    return parse_epoch(value)
 
 
-Instant = Annotated[Epoch, PlainValidator(_instant), WithJsonSchema({"type": "string"})]
+Instant = Annotated[Epoch, reading(_instant), WithJsonSchema({"type": "string"})]
 """A date and time with its scale."""
 
 
 def _time_unit(value: Any) -> str:
     if not isinstance(value, str):
-        raise refuse(f'given {shown(value)}; the name of a unit of time such as "day" is allowed')
+        raise ValueError(f'given {shown(value)}; the name of a unit of time such as "day" is allowed')
     try:
         time_unit(value)
     except UnitError as error:
-        raise refuse(f'given {shown(value)}: {error}; a unit of time is allowed, such as "day"') from None
+        raise ValueError(f'given {shown(value)}: {error}; a unit of time is allowed, such as "day"') from None
     return value
 
 
-TimeUnitName = Annotated[str, PlainValidator(_time_unit), WithJsonSchema({"type": "string"})]
+TimeUnitName = Annotated[str, reading(_time_unit), WithJsonSchema({"type": "string"})]
 """The name of a unit of time."""
-
-
-class ConfigTable(BaseModel):
-    """A TOML table: unknown keys are errors, values never change after reading."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True, arbitrary_types_allowed=True, defer_build=True)
-
-
-if TYPE_CHECKING:
-    Later: TypeAlias = Annotated[T, ...]
-else:
-
-    class Later:
-        """Defers building the validator of a nested table until the first such table is read, since most
-        configs use few of the possible tables.
-        """
-
-        def __class_getitem__(cls, table: type[ConfigTable]) -> Any:
-            return Annotated[table, _BuiltLater(table)]
-
-
-BUILT_LATER = "rigidsim_table"
-"""Key in a core schema that tells which table it stands for."""
-
-
-@dataclass(frozen=True)
-class _BuiltLater:
-    table: type[ConfigTable]
-
-    def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> Any:
-        """Schema that builds the table's own validator when needed."""
-        read = self.table.model_validate
-        return core_schema.no_info_plain_validator_function(read, metadata={BUILT_LATER: self.table})
-
-
-EULER_SEQUENCES = tuple(
-    first + second + third
-    for first in "xyz"
-    for second in "xyz"
-    for third in "xyz"
-    if first != second != third
-)
+EULER_SEQUENCES = tuple("".join(axes) for axes in product("xyz", repeat=3) if axes[0] != axes[1] != axes[2])
 """Axes of intrinsic rotations, one after the other."""
-
-
-def _sequence(value: str | None) -> str | None:
-    if value is not None and value not in EULER_SEQUENCES:
-        raise refuse(f"given {shown(value)}; allowed: {', '.join(EULER_SEQUENCES)} (intrinsic)")
-    return value
-
-
-EulerSequence = Annotated[
-    StrictStr,
-    AfterValidator(_sequence),
-    WithJsonSchema({"type": "string", "enum": list(EULER_SEQUENCES)}),
-]
+EulerSequence = Annotated[str, OneOf(EULER_SEQUENCES)]

@@ -1,18 +1,63 @@
-"""The body's figure axis, and the plane from which obliquity and longitudes count."""
+"""``[frame]``: names of the space axes, the body's figure axis, and the plane from which angles count."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from fractions import Fraction
+from typing import Annotated, Any, Literal
+
+from pydantic import Discriminator, Tag
 
 from rigidsim.errors import ConfigError, Problem
-from rigidsim.scene import schema
 from rigidsim.scene.arithmetic import Vector, cross, dot, negligible, norm
 from rigidsim.scene.bodies.body import RigidBody
+from rigidsim.scene.exact import ExactNumber
+from rigidsim.scene.fields import ConfigTable, Dimensionless, Triple
 from rigidsim.scene.tracing.numbers import largest_of
 
 ORBIT = "orbit"
 SPACE = "space"
+SpaceAxes = Literal["EME2000", "ICRF", "GCRF", "ecliptic J2000"]
+ECLIPTIC: SpaceAxes = "ecliptic J2000"
+"""Mean ecliptic and equinox of J2000: the axes of the ephemerides."""
+EQUATOR: SpaceAxes = "EME2000"
+"""Mean equator and equinox of J2000: the ecliptic's, turned about their common X axis, the equinox."""
+OBLIQUITY = ExactNumber(Fraction(84381406, 1000 * 3600 * 180), pi_power=1)
+"""Angle (rad) from the equator to the ecliptic of J2000, 84381.406 arcsec: IAU 2006 (resolution B1, the P03
+precession of Capitaine et al. 2003, A&A 412, 567).
+"""
+PLANE_OR_NORMAL = ("as a name", "as a normal")
+"""Names of the alternatives of ``[frame] reference``."""
+
+
+def _kind_of_plane(value: Any) -> str | None:
+    if isinstance(value, str):
+        return PLANE_OR_NORMAL[0]
+    return PLANE_OR_NORMAL[1] if isinstance(value, list) else None
+
+
+class Frame(ConfigTable):
+    """``[frame]``: what the scene's axes are, beside its own equations, and what angles are counted from."""
+
+    axes: SpaceAxes | None = None
+    """name of the space axes; with an ephemeris they are ecliptic J2000"""
+    reference: Annotated[
+        Annotated[Literal["space", "orbit"], Tag(PLANE_OR_NORMAL[0])]
+        | Annotated[Triple[Dimensionless], Tag(PLANE_OR_NORMAL[1])],
+        Discriminator(
+            _kind_of_plane,
+            custom_error_type="kind_of_value",
+            custom_error_message='"space" (the plane XY), "orbit" (the source\'s own, moving plane) or a '
+            "normal [x, y, z] in space axes is allowed",
+        ),
+    ] = "space"
+    """reference plane of obliquity and longitudes: space (XY), orbit (the moving plane of the source's
+    orbit), or a normal [x, y, z] in space axes
+    """
+    figure_axis: Literal["x", "y", "z", "largest", "symmetry"] | None = None
+    """the body axis to which obliquity, wobble and polar motion refer; by default the axis of symmetry, or
+    that of the largest moment if there is none
+    """
 
 
 @dataclass(frozen=True)
@@ -31,7 +76,7 @@ class Figure:
     described: str
 
 
-def figure_of(config: schema.Config, body: RigidBody, context: Any) -> Figure:
+def figure_of(table: Frame, body: RigidBody, context: Any) -> Figure:
     """The figure axis that ``[frame] figure_axis`` chooses: by default the symmetry axis of a symmetric body,
     and the principal axis of largest moment of any other.
 
@@ -43,7 +88,7 @@ def figure_of(config: schema.Config, body: RigidBody, context: Any) -> Figure:
     Raises:
         ConfigError: the body has no unique axis of symmetry, or of largest moment, as requested.
     """
-    asked = config.frame.figure_axis
+    asked = table.figure_axis
     one, zero = context.one, context.zero
     if asked is not None and asked in "xyz":
         pole = [one if name == asked else zero for name in "xyz"]
@@ -56,44 +101,35 @@ def figure_of(config: schema.Config, body: RigidBody, context: Any) -> Figure:
         raise _fault("figure_axis", what + "allowed here")
     if asked != "largest" and found is not None:
         return _with_equator(context, found, "axis of symmetry")
-    moments = body.principal_moments
-    order = sorted(range(3), key=lambda i: moments[i])
-    if moments[order[2]] - moments[order[1]] <= moments[order[2]] * negligible(context):
-        if asked == "largest":
-            what = 'given "largest", but the two largest principal moments are equal; "x", "y" or "z"'
-            more = ' or "symmetry"' if found else ""
-            raise _fault("figure_axis", f"{what}{more} is allowed here")
-        return _with_equator(context, [zero, zero, one], "body axis z, as good as any of a sphere")
-    return _with_equator(context, _upright(body.principal_axes[order[2]]), "axis of largest moment")
+    axis = unique_axis(body, context, largest=True)
+    if axis is not None:
+        return _with_equator(context, axis, "axis of largest moment")
+    if asked == "largest":
+        what = 'given "largest", but the two largest principal moments are equal; "x", "y" or "z"'
+        more = ' or "symmetry"' if found else ""
+        raise _fault("figure_axis", f"{what}{more} is allowed here")
+    return _with_equator(context, [zero, zero, one], "body axis z, as good as any of a sphere")
 
 
-def largest_axis(body: RigidBody, context: Any) -> Vector | None:
-    """Unit principal axis of largest moment, body axes (mpf), its largest component positive; None if it
-    isn't unique.
+def unique_axis(body: RigidBody, context: Any, *, largest: bool) -> Vector | None:
+    """Unit principal axis of the largest or smallest moment, body axes (mpf), its largest component positive;
+    None if it isn't unique.
     """
     moments = body.principal_moments
-    order = sorted(range(3), key=lambda i: moments[i])
-    if moments[order[2]] - moments[order[1]] <= moments[order[2]] * negligible(context):
+    low, middle, high = sorted(range(3), key=lambda i: moments[i])
+    apart = moments[high] - moments[middle] if largest else moments[middle] - moments[low]
+    if apart <= moments[high] * negligible(context):
         return None
-    return _upright(body.principal_axes[order[2]])
+    return _upright(body.principal_axes[high if largest else low])
 
 
-def smallest_axis(body: RigidBody, context: Any) -> Vector | None:
-    """The same for the smallest moment: the long axis."""
-    moments = body.principal_moments
-    order = sorted(range(3), key=lambda i: moments[i])
-    if moments[order[1]] - moments[order[0]] <= moments[order[2]] * negligible(context):
-        return None
-    return _upright(body.principal_axes[order[0]])
-
-
-def reference_normal(config: schema.Config, context: Any) -> Vector | None:
+def reference_normal(table: Frame, context: Any) -> Vector | None:
     """Unit normal (mpf, space axes) of the plane named by ``[frame] reference``; None for a moving plane.
 
     Raises:
         ConfigError: the given normal is the zero vector.
     """
-    asked = config.frame.reference
+    asked = table.reference
     if asked == ORBIT:
         return None
     if isinstance(asked, str):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Literal
 
-from pydantic import Field, StrictBool
+from pydantic import StrictBool
 
 from rigidsim.scene.fields import ConfigTable
 
@@ -16,19 +16,15 @@ REDUCED = (SPIN_AVERAGED, ORBIT_AVERAGED)
 class Model(ConfigTable):
     """``[model]``: every rotation, or the motion averaged over it, or over the sources' orbits as well."""
 
-    level: Literal["full", "spin_averaged", "orbit_averaged", "auto"] = Field(
-        default="full",
-        description="full resolves every rotation; spin_averaged follows the direction of the angular "
-        "momentum, and its size and energy under torques that do work, averaged over the body's free "
-        "rotation; orbit_averaged "
-        "averages over the sources' orbits as well; auto is the cheapest level that keeps "
-        "[integrator] accuracy_axis",
-    )
-    short_period: StrictBool = Field(
-        default=False,
-        description="add back, to first order, what averaging removed: the nutation with the orbital "
-        "periods, and the offset of figure and spin axes from the angular momentum",
-    )
+    level: Literal["full", "spin_averaged", "orbit_averaged", "auto"] = "full"
+    """full resolves every rotation; spin_averaged follows the direction of the angular momentum, and its size
+    and energy under torques that do work, averaged over the body's free rotation; orbit_averaged averages
+    over the sources' orbits as well; auto is the cheapest level that keeps [integrator] accuracy_axis
+    """
+    short_period: StrictBool = False
+    """add back, to first order, what averaging removed: the nutation with the orbital periods, and the offset
+    of figure and spin axes from the angular momentum
+    """
 
     @property
     def reduced(self) -> bool:

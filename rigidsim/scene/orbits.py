@@ -7,9 +7,9 @@ from typing import Any
 
 from pydantic import Field, StrictStr
 
+from rigidsim.scene.arithmetic import eccentric_anomaly
 from rigidsim.scene.exact import ZERO, ExactNumber
 from rigidsim.scene.fields import Angle, ConfigTable, Dimensionless, Metre, Rate, Second
-from rigidsim.scene.kepler import eccentric_anomaly
 from rigidsim.scene.registry import Surroundings
 from rigidsim.scene.validation_messages import nearest
 
@@ -22,49 +22,36 @@ class Orbit(ConfigTable):
     gives elements over time; those that it hasn't are constant.
     """
 
-    body: StrictStr | None = Field(
-        default=None,
-        description="name of the attracting point mass in [[bodies]]; excludes all other keys",
-        examples=["sun"],
-    )
-    table: StrictStr | None = Field(
-        default=None,
-        description="name of a CSV file beside the config, with elements over time",
-        examples=["mars_elements.csv"],
-    )
-    semi_major_axis: Metre | None = Field(
-        default=None, description="semi-major axis of the ellipse", examples=["7000 km"]
-    )
-    eccentricity: Dimensionless = Field(default=ZERO, description="0 to below 1")
-    inclination: Angle = Field(
-        default=ZERO, description="inclination to the XY plane of the space axes", examples=["51.6 deg"]
-    )
-    ascending_node: Angle = Field(
-        default=ZERO, description="longitude of the ascending node from X, at time 0"
-    )
-    periapsis: Angle = Field(
-        default=ZERO, description="argument of periapsis from the ascending node, at time 0"
-    )
-    mean_anomaly: Angle = Field(default=ZERO, description="mean anomaly at time 0")
-    node_rate: Rate = Field(default=ZERO, description="rate of the ascending node", examples=["-19.3 deg/yr"])
-    periapsis_rate: Rate = Field(default=ZERO, description="rate of the argument of periapsis")
-    period: Second | None = Field(
-        default=None,
-        description="anomalistic period, from periapsis to periapsis: that of the mean anomaly (beside a "
-        "table without one, of the mean longitude); by default that of Kepler's third law",
-        examples=["27.55455 day"],
-    )
-    sidereal_period: Second | None = Field(
-        default=None,
-        description="period of the mean longitude (node + periapsis + mean anomaly), such as a sidereal "
-        "month or year, instead of period",
-        examples=["27.321661 day"],
-    )
-    longitude_rate: Rate | None = Field(
-        default=None,
-        description="rate of the mean longitude (node + periapsis + mean anomaly), instead of period",
-        examples=["13.17639648 deg/day"],
-    )
+    body: StrictStr | None = Field(None, examples=["sun"])
+    """name of the attracting point mass in [[bodies]]; excludes all other keys"""
+    table: StrictStr | None = Field(None, examples=["mars_elements.csv"])
+    """name of a CSV file beside the config, with elements over time"""
+    semi_major_axis: Metre | None = Field(None, examples=["7000 km"])
+    """semi-major axis of the ellipse"""
+    eccentricity: Dimensionless = ZERO
+    """0 to below 1"""
+    inclination: Angle = Field(ZERO, examples=["51.6 deg"])
+    """inclination to the XY plane of the space axes"""
+    ascending_node: Angle = ZERO
+    """longitude of the ascending node from X, at time 0"""
+    periapsis: Angle = ZERO
+    """argument of periapsis from the ascending node, at time 0"""
+    mean_anomaly: Angle = ZERO
+    """mean anomaly at time 0"""
+    node_rate: Rate = Field(ZERO, examples=["-19.3 deg/yr"])
+    """rate of the ascending node"""
+    periapsis_rate: Rate = ZERO
+    """rate of the argument of periapsis"""
+    period: Second | None = Field(None, examples=["27.55455 day"])
+    """anomalistic period, from periapsis to periapsis: that of the mean anomaly (beside a table without one,
+    of the mean longitude); by default that of Kepler's third law
+    """
+    sidereal_period: Second | None = Field(None, examples=["27.321661 day"])
+    """period of the mean longitude (node + periapsis + mean anomaly), such as a sidereal month or year,
+    instead of period
+    """
+    longitude_rate: Rate | None = Field(None, examples=["13.17639648 deg/day"])
+    """rate of the mean longitude (node + periapsis + mean anomaly), instead of period"""
 
 
 @dataclass(frozen=True)

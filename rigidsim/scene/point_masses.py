@@ -1,4 +1,4 @@
-"""Point masses under mutual gravity: ``[[bodies]]`` with every number worked out."""
+"""``[[bodies]]``: point masses under mutual gravity, as keys and with every number worked out."""
 
 from __future__ import annotations
 
@@ -7,10 +7,20 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
+from pydantic import Field, StrictStr
+
 from rigidsim.errors import ConfigError, Problem
-from rigidsim.scene.arithmetic import Vector, cross, norm
-from rigidsim.scene.kepler import eccentric_anomaly
-from rigidsim.scene.point_mass_table import PointMassBody, StartingOrbit
+from rigidsim.scene.arithmetic import Vector, cross, eccentric_anomaly, norm
+from rigidsim.scene.exact import ZERO
+from rigidsim.scene.fields import (
+    Angle,
+    ConfigTable,
+    Dimensionless,
+    GravitationalParameter,
+    Metre,
+    Speed,
+    Triple,
+)
 from rigidsim.scene.validation_messages import nearest, shown
 
 GRAVITATIONAL_CONSTANT = "6.67430e-11"
@@ -22,6 +32,42 @@ _SAME_MASS = 0.01
 _MOST = 64
 _CLOSEST = 1000
 """A scale of distance is at least this part of the initial one: it must not vanish for a plunging orbit."""
+
+
+class StartingOrbit(ConfigTable):
+    """Osculating elements at the start, about another of the bodies."""
+
+    about: StrictStr = Field(examples=["sun"])
+    """name of the point mass to which the elements are relative"""
+    semi_major_axis: Metre = Field(examples=["1 au"])
+    """semi-major axis of the ellipse"""
+    eccentricity: Dimensionless = ZERO
+    """0 to below 1"""
+    inclination: Angle = ZERO
+    """inclination to the XY plane of the space axes"""
+    ascending_node: Angle = ZERO
+    """longitude of the ascending node from X"""
+    periapsis: Angle = ZERO
+    """argument of periapsis from the ascending node"""
+    mean_anomaly: Angle = ZERO
+    """mean anomaly at the start"""
+
+
+class PointMassBody(ConfigTable):
+    """A point mass under the gravity of all others."""
+
+    name: StrictStr = Field(examples=["sun"])
+    """letters, digits and underscores, beginning with a letter"""
+    gravitational_parameter: GravitationalParameter = Field(examples=["1.32712440018e20 m^3/s^2"])
+    """G M"""
+    position: Triple[Metre] | None = None
+    """position at the start, space axes"""
+    velocity: Triple[Speed] | None = None
+    """velocity at the start, space axes"""
+    orbit: StartingOrbit | None = Field(
+        None, examples=[{"about": "sun", "semi_major_axis": "1 au", "eccentricity": 0.0167}]
+    )
+    """osculating elements at the start, instead of position and velocity"""
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""Sample times of a scene: a grid or a list, kept exactly as written."""
+"""``[time]``: the sample times of a scene, a grid or a list, kept exactly as written."""
 
 from __future__ import annotations
 
@@ -9,12 +9,35 @@ from fractions import Fraction
 from itertools import pairwise
 from typing import Any
 
+from pydantic import Field, StrictInt
+
 from rigidsim.errors import ConfigError, Problem, either
-from rigidsim.scene import schema
-from rigidsim.scene.exact import rounded
+from rigidsim.scene.exact import ZERO, rounded
+from rigidsim.scene.fields import ConfigTable, Instant, Second, TimeUnitName
 from rigidsim.scene.validation_messages import shown
 
 _MOST_SAMPLES = 10**12
+
+
+class Time(ConfigTable):
+    """``[time]``: where the samples lie; one of ``samples``, ``every`` and ``times``; what time 0 is, and
+    the unit that times are shown in.
+    """
+
+    start: Second = ZERO
+    """start of the run, to which [initial] refers"""
+    end: Second | None = Field(None, examples=[1000.0, "10 yr"])
+    """end of the run; with samples or every"""
+    samples: StrictInt | None = Field(None, examples=[10001])
+    """number of samples, equally spaced from start to end, both included"""
+    every: Second | None = Field(None, examples=[0.1, "1 day"])
+    """interval between samples, instead of samples"""
+    times: list[Second] | None = Field(None, examples=[[0, 1, 10, 100]])
+    """sample times, ascending, instead of end"""
+    epoch: Instant | None = Field(None, examples=["J2000", "2029-04-13T21:46:00 TDB"])
+    """date of time 0; scales TDB, TT and UTC"""
+    unit: TimeUnitName | None = Field(None, examples=["day"])
+    """unit in which times are displayed, such as day, yr or kyr; bare numbers in the config remain seconds"""
 
 
 @dataclass(frozen=True)
@@ -63,7 +86,7 @@ class SampleTimes:
         return max((float(b - a) for a, b in pairwise(self.times)), default=0.0)
 
 
-def sample_times(table: schema.Time, context: Any) -> tuple[Any, Any, SampleTimes]:
+def sample_times(table: Time, context: Any) -> tuple[Any, Any, SampleTimes]:
     """Start and end of the motion (s, mpf) and the sample times from a config's ``[time]``.
 
     Raises:

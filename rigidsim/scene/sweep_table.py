@@ -2,25 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import Field, StrictBool, StrictInt, StrictStr, field_validator, model_validator
 
-from rigidsim.scene.fields import ConfigTable, refuse
-from rigidsim.scene.validation_messages import nearest, shown
+from rigidsim.scene.fields import ConfigTable, EachOnce, OneOf, Pair, Triple, refuse
+from rigidsim.scene.validation_messages import shown
 
 KEPT = (
-    "final",
-    "extremes",
-    "means",
-    "events",
-    "section",
-    "megno",
-    "fli",
-    "lyapunov",
-    "frequencies",
-    "series",
-)
+    "final", "extremes", "means", "events", "section", "megno", "fli", "lyapunov", "frequencies", "series",
+)  # fmt: skip
 """Items that can be kept of a member; drifts, steps and warnings always are."""
 INDICATORS = ("megno", "fli", "lyapunov")
 """Items that need a tangent vector's growth, which is recorded for them."""
@@ -35,39 +26,28 @@ MOST_EVENTS = 100_000
 class AxisTable(ConfigTable):
     """One axis: the values that a key takes, said in one of seven ways."""
 
-    linspace: list[Any] | None = Field(
-        default=None, description="[from, to, count], both ends included", min_length=3, max_length=3
-    )
-    logspace: list[Any] | None = Field(
-        default=None, description="[from, to, count], with equal ratios, both ends included",
-        min_length=3, max_length=3,
-    )  # fmt: skip
-    step: list[Any] | None = Field(
-        default=None, description="[from, step, count], equally spaced", min_length=3, max_length=3
-    )
-    values: list[Any] | None = Field(
-        default=None, description="list of values, each as the key itself accepts it", min_length=1
-    )
-    normal: list[Any] | None = Field(
-        default=None, description="[mean, standard deviation]; with count", min_length=2, max_length=2
-    )
-    uniform: list[Any] | None = Field(
-        default=None, description="[from, to]; with count", min_length=2, max_length=2
-    )
-    sphere: Any = Field(
-        default=None,
-        description="radius: random directions of a vector with count, or a grid of directions with grid",
-    )
-    count: StrictInt | None = Field(default=None, ge=1, description="number of random values")
-    grid: list[StrictInt] | None = Field(
-        default=None, min_length=2, max_length=2,
-        description="for sphere: numbers of polar angles (equally spaced in their cosine) and azimuths",
-    )  # fmt: skip
-    name: StrictStr | None = Field(
-        default=None,
-        description="name of the dimension; by default the last part of the key, or the whole key where the "
-        "last part is the name of something recorded",
-    )
+    linspace: Triple[Any] | None = None
+    """[from, to, count], both ends included"""
+    logspace: Triple[Any] | None = None
+    """[from, to, count], with equal ratios, both ends included"""
+    step: Triple[Any] | None = None
+    """[from, step, count], equally spaced"""
+    values: list[Any] | None = Field(None, min_length=1)
+    """list of values, each as the key itself accepts it"""
+    normal: Pair[Any] | None = None
+    """[mean, standard deviation]; with count"""
+    uniform: Pair[Any] | None = None
+    """[from, to]; with count"""
+    sphere: Any = None
+    """radius: random directions of a vector with count, or a grid of directions with grid"""
+    count: StrictInt | None = Field(None, ge=1)
+    """number of random values"""
+    grid: Pair[StrictInt] | None = None
+    """for sphere: numbers of polar angles (equally spaced in their cosine) and azimuths"""
+    name: StrictStr | None = None
+    """name of the dimension; by default the last part of the key, or the whole key where the last part is the
+    name of something recorded
+    """
 
     @model_validator(mode="after")
     def _one_way(self) -> AxisTable:
@@ -105,50 +85,23 @@ class AxisTable(ConfigTable):
 class SweepTable(ConfigTable):
     """``[sweep]``: many members of one experiment."""
 
-    mode: Literal["product", "zip"] = Field(
-        default="product",
-        description="product: every combination of the axes' values; zip: the first of each, the second, ...",
-    )
-    seed: StrictInt = Field(
-        default=0, description="seed of random values; each draw depends on seed, key and index"
-    )
-    keep: list[StrictStr] = Field(
-        default_factory=lambda: ["final"],
-        description="results kept of each member, besides drifts, steps and warnings",
-        json_schema_extra={"items": {"type": "string", "enum": list(KEPT)}, "default": ["final"]},
-    )
-    most_events: StrictInt = Field(
-        default=16,
-        ge=1,
-        le=MOST_EVENTS,
-        description="largest number of times (events) or points (section) kept of an event",
-    )
-    tile: StrictInt | None = Field(
-        default=None,
-        ge=1,
-        le=LARGEST_TILE,
-        description="number of members computed and saved together; by default some seconds of work",
-    )
-    batch: StrictBool = Field(
-        default=True,
-        description="integrate members that share their equations side by side; false: each by itself, "
-        "which takes many times as long",
-    )
-    impossible: Literal["refuse", "mark"] = Field(
-        default="refuse",
-        description="members that can't be run: refuse the sweep before any of them runs, or mark those "
-        'as "refused", with the reason, and run the others',
-    )
-    axes: dict[StrictStr, AxisTable] = Field(
-        min_length=1, description="the axes, by the dotted keys whose values are swept, with indices from 0"
-    )
-
-    @field_validator("keep")
-    @classmethod
-    def _can_be_kept(cls, value: list[str]) -> list[str]:
-        for name in value:
-            if name not in KEPT:
-                raise refuse(f"given {shown(name)}{nearest(name, KEPT)}; allowed: {', '.join(KEPT)}")
-        if len(set(value)) < len(value):
-            raise refuse("something is named twice; name each once")
-        return value
+    mode: Literal["product", "zip"] = "product"
+    """product: every combination of the axes' values; zip: the first of each, the second, ..."""
+    seed: StrictInt = 0
+    """seed of random values; each draw depends on seed, key and index"""
+    keep: EachOnce[Annotated[str, OneOf(KEPT)]] = Field(["final"])
+    """results kept of each member, besides drifts, steps and warnings"""
+    most_events: StrictInt = Field(16, ge=1, le=MOST_EVENTS)
+    """largest number of times (events) or points (section) kept of an event"""
+    tile: StrictInt | None = Field(None, ge=1, le=LARGEST_TILE)
+    """number of members computed and saved together; by default some seconds of work"""
+    batch: StrictBool = True
+    """integrate members that share their equations side by side; false: each by itself, which takes many
+    times as long
+    """
+    impossible: Literal["refuse", "mark"] = "refuse"
+    """members that can't be run: refuse the sweep before any of them runs, or mark those as "refused", with
+    the reason, and run the others
+    """
+    axes: dict[StrictStr, AxisTable] = Field(min_length=1)
+    """the axes, by the dotted keys whose values are swept, with indices from 0"""

@@ -13,20 +13,9 @@ from pydantic import BaseModel, ValidationError
 from rigidsim.errors import ConfigError, Problem
 
 _TABLES = (
-    "body",
-    "initial",
-    "loads",
-    "bodies",
-    "frame",
-    "time",
-    "integrator",
-    "output",
-    "limits",
-    "parameters",
-    "events",
-    "sweep",
-    "tables",
-)
+    "body", "initial", "loads", "bodies", "frame", "time", "integrator", "output", "limits", "parameters",
+    "events", "sweep", "tables",
+)  # fmt: skip
 _ARRAYS_OF_TABLES = ("loads", "bodies", "events")
 _MEANT = {
     "box": "cuboid", "brick": "cuboid", "ball": "sphere", "disc": "disk", "hoop": "ring", "bar": "rod",
@@ -158,14 +147,12 @@ def _what(table: type[BaseModel] | None, error: Mapping[str, Any]) -> str:
         names = [part.strip() for part in allowed.split(",")]
         near = nearest(given if isinstance(given, str) else shown(given), names)
         return f"given {shown(given)}{near}; allowed: {', '.join(names)}"
-    if kind in ("too_short", "too_long"):
-        if not given:
-            return "given an empty array; at least one entry is needed"
-        return f"given {shown(given)}; an array{_of_how_many(table, location)} is allowed"
+    if kind == "too_short":
+        return "given an empty array; at least one entry is needed"
     if kind == "kind_of_value":
         return f"given {shown(given)}; {error['msg']}"
     if kind in ("list_type", "model_type", "model_attributes_type"):
-        wanted = f"an array{_of_how_many(table, location)}" if kind == "list_type" else "a table"
+        wanted = "an array" if kind == "list_type" else "a table"
         return f"given {shown(given)}; {wanted} is allowed"
     if kind in ("int_type", "int_from_float"):
         return f"given {shown(given)}; a whole number, without point or exponent, is allowed"
@@ -178,20 +165,6 @@ def _what(table: type[BaseModel] | None, error: Mapping[str, Any]) -> str:
     if kind == "less_than_equal":
         return f"given {shown(given)}; at most {context['le']:g} is allowed"
     return str(error["msg"])
-
-
-def _of_how_many(table: type[BaseModel] | None, location: tuple[str | int, ...]) -> str:
-    """The text `` of 3`` for an array of fixed length."""
-    names = [key for key in location if isinstance(key, str)]
-    field = table.model_fields.get(names[-1]) if table and names else None
-    waiting = [] if field is None or isinstance(location[-1], int) else [field.annotation, *field.metadata]
-    while waiting:
-        part = waiting.pop(0)
-        count = getattr(part, "max_length", None)
-        if count is not None:
-            return f" of {count}"
-        waiting += [*get_args(part), *getattr(part, "metadata", [])]
-    return ""
 
 
 def _of_the_user(location: tuple[str | int, ...], alternatives: Collection[str]) -> tuple[str | int, ...]:

@@ -109,7 +109,7 @@ def verify(path: str | Path, *, observer: Observer | None = None) -> Verdict:
     experiment = as_begun(embedded(dataset), dataset)
     with _scratch() as scratch:
         quiet = experiment.config.output.model_copy(update={"timeline": False})
-        unguarded = type(experiment.config.limits)()
+        unguarded = type(experiment.config.limits).model_construct()
         plain = experiment.config.integrator.model_copy(update={"accuracy": None})
         replaced = {"output": quiet, "limits": unguarded, "integrator": plain}
         config = experiment.config.model_copy(update=replaced)

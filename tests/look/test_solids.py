@@ -17,8 +17,7 @@ from rigidsim.look.solids import (
     body_meshes,
     solid_mesh,
 )
-from rigidsim.scene.bodies.outlines import THINNESS, Arc, Revolved, StraightPiece
-from rigidsim.scene.bodies.shapes import SHAPES, Shape
+from rigidsim.scene.bodies.shapes import SHAPES, THINNESS, Arc, Revolved, Shape, StraightPiece
 from rigidsim.scene.scene import build_scene
 
 # Area of the regular polygon inscribed in the unit circle, over pi.

@@ -12,7 +12,7 @@ from rigidsim.accuracy.estimates.margins import Margins
 from rigidsim.model.capabilities import Ahead, having, is_wide
 from rigidsim.model.formulations.formulation import Rounding
 from rigidsim.model.system import System
-from rigidsim.scene.moments import acts_at_moments_alone
+from rigidsim.scene.transitions import acts_at_moments_alone
 from rigidsim.solve.effects.angle_wrapping import STEPS_BETWEEN
 from rigidsim.solve.neighbours.lanes import (
     TIGHT,

@@ -27,12 +27,12 @@ from rigidsim.scene.arithmetic import Vector, dot, negligible, norm, parallel
 from rigidsim.scene.epochs import J2000, Epoch
 from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.fields import GravitationalParameter, Metre, Triple
+from rigidsim.scene.frame import ECLIPTIC
 from rigidsim.scene.orbit_tables.orbit import resolve_tabulated_orbit
 from rigidsim.scene.orbit_tables.pieces import TabulatedOrbit
 from rigidsim.scene.orbits import KeplerOrbit, Orbit, attracting_body, resolve_orbit
 from rigidsim.scene.registry import LoadFields, Surroundings, register_load
 from rigidsim.scene.scene import Scene
-from rigidsim.scene.space_axes import ECLIPTIC
 from rigidsim.store.summary_parts import Caution
 
 

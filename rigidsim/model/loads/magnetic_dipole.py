@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal, TypeAlias
+from typing import Annotated, Any, Literal
 
 import heyoka as hy
 from pydantic import Field
@@ -23,7 +23,7 @@ from rigidsim.model.rotations import Symbolic
 from rigidsim.model.two_part import as_factor
 from rigidsim.scene.arithmetic import Vector, cross, dot, negligible, norm
 from rigidsim.scene.exact import ExactNumber
-from rigidsim.scene.fields import GravitationalParameter, Metre, Triple, quantity
+from rigidsim.scene.fields import GravitationalParameter, InUnit, Metre, Triple
 from rigidsim.scene.orbits import KeplerOrbit, Orbit, resolve_orbit
 from rigidsim.scene.registry import LoadFields, Surroundings, register_load
 from rigidsim.scene.scene import Scene
@@ -32,12 +32,8 @@ from rigidsim.store.summary_parts import Caution
 _FIELD_CONSTANT = "1e-7"
 """mu_0 / 4 pi, T m/A: CODATA 2022 has 0.99999999987(16) times this, measured since the SI of 2019."""
 
-if TYPE_CHECKING:
-    MagneticMoment: TypeAlias = ExactNumber
-    FluxDensity: TypeAlias = ExactNumber
-else:
-    MagneticMoment = quantity("A m^2")
-    FluxDensity = quantity("T")
+MagneticMoment = Annotated[ExactNumber, InUnit("A m^2")]
+FluxDensity = Annotated[ExactNumber, InUnit("T")]
 
 
 class MagneticDipoleFields(LoadFields):

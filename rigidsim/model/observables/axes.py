@@ -32,7 +32,7 @@ from rigidsim.model.observables.steadiness import is_planet, steady_directions
 from rigidsim.model.observables.vectors import figure_told, plane_told, unit
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.two_part import as_factor
-from rigidsim.scene.space_axes import ECLIPTIC, OBLIQUITY
+from rigidsim.scene.frame import ECLIPTIC, OBLIQUITY
 
 AXIS = ("axis",)
 

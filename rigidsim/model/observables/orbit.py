@@ -53,13 +53,13 @@ def roll_pitch_yaw(m: Mechanics) -> list[Angle]:
 def libration(m: Mechanics) -> list[Angle]:
     """Libration angles of the long axis, in the orbit's plane and out of it."""
     frame = local_frame(m)
-    axis = in_body(m, m.carried(smallest_axis(m.scene.body, m.scene.context)))
+    axis = in_body(m, m.carried(unique_axis(m.scene.body, m.scene.context, largest=False)))
     x, z = along(axis, frame.forward), along(axis, frame.down)
     return [Angle(x, z), Angle(along(axis, frame.normal), hy.sqrt(x * x + z * z))]
 
 
 def _no_long_axis(m: Mechanics) -> str | None:
-    if smallest_axis(m.scene.body, m.scene.context) is not None:
+    if unique_axis(m.scene.body, m.scene.context, largest=False) is not None:
         return None
     return "the body has no single axis of smallest moment, whose libration it would be"
 

@@ -16,7 +16,7 @@ from rigidsim.model.observables.steadiness import is_nearly_axial
 from rigidsim.model.observables.vectors import angle_between, figure_told, in_body
 from rigidsim.model.rotations import Symbolic
 from rigidsim.scene.arithmetic import dot, norm
-from rigidsim.scene.frame import largest_axis
+from rigidsim.scene.frame import unique_axis
 
 
 def _polar_motion(m: Mechanics) -> list[Symbolic]:
@@ -50,13 +50,13 @@ def _no_polar_motion(m: Mechanics) -> str | None:
 
 
 def _wobble_angle(m: Mechanics) -> list[Symbolic]:
-    largest = largest_axis(m.scene.body, m.scene.context)
+    largest = unique_axis(m.scene.body, m.scene.context, largest=True)
     assert largest is not None
     return [angle_between(in_body(m, largest), m.momentum_body)]
 
 
 def _no_largest(m: Mechanics) -> str | None:
-    if largest_axis(m.scene.body, m.scene.context) is not None:
+    if unique_axis(m.scene.body, m.scene.context, largest=True) is not None:
         return None
     return (
         "the two largest principal moments are equal, so that no axis is that of the largest; record "

@@ -33,7 +33,6 @@ from rigidsim.scene.bodies.pieces import (
 from rigidsim.scene.bodies.presets import PRESETS
 from rigidsim.scene.exact import ExactNumber, parse_number
 from rigidsim.scene.tracing.context import plain
-from rigidsim.scene.validation_messages import nearest, shown
 
 SOURCES = ("principal_moments", "inertia_tensor", "points", "shape", "parts", "preset")
 # A tensor that was printed by a double-precision program obeys the triangle inequality to about this.
@@ -105,10 +104,7 @@ def _from_tensor(table: body_table.Body, source: str, context: Any) -> RigidBody
     drawing: list[dict[str, Any]] = []
     described = source
     if source == "preset":
-        preset = PRESETS.get(str(table.preset))
-        if preset is None:
-            near = nearest(str(table.preset), PRESETS)
-            raise refusal("preset", f"given {shown(table.preset)}{near}; allowed: {', '.join(PRESETS)}")
+        preset = PRESETS[str(table.preset)]
         if table.mass is not None:
             raise refusal("mass", "it follows from preset; remove it")
         inertia = diagonal(preset.moments(context))

@@ -9,9 +9,63 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from itertools import pairwise
+from typing import Any, TypeAlias
 
-from rigidsim.scene.bodies.outlines import THINNESS, Arc, Box, Ellipsoid, Outline, Revolved, polygon
+THINNESS = 0.02
+"""Thickness with which an ideally thin solid is drawn, relative to its largest dimension."""
+
+
+@dataclass(frozen=True)
+class Box:
+    """A cuboid with these edges along x, y, z."""
+
+    x: float
+    y: float
+    z: float
+
+
+@dataclass(frozen=True)
+class Ellipsoid:
+    """An ellipsoid with these semi-axes along x, y, z."""
+
+    x: float
+    y: float
+    z: float
+
+
+@dataclass(frozen=True)
+class StraightPiece:
+    """A straight piece of an outline, from one (radius, z) to another."""
+
+    start: tuple[float, float]
+    stop: tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Arc:
+    """A piece of a circle about ``center`` (radius, z), from one angle to another (rad, 0 is radial)."""
+
+    center: tuple[float, float]
+    radius: float
+    start: float
+    stop: float
+
+
+@dataclass(frozen=True)
+class Revolved:
+    """A solid of revolution about z: its outline, piece by piece, runs with the outside on its right."""
+
+    pieces: tuple[StraightPiece | Arc, ...]
+
+
+Outline: TypeAlias = Box | Ellipsoid | Revolved
+
+
+def polygon(*corners: tuple[float, float]) -> Revolved:
+    """The solid of revolution whose outline joins these (radius, z) by straight lines."""
+    return Revolved(tuple(StraightPiece(a, b) for a, b in pairwise(corners)))
+
 
 Dimensions = Mapping[str, list[Any]]
 Vector = list[Any]

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from pydantic import Discriminator, Field, StrictStr, Tag, WithJsonSchema, create_model, field_validator
+from pydantic import Discriminator, Field, StrictStr, Tag, WithJsonSchema, create_model
 
 from rigidsim.scene.bodies.presets import PRESETS
 from rigidsim.scene.bodies.shapes import DIMENSIONS, SHAPES
@@ -17,13 +16,11 @@ from rigidsim.scene.fields import (
     EulerSequence,
     Four,
     Kilogram,
-    Later,
     Metre,
     Moment,
+    OneOf,
     Triple,
-    refuse,
 )
-from rigidsim.scene.validation_messages import nearest, shown
 
 _SIZES = {
     "size": "edges along x, y (and z)",
@@ -36,7 +33,6 @@ _SIZES = {
     "major_radius": "from the centre to the middle of the tube",
     "minor_radius": "of the tube",
 }
-_ORIGIN: dict[str, Any] = {"default": [0, 0, 0]}
 POINT_OR_NAME = ("as a name", "as a point")
 """Names of the alternatives of ``[body] reference``."""
 
@@ -50,27 +46,15 @@ def _kind_of_reference(value: Any) -> str | None:
 class PointMass(ConfigTable):
     """One particle of a body of particles."""
 
-    mass: Kilogram = Field(description="mass of the particle")
-    position: Triple[Metre] = Field(description="position in body axes")
-
-
-def _named(names: Iterable[str]) -> dict[str, Any]:
-    return {"enum": list(names)}
+    mass: Kilogram
+    """mass of the particle"""
+    position: Triple[Metre]
+    """position in body axes"""
 
 
 class _Shaped(ConfigTable):
-    shape: StrictStr | None = Field(
-        default=None,
-        description="a homogeneous solid; needs mass and dimensions",
-        json_schema_extra=_named(SHAPES),
-    )
-
-    @field_validator("shape")
-    @classmethod
-    def _known_shape(cls, value: str | None) -> str | None:
-        if value is not None and value not in SHAPES:
-            raise refuse(f"given {shown(value)}{nearest(value, SHAPES)}; allowed: {', '.join(SHAPES)}")
-        return value
+    shape: Annotated[str, OneOf(SHAPES)] | None = None
+    """a homogeneous solid; needs mass and dimensions"""
 
 
 def _dimension(key: str, count: int) -> Any:
@@ -78,12 +62,10 @@ def _dimension(key: str, count: int) -> Any:
     taking = [name for name, shape in SHAPES.items() if key in shape.dimensions]
     told = f"{_SIZES[key]}; of {' and '.join(', '.join(taking).rsplit(', ', 1))}"
     if count == 1:
-        return Metre | None, Field(default=None, description=told, examples=[0.5])
-    most: dict[str, Any] = {
-        "minItems": min(SHAPES[name].dimensions[key] for name in taking),
-        "maxItems": count,
-    }
-    field = Field(default=None, description=told, examples=[[4, 3, 2][:count]], json_schema_extra=most)
+        return Metre | None, Field(None, description=told, examples=[0.5])
+    least = min(SHAPES[name].dimensions[key] for name in taking)
+    sizes: dict[str, Any] = {"minItems": least, "maxItems": count}
+    field = Field(None, description=told, examples=[[4, 3, 2][:count]], json_schema_extra=sizes)
     return list[Metre] | None, field
 
 
@@ -101,91 +83,63 @@ else:
 class Part(Solid):
     """One solid of a composite body, placed by its centre of mass, turned by a quaternion or Euler angles."""
 
-    shape: StrictStr = Field(
-        description="a homogeneous solid; needs mass and dimensions", json_schema_extra=_named(SHAPES)
-    )
-    mass: Kilogram = Field(description="mass of the part")
-    position: Triple[Metre] = Field(
-        default_factory=lambda: [ZERO] * 3,
-        description="position of its centre of mass, in body axes",
-        json_schema_extra=_ORIGIN,
-    )
-    quaternion: Four[Dimensionless] | None = Field(
-        default=None, description="attitude w, x, y, z: takes the part's own axes to the body's"
-    )
-    euler_angles: Triple[Angle] | None = Field(
-        default=None, description="attitude from the part's own axes to the body's, instead of quaternion"
-    )
-    euler_sequence: EulerSequence | None = Field(
-        default=None, description="sequence of euler_angles; by default that of [integrator]"
-    )
+    shape: Annotated[str, OneOf(SHAPES)]
+    """a homogeneous solid; needs mass and dimensions"""
+    mass: Kilogram
+    """mass of the part"""
+    position: Triple[Metre] = Field([ZERO] * 3)
+    """position of its centre of mass, in body axes"""
+    quaternion: Four[Dimensionless] | None = None
+    """attitude w, x, y, z: takes the part's own axes to the body's"""
+    euler_angles: Triple[Angle] | None = None
+    """attitude from the part's own axes to the body's, instead of quaternion"""
+    euler_sequence: EulerSequence | None = None
+    """sequence of euler_angles; by default that of [integrator]"""
 
 
-_LANDMARK = WithJsonSchema(
-    {
-        "type": "string",
-        "enum": ["center_of_mass", *sorted({name for shape in SHAPES.values() for name in shape.landmarks})],
-    }
-)
+_LANDMARKS = {name for shape in SHAPES.values() for name in shape.landmarks}
+Reference = Annotated[
+    Annotated[
+        StrictStr,
+        Tag(POINT_OR_NAME[0]),
+        WithJsonSchema({"type": "string", "enum": ["center_of_mass", *sorted(_LANDMARKS)]}),
+    ]
+    | Annotated[Triple[Metre], Tag(POINT_OR_NAME[1])],
+    Discriminator(
+        _kind_of_reference,
+        custom_error_type="kind_of_value",
+        custom_error_message='"center_of_mass", a landmark of the shape such as "corner", or a point '
+        "[x, y, z] is allowed",
+    ),
+]
 
 
 class Body(Solid):
     """``[body]``: exactly one source of inertia, and what loads need beside it."""
 
-    principal_moments: Triple[Moment] | None = Field(
-        default=None,
-        description="principal moments of inertia about the body axes x, y, z",
-        examples=[[1, 2, 2.5]],
-    )
+    principal_moments: Triple[Moment] | None = Field(None, examples=[[1, 2, 2.5]])
+    """principal moments of inertia about the body axes x, y, z"""
     inertia_tensor: Triple[Triple[Moment]] | None = Field(
-        default=None,
-        description="symmetric inertia tensor in any body axes (products are -sum m x y); results are in "
-        "these axes",
-        examples=[[[2, -0.1, 0], [-0.1, 3, 0], [0, 0, 4]]],
+        None, examples=[[[2, -0.1, 0], [-0.1, 3, 0], [0, 0, 4]]]
     )
-    points: Annotated[list[Later[PointMass]], Field(min_length=1)] | None = Field(
-        default=None, description="list of particles", examples=[[{"mass": 1, "position": [0, 0, 1]}]]
+    """symmetric inertia tensor in any body axes (products are -sum m x y); results are in these axes"""
+    points: Annotated[list[PointMass], Field(min_length=1)] | None = Field(
+        None, examples=[[{"mass": 1, "position": [0, 0, 1]}]]
     )
-    parts: Annotated[list[Later[Part]], Field(min_length=1)] | None = Field(
-        default=None, description="solids that make up the body"
-    )
-    preset: StrictStr | None = Field(
-        default=None, description="name of a published body", json_schema_extra=_named(PRESETS)
-    )
-    mass: Kilogram | None = Field(
-        default=None,
-        description="mass of the body; required for shapes, and wherever a load or the translational "
-        "motion uses it",
-        examples=[12],
-    )
-    host: StrictStr | None = Field(
-        default=None, description="name of the point mass in [[bodies]] that this body is", examples=["earth"]
-    )
-    coupling: Literal["one_way", "full"] | None = Field(
-        default=None,
-        description="whether [[bodies]] feel this body's shape: one_way (the default) or full",
-    )
-    center_of_mass: Triple[Metre] | None = Field(
-        default=None,
-        description="position relative to the point that the body turns about, in body axes; with "
-        "moments or a tensor",
-        examples=[[0, 0, 0.5]],
-    )
-    reference: (
-        Annotated[
-            Annotated[StrictStr, Tag(POINT_OR_NAME[0]), _LANDMARK]
-            | Annotated[Triple[Metre], Tag(POINT_OR_NAME[1])],
-            Discriminator(
-                _kind_of_reference,
-                custom_error_type="kind_of_value",
-                custom_error_message='"center_of_mass", a landmark of the shape such as "corner", or a point '
-                "[x, y, z] is allowed",
-            ),
-        ]
-        | None
-    ) = Field(
-        default=None,
-        description="the point that the body turns about: center_of_mass (the default), a landmark of the "
-        "shape (corner, apex, end), or a point in the coordinates of the description",
-        examples=["corner", [0, 0, -0.5]],
-    )
+    """list of particles"""
+    parts: Annotated[list[Part], Field(min_length=1)] | None = None
+    """solids that make up the body"""
+    preset: Annotated[str, OneOf(PRESETS)] | None = None
+    """name of a published body"""
+    mass: Kilogram | None = Field(None, examples=[12])
+    """mass of the body; required for shapes, and wherever a load or the translational motion uses it"""
+    host: StrictStr | None = Field(None, examples=["earth"])
+    """name of the point mass in [[bodies]] that this body is"""
+    coupling: Literal["one_way", "full"] | None = None
+    """whether [[bodies]] feel this body's shape: one_way (the default) or full"""
+    center_of_mass: Triple[Metre] | None = Field(None, examples=[[0, 0, 0.5]])
+    """position relative to the point that the body turns about, in body axes; with moments or a tensor"""
+    reference: Reference | None = Field(None, examples=["corner", [0, 0, -0.5]])
+    """the point that the body turns about: center_of_mass (the default), a landmark of the shape (corner,
+    apex, end), or a point in the coordinates of the description
+    """

@@ -20,17 +20,17 @@ from typing import Any
 
 import numpy as np
 
-from rigidsim.scene.kepler import eccentric_anomaly
-from rigidsim.scene.orbit_tables.element_interpolation import (
+from rigidsim.scene.arithmetic import eccentric_anomaly
+from rigidsim.scene.orbit_tables.elements import ElementTable, TableError
+from rigidsim.scene.orbit_tables.interpolation import (
     AXIS,
     EXCENTRIC,
     LONGITUDE,
     TILTED,
+    Interpolation,
     InterpolationError,
     interpolation_error,
 )
-from rigidsim.scene.orbit_tables.elements import ElementTable, TableError
-from rigidsim.scene.orbit_tables.interpolation import Interpolation
 
 _DOUBTFUL_TURN = 0.25  # of a turn, by which the mean longitude may be off what Kepler's law expects
 _LARGEST_TILT = 0.9999  # of sin(i/2): 178.4 deg

@@ -7,7 +7,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from functools import lru_cache
 from typing import Any
 
-from rigidsim.scene.editor_schema import python_schema
 from rigidsim.scene.overrides import apply_overrides, key_steps
 from rigidsim.scene.schema import config_model
 from rigidsim.scene.validation_messages import nearest
@@ -15,7 +14,8 @@ from rigidsim.scene.validation_messages import nearest
 
 @lru_cache(maxsize=4)
 def _json_schema(model: Any) -> dict[str, Any]:
-    return python_schema(model)
+    found: dict[str, Any] = model.model_json_schema()
+    return found
 
 
 def unit_and_length(key: str, tables: Mapping[str, Any]) -> tuple[str, int]:
