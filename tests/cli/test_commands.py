@@ -377,10 +377,7 @@ def test_help_loads_nothing_heavy() -> None:
     assert done.stdout.splitlines()[-1] == "loaded: []"
 
 
-UNUSED = (
-    "{'rerun', 'xarray', 'pandas', 'matplotlib', 'dask', 'pyarrow', 'scipy', 'h5netcdf', "
-    "'email.parser'}"
-)
+UNUSED = "{'rerun', 'xarray', 'pandas', 'matplotlib', 'dask', 'pyarrow', 'scipy', 'h5netcdf', 'email.parser'}"
 OWN_MODULES = 330
 """That a short run loads, at 0.3 ms each: what few scenes need is loaded where it is used."""
 
