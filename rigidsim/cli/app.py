@@ -17,37 +17,8 @@ from typing import Annotated, Any
 import typer
 
 from rigidsim import __version__
+from rigidsim.cli import options
 from rigidsim.cli.ending import exit_code
-from rigidsim.cli.options import (
-    AnalysisOption,
-    AngleUnitOption,
-    AnyConfigs,
-    AxesOption,
-    ConfigPath,
-    Configs,
-    EpochOption,
-    FigureOption,
-    FormatOption,
-    FromOption,
-    GuardOption,
-    JsonOption,
-    MemberOption,
-    MembersOption,
-    NameArgument,
-    OutOption,
-    ResumeWorkersOption,
-    RunPath,
-    RunPaths,
-    ScanOption,
-    SceneArgument,
-    SchedulerOption,
-    SetOption,
-    TilesOption,
-    UntilOption,
-    VariableOption,
-    WhatOption,
-    WorkersOption,
-)
 from rigidsim.look.figure_names import FIGURES
 
 app = typer.Typer(
@@ -112,8 +83,8 @@ def _program(
 
 @_command("new")
 def new(
-    scene: SceneArgument = None,
-    name: NameArgument = None,
+    scene: options.SceneArgument = None,
+    name: options.NameArgument = None,
 ) -> None:
     """Write a commented config to start from; alone, list the scenes there are.
 
@@ -124,7 +95,9 @@ def new(
 
 
 @_command("configs")
-def check(configs: Configs, overrides: SetOption = None, as_json: JsonOption = False) -> None:
+def check(
+    configs: options.Configs, overrides: options.SetOption = None, as_json: options.JsonOption = False
+) -> None:
     """Validate configs, and show what was understood of them; nothing is run.
 
     The exit code is 2 where one of them can't be run.
@@ -135,14 +108,14 @@ def check(configs: Configs, overrides: SetOption = None, as_json: JsonOption = F
 
 @_command("run")
 def run(
-    configs: AnyConfigs = None,
-    dataset: FromOption = None,
-    out: OutOption = Path("runs"),
-    overrides: SetOption = None,
-    scan: ScanOption = None,
-    member: MemberOption = None,
+    configs: options.AnyConfigs = None,
+    dataset: options.FromOption = None,
+    out: options.OutOption = Path("runs"),
+    overrides: options.SetOption = None,
+    scan: options.ScanOption = None,
+    member: options.MemberOption = None,
     force: Annotated[bool, typer.Option("--force", help="Replace a run of the same name.")] = False,
-    as_json: JsonOption = False,
+    as_json: options.JsonOption = False,
 ) -> None:
     """Integrate, write the run folder, print a summary of invariants and cost.
 
@@ -152,14 +125,14 @@ def run(
 
 @_command("sweep")
 def sweep(
-    config: ConfigPath,
-    out: OutOption = Path("runs"),
-    overrides: SetOption = None,
-    workers: WorkersOption = 1,
-    scheduler: SchedulerOption = None,
-    tiles: TilesOption = None,
+    config: options.ConfigPath,
+    out: options.OutOption = Path("runs"),
+    overrides: options.SetOption = None,
+    workers: options.WorkersOption = 1,
+    scheduler: options.SchedulerOption = None,
+    tiles: options.TilesOption = None,
     force: Annotated[bool, typer.Option("--force", help="Replace what lies there.")] = False,
-    as_json: JsonOption = False,
+    as_json: options.JsonOption = False,
 ) -> None:
     """Run all members, and write one labelled dataset; what is there already isn't computed again.
 
@@ -171,11 +144,11 @@ def sweep(
 
 @_command("saved_runs")
 def resume(
-    run_path: RunPath,
-    until: UntilOption = None,
-    overrides: GuardOption = None,
-    workers: ResumeWorkersOption = 1,
-    as_json: JsonOption = False,
+    run_path: options.RunPath,
+    until: options.UntilOption = None,
+    overrides: options.GuardOption = None,
+    workers: options.ResumeWorkersOption = 1,
+    as_json: options.JsonOption = False,
 ) -> None:
     """Go on with an interrupted, killed or guarded run; the result is bit for bit the uninterrupted one.
 
@@ -187,9 +160,9 @@ def resume(
 
 @_command("saved_runs")
 def verify(
-    run_path: RunPath,
-    members: MembersOption = 100,
-    as_json: JsonOption = False,
+    run_path: options.RunPath,
+    members: options.MembersOption = 100,
+    as_json: options.JsonOption = False,
 ) -> None:
     """Integrate the embedded config again and compare: identical, or what differs first. Exit code 1 then.
 
@@ -199,10 +172,10 @@ def verify(
 
 @_command("configs")
 def plan(
-    config: ConfigPath,
-    overrides: SetOption = None,
-    out: OutOption = Path("runs"),
-    as_json: JsonOption = False,
+    config: options.ConfigPath,
+    overrides: options.SetOption = None,
+    out: options.OutOption = Path("runs"),
+    as_json: options.JsonOption = False,
 ) -> None:
     """Explain what would be integrated and why; predict steps, time, memory and file sizes.
 
@@ -211,7 +184,7 @@ def plan(
 
 
 @_command("info")
-def info(run_path: RunPath, as_json: JsonOption = False) -> None:
+def info(run_path: options.RunPath, as_json: options.JsonOption = False) -> None:
     """Summary of a run, finished or partial; exit code 2 if its dataset is damaged or was edited.
 
     Example: rigidsim info runs/intermediate_axis
@@ -220,7 +193,7 @@ def info(run_path: RunPath, as_json: JsonOption = False) -> None:
 
 @_command("results")
 def view(
-    run_paths: RunPaths,
+    run_paths: options.RunPaths,
     web: Annotated[bool, typer.Option("--web", help="In the browser, served on loopback only.")] = False,
     png: Annotated[
         Path | None, typer.Option("--png", metavar="FILE", help="Draw a picture, without a display.")
@@ -252,9 +225,9 @@ _EACH_FIGURE = "\n".join(f"{name:14}{told}" for name, told in FIGURES.items())
 
 @_command("results", f"\n\n\b\nFigures:\n{_EACH_FIGURE}")
 def plot(
-    run_path: RunPath,
-    what: WhatOption = None,
-    out: FigureOption = None,
+    run_path: options.RunPath,
+    what: options.WhatOption = None,
+    out: options.FigureOption = None,
 ) -> None:
     """Draw the page that suits the scene, or the figures named; of a sweep a variable over its axes.
 
@@ -264,9 +237,9 @@ def plot(
 
 @_command("configs")
 def tradeoff(
-    config: ConfigPath,
-    overrides: SetOption = None,
-    out: OutOption = Path("runs"),
+    config: options.ConfigPath,
+    overrides: options.SetOption = None,
+    out: options.OutOption = Path("runs"),
     budget: Annotated[
         float, typer.Option("--budget", metavar="SECONDS", help="Time that it may take, roughly.")
     ] = 90.0,
@@ -277,7 +250,7 @@ def tradeoff(
         bool, typer.Option("--full", help="Every tolerance in every formulation; needs a larger budget.")
     ] = False,
     force: Annotated[bool, typer.Option("--force", help="Replace an earlier measurement.")] = False,
-    as_json: JsonOption = False,
+    as_json: options.JsonOption = False,
 ) -> None:
     """Measure speed against accuracy of a scene: what to use for which accuracy. Dataset and figure in
     NAME_tradeoff.
@@ -288,15 +261,15 @@ def tradeoff(
 
 @_command("results")
 def export(
-    run_path: RunPath,
-    file_format: FormatOption,
+    run_path: options.RunPath,
+    file_format: options.FormatOption,
     out: Annotated[
         Path | None, typer.Option("--out", metavar="PATH", help="Default NAME.FORMAT in this folder.")
     ] = None,
     force: Annotated[bool, typer.Option("--force", help="Replace what is there.")] = False,
-    angle_unit: AngleUnitOption = None,
-    epoch: EpochOption = None,
-    axes: AxesOption = None,
+    angle_unit: options.AngleUnitOption = None,
+    epoch: options.EpochOption = None,
+    axes: options.AxesOption = None,
     object_name: Annotated[
         str | None, typer.Option("--object-name", metavar="NAME", help="For aem and oem.")
     ] = None,
@@ -311,11 +284,11 @@ def export(
 
 @_command("results")
 def analyse(
-    run_path: RunPath,
-    variable: VariableOption = None,
+    run_path: options.RunPath,
+    variable: options.VariableOption = None,
     lines: Annotated[int, typer.Option("--lines", metavar="N", help="Of each signal at most.")] = 20,
-    out: AnalysisOption = None,
-    as_json: JsonOption = False,
+    out: options.AnalysisOption = None,
+    as_json: options.JsonOption = False,
 ) -> None:
     """Secular rates and spectral lines, labelled with the scene's frequencies: table, dataset and figure.
 

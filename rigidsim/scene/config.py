@@ -138,11 +138,7 @@ def parse(text: str, *, source: str = "config", overrides: Overrides = ()) -> Ex
 
 
 def validated(table: dict[str, Any], source: str) -> Config:
-    """The tables of a config, validated.
-
-    Raises:
-        ConfigError: with every problem found.
-    """
+    """The tables of a config, validated."""
     problems = long_integers(table)
     if problems:
         raise ConfigError(problems, source)
@@ -204,12 +200,6 @@ def _with_tables(experiment: Experiment, folder: Path) -> Experiment:
 def _table_sections(config: Config, folder: Path) -> str:
     """TOML text, to be appended to the config, with the tables that loads name and the config doesn't
     contain.
-
-    Args:
-        folder: folder to which relative names refer.
-
-    Raises:
-        ConfigError: a file can't be read, or can't be part of a TOML text.
     """
     found: dict[str, str] = {}
     for where, name in _named(config):

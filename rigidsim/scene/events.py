@@ -71,11 +71,7 @@ class Event:
 def resolve_events(
     tables: Sequence[EventTable], parameters: Mapping[str, ExactNumber], *, free_flight: bool
 ) -> tuple[Event, ...]:
-    """Read the expressions of ``[[events]]``.
-
-    Raises:
-        ConfigError: an expression can't be read, or never changes.
-    """
+    """Read the expressions of ``[[events]]``."""
     names = ("t", *RATE_NAMES, *ATTITUDE_NAMES, *(FLIGHT_NAMES if free_flight else ()))
     found = []
     for number, table in enumerate(tables):

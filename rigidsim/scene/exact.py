@@ -195,11 +195,8 @@ def parse_quantity(value: Any) -> ExactNumber:
     Raises:
         ValueError: see ``parse_number``.
     """
-    short = isinstance(value, str) and len(value) <= _LONGEST_TEXT
-    match = _NUMBER_AND_UNIT.fullmatch(value) if short else None
-    if match is None or match["unit"] is None:
-        return parse_number(value, "1")
-    return with_unit(parse_number(match["number"], "1"), match["unit"].strip(), value)
+    number, unit = in_its_unit(value)
+    return with_unit(number, unit, value) if unit else number
 
 
 def in_its_unit(value: Any) -> tuple[ExactNumber, str]:

@@ -84,9 +84,6 @@ def figure_of(table: Frame, body: RigidBody, context: Any) -> Figure:
     positive largest component. The prime meridian is the body axis that follows (x after z, y after x, z
     after y) the one nearest to the figure axis, projected onto the equator: it is the body axis itself where
     the figure axis is one.
-
-    Raises:
-        ConfigError: the body has no unique axis of symmetry, or of largest moment, as requested.
     """
     asked = table.figure_axis
     one, zero = context.one, context.zero
@@ -124,11 +121,7 @@ def unique_axis(body: RigidBody, context: Any, *, largest: bool) -> Vector | Non
 
 
 def reference_normal(table: Frame, context: Any) -> Vector | None:
-    """Unit normal (mpf, space axes) of the plane named by ``[frame] reference``; None for a moving plane.
-
-    Raises:
-        ConfigError: the given normal is the zero vector.
-    """
+    """Unit normal (mpf, space axes) of the plane named by ``[frame] reference``; None for a moving plane."""
     asked = table.reference
     if asked == ORBIT:
         return None

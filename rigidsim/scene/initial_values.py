@@ -41,22 +41,12 @@ def start_values(scene: Scene) -> dict[str, Any]:
 
 
 def check_start(scene: Scene) -> None:
-    """Evaluate the components of loads and the events at the start, and what depends on time alone later.
-
-    Raises:
-        ConfigError: some have no finite value (all of them are named), or read Euler angles that are
-            singular at the start, or of which it has the other triple.
-    """
+    """Evaluate the components of loads and the events at the start, and what depends on time alone later."""
     values = start_values(scene)
     problems = _check_branch(scene) or _check_singular(scene, values)
-    for load in scene.loads:
-        for where, expression in load.formulas():
-            problems += _check(where, expression, values, scene.context)
-            problems += _check_span(where, expression, scene)
-    for number, event in enumerate(scene.events):
-        where = f"[[events]] number {number + 1} expression"
-        problems += _check(where, event.expression, values, scene.context)
-        problems += _check_span(where, event.expression, scene)
+    for where, expression in scene.formulas():
+        problems += _check(where, expression, values, scene.context)
+        problems += _check_span(where, expression, scene)
     if problems:
         raise ConfigError(problems)
 
@@ -67,9 +57,7 @@ def _check_branch(scene: Scene) -> list[Problem]:
     Every attitude has two triples of Euler angles; expressions use the one whose middle angle is in its
     range, which other formulations find as well.
     """
-    expressions = [e for load in scene.loads for _, e in load.formulas()]
-    expressions += [event.expression for event in scene.events]
-    read = frozenset().union(*(names_used(e) for e in expressions)) & set(ATTITUDE_NAMES[4:])
+    read = frozenset().union(*(names_used(e) for _, e in scene.formulas())) & set(ATTITUDE_NAMES[4:])
     if scene.euler_angles is None or not read:
         return []
     sequence, middle, pi = scene.config.integrator.euler_sequence, scene.euler_angles[1], scene.context.pi

@@ -107,11 +107,7 @@ class KeplerOrbit:
 
 
 def attracting_body(orbit: Orbit, around: Surroundings) -> int:
-    """Index of the point mass that an orbit names.
-
-    Raises:
-        ConfigError: there is no such body, or it is this body itself.
-    """
+    """Index of the point mass that an orbit names."""
     more = sorted(orbit.model_fields_set - {"body"})
     if more:
         raise around.fault(f"orbit.{more[0]}", "given beside body, whose motion is integrated; remove it")
@@ -132,11 +128,7 @@ PACES = ("period", "sidereal_period", "longitude_rate")
 
 
 def pace_of(table: Orbit, around: Surroundings) -> tuple[str, ExactNumber] | None:
-    """The key that replaces the mean motion of Kepler's third law, and its value; None if none is given.
-
-    Raises:
-        ConfigError: several are given, or a value that isn't positive.
-    """
+    """The key that replaces the mean motion of Kepler's third law, and its value; None if none is given."""
     given = [(key, getattr(table, key)) for key in PACES if getattr(table, key) is not None]
     for key, value in given:
         if value.sign <= 0:
@@ -161,9 +153,6 @@ def mean_motion(table: Orbit, strength: Any | None, around: Surroundings) -> Any
 
     Args:
         strength: gravitational parameter (mpf, m^3/s^2) of Kepler's third law; None if unknown.
-
-    Raises:
-        ConfigError: there is no pace, or the mean anomaly would stand still or go backwards.
     """
     context, pace = around.context, pace_of(table, around)
     if pace is None:
@@ -187,9 +176,6 @@ def resolve_orbit(table: Orbit, strength: Any | None, around: Surroundings) -> K
 
     Args:
         strength: gravitational parameter (mpf, m^3/s^2) of Kepler's third law; None if unknown.
-
-    Raises:
-        ConfigError: the elements describe no orbit.
     """
     context = around.context
     if table.semi_major_axis is None:

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import re
 import tomllib
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from itertools import pairwise
 from typing import Any
+
+import tomlkit
+from tomlkit.exceptions import TOMLKitError
 
 from rigidsim.errors import ConfigError, Problem
 from rigidsim.scene.toml_text import DEEP_KEY, DEEPEST_KEY, decimal, parse_toml
@@ -24,24 +27,12 @@ def apply_overrides(table: dict[str, Any], overrides: Sequence[str], what: str =
             such as a bare word or a number with its unit, is a string); nothing after the equals sign removes
             the key.
         what: what the overrides are called in messages.
-
-    Raises:
-        ConfigError: an override can't be applied.
     """
     if len(overrides) > _MOST_OVERRIDES:
         many = f"given {len(overrides)} values to set; at most {_MOST_OVERRIDES} are allowed"
         raise ConfigError(Problem(what, many))
     for assignment in overrides:
-        where = f"{what} {assignment[:60]}"
-        key, value_text = _parts(assignment, where)
-        if not value_text:
-            _remove(table, key, where)
-            continue
-        try:
-            value = tomllib.loads(f"value = {value_text}", parse_float=decimal)["value"]
-        except (ValueError, RecursionError):
-            value = value_text
-        _assign(table, key, value, where)
+        _apply(table, assignment, f"{what} {assignment[:60]}", _plain_value)
 
 
 def written(text: str, overrides: Sequence[str], meant: dict[str, Any], source: str, what: str = FLAG) -> str:
@@ -50,26 +41,11 @@ def written(text: str, overrides: Sequence[str], meant: dict[str, Any], source: 
     Args:
         meant: the tables that the result must have.
         what: what the values are called in messages.
-
-    Raises:
-        ConfigError: the text can't be written like that.
     """
-    import tomlkit  # 25 ms that only configs with something to replace pay for
-    from tomlkit.exceptions import TOMLKitError
-
     try:
         document = tomlkit.parse(text)
         for assignment in overrides:
-            key, value_text = _parts(assignment, what)
-            if not value_text:
-                _remove(document, key, what)
-                continue
-            try:
-                value: Any = tomlkit.parse(f"value = {value_text}\n").item("value")
-                value.trivia.comment = value.trivia.comment_ws = ""
-            except (ValueError, RecursionError):
-                value = tomlkit.string(value_text)
-            _assign(document, key, value, what)
+            _apply(document, assignment, what, _written_value)
         result = document.as_string()
         if parse_toml(result, source) == meant:
             return result
@@ -79,12 +55,32 @@ def written(text: str, overrides: Sequence[str], meant: dict[str, Any], source: 
     raise ConfigError(Problem(f"{what} {overrides[-1][:60]}", why), source)
 
 
+def _apply(table: dict[str, Any], assignment: str, where: str, read: Callable[[str], Any]) -> None:
+    key, value_text = _parts(assignment, where)
+    if not value_text:
+        _remove(table, key, where)
+        return
+    try:
+        value = read(value_text)
+    except (ValueError, RecursionError):
+        value = value_text
+    _assign(table, key, value, where)
+
+
+def _plain_value(text: str) -> Any:
+    return tomllib.loads(f"value = {text}", parse_float=decimal)["value"]
+
+
+def _written_value(text: str) -> Any:
+    value: Any = tomlkit.parse(f"value = {text}\n").item("value")
+    value.trivia.comment = value.trivia.comment_ws = ""
+    return value
+
+
 def assignments(text: str, keys: Sequence[str]) -> list[str]:
     """``KEY=VALUE`` texts, in the config's own digits, for those of the given keys (``table.key``) that it
     has.
     """
-    import tomlkit
-
     document = tomlkit.parse(text)
     found = []
     for key in keys:
@@ -107,11 +103,7 @@ _KEY_PART = re.compile(r"""\s*(?:"([^"\n]+)"|'([^'\n]+)'|([^\[\].\"']+))((?:\[\d
 
 
 def key_steps(key: str, where: str) -> list[str | int]:
-    """The parts of a dotted key and its indices, counted from 0; a part that contains dots is quoted.
-
-    Raises:
-        ConfigError: the text is no key.
-    """
+    """The parts of a dotted key and its indices, counted from 0; a part that contains dots is quoted."""
     steps: list[str | int] = []
     begin = 0
     while True:
@@ -146,11 +138,7 @@ def _remove(table: dict[str, Any], key: str, where: str) -> None:
 
 
 def _found(table: dict[str, Any], key: str, where: str, *, new: bool) -> tuple[Any, str | int]:
-    """The table or array that a key's last part is in, and that part.
-
-    Args:
-        new: whether tables that aren't there are made.
-    """
+    """The table or array that a key's last part is in, and that part."""
     steps = key_steps(key, where)
     target: Any = table
     for step, following in pairwise(steps):

@@ -146,9 +146,6 @@ def resolve_point_masses(
         host, coupling: the keys of ``[body]``.
         mass: mass of the rigid body, kg (mpf).
         free_flight: whether the rigid body has a position of its own.
-
-    Raises:
-        ConfigError: a contradiction or a value out of range.
     """
     if not tables:
         for key, given in (("host", host), ("coupling", coupling)):

@@ -8,6 +8,8 @@ from decimal import Decimal
 from fractions import Fraction
 from typing import Any
 
+import tomlkit
+
 from rigidsim.errors import ConfigError, Problem
 from rigidsim.scene.exact import fraction_of
 from rigidsim.scene.validation_messages import shown
@@ -26,12 +28,7 @@ def toml_text(tables: Mapping[str, Any]) -> str:
         tables: as in a TOML file. Floats, numpy's too, count as the shortest decimal that denotes them,
             which is how they print: ``0.1`` is one tenth. Decimals, fractions and mpmath's numbers count
             exactly. A value that is None counts as not given.
-
-    Raises:
-        ConfigError: something that a config can't hold.
     """
-    import tomlkit
-
     document = tomlkit.document()
     for key, value in tables.items():
         if value is not None:
@@ -45,9 +42,6 @@ def assignments_of(changes: Mapping[str, Any]) -> list[str]:
     Args:
         changes: dotted keys with optional [index] to values as in ``toml_text``; a dictionary as a value
             changes those keys in its table that it has. None removes a key.
-
-    Raises:
-        ConfigError: something that a config can't hold.
     """
     found = []
     for key, value in changes.items():
@@ -63,8 +57,6 @@ def assignments_of(changes: Mapping[str, Any]) -> list[str]:
 
 def _item(value: Any, where: str) -> Any:
     """A tomlkit item: tables and lists of tables as blocks, everything else on one line."""
-    import tomlkit
-
     if isinstance(value, Mapping):
         table = tomlkit.table()
         for key, inner in value.items():
@@ -86,7 +78,7 @@ def _inline(value: Any, where: str, depth: int = 0) -> str:
     if depth > _DEEPEST:
         raise ConfigError(Problem(where, "nested too deeply"))
     if isinstance(plain, str):
-        return _quoted(plain)
+        return tomlkit.string(plain).as_string()
     if isinstance(plain, bool):
         return "true" if plain else "false"
     if isinstance(plain, int):
@@ -94,7 +86,10 @@ def _inline(value: Any, where: str, depth: int = 0) -> str:
     if isinstance(plain, Decimal):
         return _number(plain, where)
     if isinstance(plain, Mapping):
-        inner = (f"{_quoted(_key(k))} = {_inline(v, f'{where}.{k}', depth + 1)}" for k, v in plain.items())
+        inner = (
+            f"{tomlkit.string(_key(k)).as_string()} = {_inline(v, f'{where}.{k}', depth + 1)}"
+            for k, v in plain.items()
+        )
         return "{" + ", ".join(inner) + "}"
     if isinstance(plain, list):
         entries = (_inline(entry, f"{where}[{n}]", depth + 1) for n, entry in enumerate(plain))
@@ -150,12 +145,6 @@ def _number(value: Decimal, where: str) -> str:
     return text if "." in text or "e" in text else f"{text}.0"
 
 
-def _quoted(text: str) -> str:
-    import tomlkit
-
-    return tomlkit.string(text).as_string()
-
-
 def _key(key: Any) -> str:
     if not isinstance(key, str) or not key:
         raise ConfigError(Problem("config", f'given the key {shown(key)}; a key is a text, such as "end"'))
@@ -163,9 +152,5 @@ def _key(key: Any) -> str:
 
 
 def inline_text(value: Any) -> str:
-    """A TOML value as written on one line.
-
-    Raises:
-        ConfigError: something that a config can't hold.
-    """
+    """A TOML value as written on one line."""
     return _inline(value, "value")

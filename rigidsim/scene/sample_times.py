@@ -87,11 +87,7 @@ class SampleTimes:
 
 
 def sample_times(table: Time, context: Any) -> tuple[Any, Any, SampleTimes]:
-    """Start and end of the motion (s, mpf) and the sample times from a config's ``[time]``.
-
-    Raises:
-        ConfigError: a contradiction or a value out of range.
-    """
+    """Start and end of the motion (s, mpf) and the sample times from a config's ``[time]``."""
     ways = [key for key in ("samples", "every", "times") if getattr(table, key) is not None]
     if len(ways) > 1:
         less = either(f"--set time.{ways[0]}= removes it", "Experiment.replace removes keys, too")

@@ -13,6 +13,7 @@ from rigidsim.scene.bodies.body import RigidBody, build_body, inverse_inertia
 from rigidsim.scene.config import Experiment
 from rigidsim.scene.epochs import Epoch
 from rigidsim.scene.events import Event, resolve_events
+from rigidsim.scene.expressions.tree import Expression
 from rigidsim.scene.frame import Figure, figure_of, reference_normal
 from rigidsim.scene.point_masses import PointMasses, resolve_point_masses
 from rigidsim.scene.registry import LOAD_KINDS, SceneLoad, Surroundings
@@ -81,6 +82,12 @@ class Scene:
         if all(x == 0 for x in self.body.center_of_mass) or all(g == 0 for g in self.gravity):
             return None
         return [self.body.mass * x for x in self.body.center_of_mass]
+
+    def formulas(self) -> list[tuple[str, Expression]]:
+        """Expressions of loads and events, with their places in the config."""
+        found = [formula for load in self.loads for formula in load.formulas()]
+        events = enumerate(self.events, start=1)
+        return found + [(f"[[events]] number {n} expression", event.expression) for n, event in events]
 
 
 def build_scene(experiment: Experiment, context: Any = None) -> Scene:

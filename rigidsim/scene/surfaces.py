@@ -6,7 +6,7 @@ Surfaces are the same whatever the formulation and the precision; arguments in a
 from __future__ import annotations
 
 import random
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -22,6 +22,7 @@ from rigidsim.scene.expressions.tree import (
     Operation,
     evaluate,
     names_used,
+    nodes,
 )
 from rigidsim.scene.initial_values import start_values
 from rigidsim.scene.scene import Scene
@@ -65,10 +66,10 @@ class Surfaces:
 
 def surfaces_of(scene: Scene) -> Surfaces:
     """Find the surfaces in the loads and events of a scene."""
-    expressions = list(_expressions(scene))
+    expressions = scene.formulas()
     arguments: dict[Node, Surface] = {}
     for where, expression in expressions:
-        for node in _nodes(expression):
+        for node in nodes(expression):
             if isinstance(node, Operation) and node.operator == "sign":
                 argument = Expression(expression.text, node.operands[0])
                 if names_used(argument):
@@ -147,22 +148,6 @@ def changes(
     return False
 
 
-def _expressions(scene: Scene) -> Iterator[tuple[str, Expression]]:
-    for load in scene.loads:
-        yield from load.formulas()
-    for number, event in enumerate(scene.events):
-        yield f"[[events]] number {number + 1} expression", event.expression
-
-
-def _nodes(expression: Expression) -> Iterator[Node]:
-    waiting = [expression.root]
-    while waiting:
-        node = waiting.pop()
-        yield node
-        if isinstance(node, Operation):
-            waiting += node.operands
-
-
 def _kinds(
     arguments: Mapping[Node, Surface], states: Sequence[Mapping[str, Any]], context: Any
 ) -> dict[Node, tuple[int, int]]:
@@ -193,7 +178,7 @@ def _kinds(
 
 def _size(expression: Expression) -> int:
     """Number of nodes: what is within an argument has fewer."""
-    return sum(1 for _ in _nodes(expression))
+    return sum(1 for _ in nodes(expression))
 
 
 def _value(expression: Expression, state: Mapping[str, Any], context: Any) -> Any | None:

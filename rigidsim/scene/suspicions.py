@@ -10,7 +10,7 @@ from pydantic import BaseModel
 from rigidsim.errors import Problem
 from rigidsim.scene.events import Event
 from rigidsim.scene.exact import ExactNumber
-from rigidsim.scene.expressions.tree import Constant, Expression, Name, Node, Operation, fold
+from rigidsim.scene.expressions.tree import Constant, Expression, Name, Operation, operations
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.schema import Config
 from rigidsim.scene.units import time_unit
@@ -54,13 +54,8 @@ def suspicious_angles(config: Config) -> list[Problem]:
 
 def suspicious_expressions(scene: Scene) -> list[Problem]:
     """Sines, cosines and tangents of whole numbers beyond a full turn: of degrees?"""
-    formulas = [formula for load in scene.loads for formula in load.formulas()]
-    formulas += [
-        (f"[[events]] number {number} expression", event.expression)
-        for number, event in enumerate(scene.events, start=1)
-    ]
     found = []
-    for where, expression in formulas:
+    for where, expression in scene.formulas():
         for name, value in _constant_arguments(expression):
             number, degrees = f"{float(value):.6g}", f"{math.degrees(float(value)):.6g}"
             found.append(
@@ -76,17 +71,14 @@ def suspicious_expressions(scene: Scene) -> list[Problem]:
 def _constant_arguments(expression: Expression) -> list[tuple[str, ExactNumber]]:
     """Trigonometric functions of whole numbers of radians beyond a full turn, as written."""
     found = []
-
-    def look(node: Node, _: list[None]) -> None:
-        if isinstance(node, Operation) and node.operator in ("sin", "cos", "tan"):
+    for node in reversed([*operations(expression)]):  # in the order of the text
+        if node.operator in ("sin", "cos", "tan"):
             (argument,) = node.operands
             value = argument.value if isinstance(argument, Constant) else None
             whole = value is not None and not value.pi_power and value.rational.denominator == 1
             literal = expression.text[slice(*argument.span)].lstrip("+- ").replace(".", "").isdigit()
             if value is not None and whole and literal and abs(value.rational) > _TURN:
                 found.append((node.operator, value))
-
-    fold(expression, look)
     return found
 
 

@@ -30,11 +30,7 @@ def decimal(text: str) -> Decimal:
 
 
 def parse_toml(text: str, source: str) -> dict[str, Any]:
-    """The tables of a TOML text, decimals kept as written.
-
-    Raises:
-        ConfigError: not TOML; the message has the line and column.
-    """
+    """The tables of a TOML text, decimals kept as written."""
     deep = DEEP_KEY.search(text)
     if deep is not None:
         line = text.count("\n", 0, deep.start()) + 1

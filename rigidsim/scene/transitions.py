@@ -14,7 +14,7 @@ worked out from such a time, gives another impulse than the one that was written
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from fractions import Fraction
 from typing import Any
 
@@ -30,6 +30,7 @@ from rigidsim.scene.expressions.tree import (
     fold,
     names_used,
     operation,
+    operations,
 )
 from rigidsim.scene.scene import Scene
 
@@ -47,16 +48,6 @@ _BOUNDED: Mapping[str, float] = {
     "atan": 2, "asin": 2, "acos": 4, "atan2": 4,
     "qw": 1, "qx": 1, "qy": 1, "qz": 1, "phi": 4, "theta": 4, "psi": 4,
 }  # fmt: skip
-
-
-def operations(expression: Expression) -> Iterator[Operation]:
-    """Every operation, outer ones before inner ones."""
-    waiting = [expression.root]
-    while waiting:
-        node = waiting.pop()
-        if isinstance(node, Operation):
-            waiting += node.operands
-            yield node
 
 
 def narrow_parts(expression: Expression) -> list[Expression]:
@@ -185,13 +176,10 @@ def acts_at_moments_alone(scene: Scene) -> bool:
 
 def _of_switches(expression: Expression, context: Any) -> list[LineInTime]:
     """Lines in the arguments of signs, which don't pass through zero at t = 0."""
-    found, waiting = [], [expression.root]
-    while waiting:
-        node = waiting.pop()
-        if isinstance(node, Operation):
-            waiting += node.operands
-            if node.operator == "sign":
-                found += lines_in(Expression(expression.text, node.operands[0]), context)
+    found = []
+    for node in operations(expression):
+        if node.operator == "sign":
+            found += lines_in(Expression(expression.text, node.operands[0]), context)
     return [line for line in found if line.offset != 0]
 
 

@@ -79,11 +79,15 @@ class UnitError(ValueError):
     """Raised if a unit is unknown, malformed, or of another dimension than the key requires."""
 
 
+def _pint() -> Any:
+    import pint  # takes longer to load than a tiny run; only configs that write units pay for it
+
+    return pint
+
+
 @lru_cache(maxsize=1)
 def _registry() -> Any:
-    import pint  # only configs that write units pay for it
-
-    registry: Any = pint.UnitRegistry(None, non_int_type=Fraction)
+    registry: Any = _pint().UnitRegistry(None, non_int_type=Fraction)
     registry.load_definitions(_DEFINITIONS)
     return registry
 
@@ -91,8 +95,6 @@ def _registry() -> Any:
 @lru_cache(maxsize=512)
 def _to_si(text: str) -> tuple[Fraction, int, dict[str, Fraction]]:
     """Factor, power of pi and dimensions of a unit."""
-    import pint
-
     exponents = [int(digits) for digits in re.findall(r"\d+", text)]
     before = [text[: number.start()].rstrip(" (+-") for number in _NUMBER.finditer(text)]
     factors = any(not start.endswith(("^", "**")) for start in before)  # a unit has numbers only as exponents
@@ -104,8 +106,9 @@ def _to_si(text: str) -> tuple[Fraction, int, dict[str, Fraction]]:
         if any(abs(power) > _LARGEST_EXPONENT for power in unit._units.values()):  # such as m^1e9
             raise UnitError(f"{shown(text)} is not a unit")
         quantity = _registry().Quantity(Fraction(1), unit).to_root_units()
-    except pint.UndefinedUnitError as error:
-        near = nearest(str(error.args[0]).lower(), _names())
+    except _pint().UndefinedUnitError as error:
+        names = [n for parts in _units() for n in parts if re.fullmatch(r"[A-Za-z_]{2,}", n)]
+        near = nearest(str(error.args[0]).lower(), names)
         raise UnitError(f'unknown unit "{error.args[0]}"{near}; {known_units()}') from None
     except Exception:  # pint and its tokenizer raise many kinds on malformed text
         raise UnitError(f"{shown(text)} is not a unit") from None
@@ -168,20 +171,15 @@ def unit_text(dimension: Powers) -> str:
     return f"{over or '1'}/{under if ' ' not in under else f'({under})'}"
 
 
-def _names() -> list[str]:
-    """All names of units, long and short."""
-    found = [part.strip() for line in _DEFINITIONS for part in line.split("=")]
-    return [name for name in found if re.fullmatch(r"[A-Za-z_]{2,}", name) and name != "pi"]
+def _units() -> list[list[str]]:
+    """Names of each unit, and its definition in the second place; without prefixes and pi."""
+    lines = [[part.strip() for part in line.split("=")] for line in _DEFINITIONS]
+    return [parts for parts in lines if not parts[0].endswith("-") and parts[0] != "pi"]
 
 
 def known_units() -> str:
     """A line that lists the units, for error messages."""
-    names = []
-    for line in _DEFINITIONS:
-        names_of_unit = [part.strip() for part in line.split("=")]
-        if names_of_unit[0].endswith("-") or names_of_unit[0] == "pi":
-            continue
-        names.append(names_of_unit[2] if len(names_of_unit) > 2 else names_of_unit[0])
+    names = [parts[2] if len(parts) > 2 else parts[0] for parts in _units()]
     return "known units: " + " ".join(names) + ", with SI prefixes, * / ^"
 
 

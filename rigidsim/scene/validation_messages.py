@@ -31,6 +31,20 @@ _MEANT = {
     "float": "single", "float32": "single", "float64": "double", "quad": "quadruple",
 }  # fmt: skip
 """Common names of things that have another name here."""
+_WORDS = {
+    "too_short": "given an empty array; at least one entry is needed",
+    "kind_of_value": "given {given}; {msg}",
+    "list_type": "given {given}; an array is allowed",
+    "model_type": "given {given}; a table is allowed",
+    "model_attributes_type": "given {given}; a table is allowed",
+    "int_type": "given {given}; a whole number, without point or exponent, is allowed",
+    "int_from_float": "given {given}; a whole number, without point or exponent, is allowed",
+    "string_type": "given {given}; a string is allowed",
+    "bool_type": "given {given}; true or false is allowed",
+    "greater_than_equal": "given {given}; at least {ge} is allowed",
+    "less_than_equal": "given {given}; at most {le:g} is allowed",
+}
+"""Kinds of errors of pydantic, in the words of ``Problem``."""
 _MOST_PROBLEMS = 200  # worth telling; a file of a million wrong keys has said enough by then
 _LONGEST_NAME = 60
 LONGEST_INTEGER = 10_000  # bits; Python refuses to write out integers not much longer
@@ -93,14 +107,6 @@ def _key(key: str) -> str:
     return key if plain else shown(key)
 
 
-def _value_at(table: Any, path: tuple[str, ...]) -> Any:
-    for key in path:
-        if not isinstance(table, Mapping) or key not in table:
-            return None
-        table = table[key]
-    return table
-
-
 def _model_at(
     model: type[BaseModel], location: tuple[str | int, ...], alternatives: Collection[str]
 ) -> type[BaseModel] | None:
@@ -147,23 +153,8 @@ def _what(table: type[BaseModel] | None, error: Mapping[str, Any]) -> str:
         names = [part.strip() for part in allowed.split(",")]
         near = nearest(given if isinstance(given, str) else shown(given), names)
         return f"given {shown(given)}{near}; allowed: {', '.join(names)}"
-    if kind == "too_short":
-        return "given an empty array; at least one entry is needed"
-    if kind == "kind_of_value":
-        return f"given {shown(given)}; {error['msg']}"
-    if kind in ("list_type", "model_type", "model_attributes_type"):
-        wanted = "an array" if kind == "list_type" else "a table"
-        return f"given {shown(given)}; {wanted} is allowed"
-    if kind in ("int_type", "int_from_float"):
-        return f"given {shown(given)}; a whole number, without point or exponent, is allowed"
-    if kind == "string_type":
-        return f"given {shown(given)}; a string is allowed"
-    if kind == "bool_type":
-        return f"given {shown(given)}; true or false is allowed"
-    if kind == "greater_than_equal":
-        return f"given {shown(given)}; at least {context['ge']} is allowed"
-    if kind == "less_than_equal":
-        return f"given {shown(given)}; at most {context['le']:g} is allowed"
+    if kind in _WORDS:
+        return _WORDS[kind].format(given=shown(given), msg=error["msg"], **context)
     return str(error["msg"])
 
 
@@ -193,7 +184,7 @@ def config_error(
         given = item["input"]
         if item["type"].startswith("union_tag"):  # a table told apart by its kind: the key at fault is kind
             location = (*location, "kind")
-            given = _value_at(given, ("kind",))
+            given = given.get("kind") if isinstance(given, Mapping) else None
         where = key_path(location)
         table = _model_at(model, tuple(item["loc"]), alternatives)
         problem = Problem(where, _what(table, {**item, "loc": location, "input": given}))

@@ -67,10 +67,6 @@ def build_body(table: body_table.Body, context: Any, sequence: str = "zxz") -> R
 
     Args:
         sequence: sequence of Euler angles for parts that name none.
-
-    Raises:
-        ConfigError: not exactly one source of inertia, a dimension missing or foreign, a tensor that no
-            body has (asymmetric, negative, against the triangle inequality), a contradiction.
     """
     given = [name for name in SOURCES if getattr(table, name) is not None]
     if len(given) != 1:

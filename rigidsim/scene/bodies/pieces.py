@@ -34,9 +34,6 @@ def pieces_of(table: body_table.Body, source: str, context: Any, sequence: str) 
     Args:
         source: which of the three is given.
         sequence: sequence of Euler angles for parts that name none.
-
-    Raises:
-        ConfigError: a mass or dimension is missing, foreign or not positive; a part is given two attitudes.
     """
     if source == "shape":
         return [_solid(table, table.mass, [context.zero] * 3, None, "", context)]
@@ -165,11 +162,7 @@ def drawn(solid: str, dimensions: dict[str, Any], position: Vector) -> dict[str,
 
 
 def positive(number: ExactNumber | None, key: str, what: str, context: Any) -> Any:
-    """A mass or length of the config as mpf.
-
-    Raises:
-        ConfigError: the number is missing, zero or negative.
-    """
+    """A mass or length of the config as mpf."""
     if number is None:
         raise refusal(key, f"missing; this body needs a {what}, a positive number")
     if number.sign <= 0:

@@ -92,59 +92,32 @@ class Shape:
     at_most: tuple[str, str] | None = None
 
 
-def _cuboid(_: Any, d: Dimensions) -> Vector:
-    a, b, c = (x**2 / 12 for x in d["size"])
+def _boxed(d: Dimensions, key: str, part: int) -> Vector:
+    a, b, c = (x**2 / part for x in d[key])
     return [b + c, a + c, a + b]
 
 
-def _plate(_: Any, d: Dimensions) -> Vector:
+def _plate(d: Dimensions) -> Vector:
     a, b = (x**2 / 12 for x in d["size"])
     return [b, a, a + b]
 
 
-def _ellipsoid(_: Any, d: Dimensions) -> Vector:
-    a, b, c = (x**2 / 5 for x in d["semi_axes"])
-    return [b + c, a + c, a + b]
+def _round(square: Any, height: Any) -> Vector:
+    """A cylinder or tube, from the square of its radius or the sum of two."""
+    return [(3 * square + height**2) / 12] * 2 + [square / 2]
 
 
-def _sphere(_: Any, d: Dimensions) -> Vector:
-    return [2 * d["radius"][0] ** 2 / 5] * 3
-
-
-def _spherical_shell(_: Any, d: Dimensions) -> Vector:
-    return [2 * d["radius"][0] ** 2 / 3] * 3
-
-
-def _cylinder(_: Any, d: Dimensions) -> Vector:
-    r2, h2 = d["radius"][0] ** 2, d["height"][0] ** 2
-    return [(3 * r2 + h2) / 12] * 2 + [r2 / 2]
-
-
-def _tube(_: Any, d: Dimensions) -> Vector:
-    r2, h2 = d["inner_radius"][0] ** 2 + d["outer_radius"][0] ** 2, d["height"][0] ** 2
-    return [(3 * r2 + h2) / 12] * 2 + [r2 / 2]
-
-
-def _cone(_: Any, d: Dimensions) -> Vector:
+def _cone(d: Dimensions) -> Vector:
     r2, h2 = d["radius"][0] ** 2, d["height"][0] ** 2
     return [3 * (4 * r2 + h2) / 80] * 2 + [3 * r2 / 10]
 
 
-def _rod(context: Any, d: Dimensions) -> Vector:
-    return [d["length"][0] ** 2 / 12] * 2 + [context.zero]
+def _flat(square: Any, part: int) -> Vector:
+    """A disk (part 2) or a ring (part 1), from the square of its radius."""
+    return [square / (2 * part)] * 2 + [square / part]
 
 
-def _disk(_: Any, d: Dimensions) -> Vector:
-    r2 = d["radius"][0] ** 2
-    return [r2 / 4, r2 / 4, r2 / 2]
-
-
-def _ring(_: Any, d: Dimensions) -> Vector:
-    r2 = d["radius"][0] ** 2
-    return [r2 / 2, r2 / 2, r2]
-
-
-def _torus(_: Any, d: Dimensions) -> Vector:
+def _torus(d: Dimensions) -> Vector:
     major, minor = d["major_radius"][0] ** 2, d["minor_radius"][0] ** 2
     return [(4 * major + 5 * minor) / 8] * 2 + [major + 3 * minor / 4]
 
@@ -152,15 +125,6 @@ def _torus(_: Any, d: Dimensions) -> Vector:
 def _upright(radius: float, height: float) -> Revolved:
     h = height / 2
     return polygon((0, -h), (radius, -h), (radius, h), (0, h))
-
-
-def _drawn_plate(d: Dimensions) -> Box:
-    a, b = d["size"]
-    return Box(a, b, THINNESS * max(a, b))
-
-
-def _drawn_ball(d: Dimensions) -> Ellipsoid:
-    return Ellipsoid(*d["radius"] * 3)
 
 
 def _drawn_tube(d: Dimensions) -> Revolved:
@@ -182,65 +146,78 @@ SHAPES: dict[str, Shape] = {
     "cuboid": Shape(
         {"size": 3},
         "edges along x, y, z",
-        _cuboid,
+        lambda _, d: _boxed(d, "size", 12),
         lambda d: Box(*d["size"]),
         {"corner": lambda _, d: [-x / 2 for x in d["size"]]},
     ),
     "plate": Shape(
         {"size": 2},
         "thin rectangle with edges along x and y",
-        _plate,
-        _drawn_plate,
+        lambda _, d: _plate(d),
+        lambda d: Box(d["size"][0], d["size"][1], THINNESS * max(d["size"])),
         {"corner": lambda c, d: [-x / 2 for x in d["size"]] + [c.zero]},
     ),
     "ellipsoid": Shape(
-        {"semi_axes": 3}, "semi-axes along x, y, z", _ellipsoid, lambda d: Ellipsoid(*d["semi_axes"])
+        {"semi_axes": 3},
+        "semi-axes along x, y, z",
+        lambda _, d: _boxed(d, "semi_axes", 5),
+        lambda d: Ellipsoid(*d["semi_axes"]),
     ),
-    "sphere": Shape({"radius": 1}, "solid ball", _sphere, _drawn_ball),
-    "spherical_shell": Shape({"radius": 1}, "thin hollow ball", _spherical_shell, _drawn_ball),
+    "sphere": Shape(
+        {"radius": 1},
+        "solid ball",
+        lambda _, d: [2 * d["radius"][0] ** 2 / 5] * 3,
+        lambda d: Ellipsoid(*d["radius"] * 3),
+    ),
+    "spherical_shell": Shape(
+        {"radius": 1},
+        "thin hollow ball",
+        lambda _, d: [2 * d["radius"][0] ** 2 / 3] * 3,
+        lambda d: Ellipsoid(*d["radius"] * 3),
+    ),
     "cylinder": Shape(
         {"radius": 1, "height": 1},
         "axis along z",
-        _cylinder,
+        lambda _, d: _round(d["radius"][0] ** 2, d["height"][0]),
         lambda d: _upright(*d["radius"], *d["height"]),
     ),
     "tube": Shape(
         {"inner_radius": 1, "outer_radius": 1, "height": 1},
         "hollow cylinder, axis along z",
-        _tube,
+        lambda _, d: _round(d["inner_radius"][0] ** 2 + d["outer_radius"][0] ** 2, d["height"][0]),
         _drawn_tube,
         at_most=("inner_radius", "outer_radius"),
     ),
     "cone": Shape(
         {"radius": 1, "height": 1},
         "axis along z, apex towards -z",
-        _cone,
+        lambda _, d: _cone(d),
         _drawn_cone,
         {"apex": lambda c, d: [c.zero, c.zero, -3 * d["height"][0] / 4]},
     ),
     "rod": Shape(
         {"length": 1},
         "thin, along z",
-        _rod,
+        lambda c, d: [d["length"][0] ** 2 / 12] * 2 + [c.zero],
         lambda d: _upright(THINNESS * d["length"][0], d["length"][0]),
         {"end": lambda c, d: [c.zero, c.zero, -d["length"][0] / 2]},
     ),
     "disk": Shape(
         {"radius": 1},
         "thin, normal along z",
-        _disk,
+        lambda _, d: _flat(d["radius"][0] ** 2, 2),
         lambda d: _upright(d["radius"][0], 2 * THINNESS * d["radius"][0]),
     ),
     "ring": Shape(
         {"radius": 1},
         "thin hoop, normal along z",
-        _ring,
+        lambda _, d: _flat(d["radius"][0] ** 2, 1),
         lambda d: _drawn_torus(d["radius"][0], 2 * THINNESS * d["radius"][0]),
     ),
     "torus": Shape(
         {"major_radius": 1, "minor_radius": 1},
         "axis along z",
-        _torus,
+        lambda _, d: _torus(d),
         lambda d: _drawn_torus(*d["major_radius"], *d["minor_radius"]),
         at_most=("minor_radius", "major_radius"),
     ),

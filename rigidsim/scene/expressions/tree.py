@@ -6,7 +6,7 @@ Numbers and parameters stay exact in sums, products, quotients and whole powers.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Any
@@ -164,11 +164,23 @@ def fold(expression: Expression, combine: Callable[[Node, list[Any]], Any]) -> A
     return results[0]
 
 
+def nodes(expression: Expression) -> Iterator[Node]:
+    """Every node, outer ones before inner ones."""
+    waiting = [expression.root]
+    while waiting:
+        node = waiting.pop()
+        waiting += node.operands if isinstance(node, Operation) else ()
+        yield node
+
+
+def operations(expression: Expression) -> Iterator[Operation]:
+    """Every operation, outer ones before inner ones."""
+    return (node for node in nodes(expression) if isinstance(node, Operation))
+
+
 def names_used(expression: Expression) -> frozenset[str]:
     """Names of time and the state that the expression reads; parameters are already numbers."""
-    found: set[str] = set()
-    fold(expression, lambda node, _: found.add(node.name) if isinstance(node, Name) else None)
-    return frozenset(found)
+    return frozenset(node.name for node in nodes(expression) if isinstance(node, Name))
 
 
 def constant_value(expression: Expression, context: Any) -> Any:

@@ -71,9 +71,6 @@ def resolve_tabulated_orbit(fields: Orbit, strength: Any | None, around: Surroun
 
     Args:
         strength: gravitational parameter (mpf, m^3/s^2) of Kepler's third law; None if unknown.
-
-    Raises:
-        ConfigError: no such table, a bad one, or one that doesn't cover the run.
     """
     name = fields.table
     assert name is not None
