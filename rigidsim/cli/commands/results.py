@@ -15,8 +15,8 @@ from rigidsim.errors import RigidsimError
 from rigidsim.formats.naming import Naming
 from rigidsim.look.figure_names import OVERVIEW, SPECTRUM
 from rigidsim.look.figures import available, check_name, figure_format, save_figure
-from rigidsim.look.figures.sweep_maps import drawable, save_sweep_figure
 from rigidsim.look.figures.spectrum import save_spectrum
+from rigidsim.look.figures.sweep_maps import drawable, save_sweep_figure
 from rigidsim.store import atomic
 from rigidsim.store.run import open_run
 from rigidsim.store.sweeps.folder import is_sweep
