@@ -31,7 +31,7 @@ from rigidsim.model.observables.observable import (
 )
 from rigidsim.model.observables.vectors import along, in_body
 from rigidsim.model.rotations import Symbolic
-from rigidsim.scene.frame import smallest_axis
+from rigidsim.scene.frame import unique_axis
 
 ROLL_PITCH_YAW = ("roll_pitch_yaw_component",)
 LIBRATION = ("libration_angle",)
