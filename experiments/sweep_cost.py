@@ -90,7 +90,7 @@ def side_by_side(count: int) -> list[Check]:
     ratios, width = [], 0
     for _ in range(ROUNDS):
         begin = time.process_time()
-        groups = Families(Members.of(sweep)).sort().groups
+        groups = Families(Members(sweep)).sort().groups
         before = time.process_time() - begin
         runs = [BatchRun(family) for family, _ in groups]
         blocks = [list(run.blocks(numbers)) for run, (_, numbers) in zip(runs, groups, strict=True)]

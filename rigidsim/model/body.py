@@ -10,7 +10,6 @@ import heyoka as hy
 from rigidsim.model.numbers import Rounder
 from rigidsim.model.rotations import Symbolic
 from rigidsim.scene.arithmetic import Matrix, negligible
-from rigidsim.scene.tracing.numbers import largest_of
 
 
 @dataclass(frozen=True)
@@ -55,7 +54,7 @@ class RotatingBody:
         self, inertia: Matrix, rates: list[Symbolic], number: Rounder, context: Any
     ) -> list[Symbolic]:
         """Angular momentum I w, body axes, internal units; moments that are only rounding are left out."""
-        least = largest_of([abs(x) for row in inertia for x in row]) * negligible(context)
+        least = context.maximum([abs(x) for row in inertia for x in row]) * negligible(context)
         rows = []
         for row in inertia:
             terms = [number(x) * w for x, w in zip(row, rates, strict=True) if abs(x) > least]

@@ -9,7 +9,6 @@ from rigidsim.model.loads.central_gravity import CentralGravity
 from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.scaling import loads_amplitude, potential_amplitude, source_rate
 from rigidsim.scene.arithmetic import Vector, apply, cross, dot, norm
-from rigidsim.scene.tracing.numbers import largest_of
 
 
 def _driven(m: Mechanics) -> Any:
@@ -24,8 +23,9 @@ def momentum_scale(m: Mechanics) -> tuple[Any, str]:
     for carrier in m.carriers:
         initial += norm(context, carrier.carried_at_start(scene)[0])
     fed = potential_amplitude(scene) + loads_amplitude(scene) + _driven(m)
-    swing = context.sqrt(2 * largest_of(scene.body.principal_moments) * fed)
-    swing = largest_of([swing, largest_of(scene.body.principal_moments) * source_rate(scene)])
+    largest = context.maximum(scene.body.principal_moments)
+    swing = context.sqrt(2 * largest * fed)
+    swing = context.maximum([swing, largest * source_rate(scene)])
     if initial == 0 and swing == 0:
         return context.one, "1 kg m^2/s (the body is at rest)"
     if initial >= swing:
@@ -40,7 +40,7 @@ def rotational_scale(m: Mechanics) -> tuple[Any, str]:
     kinetic = dot(scene.angular_velocity, momentum) / 2
     for carrier in m.carriers:
         kinetic += carrier.carried_at_start(scene)[1]
-    carried = largest_of(scene.body.principal_moments) * source_rate(scene) ** 2 / 2
+    carried = context.maximum(scene.body.principal_moments) * source_rate(scene) ** 2 / 2
     amplitude = potential_amplitude(scene) + loads_amplitude(scene) + carried + _driven(m)
     if kinetic + amplitude == 0:
         return context.one, "1 J (the body is at rest)"

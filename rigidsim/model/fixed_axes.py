@@ -38,7 +38,6 @@ from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.rotations import Symbolic, apply, transpose
 from rigidsim.model.two_part import as_factor
 from rigidsim.scene.arithmetic import Matrix, Vector, cross, dot, eigen, negligible, norm, parallel
-from rigidsim.scene.tracing.numbers import largest_of
 
 
 def _outer(a: Vector, b: Vector) -> Matrix:
@@ -51,8 +50,8 @@ def _added(matrices: list[Matrix]) -> Matrix:
     )
 
 
-def _size(matrix: Matrix) -> Any:
-    return largest_of([abs(x) for row in matrix for x in row])
+def _size(context: Any, matrix: Matrix) -> Any:
+    return context.maximum(abs(x) for row in matrix for x in row)
 
 
 def _linear(m: Mechanics, loads: Sequence[Load]) -> list[tuple[Vector, Vector]]:
@@ -76,17 +75,19 @@ def keeps(m: Mechanics, axis: Vector, loads: Sequence[Load] | None = None) -> bo
     Args:
         loads: the loads to look at; all of them by default.
     """
-    tiny = negligible(m.scene.context)
+    context = m.scene.context
+    tiny = negligible(context)
     turning = [load for load in m.turning if loads is None or load in loads]
     linear, sources = _linear(m, turning), _sources(m, turning)
     if linear:
         along = _added([_outer(a, cross(f, axis)) for a, f in linear])
-        if _size(along) > tiny * sum(_size(_outer(a, f)) for a, f in linear):
+        if _size(context, along) > tiny * sum(_size(context, _outer(a, f)) for a, f in linear):
             return False
     if sources:
         s = _source_matrix(sources)
         turned = transpose([cross(axis, column) for column in transpose(s)])  # n x S
-        if max(abs(turned[i][j] + turned[j][i]) for i in range(3) for j in range(i + 1)) > tiny * _size(s):
+        twisted = max(abs(turned[i][j] + turned[j][i]) for i in range(3) for j in range(i + 1))
+        if twisted > tiny * _size(context, s):
             return False
     return not any(
         _turns_about(m, load, axis)
@@ -112,7 +113,7 @@ def field_axis(m: Mechanics) -> Vector | None:
         return None
     context = m.scene.context
     total = _added([_outer(a, f) for a, f in linear])
-    tiny = negligible(context) * sum(_size(_outer(a, f)) for a, f in linear)
+    tiny = negligible(context) * sum(_size(context, _outer(a, f)) for a, f in linear)
     row = max(total, key=lambda row: norm(context, row))
     size = norm(context, row)
     if size <= tiny:
@@ -130,7 +131,7 @@ def source_axis(m: Mechanics) -> Vector | None:
         return None
     s = _source_matrix(sources)
     values, axes = eigen(m.scene.context, s)
-    tiny = negligible(m.scene.context) * _size(s)
+    tiny = negligible(m.scene.context) * _size(m.scene.context, s)
     for i in range(3):
         j, k = (i + 1) % 3, (i + 2) % 3
         if abs(values[j] - values[k]) <= tiny < abs(values[i] - values[j]):

@@ -19,13 +19,13 @@ from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.orbit_tables.pieces import TabulatedOrbit
 from rigidsim.scene.orbits import KeplerOrbit
 from rigidsim.scene.scene import Scene
-from rigidsim.scene.tracing.numbers import largest_of, smallest_of
 
 
 def tidal_range(scene: Scene, strength: Any, distance: Any) -> Any:
     """(3/2) (G M / R^3) (I_max - I_min): range of the gradient's potential energy at a distance, J."""
     moments = scene.body.principal_moments
-    return 3 * strength / distance**3 * (largest_of(moments) - smallest_of(moments)) / 2
+    difference = scene.context.maximum(moments) - scene.context.minimum(moments)
+    return 3 * strength / distance**3 * difference / 2
 
 
 def gradient_terms(

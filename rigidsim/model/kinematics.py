@@ -26,7 +26,6 @@ from rigidsim.scene.orbit_tables.pieces import TabulatedOrbit
 from rigidsim.scene.orbits import KeplerOrbit
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.surfaces import Surfaces
-from rigidsim.scene.tracing.numbers import largest_of
 
 T = TypeVar("T")
 
@@ -135,7 +134,7 @@ class Kinematics:
         """
         context, body = self.scene.context, self.scene.body
         moments, axes = body.principal_moments, body.principal_axes
-        tiny = largest_of(moments) * negligible(context)
+        tiny = context.maximum(moments) * negligible(context)
         if all(abs(moments[i] - moments[0]) <= tiny for i in (1, 2)):  # a sphere
             if self.marked is None:
                 return None

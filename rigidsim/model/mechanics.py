@@ -17,7 +17,6 @@ from rigidsim.model.scaling import exponent
 from rigidsim.model.two_part import as_factor
 from rigidsim.scene.arithmetic import Vector, dot, negligible, norm
 from rigidsim.scene.arithmetic import apply as multiply
-from rigidsim.scene.tracing.numbers import largest_of
 
 
 @dataclass(frozen=True)
@@ -156,7 +155,7 @@ class Mechanics(Kinematics):
         if self.velocity is None or not any(load.force(self) for load in working):
             return scaling.energy
         flight = context.ldexp(self.scene.body.mass, 2 * scaling.speed)
-        return exponent(context, largest_of([flight, context.ldexp(context.one, scaling.energy)]))
+        return exponent(context, context.maximum([flight, context.ldexp(context.one, scaling.energy)]))
 
     @cached_property
     def power(self) -> Symbolic | None:

@@ -12,8 +12,6 @@ from typing import Any, Protocol, runtime_checkable
 
 from rigidsim.scene.arithmetic import dot, norm
 from rigidsim.scene.scene import Scene
-from rigidsim.scene.tracing.numbers import Traced, largest_of, smallest_of
-from rigidsim.scene.tracing.whole import binary_exponent
 
 
 @dataclass(frozen=True)
@@ -66,10 +64,7 @@ def exponent(context: Any, value: Any) -> int:
     """The smallest e with abs(value) <= 2**e; zero for zero."""
     if value == 0:
         return 0
-    if isinstance(value, Traced):
-        return binary_exponent(value)  # type: ignore[return-value]
-    mantissa, power = context.frexp(abs(value))
-    return int(power) - 1 if mantissa == 0.5 else int(power)
+    return 1 - context.frexp(1 / value)[1]
 
 
 def largest_rates(scene: Scene, drive: Drive | None = None) -> list[Any]:
@@ -90,7 +85,7 @@ def largest_rates(scene: Scene, drive: Drive | None = None) -> list[Any]:
     swing = 4 * potential_amplitude(scene)
     if scene.loads or drive is not None:  # an orbit feeds energy in: bound carried along with it
         carried = source_rate(scene)
-        fed = context.sqrt(largest_of([twice_energy, zero]) + swing + 4 * loads_amplitude(scene))
+        fed = context.sqrt(context.maximum([twice_energy, zero]) + swing + 4 * loads_amplitude(scene))
         if drive is not None:
             fed += context.sqrt(2 * drive.energy)
         return [fed * context.sqrt(inverse[i][i]) + carried for i in range(3)]
@@ -109,7 +104,7 @@ def largest_rates(scene: Scene, drive: Drive | None = None) -> list[Any]:
         for i, moment in enumerate(moments):
             if moment != extreme and moment != 0:
                 bound = context.sqrt(invariant / (moment * abs(extreme - moment)))
-                bounds[i] = smallest_of([bounds[i], bound])
+                bounds[i] = context.minimum([bounds[i], bound])
     return bounds
 
 
@@ -177,7 +172,7 @@ def loads_amplitude(scene: Scene) -> Any:
 def source_rate(scene: Scene) -> Any:
     """Fastest angular rate of any source seen from the body, rad/s; zero without one."""
     rates = [load.fastest_rate(scene) for load in scene.loads if isinstance(load, Swift)]
-    return largest_of(rates or [scene.context.zero])
+    return scene.context.maximum(rates or [scene.context.zero])
 
 
 def _flight_scales(scene: Scene, drive: Drive | None) -> tuple[Any, Any]:
@@ -213,23 +208,24 @@ def _point_mass_scales(scene: Scene) -> tuple[Any, Any]:
     if scene.position is not None and scene.velocity is not None:
         places.append(scene.position)
         speeds.append(scene.velocity)
-    return largest_of([norm(context, x) for x in places]), largest_of([norm(context, v) for v in speeds])
+    farthest, swiftest = ([norm(context, x) for x in vectors] for vectors in (places, speeds))
+    return context.maximum(farthest), context.maximum(swiftest)
 
 
 def choose_scaling(scene: Scene, drive: Drive | None = None) -> Scaling:
     """The units of a scene; a pure function of it, so that the same config gives the same bits."""
     context, body = scene.context, scene.body
     bounds = largest_rates(scene, drive)
-    fastest = largest_of(bounds)
+    fastest = context.maximum(bounds)
     potential = potential_amplitude(scene)
     if potential != 0:
-        smallest = smallest_of([m for m in body.principal_moments if m != 0])
+        smallest = context.minimum(m for m in body.principal_moments if m != 0)
         axial = symmetry_axis(scene)
         swing_moment = smallest
         if axial is not None and all(body.inertia[i][j] == 0 for i in range(3) for j in range(3) if i != j):
             swing_moment = body.inertia[(axial + 1) % 3][(axial + 1) % 3]
-        fastest = largest_of([fastest, context.sqrt(potential / swing_moment)])
-    fastest = largest_of([fastest, source_rate(scene), *_point_mass_rates(scene)])
+        fastest = context.maximum([fastest, context.sqrt(potential / swing_moment)])
+    fastest = context.maximum([fastest, source_rate(scene), *_point_mass_rates(scene)])
     time = -exponent(context, fastest)
     if fastest == 0:  # at rest for good: any unit will do, the horizon is the natural one
         time = exponent(context, scene.end - scene.start)

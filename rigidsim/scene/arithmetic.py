@@ -7,6 +7,7 @@ here and rounded once, to the working precision, where it enters the equations.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from typing import Any
 
 import mpmath
@@ -42,6 +43,16 @@ class _Context(mpmath.MPContext):
     @classmethod
     def _wrap_specfun(cls, *_: Any) -> None:
         """Wrap the special functions once; contexts inherit them as wrapped for ``mpmath.mp``."""
+
+    @staticmethod
+    def maximum(values: Iterable[Any]) -> Any:
+        """The largest number; unlike ``max`` an operation, which decides nothing for members of a sweep."""
+        return max(values)
+
+    @staticmethod
+    def minimum(values: Iterable[Any]) -> Any:
+        """The smallest number; see ``maximum``."""
+        return min(values)
 
 
 def context_for(precision: str | int) -> Any:

@@ -13,7 +13,6 @@ from rigidsim.scene.arithmetic import Vector, cross, dot, negligible, norm
 from rigidsim.scene.bodies.body import RigidBody
 from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.fields import ConfigTable, Dimensionless, Triple
-from rigidsim.scene.tracing.numbers import largest_of
 
 ORBIT = "orbit"
 SPACE = "space"
@@ -141,7 +140,7 @@ def _fault(key: str, text: str) -> ConfigError:
 def _symmetry(body: RigidBody, context: Any) -> Vector | None:
     """Unit symmetry axis of a body with two equal moments and a different third; None for others."""
     moments = body.principal_moments
-    tiny = largest_of(moments) * negligible(context)
+    tiny = context.maximum(moments) * negligible(context)
     for i in range(3):
         j, k = (i + 1) % 3, (i + 2) % 3
         if abs(moments[j] - moments[k]) <= tiny < abs(moments[i] - moments[j]):

@@ -92,7 +92,7 @@ def _first_rates(sweep: Sweep, member: int) -> np.ndarray:
     from rigidsim.solve.batch.family import Families
     from rigidsim.solve.batch.members import Members
 
-    (_, numbers), *_ = Families(Members.of(sweep)).sort().groups
+    (_, numbers), *_ = Families(Members(sweep)).sort().groups
     return np.asarray(numbers.initial[:3, numbers.members.tolist().index(member)])
 
 

@@ -30,7 +30,6 @@ from rigidsim.scene.orbit_tables.pieces import TabulatedOrbit
 from rigidsim.scene.orbits import KeplerOrbit
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.surfaces import Surfaces
-from rigidsim.scene.tracing.numbers import largest_of
 
 _LEVI_CIVITA = {
     (0, 1, 2): 1, (1, 2, 0): 1, (2, 0, 1): 1,
@@ -222,7 +221,7 @@ class Formulation:
 
     def rate_bound(self, plan: ModelPlan) -> Any:
         """Upper bound (mpf, rad/s) of the rate at which what is carried turns."""
-        return largest_of(largest_rates(plan.scene, plan.scaling.drive))
+        return plan.scene.context.maximum(largest_rates(plan.scene, plan.scaling.drive))
 
 
 def rate_block(m: Mechanics, why: str) -> StateBlock:
@@ -249,9 +248,9 @@ def _rate_equations(m: Mechanics, torque: list[Term]) -> list[Symbolic]:
     context, numbers, states = m.scene.context, m.numbers, m.rate_states
     zero = context.zero
     inverse, inertia, units = numbers.inverse_inertia, numbers.inertia, numbers.rate_units
-    largest_inverse = largest_of([abs(x) for row in inverse for x in row])
+    largest_inverse = context.maximum(abs(x) for row in inverse for x in row)
     tiny = negligible(context)
-    scale = largest_inverse * largest_of([abs(x) for row in inertia for x in row])
+    scale = largest_inverse * context.maximum(abs(x) for row in inertia for x in row)
     result = []
     for i in range(3):
         quadratic: dict[tuple[int, int], Any] = {}
@@ -267,7 +266,7 @@ def _rate_equations(m: Mechanics, torque: list[Term]) -> list[Symbolic]:
         ]
         for vector, expression in torque:
             coefficient = dot(inverse[i], vector) / units[i]
-            size = largest_inverse * largest_of([abs(x) for x in vector]) / units[i]
+            size = largest_inverse * context.maximum(abs(x) for x in vector) / units[i]
             if abs(coefficient) > tiny * size:
                 terms.append(m.number(coefficient) * expression)
         result.append(hy.sum(terms) if terms else hy.expression(0.0))

@@ -30,7 +30,6 @@ from rigidsim.model.observables.observable import (
 )
 from rigidsim.model.rotations import Symbolic
 from rigidsim.scene.arithmetic import cross
-from rigidsim.scene.tracing.whole import binary_magnitude
 
 WORK = "work"
 
@@ -134,7 +133,7 @@ def linear_momentum(m: Mechanics) -> list[Symbolic]:
 
 def mass_exponent(m: Mechanics) -> int:
     """Binary exponent of the mass in kg."""
-    return binary_magnitude(m.scene.context, m.scene.body.mass)
+    return m.scene.context.frexp(m.scene.body.mass)[1]
 
 
 def _in_states(name: str) -> Callable[[Mechanics], bool]:

@@ -32,7 +32,7 @@ from rigidsim.scene.bodies.pieces import (
 )
 from rigidsim.scene.bodies.presets import PRESETS
 from rigidsim.scene.exact import ExactNumber, parse_number
-from rigidsim.scene.tracing.context import plain
+from rigidsim.scene.tracing.numbers import plain
 
 SOURCES = ("principal_moments", "inertia_tensor", "points", "shape", "parts", "preset")
 # A tensor that was printed by a double-precision program obeys the triangle inequality to about this.

@@ -14,7 +14,7 @@ from rigidsim.scene.arithmetic import Matrix, Vector, diagonal, dot, multiply, t
 from rigidsim.scene.bodies import table as body_table
 from rigidsim.scene.bodies.shapes import DIMENSIONS, SHAPES
 from rigidsim.scene.exact import ExactNumber
-from rigidsim.scene.tracing.context import plain
+from rigidsim.scene.tracing.numbers import plain
 from rigidsim.scene.validation_messages import shown
 
 

@@ -8,24 +8,21 @@ from typing import Any
 
 from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.tracing.context import TracingContext
-from rigidsim.scene.tracing.graph import Graph
-from rigidsim.scene.tracing.numbers import Traced
+from rigidsim.scene.tracing.numbers import Graph, Traced
 
 
 class TracedExact(ExactNumber):
     """A swept number as written in a config.
 
-    Args:
+    Attributes:
         exact: the representative's number.
     """
 
-    def __init__(self, graph: Graph, node: int, exact: ExactNumber) -> None:
-        for name, value in (("graph", graph), ("node", node), ("exact", exact)):
+    def __init__(self, traced: Traced, exact: ExactNumber) -> None:
+        for name, value in (("traced", traced), ("exact", exact), ("assumed", exact.assumed)):
             object.__setattr__(self, name, value)
-        object.__setattr__(self, "assumed", exact.assumed)
 
-    graph: Graph
-    node: int
+    traced: Traced
     exact: ExactNumber
 
     @property
@@ -35,12 +32,12 @@ class TracedExact(ExactNumber):
 
     def at(self, context: Any) -> Any:
         """A traced number in the graph's context, the representative's value in any other."""
-        return self._traced() if isinstance(context, TracingContext) else self.exact.at(context)
+        return self.traced if isinstance(context, TracingContext) else self.exact.at(context)
 
     @property
     def rational(self) -> Fraction:
         """The representative's value, and that of members that share it."""
-        self._traced()._decided()
+        self.traced.decided()
         return self.exact.rational
 
     @property
@@ -50,7 +47,7 @@ class TracedExact(ExactNumber):
 
     def fraction(self, context: Any) -> Fraction:
         """See ``rational``."""
-        self._traced()._decided()
+        self.traced.decided()
         return self.exact.fraction(context)
 
     def __float__(self) -> float:
@@ -61,41 +58,36 @@ class TracedExact(ExactNumber):
         """The number itself."""
         return self
 
-    def _traced(self) -> Traced:
-        return Traced(self.graph, self.node)
-
     @property
     def sign(self) -> int:
         """Sign, decided by a guard."""
-        number = self._traced()
-        return 0 if number == 0 else (1 if number > 0 else -1)
+        return 0 if self.traced == 0 else (1 if self.traced > 0 else -1)
 
     def __hash__(self) -> int:
         return 0
 
     def __eq__(self, other: object) -> bool:
-        if not isinstance(other, ExactNumber):
-            return False
-        there = other._traced() if isinstance(other, TracedExact) else other.at(self.graph.context)
-        return self._traced() == there
+        return isinstance(other, ExactNumber) and self.traced == _number(other, self.traced.graph)
 
 
-def swept_number(graph: Graph, number: int, exact: ExactNumber) -> TracedExact:
+def swept_number(graph: Graph, column: int, exact: ExactNumber) -> TracedExact:
     """The swept number of a column; ``exact`` is the representative's."""
-    return TracedExact(graph, graph.node("column", (number,), exact.at(graph.context)), exact)
+    return TracedExact(graph.made("column", (column,), exact.at(graph.context)), exact)
+
+
+def _number(number: ExactNumber, graph: Graph) -> Any:
+    return number.traced if isinstance(number, TracedExact) else number.at(graph.context)
 
 
 def exactly(operator: str, numbers: Sequence[ExactNumber]) -> ExactNumber | None:
     """Result of an operation on numbers of which some are swept; None if it isn't a rational times a power of
     pi.
     """
-    swept = next(n for n in numbers if isinstance(n, TracedExact))
-    graph = swept.graph
+    graph = next(n.traced.graph for n in numbers if isinstance(n, TracedExact))
     a, b = numbers[0], numbers[-1]
-    x, y = (n._traced() if isinstance(n, TracedExact) else n.at(graph.context) for n in (a, b))
-    plain = [n.exact if isinstance(n, TracedExact) else n for n in (a, b)]
-    p, q, turns = plain[0].rational, plain[1].rational, a.pi_power
-    made: Any
+    x, y = _number(a, graph), _number(b, graph)
+    p, q = (n.exact.rational if isinstance(n, TracedExact) else n.rational for n in (a, b))
+    turns, made = a.pi_power, x
     if operator == "negative":
         p, made = -p, -x
     elif operator == "sum" and a.pi_power == b.pi_power:
@@ -111,4 +103,4 @@ def exactly(operator: str, numbers: Sequence[ExactNumber]) -> ExactNumber | None
     else:
         return None
     found = ExactNumber(p, turns)
-    return TracedExact(graph, made.node, found) if isinstance(made, Traced) else found
+    return TracedExact(made, found) if isinstance(made, Traced) else found

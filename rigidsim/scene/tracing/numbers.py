@@ -9,34 +9,108 @@ are traced again.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from typing import Any
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from fractions import Fraction
+from typing import Any, Self
 
-from rigidsim.scene.tracing.graph import Node, Untraceable
+
+class Untraceable(Exception):
+    """Raised if something is asked of a traced number that the graph can't hold: its members are run one by
+    one.
+    """
 
 
-class Traced(Node):
-    """A real number in a graph; see the module."""
+@dataclass(frozen=True)
+class Guard:
+    """A decision: whether the left node is less than ("<") or equal to ("=") the right one."""
 
-    __slots__ = ()
-    whole = False
+    kind: str
+    left: int
+    right: int
+    outcome: bool
 
-    def _other(self, other: Any) -> int:
-        if isinstance(other, Traced):
-            return other.node
-        return self.graph.constant(other)
 
-    def _made(self, operation: str, arguments: tuple[int, ...], value: Any) -> Traced:
-        return Traced(self.graph, self.graph.node(operation, arguments, value))
+@dataclass
+class Graph:
+    """Operations on the swept numbers, each once, in an order in which they can be worked out.
+
+    Attributes:
+        context: mpmath context of the scene, in which the representative is worked out.
+        nodes: (operation, arguments): "column" (its number), "constant" (an mpf), or an operation on nodes
+            of ``Traced`` or ``TracingContext``.
+        values: the representative's values, mpf.
+        guards: decisions so far, each once.
+    """
+
+    context: Any
+    nodes: list[tuple[str, tuple[Any, ...]]] = field(default_factory=list)
+    values: list[Any] = field(default_factory=list)
+    guards: dict[Guard, None] = field(default_factory=dict)
+    _known: dict[Any, int] = field(default_factory=dict)
+
+    def made(self, operation: str, arguments: tuple[Any, ...], value: Any) -> Traced:
+        """The number of a node, new or known."""
+        key = (operation, tuple(a._mpf_ if hasattr(a, "_mpf_") else a for a in arguments))
+        if key not in self._known:
+            self._known[key] = len(self.nodes)
+            self.nodes.append((operation, arguments))
+            self.values.append(value)
+        return Traced(self, self._known[key])
+
+    def node(self, value: Any) -> int:
+        """Node of a number, traced or plain."""
+        if isinstance(value, Traced):
+            return value.node
+        if isinstance(value, Fraction):
+            value = self.context.mpf(value.numerator) / self.context.mpf(value.denominator)
+        value = self.context.convert(value)
+        return self.made("constant", (value,), value).node
+
+    def decide(self, kind: str, left: int, right: int) -> bool:
+        """Compare two nodes of the representative, and note the outcome."""
+        one, other = self.values[left], self.values[right]
+        outcome = bool(one < other if kind == "<" else one == other)
+        self.guards.setdefault(Guard(kind, left, right, outcome))
+        return outcome
+
+
+class Traced:
+    """A number in a graph; any decision made with it is noted as a guard."""
+
+    __slots__ = ("graph", "node")
+
+    def __init__(self, graph: Graph, node: int) -> None:
+        self.graph, self.node = graph, node
+
+    @property
+    def value(self) -> Any:
+        """The representative's value."""
+        return self.graph.values[self.node]
+
+    def decided(self) -> Any:
+        """The value itself, which restricts members to those that share it."""
+        self.graph.decide("=", self.node, self.graph.node(self.value))
+        return self.value
+
+    def _is_negative_of(self, node: int) -> bool:
+        nodes = self.graph.nodes
+        return nodes[self.node] == ("negative", (node,)) or nodes[node] == ("negative", (self.node,))
+
+    def _made(self, operation: str, arguments: tuple[Any, ...], value: Any) -> Self:
+        return type(self)(self.graph, self.graph.made(operation, arguments, value).node)
+
+    def _with(self, operation: str, left: int, right: int) -> Self:
+        value = BINARY[operation](self.graph.values[left], self.graph.values[right])
+        return self._made(operation, (left, right), value)
 
     def __add__(self, other: Any) -> Any:
         if not isinstance(other, Traced) and other == 0:
             return self
-        there = self._other(other)
-        for this, that in ((self.node, there), (there, self.node)):
-            if self.graph.nodes[this] == ("negative", (that,)):
-                return self.graph.context.zero
-        return self._made("add", (self.node, there), self.value + self.graph.values[there])
+        there = self.graph.node(other)
+        if self._is_negative_of(there):
+            return self.graph.context.zero
+        return self._with("add", self.node, there)
 
     __radd__ = __add__
 
@@ -49,16 +123,11 @@ class Traced(Node):
     def __sub__(self, other: Any) -> Any:
         if not isinstance(other, Traced) and other == 0:
             return self
-        there = self._other(other)
-        if there == self.node:
-            return self.graph.context.zero
-        return self._made("subtract", (self.node, there), self.value - self.graph.values[there])
+        there = self.graph.node(other)
+        return self.graph.context.zero if there == self.node else self._with("subtract", self.node, there)
 
     def __rsub__(self, other: Any) -> Any:
-        if other == 0:
-            return -self
-        there = self._other(other)
-        return self._made("subtract", (there, self.node), self.graph.values[there] - self.value)
+        return -self if other == 0 else self._with("subtract", self.graph.node(other), self.node)
 
     def __mul__(self, other: Any) -> Any:
         if not isinstance(other, Traced):
@@ -68,41 +137,35 @@ class Traced(Node):
                 return self
             if other == -1:
                 return -self
-        there = self._other(other)
-        return self._made("multiply", (self.node, there), self.value * self.graph.values[there])
+        return self._with("multiply", self.node, self.graph.node(other))
 
     __rmul__ = __mul__
 
     def __truediv__(self, other: Any) -> Any:
         if not isinstance(other, Traced) and other == 1:
             return self
-        there = self._other(other)
-        for this, that, ratio in ((self.node, there, 1), (there, self.node, 1)):
-            if this == that and self != 0:
+        there = self.graph.node(other)
+        for ratio, found in ((1, there == self.node), (-1, self._is_negative_of(there))):
+            if found and self != 0:
                 return self.graph.context.mpf(ratio)
-            if self.graph.nodes[this] == ("negative", (that,)) and self != 0:
-                return self.graph.context.mpf(-ratio)
-        return self._made("divide", (self.node, there), self.value / self.graph.values[there])
+        return self._with("divide", self.node, there)
 
     def __rtruediv__(self, other: Any) -> Any:
-        there = self._other(other)
         if other == 0 and self != 0:
             return self.graph.context.zero
-        return self._made("divide", (there, self.node), self.graph.values[there] / self.value)
+        return self._with("divide", self.graph.node(other), self.node)
 
     def __pow__(self, exponent: Any) -> Any:
         if isinstance(exponent, Traced):
-            if exponent != int(exponent.value):
-                raise Untraceable("a fractional power")
-            exponent = int(exponent.value)
+            exponent = exponent.decided()
+        if exponent == 0.5:
+            return root(self)
         if exponent != int(exponent):
-            if exponent == 0.5:
-                return root(self)
             raise Untraceable("a fractional power")
         exponent = int(exponent)
         if exponent < 0:
             return 1 / self ** (-exponent)
-        return self._made("power", (self.node, exponent), self.value**exponent)
+        return self.graph.made("power", (self.node, exponent), self.value**exponent)
 
     def __rpow__(self, base: Any) -> Any:
         raise Untraceable("a swept power")
@@ -111,15 +174,68 @@ class Traced(Node):
         return self._made("absolute", (self.node,), abs(self.value))
 
     def __float__(self) -> float:
-        return float(self._decided())
+        return float(self.decided())
 
     def __int__(self) -> int:
-        return int(self._decided())
+        return int(self.decided())
 
-    def _decided(self) -> Any:
-        """The value itself, which restricts members to those that share it."""
-        self.graph.decide("=", self.node, self.graph.constant(self.value), outcome=True)
-        return self.value
+    def __hash__(self) -> int:
+        return 0  # whether two are equal is always decided by a guard
+
+    def __eq__(self, other: object) -> bool:
+        if other is None or isinstance(other, str):
+            return False
+        there = self.graph.node(other)
+        return there == self.node or self.graph.decide("=", self.node, there)
+
+    def __lt__(self, other: Any) -> bool:
+        return self.graph.decide("<", self.node, self.graph.node(other))
+
+    def __gt__(self, other: Any) -> bool:
+        return self.graph.decide("<", self.graph.node(other), self.node)
+
+    def __le__(self, other: Any) -> bool:
+        return not self > other
+
+    def __ge__(self, other: Any) -> bool:
+        return not self < other
+
+    def __bool__(self) -> bool:
+        return self != 0
+
+
+BINARY: dict[str, Callable[[Any, Any], Any]] = {
+    "add": lambda a, b: a + b,
+    "subtract": lambda a, b: a - b,
+    "multiply": lambda a, b: a * b,
+    "divide": lambda a, b: a / b,
+}
+
+
+class TracedExponent(Traced):
+    """A binary exponent, or what is made of some. Nothing is left out where units cancel, so that a family's
+    coefficients are parameters whatever the units of the member that represents it.
+    """
+
+    __slots__ = ()
+
+    def __add__(self, other: Any) -> Any:
+        if not isinstance(other, Traced) and other == 0:
+            return self
+        return self._with("add", self.node, self.graph.node(other))
+
+    __radd__ = __add__
+
+    def __sub__(self, other: Any) -> Any:
+        return self + (-other)
+
+    def __rsub__(self, other: Any) -> Any:
+        return -self + other
+
+    def __mul__(self, other: Any) -> Any:
+        return self._with("multiply", self.node, self.graph.node(other))
+
+    __rmul__ = __mul__
 
 
 def root(x: Traced) -> Traced:
@@ -131,7 +247,7 @@ def root(x: Traced) -> Traced:
     if square:  # its root is exact
         base = Traced(x.graph, arguments[0])
         return base if base >= 0 else -base
-    return Traced(x.graph, x.graph.node("sqrt", (x.node,), x.graph.context.sqrt(x.value)))
+    return x.graph.made("sqrt", (x.node,), x.graph.context.sqrt(x.value))
 
 
 def called(function: Callable[..., Any], context: Any, *values: Any) -> Any:
@@ -140,32 +256,10 @@ def called(function: Callable[..., Any], context: Any, *values: Any) -> Any:
     if traced is None:
         return function(context, *values)
     graph = traced.graph
-    nodes = tuple(x.node if isinstance(x, Traced) else graph.constant(x) for x in values)
-    result = function(graph.context, *(graph.values[n] for n in nodes))
-    return Traced(graph, graph.node("call", (function, *nodes), result))
+    nodes = tuple(graph.node(x) for x in values)
+    return graph.made("call", (function, *nodes), function(graph.context, *(graph.values[n] for n in nodes)))
 
 
-def largest_of(values: Sequence[Any]) -> Any:
-    """The maximum, without deciding which of them it is."""
-    return _extreme("maximum", values)
-
-
-def smallest_of(values: Sequence[Any]) -> Any:
-    """The minimum, without deciding which of them it is."""
-    return _extreme("minimum", values)
-
-
-def _extreme(operation: str, values: Sequence[Any]) -> Any:
-    found = values[0]
-    for value in values[1:]:
-        traced = next((x for x in (found, value) if isinstance(x, Traced)), None)
-        choose = max if operation == "maximum" else min
-        if traced is None:
-            found = choose(found, value)
-            continue
-        graph = traced.graph
-        nodes = tuple(x.node if isinstance(x, Traced) else graph.constant(x) for x in (found, value))
-        if nodes[0] != nodes[1]:
-            result = choose(graph.values[nodes[0]], graph.values[nodes[1]])
-            found = Traced(graph, graph.node(operation, nodes, result))
-    return found
+def plain(value: Any) -> Any:
+    """The plain number of one that may be traced, for pictures and messages: the representative's."""
+    return value.value if isinstance(value, Traced) else value

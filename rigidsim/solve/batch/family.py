@@ -17,17 +17,15 @@ from rigidsim.scene.formulations import variables_named
 from rigidsim.scene.methods import DEFAULT_METHOD
 from rigidsim.scene.model_table import FULL
 from rigidsim.scene.overrides import key_steps
-from rigidsim.scene.tracing.graph import Guard, Untraceable
-from rigidsim.scene.tracing.numbers import Traced
-from rigidsim.scene.tracing.whole import TracedWhole
+from rigidsim.scene.tracing.numbers import Traced, Untraceable
 from rigidsim.solve.batch.members import Members
-from rigidsim.solve.batch.replay import ColumnReplays, Replay
+from rigidsim.solve.batch.replay import Replay
 from rigidsim.solve.batch.tracing import TRACED_TABLES, TracedSystem, trace
 from rigidsim.solve.effects.effect import registered_effects
 from rigidsim.solve.precision import precision_of
 from rigidsim.solve.problem import prepare
 
-_AT_ONCE = 4096  # members whose numbers are worked out together
+_AT_ONCE = 2048  # members whose numbers are worked out together
 
 
 class Alone(Enum):
@@ -121,17 +119,7 @@ class Family:
     """
 
     traced: TracedSystem
-    kind: Any = None
-
-    @cached_property
-    def guards(self) -> list[Guard]:
-        """Decisions that its members share, the most selective first."""
-        return list(self.traced.graph.guards)
-
-    @cached_property
-    def columns(self) -> ColumnReplays:
-        """What depends on one swept number alone, for each of its values."""
-        return ColumnReplays(self.traced.graph)
+    kind: int
 
 
 @dataclass(frozen=True)
@@ -150,6 +138,24 @@ class Numbers:
     parameters: np.ndarray
     replay: Replay
 
+    @classmethod
+    def of(cls, traced: TracedSystem, members: np.ndarray, replay: Replay) -> Numbers:
+        """Numbers of members that share a traced system."""
+        number = traced.prepared.precision.number
+        initial = np.empty((len(traced.system.initial), len(members)))
+        for row, value in enumerate(traced.system.initial):
+            initial[row] = replay.doubles(value.node) if isinstance(value, Traced) else number(value)
+        parameters = np.empty((len(traced.parameters.nodes), len(members)))
+        for row, node in enumerate(traced.parameters.nodes):
+            parameters[row] = replay.doubles(node)
+        return cls(members, initial, parameters, replay)
+
+    def some(self, which: np.ndarray) -> Numbers:
+        """Those of some of the members."""
+        return Numbers(
+            self.members[which], self.initial[:, which], self.parameters[:, which], self.replay.of(which)
+        )
+
     def doubles(self, value: Any) -> np.ndarray:
         """A number of the scene for each member, rounded once, (members,)."""
         if isinstance(value, Traced):
@@ -158,9 +164,7 @@ class Numbers:
 
     def whole_numbers(self, value: Any) -> np.ndarray:
         """A whole number of the model for each member, (members,)."""
-        if isinstance(value, TracedWhole):
-            return self.replay.whole_numbers(value.node)
-        return np.full(len(self.members), int(value))
+        return self.doubles(value).astype(np.int64)
 
 
 @dataclass
@@ -193,25 +197,17 @@ class Families:
     ) -> None:
         self._members = members
         self._most_refused, self._most_untraced = most_refused, most_untraced
-        self._swept = members.numbers
         self.known: list[Family] = []
 
-    def sort(self, which: Sequence[int] | np.ndarray | None = None) -> Sorted:
-        """Sort members into families.
-
-        Args:
-            which: indices of the members; all by default.
-        """
+    def sort(self) -> Sorted:
+        """Sort members into families."""
         result = Sorted()
-        chosen = np.arange(self._members.count) if which is None else np.asarray(which, dtype=np.int64)
-        for first in range(0, len(chosen), _AT_ONCE):
-            self._sort_some(chosen[first : first + _AT_ONCE], result)
+        for first in range(0, self._members.count, _AT_ONCE):
+            self._sort_some(np.arange(first, min(first + _AT_ONCE, self._members.count)), result)
         return result
 
     def _sort_some(self, waiting: np.ndarray, result: Sorted) -> None:
         for family in list(self.known):
-            if not len(waiting):
-                return
             waiting = self._taken(family, waiting, result)
         while len(waiting):
             first = int(waiting[0])
@@ -239,7 +235,7 @@ class Families:
             Untraceable: the base experiment can't be built.
         """
         try:
-            return prepare(self._members.base).system.scaling.drive
+            return prepare(self._members.sweep.base).system.scaling.drive
         except ConfigError as error:
             raise Untraceable(str(error)) from error
 
@@ -249,49 +245,29 @@ class Families:
         if reason is not None:
             return reason
         try:
-            numbers = [column.of(member) for column in self._swept]
-            traced = trace(experiment, self._members.keys, numbers, lambda: self._drive)
+            traced = trace(experiment, self._members.keys, self._members.exact(member), lambda: self._drive)
         except ConfigError as error:
             return error
         except Untraceable:
             return Alone.UNTRACEABLE
-        return _reason_of_system(traced) or Family(traced, self._members.kind(member))
+        return _reason_of_system(traced) or Family(traced, int(self._members.kinds[member]))
 
     def _taken(self, family: Family, waiting: np.ndarray, result: Sorted) -> np.ndarray:
         """Put the waiting members of a family into the result; returns those that are left."""
-        candidates = waiting
-        if self._members.kinds is not None:
-            candidates = waiting[self._members.kinds[waiting] == family.kind]
+        candidates = waiting[self._members.kinds[waiting] == family.kind]
         if not len(candidates):
             return waiting
-        replay = self._replay(family, candidates)
-        agree = replay.agreeing(family.guards)
+        graph = family.traced.graph
+        replay = Replay(graph, self._members.columns(candidates), len(candidates))
+        agree = replay.agreeing(list(graph.guards))
         taken = candidates[agree]
         if not len(taken):
             return waiting
-        if len(taken) < len(candidates):
-            replay = self._replay(family, taken)
-        numbers = _numbers_of(family, taken, replay)
+        numbers = Numbers.of(family.traced, taken, replay.of(agree))
         within = np.isfinite(numbers.initial).all(axis=0) & np.isfinite(numbers.parameters).all(axis=0)
         if not within.all():
             result.alone |= dict.fromkeys(taken[~within].tolist(), Alone.RANGE)
-            kept = taken[within]
-            numbers = _numbers_of(family, kept, self._replay(family, kept))
+            numbers = numbers.some(within)
         if len(numbers.members):
             result.groups.append((family, numbers))
-        return waiting[:0] if len(taken) == len(waiting) else waiting[~np.isin(waiting, taken)]
-
-    def _replay(self, family: Family, members: np.ndarray) -> Replay:
-        return Replay(family.traced.graph, self._swept, members, family.columns)
-
-
-def _numbers_of(family: Family, members: np.ndarray, replay: Replay) -> Numbers:
-    traced = family.traced
-    number = traced.prepared.precision.number
-    initial = np.empty((len(traced.system.initial), len(members)))
-    for row, value in enumerate(traced.system.initial):
-        initial[row] = replay.doubles(value.node) if isinstance(value, Traced) else number(value)
-    parameters = np.empty((len(traced.parameters.nodes), len(members)))
-    for row, node in enumerate(traced.parameters.nodes):
-        parameters[row] = replay.doubles(node)
-    return Numbers(members, initial, parameters, replay)
+        return waiting[~np.isin(waiting, taken)]

@@ -11,6 +11,7 @@ import numpy as np
 
 from rigidsim.model.outputs import Recorded
 from rigidsim.model.tangents import GROWTH
+from rigidsim.scene.tracing.numbers import Traced
 from rigidsim.solve.batch.family import Numbers
 from rigidsim.solve.batch.tracing import TracedSystem
 from rigidsim.solve.compiled import compiled_function
@@ -178,8 +179,8 @@ class BatchOutputs:
 
 
 def _to_si(values: np.ndarray, numbers: Numbers, exponent: Any, part: np.ndarray) -> np.ndarray:
-    if isinstance(exponent, int):
-        return np.ldexp(values, exponent) if exponent else values
+    if not isinstance(exponent, Traced):
+        return np.ldexp(values, int(exponent)) if exponent else values
     exponents = numbers.whole_numbers(exponent)[part]
     if (
         np.abs(exponents).max(initial=0) < _NORMAL

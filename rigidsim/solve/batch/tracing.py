@@ -21,9 +21,7 @@ from rigidsim.scene.overrides import key_steps
 from rigidsim.scene.scene import Scene, build_scene
 from rigidsim.scene.tracing.context import TracingContext
 from rigidsim.scene.tracing.exact import swept_number
-from rigidsim.scene.tracing.graph import Graph, Untraceable
-from rigidsim.scene.tracing.numbers import Traced
-from rigidsim.scene.tracing.whole import TracedWhole
+from rigidsim.scene.tracing.numbers import Graph, Traced, Untraceable
 from rigidsim.solve.precision import precision_of
 from rigidsim.solve.problem import InitialValueProblem, prepare
 
@@ -45,8 +43,6 @@ class Parameters:
 
     def number(self, value: Any) -> Any:
         """A coefficient as a double, rounded once, or as a parameter."""
-        if isinstance(value, TracedWhole):
-            raise Untraceable("a whole number as a coefficient")
         if not isinstance(value, Traced):
             return _DOUBLE.number(value)
         if value.node not in self._names:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -24,8 +24,6 @@ _GZIP = 4
 _BOX_NUMBERS = 1 << 22  # numbers of a variable that are gathered at once: 32 MB
 _CHUNK_NUMBERS = 1 << 17
 _SAMPLES = "sample"
-
-Labels = Callable[[int], np.ndarray | None]
 
 RESERVED = {
     *LABELS,
@@ -57,12 +55,8 @@ def write_dataset(
     reader: TileReader,
     found: Gathered,
     attributes: Mapping[str, Any],
-    labels: Labels = lambda place: None,
 ) -> str:
     """Write the dataset atomically; returns the digest of the file.
-
-    Args:
-        labels: the doubles nearest to an axis's values, (values, components), where they are known already.
 
     Raises:
         OSError: the file can't be written.
@@ -70,7 +64,7 @@ def write_dataset(
     with atomic.replacing(path) as temporary:
         with sink(temporary) as target, writing(target) as file:
             file.attributes(attributes)
-            beside = _coordinates(file, sweep, labels)
+            beside = _coordinates(file, sweep)
             created = _declared(file, sweep, found, beside)
             for name, (target_variable, described) in created.items():
                 item = _item(sources, described.variable.item)
@@ -86,12 +80,12 @@ def _item(sources: Sources, name: str) -> str:
     return next(item for item in sources.found if plain(item) == name)
 
 
-def _coordinates(file: NetcdfFile, sweep: Sweep, labels: Labels) -> str:
+def _coordinates(file: NetcdfFile, sweep: Sweep) -> str:
     """Write the axes; returns the names of coordinates that aren't dimensions."""
     beside = []
     for dim, size in zip(sweep.dims, sweep.shape, strict=True):
         file.dimension(dim, size)
-    for place, axis in enumerate(sweep.axes):
+    for axis in sweep.axes:
         dim = axis.name if sweep.product else sweep.dims[0]
         described: dict[str, Any] = {"long_name": axis.key, "units": axis.unit, "swept_key": axis.key}
         if not axis.numeric:
@@ -100,7 +94,7 @@ def _coordinates(file: NetcdfFile, sweep: Sweep, labels: Labels) -> str:
             file.texts(axis.name, dim, texts, described)
             beside += [] if dim == axis.name else [axis.name]
             continue
-        numbers = label_numbers(axis, labels(place))
+        numbers = label_numbers(axis)
         name = axis.name
         dims: tuple[str, ...] = (dim,)
         if axis.values.components:
@@ -113,15 +107,10 @@ def _coordinates(file: NetcdfFile, sweep: Sweep, labels: Labels) -> str:
     return " ".join(beside)
 
 
-def label_numbers(axis: Axis, known: np.ndarray | None = None) -> np.ndarray:
-    """The values of an axis as doubles, (count,) or (count, components); their texts are exact.
-
-    Args:
-        known: the same, (count, components), where they are known already.
-    """
-    if known is None:
-        known = np.array([[nearest_double(x) for x in axis.exact(i)] for i in range(axis.values.count)])
-    return known if axis.values.components else known[:, 0]
+def label_numbers(axis: Axis) -> np.ndarray:
+    """The values of an axis as doubles, (count,) or (count, components); their texts are exact."""
+    found = np.array([[nearest_double(x) for x in axis.exact(i)] for i in range(axis.values.count)])
+    return found if axis.values.components else found[:, 0]
 
 
 def _bare(text: str) -> str:

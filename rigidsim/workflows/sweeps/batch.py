@@ -137,7 +137,7 @@ class BatchTiles:
             self._known.clear()
             self._runs.clear()
             self._estimates.clear()
-        families = Families(Members.of(self._sweep, members, self.axes), most_refused, most_untraced)
+        families = Families(Members(self._sweep, members, self.axes), most_refused, most_untraced)
         families.known = self._known
         return families.sort()
 

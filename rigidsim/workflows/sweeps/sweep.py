@@ -275,13 +275,10 @@ def _run_tiles(
     done = members - sum(len(generation.members_of(tile)) for tile in missing)
     observer.started(folder.path, members, done)
     os.utime(folder.generation_file(generation))
-    axes = batches_of(generation.config).axes
     try:
         for tile, image in way.images(generation, missing):
             folder.save(generation, tile, image)
-            these = generation.members_of(tile)
-            axes.look_at(these)  # for the dataset, beside whoever computes the next tile
-            done += len(these)
+            done += len(generation.members_of(tile))
             observer.progressed(done)
     except KeyboardInterrupt as interruption:
         return interruption
@@ -314,8 +311,7 @@ def _completed(wanted: Sweep, folder: SweepFolder, wall: float, cpu: float) -> S
         "mixed_provenance": summary["mixed_provenance"] or "",
         **summary["provenance"],
     }
-    labels = batches_of(wanted.experiment.text).axes.nearest
-    digest = write_dataset(folder.dataset, wanted, sources, reader, found, attributes, labels)
+    digest = write_dataset(folder.dataset, wanted, sources, reader, found, attributes)
     summary["dataset_sha256"] = digest
     folder.write_summary(summary)
     return SavedSweep(folder, {"kind": "sweep", **summary})

@@ -3,6 +3,7 @@
 import re
 
 import heyoka as hy
+import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -58,7 +59,7 @@ def swept(text: str, axes: dict[str, str], mode: str = "zip") -> Sweep:
 
 def assert_own_numbers(sweep: Sweep, most: int = 64) -> Families:
     """Each member's equations and start, bit for bit those of its own build."""
-    families = Families(Members.of(sweep))
+    families = Families(Members(sweep))
     found = families.sort()
     assert not found.alone
     assert not found.refused
@@ -137,7 +138,7 @@ def test_any_values_at_all(rates: list[str], moment: str) -> None:
         "body.principal_moments[1]": f'values = ["{moment}", "2"]',
     }
     sweep = swept(FREE, axes, mode="product")
-    found = Families(Members.of(sweep)).sort()
+    found = Families(Members(sweep)).sort()
     assert not found.alone
     for member, error in found.refused.items():
         with pytest.raises(ConfigError) as own:
@@ -155,18 +156,18 @@ def test_members_of_another_structure_are_another_family() -> None:
     axes = {
         "body.principal_moments": "values = [[1, 2, 2.5], [1, 2, 2.4], [1, 1, 2], [2, 2, 2], [1, 2, 2.6]]"
     }
-    found = Families(Members.of(swept(FREE, axes))).sort()
+    found = Families(Members(swept(FREE, axes))).sort()
     groups = sorted(numbers.members.tolist() for _, numbers in found.groups)
     assert groups == [[0, 1, 4], [2], [3]]
     axes = {"parameters.k": "values = [0.1, 0, 0.3]"}
-    found = Families(Members.of(swept(TORQUE, axes))).sort()
+    found = Families(Members(swept(TORQUE, axes))).sort()
     assert sorted(numbers.members.tolist() for _, numbers in found.groups) == [[0, 2], [1]]
 
 
 def test_a_bad_member_is_refused_as_its_own_run_would_be() -> None:
     axes = {"body.principal_moments[2]": "values = [2.5, 2.6, 7, -1, 2.7]"}
     sweep = swept(FREE, axes)
-    found = Families(Members.of(sweep)).sort()
+    found = Families(Members(sweep)).sort()
     assert sorted(found.refused) == [2, 3]
     for member, error in found.refused.items():
         with pytest.raises(ConfigError) as own:
@@ -195,14 +196,28 @@ def test_what_a_batch_cannot_do_is_said(override: str, reason: Alone) -> None:
 
 def test_switching_equations_and_full_tensors() -> None:
     text = TORQUE.replace("k*sin(t)^2/2", "k*abs(wx)")
-    found = Families(Members.of(swept(text, {"parameters.k": "values = [0.1, 0.2]"}))).sort()
+    found = Families(Members(swept(text, {"parameters.k": "values = [0.1, 0.2]"}))).sort()
     assert set(found.alone.values()) == {Alone.SWITCHING}
     tensor = FREE.replace(
         "principal_moments = [1, 2, 2.5]", "inertia_tensor = [[2, 0.1, 0], [0.1, 2.5, 0.2], [0, 0.2, 3]]"
     )
     sweep = swept(tensor, {"body.inertia_tensor[2][2]": "values = [3, 3.1]"})
-    assert set(Families(Members.of(sweep)).sort().alone.values()) == {Alone.UNTRACEABLE}
+    assert set(Families(Members(sweep)).sort().alone.values()) == {Alone.UNTRACEABLE}
     assert_own_numbers(swept(tensor, {"initial.angular_velocity[0]": "uniform = [0.1, 1], count = 6"}))
+
+
+def test_numbers_of_many_members_are_those_of_each_in_every_bit_of_the_scenes_arithmetic() -> None:
+    axes = {
+        "loads[0].orbit.eccentricity": "uniform = [0.01, 0.6], count = 3",
+        "loads[0].gravitational_parameter": "uniform = [1e-3, 1e9], count = 3",
+        "initial.euler_angles[1]": "uniform = [0.1, 3], count = 3",
+    }
+    families = Families(Members(swept(ORBIT, axes)))
+    for family, numbers in families.sort().groups:
+        graph = family.traced.graph  # whose values are those of the first member, worked out by mpmath
+        for node, value in enumerate(graph.values):
+            found = np.broadcast_to(numbers.replay.number(node), len(numbers.members))[0]
+            assert graph.context.mpf(str(found)) == value, graph.nodes[node]
 
 
 def test_a_member_belongs_to_its_family_whoever_represents_it() -> None:
@@ -213,7 +228,7 @@ def test_a_member_belongs_to_its_family_whoever_represents_it() -> None:
     sweep = swept(TORQUE, axes)
     numbers = []
     for order in ([0, 1, 2], [2, 1, 0]):
-        found = Families(Members.of(sweep, order)).sort()
+        found = Families(Members(sweep, order)).sort()
         rows = {}
         for family, group in found.groups:
             for place, member in enumerate(group.members.tolist()):

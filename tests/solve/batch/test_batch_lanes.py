@@ -25,7 +25,7 @@ def blocks_of(
     sweep: Sweep, members: list[int] | None = None, width: int | None = None, **options: float
 ) -> list[BatchBlock]:
     """All members, run with options of ``BatchRun``."""
-    found = Families(Members.of(sweep, members)).sort()
+    found = Families(Members(sweep, members)).sort()
     assert not found.alone
     return [b for family, numbers in found.groups for b in BatchRun(family, width, **options).blocks(numbers)]
 
