@@ -87,7 +87,7 @@ class System:
 
         Its states are the same but for the angles. Its recorded Euler angles are those of this system's
         sequence, on the branch given by the parameter after the invariants' (see
-        ``rigidsim.model.euler_charts``).
+        ``rigidsim.model.formulations.euler_angles``).
         """
         partner = self.formulation.partner
         if partner is None:

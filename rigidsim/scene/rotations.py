@@ -26,6 +26,11 @@ def from_left(terms: Sequence[Scalar]) -> Scalar:
     return reduce(add, terms)
 
 
+def is_proper(sequence: str) -> bool:
+    """Whether a sequence of axes is proper, that is, whether its outer axes are the same."""
+    return sequence[0] == sequence[2]
+
+
 def parity(i: int, j: int) -> int:
     """+1 where axis j follows axis i cyclically (xy, yz, zx), else -1."""
     return 1 if (j - i) % 3 == 1 else -1

@@ -13,7 +13,6 @@ from rigidsim.model.frames.reference_plane import refuse_without_plane
 from rigidsim.model.load import Load
 from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.numbers import Rounder
-from rigidsim.model.orbits.table_states import Carried
 from rigidsim.model.scaling import choose_scaling
 from rigidsim.model.state_blocks import StateBlock
 from rigidsim.scene.formulations import Variables
@@ -25,10 +24,13 @@ class Averaged(Formulation):
 
     carries_rates = False
     resolves_rotation = False
+    twin = None
     average: Average
 
     def __init__(self, average: Average) -> None:
-        self.average = average
+        self.average, self.longitude = average, average.longitude
+        summed = average.driven is not None and average.driven.course.nodes
+        self.wide = average.resonance is not None or bool(summed)
         self.variables = Variables(average.level, general=False)  # type: ignore[misc]  # told by the scene
 
     @classmethod
@@ -53,23 +55,7 @@ class Averaged(Formulation):
             left_out.append(("anomalies", "the torques are averaged over the orbits"))
         return Requirements(True, False, False, scene.config.output.record, {}, left_out)
 
-    @property
-    def twin(self) -> None:
-        """See ``Formulation``."""
-
-    @property
-    def wide(self) -> bool:  # type: ignore[override]
-        """See ``Formulation``."""
-        driven = self.average.driven
-        return self.average.resonance is not None or (driven is not None and bool(driven.course.nodes))
-
-    @property
-    def longitude(self) -> Carried:  # type: ignore[override]
-        """See ``Formulation``."""
-        return self.average.longitude
-
     def assembled(self, plan: ModelPlan, number: Rounder) -> tuple[Mechanics, list[StateBlock]]:
-        """See ``Formulation``."""
         return averaged_states(
             plan.scene,
             self.average,

@@ -16,7 +16,6 @@ import heyoka as hy
 from rigidsim.errors import ConfigError, Problem
 from rigidsim.model import rotations
 from rigidsim.model.carriers import carried_beside
-from rigidsim.model.euler_charts import is_proper
 from rigidsim.model.formulations.euler_angles import ANGLES, euler_states
 from rigidsim.model.formulations.formulation import Formulation, ModelPlan, Rotation, Rounding, formulates
 from rigidsim.model.load import Load
@@ -28,6 +27,7 @@ from rigidsim.model.state_blocks import AttitudeStates, StateBlock
 from rigidsim.scene import attitude as numeric
 from rigidsim.scene.arithmetic import apply, dot, multiply, negligible
 from rigidsim.scene.formulations import FORMULATIONS
+from rigidsim.scene.rotations import is_proper
 from rigidsim.scene.scene import Scene
 
 MOMENTA = ("p_phi", "p_theta", "p_psi")
@@ -49,7 +49,6 @@ class Canonical(Formulation):
         return cls(scene.config.integrator.euler_sequence)
 
     def rotation(self, plan: ModelPlan, number: Rounder) -> Rotation:
-        """See ``Formulation``."""
         angles, momenta = list(hy.make_vars(*ANGLES)), list(hy.make_vars(*MOMENTA))
         columns = []
         for i in range(3):
@@ -65,7 +64,6 @@ class Canonical(Formulation):
         return Rotation(rates, replace(euler_states(plan.scene, rates, self.sequence), momenta=MOMENTA))
 
     def blocks(self, m: Mechanics, plan: ModelPlan) -> list[StateBlock]:
-        """See ``Formulation``."""
         attitude = m.carried(m.attitude)
         block = StateBlock(
             [*attitude.names, *MOMENTA],

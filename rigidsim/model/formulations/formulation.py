@@ -130,6 +130,8 @@ class Formulation:
             over has an error of its model, which is measured beside it.
         rounding: how the states' rounding moves the motion.
         unfelt_tangents: whether a tangent vector beside it, however compiled, changes no bit of its steps.
+        twin: formulation in which questions about the motion itself, such as its stability, are asked in
+            double precision; None for this one.
         sequence: sequence of the Euler angles that are states; empty for other states.
         partner: the same motion in the chart that a run changes to near a singularity; None without one.
         why: what speaks for it in this scene, besides that an attitude is needed; shown by ``plan``.
@@ -143,6 +145,7 @@ class Formulation:
     resolves_rotation: ClassVar[bool] = True
     rounding: ClassVar[Rounding] = Rounding.PLAIN
     unfelt_tangents: ClassVar[bool] = False
+    twin: ClassVar[str | None] = DEFAULT_FORMULATION
     sequence: str = ""
     partner: Formulation | None = None
     why: str = ""
@@ -163,13 +166,6 @@ class Formulation:
     def name(self) -> str:
         """Name in summaries and datasets."""
         return self.variables.name
-
-    @property
-    def twin(self) -> str | None:
-        """Formulation in which questions about the motion itself, such as its stability, are asked in double
-        precision; None for this one.
-        """
-        return DEFAULT_FORMULATION
 
     def attitude(self, plan: ModelPlan, rates: list[Symbolic], number: Rounder) -> AttitudeStates | None:
         """States of the attitude, their equations and initial values; None if none is carried.

@@ -20,106 +20,82 @@ import heyoka as hy
 
 from rigidsim.model import rotations
 from rigidsim.model.capabilities import corotating_orbit_of
+from rigidsim.model.formulations.formulation import Formulation, ModelPlan
 from rigidsim.model.load import Load
 from rigidsim.model.numbers import Rounder
 from rigidsim.model.rotations import Symbolic, SymbolicMatrix
 from rigidsim.model.state_blocks import AttitudeStates, OrbitalFrame, StateBlock
 from rigidsim.model.two_part import as_factor
 from rigidsim.scene import attitude
+from rigidsim.scene.formulations import DEFAULT_FORMULATION, FORMULATIONS
 from rigidsim.scene.orbits import KeplerOrbit
 from rigidsim.scene.scene import Scene
 
 
-def corotating_orbit(scene: Scene, loads: Sequence[Load]) -> KeplerOrbit | None:
-    """Orbit in whose frame a quaternion is best carried: a circle in a fixed plane, if the load on it is the
-    only one that reads the attitude; None otherwise.
-    """
-    readers = [load for load in loads if {"attitude", "vertical"} & load.reads]
-    if scene.torque_arm is not None or len(readers) != 1:
-        return None
-    return corotating_orbit_of(readers[0])
+class OrbitalQuaternion(Formulation):
+    """The quaternion relative to the frame of an orbit; a quaternion to whoever asks."""
+
+    variables = FORMULATIONS[DEFAULT_FORMULATION]
+    why = "relative to the frame that turns with the orbit, where the gradient takes a third fewer products"
+
+    def __init__(self, orbit: KeplerOrbit) -> None:
+        self._orbit = orbit
+
+    @classmethod
+    def if_cheaper(cls, scene: Scene, loads: Sequence[Load]) -> OrbitalQuaternion | None:
+        """The formulation where it saves products: on a circle in a fixed plane, if the load on it is the
+        only one that reads the attitude; None elsewhere.
+        """
+        readers = [load for load in loads if {"attitude", "vertical"} & load.reads]
+        if scene.torque_arm is not None or len(readers) != 1:
+            return None
+        orbit = corotating_orbit_of(readers[0])
+        return None if orbit is None else cls(orbit)
+
+    def attitude(self, plan: ModelPlan, rates: list[Symbolic], number: Rounder) -> AttitudeStates:
+        scene, orbit = plan.scene, self._orbit
+        context, tag = scene.context, plan.orbit_tags[orbit]
+        names, pair = ["pw", "px", "py", "pz"], [f"cos_half_anomaly{tag}", f"sin_half_anomaly{tag}"]
+        p, (c, s) = list(hy.make_vars(*names)), hy.make_vars(*pair)
+        unit = context.ldexp(context.one, plan.scaling.time)
+        half_motion = as_factor(number(orbit.mean_motion * unit / 2))
+        w, x, y, z = p
+        turning = rotations.quaternion_kinematics(p, rates)
+        derivatives = [a + half_motion * b for a, b in zip(turning, [z, y, -x, -w], strict=True)]
+        half = orbit.eccentric_anomaly(context, scene.start) / 2  # that the frame has turned by at the start
+        cosine, sine = context.cos(half), context.sin(half)
+        plane = _plane(context, orbit)
+        before, *v = attitude.product(plane, [cosine, context.zero, context.zero, sine])
+        initial = attitude.product([before, *(-x for x in v)], list(scene.quaternion))
+        turned = [-(half_motion * s), half_motion * c]
+        states = StateBlock(pair, turned, [cosine, sine], [hy.sqrt(c * c + s * s)])
+        relative = rotations.quaternion_matrix(p)
+        matrix, quaternion = _in_space(plane, [c, s], relative, p, number)
+        norm = hy.sqrt(hy.sum([component * component for component in p]))
+        return AttitudeStates(
+            names,
+            derivatives,
+            initial,
+            matrix,
+            quaternion,
+            "state",
+            defect=("quaternion_norm", "norm of the attitude quaternion", norm),
+            orbital=OrbitalFrame(direction=relative[0], normal=relative[2], states=states),
+            chord=2.0,
+        )
 
 
-def orbital_states(
-    scene: Scene,
-    rates: list[Symbolic],
-    orbit: KeplerOrbit,
-    tag: str,
-    time_unit: Any,
-    number: Rounder,
-) -> AttitudeStates:
-    """Four states of the relative quaternion, and the orbit's half angle as states of the load.
-
-    Args:
-        rates: angular velocity, body axes, 1 / ``time_unit``.
-        orbit: see ``corotating_orbit``.
-        tag: suffix that makes the names of the orbit's states unique.
-        time_unit: internal unit of time, seconds (mpf).
-    """
-    names = ["pw", "px", "py", "pz"]
-    p = list(hy.make_vars(*names))
-    half_motion = as_factor(number(orbit.mean_motion * time_unit / 2))
-    w, x, y, z = p
-    carried_along = [z, y, -x, -w]
-    derivatives = [
-        turning + half_motion * along
-        for turning, along in zip(rotations.quaternion_kinematics(p, rates), carried_along, strict=True)
-    ]
-    initial = relative_attitude(scene, orbit)
-    orbital = half_turn(scene, orbit, tag, time_unit, number)
-    relative = rotations.quaternion_matrix(p)
-    matrix, quaternion = in_space(scene, orbit, orbital.variables, relative, p, number)
-    return AttitudeStates(
-        names,
-        derivatives,
-        initial,
-        matrix,
-        quaternion,
-        "state",
-        defect=(
-            "quaternion_norm",
-            "norm of the attitude quaternion",
-            hy.sqrt(hy.sum([component * component for component in p])),
-        ),
-        orbital=OrbitalFrame(direction=relative[0], normal=relative[2], states=orbital),
-        chord=2.0,
-    )
-
-
-def relative_attitude(scene: Scene, orbit: KeplerOrbit) -> list[Any]:
-    """The initial quaternion from body axes to the orbital frame (mpf)."""
-    context = scene.context
-    cosine, sine = _start(scene, orbit)
-    w, *v = attitude.product(_plane(context, orbit), [cosine, context.zero, context.zero, sine])
-    return attitude.product([w, *(-x for x in v)], list(scene.quaternion))
-
-
-def half_turn(scene: Scene, orbit: KeplerOrbit, tag: str, time_unit: Any, number: Rounder) -> StateBlock:
-    """Cosine and sine of half the angle that the orbital frame has turned by."""
-    half_motion = as_factor(number(orbit.mean_motion * time_unit / 2))
-    pair = [f"cos_half_anomaly{tag}", f"sin_half_anomaly{tag}"]
-    c, s = hy.make_vars(*pair)
-    initial = list(_start(scene, orbit))
-    return StateBlock(pair, [-(half_motion * s), half_motion * c], initial, [hy.sqrt(c * c + s * s)])
-
-
-def in_space(
-    scene: Scene,
-    orbit: KeplerOrbit,
-    half: Sequence[Symbolic],
-    relative: SymbolicMatrix,
-    quaternion: list[Symbolic],
-    number: Rounder,
+def _in_space(
+    plane: list[Any], half: list[Symbolic], relative: SymbolicMatrix, p: list[Symbolic], number: Rounder
 ) -> tuple[SymbolicMatrix, list[Symbolic]]:
-    """From the orbital frame to space: R, and the quaternion.
+    """R and the quaternion in space, for those relative to the orbital frame.
 
     Args:
-        half: cosine and sine of half the angle that the orbital frame has turned by.
-        relative, quaternion: attitude relative to the orbital frame.
+        plane: quaternion of the orbit's plane.
+        half: cosine and sine of half the angle that the frame has turned by.
     """
-    plane = _plane(scene.context, orbit)
     c, s = half
-    w, x, y, z = quaternion
+    w, x, y, z = p
     zero = rotations.constant(0.0)
     turned = [
         hy.sum([c * w, -(s * z)]),
@@ -137,12 +113,6 @@ def in_space(
 def _plane(context: Any, orbit: KeplerOrbit) -> list[Any]:
     """Quaternion of the orbit's plane, from orbital to space axes."""
     return attitude.product(_turn(context, orbit.ascending_node, 3), _turn(context, orbit.inclination, 1))
-
-
-def _start(scene: Scene, orbit: KeplerOrbit) -> tuple[Any, Any]:
-    """Cosine and sine of half the orbital frame's angle at the start (mpf)."""
-    half = orbit.eccentric_anomaly(scene.context, scene.start) / 2
-    return scene.context.cos(half), scene.context.sin(half)
 
 
 def _turn(context: Any, angle: Any, axis: int) -> list[Any]:

@@ -68,13 +68,13 @@ class Planar(Formulation):
 
     carries_rates = False
     unfelt_tangents = True
+    twin = "planar"
 
     def __init__(self, plane: PlaneOfMotion, why: str = "") -> None:
         self._plane, self.why = plane, why
 
     @classmethod
     def of(cls, scene: Scene, loads: Sequence[Load]) -> Planar:
-        """See ``Formulation``."""
         try:
             return cls(plane_of(scene, loads))
         except Unsuited as why:
@@ -93,13 +93,7 @@ class Planar(Formulation):
         except Unsuited:
             return None
 
-    @property
-    def twin(self) -> str:
-        """See ``Formulation``."""
-        return self.name
-
     def rotation(self, plan: ModelPlan, number: Rounder) -> Rotation:
-        """See ``Formulation``."""
         context, plane = plan.scene.context, self._plane
         state, spin = hy.make_vars(ANGLE, SPIN)
         angle = 2.0**ANGLE_UNIT * state
@@ -126,7 +120,6 @@ class Planar(Formulation):
         return Rotation([x * spin for x in axis], states)
 
     def blocks(self, m: Mechanics, plan: ModelPlan) -> list[StateBlock]:
-        """See ``Formulation``."""
         states, axis, why = m.carried(m.attitude), self._plane.axis, plan.requirements.why["attitude"]
         spin = m.scene.context.ldexp(dot(m.scene.angular_velocity, axis), m.scaling.time)
         block = StateBlock(

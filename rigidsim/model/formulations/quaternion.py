@@ -9,13 +9,12 @@ import heyoka as hy
 from rigidsim.model import rotations
 from rigidsim.model.body import BODY
 from rigidsim.model.formulations.formulation import Formulation, ModelPlan, formulates
-from rigidsim.model.formulations.orbital_frame import corotating_orbit, orbital_states
+from rigidsim.model.formulations.orbital_frame import OrbitalQuaternion
 from rigidsim.model.load import Load
 from rigidsim.model.numbers import Rounder
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.state_blocks import AttitudeStates
 from rigidsim.scene.formulations import DEFAULT_FORMULATION, FORMULATIONS
-from rigidsim.scene.orbits import KeplerOrbit
 from rigidsim.scene.scene import Scene
 
 
@@ -26,27 +25,10 @@ class Quaternion(Formulation):
     @classmethod
     def of(cls, scene: Scene, loads: Sequence[Load]) -> Formulation:
         """In space axes, or where that is cheaper relative to an orbit's frame."""
-        orbit = corotating_orbit(scene, loads)
-        return cls() if orbit is None else OrbitalQuaternion(orbit)
+        return OrbitalQuaternion.if_cheaper(scene, loads) or cls()
 
     def attitude(self, plan: ModelPlan, rates: list[Symbolic], number: Rounder) -> AttitudeStates:
-        """See ``Formulation``."""
         return quaternion_states(plan.scene, rates)
-
-
-class OrbitalQuaternion(Quaternion):
-    """The quaternion relative to the frame that turns with a circular orbit."""
-
-    why = "relative to the frame that turns with the orbit, where the gradient takes a third fewer products"
-
-    def __init__(self, orbit: KeplerOrbit) -> None:
-        self.orbit = orbit
-
-    def attitude(self, plan: ModelPlan, rates: list[Symbolic], number: Rounder) -> AttitudeStates:
-        """See ``Formulation``."""
-        scene, orbit = plan.scene, self.orbit
-        unit = scene.context.ldexp(scene.context.one, plan.scaling.time)
-        return orbital_states(scene, rates, orbit, plan.orbit_tags[orbit], unit, number)
 
 
 def quaternion_states(scene: Scene, rates: list[Symbolic]) -> AttitudeStates:

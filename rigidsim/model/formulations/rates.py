@@ -17,16 +17,12 @@ from rigidsim.scene.formulations import FORMULATIONS
 class Rates(Formulation):
     """Euler's equations, and Poisson's for the vertical."""
 
-    @property
-    def twin(self) -> str:
-        """See ``Formulation``."""
-        return self.name
+    twin = "rates"
 
     def attitude(self, plan: ModelPlan, rates: list[Symbolic], number: Rounder) -> None:
-        """See ``Formulation``."""
+        return None
 
     def blocks(self, m: Mechanics, plan: ModelPlan) -> list[StateBlock]:
-        """See ``Formulation``."""
         why = plan.requirements.why
         blocks = [rate_block(m, why["rates"])]
         if plan.requirements.vertical:

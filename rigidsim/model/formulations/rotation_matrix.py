@@ -20,7 +20,6 @@ class RotationMatrix(Formulation):
     """The rotation matrix, body to space axes, row by row."""
 
     def attitude(self, plan: ModelPlan, rates: list[Symbolic], number: Rounder) -> AttitudeStates:
-        """See ``Formulation``."""
         names = [f"r{i}{j}" for i in "123" for j in "123"]
         flat = list(hy.make_vars(*names))
         r = [flat[0:3], flat[3:6], flat[6:9]]

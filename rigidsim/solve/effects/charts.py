@@ -2,7 +2,7 @@
 
 The chart is changed at the first natural step boundary where its singular factor is below ``NEAR``: a
 function of the state alone, so that bits don't depend on how a run is driven. The other chart's factor is at
-least sqrt(1 - NEAR^2) there (see ``rigidsim.model.euler_charts``), far from a change back.
+least sqrt(1 - NEAR^2) there (see ``rigidsim.model.formulations.euler_angles``), far from a change back.
 
 What is recorded stays in the asked sequence: in the partner chart the asked angles are followed from natural
 step to natural step (where they swing fast: in parts of steps), and each sample is joined to what was found
@@ -23,9 +23,15 @@ import heyoka as hy
 import mpmath
 import numpy as np
 
-from rigidsim.model.euler_charts import across, is_proper, partner_sequence, pole_of_partner, singular_factor
+from rigidsim.model.formulations.euler_angles import (
+    across,
+    partner_sequence,
+    pole_of_partner,
+    singular_factor,
+)
 from rigidsim.model.system import System
 from rigidsim.scene.attitude import quaternion_from_euler
+from rigidsim.scene.rotations import is_proper
 from rigidsim.solve.compiled import CompiledFunction, TaylorEngine, compiled_function
 from rigidsim.solve.effects.angle_wrapping import AngleWrapping
 from rigidsim.solve.effects.effect import Effect

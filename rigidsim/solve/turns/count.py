@@ -26,11 +26,11 @@ from dataclasses import dataclass, replace
 import heyoka as hy
 import numpy as np
 
-from rigidsim.model.euler_charts import is_proper
 from rigidsim.model.frames.reference_plane import plane_drift
 from rigidsim.model.outputs import Recorded
 from rigidsim.model.scaling import source_rate
 from rigidsim.model.system import System
+from rigidsim.scene.rotations import is_proper
 from rigidsim.scene.scene import SampleTimes
 from rigidsim.solve.compiled import CompiledFunction, compiled_engine, compiled_function, interruptible
 from rigidsim.solve.precision import precision_of

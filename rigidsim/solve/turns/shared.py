@@ -11,9 +11,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from rigidsim.model.euler_charts import is_proper
 from rigidsim.model.outputs import Recorded
 from rigidsim.scene.attitude import AXES, parity
+from rigidsim.scene.rotations import is_proper
 
 _NEAR = (
     0.5  # singular factor: between two points below it, on one side, the body turns by less than half a turn
