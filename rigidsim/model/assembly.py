@@ -11,8 +11,8 @@ from rigidsim.model.capabilities import Reacting, having, orbit_of, table_of
 from rigidsim.model.formulations.formulation import Formulation, ModelPlan
 from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.needs import work_is_needed
-from rigidsim.model.numbers import Rounder
 from rigidsim.model.observables.mechanical import WORK
+from rigidsim.model.scaling import Rounder
 from rigidsim.model.state_blocks import StateBlock, joined
 from rigidsim.model.step_limiter import PACE, arguments, pace_derivative, roots
 from rigidsim.model.tangents import GROWTH, tangent_block

@@ -7,8 +7,8 @@ from typing import Any
 
 import heyoka as hy
 
-from rigidsim.model.numbers import Rounder
 from rigidsim.model.rotations import Symbolic
+from rigidsim.model.scaling import Rounder
 from rigidsim.scene.arithmetic import Matrix, negligible
 
 

@@ -25,9 +25,8 @@ import heyoka as hy
 
 from rigidsim.model.kinematics import Kinematics
 from rigidsim.model.load import Load, Term
-from rigidsim.model.numbers import unit_vectors
 from rigidsim.model.rotations import Symbolic
-from rigidsim.scene.arithmetic import Vector, cross
+from rigidsim.scene.arithmetic import Vector, cross, unit_vectors
 from rigidsim.scene.scene import Scene
 
 

@@ -9,11 +9,10 @@ import heyoka as hy
 
 from rigidsim.model.kinematics import Kinematics
 from rigidsim.model.load import Term
-from rigidsim.model.numbers import unit_vectors
 from rigidsim.model.orbits.ephemeris import MEAN_DISTANCE, SourcePosition, source_position
 from rigidsim.model.orbits.point_mass_pair import PointMassPair
 from rigidsim.model.rotations import Symbolic, transpose
-from rigidsim.scene.arithmetic import Vector, cross, norm
+from rigidsim.scene.arithmetic import Vector, cross, norm, unit_vectors
 from rigidsim.scene.epochs import J2000, Epoch
 from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.orbit_tables.pieces import TabulatedOrbit

@@ -21,8 +21,8 @@ import heyoka as hy
 
 from rigidsim.model.euler_poles import angles_of_matrix, starts_near_pole
 from rigidsim.model.kinematics import Kinematics
-from rigidsim.model.numbers import Rounder
 from rigidsim.model.rotations import Symbolic, euler_from_matrix, quaternion_from_matrix
+from rigidsim.model.scaling import Rounder
 from rigidsim.model.two_part import TwoPartTime, rounded
 from rigidsim.scene.expressions import tree as expressions
 from rigidsim.scene.expressions.lines import LineInTime, line_of

@@ -13,12 +13,11 @@ from typing import Any, TypeVar
 import heyoka as hy
 
 from rigidsim.model.body import BODY, RotatingBody
-from rigidsim.model.numbers import Rounder, ScaledNumbers
 from rigidsim.model.orbits.kepler_states import OrbitStates, orbit_states
 from rigidsim.model.orbits.point_mass_states import PointMassStates
 from rigidsim.model.orbits.table_states import TablePlace, table_states
 from rigidsim.model.rotations import Symbolic, SymbolicMatrix, apply, transpose
-from rigidsim.model.scaling import Scaling
+from rigidsim.model.scaling import Rounder, ScaledNumbers, Scaling
 from rigidsim.model.state_blocks import AttitudeStates, StateBlock
 from rigidsim.scene.arithmetic import Vector, dot, negligible
 from rigidsim.scene.expressions.tree import Node

@@ -25,9 +25,8 @@ from rigidsim.model.heyoka_expressions import state_names, to_heyoka
 from rigidsim.model.kinematics import in_common_unit
 from rigidsim.model.load import Load, Term, force_terms, torque_terms
 from rigidsim.model.mechanics import Mechanics
-from rigidsim.model.numbers import scaled_numbers
 from rigidsim.model.rotations import Symbolic
-from rigidsim.model.scaling import Drive, choose_scaling
+from rigidsim.model.scaling import Drive, choose_scaling, scaled_numbers
 from rigidsim.scene import attitude as numeric
 from rigidsim.scene.arithmetic import apply, transpose
 from rigidsim.scene.expressions.tree import names_used

@@ -27,10 +27,9 @@ from rigidsim.model.load import Load, loads_of
 from rigidsim.model.load_estimate import estimate_drive
 from rigidsim.model.loads.uniform_gravity import UniformGravity
 from rigidsim.model.needs import NEEDS
-from rigidsim.model.numbers import scaled_numbers
 from rigidsim.model.orbits.table_states import Carried, TablePlace, places_of
 from rigidsim.model.refusals import refuse_odd_loads, refuse_second_orbits
-from rigidsim.model.scaling import Scaling, amplitude_of, choose_scaling
+from rigidsim.model.scaling import Scaling, amplitude_of, choose_scaling, scaled_numbers
 from rigidsim.scene.expressions.tree import ATTITUDE_NAMES, FLIGHT_NAMES
 from rigidsim.scene.formulations import AUTO, variables_named
 from rigidsim.scene.orbit_tables.pieces import TabulatedOrbit

@@ -14,9 +14,9 @@ import rigidsim.model.partial_invariants  # noqa: F401  (enters what it defines 
 from rigidsim.errors import ConfigError, Problem
 from rigidsim.model.euler_poles import Poles
 from rigidsim.model.mechanics import Mechanics
-from rigidsim.model.numbers import Rounder
 from rigidsim.model.observables import Steady
 from rigidsim.model.rotations import Symbolic
+from rigidsim.model.scaling import Rounder
 from rigidsim.scene.registry import OBSERVABLES
 
 

@@ -13,11 +13,10 @@ from rigidsim.model.assembly import assemble_states
 from rigidsim.model.formulations.formulation import Formulation, ModelPlan, Requirements
 from rigidsim.model.heyoka_expressions import carries_sign, plain_angles, state_names, to_heyoka
 from rigidsim.model.mechanics import Mechanics
-from rigidsim.model.numbers import Rounder
 from rigidsim.model.orbits.table_states import Pieces
 from rigidsim.model.outputs import Invariant, Recorded, drift_outputs, find_invariants, recorded_variables
 from rigidsim.model.rotations import Symbolic
-from rigidsim.model.scaling import Scaling
+from rigidsim.model.scaling import Rounder, Scaling
 from rigidsim.model.state_blocks import StateBlock, joined
 from rigidsim.scene.expressions.tree import ATTITUDE_NAMES, names_used
 from rigidsim.scene.scene import Scene

@@ -82,6 +82,11 @@ def norm(context: Any, a: Vector) -> Any:
     return context.sqrt(dot(a, a))
 
 
+def unit_vectors(context: Any) -> Matrix:
+    """The three unit vectors along the axes."""
+    return [[context.one if i == j else context.zero for j in range(3)] for i in range(3)]
+
+
 def cross(a: Vector, b: Vector) -> Vector:
     """Cross product."""
     return [

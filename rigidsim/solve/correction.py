@@ -10,8 +10,8 @@ from typing import Any
 import heyoka as hy
 import mpmath
 
-from rigidsim.model.numbers import Rounder
 from rigidsim.model.rotations import Symbolic
+from rigidsim.model.scaling import Rounder
 from rigidsim.model.system import System
 from rigidsim.solve.precision import Scalar
 

@@ -24,8 +24,8 @@ from support import EPSILON, angle_between, config, law, loaded, run_text, same_
 
 import rigidsim
 from rigidsim.model.formulations.formulation import Formulation, ModelPlan, formulates
-from rigidsim.model.numbers import Rounder
 from rigidsim.model.rotations import Symbolic, quaternion_matrix
+from rigidsim.model.scaling import Rounder
 from rigidsim.model.state_blocks import AttitudeStates
 from rigidsim.model.system import System
 from rigidsim.scene.formulations import Variables

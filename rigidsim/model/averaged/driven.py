@@ -19,8 +19,7 @@ from rigidsim.model.averaged.free_motion import FreeMotion, free_motion
 from rigidsim.model.averaged.polhode import Polhodes, mean_square_sine, means_needed
 from rigidsim.model.averaged.torques import DrivingTorques
 from rigidsim.model.load import Load
-from rigidsim.model.numbers import scaled_numbers
-from rigidsim.model.scaling import Scaling
+from rigidsim.model.scaling import Scaling, scaled_numbers
 from rigidsim.scene import attitude
 from rigidsim.scene.arithmetic import Vector, apply, dot, norm
 from rigidsim.scene.readable_time import span_text

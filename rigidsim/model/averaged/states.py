@@ -14,9 +14,8 @@ from rigidsim.model.averaged.driven_mechanics import AMPLITUDES, DrivenMechanics
 from rigidsim.model.averaged.mechanics import AveragedMechanics
 from rigidsim.model.averaged.resonant_mechanics import RESONANT_ANGLE, SLOW, ResonantMechanics
 from rigidsim.model.load import Load
-from rigidsim.model.numbers import Rounder, ScaledNumbers
 from rigidsim.model.orbits.table_states import TablePlace
-from rigidsim.model.scaling import Scaling
+from rigidsim.model.scaling import Rounder, ScaledNumbers, Scaling
 from rigidsim.model.state_blocks import AttitudeStates, StateBlock
 from rigidsim.scene.orbit_tables.pieces import TabulatedOrbit
 from rigidsim.scene.orbits import KeplerOrbit

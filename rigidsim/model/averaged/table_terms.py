@@ -13,10 +13,10 @@ from typing import Any
 import heyoka as hy
 
 from rigidsim.model.averaged.orbit_terms import Ellipse, OrbitPlace, equinoctial_axes, nutation, turned
-from rigidsim.model.numbers import Rounder
 from rigidsim.model.orbits.kepler_states import OrbitStates
 from rigidsim.model.orbits.table_states import ElementStates, TablePlace, element_states
 from rigidsim.model.rotations import Symbolic
+from rigidsim.model.scaling import Rounder
 from rigidsim.model.two_part import as_factor, rounded
 from rigidsim.scene.arithmetic import dot
 from rigidsim.scene.orbit_tables.pieces import AXIS, TabulatedOrbit

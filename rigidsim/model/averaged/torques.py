@@ -25,9 +25,8 @@ from rigidsim.model.capabilities import Damping, Reacting, has_source, orbit_of,
 from rigidsim.model.carriers import Carrier
 from rigidsim.model.load import Load
 from rigidsim.model.mechanics import Mechanics
-from rigidsim.model.numbers import Rounder, ScaledNumbers
 from rigidsim.model.rotations import Symbolic
-from rigidsim.model.scaling import Scaling
+from rigidsim.model.scaling import Rounder, ScaledNumbers, Scaling
 from rigidsim.model.two_part import as_factor
 from rigidsim.scene.arithmetic import Vector, dot
 from rigidsim.scene.scene import Scene

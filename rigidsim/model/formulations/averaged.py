@@ -12,8 +12,7 @@ from rigidsim.model.formulations.formulation import Formulation, ModelPlan, Requ
 from rigidsim.model.frames.reference_plane import refuse_without_plane
 from rigidsim.model.load import Load
 from rigidsim.model.mechanics import Mechanics
-from rigidsim.model.numbers import Rounder
-from rigidsim.model.scaling import choose_scaling
+from rigidsim.model.scaling import Rounder, choose_scaling
 from rigidsim.model.state_blocks import StateBlock
 from rigidsim.scene.formulations import Variables
 from rigidsim.scene.scene import Scene

@@ -20,9 +20,8 @@ from rigidsim.model.formulations.euler_angles import ANGLES, euler_states
 from rigidsim.model.formulations.formulation import Formulation, ModelPlan, Rotation, Rounding, formulates
 from rigidsim.model.load import Load
 from rigidsim.model.mechanics import Mechanics
-from rigidsim.model.numbers import Rounder
 from rigidsim.model.rotations import Symbolic
-from rigidsim.model.scaling import Scaling
+from rigidsim.model.scaling import Rounder, Scaling
 from rigidsim.model.state_blocks import AttitudeStates, StateBlock
 from rigidsim.scene import attitude as numeric
 from rigidsim.scene.arithmetic import apply, dot, multiply, negligible

@@ -21,8 +21,8 @@ import heyoka as hy
 from rigidsim.model import rotations
 from rigidsim.model.formulations.formulation import Formulation, ModelPlan, Rounding, formulates
 from rigidsim.model.load import Load
-from rigidsim.model.numbers import Rounder
 from rigidsim.model.rotations import Symbolic
+from rigidsim.model.scaling import Rounder
 from rigidsim.model.state_blocks import AttitudeStates
 from rigidsim.scene import attitude
 from rigidsim.scene.arithmetic import dot

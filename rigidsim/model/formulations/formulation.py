@@ -19,10 +19,9 @@ from rigidsim.model.capabilities import is_wide
 from rigidsim.model.kinematics import in_common_unit
 from rigidsim.model.load import Load, Term
 from rigidsim.model.mechanics import Mechanics
-from rigidsim.model.numbers import Rounder, ScaledNumbers
 from rigidsim.model.orbits.table_states import Carried, TablePlace
 from rigidsim.model.rotations import Symbolic
-from rigidsim.model.scaling import Scaling, largest_rates
+from rigidsim.model.scaling import Rounder, ScaledNumbers, Scaling, largest_rates
 from rigidsim.model.state_blocks import AttitudeStates, StateBlock
 from rigidsim.scene.arithmetic import dot, negligible
 from rigidsim.scene.formulations import DEFAULT_FORMULATION, FORMULATIONS, Variables

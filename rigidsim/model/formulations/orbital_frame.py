@@ -22,8 +22,8 @@ from rigidsim.model import rotations
 from rigidsim.model.capabilities import corotating_orbit_of
 from rigidsim.model.formulations.formulation import Formulation, ModelPlan
 from rigidsim.model.load import Load
-from rigidsim.model.numbers import Rounder
 from rigidsim.model.rotations import Symbolic, SymbolicMatrix
+from rigidsim.model.scaling import Rounder
 from rigidsim.model.state_blocks import AttitudeStates, OrbitalFrame, StateBlock
 from rigidsim.model.two_part import as_factor
 from rigidsim.scene import attitude

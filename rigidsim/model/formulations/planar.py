@@ -24,8 +24,8 @@ from rigidsim.model.carriers import carried_beside
 from rigidsim.model.formulations.formulation import Formulation, ModelPlan, Rotation, Unsuited, formulates
 from rigidsim.model.load import Load
 from rigidsim.model.mechanics import Mechanics
-from rigidsim.model.numbers import Rounder
 from rigidsim.model.rotations import Symbolic
+from rigidsim.model.scaling import Rounder
 from rigidsim.model.state_blocks import AttitudeStates, StateBlock
 from rigidsim.model.two_part import as_factor
 from rigidsim.scene import attitude

@@ -5,8 +5,8 @@ from __future__ import annotations
 from rigidsim.model.body import BODY
 from rigidsim.model.formulations.formulation import Formulation, ModelPlan, formulates, rate_block
 from rigidsim.model.mechanics import Mechanics
-from rigidsim.model.numbers import Rounder
 from rigidsim.model.rotations import Symbolic
+from rigidsim.model.scaling import Rounder
 from rigidsim.model.state_blocks import StateBlock
 from rigidsim.scene.arithmetic import apply, cross, transpose
 from rigidsim.scene.attitude import rotation_matrix

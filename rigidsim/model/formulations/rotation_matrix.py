@@ -8,8 +8,8 @@ import heyoka as hy
 
 from rigidsim.model import rotations
 from rigidsim.model.formulations.formulation import Formulation, ModelPlan, formulates
-from rigidsim.model.numbers import Rounder
 from rigidsim.model.rotations import Symbolic
+from rigidsim.model.scaling import Rounder
 from rigidsim.model.state_blocks import AttitudeStates
 from rigidsim.scene.attitude import rotation_matrix
 from rigidsim.scene.formulations import FORMULATIONS

@@ -17,11 +17,10 @@ from rigidsim.model.kinematics import Kinematics
 from rigidsim.model.load import Load, Term, loads_of
 from rigidsim.model.load_words import length_text, orbit_text, value_text
 from rigidsim.model.loads.central_gravity import CentralGravity
-from rigidsim.model.numbers import unit_vectors
 from rigidsim.model.plausibility import about_orbit, implied_strength
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.two_part import as_factor
-from rigidsim.scene.arithmetic import Vector, cross, dot, negligible, norm
+from rigidsim.scene.arithmetic import Vector, cross, dot, negligible, norm, unit_vectors
 from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.fields import GravitationalParameter, InUnit, Metre, Triple
 from rigidsim.scene.orbits import KeplerOrbit, Orbit, resolve_orbit

@@ -18,12 +18,11 @@ from rigidsim.model.kinematics import Kinematics
 from rigidsim.model.load import Term
 from rigidsim.model.load_words import reach_text, source_text, value_text
 from rigidsim.model.loads.point_attraction import PointAttraction
-from rigidsim.model.numbers import unit_vectors
 from rigidsim.model.orbit_planes import OrbitPlane
 from rigidsim.model.orbits.point_mass_pair import PointMassPair
 from rigidsim.model.plausibility import about_start, about_strength, attracting
 from rigidsim.model.rotations import Symbolic
-from rigidsim.scene.arithmetic import Vector, cross, norm
+from rigidsim.scene.arithmetic import Vector, cross, norm, unit_vectors
 from rigidsim.scene.point_masses import GRAVITATIONAL_CONSTANT, PointMasses, closest
 from rigidsim.scene.scene import Scene
 from rigidsim.store.summary_parts import Caution

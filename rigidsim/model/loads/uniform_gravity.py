@@ -13,9 +13,8 @@ from pydantic import Field
 from rigidsim.model.kinematics import Kinematics
 from rigidsim.model.load import Load, Term
 from rigidsim.model.load_words import direction_text, value_text
-from rigidsim.model.numbers import unit_vectors
 from rigidsim.model.rotations import Symbolic
-from rigidsim.scene.arithmetic import Vector, cross, dot, negligible, norm
+from rigidsim.scene.arithmetic import Vector, cross, dot, negligible, norm, unit_vectors
 from rigidsim.scene.exact import ExactNumber, parse_number
 from rigidsim.scene.fields import Acceleration, Triple
 from rigidsim.scene.registry import LoadFields, Surroundings, register_load

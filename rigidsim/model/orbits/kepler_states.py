@@ -15,8 +15,8 @@ from typing import Any
 
 import heyoka as hy
 
-from rigidsim.model.numbers import Rounder
 from rigidsim.model.rotations import Symbolic
+from rigidsim.model.scaling import Rounder
 from rigidsim.model.state_blocks import StateBlock
 from rigidsim.model.two_part import as_factor
 from rigidsim.scene.orbits import KeplerOrbit

@@ -13,9 +13,8 @@ from typing import Any
 
 import heyoka as hy
 
-from rigidsim.model.numbers import Rounder
 from rigidsim.model.rotations import Symbolic
-from rigidsim.model.scaling import Scaling
+from rigidsim.model.scaling import Rounder, Scaling
 from rigidsim.model.state_blocks import StateBlock
 from rigidsim.scene.point_masses import PointMasses
 

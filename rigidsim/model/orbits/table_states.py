@@ -27,9 +27,9 @@ from typing import Any
 
 import heyoka as hy
 
-from rigidsim.model.numbers import Rounder
 from rigidsim.model.orbits.kepler_states import OrbitStates
 from rigidsim.model.rotations import Symbolic
+from rigidsim.model.scaling import Rounder
 from rigidsim.model.state_blocks import StateBlock
 from rigidsim.model.two_part import as_factor, rounded
 from rigidsim.scene.arithmetic import GUARD_BITS
