@@ -82,6 +82,11 @@ def globe_of(one: dict[str, Any]) -> Globe | None:
     return None if known is None else next(globe for globe in GLOBES if globe.name == known.name)
 
 
+def named_globe(name: str) -> Globe | None:
+    """The known body of this name; None if it is no known one."""
+    return next((globe for globe in GLOBES if globe.name.lower() == name.lower()), None)
+
+
 def called(globe: Globe | None, unknown: str) -> str:
     """The attracting body in a sentence: ``the Sun``, ``Saturn``, or ``the`` and a word if unknown."""
     return f"the {unknown}" if globe is None else globe.called

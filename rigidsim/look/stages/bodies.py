@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -18,6 +19,7 @@ from rigidsim.look.stages.parts import (
     MOMENTUM,
     POLHODE,
     SOURCE,
+    TRACK,
     VELOCITY,
     Array,
     Arrow,
@@ -34,6 +36,11 @@ if TYPE_CHECKING:
 
 FIELD = np.deg2rad(55.0)
 """Field of view from bottom to top (rad), the viewer's own."""
+USUAL_VIEW = (float(np.deg2rad(24.0)), float(np.deg2rad(-55.0)))
+"""Elevation and azimuth (rad) of the eye where nothing asks for another."""
+NEAR = 6.0  # reaches: a body that moves further gets a track view of its own
+DISTANT = 30.0  # extents from the origin, beyond which the picture has an origin of its own
+TRACK_BODY = 0.08  # reach of the enlarged body in the track view
 _FLAT = 0.12  # of the other extents, below which a body is a plate
 
 
@@ -88,9 +95,21 @@ class Subject:
             points=self.points,
             axis_length=AXIS_REACH,
             quaternion=None if self.quaternion is None else viewer_quaternion(self.quaternion),
-            translation=None,
             arrows=arrows,
             trails=trails,
+        )
+
+    def enlarged(self, size: float, title: str, unit: float, path: Array, words: str) -> Stage:
+        """A stage with the path (rows, 3) of the body, which is drawn with a reach of `size`."""
+        return Stage(
+            root="path",
+            title=title,
+            unit=unit,
+            meshes=[mesh.scaled(size) for mesh in self.meshes],
+            points=self.points * size,
+            quaternion=None if self.quaternion is None else viewer_quaternion(self.quaternion),
+            translation=path,
+            trails=[trail("track", TRACK, path, words=words)],
         )
 
     @property
@@ -110,11 +129,7 @@ def column(dataset: Table, name: str, width: int) -> Array | None:
 def vectors_of(
     dataset: Table, subject: Subject, *, paths: bool = True
 ) -> tuple[list[Arrow], list[Trail], list[str]]:
-    """Angular momentum and velocity with the paths of the latter's tip, and notes on their scales.
-
-    Args:
-        paths: whether polhode and herpolhode are wanted.
-    """
+    """Angular momentum and velocity, if wanted the paths of the latter's tip, and notes on their scales."""
     arrows: list[Arrow] = []
     trails: list[Trail] = []
     notes: list[str] = []
@@ -122,39 +137,26 @@ def vectors_of(
     momentum = column(dataset, "angular_momentum", 3)
     if momentum is not None and attitude is not None and longest(momentum) > 0:
         factor = ARROW_REACH / longest(momentum)
+        words = "angular momentum L"
         arrows.append(
-            Arrow(
-                "angular_momentum",
-                "L",
-                MOMENTUM,
-                momentum * factor,
-                False,
-                "angular momentum L",
-                label_at=1.09,
-            )
+            Arrow("angular_momentum", "L", MOMENTUM, momentum * factor, False, words, label_at=1.09)
         )
-        notes.append(f"angular momentum L (yellow), space axes: 1 unit = {1 / factor:.6g} kg m²/s")
+        notes.append(f"{words} (yellow), space axes: 1 unit = {1 / factor:.6g} kg m²/s")
     rates = column(dataset, "angular_velocity", 3)
     if rates is not None and longest(rates) > 0:
         factor = ARROW_REACH / longest(rates)
         in_body = rates * factor
         tip = in_body if attitude is None else np.einsum("tij,tj->ti", attitude, in_body)
-        arrows.append(
-            Arrow(
-                "angular_velocity", "ω", VELOCITY, tip, attitude is None, "angular velocity ω",
-                label_at=0.93 if arrows else 1.07,
-            )
-        )  # fmt: skip
-        notes.append(f"angular velocity ω (cyan): 1 unit = {1 / factor:.6g} rad/s")
+        words, at = "angular velocity ω", 0.93 if arrows else 1.07
+        arrows.append(Arrow("angular_velocity", "ω", VELOCITY, tip, attitude is None, words, label_at=at))
+        notes.append(f"{words} (cyan): 1 unit = {1 / factor:.6g} rad/s")
         if paths:
-            trails.append(
-                trail("polhode", POLHODE, in_body, in_body=True, words="polhode: ω's path in the body")
-            )
+            words = "polhode: ω's path in the body"
+            trails.append(trail("polhode", POLHODE, in_body, in_body=True, words=words))
             notes.append("polhode (pink): the path of the tip of ω in body axes, carried by the body")
         if paths and attitude is not None:
-            trails.append(
-                trail("herpolhode", VELOCITY, tip, with_centre=True, words="herpolhode: ω's path in space")
-            )
+            words = "herpolhode: ω's path in space"
+            trails.append(trail("herpolhode", VELOCITY, tip, with_centre=True, words=words))
             notes.append("herpolhode (cyan): the path of the tip of ω in space axes")
     if trails:
         notes.append("trails: bright for the time just passed, dark for the whole run")
@@ -163,54 +165,49 @@ def vectors_of(
 
 def source_arrows(dataset: Table, subject: Subject, length: float) -> list[Arrow]:
     """Directions in space to attracting bodies: from orbits, recorded point masses, or the recorded nadir."""
-    arrows = _mass_arrows(dataset, length)
+    arrows = []
+    for key, globe, name, path in [*_masses(dataset), *_sources(dataset, subject)]:
+        way = length * path / np.linalg.norm(path, axis=1, keepdims=True)
+        called = surroundings.called(globe, name)
+        color = globe.color if globe else SOURCE
+        arrows.append(Arrow(key, f"to {called}", color, way, False, f"direction of {called}"))
+    return arrows
+
+
+_Towards = Iterator[tuple[str, surroundings.Globe | None, str, Array]]
+"""Key, known body, name, and vectors (rows, 3), space axes, to attracting bodies."""
+
+
+def _sources(dataset: Table, subject: Subject) -> _Towards:
     listed = surroundings.told(dataset, "source")
     nadir = column(dataset, "nadir", 3)
     for number, one in enumerate(listed):
         path = surroundings.source_path(one, signals.seconds(dataset))
         if path is None and nadir is not None and len(listed) == 1 and subject.attitude is not None:
             path = np.einsum("tij,tj->ti", subject.attitude, nadir)
-        if path is None:
-            continue
-        way = length * path / np.linalg.norm(path, axis=1, keepdims=True)
-        known = surroundings.globe_of(one)
-        name = surroundings.called(known, str(one.get("ephemeris", "source")))
-        color = known.color if known else SOURCE
-        arrows.append(Arrow(f"source{number}", f"to {name}", color, way, False, f"direction of {name}"))
-    return arrows
+        if path is not None:
+            name = str(one.get("ephemeris", "source"))
+            yield f"source{number}", surroundings.globe_of(one), name, path
 
 
-def _mass_arrows(dataset: Table, length: float) -> list[Arrow]:
-    """Directions to the point masses whose positions were recorded, from the body that is one of them."""
+def _masses(dataset: Table) -> _Towards:
+    """Point masses whose positions were recorded, from the body if it is one of them."""
     positions = signals.values(dataset, "point_mass_position")
     body = read_config(dataset).get("body", {})
     host = str(body.get("host", "")) if isinstance(body, dict) else ""
     if positions is None or "point_mass" not in dataset["point_mass_position"].coords:
-        return []
+        return
     names = [str(name) for name in dataset["point_mass_position"].coords["point_mass"].values]
-    if host not in names:
-        return []
-    arrows = []
     for number, name in enumerate(names):
-        if name == host:
-            continue
-        way = positions[:, number] - positions[:, names.index(host)]
-        way = length * way / np.linalg.norm(way, axis=1, keepdims=True)
-        known = next((one for one in surroundings.GLOBES if one.name.lower() == name.lower()), None)
-        called = surroundings.called(known, name)
-        color = known.color if known else SOURCE
-        arrows.append(Arrow(f"mass{number}", f"to {called}", color, way, False, f"direction of {called}"))
-    return arrows
+        if host in names and name != host:
+            path = positions[:, number] - positions[:, names.index(host)]
+            yield f"mass{number}", surroundings.named_globe(name), name, path
 
 
 def eye_at(
     elevation: float, azimuth: float, radius: float, target: Array | None = None, *, narrow: bool = False
 ) -> Camera:
-    """A camera that sees a ball of given radius from an elevation and azimuth (rad), Z up.
-
-    Args:
-        narrow: the view is about as wide as high, or less.
-    """
+    """A camera that sees a ball from an elevation and azimuth (rad), Z up; a narrow view from further off."""
     direction = direction_of(elevation, azimuth)
     target = np.zeros(3) if target is None else target
     distance = radius / np.sin(FIELD / 2) * (1.08 if narrow else 1.0)
@@ -241,7 +238,7 @@ def camera(stage: Stage, *, narrow: bool = False, subject: Subject | None = None
         target = (low + high) / 2
         margin = ARROW_REACH if stage.arrows else 0.16
         radius = float(np.linalg.norm(high - low)) / 2 + margin
-    elevation, azimuth = np.deg2rad((24.0, -55.0))
+    elevation, azimuth = USUAL_VIEW
     if stage.translation is not None and not stage.arrows:
         elevation, azimuth = plane_view(stage.translation)
     space = [arrow for arrow in stage.arrows if not arrow.in_body] or stage.arrows
@@ -256,16 +253,12 @@ def camera(stage: Stage, *, narrow: bool = False, subject: Subject | None = None
 
 
 def _facing(normals: Array, leading: Array | None) -> tuple[float, float]:
-    """Elevation and azimuth (rad) from which a plate shows its face, and an arrow isn't seen end on.
-
-    Args:
-        normals: (rows, 3), normals of the plate.
-        leading: (3,), the arrow.
+    """Elevation and azimuth (rad) from which a plate with normals (rows, 3) shows its face, and the leading
+    arrow (3,) isn't seen end on.
     """
-    normals = normals[:: max(len(normals) // 200, 1)]
-    normals = normals[np.isfinite(normals).all(axis=1)]
+    normals = signals.finite_rows(normals[:: max(len(normals) // 200, 1)])
     if not len(normals):
-        return float(np.deg2rad(24.0)), float(np.deg2rad(-55.0))
+        return USUAL_VIEW
     along = np.zeros(3) if leading is None else leading / (np.linalg.norm(leading) or 1.0)
     tried = [(e, a) for e in np.deg2rad((20.0, 30.0, 42.0)) for a in np.deg2rad(np.arange(0.0, 360.0, 15.0))]
     directions = np.array([direction_of(*angles) for angles in tried])
@@ -279,12 +272,47 @@ def _facing(normals: Array, leading: Array | None) -> tuple[float, float]:
 
 def plane_view(points: Array) -> tuple[float, float]:
     """Elevation and azimuth (radians) from which a path (points, 3) shows its plane, obliquely."""
-    finite = points[np.isfinite(points).all(axis=1)]
+    finite = signals.finite_rows(points)
     _, spread, axes = np.linalg.svd(finite - finite.mean(axis=0), full_matrices=False)
     if len(spread) < 3 or spread[1] < 0.05 * spread[0]:  # a point or a line lies in no one plane
-        return float(np.deg2rad(24.0)), float(np.deg2rad(-55.0))
+        return USUAL_VIEW
     normal = axes[2] if axes[2, 2] >= 0 else -axes[2]
     elevation = np.clip(np.arcsin(normal[2]), np.deg2rad(20.0), np.deg2rad(55.0))
     tilted = np.hypot(normal[0], normal[1]) > 0.05
     azimuth = np.arctan2(normal[1], normal[0]) - np.deg2rad(30.0) if tilted else np.deg2rad(-55.0)
     return float(elevation), float(azimuth)
+
+
+def with_track(subject: Subject, body: Stage, notes: list[str]) -> list[Stage]:
+    """The body's stage, and a second one with its track if it moves far.
+
+    A position that moves by more than `NEAR` reaches can't be shown to the scale of the body: then the body
+    stays at the centre of the first stage, and is enlarged on the second.
+    """
+    position, reach = subject.position, subject.reach
+    if position is None:
+        return [body]
+    extent = float(np.nanmax(np.linalg.norm(position - position[0], axis=1)))
+    middle = (np.nanmin(position, axis=0) + np.nanmax(position, axis=0)) / 2
+    # Far from the origin float32 would make the body jitter: then the picture has its own origin.
+    distant = float(np.linalg.norm(middle)) > DISTANT * max(extent, reach)
+    center = middle if distant else np.zeros(3)
+    if distant:
+        notes.append("the origin of the picture is at {:.9g}, {:.9g}, {:.9g} m".format(*center))
+    near = extent <= NEAR * reach
+    unit = reach if near else max(float(np.nanmax(np.abs(position - center))), reach)
+    translation = (position - center) / unit
+    if near:
+        track = trail("track", TRACK, translation, words="track of the centre of mass")
+        return [replace(body, translation=translation, trails=[*body.trails, track])]
+    enlarged = TRACK_BODY * unit / reach
+    notes.append(
+        f"the body view follows the body; in the track view 1 unit = {unit:.6g} m "
+        f"and the body is drawn {enlarged:.3g} times too large"
+    )
+    path = replace(
+        subject.enlarged(TRACK_BODY, "Track in space", unit, translation, "track of the centre of mass"),
+        axis_length=2 * TRACK_BODY,
+        origin=not distant,
+    )
+    return [body, path]

@@ -1,36 +1,90 @@
-"""Parts shared by satellites and bodies on free orbits: the local frame, and the planet in a picture of the
-orbit.
-"""
+"""Stages of bodies on free and on prescribed orbits: the body before its planet, and the orbit."""
 
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rigidsim.look.solids import Mesh
-from rigidsim.look.stages.bodies import FIELD, Subject, direction_of, plane_view
+from rigidsim.look import signals, surroundings
+from rigidsim.look.solids import rotation_matrix
+from rigidsim.look.stages.bodies import FIELD, Subject, column, direction_of, plane_view, vectors_of
 from rigidsim.look.stages.parts import (
     FAINT,
+    FIGURE,
     PALE,
+    SOURCE,
     SPACE,
-    TRACK,
     Array,
+    Arrow,
     Camera,
     Line,
+    Picture,
     Solid,
     Spot,
     Stage,
+    Vector,
+    quaternion_of,
     trail,
     viewer_quaternion,
 )
 from rigidsim.look.surroundings import GREY, Globe, called
 from rigidsim.look.symbols import globe, graticule
 
+if TYPE_CHECKING:
+    from rigidsim.look.rows import Table
+
 ORBIT_BODY = 0.11  # reach of the enlarged body, in units of the orbit's largest distance
 NORMAL: tuple[int, int, int] = (190, 150, 255)
 FORWARD: tuple[int, int, int] = (150, 205, 110)
 _ALMOST = 0.93  # of the least distance: a larger planet would swallow the enlarged body
+_LARGE = 1e5  # m: a larger body is a planet, and what pulls it is far away
+_HORIZON, _BELOW = 9.0, 2.2  # radius of the planet drawn near the body, and its distance
+
+
+def free_orbit(dataset: Table, subject: Subject) -> Picture | None:
+    """Picture of a body with a position and one attracting point; None for others."""
+    listed = surroundings.told(dataset, "attractor")
+    if len(listed) != 1 or subject.position is None:
+        return None
+    position = subject.position - np.asarray(listed[0]["position"], dtype=float)
+    planet = surroundings.globe_of(listed[0])
+    arrows, trails, notes = vectors_of(dataset, subject, paths=False)
+    name = called(planet, "attracting point")
+    down = -position / np.linalg.norm(position, axis=1, keepdims=True)
+    arrows.append(Arrow("nadir", f"to {name}", SOURCE, 1.35 * down, False, f"direction of {name}"))
+    close = subject.stage(arrows, trails, "Body, seen in space axes")
+    stages = [close, _orbit(subject, position, planet, notes)]
+    leading = ("libration", "angular_velocity")
+    return Picture("orbit about an attracting point", stages, [], leading, notes)
+
+
+def satellite(dataset: Table, subject: Subject) -> Picture | None:
+    """Picture of a small body with a single source on an orbit, its attitude known in space or in the local
+    frame; None for others.
+    """
+    listed = [one for one in surroundings.told(dataset, "source") if "orbit" in one]
+    unsized = subject.solids and subject.solids[0].get("equivalent")  # known by its moments alone
+    large = subject.reach > _LARGE and not unsized
+    if len(listed) != 1 or subject.position is not None or large:
+        return None
+    orbit = listed[0]["orbit"]
+    source = surroundings.kepler_path(orbit, signals.seconds(dataset))
+    # The normal of the satellite's orbit: as seen from the planet it goes about it in the same sense.
+    local = local_frame(-source, surroundings.orbit_normal(orbit))
+    quaternion = subject.quaternion
+    if quaternion is None:
+        angles = column(dataset, "roll_pitch_yaw", 3)
+        if angles is None or not np.isfinite(angles).all():
+            return None
+        quaternion = quaternion_of(local @ _turned(angles))
+    planet = surroundings.globe_of(listed[0])
+    known = replace(subject, quaternion=quaternion, attitude=rotation_matrix(quaternion))
+    notes = ["in the local frame the planet's surface is drawn near the body, and not to scale"]
+    stages = [_in_local_frame(dataset, known, local, planet), _orbit(known, -source, planet, notes)]
+    leading = ("libration", "roll_pitch_yaw", "angular_velocity")
+    return Picture("satellite on its orbit", stages, [], leading, notes)
 
 
 def local_frame(position: Array, normal: Array) -> Array:
@@ -47,62 +101,81 @@ def local_frame(position: Array, normal: Array) -> Array:
     return np.stack([forward, np.cross(down, forward), down], axis=2)
 
 
-def orbit_stage(subject: Subject, quaternion: Array | None, position: Array, planet: Globe | None) -> Stage:
-    """The orbit about its planet, both to one scale, with the body enlarged.
+def _turned(angles: Array) -> Array:
+    """Rotations (rows, 3, 3) from body axes to the local frame for roll, pitch and yaw (rows, 3), 3-2-1."""
+    found = np.eye(3)
+    for k in (2, 1, 0):  # yaw, pitch, roll: about z, y, x
+        i, j = (k + 1) % 3, (k + 2) % 3
+        one = np.zeros((len(angles), 3, 3))
+        one[:, k, k] = 1.0
+        one[:, i, i] = one[:, j, j] = np.cos(angles[:, k])
+        one[:, j, i] = np.sin(angles[:, k])
+        one[:, i, j] = -one[:, j, i]
+        found = found @ one
+    return np.asarray(found)
 
-    Args:
-        quaternion: (rows, 4) w x y z of the body in space.
-        position: (rows, 3), m, from the planet.
-    """
-    unit = float(np.nanmax(np.linalg.norm(position, axis=1)))
-    nearest = float(np.nanmin(np.linalg.norm(position, axis=1))) / unit
+
+def _orbit(subject: Subject, position: Array, planet: Globe | None, notes: list[str]) -> Stage:
+    """The orbit (rows, 3), m, from the planet, and the planet, both to one scale, with the body enlarged."""
+    distance = np.linalg.norm(position, axis=1)
+    unit = float(np.nanmax(distance))
     places = position / unit
-    radius = min(planet.radius / unit, _ALMOST * nearest) if planet is not None else 0.02
-    color = planet.color if planet is not None else GREY
-    name = planet.name if planet is not None else "attracting point"
-    sizes = np.full(3, radius)
+    nearest = float(np.nanmin(distance)) / unit
+    radius = 0.02 if planet is None else min(planet.radius / unit, _ALMOST * nearest)
     elevation, azimuth = plane_view(places)
-    direction = direction_of(max(elevation, np.deg2rad(28.0)), azimuth)
-    camera = Camera(1.3 / np.sin(FIELD / 2) * direction, np.zeros(3), np.array([0.0, 0.0, 1.0]))
-    stage = Stage(
-        root="path",
-        title=f"Orbit about {called(planet, 'attracting point')}",
-        unit=unit,
-        meshes=[mesh.scaled(ORBIT_BODY) for mesh in subject.meshes],
-        points=subject.points * ORBIT_BODY,
-        axis_length=0.0,
-        quaternion=None if quaternion is None else viewer_quaternion(quaternion),
-        translation=places,
-        arrows=[],
-        trails=[trail("track", TRACK, places, words="orbit")],
-        solids=[Solid("planet", globe(sizes, color))],
-        spots=[Spot("planet", name, PALE, np.array([0.0, 0.0, radius + 0.06]))],
-        camera=camera,
+    direction = direction_of(max(elevation, float(np.deg2rad(28.0))), azimuth)
+    notes.append(
+        f"in the view of the orbit 1 unit = {unit:.6g} m; the body is drawn "
+        f"{ORBIT_BODY * unit / subject.reach:.3g} times too large"
     )
-    if radius > 0.1:
-        stage.lines.extend(
-            [
-                Line(f"graticule/{k}", (20, 24, 30), line, SPACE, 0.7, 0.5)
-                for k, line in enumerate(graticule(sizes))
-            ]
-        )
-    return stage
+    name = planet.name if planet is not None else "attracting point"
+    title = f"Orbit about {called(planet, 'attracting point')}"
+    rings = graticule(np.full(3, radius)) if radius > 0.1 else []
+    return replace(
+        subject.enlarged(ORBIT_BODY, title, unit, places, "orbit"),
+        solids=[Solid("planet", globe(np.full(3, radius), planet.color if planet is not None else GREY))],
+        spots=[Spot("planet", name, PALE, np.array([0.0, 0.0, radius + 0.06]))],
+        lines=[Line(f"graticule/{k}", (20, 24, 30), ring, SPACE, 0.7, 0.5) for k, ring in enumerate(rings)],
+        camera=Camera(1.3 / np.sin(FIELD / 2) * direction, np.zeros(3), np.array([0.0, 0.0, 1.0])),
+    )
 
 
-def horizon(planet: Globe | None, place: str, *, below: float = 2.2) -> tuple[list[Solid], list[Line]]:
-    """The planet's surface beneath the body, not to scale: a spherical cap of radius ten units, z down."""
-    color = planet.color if planet is not None else GREY
-    radius = 9.0
-    whole = globe(np.full(3, radius), color)
-    center = np.array([0.0, 0.0, below + radius])
-    moved = Mesh(whole.vertices + center, whole.triangles, whole.normals, whole.colors)
-    lines = [
-        Line(f"horizon/{k}", FAINT, line + center, place, 0.6, 0.35)
-        for k, line in enumerate(graticule(np.full(3, radius), 15.0))
+def _in_local_frame(dataset: Table, subject: Subject, local: Array, planet: Globe | None) -> Stage:
+    """The body above its planet, whose surface is drawn near it, not to scale, z down."""
+    attitude = subject.attitude
+    assert attitude is not None
+    relative = np.einsum("tji,tjk->tik", local, attitude)
+    # the principal axis that points to the planet on average, or nearest to that
+    along = signals.principal_axes(dataset) @ np.nanmean(relative[:, 2, :], axis=0)
+    k = int(np.abs(along).argmax())
+    axis = signals.principal_axes(dataset)[k] * (1.0 if along[k] >= 0 else -1.0)
+    # in space, as all moving parts are; the view looks from the local frame
+    tip = 1.3 * np.einsum("tij,tj->ti", relative, np.broadcast_to(axis, (len(relative), 3)))
+    words = "trace of the body axis that points down"
+    trails = [trail("local/axis_trace", FIGURE, tip, words=words, head=True)]
+    center = np.array([0.0, 0.0, _BELOW + _HORIZON])
+    surface = globe(np.full(3, _HORIZON), planet.color if planet is not None else GREY)
+    name = f"to {called(planet, 'source')}"
+    vectors = [
+        ("nadir", name, SOURCE, (0, 0, 1.75), f"nadir: {name}"),
+        ("forward", "forward", FORWARD, (1.75, 0, 0), "along the orbit"),
+        ("normal", "normal", NORMAL, (0, -1.6, 0), "the orbit's normal"),
     ]
-    return [Solid("horizon", moved, place)], lines
-
-
-def without_axes(stage: Stage) -> Stage:
-    """A stage without body axes."""
-    return replace(stage, axis_length=0.0)
+    eye = np.array([2.0, -4.3, -1.35])
+    eye = eye / np.linalg.norm(eye) * 2.15 / np.sin(FIELD / 2)
+    target = np.array([0.0, 0.0, 0.35])
+    return replace(
+        subject.stage([], trails, "Body in the local frame"),
+        solids=[Solid("horizon", surface.moved(np.eye(3), center), "local")],
+        lines=[
+            Line(f"horizon/{k}", FAINT, line + center, "local", 0.6, 0.35)
+            for k, line in enumerate(graticule(np.full(3, _HORIZON), 15.0))
+        ],
+        vectors=[
+            Vector(key, label, color, np.zeros(3), np.array(way), "local", words)
+            for key, label, color, way, words in vectors
+        ],
+        frames={"local": viewer_quaternion(quaternion_of(local))},
+        looked_from="local",
+        camera=Camera(target + eye, target, np.array([0.0, 0.0, -1.0])),
+    )

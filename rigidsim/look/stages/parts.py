@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from rigidsim.look.signals import across
 from rigidsim.look.solids import Mesh
 from rigidsim.look.thinning import thinned_indices
 
@@ -43,10 +44,7 @@ FIGURE: Color = (120, 165, 255)
 class Arrow:
     """A vector along time: (rows, 3) in stage units, from the reference point, fixed to space or the body.
 
-    Attributes:
-        label: label at its tip; empty if the legend says enough.
-        words: description for the legend; empty if it isn't listed.
-        label_at: position of the label, in lengths of the arrow.
+    `words` are for the legend, which lists those that have some; the label stands at so many lengths.
     """
 
     name: str
@@ -65,8 +63,6 @@ class Trail:
 
     Attributes:
         line, whole_line: whether neighbours are close enough to be joined.
-        stride: stride between drawn rows; 1 if the motion needs every one.
-        words: what it is, for the legend.
         head: whether the point itself is marked.
     """
 
@@ -132,34 +128,18 @@ class Solid:
 
 @dataclass(frozen=True)
 class Shell:
-    """A translucent ellipsoid, with axes along those of its place."""
+    """A translucent ellipsoid, turned by a quaternion [x, y, z, w] within its place."""
 
     name: str
     half_sizes: Array
     color: Color
-    place: str = BODY
-    quaternion: Array | None = None  # x y z w, within the place
-
-
-@dataclass(frozen=True)
-class MovingFrame:
-    """A frame that moves in space: parts may be attached to it, and a view may look from it.
-
-    Attributes:
-        quaternion: (rows, 4) float32 x y z w, or None if its axes are fixed.
-        translation: (rows, 3), or None if it stays at the origin.
-    """
-
-    name: str
-    quaternion: NDArray[np.float32] | None
-    translation: Array | None = None
+    place: str
+    quaternion: Array
 
 
 @dataclass(frozen=True)
 class Camera:
-    """Position of the eye, the point it looks at, and the upward direction, (3,) each, in the frame looked
-    from.
-    """
+    """The eye, what it looks at, and the upward direction, (3,) each, in the frame looked from."""
 
     position: Array
     target: Array
@@ -178,6 +158,7 @@ class Stage:
         quaternion: (rows, 4) float32 [x, y, z, w] as the viewer wants it, or None: no attitude.
         translation: (rows, 3), of the reference point, or None if it stays at the origin.
         origin: whether the origin of space is in the picture and marked.
+        frames: quaternions as above of frames that turn, to which parts may be attached, by name.
         looked_from: name of the frame that the camera is in, or empty for space.
         turns_with: root of another stage whose body turns alike about the same point (written once).
         camera: None for the one that suits arrows and path.
@@ -186,20 +167,20 @@ class Stage:
     root: str
     title: str
     unit: float
-    meshes: list[Mesh]
-    points: Array
-    axis_length: float
-    quaternion: NDArray[np.float32] | None
-    translation: Array | None
-    arrows: list[Arrow]
-    trails: list[Trail]
+    meshes: list[Mesh] = field(default_factory=list)
+    points: Array = field(default_factory=lambda: np.zeros((0, 3)))
+    axis_length: float = 0.0
+    quaternion: NDArray[np.float32] | None = None
+    translation: Array | None = None
+    arrows: list[Arrow] = field(default_factory=list)
+    trails: list[Trail] = field(default_factory=list)
     origin: bool = False
     lines: list[Line] = field(default_factory=list)
     spots: list[Spot] = field(default_factory=list)
     vectors: list[Vector] = field(default_factory=list)
     solids: list[Solid] = field(default_factory=list)
     shells: list[Shell] = field(default_factory=list)
-    frames: list[MovingFrame] = field(default_factory=list)
+    frames: dict[str, NDArray[np.float32]] = field(default_factory=dict)
     looked_from: str = ""
     turns_with: str = ""
     camera: Camera | None = None
@@ -293,35 +274,45 @@ def viewer_quaternion(quaternion: Array) -> NDArray[np.float32]:
 
 def quaternion_of(matrices: Array) -> Array:
     """Quaternions (rows, 4) w x y z of rotation matrices (rows, 3, 3), continuous in sign (Shepperd 1978)."""
-    m = matrices
-    trace = np.trace(m, axis1=1, axis2=2)
-    squares = np.stack([trace, m[:, 0, 0], m[:, 1, 1], m[:, 2, 2]], axis=1)
-    largest = np.argmax(squares, axis=1)
-    found = np.empty((len(m), 4))
-    products = np.empty((len(m), 4, 4))
-    products[:, 0] = np.stack(
-        [1 + trace, m[:, 2, 1] - m[:, 1, 2], m[:, 0, 2] - m[:, 2, 0], m[:, 1, 0] - m[:, 0, 1]], axis=1
-    )
-    for k in range(3):
-        i, j = (k + 1) % 3, (k + 2) % 3
-        row = np.empty((len(m), 4))
-        row[:, 0] = m[:, j, i] - m[:, i, j]
-        row[:, 1 + k] = 1 + 2 * m[:, k, k] - trace
-        row[:, 1 + i] = m[:, k, i] + m[:, i, k]
-        row[:, 1 + j] = m[:, k, j] + m[:, j, k]
-        products[:, k + 1] = row
+    m, rest = matrices, 1 - np.trace(matrices, axis1=1, axis2=2)
+    products = np.empty((len(m), 4, 4))  # four times those of the quaternion's components
+    products[:, 1:, 1:] = m + m.transpose(0, 2, 1)
+    products[:, [1, 2, 3], [1, 2, 3]] += rest[:, None]
+    products[:, 0, 0] = 2 - rest
+    halves = np.stack([m[:, 2, 1] - m[:, 1, 2], m[:, 0, 2] - m[:, 2, 0], m[:, 1, 0] - m[:, 0, 1]], axis=1)
+    products[:, 0, 1:] = products[:, 1:, 0] = halves
+    largest = np.einsum("tii->ti", products).argmax(axis=1)
     found = products[np.arange(len(m)), largest]
     found /= np.linalg.norm(found, axis=1, keepdims=True)
-    flips = np.sign(np.einsum("ij,ij->i", found[1:], found[:-1]))
-    flips[~(np.abs(flips) > 0)] = 1.0
+    flips = np.where(np.einsum("ij,ij->i", found[1:], found[:-1]) < 0, -1.0, 1.0)
     return np.asarray(found * np.cumprod(np.append(1.0, flips))[:, None])
 
 
 def circle(radius: float, normal: Array, center: Array | None = None, count: int = 121) -> Array:
     """Points (count, 3) of a circle about an axis."""
-    normal = normal / np.linalg.norm(normal)
-    first = np.cross(np.eye(3)[np.abs(normal).argmin()], normal)
-    first /= np.linalg.norm(first)
+    first, second = across(normal / np.linalg.norm(normal))
     angle = np.linspace(0, 2 * np.pi, count)[:, None]
-    ring = radius * (np.cos(angle) * first + np.sin(angle) * np.cross(normal, first))
+    ring = radius * (np.cos(angle) * first + np.sin(angle) * second)
     return np.asarray(ring if center is None else ring + center)
+
+
+def grid(
+    name: str,
+    center: Array,
+    first: Array,
+    second: Array,
+    size: float,
+    count: int,
+    strength: float,
+    *,
+    round_: bool = False,
+) -> list[Line]:
+    """Lines of a square or round grid along two unit vectors, so many to either side of its center."""
+    lines = []
+    for k in range(-count, count + 1):
+        at = size * k / count
+        half = np.sqrt(size**2 - at**2) if round_ else size
+        for letter, u, v in (("a", first, second), ("b", second, first)):
+            ends = np.stack([center + at * u - half * v, center + at * u + half * v])
+            lines.append(Line(f"{name}/{letter}{k + count}", FAINT, ends, SPACE, 0.7, strength))
+    return lines

@@ -13,7 +13,7 @@ import numpy as np
 from rigidsim.look import signals, surroundings
 from rigidsim.look.coasts import earth
 from rigidsim.look.stages import precession
-from rigidsim.look.stages.bodies import FIELD, Subject, column, direction_of, source_arrows
+from rigidsim.look.stages.bodies import Subject, column, source_arrows
 from rigidsim.look.stages.parts import (
     BODY,
     FIGURE,
@@ -22,7 +22,6 @@ from rigidsim.look.stages.parts import (
     VELOCITY,
     Array,
     Arrow,
-    Camera,
     Color,
     Line,
     Picture,
@@ -42,89 +41,70 @@ _ROUND = 0.9  # of the smallest over the largest semi-axis
 _ALIKE = 1e-3  # of a radius, for a body to be taken for one that is known
 _UNKNOWN: Color = (128, 148, 170)
 EQUATOR: Color = (150, 205, 110)
-_LEADING = (
-    "polar_motion",
-    "obliquity",
-    "node_longitude",
-    "wobble_angle",
-    "rotation_angle",
-)
+_LEADING = ("polar_motion", "obliquity", "node_longitude", "wobble_angle", "rotation_angle")
 
 
 def picture(dataset: Table, subject: Subject) -> Picture | None:
     """Picture of a large, nearly round body that spins nearly about its figure axis; None for others."""
     axes = _semi_axes(subject)
-    if axes is None or subject.position is not None or not (signals.near_axis(dataset) or _poles(dataset)):
+    poles = signals.near_axis(dataset) or "obliquity" in dataset or "polar_motion" in dataset
+    if axes is None or subject.position is not None or not poles:
         return None
-    known = _known(str(subject.solids[0].get("name", "")), float(axes.max()))
-    name = str(subject.solids[0].get("name", "")) or (known.name.lower() if known else "")
+    name = str(subject.solids[0].get("name", ""))
+    known = _known(name, float(axes.max()))
+    name = name or (known.name.lower() if known else "")
     half = axes / axes.max()
     mesh = earth(half) if name == "earth" else globe(half, known.color if known else _UNKNOWN)
     figure = signals.figure_direction(dataset)
-    turns = subject.attitude is not None
-    if not turns and "angular_velocity" not in dataset:
+    turns, averaged = subject.attitude is not None, "angular_velocity" not in dataset
+    if not turns and averaged:
         subject = precession.pointed(dataset, subject, figure)
-    beside = subject.attitude is None and not turns and precession.moving_plane(dataset)
-    if beside and "angular_velocity" not in dataset:
+    beside = subject.attitude is None and precession.moving_plane(dataset)
+    if beside and averaged:
         subject = precession.pointed(dataset, subject, figure, plane=True)
     subject = replace(subject, meshes=[mesh], reach=float(axes.max()))
-    stage = replace(subject.stage([], []), title=name.capitalize() or "Planet", axis_length=0.0)
-    stage.lines.extend(
-        [
-            Line(f"graticule/{k}", (20, 24, 30), line, BODY, 0.8, 0.55)
-            for k, line in enumerate(graticule(half))
-        ]
-    )
+    stage = replace(subject.stage([], [], name.capitalize() or "Planet"), axis_length=0.0)
+    rings = enumerate(graticule(half))
+    stage.lines.extend(Line(f"graticule/{k}", (20, 24, 30), line, BODY, 0.8, 0.55) for k, line in rings)
     if turns or subject.attitude is None:  # the prime meridian stands out, so that the rotation shows
         stage.lines.append(Line("prime_meridian", PALE, graticule(half, 180.0, 1.006)[0], BODY, 1.6))
     stage.lines.append(Line("equator", EQUATOR, circle(1.01, figure), BODY, 1.8, 1.0, "equator"))
-    notes: list[str] = []
-    if name == "earth":
-        notes.append("continents: Natural Earth; the body's x axis is at longitude zero")
+    notes = ["continents: Natural Earth; the body's x axis is at longitude zero"] if name == "earth" else []
     planes = _pole_planes(dataset)
+    called = {"": "a planet", "earth": "the Earth", "moon": "the Moon"}.get(name, name.capitalize())
     if subject.attitude is None:
         _in_its_own_axes(dataset, stage, figure, notes)
-        stage = replace(stage, camera=_eye(np.array([0.0, 0.0, 0.3]), 1.75))
-        return Picture(f"rotation of {_article(name)}", [stage], planes, _LEADING, notes)
+        stage = replace(stage, camera=precession.eye_of_pole(0.3, 1.75))
+        return Picture(f"rotation of {called}", [stage], planes, _LEADING, notes)
     pole = subject.attitude @ figure
-    stage.arrows.append(Arrow("figure_axis", "figure axis", FIGURE, 1.45 * pole, False, "figure axis"))
+    arrow = Arrow("figure_axis", "figure axis", FIGURE, precession.POLE_REACH * pole, False, "figure axis")
+    stage.arrows.append(arrow)
     precession.reference_plane(stage)
     precession.circle_of_precession(dataset, stage, pole, "figure", notes)
     if turns:
-        stage.arrows.extend(source_arrows(dataset, subject, 1.75))
+        stage.arrows.extend(source_arrows(dataset, subject, precession.SOURCE_REACH))
     elif beside:
         notes.append("the plane of reference moves in space: the globe is drawn as seen from it")
-        notes.append(precession.standing_note(dataset, "globe"))
     else:
-        stage.arrows.extend(precession.followed_sources(dataset, subject, 1.75, notes))
+        stage.arrows.extend(precession.followed_sources(dataset, subject, notes))
+    if not turns:
         notes.append(precession.standing_note(dataset, "globe"))
-    step = _largest_turn(dataset)
-    if step > 1.0:
-        notes.append(
-            f"samples are {step:.3g} rad of rotation apart: the globe's turning isn't seen between them"
-        )
-    stage = replace(stage, camera=_eye(np.array([0.0, 0.0, 0.05]), 1.95))
-    return Picture(f"rotation of {_article(name)} in space", [stage], planes, _LEADING, notes)
+    rates, seconds = column(dataset, "angular_velocity", 3), signals.seconds(dataset)
+    if rates is not None and len(seconds) > 1:
+        step = float(np.nanmean(np.linalg.norm(rates, axis=1)) * np.abs(np.diff(seconds)).mean())
+        if step > 1.0:
+            words = "the globe's turning isn't seen between them"
+            notes.append(f"samples are {step:.3g} rad of rotation apart: {words}")
+    stage = replace(stage, camera=precession.eye_of_pole())
+    return Picture(f"rotation of {called} in space", [stage], planes, _LEADING, notes)
 
 
 def _known(name: str, radius: float) -> surroundings.Globe | None:
     """The known planet with this name, or else with this equatorial radius (m); None if unknown."""
     if name:
-        return next((one for one in surroundings.GLOBES if one.name.lower() == name), None)
+        return surroundings.named_globe(name)
     near = min(surroundings.GLOBES, key=lambda one: abs(one.radius - radius))
     return near if abs(near.radius / radius - 1) < _ALIKE else None
-
-
-def _largest_turn(dataset: Table) -> float:
-    """Mean rotation (rad) from one row to the next; 0 if the rate isn't known."""
-    rates, seconds = column(dataset, "angular_velocity", 3), signals.seconds(dataset)
-    if rates is None or len(seconds) < 2:
-        return 0.0
-    return float(np.nanmean(np.linalg.norm(rates, axis=1)) * np.abs(np.diff(seconds)).mean())
-
-
-def _article(name: str) -> str:
-    return {"": "a planet", "earth": "the Earth", "moon": "the Moon"}.get(name, name.capitalize())
 
 
 def _semi_axes(subject: Subject) -> Array | None:
@@ -136,15 +116,6 @@ def _semi_axes(subject: Subject) -> Array | None:
     if axes.shape != (3,) or not axes.min() > _LARGE or axes.min() < _ROUND * axes.max():
         return None
     return np.asarray(axes)
-
-
-def _poles(dataset: Table) -> bool:
-    return "obliquity" in dataset or "polar_motion" in dataset
-
-
-def _eye(target: Array, radius: float) -> Camera:
-    direction = direction_of(np.deg2rad(22.0), np.deg2rad(-52.0))
-    return Camera(target + radius / np.sin(FIELD / 2) * direction, target, np.array([0.0, 0.0, 1.0]))
 
 
 def _in_its_own_axes(dataset: Table, stage: Stage, figure: Array, notes: list[str]) -> None:
@@ -166,14 +137,11 @@ def _in_its_own_axes(dataset: Table, stage: Stage, figure: Array, notes: list[st
     power = 10.0 ** np.floor(np.log10(factor))
     factor = max(np.floor(factor / power) * power, 1.0)
     shown = 1.4 * figure + 1.4 * factor * apart
-    words = "spin axis" if factor == 1.0 else f"spin axis, {_times(factor)} farther from the figure axis"
+    times = f"{factor:,.0f} times"
+    words = "spin axis" if factor == 1.0 else f"spin axis, {times} farther from the figure axis"
     stage.arrows.append(Arrow("spin_axis", "spin axis", VELOCITY, shown, True, words))
     stage.trails.append(trail("polar_motion", POLHODE, shown, in_body=True, words="path of the spin axis"))
-    notes.append(f"the angle between spin axis and figure axis is drawn {_times(factor)} too large")
-
-
-def _times(factor: float) -> str:
-    return f"{factor:,.0f} times"
+    notes.append(f"the angle between spin axis and figure axis is drawn {times} too large")
 
 
 def _pole_planes(dataset: Table) -> list[Plane]:

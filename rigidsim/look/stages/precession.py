@@ -1,7 +1,7 @@
 """Precession of a pole: the reference plane, the circle about its normal, and the motion beside it.
 
 If no attitude is known but an axis is (in an averaged model, which has no rotation), a body is drawn that
-points there and doesn't turn.
+points there and doesn't turn; a body of which nothing else is known has a stage of its own.
 """
 
 from __future__ import annotations
@@ -13,21 +13,26 @@ import numpy as np
 
 from rigidsim.look import signals, surroundings
 from rigidsim.look.roles import is_averaged, read_config
-from rigidsim.look.stages.bodies import Subject, direction_of, source_arrows
+from rigidsim.look.stages.bodies import Subject, direction_of, eye_at, source_arrows
 from rigidsim.look.stages.parts import (
     FAINT,
     FIGURE,
+    MOMENTUM,
     SPACE,
     Array,
     Arrow,
+    Camera,
     Color,
     Line,
+    Picture,
     Plane,
     Spot,
     Stage,
     circle,
     quaternion_of,
+    trail,
 )
+from rigidsim.look.symbols import graticule
 from rigidsim.scene.readable_time import span_text
 from rigidsim.scene.readable_units import angle_unit
 
@@ -38,8 +43,58 @@ ECLIPTIC: Color = (226, 196, 90)
 PRECESSION: Color = (190, 150, 255)
 POLE_REACH = 1.45
 """Length of a pole's arrow, in units of the body's reach."""
+SOURCE_REACH = 1.75
+"""Length of an arrow to a source."""
+_APART = 0.02  # rad, from which two arrows are told apart
 _UPRIGHT = 1e-9  # sine of the tilt, below which a pole has no node
 _SPARSE = 1.0  # rad of an orbit from one row to the next, from which a source can't be followed
+
+
+def picture(dataset: Table, subject: Subject) -> Picture | None:
+    """Picture of a body without attitude and rates whose figure axis or momentum is known in space; None for
+    others.
+
+    With a figure axis the body points along it; a tumbling body isn't drawn, as its attitude is unknown.
+    """
+    if subject.attitude is not None or subject.position is not None or "angular_velocity" in dataset:
+        return None
+    known = {name: axis_in_space(dataset, name) for name in ("figure", "momentum")}
+    axes = {name: axis for name, axis in known.items() if axis is not None}
+    if not axes:
+        return None
+    leading = next(iter(axes))
+    if len(axes) == 2 and np.linalg.norm(axes["figure"] - axes["momentum"], axis=1).max() < _APART:
+        del axes["momentum"]
+    notes: list[str] = []
+    subject = pointed(dataset, subject, signals.figure_direction(dataset))
+    stage = replace(subject.stage([], [], "Axes in space"), axis_length=0.0, camera=eye_of_pole())
+    if leading == "figure":
+        notes.append(standing_note(dataset, "body"))
+    else:
+        stage = replace(stage, meshes=[], points=np.empty((0, 3)))
+        rings = enumerate(graticule(np.full(3, 0.6), lift=1.0))
+        stage.lines.extend(Line(f"directions/{k}", FAINT, line, SPACE, 0.7, 0.4) for k, line in rings)
+        notes.append("the body isn't drawn: of its attitude only the momentum's direction is known")
+    for name, axis in axes.items():
+        color = FIGURE if name == "figure" else MOMENTUM
+        shown, words = POLE_REACH * axis, f"{name} axis"
+        stage.arrows.append(Arrow(f"{name}_axis", words, color, shown, False, words))
+        path = trail(f"{name}_path", color, shown, words=f"path of the {words}")
+        # of samples too far apart it would be a cloud; on the circle of precession it wouldn't be seen
+        if path.line and np.ptp(axis[:, 2]) > _APART:
+            stage.trails.append(path)
+    reference_plane(stage)
+    circle_of_precession(dataset, stage, axes[leading], leading, notes)
+    stage.arrows.extend(followed_sources(dataset, subject, notes))
+    planes = nutation_planes(dataset, leading)
+    variables = ("obliquity", "node_longitude", "momentum_axis", "figure_axis")
+    return Picture("axes in space", [stage], planes, variables, notes)
+
+
+def eye_of_pole(height: float = 0.05, radius: float = 1.95) -> Camera:
+    """The eye before a globe or axes, at which it looks at some height."""
+    view = float(np.deg2rad(22.0)), float(np.deg2rad(-52.0))
+    return eye_at(*view, radius, np.array([0.0, 0.0, height]))
 
 
 def axis_in_space(dataset: Table, axis: str) -> Array | None:
@@ -70,13 +125,8 @@ def _against_plane(dataset: Table, axis: str) -> Array | None:
 
 
 def pointed(dataset: Table, subject: Subject, figure: Array, *, plane: bool = False) -> Subject:
-    """The subject with an attitude whose figure axis is the recorded one, without rotation about it.
-
-    The subject itself if no figure axis is known.
-
-    Args:
-        figure: (3,) unit vector of the figure axis, body axes.
-        plane: take the axis relative to the reference plane, which may move in space.
+    """The subject with an attitude whose figure axis (3,), body axes, is the recorded one, without rotation
+    about it; itself if none is known. With `plane`, relative to the reference plane, which may move in space.
     """
     pole = _against_plane(dataset, "figure") if plane else axis_in_space(dataset, "figure")
     if pole is None or not np.isfinite(pole).all():
@@ -85,9 +135,7 @@ def pointed(dataset: Table, subject: Subject, figure: Array, *, plane: bool = Fa
     node[np.hypot(pole[:, 0], pole[:, 1]) < _UPRIGHT] = (1.0, 0.0, 0.0)
     node -= np.sum(node * pole, axis=1, keepdims=True) * pole
     node /= np.linalg.norm(node, axis=1, keepdims=True)
-    across = np.cross(np.eye(3)[np.abs(figure).argmin()], figure)
-    across /= np.linalg.norm(across)
-    in_body = np.stack([across, np.cross(figure, across), figure], axis=1)
+    in_body = np.stack([*signals.across(figure), figure], axis=1)
     in_space = np.stack([node, np.cross(pole, node), pole], axis=2)
     attitude = in_space @ in_body.T
     return replace(subject, attitude=attitude, quaternion=quaternion_of(attitude))
@@ -99,7 +147,7 @@ def standing_note(dataset: Table, what: str) -> str:
     return f"{why}: the {what} points where its figure axis does, and doesn't turn about it"
 
 
-def followed_sources(dataset: Table, subject: Subject, length: float, notes: list[str]) -> list[Arrow]:
+def followed_sources(dataset: Table, subject: Subject, notes: list[str]) -> list[Arrow]:
     """Directions of sources that advance so little from row to row that the eye can follow.
 
     Some others would seem to stand still if samples are whole revolutions apart.
@@ -109,7 +157,7 @@ def followed_sources(dataset: Table, subject: Subject, length: float, notes: lis
     orbits = [one.get("orbit", {}) for one in surroundings.told(dataset, "source")]
     rates = {f"source{k}": float(orbit.get("mean_motion", 0.0)) for k, orbit in enumerate(orbits)}
     kept = []
-    for arrow in source_arrows(dataset, subject, length):
+    for arrow in source_arrows(dataset, subject, SOURCE_REACH):
         if abs(rates.get(arrow.name, 0.0)) * step > _SPARSE:
             notes.append(f"the {arrow.words} isn't shown: samples are too far apart to follow it")
         else:
@@ -120,27 +168,18 @@ def followed_sources(dataset: Table, subject: Subject, length: float, notes: lis
 def reference_plane(stage: Stage) -> None:
     """Put the XY plane of space with its normal on a stage."""
     up = np.array([0.0, 0.0, 1.0])
-    stage.lines.extend(
-        [
-            Line("ecliptic/rim", ECLIPTIC, circle(1.75, up), SPACE, 1.8, 0.9, "plane of reference"),
-            Line("ecliptic/inner", ECLIPTIC, circle(1.3, up), SPACE, 0.8, 0.35),
-        ]
-    )
+    rim = Line("ecliptic/rim", ECLIPTIC, circle(1.75, up), SPACE, 1.8, 0.9, "plane of reference")
+    stage.lines.extend([rim, Line("ecliptic/inner", ECLIPTIC, circle(1.3, up), SPACE, 0.8, 0.35)])
     for k in range(6):
-        way = direction_of(0.0, np.pi * k / 6)
-        stage.lines.append(
-            Line(f"ecliptic/spoke{k}", ECLIPTIC, np.stack([-1.75 * way, 1.75 * way]), SPACE, 0.7, 0.22)
-        )
+        ends = np.outer([-1.75, 1.75], direction_of(0.0, np.pi * k / 6))
+        stage.lines.append(Line(f"ecliptic/spoke{k}", ECLIPTIC, ends, SPACE, 0.7, 0.22))
     stage.lines.append(Line("normal", FAINT, np.array([[0, 0, -1.5], [0, 0, 1.75]]), SPACE, 1.0))
     stage.spots.append(Spot("normal", "normal", FAINT, np.array([0.0, 0.0, 1.78])))
 
 
 def circle_of_precession(dataset: Table, stage: Stage, pole: Array, axis: str, notes: list[str]) -> None:
-    """Put on a stage the circle that a pole describes about the normal, if it does, with its period.
-
-    Args:
-        pole: unit vectors (rows, 3), space axes.
-        axis: its name, figure or momentum.
+    """Put on a stage the circle, with its period, that a pole (rows, 3), space axes, of the axis named figure
+    or momentum describes about the normal, if it does.
     """
     tilt = float(np.nanmean(np.arctan2(np.hypot(pole[:, 0], pole[:, 1]), pole[:, 2])))
     if not 1e-3 < tilt < np.pi - 1e-3:
@@ -164,11 +203,7 @@ def circle_of_precession(dataset: Table, stage: Stage, pole: Array, axis: str, n
 
 
 def nutation_planes(dataset: Table, axis: str) -> list[Plane]:
-    """Motion of an axis in space less its mean motion, if its momentum moves: one plane, or none.
-
-    Args:
-        axis: figure or momentum.
-    """
+    """The axis named figure or momentum less its mean motion, if the momentum moves: one plane, or none."""
     momentum = signals.steady_momentum(dataset) if "quaternion" in dataset else None
     found = signals.orientation(dataset, axis) if momentum is None else None
     if found is None or not np.isfinite(found).all() or len(found[0]) <= 8:

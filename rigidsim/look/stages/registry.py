@@ -1,28 +1,27 @@
-"""The kinds of scenes that have a stage of their own, and the choice among them."""
+"""The kinds of scenes that have a stage of their own, the choice among them, and the stage of any other."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-from rigidsim.look.stages import flight, free, generic, orbit, planet, pole, satellite, top
-from rigidsim.look.stages.bodies import Subject
-from rigidsim.look.stages.parts import Picture
+from rigidsim.look.stages import flight, free, orbits, planet, precession, top
+from rigidsim.look.stages.bodies import Subject, source_arrows, vectors_of, with_track
+from rigidsim.look.stages.parts import ARROW_REACH, Picture
 
 if TYPE_CHECKING:
     from rigidsim.look.rows import Table
 
 KINDS: tuple[Callable[[Table, Subject], Picture | None], ...] = (
     top.picture,
-    orbit.picture,
+    orbits.free_orbit,
     flight.picture,
-    satellite.picture,
+    orbits.satellite,
     planet.picture,
-    pole.picture,
+    precession.picture,
     free.picture,
-    generic.picture,
 )
-"""Functions that return the picture of a scene of their kind, or None; the last accepts every scene."""
+"""Functions that return the picture of a scene of their kind, or None for others; the first that has one."""
 
 
 def build_picture(dataset: Table) -> tuple[Picture, Subject]:
@@ -32,9 +31,18 @@ def build_picture(dataset: Table) -> tuple[Picture, Subject]:
         ValueError: an unreadable ``drawing``, see ``solids.body_meshes``.
     """
     subject = Subject.of(dataset)
-    for kind in KINDS:
-        found = kind(dataset, subject)
-        if found is not None:
-            found.notes.insert(0, f"lengths are in units of the body's reach: 1 unit = {subject.reach:.6g} m")
-            return found, subject
-    raise AssertionError("a generic stage takes every scene")
+    pictures = (kind(dataset, subject) for kind in KINDS)
+    found = next((picture for picture in pictures if picture is not None), None) or _any(dataset, subject)
+    found.notes.insert(0, f"lengths are in units of the body's reach: 1 unit = {subject.reach:.6g} m")
+    return found, subject
+
+
+def _any(dataset: Table, subject: Subject) -> Picture:
+    """Any scene: the body with its momentum and angular velocity, and its track if it moves far."""
+    arrows, trails, notes = vectors_of(dataset, subject)
+    if subject.attitude is None:
+        notes.append("no attitude was recorded: the body is shown in its own axes and doesn't turn")
+    else:
+        arrows += source_arrows(dataset, subject, 0.95 * ARROW_REACH)
+    stages = with_track(subject, subject.stage(arrows, trails), notes)
+    return Picture("motion of a rigid body", stages, [], ("angular_velocity",), notes)

@@ -62,47 +62,41 @@ def picture(dataset: Table, subject: Subject) -> Picture | None:
     assert attitude is not None
     arrows = [replace(a, vectors=a.vectors * (1.25 if a.name == "angular_momentum" else 1.1)) for a in arrows]
     tip = TRACE * attitude @ axis
-    stage = subject.stage(
-        arrows, [trail("tip", FIGURE, tip, words="trace of the axis", head=True)], "Top on its pivot"
-    )
+    trails = [trail("tip", FIGURE, tip, words="trace of the axis", head=True)]
     lowest = min(float(np.nanmin(tip @ up)), float((subject.meshes[0].vertices @ axis).min()))
     # A top that dips below its pivot stands on a post, not on a floor that it would pass through.
-    drop = 0.0 if lowest > -0.02 and float(np.nanmin(tip @ up)) > 0.25 else 1.35
-    ground = -drop * up
-    stage.lines.extend(_ground(up, ground))
-    if drop:
-        stage.lines.append(Line("ground/post", PALE, np.stack([ground, np.zeros(3)]), SPACE, 4.0))
+    post = not (lowest > -0.02 and float(np.nanmin(tip @ up)) > 0.25)
+    ground, center = (-1.35 if post else 0.0) * up, np.zeros(3)
     across = _across(up)
-    stage.lines.append(Line("vertical", FAINT, np.stack([ground, 1.5 * up]), SPACE, 1.0, words="vertical"))
-    stage.vectors.append(
-        Vector("gravity", "gravity", PULL, 1.25 * across[0] + 0.9 * up, -0.55 * up, SPACE, "gravity", 0.02)
-    )
+    lines = [
+        *_ground(up, ground),
+        Line("vertical", FAINT, np.stack([ground, 1.5 * up]), width=1.0, words="vertical"),
+    ]
     # on a post the label is below, where it is clear of the body's own
-    label = np.zeros(3) if drop == 0 else 0.55 * ground
-    stage.spots.append(Spot("pivot", "pivot", PALE, label, SPACE, 5.0 if drop == 0 else 0.0))
+    spots = [Spot("pivot", "pivot", PALE, 0.55 * ground if post else center, size=0.0 if post else 5.0)]
+    if post:
+        lines.append(Line("ground/post", PALE, np.stack([ground, center]), width=4.0))
     if symbol is None:
         com = arm / subject.reach
-        stage.lines.append(Line("arm", PALE, np.stack([np.zeros(3), com]), BODY, 2.5))
-        stage.spots.append(Spot("center_of_mass", "centre of mass", PULL, com, BODY, 6.0))
+        lines.append(Line("arm", PALE, np.stack([center, com]), BODY, 2.5))
+        spots.append(Spot("center_of_mass", "centre of mass", PULL, com, BODY, 6.0))
+    place, words = 1.25 * across[0] + 0.9 * up, "gravity"
     elevation = np.deg2rad(20.0)
     direction = np.cos(elevation) * (0.55 * across[0] - 0.83 * across[1]) + np.sin(elevation) * up
-    radius = 1.62 if drop == 0 else 2.05
-    target = (0.55 if drop == 0 else -0.1) * up
-    camera = Camera(target + radius / np.sin(FIELD / 2) * direction, target, up)
-    stage = replace(stage, camera=camera)
-    return Picture(
-        "top on a fixed point",
-        [stage],
-        [_from_above(tip, up, across)],
-        ("tilt", "precession_angle", "nutation_angle", "euler_angles"),
-        notes,
+    target, radius = (-0.1 if post else 0.55) * up, 2.05 if post else 1.62
+    stage = replace(
+        subject.stage(arrows, trails, "Top on its pivot"),
+        lines=lines,
+        spots=spots,
+        vectors=[Vector("gravity", words, PULL, place, -0.55 * up, SPACE, words, 0.02)],
+        camera=Camera(target + radius / np.sin(FIELD / 2) * direction, target, up),
     )
+    leading = ("tilt", "precession_angle", "nutation_angle", "euler_angles")
+    return Picture("top on a fixed point", [stage], [_from_above(tip, up, across)], leading, notes)
 
 
 def _figure(dataset: Table, arm: Array) -> Array:
-    """The axis whose trace is shown: the symmetry axis if the centre of mass lies on it, else that through
-    the centre of mass.
-    """
+    """The axis whose trace is shown: of symmetry if the centre of mass lies on it, else through that."""
     moments = signals.moments(dataset)
     if moments is not None:
         axis = signals.principal_axes(dataset)[signals.figure_index(moments)]
@@ -153,7 +147,7 @@ def _ground(up: Array, at: Array) -> list[Line]:
 
 
 def _from_above(tip: Array, up: Array, across: tuple[Array, Array]) -> Plane:
-    plane = np.stack([tip @ across[0], tip @ across[1]], axis=1)
+    plane = tip @ np.stack(across, axis=1)
     # its tilt, not its height, is what rings can tell
     rings = tuple((float(np.sin(np.deg2rad(t))), f"{t}°") for t in (10, 30, 60, 90))
     largest = float(np.nanmax(np.linalg.norm(plane, axis=1)))

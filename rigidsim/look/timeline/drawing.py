@@ -144,9 +144,8 @@ def _draw_surroundings(recording: rr.RecordingStream, stage: Stage) -> None:
 
 def _draw_shell(recording: rr.RecordingStream, path: str, shell: Shell) -> None:
     """A translucent ellipsoid with its meridians and parallels."""
-    if shell.quaternion is not None:
-        turn = rr.Transform3D(quaternion=rr.Quaternion(xyzw=shell.quaternion))
-        recording.log(path, turn, static=True)
+    turn = rr.Transform3D(quaternion=rr.Quaternion(xyzw=shell.quaternion))
+    recording.log(path, turn, static=True)
     surface = ball(*shell.half_sizes)
     mesh = rr.Mesh3D(
         vertex_positions=surface.vertices.astype(np.float32),
@@ -221,13 +220,8 @@ def stage_columns(
         transform["quaternion"] = stage.quaternion[rows]
     if transform:
         yield f"{root}/body", rows, rr.Transform3D.columns(**transform)
-    for frame in stage.frames:
-        moved: dict[str, Any] = {}
-        if frame.translation is not None:
-            moved["translation"] = frame.translation[rows].astype(np.float32)
-        if frame.quaternion is not None:
-            moved["quaternion"] = frame.quaternion[rows]
-        yield f"{root}/{frame.name}", rows, rr.Transform3D.columns(**moved)
+    for name, turning in stage.frames.items():
+        yield f"{root}/{name}", rows, rr.Transform3D.columns(quaternion=turning[rows])
     for arrow in stage.arrows:
         path = _arrow_path(stage, arrow)
         picked = _every(rows, strides[path])
