@@ -17,9 +17,8 @@ from rigidsim.scene.suspicions import (
     unreachable_events,
 )
 from rigidsim.solve.problem import InitialValueProblem
-from rigidsim.store.summary_fields import Three
-from rigidsim.store.summary_parts import Caution, WarningCode
-from rigidsim.store.understood import Span, Start, UnderstoodBody
+from rigidsim.store.summary import Span, Start, UnderstoodBody
+from rigidsim.store.summary_parts import Caution, Three, WarningCode
 
 
 def body_of(scene: Scene) -> UnderstoodBody:

@@ -1,14 +1,48 @@
-"""Parts of a run's summary: its cost, its invariants, its accuracy, and the codes of its warnings."""
+"""Parts of the summaries of runs: fields and which of them are claims, codes, cost, invariants, accuracy."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import Enum
-from typing import Annotated, ClassVar
+from typing import Annotated, Any, ClassVar, Self
 
-from pydantic import AfterValidator, Field, StrictBool, StrictInt, StrictStr
+from pydantic import BaseModel, ConfigDict, Field, StrictBool, StrictInt, StrictStr, field_validator
 
-from rigidsim.store.summary_fields import Claim, FiniteNumber, SummaryPart, Text
+FiniteNumber = Annotated[float, Field(strict=True, allow_inf_nan=False)]
+Text = Annotated[StrictStr, Field(max_length=20_000)]
+Three = tuple[FiniteNumber, FiniteNumber, FiniteNumber]
+Four = tuple[FiniteNumber, FiniteNumber, FiniteNumber, FiniteNumber]
+
+
+@dataclass(frozen=True)
+class Claim:
+    """Marks a field that follows from the config alone, so that running it again must confirm it.
+
+    Attributes:
+        since: schema version of the dataset from which the field has its present meaning.
+        of_end: whether it tells how the run ended, which an interruption changes.
+        beside: field whose absence, in older summaries, gives this one another meaning; empty for none.
+    """
+
+    since: int = 1
+    of_end: bool = False
+    beside: str = ""
+
+
+class SummaryPart(BaseModel):
+    """Immutable part of a summary; unknown fields, written by a newer version, are kept."""
+
+    model_config = ConfigDict(extra="allow", frozen=True, ser_json_inf_nan="constants", defer_build=True)
+
+    def having(self, **known: Any) -> Self:
+        """A copy with the given fields set, validated as on reading."""
+        given = {name: value for name, value in self if name in self.model_fields_set}
+        return type(self).model_validate({**given, **known})
+
+    def as_dict(self) -> dict[str, Any]:
+        """Fields for JSON, without those that weren't given."""
+        return self.model_dump(mode="json", exclude_unset=True)
+
 
 ENGINE = "engine"
 """Key beside the phases in ``Cost.seconds``: time that the engine alone took of integrating and recording."""
@@ -68,34 +102,32 @@ class Caution:
     text: str
 
 
-def _with_engine(seconds: dict[str, float]) -> dict[str, float]:
-    if ENGINE not in seconds:
-        raise ValueError(f'"{ENGINE}" is missing')
-    return seconds
-
-
 Digest = Annotated[StrictStr, Field(pattern=r"^[0-9a-f]{64}$")]
-Seconds = Annotated[dict[Text, FiniteNumber], AfterValidator(_with_engine)]
 
 
 class Cost(SummaryPart):
-    """What a run cost.
+    """What a run cost: CPU and wall seconds of all sessions, and of this one by phase.
 
     Attributes:
         smallest_step, largest_step: seconds; None if no step was taken, or none was finite.
-        seconds, cpu_by_phase: wall and CPU seconds of this session by phase.
-        cpu_seconds, wall_seconds: seconds of all sessions.
     """
 
     steps: Annotated[StrictInt, Claim()]
     steps_redone: StrictInt
     smallest_step: FiniteNumber | None
     largest_step: FiniteNumber | None
-    seconds: Seconds
+    seconds: dict[Text, FiniteNumber]
     cpu_seconds: FiniteNumber
     cpu_by_phase: dict[Text, FiniteNumber] = Field(default_factory=dict)
     sessions: StrictInt = 1
     wall_seconds: FiniteNumber | None = None
+
+    @field_validator("seconds")
+    @classmethod
+    def _has_engine(cls, seconds: dict[str, float]) -> dict[str, float]:
+        if ENGINE not in seconds:
+            raise ValueError(f'"{ENGINE}" is missing')
+        return seconds
 
 
 class InvariantDrift(SummaryPart):
@@ -130,7 +162,6 @@ class Accuracy(SummaryPart):
         predictable_seconds: time from the start after which no digit is left; None if never.
         examined_share: share of the run over which error growth was followed without a gap from its start; 1
             for all of it.
-        chosen, chosen_why, forecast: the setting that was chosen for ``requested``, and its forecast.
     """
 
     requested: FiniteNumber | None
@@ -159,7 +190,7 @@ class TableErrors(SummaryPart):
     """Interpolation errors between the rows of an orbit's table.
 
     Attributes:
-        direction: largest error of the source's direction with every other row left out, rad.
+        direction, distance: largest errors with every other row left out, rad and relative.
         expected: factor by which both shrink with all rows present, if the rows follow smooth functions.
     """
 
@@ -172,11 +203,10 @@ class ModellingWindow(SummaryPart):
     """A window in which the full model ran beside a reduced one; see ``rigidsim.accuracy.models.modelling``.
 
     Attributes:
-        start, end: times, s.
         momentum_axis, figure_axis: largest distances between both models' directions, with what averaging
             removed added back, rad; None if the figure axis has no mean direction.
-        growth_along, growth_across: growth of the former, along and across the precession, rad/s.
-        doubt: difference of growth between the window's parts, rad/s.
+        growth_along, growth_across, doubt: growth of the former along and across the precession, and its
+            difference between the window's parts, rad/s.
     """
 
     start: FiniteNumber
@@ -241,11 +271,7 @@ class Lyapunov(SummaryPart):
 
 
 class EventTimes(SummaryPart):
-    """Times at which an event happened, s.
-
-    Attributes:
-        early: the first ones, at most ``EventTimes.EARLY``; the first among them.
-    """
+    """Times at which an event happened, s: the first, at most ``EARLY`` of the first ones, and the last."""
 
     EARLY: ClassVar[int] = 5
     first: Annotated[FiniteNumber, Claim()]
@@ -257,9 +283,8 @@ class Advice(SummaryPart):
     """A setting that would do better.
 
     Attributes:
-        now, then: attitude error at the end as it is, and as it would be, rad; for an averaged model the
-            error of the recorded axes.
-        level: level of the model advised; empty for none.
+        now, then: attitude error at the end (of an averaged model, error of the recorded axes) as it is, and
+            as it would be, rad.
         share: largest share of the steps that it would take; None if unchanged.
     """
 

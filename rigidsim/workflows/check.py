@@ -13,8 +13,8 @@ from rigidsim.scene.sweeps.sweep import Sweep
 from rigidsim.session.dataset import refuse_taken_names
 from rigidsim.session.understood import body_of, cautions_of, span_of, start_of, told_loads
 from rigidsim.solve.problem import prepare
+from rigidsim.store.summary import Span, Start, UnderstoodBody
 from rigidsim.store.summary_parts import Caution
-from rigidsim.store.understood import Span, Start, UnderstoodBody
 from rigidsim.workflows.read import load
 from rigidsim.workflows.sweeps.check import QUICK, check_sweep
 from rigidsim.workflows.sweeps.members import recording

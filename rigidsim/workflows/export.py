@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from rigidsim.errors import RESUME, RigidsimError, RunFolderError
 from rigidsim.formats import FOR_SWEEPS
 from rigidsim.formats.angles import angle_unit_named
+from rigidsim.formats.member_tables import member_tables
 from rigidsim.formats.naming import Naming
 from rigidsim.formats.registry import Format, TableSource, format_named
 from rigidsim.formats.tables import BLOCK_NUMBERS, Table, tables_of
@@ -101,8 +102,6 @@ def _run_read(run: SavedRun, naming: Naming, unit: AngleUnit | None) -> Iterator
 
 @contextmanager
 def _sweep_read(sweep: SavedSweep, unit: AngleUnit | None, block_numbers: int) -> Iterator[Read]:
-    from rigidsim.formats.member_tables import member_tables
-
     with sweep.dataset as dataset:
         bits = _bits_of_members(dataset)
         source = TableSource(_name(sweep), bits, dict(dataset.attrs), Naming(), unit)

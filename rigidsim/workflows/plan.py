@@ -29,7 +29,9 @@ from rigidsim.solve.problem import InitialValueProblem, prepare
 from rigidsim.solve.projection import LATE
 from rigidsim.solve.sample_block import SampleBlock
 from rigidsim.store.segments import SegmentLimits
-from rigidsim.workflows.plan_levels import compared_levels, timed_pilot
+from rigidsim.store.summary import Span, Start, UnderstoodBody
+from rigidsim.store.summary_parts import SummaryPart
+from rigidsim.workflows.plan_levels import LevelCost, compared_levels, timed_pilot
 from rigidsim.workflows.read import Given, as_experiment
 
 _PILOT_SECONDS = 0.5
@@ -39,6 +41,139 @@ _BUFFERING = 2e-7  # seconds per sample
 _EVALUATED = {True: 4096, False: 16}  # samples to evaluate, in precisions with cheap arithmetic and without
 
 
+class StatesWhy(SummaryPart):
+    """States that are integrated, and why."""
+
+    states: str
+    why: str
+
+
+class LeftOut(SummaryPart):
+    """What isn't modelled, and why."""
+
+    what: str
+    why: str
+
+
+class PlannedSurface(SummaryPart):
+    """A kink or jump on which steps end, and the load that has it."""
+
+    surface: str
+    where: str
+
+
+class PlannedInvariant(SummaryPart):
+    """An invariant, and why it is one; numerical: constant by definition, whatever the motion."""
+
+    name: str
+    why: str
+    numerical: bool
+
+
+class PlannedSetting(SummaryPart):
+    """The setting chosen for the accuracy asked for, and its forecast error."""
+
+    chosen: str
+    why: str
+    forecast: float | None
+
+
+class PilotCosts(SummaryPart):
+    """What a short pilot measured: steps, their mean length (s), and seconds of CPU time."""
+
+    steps: float
+    step: float
+    seconds_per_step: float
+    seconds_per_sample: float
+
+
+class Predicted(SummaryPart):
+    """The forecast cost of a run, and its errors.
+
+    Attributes:
+        pace: mean length of the first steps over that of all; None if torques change it unpredictably.
+        building_seconds, choosing_seconds, modelling_seconds: CPU time of compiling, of choosing settings,
+            and of the full model beside an averaged one.
+        free_bytes: free space on the disk; infinite if unknown.
+        attitude_error_rad: None without an attitude, or if the method tells its own errors.
+        held: whether that is with projected invariants.
+        amplification: factor by which the motion amplifies rounding errors by the end.
+        growth_seconds: span over which their growth was followed.
+    """
+
+    steps: float
+    pace: float | None
+    integration_seconds: float
+    recording_seconds: float
+    building_seconds: float
+    choosing_seconds: float
+    modelling_seconds: float
+    total_seconds: float
+    memory_bytes: float
+    segment_bytes: float
+    dataset_bytes: float
+    timeline_bytes: float
+    free_bytes: float
+    attitude_error_rad: float | None
+    held: bool
+    amplification: float
+    growth_seconds: float | None
+
+
+class RunPlan(SummaryPart):
+    """What would be integrated and why, and what it would cost; ``as_dict`` gives what ``--json`` prints.
+
+    Attributes:
+        shared_terms, equations: as of ``rigidsim.model.equation_text``.
+        internal_units: by quantity, in s and kg m^2.
+        closed_form, closed_form_why_not: its title, or why there is none.
+        hold_from_step: natural steps after which invariants are projected; None if from the start.
+        levels: levels of ``[model]``, the cheapest first; empty if the config says nothing about models.
+        accuracy: None if no accuracy is asked for.
+    """
+
+    name: str
+    formulation: str
+    euler_sequence: str | None
+    euler_partner_sequence: str | None
+    states: list[str]
+    state_count: int
+    loads: list[str]
+    reasons: list[StatesWhy]
+    left_out: list[LeftOut]
+    switching: list[PlannedSurface]
+    turning: list[str]
+    shared_terms: list[str]
+    equations: list[str]
+    internal_units: dict[str, float]
+    recorded: list[str]
+    invariants: list[PlannedInvariant]
+    precision: str
+    tolerance: float
+    method: str
+    closed_form: str | None
+    closed_form_why_not: str | None
+    hold_invariants: bool
+    hold_from_step: int | None
+    levels: list[LevelCost]
+    accuracy: PlannedSetting | None
+    taylor_order: int | None
+    pilot: PilotCosts
+    predicted: Predicted
+    warnings: list[str]
+    warning_codes: list[str]
+    body: UnderstoodBody
+    start: Start
+    time: Span
+
+    def __repr__(self) -> str:
+        cost = self.predicted
+        return (
+            f"<Plan of {self.name!r}: {self.state_count} states, {self.formulation}, about {cost.steps:.3g} "
+            f"steps in {cost.total_seconds:.3g} s>"
+        )
+
+
 def plan(
     experiment: Given,
     *,
@@ -46,7 +181,7 @@ def plan(
     loads: Sequence[Load] = (),
     out: str | Path = "runs",
     pilot_seconds: float = _PILOT_SECONDS,
-) -> dict[str, Any]:
+) -> RunPlan:
     """Explain and predict a run; integrates for about half a second and writes nothing.
 
     Args:
@@ -55,7 +190,7 @@ def plan(
         pilot_seconds: largest CPU time of the pilot, s; some thousands of steps give the mean.
 
     Returns:
-        A JSON-like dictionary: states, reasons, invariants, steps, seconds, bytes, warnings.
+        States, reasons, invariants, steps, seconds, bytes, warnings; ``as_dict`` for JSON.
 
     Raises:
         ConfigError: the config can't be run.
@@ -89,86 +224,90 @@ def plan(
     system, unused = prepared.system, unused_variables(prepared, int(steps))
     rate = float(system.rate_bound)
     growth = motion_growth(prepared)
-    plain_error = attitude_error(prepared.law_tolerance, int(steps), rate, duration, growth)
     first = LATE if prepared.holds_late else 0
     held = prepared.holds_invariants and closed is not None and steps > first
     shared, equations = equation_texts(system.equations, **prepared.precision.options)
     warnings = [(caution.code.value, caution.text) for caution in cautions_of(prepared.scene)]
     if room.problem is not None:
         warnings.append(("disk_space", f"the run {room.problem}"))
-    return {
-        "name": prepared.scene.name,
-        "formulation": system.formulation.name,
-        "euler_sequence": system.sequence if system.angle_states else None,
-        "euler_partner_sequence": None if system.partner is None else system.partner.sequence,
-        "states": system.states,
-        "state_count": len(system.states),
-        "loads": list(told_loads(prepared)),
-        "reasons": [{"states": s, "why": w} for s, w in system.reasons],
-        "left_out": [{"what": s, "why": w} for s, w in system.requirements.left_out],
-        "switching": [{"surface": s.text, "where": s.where} for s in system.plan.surfaces.found],
-        "turning": list(system.plan.surfaces.turning),
-        "shared_terms": shared,
-        "equations": equations,
-        "internal_units": {
+    error: float | None = attitude_error(prepared.law_tolerance, int(steps), rate, duration, growth)
+    if held:
+        error = held_error(prepared, int(steps), rate, duration, growth)
+    if not system.requirements.attitude or prepared.algorithm.own_errors:
+        error = None
+    return RunPlan(
+        name=prepared.scene.name,
+        formulation=system.formulation.name,
+        euler_sequence=system.sequence if system.angle_states else None,
+        euler_partner_sequence=None if system.partner is None else system.partner.sequence,
+        states=list(system.states),
+        state_count=len(system.states),
+        loads=list(told_loads(prepared)),
+        reasons=[StatesWhy(states=states, why=why) for states, why in system.reasons],
+        left_out=[LeftOut(what=what, why=why) for what, why in system.requirements.left_out],
+        switching=[PlannedSurface(surface=s.text, where=s.where) for s in system.plan.surfaces.found],
+        turning=list(system.plan.surfaces.turning),
+        shared_terms=shared,
+        equations=equations,
+        internal_units={
             "time_s": math.ldexp(1.0, system.scaling.time),
             "inertia_kg_m2": math.ldexp(1.0, system.scaling.inertia),
         },
-        "recorded": [v.name for v in dataset_variables(prepared) if v.name not in unused],
-        "invariants": [{"name": i.name, "why": i.why, "numerical": i.numerical} for i in system.invariants],
-        "precision": prepared.precision.name,
-        "tolerance": prepared.effective_tolerance,
-        "method": prepared.scene.config.integrator.method,
-        "closed_form": None if closed is None else closed.title,
-        "closed_form_why_not": why_not or None,
-        "hold_invariants": prepared.holds_invariants,
-        "hold_from_step": LATE if prepared.holds_late else None,
-        "levels": levels,
-        "accuracy": None
+        recorded=[v.name for v in dataset_variables(prepared) if v.name not in unused],
+        invariants=[
+            PlannedInvariant(name=i.name, why=i.why, numerical=i.numerical) for i in system.invariants
+        ],
+        precision=prepared.precision.name,
+        tolerance=prepared.effective_tolerance,
+        method=prepared.scene.config.integrator.method,
+        closed_form=None if closed is None else closed.title,
+        closed_form_why_not=why_not or None,
+        hold_invariants=prepared.holds_invariants,
+        hold_from_step=LATE if prepared.holds_late else None,
+        levels=levels,
+        accuracy=None
         if choice is None
-        else {"chosen": choice.setting.title, "why": choice.why, "forecast": choice.forecast},
-        "taylor_order": parts.order,
-        "pilot": {
-            "steps": float(pilot.taken),
-            "step": step,
-            "seconds_per_step": pilot.seconds_per_step,
-            "seconds_per_sample": seconds_per_sample,
-        },
-        "predicted": {
-            "steps": steps,
-            "pace": pace,
-            "integration_seconds": integrate,
-            "recording_seconds": record,
-            "building_seconds": building,
-            "choosing_seconds": choosing,
-            "modelling_seconds": modelling,
-            "total_seconds": compile_seconds + integrate + record + modelling,
-            "memory_bytes": _BASE_MEMORY + 3 * min(room.segments, SegmentLimits().bytes),
-            "segment_bytes": room.segments,
-            "dataset_bytes": room.dataset,
-            "timeline_bytes": room.timeline,
-            "free_bytes": room.free,
-            "attitude_error_rad": None
-            if not system.requirements.attitude or prepared.algorithm.own_errors
-            else (held_error(prepared, int(steps), rate, duration, growth) if held else plain_error),
-            "held": held,
-            "amplification": growth.at(duration),
-            "growth_seconds": growth.seconds,
-        },
-        "warnings": [text for _, text in warnings],
-        "warning_codes": [code for code, _ in warnings],
-        "body": body_of(prepared.scene).as_dict(),
-        "start": start_of(prepared.scene).as_dict(),
-        "time": span_of(prepared.scene).as_dict(),
-    }
+        else PlannedSetting(chosen=choice.setting.title, why=choice.why, forecast=choice.forecast),
+        taylor_order=parts.order,
+        pilot=PilotCosts(
+            steps=pilot.taken,
+            step=step,
+            seconds_per_step=pilot.seconds_per_step,
+            seconds_per_sample=seconds_per_sample,
+        ),
+        predicted=Predicted(
+            steps=steps,
+            pace=pace,
+            integration_seconds=integrate,
+            recording_seconds=record,
+            building_seconds=building,
+            choosing_seconds=choosing,
+            modelling_seconds=modelling,
+            total_seconds=compile_seconds + integrate + record + modelling,
+            memory_bytes=_BASE_MEMORY + 3 * min(room.segments, SegmentLimits().bytes),
+            segment_bytes=room.segments,
+            dataset_bytes=room.dataset,
+            timeline_bytes=room.timeline,
+            free_bytes=room.free,
+            attitude_error_rad=error,
+            held=held,
+            amplification=growth.at(duration),
+            growth_seconds=growth.seconds,
+        ),
+        warnings=[text for _, text in warnings],
+        warning_codes=[code for code, _ in warnings],
+        body=body_of(prepared.scene),
+        start=start_of(prepared.scene),
+        time=span_of(prepared.scene),
+    )
 
 
-def _modelling_seconds(prepared: InitialValueProblem, levels: Sequence[Mapping[str, Any]]) -> float:
+def _modelling_seconds(prepared: InitialValueProblem, levels: Sequence[LevelCost]) -> float:
     """CPU time, s, of the full model beside an averaged run, as it was measured over the beginning."""
     average = prepared.system.formulation.average
     if average is None or not prepared.scene.config.output.estimate:
         return 0.0
-    return next((row["modelling_seconds"] or 0.0 for row in levels if row["level"] == average.level), 0.0)
+    return next((row.modelling_seconds or 0.0 for row in levels if row.level == average.level), 0.0)
 
 
 def _seconds_per_sample(prepared: InitialValueProblem, parts: Assembly, row: float) -> float:

@@ -19,21 +19,37 @@ from rigidsim.scene.model_table import FULL
 from rigidsim.solve.assembly import assemble
 from rigidsim.solve.corrected_stepper import CorrectedStepper
 from rigidsim.solve.problem import InitialValueProblem, prepare
+from rigidsim.store.summary_parts import SummaryPart
 
 _PILOT_SECONDS = 0.2
 _LARGEST_CHUNK = 1024  # steps: at this length a call's overhead is negligible
 
 
+class LevelCost(SummaryPart):
+    """What a level of ``[model]`` would cost, and leave out.
+
+    Attributes:
+        error_rad: modelling error of axes, forecast from the beginning; None if none is known.
+        steps, cpu_seconds: of the integration, from a short pilot; None if there is no such average.
+        modelling_seconds: CPU time of measuring that error after a run.
+        why_not: why it isn't chosen; empty for the one that is.
+    """
+
+    level: str
+    error_rad: float | None
+    steps: float | None
+    cpu_seconds: float | None
+    modelling_seconds: float | None
+    why_not: str
+
+
 def compared_levels(
     experiment: Experiment, choice: LevelChoice | None, loads: Sequence[Load] = ()
-) -> list[dict[str, Any]]:
+) -> list[LevelCost]:
     """All levels, the cheapest first, if the config says anything about models.
 
-    Returns:
-        For JSON: the level; ``error_rad``, the modelling error of axes forecast from the beginning,
-        None if there is none; ``steps`` and ``cpu_seconds`` of the integration, from a short pilot;
-        ``modelling_seconds``, CPU time of measuring that error after a run; and why it isn't chosen, empty
-        for the one that is.
+    Args:
+        choice: result of ``level = "auto"``, whose measurements aren't repeated.
     """
     if "model" not in experiment.config.model_fields_set:
         return []
@@ -47,7 +63,7 @@ def compared_levels(
         try:
             prepared = prepare(experiment.having([f'model.level="{level}"']), loads=loads)
         except ConfigError as error:
-            found.append({**row, "why_not": "; ".join(problem.what for problem in error.problems)})
+            found.append(LevelCost(**row, why_not="; ".join(problem.what for problem in error.problems)))
             continue
         row |= _cost(prepared)
         if level == FULL:
@@ -59,7 +75,7 @@ def compared_levels(
                 measured = measure_modelling(prepared)
                 row |= {"error_rad": measured.worst, "modelling_seconds": measured.cpu_seconds_of_run}
         why = known.why_not if known is not None else "" if level == asked else "another level is cheaper"
-        found.append({**row, "why_not": why if choice or level == asked else "not asked for"})
+        found.append(LevelCost(**row, why_not=why if choice or level == asked else "not asked for"))
     return found
 
 

@@ -6,14 +6,15 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from decimal import Decimal
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from rigidsim.errors import FORCE, RunFolderError, either
+from rigidsim.model.load import Load
 from rigidsim.scene.config import Experiment, Overrides, has_earlier_settings, parse, parse_earlier
 from rigidsim.scene.overrides import assignments
 from rigidsim.scene.python_values import assignments_of
+from rigidsim.scene.scene import build_scene
 from rigidsim.session.dataset import root_attributes as attributes_now
 from rigidsim.session.execution import execute, with_timeline
 from rigidsim.session.guards import Observer
@@ -34,11 +35,7 @@ from rigidsim.store.summary import Summary
 from rigidsim.store.summary_parts import Caution, WarningCode
 from rigidsim.store.variables import SCHEMA_VERSION
 from rigidsim.workflows.certify import certified
-from rigidsim.workflows.recorded_then import as_begun
-from rigidsim.workflows.verify import embedded, text_difference
-
-if TYPE_CHECKING:
-    from rigidsim.model.load import Load
+from rigidsim.workflows.embedded import as_begun, embedded, text_difference
 
 _ROWS_AT_ONCE = 65536
 _UNTIL = either("--until", "until")
@@ -181,8 +178,6 @@ def _guarded(experiment: Experiment, overrides: Sequence[str]) -> Experiment:
 
 def _prolonged(experiment: Experiment, until: str) -> Experiment:
     """The same experiment to a later end, with the same sampling interval."""
-    from rigidsim.scene.scene import build_scene
-
     before = build_scene(experiment).samples
     if before.times is not None:
         raise RunFolderError(f"{_UNTIL}: this run has a list of sample times, which no later end prolongs")
@@ -251,8 +246,6 @@ def _continued(experiment: Experiment, last: Path) -> Experiment:
 
 def _prolongs(experiment: Experiment, begun: Experiment, ends: Sequence[str]) -> bool:
     """Whether the experiment is the one that was begun, except for a later end."""
-    from rigidsim.scene.scene import build_scene
-
     if begun.having(ends).text != experiment.text:
         return False
     return build_scene(experiment).samples.count > build_scene(begun).samples.count

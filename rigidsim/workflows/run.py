@@ -5,10 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, overload
+from typing import Any, overload
 
 from rigidsim.accuracy.asked import leaves_choice, wanted
+from rigidsim.accuracy.choice import Choice, chosen
+from rigidsim.accuracy.models.level import choose_level
+from rigidsim.accuracy.setting import Setting
 from rigidsim.errors import ConfigError
+from rigidsim.model.load import Load
 from rigidsim.scene.model_table import AUTO, FULL
 from rigidsim.session.dataset import refuse_taken_names
 from rigidsim.session.execution import execute
@@ -21,12 +25,8 @@ from rigidsim.store.folder import RunFolder
 from rigidsim.store.memory import MemoryRun
 from rigidsim.store.run import Run, SavedRun
 from rigidsim.store.summary_parts import WarningCode
+from rigidsim.workflows.certify import certified
 from rigidsim.workflows.read import Experiment, Given, as_experiment
-
-if TYPE_CHECKING:
-    from rigidsim.accuracy.choice import Choice
-    from rigidsim.accuracy.setting import Setting
-    from rigidsim.model.load import Load
 
 
 @overload
@@ -104,8 +104,6 @@ def _run_a_level(
     """Run the given level, or the cheapest one whose measured error is within the requested accuracy."""
     failed: list[str] = []
     while experiment.config.model.level == AUTO:
-        from rigidsim.accuracy.models.level import choose_level
-
         observer.choosing(experiment.config.name)
         choice = choose_level(experiment, loads=loads, without=failed)
         assert choice is not None
@@ -138,8 +136,6 @@ def _run(
     while True:
         setting, choice = experiment, None
         if leaves_choice(experiment):
-            from rigidsim.accuracy.choice import chosen
-
             observer.choosing(experiment.config.name)
             try:
                 setting, choice = chosen(experiment, loads=loads, beyond=beyond, told=observer.trying)
@@ -155,8 +151,6 @@ def _run(
             result = execute(session, prepared, folder)
             kept = True
             if wanted(setting) is not None:
-                from rigidsim.workflows.certify import certified
-
                 result, kept = certified(result, setting, choice, session, loads)
         if kept or choice is None:
             return result

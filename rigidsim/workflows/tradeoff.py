@@ -21,6 +21,7 @@ from rigidsim.accuracy.bench.measure import measure
 from rigidsim.errors import RunFolderError
 from rigidsim.scene.config import Experiment
 from rigidsim.scene.model_table import FULL
+from rigidsim.store import atomic
 from rigidsim.workflows.plan_levels import compared_levels
 
 if TYPE_CHECKING:
@@ -138,28 +139,29 @@ def with_models(dataset: xarray.Dataset, experiment: Experiment) -> xarray.Datas
     over the cost of the full model in the default setting, both from short pilots.
     """
     rows = compared_levels(experiment, None)
-    full = next((row["cpu_seconds"] for row in rows if row["level"] == FULL), None)
-    known = [row for row in rows if row["error_rad"] and row["cpu_seconds"] and full]
+    full = next((row.cpu_seconds for row in rows if row.level == FULL), None)
+    known = [
+        (r.level, r.error_rad, r.cpu_seconds / full) for r in rows if r.error_rad and r.cpu_seconds and full
+    ]
     if not known:
         return dataset
     told = {
         "model_error": ("rad", "error of the momentum's and the figure axis' direction at the end",
-                        [row["error_rad"] for row in known]),
+                        [error for _, error, _ in known]),
         "model_cpu_ratio": ("1", "CPU time relative to the full model in the default setting",
-                            [row["cpu_seconds"] / full for row in known]),
+                            [ratio for _, _, ratio in known]),
     }  # fmt: skip
     found = {
         name: ("model", np.array(values), {"units": units, "long_name": long_name})
         for name, (units, long_name, values) in told.items()
     }
-    names = np.array([row["level"] for row in known], dtype=object)
+    names = np.array([level for level, _, _ in known], dtype=object)
     return dataset.assign(found).assign_coords(model=("model", names, {"long_name": "averaged model"}))
 
 
 def save(dataset: xarray.Dataset, folder: Path) -> None:
     """Write dataset and figure, each of which appears only when complete."""
     from rigidsim.look.figures.work_precision import save_work_precision
-    from rigidsim.store import atomic
 
     try:
         with atomic.replacing(folder / DATASET) as temporary:

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import xarray
+from pydantic import BaseModel
 
 from rigidsim.errors import RESUME, RunFolderError
-from rigidsim.scene.config import Experiment, parse, parse_earlier
 from rigidsim.session.guards import Observer
 from rigidsim.solve.status import Status
 from rigidsim.store import provenance
@@ -22,9 +22,10 @@ from rigidsim.store.netcdf import root_attributes
 from rigidsim.store.reader import open_dataset
 from rigidsim.store.run import Run, open_run
 from rigidsim.store.seal import check_seal, read_seal
-from rigidsim.workflows.recorded_then import as_begun
+from rigidsim.store.summary import Brief, Summary
+from rigidsim.store.summary_parts import Claim
+from rigidsim.workflows.embedded import as_begun, embedded, text_difference
 from rigidsim.workflows.run import run
-from rigidsim.workflows.verify_summary import summary_problems, timeline_problems
 
 _ROWS_AT_ONCE = 65536
 
@@ -124,8 +125,8 @@ def verify(path: str | Path, *, observer: Observer | None = None) -> Verdict:
         problems.append(f"{folder.summary}: is missing; it was written with the dataset")
     elif folder is not None:
         claimed = folder.read_summary()
-        problems += summary_problems(claimed, again.outcome, folder, saved.schema_version)
-        problems += timeline_problems(claimed, folder)
+        problems += _summary_problems(claimed, again.outcome, folder, saved.schema_version)
+        problems += _timeline_problems(claimed, folder)
     for name, then, value in saved.changed(Use.SETTING, now):
         problems.append(f"{name} is {then} in the dataset, {value} when run again")
     changed = [f"{name} {then} -> {value}" for name, then, value in saved.changed(Use.PLATFORM, now)]
@@ -143,19 +144,6 @@ def _scratch() -> tempfile.TemporaryDirectory[str]:
             f"{error.filename or 'the temporary folder'}: can't be written: {why}; set TMPDIR to a folder "
             "with room for the run again"
         ) from None
-
-
-def embedded(dataset: Path, *, overrides: Sequence[str] = ()) -> Experiment:
-    """The experiment that a dataset was made from; ``overrides`` as in ``rigidsim.load``."""
-    found = root_attributes(dataset)
-    text, given, settings = (found.get(name) for name in ("config", "config_given", "config_set"))
-    if not isinstance(text, str):
-        raise RunFolderError(f"{dataset}: embeds no config; it is no dataset of rigidsim")
-    source = f"{dataset} (embedded config)"
-    if not isinstance(given, str) or not isinstance(settings, str):
-        return parse_earlier(text, source=source, overrides=overrides)
-    experiment = parse(text, source=source, overrides=overrides)
-    return replace(experiment, given=given, settings=(*settings.splitlines(), *experiment.settings))
 
 
 def _dataset(path: Path) -> tuple[Path, RunFolder | None]:
@@ -190,15 +178,6 @@ def _file_problems(dataset: Path, folder: RunFolder | None) -> list[str]:
         line = text_difference(text, str(root_attributes(dataset).get("config")))
         problems.append(f"{folder.config}: isn't the config that the dataset was made by ({line})")
     return problems
-
-
-def text_difference(one: str, other: str) -> str:
-    """The first line in which two texts differ, in words."""
-    first, second = one.splitlines(), other.splitlines()
-    for number, (a, b) in enumerate(zip(first, second, strict=False), start=1):
-        if a != b:
-            return f'line {number} is "{a.strip()[:60]}", it was "{b.strip()[:60]}"'
-    return f"{len(first)} lines, it had {len(second)}"
 
 
 def _compare(saved: Path, again: Path, version: int) -> tuple[list[str], Difference | None, int]:
@@ -245,3 +224,81 @@ def _first_difference(name: str, one: xarray.DataArray, other: xarray.DataArray)
             x, y = a.reshape(len(unequal), -1)[row, column], b.reshape(len(unequal), -1)[row, column]
             return Difference(name, first + row, float(x), float(y))
     return None
+
+
+def _summary_problems(saved: Brief, again: Brief, folder: RunFolder, version: int) -> list[str]:
+    """The first claim of a summary that running again doesn't confirm, in words; empty if all hold.
+
+    Args:
+        saved, again: summaries; the saved one may be of an older version, which claimed less.
+    """
+    if not isinstance(saved, Summary):
+        return []  # a run that was killed claims nothing
+    # once there is a dataset, an interruption can only have hit its timeline or its segments' removal
+    ended = saved.status != Status.INTERRUPTED.value
+    claims = (_claims(summary, version, ended=ended) for summary in (saved, again))
+    found = list(_differences("", *claims))
+    if not found:
+        return []
+    more = f" (and {len(found) - 1} more of its claims don't hold)" if len(found) > 1 else ""
+    return [f"{folder.summary}: says that {found[0]}{more}"]
+
+
+def _claims(part: BaseModel, version: int, *, ended: bool) -> dict[str, Any]:
+    """The fields marked as claims, in this part and in parts within, as plain values; an older summary lacks
+    some.
+    """
+    found: dict[str, Any] = {}
+    given = part.model_dump(mode="json", exclude_unset=True)
+    for name in (n for n in type(part).model_fields if n in given):
+        marks = type(part).model_fields[name].metadata
+        claim, value = next((m for m in marks if isinstance(m, Claim)), None), getattr(part, name)
+        if claim is not None:
+            known = not claim.beside or claim.beside in given
+            if known and version >= claim.since and (ended or not claim.of_end):
+                found[name] = given[name]
+        elif isinstance(value, BaseModel):
+            found[name] = _claims(value, version, ended=ended)
+        elif isinstance(value, dict):
+            parts = {key: item for key, item in value.items() if isinstance(item, BaseModel)}
+            found[name] = {key: _claims(item, version, ended=ended) for key, item in parts.items()}
+    return found
+
+
+_ABSENT = object()
+
+
+def _differences(name: str, saved: Any, again: Any) -> Iterator[str]:
+    """Claims that differ; one that is missing in an older summary doesn't count."""
+    if isinstance(saved, Mapping) and isinstance(again, Mapping):
+        for key in [*again, *(k for k in saved if k not in again)]:
+            there, inner = saved.get(key, _ABSENT), f"{name}.{key}".lstrip(".")
+            if there is _ABSENT and name and isinstance(again[key], Mapping):
+                yield f"there is no {inner}, which there is when run again"
+            else:
+                yield from _differences(inner, there, again.get(key, _ABSENT))
+    elif saved is _ABSENT or (saved is None and again is _ABSENT):
+        return
+    elif again is _ABSENT:
+        yield f"{name} is {_short(saved)}, which there isn't when run again"
+    elif type(saved) is not type(again) or saved != again:
+        yield f"{name} is {_short(saved)}, {_short(again)} when run again"
+
+
+def _short(value: Any) -> str:
+    text = repr(value)
+    return text if len(text) <= 120 else text[:117] + "..."
+
+
+def _timeline_problems(saved: Brief, folder: RunFolder) -> list[str]:
+    """Problems with the timeline that a summary names, if it is missing or changed; older summaries name
+    none.
+    """
+    if not isinstance(saved, Summary) or saved.timeline_sha256 is None:
+        return []
+    if not folder.timeline.is_file() or folder.timeline.is_symlink():
+        return [f"{folder.timeline}: is missing; rigidsim view draws it again"]
+    if provenance.file_sha256(folder.timeline) != saved.timeline_sha256:
+        return [f"{folder.timeline}: was damaged or changed since it was drawn; rigidsim view draws it again "
+                "once it is removed"]  # fmt: skip
+    return []

@@ -6,15 +6,20 @@ import tempfile
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING
+
+import xarray
 
 from rigidsim.errors import RigidsimError, RunFolderError
+from rigidsim.look import film, live, viewer
+from rigidsim.look.timeline.comparison import write_comparison
+from rigidsim.scene.sweeps.sweep import Sweep
 from rigidsim.store import atomic
 from rigidsim.store.run import Run, SavedRun, open_run
 from rigidsim.store.sweeps.folder import is_sweep
-
-if TYPE_CHECKING:
-    import xarray
+from rigidsim.store.sweeps.run import open_sweep
+from rigidsim.workflows.read import parse
+from rigidsim.workflows.run import run
+from rigidsim.workflows.sweeps.members import single_member
 
 Told = Callable[[int, int], None]
 
@@ -41,12 +46,6 @@ def runs_of(paths: Sequence[Path], members: Sequence[int] = ()) -> list[tuple[st
 
 
 def _members(paths: Sequence[Path], members: Sequence[int]) -> list[tuple[str, Run]]:
-    from rigidsim.scene.sweeps.sweep import Sweep
-    from rigidsim.store.sweeps.run import open_sweep
-    from rigidsim.workflows.read import parse
-    from rigidsim.workflows.run import run
-    from rigidsim.workflows.sweeps.members import single_member
-
     if len(paths) != 1 or not is_sweep(paths[0]):
         raise RunFolderError("--member is for one sweep: give its folder (runs/NAME), and no other run")
     folder = open_sweep(paths[0]).folder
@@ -67,31 +66,24 @@ def show(named: Sequence[tuple[str, Run]], *, web: bool = False) -> int:
     Returns:
         The viewer's exit code; 130 after Ctrl-C.
     """
-    from rigidsim.look.viewer import NoDisplay, open_viewer
-
-    (_, first), *others = named
-    if not others and isinstance(first, SavedRun) and first.folder.at_work:
-        return _follow(first, web=web)
-    if not others:
-        return first.view(web=web)
-    with recording_of(named) as timeline:
-        try:
-            return open_viewer(timeline, web=web)
-        except (FileNotFoundError, NoDisplay) as error:
-            raise RunFolderError(str(error)) from None
+    first = named[0][1]
+    try:
+        if len(named) == 1 and isinstance(first, SavedRun) and first.folder.at_work:
+            return live.follow(lambda: _so_far(first), web=web)
+        with _recording_of(named) as timeline:
+            return viewer.open_viewer(timeline, web=web)
+    except (FileNotFoundError, RuntimeError) as error:
+        raise RunFolderError(str(error)) from None
 
 
 def render(
     named: Sequence[tuple[str, Run]], target: Path, *, seconds: float | None = None, told: Told | None = None
 ) -> Path:
     """Draw runs to a PNG picture, or a GIF or MP4 film, without a screen."""
-    from rigidsim.look import film
-    from rigidsim.look.viewer import NoGraphics
-
-    with recording_of(named) as timeline, _new(target) as new:
+    with _recording_of(named) as timeline, _new(target) as new:
         try:
             film.render(timeline, new, seconds=seconds or film.SECONDS, told=told)
-        except (FileNotFoundError, NoGraphics, film.NoEncoder, RuntimeError, ValueError) as error:
+        except (FileNotFoundError, film.NoEncoder, RuntimeError, ValueError) as error:
             raise RunFolderError(f"{target}: can't be drawn: {error}") from None
     return target
 
@@ -110,14 +102,12 @@ def _new(target: Path) -> Iterator[Path]:
 
 
 @contextmanager
-def recording_of(named: Sequence[tuple[str, Run]]) -> Iterator[Path]:
+def _recording_of(named: Sequence[tuple[str, Run]]) -> Iterator[Path]:
     """The recording of a run, or a temporary one of several runs side by side."""
     if len(named) == 1:
         with named[0][1].recording() as timeline:
             yield timeline
         return
-    from rigidsim.look.timeline.comparison import write_comparison
-
     with tempfile.TemporaryDirectory(prefix="rigidsim-view-") as scratch, ExitStack() as opened:
         datasets = [(name, opened.enter_context(run.dataset)) for name, run in named]
         path = Path(scratch) / "timeline.rrd"
@@ -128,17 +118,7 @@ def recording_of(named: Sequence[tuple[str, Run]]) -> Iterator[Path]:
         yield path
 
 
-def _follow(run: SavedRun, *, web: bool) -> int:
-    from rigidsim.look import live
-    from rigidsim.look.viewer import NoDisplay
-
-    try:
-        return live.follow(lambda: so_far(run), web=web)
-    except (FileNotFoundError, NoDisplay, RuntimeError) as error:
-        raise RunFolderError(str(error)) from None
-
-
-def so_far(run: SavedRun) -> tuple[xarray.Dataset | None, bool]:
+def _so_far(run: SavedRun) -> tuple[xarray.Dataset | None, bool]:
     """What is saved of a run now (None before its first segment), and whether the run goes on."""
     going_on = run.folder.at_work
     try:

@@ -185,7 +185,7 @@ def test_sampling_changes_no_bit() -> None:
 
 def test_plan_says_why_it_is_carried(tmp_path: Path) -> None:
     plan = rigidsim.plan(rigidsim.parse(text()), out=tmp_path)
-    [why] = [row["why"] for row in plan["reasons"] if row["states"] == " ".join(SIGMA)]
+    [why] = [row.why for row in plan.reasons if row.states == " ".join(SIGMA)]
     assert 'formulation = "rodrigues" asks for it' in why
     assert why.endswith(Rodrigues.why)
 

@@ -192,8 +192,8 @@ def test_a_plan_is_of_its_steps_and_forecasts_no_errors(tmp_path: Path) -> None:
     """Which error laws would tell of Taylor series."""
     plan = rigidsim.plan(rigidsim.parse(text()), out=tmp_path)
     run = run_text(text())
-    assert plan["predicted"]["steps"] == pytest.approx(run.summary["cost"]["steps"], rel=1e-3)
-    assert plan["predicted"]["attitude_error_rad"] is None
+    assert plan.predicted.steps == pytest.approx(run.summary["cost"]["steps"], rel=1e-3)
+    assert plan.predicted.attitude_error_rad is None
 
 
 def test_it_goes_on_after_any_step(tmp_path: Path) -> None:

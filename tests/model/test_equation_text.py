@@ -24,7 +24,7 @@ def value(text: str, known: dict[str, float]) -> float:
 def test_what_is_written_is_what_is_integrated(name: str) -> None:
     experiment = rigidsim.load(f"configs/{name}.toml")
     system, planned = prepare(experiment).system, rigidsim.plan(experiment, pilot_seconds=0.01)
-    shared, lines = planned["shared_terms"], planned["equations"]
+    shared, lines = planned.shared_terms, planned.equations
     variables = [variable for variable, _ in system.equations]
     state, time = np.random.default_rng(7).uniform(0.2, 1.0, len(variables)), 0.7
     function = hy.cfunc([right for _, right in system.equations], variables)

@@ -104,7 +104,7 @@ def test_a_load_from_python_is_measured_too() -> None:
 
 def test_plan_with_loads_from_python() -> None:
     found = rigidsim.plan(rigidsim.parse(FREE), loads=[Thruster()])
-    assert "work" in found["states"]
-    assert [i["name"] for i in found["invariants"] if not i["numerical"]] == ["energy_balance"]
+    assert "work" in found.states
+    assert [i.name for i in found.invariants if not i.numerical] == ["energy_balance"]
     alone = rigidsim.plan(rigidsim.parse(FREE))
-    assert "work" not in alone["states"]
+    assert "work" not in alone.states

@@ -141,8 +141,8 @@ def test_plan_warns_of_it(tmp_path: Path) -> None:
     said = {}
     for time in (VAST, "end = 3\nsamples = 49"):
         plan = rigidsim.plan(rigidsim.parse(config(time=time)), out=tmp_path, pilot_seconds=0.01)
-        said[time] = plan["warnings"]
-        assert plan["predicted"]["free_bytes"] == pytest.approx(shutil.disk_usage(tmp_path).free, rel=0.1)
+        said[time] = plan.warnings
+        assert plan.predicted.free_bytes == pytest.approx(shutil.disk_usage(tmp_path).free, rel=0.1)
     assert said["end = 3\nsamples = 49"] == []
     assert len(said[VAST]) == 1
     assert "take fewer [time] samples" in said[VAST][0]

@@ -116,8 +116,8 @@ def test_held_or_in_euler_angles_it_is_refused() -> None:
 
 def test_plan_says_where_it_applies() -> None:
     taylor = FREE.replace('method = "closed_form"', "")
-    assert rigidsim.plan(rigidsim.parse(taylor))["closed_form"] is not None
+    assert rigidsim.plan(rigidsim.parse(taylor)).closed_form is not None
     damped = taylor.replace("[time]", '[[loads]]\nkind = "viscous_torque"\ncoefficients = [1, 1, 1]\n[time]')
     plan = rigidsim.plan(rigidsim.parse(damped))
-    assert plan["closed_form"] is None
-    assert "viscous" in plan["closed_form_why_not"]
+    assert plan.closed_form is None
+    assert "viscous" in plan.closed_form_why_not

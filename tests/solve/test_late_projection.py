@@ -121,7 +121,7 @@ def test_errors_stay_those_of_the_beginning() -> None:
 
 def forecast(end: float, hold: str) -> float:
     plan = rigidsim.plan(rigidsim.parse(text(end, hold)), pilot_seconds=0.01)
-    return float(plan["predicted"]["attitude_error_rad"])
+    return float(plan.predicted.attitude_error_rad)
 
 
 class WrongPotential(Load):

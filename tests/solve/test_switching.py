@@ -272,8 +272,8 @@ def test_a_plan_lists_the_surfaces_each_once() -> None:
     torque = '"sign(2*wz)", "abs(-wz)*min(t, 3)", "-0.1*psi + sqrt(wx^4)"'
     text = config(initial=TILTED, loads=f'kind = "torque"\ncomponents = [{torque}]')
     plan = rigidsim.plan(rigidsim.parse(text), pilot_seconds=0.0)
-    assert [surface["surface"] for surface in plan["switching"]] == ["sign(2*wz)", "min(t, 3)"]
-    assert plan["turning"] == ["psi"]
+    assert [surface.surface for surface in plan.switching] == ["sign(2*wz)", "min(t, 3)"]
+    assert plan.turning == ["psi"]
 
 
 def test_a_norm_that_vanishes_is_not_passed_over() -> None:

@@ -189,16 +189,16 @@ def test_twelve_digits_over_a_year_of_the_earth_take_every_rotation() -> None:
 def test_plan_says_what_each_level_costs_and_leaves_out() -> None:
     given = text("auto", time="end = 20\nsamples = 21")
     planned = rigidsim.plan(rigidsim.parse(given), changes={"integrator.accuracy_axis": 1e-2})
-    rows = {row["level"]: row for row in planned["levels"]}
+    rows = {row.level: row for row in planned.levels}
     assert list(rows) == ["orbit_averaged", "spin_averaged", "full"]
-    assert [level for level, row in rows.items() if not row["why_not"]] == ["orbit_averaged"]
-    errors = [row["error_rad"] for row in rows.values()]
+    assert [level for level, row in rows.items() if not row.why_not] == ["orbit_averaged"]
+    errors = [row.error_rad for row in rows.values()]
     assert errors[0] > errors[1] > errors[2] == 0
-    steps = [row["steps"] for row in rows.values()]
+    steps = [row.steps for row in rows.values()]
     assert steps[0] < steps[1] < steps[2]
-    assert planned["predicted"]["steps"] == pytest.approx(steps[0], rel=0.5)
+    assert planned.predicted.steps == pytest.approx(steps[0], rel=0.5)
     plain = rigidsim.plan(rigidsim.parse(config(BODY, START, LOAD, "end = 1\nsamples = 2")))
-    assert plain["levels"] == []
+    assert plain.levels == []
 
 
 def test_tradeoff_has_models_beside_settings() -> None:

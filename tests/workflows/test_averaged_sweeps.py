@@ -105,7 +105,7 @@ def test_such_a_sweep_is_resumed_verified_drawn_and_planned(tmp_path: Path) -> N
     again = rigidsim.sweep(rigidsim.parse(SPINNING), out=tmp_path).dataset
     assert again.drop_attrs().identical(before.drop_attrs())
     made = rigidsim.plan(single_member(rigidsim.parse(SPINNING), 0))
-    assert made["predicted"]["modelling_seconds"] > 0
+    assert made.predicted.modelling_seconds > 0
 
 
 @pytest.mark.slow

@@ -104,7 +104,7 @@ def test_a_rotation_that_dies_away_is_refused_from_then_on() -> None:
 
 def test_plan_says_which_states_there_are_and_why() -> None:
     planned = rigidsim.plan(rigidsim.parse(text("spin_averaged", viscous(1e-4), 4000)))
-    states = {entry["states"]: entry["why"] for entry in planned["reasons"]}
+    states = {entry.states: entry.why for entry in planned.reasons}
     assert list(states) == ["sx sy sz", "axial transverse"]
     assert "viscous_torque" in states["axial transverse"]
 
@@ -115,5 +115,5 @@ def test_plan_says_which_states_there_are_and_why() -> None:
 def test_steps_are_forecast_as_torques_change_the_rotation(loads: str) -> None:
     """From the beginning alone they would be half as many again, or 2/3."""
     given = text("full", loads, 2500.0)
-    planned = rigidsim.plan(rigidsim.parse(given), pilot_seconds=0.01)["predicted"]["steps"]
+    planned = rigidsim.plan(rigidsim.parse(given), pilot_seconds=0.01).predicted.steps
     assert planned == pytest.approx(run_text(given).summary["cost"]["steps"], rel=0.1)

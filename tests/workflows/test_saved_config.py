@@ -12,7 +12,7 @@ from support import IMPATIENT, config, loaded, same_bits
 import rigidsim
 from rigidsim import RunFolderError
 from rigidsim.store import seal
-from rigidsim.workflows.verify import embedded
+from rigidsim.workflows.embedded import embedded
 
 TEXT = config(time="end = 10 # long\nevery = 0.5", more="# the end", name="cut")
 SETTINGS = ["time.end=60", " integrator.tolerance=1.0000000000000000000000001e-15 "]

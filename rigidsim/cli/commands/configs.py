@@ -34,14 +34,14 @@ def check(configs: list[Path], overrides: list[str] | None, as_json: bool) -> in
 def plan(config: Path, overrides: list[str] | None, out: Path, as_json: bool) -> None:
     """Say what would be integrated, of a sweep what one member of it would."""
     experiment = load(config, overrides=overrides or [])
-    swept = experiment.config.sweep is not None
-    made = plan_sweep(Sweep.of(experiment)) if swept else planning.plan(experiment, out=out)
+    swept = None if experiment.config.sweep is None else plan_sweep(Sweep.of(experiment))
+    made = planning.plan(experiment, out=out) if swept is None else swept.member
     if as_json:
-        print_json(made)
+        print_json((swept or made).as_dict())
         return
-    if swept:
-        print_sweep_plan(made)
-    print_plan(made["member"] if swept else made)
+    if swept is not None:
+        print_sweep_plan(swept)
+    print_plan(made)
 
 
 def tradeoff(

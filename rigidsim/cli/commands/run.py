@@ -24,7 +24,7 @@ def run(
     """Read every config before any of them is run; the exit code is that of the first that didn't finish."""
     experiments = [load(path, overrides=overrides or []) for path in configs or []]
     if dataset is not None:
-        from rigidsim.workflows.verify import embedded  # with the reader of datasets
+        from rigidsim.workflows.embedded import embedded  # with the reader of datasets
 
         experiments.append(embedded(dataset, overrides=overrides or []))
     if scan and member is not None:

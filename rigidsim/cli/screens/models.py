@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING
 
 from rigidsim.cli.screens.page import Page, Styled
 from rigidsim.scene.readable_time import span_text
 from rigidsim.store.summary_parts import Modelling, TableErrors
+
+if TYPE_CHECKING:
+    from rigidsim.workflows.plan_levels import LevelCost
 
 _YEAR = 365.25 * 86400  # s
 
@@ -43,15 +46,13 @@ def interpolated(name: str, found: TableErrors) -> str:
     )
 
 
-def print_levels(levels: list[dict[str, Any]], on: Page) -> None:
+def print_levels(levels: list[LevelCost], on: Page) -> None:
     """Print what each model would cost, and leave out."""
     rows: list[list[Styled]] = []
     for row in levels:
-        known = row["steps"] is not None
-        cost = [f"{row['steps']:,.0f}", span_text(row["cpu_seconds"], 2)] if known else ["", ""]
-        error = (
-            "" if row["error_rad"] is None else f"{row['error_rad']:.1e} rad" if row["error_rad"] else "none"
-        )
-        rows.append([row["level"], *cost, error, row["why_not"] or ("taken", "bold")])
+        known = row.steps is not None and row.cpu_seconds is not None
+        cost = [f"{row.steps:,.0f}", span_text(row.cpu_seconds or 0.0, 2)] if known else ["", ""]
+        error = "" if row.error_rad is None else f"{row.error_rad:.1e} rad" if row.error_rad else "none"
+        rows.append([row.level, *cost, error, row.why_not or ("taken", "bold")])
     if rows:
         on.table(["model", "steps", "CPU", "leaves out", ""], rows)

@@ -18,12 +18,12 @@ from rigidsim.errors import ConfigError
 from rigidsim.scene.formulations import variables_named
 from rigidsim.scene.methods import method_named
 from rigidsim.scene.readable_time import TimeWords, span_text
-from rigidsim.store.summary import Brief, Summary
+from rigidsim.store.summary import Brief, Span, Start, Summary, UnderstoodBody
 from rigidsim.store.summary_parts import ENGINE, Accuracy, InvariantDrift
-from rigidsim.store.understood import Span, Start, UnderstoodBody
 
 if TYPE_CHECKING:
     from rigidsim.workflows.check import Checked
+    from rigidsim.workflows.plan import RunPlan
 
 
 def size(count: float) -> str:
@@ -217,60 +217,60 @@ def _print_accuracy(accuracy: Accuracy, on: Page, what: str) -> None:
         on.line("path", text)
 
 
-def print_plan(plan: dict[str, Any], out: Console | None = None) -> None:
+def print_plan(plan: RunPlan, out: Console | None = None) -> None:
     """Print the result of ``rigidsim plan``."""
     on = Page(out)
-    on.say((plan["name"], "bold"), f"  {plan['state_count']} states, {plan['formulation']}")
-    parts = UnderstoodBody(**plan["body"]), Start(**plan["start"]), Span(**plan["time"])
-    print_understood(*parts, on, plan["loads"])
-    for surface in plan["switching"]:
-        where = f"steps end on the kinks and jumps of {surface['surface']} ({surface['where']})"
+    on.say((plan.name, "bold"), f"  {plan.state_count} states, {plan.formulation}")
+    parts = plan.body, plan.start, plan.time
+    print_understood(*parts, on, plan.loads)
+    for surface in plan.switching:
+        where = f"steps end on the kinks and jumps of {surface.surface} ({surface.where})"
         on.say("  " + where)
-    if plan["turning"]:
-        on.say(f"  turns of {', '.join(plan['turning'])} count: steps are taken one by one")
-    reasons: list[list[Styled]] = [[row["states"], row["why"]] for row in plan["reasons"]]
-    reasons += [[(f"no {row['what']}", "dim"), (row["why"], "dim")] for row in plan["left_out"]]
+    if plan.turning:
+        on.say(f"  turns of {', '.join(plan.turning)} count: steps are taken one by one")
+    reasons: list[list[Styled]] = [[row.states, row.why] for row in plan.reasons]
+    reasons += [[(f"no {row.what}", "dim"), (row.why, "dim")] for row in plan.left_out]
     on.table(["states", "carried because"], reasons)
-    print_equations(plan["shared_terms"], plan["equations"], on)
-    on.table(["invariant", "holds because"], [[row["name"], row["why"]] for row in plan["invariants"]])
-    on.line("recorded", ", ".join(plan["recorded"]))
-    predicted, pilot = plan["predicted"], plan["pilot"]
-    held = ", invariants held" + _from_step(plan["hold_from_step"]) if plan["hold_invariants"] else ""
-    order = "" if plan["taylor_order"] is None else f", Taylor order {plan['taylor_order']}"
-    on.line("settings", f"{plan['precision']} precision, tolerance {plan['tolerance']:.3g}{order}{held}")
-    if not method_named(plan["method"]).has_steps:
-        on.line("method", f"{plan['closed_form']}: no steps are taken")
-    elif plan["closed_form"] is not None:
-        on.line("closed", f'{plan["closed_form"]}: method = "closed_form" would take no steps')
-    print_levels(plan["levels"], on)
-    if plan["accuracy"] is not None:
-        on.line("chosen", f"{plan['accuracy']['chosen']}: {plan['accuracy']['why']}")
-    first = "" if predicted["pace"] == 1 else " at first"
+    print_equations(plan.shared_terms, plan.equations, on)
+    on.table(["invariant", "holds because"], [[row.name, row.why] for row in plan.invariants])
+    on.line("recorded", ", ".join(plan.recorded))
+    predicted, pilot = plan.predicted, plan.pilot
+    held = ", invariants held" + _from_step(plan.hold_from_step) if plan.hold_invariants else ""
+    order = "" if plan.taylor_order is None else f", Taylor order {plan.taylor_order}"
+    on.line("settings", f"{plan.precision} precision, tolerance {plan.tolerance:.3g}{order}{held}")
+    if not method_named(plan.method).has_steps:
+        on.line("method", f"{plan.closed_form}: no steps are taken")
+    elif plan.closed_form is not None:
+        on.line("closed", f'{plan.closed_form}: method = "closed_form" would take no steps')
+    print_levels(plan.levels, on)
+    if plan.accuracy is not None:
+        on.line("chosen", f"{plan.accuracy.chosen}: {plan.accuracy.why}")
+    first = "" if predicted.pace == 1 else " at first"
     on.line(
         "forecast",
-        f"{predicted['steps']:.3g} steps of about {span_text(pilot['step'])}{first} "
-        f"(pilot of {pilot['steps']:.0f}), {span_text(predicted['total_seconds'])}, "
-        f"{size(predicted['memory_bytes'])} of memory, dataset {size(predicted['dataset_bytes'])}, "
-        f"timeline {size(predicted['timeline_bytes'])}",
+        f"{predicted.steps:.3g} steps of about {span_text(pilot.step)}{first} "
+        f"(pilot of {pilot.steps:.0f}), {span_text(predicted.total_seconds)}, "
+        f"{size(predicted.memory_bytes)} of memory, dataset {size(predicted.dataset_bytes)}, "
+        f"timeline {size(predicted.timeline_bytes)}",
     )
-    if predicted["pace"] is None:
+    if predicted.pace is None:
         on.line(
             "", "at the pace of the start, which torques change: fewer steps where they brake the rotation"
         )
-    elif predicted["pace"] != 1:
-        told = f"{predicted['pace']:.2g} times as many a second as at first"
+    elif predicted.pace != 1:
+        told = f"{predicted.pace:.2g} times as many a second as at first"
         on.line("", f"torques change the rotation: steps are {told}, on average")
-    for warning in plan["warnings"]:
+    for warning in plan.warnings:
         on.line("warning", warning, "bold red")
-    error = predicted["attitude_error_rad"]
+    error = predicted.attitude_error_rad
     if error is not None and math.isfinite(error):
-        factor = predicted["amplification"]
+        factor = predicted.amplification
         unstable = f", {factor:.1g} times amplified by the motion" if factor > 1 else ""
-        law = "invariants held" if predicted["held"] else "round-off law"
-        averaged = plan["formulation"].endswith("_averaged")
+        law = "invariants held" if predicted.held else "round-off law"
+        averaged = plan.formulation.endswith("_averaged")
         words = "momentum's direction integrated to" if averaged else "attitude uncertain by"
         on.line("accuracy", f"{words} about {error:.1e} rad at the end ({law}{unstable})")
-        seen = predicted["growth_seconds"]
+        seen = predicted.growth_seconds
         if seen:
             on.line(
                 "",

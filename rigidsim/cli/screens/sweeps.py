@@ -15,7 +15,8 @@ from rich.table import Table
 
 from rigidsim.cli.screens.page import Page
 from rigidsim.scene.sweeps.sweep import Sweep
-from rigidsim.store.sweeps.run import SavedSweep
+from rigidsim.store.sweeps.run import SavedSweep, SweepCost
+from rigidsim.workflows.sweeps.plan import SweepPlan
 from rigidsim.workflows.sweeps.sweep import SweepObserver
 
 _LINE_EVERY = 5.0  # seconds between plain lines
@@ -113,54 +114,54 @@ _ERRORS = {
 }
 
 
-def _of_errors(cost: dict[str, Any]) -> str:
-    seconds = cost.get("estimate_cpu_seconds", 0.0)
+def _of_errors(cost: SweepCost) -> str:
+    seconds = cost.estimate_cpu_seconds
     return f", {seconds:.3g} s of them for errors" if seconds else ""
 
 
 def print_sweep(result: SavedSweep) -> None:
     """Print how a sweep's members ended."""
-    told, screen = result.summary, Page().console
-    screen.print(f"[bold]{told.get('name', '')}[/] ({result.place}): {told['message']}", highlight=False)
+    told, screen = result.outcome, Page().console
+    screen.print(f"[bold]{told.name}[/] ({result.place}): {told.message}", highlight=False)
     if not result.finished:
-        rate = told.get("members_per_second")
+        rate = told.members_per_second
         if rate:
-            left = duration(told.get("seconds_left"))
+            left = duration(told.seconds_left)
             screen.print(
-                f"tiles    {told['tiles_done']:,} of {told['tiles']:,}; {rate:.3g} members a second, "
-                f"{left} left",
+                f"tiles    {told.tiles_done:,} of {told.tiles:,}; {rate:.3g} members a second, {left} left",
                 highlight=False,
             )
-        elif "tiles" in told:
-            screen.print(f"tiles    {told['tiles_done']:,} of {told['tiles']:,}", highlight=False)
+        elif told.tiles is not None:
+            screen.print(f"tiles    {told.tiles_done:,} of {told.tiles:,}", highlight=False)
         if result.status == "interrupted":
             screen.print(escape(f"next     rigidsim resume {shlex.quote(result.place)}"), highlight=False)
         return
-    shape = " x ".join(f"{name} {size:,}" for name, size in told["shape"].items())
+    shape = " x ".join(f"{name} {size:,}" for name, size in told.shape.items())
     screen.print(f"axes     {shape}", highlight=False)
     table = Table("ended", "members", box=None, pad_edge=False)
-    for status, number in told["outcomes"].items():
+    for status, number in told.outcomes.items():
         table.add_row(status, f"{number:,}")
     screen.print(table)
-    cost = told["cost"]
-    engines = ", ".join(f"{number:,} {engine}" for engine, number in told["engines"].items())
+    cost = told.cost
+    assert cost is not None
+    engines = ", ".join(f"{number:,} {engine}" for engine, number in told.engines.items())
     screen.print(
-        f"cost     {cost['steps']:,} steps, {cost['cpu_seconds']:.3g} s of CPU in {cost['tiles']:,} tiles "
+        f"cost     {cost.steps:,} steps, {cost.cpu_seconds:.3g} s of CPU in {cost.tiles:,} tiles "
         f"({engines})" + _of_errors(cost),
         highlight=False,
     )
-    errors = told.get("estimated_errors", {})
+    errors = told.estimated_errors
     for name, error in errors.items():
         words = _INTEGRATED if name == "attitude" and "modelling" in errors else _ERRORS.get(name, name)
-        units = "" if error["units"] == "1" else f" {error['units']}"
+        units = "" if error.units == "1" else f" {error.units}"
         screen.print(
-            f"error    {words}: {error['median']:.2g}{units} in the median, at most "
-            f"{error['largest']:.2g}, estimated of {error['members']:,} members",
+            f"error    {words}: {error.median:.2g}{units} in the median, at most "
+            f"{error.largest:.2g}, estimated of {error.members:,} members",
             highlight=False,
         )
-    for name, drift in told["largest_drifts"].items():
+    for name, drift in told.largest_drifts.items():
         screen.print(f"drift    {name.removesuffix('_drift')}: at most {drift:.2g}", highlight=False)
-    for text in told["warnings"]:
+    for text in told.warnings:
         screen.print(f"[yellow]warning[/]  {escape(text)}", highlight=False)
     place = shlex.quote(result.place)
     screen.print(escape(f"next     rigidsim plot {place}"), highlight=False)
@@ -168,25 +169,25 @@ def print_sweep(result: SavedSweep) -> None:
     screen.print(escape(f"         rigidsim export {place} --format csv"), highlight=False)
 
 
-def print_sweep_plan(made: dict[str, Any]) -> None:
+def print_sweep_plan(made: SweepPlan) -> None:
     """Print what a sweep would run, and what it would cost."""
     screen = Page().console
-    screen.print(f"[bold]{made['name']}[/]: {made['members']:,} members ({made['mode']})", highlight=False)
+    screen.print(f"[bold]{made.name}[/]: {made.members:,} members ({made.mode})", highlight=False)
     table = Table("axis", "key", "values", "from", "to", box=None, pad_edge=False)
-    for axis in made["axes"]:
-        unit = axis["unit"] if axis["unit"] not in (None, "1") else ""
+    for axis in made.axes:
+        unit = axis.unit if axis.unit not in (None, "1") else ""
         table.add_row(
-            axis["name"], axis["key"], f"{axis['count']:,}", _brief(axis["first"]),
-            f"{_brief(axis['last'])} {unit}",
+            axis.name, axis.key, f"{axis.count:,}", _brief(axis.first),
+            f"{_brief(axis.last)} {unit}",
         )  # fmt: skip
     screen.print(table)
-    predicted = made["predicted"]
+    predicted = made.predicted
     screen.print(
-        f"keep     {', '.join(made['keep'])}\n"
-        f"tiles    {made['tiles']:,} of {made['tile']:,} members\n"
-        f"time     {duration(predicted['total_seconds'])} on one core, "
-        f"{predicted['seconds_per_member']:.2g} s a member\n"
-        f"disk     about {predicted['dataset_bytes'] / 1e6:.3g} MB, and as much for the tiles\n\n"
+        f"keep     {', '.join(made.keep)}\n"
+        f"tiles    {made.tiles:,} of {made.tile:,} members\n"
+        f"time     {duration(predicted.total_seconds)} on one core, "
+        f"{predicted.seconds_per_member:.2g} s a member\n"
+        f"disk     about {predicted.dataset_bytes / 1e6:.3g} MB, and as much for the tiles\n\n"
         "one member:",
         highlight=False,
     )

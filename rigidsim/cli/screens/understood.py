@@ -14,7 +14,7 @@ from rigidsim.scene.readable_time import (
     span_text,
     unit_for,
 )
-from rigidsim.store.understood import Span, Start, UnderstoodBody
+from rigidsim.store.summary import Span, Start, UnderstoodBody
 
 _DIGITS = 6
 _FEWER = 4

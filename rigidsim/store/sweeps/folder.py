@@ -173,7 +173,7 @@ class SweepFolder(WorkFolder):
 
     def write_summary(self, content: dict[str, Any]) -> None:
         """Write ``summary.json`` atomically."""
-        text = json.dumps({"kind": KIND, **content}, indent=2, allow_nan=False)
+        text = json.dumps(content, indent=2, allow_nan=False)
         atomic.write_bytes(self.summary, (text + "\n").encode())
 
 

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from pydantic import Field, ValidationError
 
 from rigidsim.errors import RESUME, RunFolderError
 from rigidsim.store.seal import check_seal, check_whole
+from rigidsim.store.summary_parts import SummaryPart
 from rigidsim.store.sweeps.folder import SweepFolder
 from rigidsim.store.sweeps.generation import Generation
 
@@ -20,17 +23,86 @@ if TYPE_CHECKING:
 _RECENT = 20  # tiles from which the rate is determined
 
 
+class SweepCost(SummaryPart):
+    """What all members cost: CPU and wall seconds of their tiles, and of the session that completed them."""
+
+    steps: int
+    cpu_seconds: float
+    wall_seconds_of_tiles: float
+    tiles: int
+    estimate_cpu_seconds: float = 0.0
+    session_wall_seconds: float
+    session_cpu_seconds: float
+
+
+class ErrorsOfMembers(SummaryPart):
+    """Announced errors of the members that have one, in ``units``."""
+
+    members: int
+    median: float
+    largest: float
+    units: str
+
+
+class SweepSummary(SummaryPart):
+    """Contents of a sweep's ``summary.json``; of an unfinished one, what its tiles tell.
+
+    Attributes:
+        members_done, tiles, tiles_done, members_per_second, seconds_left: of an unfinished sweep alone.
+        shape: members along each dimension.
+        axes: key of each axis.
+        outcomes, warned: number of members by how they ended, and by what they are warned of.
+        engines: number of members by what ran them.
+        why_alone: code of the reason why members were run one by one.
+        mixed_provenance: what differs between tiles, if anything.
+    """
+
+    kind: str = "sweep"
+    name: str = ""
+    description: str = ""
+    status: str = ""
+    message: str = ""
+    exit_code: int = 0
+    members: int = 0
+    members_done: int = 0
+    tiles: int | None = None
+    tiles_done: int = 0
+    members_per_second: float | None = None
+    seconds_left: float | None = None
+    shape: dict[str, int] = Field(default_factory=dict)
+    axes: dict[str, str] = Field(default_factory=dict)
+    keep: list[str] = Field(default_factory=list)
+    outcomes: dict[str, int] = Field(default_factory=dict)
+    warned: dict[str, int] = Field(default_factory=dict)
+    warnings: list[str] = Field(default_factory=list)
+    warning_codes: list[str] = Field(default_factory=list)
+    engines: dict[str, int] = Field(default_factory=dict)
+    why_alone: str | None = None
+    cost: SweepCost | None = None
+    largest_drifts: dict[str, float] = Field(default_factory=dict)
+    estimated_errors: dict[str, ErrorsOfMembers] = Field(default_factory=dict)
+    config_sha256: str = ""
+    provenance: dict[str, str] = Field(default_factory=dict)
+    mixed_provenance: str | None = None
+    dataset_sha256: str | None = None
+
+
 @dataclass(frozen=True, repr=False)
 class SavedSweep:
     """A sweep on disk, finished or not.
 
     Attributes:
         folder: its files.
-        summary: contents of its summary; for an unfinished sweep, what its tiles tell.
+        outcome: contents of its summary; for an unfinished sweep, what its tiles tell.
     """
 
     folder: SweepFolder
-    summary: dict[str, Any]
+    outcome: SweepSummary
+
+    @cached_property
+    def summary(self) -> dict[str, Any]:
+        """The content of ``summary.json``."""
+        return self.outcome.as_dict()
 
     @property
     def place(self) -> str:
@@ -40,7 +112,7 @@ class SavedSweep:
     @property
     def status(self) -> str:
         """Status of the sweep: "finished", "running", "interrupted" ..."""
-        return str(self.summary["status"])
+        return self.outcome.status
 
     @property
     def finished(self) -> bool:
@@ -86,14 +158,14 @@ class SavedSweep:
         except RunFolderError as error:
             again = f"; remove it, and {RESUME} writes it again" if self.folder.tiles.is_dir() else ""
             raise RunFolderError(f"{error}{again}") from None
-        expected = self.summary.get("dataset_sha256")
+        expected = self.outcome.dataset_sha256
         if expected not in (None, digest):
             raise RunFolderError(
                 f"{self.folder.dataset}: isn't the dataset that summary.json beside it was written for"
             )
 
     def __repr__(self) -> str:
-        return f"<Sweep {self.summary.get('name', '')!r} ({self.place}): {self.status}>"
+        return f"<Sweep {self.outcome.name!r} ({self.place}): {self.status}>"
 
 
 def open_sweep(path: str | Path) -> SavedSweep:
@@ -106,40 +178,44 @@ def open_sweep(path: str | Path) -> SavedSweep:
     folder = SweepFolder(given if given.is_dir() else given.parent)
     if not folder.is_sweep:
         raise RunFolderError(f"{path}: no sweep here; give the folder of one (runs/NAME)")
-    return SavedSweep(folder, so_far(folder))
+    return SavedSweep(folder, _so_far(folder))
 
 
-def so_far(folder: SweepFolder) -> dict[str, Any]:
+def _so_far(folder: SweepFolder) -> SweepSummary:
     """The summary; for an unfinished sweep, what its tiles tell."""
-    summary = folder.read_summary()
+    try:
+        summary = SweepSummary.model_validate(folder.read_summary())
+    except ValidationError as error:
+        where = ".".join(str(step)[:40] for step in error.errors(include_url=False)[0]["loc"])
+        raise RunFolderError(f"{folder.summary}: is damaged or no summary of rigidsim ({where!a})") from None
     generations = folder.generations()
     if not generations:
         return summary
     latest = generations[-1]
     present = folder.present(latest)
-    ended = summary.get("config_sha256") == latest.config_sha256
-    if summary and ended and bool(present.all()):
+    ended = summary.config_sha256 == latest.config_sha256
+    if ended and bool(present.all()):
         return summary
     busy = folder.at_work
     done = int(sum(len(latest.members_of(int(t))) for t in np.flatnonzero(present)))
-    status = "running" if busy else ("interrupted" if not ended else summary.get("status", "interrupted"))
+    status = "running" if busy else (summary.status if ended and summary.status else "interrupted")
     words = "a process is at work on it" if busy else "the tiles that are complete are kept"
     rate = _rate(folder, latest) if busy else None
     left = latest.members - done
-    return {
-        "kind": "sweep",
-        "name": folder.path.name,
-        "status": status,
-        "message": f"{done:,} of {latest.members:,} members to be run are done; {words}",
-        "exit_code": 0 if busy else 130,
-        "members": latest.members,
-        "members_done": done,
-        "tiles": latest.tiles,
-        "tiles_done": int(present.sum()),
-        "members_per_second": rate,
-        "seconds_left": left / rate if rate else None,
-        "config_sha256": latest.config_sha256,
-    }
+    return SweepSummary(
+        kind="sweep",
+        name=folder.path.name,
+        status=status,
+        message=f"{done:,} of {latest.members:,} members to be run are done; {words}",
+        exit_code=0 if busy else 130,
+        members=latest.members,
+        members_done=done,
+        tiles=latest.tiles,
+        tiles_done=int(present.sum()),
+        members_per_second=rate,
+        seconds_left=left / rate if rate else None,
+        config_sha256=latest.config_sha256,
+    )
 
 
 def _rate(folder: SweepFolder, generation: Generation) -> float | None:

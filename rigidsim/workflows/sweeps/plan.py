@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
 from rigidsim.errors import ConfigError, Problem, either
 from rigidsim.scene.sweeps.sweep import Sweep
 from rigidsim.session.dataset import dataset_variables
 from rigidsim.solve.batch.lanes import recommended_width
 from rigidsim.solve.problem import InitialValueProblem, prepare
-from rigidsim.workflows.plan import plan
+from rigidsim.store.summary_parts import SummaryPart
+from rigidsim.workflows.plan import RunPlan, plan
 from rigidsim.workflows.sweeps.batch import why_alone
 from rigidsim.workflows.sweeps.check import QUICK, check_sweep
 from rigidsim.workflows.sweeps.members import alone, batches_of, first_possible, recording
@@ -57,12 +57,12 @@ def tile_length(sweep: Sweep) -> int:
     return _length(sweep, _member_seconds(sweep, made), size)
 
 
-def _member_seconds(sweep: Sweep, made: dict[str, Any]) -> float:
-    predicted = made["predicted"]
-    seconds = float(predicted["integration_seconds"] + predicted["recording_seconds"])
+def _member_seconds(sweep: Sweep, made: RunPlan) -> float:
+    predicted = made.predicted
+    seconds = predicted.integration_seconds + predicted.recording_seconds
     if not _side_by_side(sweep):
-        beside = predicted["choosing_seconds"] + predicted["modelling_seconds"]
-        return float(seconds + max(predicted["building_seconds"], _BUILD_SECONDS) + beside)
+        beside = predicted.choosing_seconds + predicted.modelling_seconds
+        return seconds + max(predicted.building_seconds, _BUILD_SECONDS) + beside
     each = _ESTIMATED if sweep.base.config.output.estimate else 1.0
     # half of what lanes could gain
     return each * seconds / max(1.0, recommended_width() / 2) + _BATCH_SECONDS
@@ -103,7 +103,53 @@ def bytes_of_member(sweep: Sweep, prepared: InitialValueProblem) -> float:
     return 8 * numbers
 
 
-def plan_sweep(sweep: Sweep) -> dict[str, Any]:
+class PlannedAxis(SummaryPart):
+    """An axis of a sweep: its key, the number of its values, and the first and the last as they are written;
+    ``unit`` is None for texts.
+    """
+
+    name: str
+    key: str
+    unit: str | None
+    count: int
+    first: str
+    last: str
+
+
+class PredictedSweep(SummaryPart):
+    """The forecast cost of all members, on one core."""
+
+    seconds_per_member: float
+    total_seconds: float
+    memory_bytes: float
+    dataset_bytes: float
+
+
+class SweepPlan(SummaryPart):
+    """What a sweep would run, and what it would cost; ``as_dict`` gives what ``--json`` prints.
+
+    Attributes:
+        tile, tiles: members of a tile, and the number of tiles.
+        member: plan of the first member that can be run.
+    """
+
+    kind: str = "sweep"
+    name: str
+    members: int
+    mode: str
+    axes: list[PlannedAxis]
+    keep: list[str]
+    tile: int
+    tiles: int
+    member: RunPlan
+    predicted: PredictedSweep
+
+    def __repr__(self) -> str:
+        seconds = self.predicted.total_seconds
+        return f"<Plan of the sweep {self.name!r}: {self.members:,} members, about {seconds:.3g} s>"
+
+
+def plan_sweep(sweep: Sweep) -> SweepPlan:
     """Explain and predict a sweep; integrates for about half a second and writes nothing.
 
     Raises:
@@ -116,30 +162,31 @@ def plan_sweep(sweep: Sweep) -> dict[str, Any]:
     length = sweep.table.tile
     if length is None:
         length = tile_length(sweep) if sweep.count <= _FEW else _length(sweep, seconds, size)
-    return {
-        "kind": "sweep",
-        "name": sweep.experiment.config.name,
-        "members": sweep.count,
-        "mode": sweep.table.mode,
-        "axes": [
-            {
-                "name": axis.name,
-                "key": axis.key,
-                "unit": axis.unit if axis.numeric else None,
-                "count": axis.values.count,
-                "first": axis.values.text(0),
-                "last": axis.values.text(axis.values.count - 1),
-            }
-            for axis in sweep.axes
-        ],
-        "keep": list(sweep.table.keep),
-        "tile": length,
-        "tiles": -(-sweep.count // length),
-        "member": made,
-        "predicted": {
-            "seconds_per_member": seconds,
-            "total_seconds": seconds * sweep.count,
-            "memory_bytes": made["predicted"]["memory_bytes"],
-            "dataset_bytes": size * sweep.count,
-        },
-    }
+    axes = [
+        PlannedAxis(
+            name=axis.name,
+            key=axis.key,
+            unit=axis.unit if axis.numeric else None,
+            count=axis.values.count,
+            first=axis.values.text(0),
+            last=axis.values.text(axis.values.count - 1),
+        )
+        for axis in sweep.axes
+    ]
+    return SweepPlan(
+        kind="sweep",
+        name=sweep.experiment.config.name,
+        members=sweep.count,
+        mode=sweep.table.mode,
+        axes=axes,
+        keep=list(sweep.table.keep),
+        tile=length,
+        tiles=-(-sweep.count // length),
+        member=made,
+        predicted=PredictedSweep(
+            seconds_per_member=seconds,
+            total_seconds=seconds * sweep.count,
+            memory_bytes=made.predicted.memory_bytes,
+            dataset_bytes=size * sweep.count,
+        ),
+    )

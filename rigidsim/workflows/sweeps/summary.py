@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from rigidsim.scene.sweeps.sweep import Sweep
 from rigidsim.session.members import ENDED_WELL, OUTCOMES, WARNINGS
 from rigidsim.store.sweeps.gathered import Gathered, TileReader
+from rigidsim.store.sweeps.run import ErrorsOfMembers, SweepCost, SweepSummary
 from rigidsim.store.sweeps.sources import ALWAYS, Sources
 
 _NOT_ESTIMATED = (
@@ -35,12 +35,12 @@ class _Counted:
     steps: int
     unestimated: int
     worst: dict[str, float]
-    errors: dict[str, dict[str, Any]]
+    errors: dict[str, ErrorsOfMembers]
 
 
 def summary_of(
     wanted: Sweep, sources: Sources, reader: TileReader, found: Gathered, wall: float, cpu: float
-) -> dict[str, Any]:
+) -> SweepSummary:
     """Contents of ``summary.json`` for a complete sweep.
 
     Args:
@@ -68,37 +68,38 @@ def summary_of(
     if mixed:
         said = f"tiles were computed with different {mixed}: members may differ in their last bits"
         warnings["mixed_provenance"] = said
-    return {
-        "name": wanted.experiment.config.name,
-        "description": wanted.experiment.config.description,
-        "status": "finished",
-        "message": f"all {wanted.count:,} members were run",
-        "exit_code": 0,
-        "members": wanted.count,
-        "shape": dict(zip(wanted.dims, wanted.shape, strict=True)),
-        "axes": {axis.name: axis.key for axis in wanted.axes},
-        "keep": list(wanted.table.keep),
-        "outcomes": outcomes,
-        "warned": warned,
-        "warnings": list(warnings.values()),
-        "warning_codes": list(warnings),
-        "engines": engines,
-        "why_alone": next((made["why_alone"] for made in found.made if made.get("why_alone")), None),
-        "cost": {
-            "steps": counted.steps,
-            "cpu_seconds": sum(made["cpu_seconds"] for made in found.made),
-            "wall_seconds_of_tiles": sum(made["wall_seconds"] for made in found.made),
-            "tiles": len(found.made),
-            "estimate_cpu_seconds": sum(made.get("estimate_cpu_seconds", 0.0) for made in found.made),
-            "session_wall_seconds": wall,
-            "session_cpu_seconds": cpu,
-        },
-        "largest_drifts": counted.worst,
-        "estimated_errors": counted.errors,
-        "config_sha256": wanted.experiment.sha256,
-        "provenance": kinds[0] if kinds else {},
-        "mixed_provenance": mixed,
-    }
+    return SweepSummary(
+        kind="sweep",
+        name=wanted.experiment.config.name,
+        description=wanted.experiment.config.description,
+        status="finished",
+        message=f"all {wanted.count:,} members were run",
+        exit_code=0,
+        members=wanted.count,
+        shape=dict(zip(wanted.dims, wanted.shape, strict=True)),
+        axes={axis.name: axis.key for axis in wanted.axes},
+        keep=list(wanted.table.keep),
+        outcomes=outcomes,
+        warned=warned,
+        warnings=list(warnings.values()),
+        warning_codes=list(warnings),
+        engines=engines,
+        why_alone=next((made["why_alone"] for made in found.made if made.get("why_alone")), None),
+        cost=SweepCost(
+            steps=counted.steps,
+            cpu_seconds=sum(made["cpu_seconds"] for made in found.made),
+            wall_seconds_of_tiles=sum(made["wall_seconds"] for made in found.made),
+            tiles=len(found.made),
+            estimate_cpu_seconds=sum(made.get("estimate_cpu_seconds", 0.0) for made in found.made),
+            session_wall_seconds=wall,
+            session_cpu_seconds=cpu,
+        ),
+        largest_drifts=counted.worst,
+        estimated_errors=counted.errors,
+        config_sha256=wanted.experiment.sha256,
+        provenance=kinds[0] if kinds else {},
+        mixed_provenance=mixed,
+    )
 
 
 def _count(sources: Sources, reader: TileReader) -> _Counted:
@@ -131,20 +132,12 @@ def _count(sources: Sources, reader: TileReader) -> _Counted:
                 largest = np.nanmax(values[rows], initial=0.0)
                 drift = name.removesuffix("_largest")
                 worst[drift] = max(worst.get(drift, 0.0), float(largest))
-    errors = {
-        name: _told(np.concatenate(found), _ERRORS[name][1]) for name, found in estimated.items() if found
-    }
-    told = {name: error for name, error in errors.items() if error["members"]}
+    told: dict[str, ErrorsOfMembers] = {}
+    for name, parts in estimated.items():
+        values = np.concatenate([np.zeros(0), *parts])
+        if len(values):
+            median, largest = float(np.median(values)), float(values.max())
+            told[name] = ErrorsOfMembers(
+                members=len(values), median=median, largest=largest, units=_ERRORS[name][1]
+            )
     return _Counted(outcomes, warned, steps, unestimated, worst, told)
-
-
-def _told(errors: np.ndarray, units: str) -> dict[str, Any]:
-    """Statistics of the estimated errors of all members that have one."""
-    if not len(errors):
-        return {"members": 0}
-    return {
-        "members": len(errors),
-        "median": float(np.median(errors)),
-        "largest": float(errors.max()),
-        "units": units,
-    }

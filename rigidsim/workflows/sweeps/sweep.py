@@ -306,12 +306,12 @@ def _completed(wanted: Sweep, folder: SweepFolder, wall: float, cpu: float) -> S
         "config_set": "\n".join(wanted.experiment.settings),
         "keep": " ".join(wanted.table.keep),
         "members": wanted.count,
-        "engines": json.dumps(summary["engines"]),
-        "warnings": "\n".join(summary["warnings"]),
-        "mixed_provenance": summary["mixed_provenance"] or "",
-        **summary["provenance"],
+        "engines": json.dumps(summary.engines),
+        "warnings": "\n".join(summary.warnings),
+        "mixed_provenance": summary.mixed_provenance or "",
+        **summary.provenance,
     }
     digest = write_dataset(folder.dataset, wanted, sources, reader, found, attributes)
-    summary["dataset_sha256"] = digest
-    folder.write_summary(summary)
-    return SavedSweep(folder, {"kind": "sweep", **summary})
+    summary = summary.having(dataset_sha256=digest)
+    folder.write_summary(summary.as_dict())
+    return SavedSweep(folder, summary)

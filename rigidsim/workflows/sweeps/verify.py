@@ -65,9 +65,9 @@ def verify_sweep(
                 differing[name] = None
                 if first is None or some[place] < first.sample:
                     first = Difference(name, some[place], there, here)
-    changed = _environment(saved.summary.get("provenance", {}))
-    if saved.summary.get("mixed_provenance"):
-        changed.append(f"the sweep itself was computed with different {saved.summary['mixed_provenance']}")
+    changed = _environment(saved.outcome.provenance)
+    if saved.outcome.mixed_provenance:
+        changed.append(f"the sweep itself was computed with different {saved.outcome.mixed_provenance}")
     identical = not problems and not differing
     return Verdict(saved.place, identical, problems, first, sorted(differing), changed, len(chosen))
 
@@ -77,10 +77,10 @@ def _problems(saved: SavedSweep, dataset: xarray.Dataset, sweep: Sweep) -> list[
     problems = []
     if dataset.attrs.get("config_sha256") != sweep.experiment.sha256:
         problems.append(f"{saved.folder.dataset}: embeds another config than its config_sha256 says")
-    if saved.summary.get("members") != sweep.count:
-        problems.append(f"{saved.place}: the summary tells of {saved.summary.get('members')} members, "
+    if saved.outcome.members != sweep.count:
+        problems.append(f"{saved.place}: the summary tells of {saved.outcome.members} members, "
                         f"the config of {sweep.count}")  # fmt: skip
-    if saved.summary.get("dataset_sha256") is None:
+    if saved.outcome.dataset_sha256 is None:
         problems.append(f"{saved.place}: the summary doesn't say which dataset it was written for")
     return problems
 
