@@ -32,7 +32,7 @@ from rigidsim.store.sweeps.folder import SweepFolder
 from rigidsim.workflows.sweeps.members import batches_of, run_members, sweep_of
 from rigidsim.workflows.sweeps.sweep import resume_sweep
 from rigidsim.workflows.sweeps.verify import verify_sweep
-from rigidsim.workflows.sweeps.workers import Workers
+from rigidsim.workflows.sweeps.ways import Workers
 
 pytestmark = pytest.mark.optimised  # compared with runs of other processes
 
@@ -478,12 +478,13 @@ def test_no_tile_is_lost_to_a_pool_that_breaks(folder: Path) -> None:
         def shutdown(self, **_: object) -> None: ...
 
     class Breaking(Workers):
-        def _pool(self, *_: object) -> Pool:  # type: ignore[override]
+        def _started(self) -> Pool:  # type: ignore[override]
             return Pool()
 
     (generation,) = SweepFolder(open_sweep(folder).folder.path).generations()
-    tiles = range(generation.tiles)
-    assert sorted(tile for tile, _ in Breaking(2).images(generation, tiles)) == list(tiles)
+    tiles, workers = range(generation.tiles), Breaking(2)
+    with workers.ready_for(sweep_of(generation.config)):
+        assert sorted(tile for tile, _ in workers.images(generation, tiles)) == list(tiles)
 
 
 def test_every_kept_quantity_can_be_drawn(folder: Path) -> None:

@@ -3,21 +3,22 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from dataclasses import replace as exchanged
-from functools import cached_property, lru_cache
+
+import tomlkit
+from tomlkit.exceptions import TOMLKitError
 
 from rigidsim.errors import ConfigError, MemberError, Problem, either
 from rigidsim.scene.config import Experiment, parse, validated
-from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.model_table import AUTO, FULL
 from rigidsim.scene.overrides import apply_overrides, key_steps
 from rigidsim.scene.python_values import toml_text
 from rigidsim.scene.sweep_table import INDICATORS, SweepTable
+from rigidsim.scene.sweeps.axes import Axis, axis_name, clashes
 from rigidsim.scene.sweeps.keys import refuse_unsettable, unit_and_length
-from rigidsim.scene.sweeps.names import axis_name, clashes
-from rigidsim.scene.sweeps.values import AxisValues, axis_values
+from rigidsim.scene.sweeps.values import axis_values
 from rigidsim.scene.sweeps.written import nearest_double
 from rigidsim.scene.toml_text import parse_toml
 
@@ -29,42 +30,6 @@ _SAME_FOR_ALL = {
     "sweep": "a sweep can't change itself",
     "output": "all members record the same",
 }
-
-
-@dataclass(frozen=True)
-class Axis:
-    """One swept key.
-
-    Attributes:
-        key: dotted key, with indices from 0.
-        name: name of its dimension (product) or variable (zip).
-        unit: SI unit of its numbers; "1" for none.
-    """
-
-    key: str
-    name: str
-    unit: str
-    values: AxisValues
-
-    @property
-    def numeric(self) -> bool:
-        """Whether its values are numbers or vectors."""
-        return self.values.entry is not None
-
-    @cached_property
-    def columns(self) -> tuple[str, ...]:
-        """The keys of its single numbers: ``initial.angular_velocity[0]`` ...; empty if values aren't
-        numbers.
-        """
-        if not self.numeric:
-            return ()
-        components = self.values.components
-        return tuple(f"{self.key}[{i}]" for i in range(components)) if components else (self.key,)
-
-    def exact(self, index: int) -> tuple[ExactNumber, ...]:
-        """The numbers of one value, SI, in the order of ``columns``."""
-        assert self.values.entry is not None
-        return tuple(number.exact for number in self.values.entry(index))
 
 
 @dataclass(frozen=True)
@@ -227,36 +192,6 @@ class Sweep:
         names = ", ".join(f'"{name}"' for name in self.table.keep if name in INDICATORS)
         return f"[sweep] keep: given {names}: {problem.what.removeprefix(added)}"
 
-    @property
-    def columns(self) -> tuple[str, ...]:
-        """Dotted keys of all swept numbers, axis by axis; vectors by component."""
-        return tuple(key for axis in self.axes for key in axis.columns)
-
-    @property
-    def numeric(self) -> bool:
-        """Whether members differ only in numbers."""
-        return all(axis.numeric for axis in self.axes)
-
-    def exact(self, members: Sequence[int]) -> list[list[ExactNumber]]:
-        """Swept numbers of some members, SI, one list for each of ``columns``.
-
-        Raises:
-            ValueError: the sweep isn't ``numeric``.
-        """
-        if not self.numeric:
-            raise ValueError("members of this sweep differ in more than numbers")
-        rows = [self.indices(member) for member in members]
-        found: list[list[ExactNumber]] = []
-        for number, axis in enumerate(self.axes):
-            kept = lru_cache(maxsize=None)(axis.exact)
-            values = [kept(row[number]) for row in rows]
-            found += [[value[i] for value in values] for i in range(len(axis.columns))]
-        return found
-
-    def members(self) -> Iterator[Experiment]:
-        """All members, one after the other."""
-        return (self.experiment_of(member) for member in range(self.count))
-
 
 def shown_text(text: str) -> str:
     """A value's text, shortened for messages."""
@@ -300,9 +235,6 @@ def _taken(name: str) -> Problem:
 
 def _without_sweep(experiment: Experiment) -> Experiment:
     """The config without its ``[sweep]``, everything else as written."""
-    import tomlkit
-    from tomlkit.exceptions import TOMLKitError
-
     tables = parse_toml(experiment.text, experiment.source)
     del tables["sweep"]
     text = ""

@@ -10,7 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from rigidsim.scene.sweeps.sweep import Axis, Sweep
+from rigidsim.scene.sweeps.axes import Axis
+from rigidsim.scene.sweeps.sweep import Sweep
 from rigidsim.scene.sweeps.written import nearest_double
 from rigidsim.store import atomic
 from rigidsim.store.hdf5_sink import sink

@@ -25,11 +25,11 @@ from rigidsim.store.variables import SCHEMA_VERSION
 from rigidsim.workflows.read import Given, as_experiment
 from rigidsim.workflows.sweeps.batch import why_alone
 from rigidsim.workflows.sweeps.check import SweepCheck
+from rigidsim.workflows.sweeps.cluster import Cluster
 from rigidsim.workflows.sweeps.members import batches_of, recording, sweep_of
 from rigidsim.workflows.sweeps.plan import refuse_untold_tiles, tile_length
 from rigidsim.workflows.sweeps.summary import summary_of
-from rigidsim.workflows.sweeps.ways import OneProcess, Way
-from rigidsim.workflows.sweeps.workers import Workers
+from rigidsim.workflows.sweeps.ways import OneProcess, Way, Workers
 
 
 class SweepObserver:
@@ -57,7 +57,7 @@ def sweep(
     changes: dict[str, Any] | None = None,
     out: str | Path = "runs",
     force: bool = False,
-    workers: int | Workers = 1,
+    workers: int = 1,
     scheduler: str | None = None,
     tiles: tuple[int, int] | None = None,
     observer: SweepObserver | None = None,
@@ -72,8 +72,8 @@ def sweep(
         changes: values to replace, as for ``Experiment.replace``.
         out: folder of the sweep's own folder; unlike a run it can't be kept in memory.
         force: replace whatever run or sweep is there.
-        workers: number of processes on this machine, or such processes started already. They read your script
-            again: in a script, sweep under ``if __name__ == "__main__":``.
+        workers: number of processes on this machine. They read your script again: in a script, sweep under
+            ``if __name__ == "__main__":``.
         scheduler: address of a Dask scheduler whose workers run the members; needs ``rigidsim[cluster]``.
         tiles: first and stop of the share of tiles computed by this one of several processes on the folder.
         observer: receives the sweep's progress.
@@ -102,7 +102,7 @@ def sweep(
 def resume_sweep(
     path: str | Path,
     *,
-    workers: int | Workers = 1,
+    workers: int = 1,
     scheduler: str | None = None,
     observer: SweepObserver | None = None,
 ) -> SavedSweep:
@@ -121,13 +121,9 @@ def resume_sweep(
     )  # fmt: skip
 
 
-def _way(workers: int | Workers, scheduler: str | None) -> Way:
+def _way(workers: int, scheduler: str | None) -> Way:
     if scheduler is not None:
-        from rigidsim.workflows.sweeps.cluster import Cluster
-
         return Cluster(scheduler)
-    if isinstance(workers, Workers):
-        return workers
     if workers > 1 and getattr(multiprocessing.current_process(), "_inheriting", False):
         # this is a worker, which reads the caller's script again before it begins
         raise SystemExit(

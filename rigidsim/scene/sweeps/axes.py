@@ -1,15 +1,16 @@
-"""Names of a sweep's axes, and those that the dataset derives from them."""
+"""Axes of a sweep: their keys and values, their names, and those that the dataset derives from them."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from typing import Protocol
+from dataclasses import dataclass
 
 from rigidsim.errors import Problem
+from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.overrides import key_steps
 from rigidsim.scene.registry import OBSERVABLES
-from rigidsim.scene.sweeps.values import AxisValues
+from rigidsim.scene.sweeps.written import AxisValues
 from rigidsim.scene.validation_messages import shown
 
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,60}")
@@ -17,20 +18,36 @@ _OF_LINES = ("_frequency", "_amplitude", "_rate")
 """Suffixes of what is kept of signals' frequencies."""
 
 
-class NamedAxis(Protocol):
-    """What is asked of an axis here."""
+@dataclass(frozen=True)
+class Axis:
+    """One swept key.
+
+    Attributes:
+        key: dotted key, with indices from 0.
+        name: name of its dimension (product) or variable (zip).
+        unit: SI unit of its numbers; "1" for none.
+    """
+
+    key: str
+    name: str
+    unit: str
+    values: AxisValues
 
     @property
-    def key(self) -> str:
-        """Dotted key."""
+    def numeric(self) -> bool:
+        """Whether its values are numbers or vectors."""
+        return self.values.entry is not None
 
     @property
-    def name(self) -> str:
-        """Name of its dimension or variable."""
+    def columns(self) -> tuple[str, ...]:
+        """The keys of its single numbers: ``initial.angular_velocity[0]`` ..."""
+        components = self.values.components
+        return tuple(f"{self.key}[{i}]" for i in range(components)) if components else (self.key,)
 
-    @property
-    def values(self) -> AxisValues:
-        """Its values."""
+    def exact(self, index: int) -> tuple[ExactNumber, ...]:
+        """The numbers of one value, SI, in the order of ``columns``."""
+        assert self.values.entry is not None
+        return tuple(number.exact for number in self.values.entry(index))
 
 
 def axis_name(key: str, given: str | None) -> str:
@@ -51,7 +68,7 @@ def axis_name(key: str, given: str | None) -> str:
     return name
 
 
-def clashes(axes: Sequence[NamedAxis], events: Sequence[str], *, product: bool) -> list[Problem]:
+def clashes(axes: Sequence[Axis], events: Sequence[str], *, product: bool) -> list[Problem]:
     """Names that the dataset would need twice, and keys that contain one another.
 
     Args:
@@ -84,7 +101,7 @@ def clashes(axes: Sequence[NamedAxis], events: Sequence[str], *, product: bool) 
     return problems
 
 
-def _needed(axis: NamedAxis, *, product: bool) -> list[str]:
+def _needed(axis: Axis, *, product: bool) -> list[str]:
     """Names of an axis's dimensions and variables."""
     if not axis.values.components:
         return [axis.name]
