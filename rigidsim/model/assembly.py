@@ -14,7 +14,7 @@ from rigidsim.model.needs import work_is_needed
 from rigidsim.model.observables.mechanical import WORK
 from rigidsim.model.scaling import Rounder
 from rigidsim.model.state_blocks import StateBlock, joined
-from rigidsim.model.step_limiter import PACE, arguments, pace_derivative, roots
+from rigidsim.model.step_limiter import pace_block
 from rigidsim.model.tangents import GROWTH, tangent_block
 from rigidsim.scene.orbit_tables.pieces import TabulatedOrbit
 from rigidsim.scene.orbits import KeplerOrbit
@@ -27,7 +27,6 @@ def assemble_states(
 
     Args:
         formulation: the plan's, or its partner.
-        number: rounds an mpf once to the working precision's scalar.
 
     Raises:
         ConfigError: a load that can't be written in the formulation's states.
@@ -36,8 +35,8 @@ def assemble_states(
     if assembled is not None:
         return assembled
     requirements, numbers = plan.requirements, plan.numbers
-    rotation = formulation.rotation(plan, number)
-    attitude, vertical = rotation.attitude, None
+    rates, attitude = formulation.rotation(plan, number)
+    vertical = None
     if attitude is not None and numbers.arm is not None:
         vertical = numbers.vertical_of(attitude.matrix, number)
     elif requirements.vertical:
@@ -47,7 +46,7 @@ def assemble_states(
         plan.scene,
         plan.scaling,
         numbers,
-        rotation.rates,
+        rates,
         attitude,
         vertical,
         list(hy.make_vars(*BODY.position)) if flies else None,
@@ -62,11 +61,16 @@ def assemble_states(
     blocks = formulation.blocks(m, plan)
     if flies:
         blocks.append(_flight_block(m, plan))
-    blocks += _point_mass_blocks(m)
+    if m.point_masses is not None:  # which feel the forces that the body exerts on them
+        m.point_masses.react([part for load in having(Reacting, m.loads) for part in load.reaction(m)])
+        blocks.append(m.point_masses.block())
     blocks += _load_blocks(m)
     if work_is_needed(m):
-        blocks.append(_work_block(m))
-    blocks += _pace_block(m, joined(blocks))
+        why, unit = "work of the loads without a potential, to check the energy", [m.work_unit]
+        blocks.append(
+            StateBlock([WORK], [m.carried(m.power)], [m.scene.context.zero], exponents=unit, why=why)
+        )
+    blocks += pace_block(m, joined(blocks))
     if GROWTH in (requirements.record or ()):
         blocks.append(tangent_block(m, blocks))
     return m, blocks
@@ -91,15 +95,6 @@ def _flight_block(m: Mechanics, plan: ModelPlan) -> StateBlock:
     )
 
 
-def _point_mass_blocks(m: Mechanics) -> list[StateBlock]:
-    """States of the point masses besides the body, and the forces that the body exerts on them."""
-    states = m.point_masses
-    if states is None:
-        return []
-    states.react([part for load in having(Reacting, m.loads) for part in load.reaction(m)])
-    return [states.block()]
-
-
 def _load_blocks(m: Mechanics) -> list[StateBlock]:
     """Orbits, each once for all loads on it, and any other states that loads bring."""
     blocks: list[StateBlock] = []
@@ -121,21 +116,3 @@ def _load_blocks(m: Mechanics) -> list[StateBlock]:
         if own is not None:
             blocks.append(replace(own, why=own.why or f"{load.title}: where its source is"))
     return blocks
-
-
-def _work_block(m: Mechanics) -> StateBlock:
-    why = "work of the loads without a potential, to check the energy"
-    return StateBlock([WORK], [m.carried(m.power)], [m.scene.context.zero], exponents=[m.work_unit], why=why)
-
-
-def _pace_block(m: Mechanics, before: StateBlock) -> list[StateBlock]:
-    """The state that keeps steps from passing over a pulse or a switch; none if the loads have neither."""
-    watched, rooted = arguments(m), roots(m)
-    if not (watched or rooted):
-        return []
-    carried = dict(zip(before.names, before.derivatives, strict=True))
-    titles = ", ".join(dict.fromkeys(title for title, _ in [*watched, *rooted]))
-    derivative = pace_derivative([u for _, u in watched], [v for _, v in rooted], carried)
-    what = " or ".join(["what is narrow"] * bool(watched) + ["a root of zero"] * bool(rooted))
-    why = f"{titles}: no step may pass over {what} in it"
-    return [StateBlock([PACE], [derivative], [m.scene.context.zero], why=why)]

@@ -70,10 +70,8 @@ def _source_matrix(sources: list[tuple[Any, Vector]]) -> Matrix:
 
 
 def keeps(m: Mechanics, axis: Vector, loads: Sequence[Load] | None = None) -> bool:
-    """Whether no torque acts about a unit axis in space, however the body moves.
-
-    Args:
-        loads: the loads to look at; all of them by default.
+    """Whether no torque of these loads (all by default) acts about a unit axis in space, however the body
+    moves.
     """
     context = m.scene.context
     tiny = negligible(context)
@@ -240,11 +238,7 @@ def bogoyavlensky_constant(m: Mechanics) -> Symbolic:
 
 
 def largest_brun(m: Mechanics, momentum: Any) -> Any:
-    """|L|^2 + tr(S) times the largest product of two moments, SI.
-
-    Args:
-        momentum: size of the angular momentum.
-    """
+    """|L|^2 + tr(S) times the largest product of two moments, SI, for a size of the momentum."""
     moments = sorted(m.scene.body.principal_moments)
     return momentum**2 + _trace(m) * moments[1] * moments[2]
 

@@ -51,8 +51,7 @@ def to_heyoka(
     Args:
         variables: a heyoka expression for every name that the expression uses; ``t`` is heyoka's time
             unless it is given here, as an expression or as a ``TwoPartTime``.
-        number: rounds an mpf once to the working precision's scalar.
-        context: mpmath context with guard bits, in which constant parts are worked out.
+        context: arithmetic in which constant parts are worked out.
         sides: heyoka expressions for the signs of arguments that are switching surfaces; those of others are
             found wherever the expression is evaluated, which is right for values alone: a series would go on
             past the jump.

@@ -26,6 +26,10 @@ def _never_missing(scene: Scene, formulation: str) -> str | None:
     return None
 
 
+def _unless(possible: Callable[[Scene], object], why: str) -> Callable[[Scene, str], str | None]:
+    return lambda scene, _: None if possible(scene) else why
+
+
 def _flight_of_a_free_body(scene: Scene) -> str | None:
     return "flight" if scene.free_flight else None
 
@@ -64,48 +68,35 @@ def _no_attitude(scene: Scene, formulation: str) -> str | None:
     return f'needs the attitude; choose another formulation than "{formulation}", such as "auto"'
 
 
-def _no_position(scene: Scene, formulation: str) -> str | None:
-    if scene.free_flight:
-        return None
-    return "the scene has no position; give [initial] position or velocity, or leave it out"
-
-
-def _no_potential(scene: Scene, formulation: str) -> str | None:
-    if scene.loads or scene.torque_arm is not None or (scene.free_flight and scene.gravity is not None):
-        return None
-    return "no load of the scene has a potential that varies; leave it out"
-
-
-def _no_vertical(scene: Scene, formulation: str) -> str | None:
-    if scene.torque_arm is not None:
-        return None
-    return "the scene has no load that marks a vertical; record angular_momentum instead"
-
-
-def _no_point_masses(scene: Scene, formulation: str) -> str | None:
-    return None if scene.bodies is not None else "there are no [[bodies]]; add them, or leave it out"
+_NO_POSITION = _unless(
+    lambda scene: scene.free_flight,
+    "the scene has no position; give [initial] position or velocity, or leave it out",
+)
+_NO_POTENTIAL = _unless(
+    lambda scene: scene.loads or scene.torque_arm is not None or (scene.free_flight and scene.gravity),
+    "no load of the scene has a potential that varies; leave it out",
+)
+_NO_VERTICAL = _unless(
+    lambda scene: scene.torque_arm is not None,
+    "the scene has no load that marks a vertical; record angular_momentum instead",
+)
+_NO_POINT_MASSES = _unless(
+    lambda scene: scene.bodies is not None, "there are no [[bodies]]; add them, or leave it out"
+)
+_NO_SOURCE = _unless(
+    lambda scene: first_source(loads_of(scene)) is not None,
+    "no load has a source whose direction it would count from (gravity_gradient, central_gravity, or "
+    "magnetic_dipole with an orbit); leave it out",
+)
 
 
 def _source_states(scene: Scene) -> str | None:
     return "flight" if flies_about_source(scene) else None
 
 
-def _no_source(scene: Scene, formulation: str) -> str | None:
-    if first_source(loads_of(scene)) is not None:
-        return None
-    return (
-        "no load has a source whose direction it would count from (gravity_gradient, central_gravity, or "
-        "magnetic_dipole with an orbit); leave it out"
-    )
-
-
 def _sourced(m: Mechanics) -> bool:
-    load = first_source(m.loads)
-    return (
-        load is not None
-        and m.attitude is not None
-        and (not isinstance(load, Attracting) or m.velocity is not None)
-    )
+    load = first_source(m.loads) if m.attitude is not None else None
+    return load is not None and (not isinstance(load, Attracting) or m.velocity is not None)
 
 
 def _free_axis(which: int) -> Need:
@@ -133,9 +124,9 @@ def _isotropic_damping(m: Mechanics) -> bool:
 
 NEEDS: dict[str, Need] = {
     "attitude": Need(lambda m: m.attitude is not None, lambda _: "attitude", _no_attitude),
-    "flight": Need(lambda m: m.velocity is not None, lambda _: "flight", _no_position),
-    "vertical": Need(lambda m: m.vertical is not None and m.numbers.arm is not None, missing=_no_vertical),
-    "potential": Need(lambda m: m.potential_energy is not None, _flight_of_a_free_body, _no_potential),
+    "flight": Need(lambda m: m.velocity is not None, lambda _: "flight", _NO_POSITION),
+    "vertical": Need(lambda m: m.vertical is not None and m.numbers.arm is not None, missing=_NO_VERTICAL),
+    "potential": Need(lambda m: m.potential_energy is not None, _flight_of_a_free_body, _NO_POTENTIAL),
     "energy": Need(_has_energy, _flight_of_a_free_body),
     "symmetry": Need(lambda m: m.symmetry_direction is not None),
     "work": Need(work_is_needed),
@@ -147,14 +138,14 @@ NEEDS: dict[str, Need] = {
     **{f"free_axis_{name}": _free_axis(i) for i, name in enumerate("xyz")},
     "isotropic_damping": Need(lambda m: m.attitude is not None and _isotropic_damping(m)),
     "plane": Need(lambda m: not flies_in_plane(m.scene, m.loads) or m.velocity is not None, _plane_states),
-    "source": Need(_sourced, _source_states, _no_source),
+    "source": Need(_sourced, _source_states, _NO_SOURCE),
     "place": Need(lambda m: not m.scene.free_flight or m.velocity is not None, _flight_of_a_free_body),
     "sources": Need(lambda m: m.attitude is not None and fixed_axes.sources_alone(m)),
     "several_sources": Need(lambda m: m.attitude is not None and fixed_axes.several_directions(m)),
     "attracting_line": Need(
         lambda m: m.velocity is not None and m.attitude is not None and central_forces.line(m) is not None
     ),
-    "point_masses": Need(lambda m: m.scene.bodies is not None, missing=_no_point_masses),
+    "point_masses": Need(lambda m: m.scene.bodies is not None, missing=_NO_POINT_MASSES),
     "free_fall": Need(lambda m: m.velocity is not None and central_forces.falls_freely(m)),
     "attractor": Need(lambda m: m.velocity is not None and any(isinstance(x, Attracting) for x in m.loads)),
 }

@@ -78,9 +78,6 @@ class Invariant:
 def recorded_variables(m: Mechanics, record: Sequence[str] | None) -> tuple[list[Recorded], list[Symbolic]]:
     """The variables of the dataset, and the expressions of all their components.
 
-    Args:
-        record: names asked for; None for everything that such a scene records by default.
-
     Raises:
         ConfigError: a requested variable doesn't exist in this scene.
     """
@@ -124,11 +121,7 @@ _WATCHED = {"orthogonality_defect": "0 by definition: any drift is rounding"}
 
 
 def find_invariants(m: Mechanics, norms: list[Symbolic]) -> list[Invariant]:
-    """All invariants of the scene, with the reasons why they are conserved.
-
-    Args:
-        norms: expressions that stay 1 by construction (of orbits carried as states).
-    """
+    """All invariants of the scene; ``norms`` of orbits that are states stay 1 by construction."""
     found = []
     for observable in OBSERVABLES.values():
         if observable.drift_scale is None or not observable.available(m):

@@ -20,7 +20,7 @@ the first step leaves it by a millionth of a turn, and those that follow grow wi
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 import heyoka as hy
 
@@ -29,6 +29,7 @@ from rigidsim.model.euler_poles import components_of_factor, starts_in_pole
 from rigidsim.model.heyoka_expressions import state_names, to_heyoka
 from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.rotations import Symbolic
+from rigidsim.model.state_blocks import StateBlock
 from rigidsim.scene.expressions.tree import ATTITUDE_NAMES
 from rigidsim.scene.transitions import WIDE, narrow_parts
 
@@ -37,8 +38,27 @@ _POLE = 2.0**20  # over the factor that vanishes in a pole of the Euler angles
 _CLOCK = "t_of_pace"  # stands in for the time, by which heyoka doesn't differentiate
 
 
-def arguments(m: Mechanics) -> list[tuple[str, Symbolic]]:
-    """(description, argument) for all loads and events."""
+def pace_block(m: Mechanics, before: StateBlock) -> list[StateBlock]:
+    """The state that keeps steps from passing over a pulse or a switch; none if nothing has either.
+
+    Args:
+        before: all other states.
+    """
+    watched = _arguments(m)
+    rooted = [(load.title, v) for load in m.loads if isinstance(load, Rooted) for v in load.roots(m)]
+    if not (watched or rooted):
+        return []
+    derivatives = dict(zip(before.names, before.derivatives, strict=True))
+    terms = [0.5 * (_along_the_motion(v, derivatives) / v) for _, v in rooted]
+    terms += [_along_the_motion(u, derivatives) * (u / (WIDE**2 + u * u)) for _, u in watched]
+    titles = ", ".join(dict.fromkeys(title for title, _ in [*watched, *rooted]))
+    what = " or ".join(["what is narrow"] * bool(watched) + ["a root of zero"] * bool(rooted))
+    why = f"{titles}: no step may pass over {what} in it"
+    return [StateBlock([PACE], [2.0**-5 * hy.sum(terms)], [m.scene.context.zero], why=why)]
+
+
+def _arguments(m: Mechanics) -> list[tuple[str, Symbolic]]:
+    """(description, argument) of what is narrow in loads and events; dimensionless."""
     found = [(load.title, u) for load in m.loads if isinstance(load, Narrow) for u in load.narrow(m)]
     angles = frozenset(ATTITUDE_NAMES[4:])
     for event in m.scene.events:
@@ -52,29 +72,7 @@ def arguments(m: Mechanics) -> list[tuple[str, Symbolic]]:
     return found
 
 
-def roots(m: Mechanics) -> list[tuple[str, Symbolic]]:
-    """(description, radicand) for the roots of all loads."""
-    return [(load.title, v) for load in m.loads if isinstance(load, Rooted) for v in load.roots(m)]
-
-
-def pace_derivative(
-    found: Sequence[Symbolic], under_roots: Sequence[Symbolic], derivatives: Mapping[str, Symbolic]
-) -> Symbolic:
-    """Right-hand side of the pace state.
-
-    Args:
-        found: arguments, dimensionless.
-        under_roots: radicands.
-        derivatives: right-hand sides of the states that they read.
-    """
-    terms = [0.5 * (along_the_motion(v, derivatives) / v) for v in under_roots]
-    for u in found:
-        rate = along_the_motion(u, derivatives)
-        terms.append(rate * (u / (WIDE**2 + u * u)))
-    return 2.0**-5 * hy.sum(terms)
-
-
-def along_the_motion(u: Symbolic, derivatives: Mapping[str, Symbolic]) -> Symbolic:
+def _along_the_motion(u: Symbolic, derivatives: Mapping[str, Symbolic]) -> Symbolic:
     """Time derivative of an expression of time and the states, internal units.
 
     Any other variable in it is a swept number, which doesn't change along a motion.

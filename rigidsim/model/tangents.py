@@ -45,10 +45,7 @@ def own_names(m: Mechanics) -> list[str]:
 
 def moving_names(own: Iterable[str], reads: Mapping[str, set[str]]) -> set[str]:
     """States whose offsets are offsets of the motion: the body's own, and those coupled to it both ways (such
-    as a load with a memory).
-
-    Args:
-        reads: for each state, the names in its derivative.
+    as a load with a memory), by the names in the derivative of each state.
     """
     own = set(own)
     acting = _reached(own, reads)
@@ -98,11 +95,8 @@ def tangent_block(m: Mechanics, before: Sequence[StateBlock]) -> StateBlock:
 def _varied(
     states: Sequence[Symbolic], rights: Sequence[Symbolic], along: Sequence[Symbolic]
 ) -> list[Symbolic]:
-    """Rates of a tangent vector of x' = f(x): the derivatives of f along it.
-
-    Args:
-        states, rights: x and f; whatever else f contains counts as constant.
-        along: components of the vector, in the order of the states.
+    """Rates of a tangent vector of x' = f(x): the derivatives of f (``rights``) along it; whatever else f
+    contains counts as constant.
     """
     others = sorted({name for right in rights for name in hy.get_variables(right)} - set(map(str, states)))
     constants = {hy.make_vars(name): hy.par[n] for n, name in enumerate(others)}
@@ -199,9 +193,7 @@ def _absent(m: Mechanics) -> str | None:
     integrator = m.scene.config.integrator
     if m.attitude is not None and m.attitude.singular_factor is not None:
         return f'formulation = "{integrator.formulation}" has singularities that the vector would feel'
-    driven = any(
-        orbit_of(load) is not None for load in m.loads
-    )  # whose phase keeps the steps of any motion short
+    driven = any(map(orbit_of, m.loads))  # whose phase keeps the steps of any motion short
     if not driven and all(w == 0 for w in m.scene.angular_velocity):
         return "the body is at rest, where steps are as long as one likes; give it a small rate"
     if not driven and m.attitude is not None and m.attitude.momenta:
@@ -220,13 +212,7 @@ def _absent(m: Mechanics) -> str | None:
 
 register_observable(
     Observable(
-        GROWTH,
-        (),
-        "1",
-        "natural logarithm of the growth of a small displacement",
-        _growth,
-        needs=("attitude",),
-        by_default=only_when_named,
-        absent=_absent,
+        GROWTH, (), "1", "natural logarithm of the growth of a small displacement", _growth,
+        needs=("attitude",), by_default=only_when_named, absent=_absent,
     )
-)
+)  # fmt: skip

@@ -82,10 +82,9 @@ def in_two_parts(
     """``number`` extended to two-part coefficients; a constant that it holds exactly stays a plain scalar.
 
     Args:
-        number: rounds an mpf once to the working precision's scalar.
-        exact: converts such a scalar to the mpf of the same value.
-        bits: number of bits of the working precision.
-        context: arithmetic with more than twice the working precision's digits.
+        exact: converts a scalar to the mpf of the same value.
+        bits: of the working precision.
+        context: arithmetic with more than twice its digits.
     """
 
     def split(value: Any) -> Any:
@@ -115,11 +114,7 @@ class TwoPartTime:
     low: Any
 
     def expression(self, line: LineInTime, number: Callable[[Any], Any], context: Any) -> Any:
-        """A line as an expression of the engine's time.
-
-        Args:
-            number: rounds an mpf once to the working precision's scalar.
-        """
+        """A line as an expression of the engine's time."""
         slope = rounded(number(line.slope * self.unit))
         if line.offset == 0:
             return slope * hy.time

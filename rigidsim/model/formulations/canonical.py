@@ -17,7 +17,7 @@ from rigidsim.errors import ConfigError, Problem
 from rigidsim.model import rotations
 from rigidsim.model.carriers import carried_beside
 from rigidsim.model.formulations.euler_angles import ANGLES, euler_states
-from rigidsim.model.formulations.formulation import Formulation, ModelPlan, Rotation, Rounding, formulates
+from rigidsim.model.formulations.formulation import Formulation, ModelPlan, Rounding, formulates
 from rigidsim.model.load import Load
 from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.rotations import Symbolic
@@ -47,7 +47,7 @@ class Canonical(Formulation):
         """See ``Formulation``: of the sequence in the config."""
         return cls(scene.config.integrator.euler_sequence)
 
-    def rotation(self, plan: ModelPlan, number: Rounder) -> Rotation:
+    def rotation(self, plan: ModelPlan, number: Rounder) -> tuple[list[Symbolic], AttitudeStates]:
         angles, momenta = list(hy.make_vars(*ANGLES)), list(hy.make_vars(*MOMENTA))
         columns = []
         for i in range(3):
@@ -60,7 +60,7 @@ class Canonical(Formulation):
         for row in inverse:
             terms = [number(x) * m for x, m in zip(row, body, strict=True) if abs(x) > tiny]
             rates.append(hy.sum(terms) if terms else hy.expression(0.0))
-        return Rotation(rates, replace(euler_states(plan.scene, rates, self.sequence), momenta=MOMENTA))
+        return rates, replace(euler_states(plan.scene, rates, self.sequence), momenta=MOMENTA)
 
     def blocks(self, m: Mechanics, plan: ModelPlan) -> list[StateBlock]:
         attitude = m.carried(m.attitude)

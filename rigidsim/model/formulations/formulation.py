@@ -102,20 +102,6 @@ class ModelPlan:
         return self.formulation.wide or any(map(is_wide, self.loads))
 
 
-@dataclass(frozen=True)
-class Rotation:
-    """The rotation as expressions of its states.
-
-    Attributes:
-        rates: angular velocity, body axes: the three states, each in its own unit, or expressions in units of
-            1/time.
-        attitude: None if none is carried.
-    """
-
-    rates: list[Symbolic]
-    attitude: AttitudeStates | None
-
-
 class Formulation:
     """How the rotation of one scene is written in states; ``formulates`` registers a class of them.
 
@@ -175,11 +161,13 @@ class Formulation:
         """
         raise NotImplementedError
 
-    def rotation(self, plan: ModelPlan, number: Rounder) -> Rotation:
-        """The states of the rotation; arguments as for ``attitude``."""
+    def rotation(self, plan: ModelPlan, number: Rounder) -> tuple[list[Symbolic], AttitudeStates | None]:
+        """Angular velocity, body axes (three states, each in its own unit, or expressions in units of
+        1/time), and attitude.
+        """
         states = list(hy.make_vars(*BODY.rates))
         rates = in_common_unit(states, plan.numbers.rate_units, number)
-        return Rotation(states, self.attitude(plan, rates, number))
+        return states, self.attitude(plan, rates, number)
 
     def blocks(self, m: Mechanics, plan: ModelPlan) -> list[StateBlock]:
         """The states of the rotation with their equations.

@@ -21,7 +21,7 @@ import heyoka as hy
 from rigidsim.model import rotations
 from rigidsim.model.capabilities import KeepsPlane, has_source
 from rigidsim.model.carriers import carried_beside
-from rigidsim.model.formulations.formulation import Formulation, ModelPlan, Rotation, Unsuited, formulates
+from rigidsim.model.formulations.formulation import Formulation, ModelPlan, Unsuited, formulates
 from rigidsim.model.load import Load
 from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.rotations import Symbolic
@@ -93,7 +93,7 @@ class Planar(Formulation):
         except Unsuited:
             return None
 
-    def rotation(self, plan: ModelPlan, number: Rounder) -> Rotation:
+    def rotation(self, plan: ModelPlan, number: Rounder) -> tuple[list[Symbolic], AttitudeStates]:
         context, plane = plan.scene.context, self._plane
         state, spin = hy.make_vars(ANGLE, SPIN)
         angle = 2.0**ANGLE_UNIT * state
@@ -117,7 +117,7 @@ class Planar(Formulation):
             chord=2.0**ANGLE_UNIT,
             momenta=(SPIN,),
         )
-        return Rotation([x * spin for x in axis], states)
+        return [x * spin for x in axis], states
 
     def blocks(self, m: Mechanics, plan: ModelPlan) -> list[StateBlock]:
         states, axis, why = m.carried(m.attitude), self._plane.axis, plan.requirements.why["attitude"]
