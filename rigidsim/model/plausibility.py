@@ -11,7 +11,7 @@ import math
 from collections.abc import Iterator, Sequence
 from fractions import Fraction
 
-from rigidsim.model.averaged.hansen import hansen
+from rigidsim.model.averaged.resonance import hansen
 from rigidsim.model.load_words import ASTRONOMICAL_UNIT, length_text, span_words
 from rigidsim.scene import attitude
 from rigidsim.scene.arithmetic import Vector, apply, dot, norm

@@ -212,10 +212,7 @@ def average_of(
         _figure(scene, motion),
     )
     if found.over_orbits:
-        start = _mean_over_orbits(scene, found)
-        found = Average(
-            found.level, found.short_period, motion, sources, start, found.energy, found.swing, found.figure
-        )
+        return replace(found, start=_mean_over_orbits(scene, found))
     return found
 
 

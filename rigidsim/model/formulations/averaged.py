@@ -6,16 +6,34 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
-from rigidsim.model.averaged.average import Average, average_of
-from rigidsim.model.averaged.states import averaged_states, refuse_untold
+import heyoka as hy
+
+from rigidsim.errors import ConfigError, Problem
+from rigidsim.model.averaged.applies import told_of_resonances
+from rigidsim.model.averaged.average import DIRECTION, TOLD, Average, average_of
+from rigidsim.model.averaged.driven_mechanics import AMPLITUDES, DrivenMechanics
+from rigidsim.model.averaged.mechanics import AveragedMechanics
+from rigidsim.model.averaged.resonant_mechanics import RESONANT_ANGLE, SLOW, ResonantMechanics
 from rigidsim.model.formulations.formulation import Formulation, ModelPlan, Requirements
 from rigidsim.model.frames.reference_plane import refuse_without_plane
 from rigidsim.model.load import Load
 from rigidsim.model.mechanics import Mechanics
+from rigidsim.model.rotations import Symbolic
 from rigidsim.model.scaling import Rounder, choose_scaling
-from rigidsim.model.state_blocks import StateBlock
+from rigidsim.model.state_blocks import AttitudeStates, StateBlock
 from rigidsim.scene.formulations import Variables
 from rigidsim.scene.scene import Scene
+
+_OF_FIGURE = ("figure_axis",)
+_WHY = {
+    "spin_averaged": "the direction of the angular momentum, under torques averaged over the body's free "
+    "rotation: its size and the energy stay as they are",
+    "orbit_averaged": "the direction of the angular momentum, under torques averaged over the body's free "
+    "rotation and over the sources' orbits: its size and the energy stay as they are",
+}
+
+_WHY_TURNED = "the direction of the angular momentum, under gravity gradients averaged over the free rotation"
+_WHY_AT_REST = "the direction of the angular momentum, which torques of the body alone don't turn on average"
 
 
 class Averaged(Formulation):
@@ -43,7 +61,7 @@ class Averaged(Formulation):
             ConfigError: the scene can't be averaged, or what is recorded needs every rotation.
         """
         average = average_of(scene, loads, replace(choose_scaling(scene), rates=(0, 0, 0)), along)
-        refuse_untold(average, scene.config.output.record)
+        _refuse_untold(average, scene.config.output.record)
         refuse_without_plane(scene, loads)
         return cls(average)
 
@@ -55,17 +73,94 @@ class Averaged(Formulation):
         return Requirements(True, False, False, scene.config.output.record, {}, left_out)
 
     def assembled(self, plan: ModelPlan, number: Rounder) -> tuple[Mechanics, list[StateBlock]]:
-        return averaged_states(
-            plan.scene,
-            self.average,
-            plan.loads,
-            plan.scaling,
-            plan.numbers,
-            plan.orbit_tags,
-            plan.tables,
-            number,
+        m, blocks = self._resonant(plan, number) if self.average.resonance else self._direction(plan, number)
+        if (states := m.point_masses) is not None:
+            blocks.append(states.block())
+        return m, blocks
+
+    def _mechanics(
+        self,
+        kind: type[AveragedMechanics],
+        plan: ModelPlan,
+        number: Rounder,
+        rates: list[Symbolic],
+        attitude: AttitudeStates,
+    ) -> Any:
+        return kind(
+            plan.scene, plan.scaling, plan.numbers, rates, attitude, None, None, None, number,
+            plan.orbit_tags, tables=plan.tables, loads=list(plan.loads), average=self.average,
+        )  # fmt: skip
+
+    def _resonant(self, plan: ModelPlan, number: Rounder) -> tuple[AveragedMechanics, list[StateBlock]]:
+        """States of a body in spin-orbit resonance."""
+        average, unit = self.average, plan.scaling.momentum
+        resonance, initial = average.resonance, average.initial(unit)
+        assert resonance is not None
+        q = list(hy.make_vars(*SLOW[:4]))
+        norm = hy.sqrt(hy.sum([x * x for x in q]))
+        defect = "quaternion_norm", "norm of the slow quaternion", norm
+        attitude = AttitudeStates(SLOW[:4], [], initial[:4], [], q, "state", defect=defect)
+        m: ResonantMechanics = self._mechanics(ResonantMechanics, plan, number, q[:3], attitude)
+        why = (
+            f"the body keeps pace with [[loads]] number {resonance.source.number}, {resonance.name}: its "
+            "axes turned back by so many turns to a revolution, and the momentum beyond that, under torques "
+            "averaged over rotation and orbits"
         )
+        exponents = [0] * 4 + [unit] * 3
+        return m, [StateBlock(SLOW, m.slow_derivatives, initial, exponents=exponents, why=why)]
+
+    def _direction(self, plan: ModelPlan, number: Rounder) -> tuple[AveragedMechanics, list[StateBlock]]:
+        """The momentum's direction, its amplitudes where torques of the body change them, and orbits."""
+        average = self.average
+        s = list(hy.make_vars(*DIRECTION))
+        norm = hy.sqrt(hy.sum([x * x for x in s]))
+        defect = "momentum_axis_norm", "norm of the momentum's direction", norm
+        start = list(average.start)
+        attitude = AttitudeStates(DIRECTION, [], start, [], [], "state", defect=defect, chord=1.0)
+        kind = AveragedMechanics if average.driven is None else DrivenMechanics
+        m = self._mechanics(kind, plan, number, s, attitude)
+        why = _WHY[average.level]
+        if average.driven is not None:
+            why = _WHY_TURNED if average.sources else _WHY_AT_REST
+        why += told_of_resonances(average.sources)
+        blocks = [StateBlock(DIRECTION, m.derivatives, average.start, why=why)]
+        if isinstance(m, DrivenMechanics):
+            blocks.append(_amplitudes(m))
+        for orbit in plan.tables:
+            what = "elements of" if average.over_orbits else "where"
+            which = "the source's orbit" if average.over_orbits else "the source is"
+            block = m.table_block(orbit)
+            blocks.append(replace(block, why=f'gravity_gradient: {what} {which}, by "{orbit.name}"'))
+        return m, blocks
 
     def rate_bound(self, plan: ModelPlan) -> Any:
         """See ``Formulation``: of the momentum's turning rate."""
         return self.average.rate_bound
+
+
+def _amplitudes(m: DrivenMechanics) -> StateBlock:
+    """P and Q of a driven motion."""
+    unit = m.scaling.momentum
+    why = f"size of the momentum and energy of rotation, under {' and '.join(m.driven.titles)}: its largest "
+    why += "components along the axis that it circles and across it"
+    return StateBlock(AMPLITUDES, m.amplitude_rates, m.driven.states(unit), exponents=[unit] * 2, why=why)
+
+
+def _refuse_untold(average: Average, record: Sequence[str] | None) -> None:
+    """Refuse observables that an averaged motion can't provide.
+
+    Raises:
+        ConfigError: names a recorded variable that needs every rotation resolved.
+    """
+    for name in record or ():
+        if name in _OF_FIGURE and not average.figure:
+            why = "the body tumbles, so that its figure axis points nowhere on average; record momentum_axis "
+            why += "instead"
+        elif name == RESONANT_ANGLE and average.resonance is not None:
+            continue
+        elif name not in TOLD:
+            why = f'needs every rotation, which [model] level = "{average.level}" averages over'
+        else:
+            continue
+        what = f'given "{name}": {why}; choose level = "full" to have it'
+        raise ConfigError(Problem("[output] record", what))
