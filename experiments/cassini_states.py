@@ -30,8 +30,7 @@ if not __package__:  # as a script
     sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from experiments.common import BLUE, GREY, ORANGE, Check, Result, main, new_figure, save, simulate, tidy
-from rigidsim.model.averaged.resonance import hansen
-from rigidsim.scene.arithmetic import context_for
+from rigidsim.scene.arithmetic import context_for, hansen
 from rigidsim.scene.bodies.presets import PRESETS
 
 NAME = "cassini_states"

@@ -11,10 +11,9 @@ import math
 from collections.abc import Iterator, Sequence
 from fractions import Fraction
 
-from rigidsim.model.averaged.resonance import hansen
 from rigidsim.model.load_words import ASTRONOMICAL_UNIT, length_text, span_words
 from rigidsim.scene import attitude
-from rigidsim.scene.arithmetic import Vector, apply, dot, norm
+from rigidsim.scene.arithmetic import Vector, apply, dot, hansen, norm
 from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.known_bodies import KNOWN, KnownBody, known_body
 from rigidsim.scene.orbits import PACES, KeplerOrbit, Orbit

@@ -34,8 +34,7 @@ from rigidsim.model.averaged.anomaly_sums import AnomalySums, second_order
 from rigidsim.model.averaged.free_motion import FreeMotion
 from rigidsim.model.averaged.sources import Source
 from rigidsim.scene import attitude
-from rigidsim.scene.arithmetic import Matrix, Vector, apply, multiply, norm, transpose
-from rigidsim.scene.kepler import hansen
+from rigidsim.scene.arithmetic import Matrix, Vector, apply, hansen, multiply, norm, transpose
 from rigidsim.scene.orbits import KeplerOrbit
 from rigidsim.scene.scene import Scene
 
