@@ -74,18 +74,14 @@ def _print_version(wanted: bool) -> None:
 @app.callback()
 def _program(
     version: Annotated[
-        bool,
-        typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version."),
+        bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version.")
     ] = False,
 ) -> None:
     """High-precision experiments on rotating rigid bodies: one TOML file is one experiment."""
 
 
 @_command("new")
-def new(
-    scene: options.SceneArgument = None,
-    name: options.NameArgument = None,
-) -> None:
+def new(scene: options.SceneArgument = None, name: options.NameArgument = None) -> None:
     """Write a commented config to start from; alone, list the scenes there are.
 
     An existing file is never replaced.
@@ -160,9 +156,7 @@ def resume(
 
 @_command("saved_runs")
 def verify(
-    run_path: options.RunPath,
-    members: options.MembersOption = 100,
-    as_json: options.JsonOption = False,
+    run_path: options.RunPath, members: options.MembersOption = 100, as_json: options.JsonOption = False
 ) -> None:
     """Integrate the embedded config again and compare: identical, or what differs first. Exit code 1 then.
 
@@ -225,9 +219,7 @@ _EACH_FIGURE = "\n".join(f"{name:14}{told}" for name, told in FIGURES.items())
 
 @_command("results", f"\n\n\b\nFigures:\n{_EACH_FIGURE}")
 def plot(
-    run_path: options.RunPath,
-    what: options.WhatOption = None,
-    out: options.FigureOption = None,
+    run_path: options.RunPath, what: options.WhatOption = None, out: options.FigureOption = None
 ) -> None:
     """Draw the page that suits the scene, or the figures named; of a sweep a variable over its axes.
 

@@ -45,10 +45,7 @@ JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON for machine
 SceneArgument = Annotated[
     str | None,
     typer.Argument(
-        metavar="[SCENE]",
-        help="Which kind of scene.",
-        autocompletion=offered("scenes"),
-        show_default=False,
+        metavar="[SCENE]", help="Which kind of scene.", autocompletion=offered("scenes"), show_default=False
     ),
 ]
 NameArgument = Annotated[
@@ -59,8 +56,7 @@ AnyConfigs = Annotated[
     list[Path] | None, typer.Argument(metavar="CONFIG...", help="TOML files.", show_default=False)
 ]
 FromOption = Annotated[
-    Path | None,
-    typer.Option("--from", metavar="DATASET", help="Run the config that a dataset embeds."),
+    Path | None, typer.Option("--from", metavar="DATASET", help="Run the config that a dataset embeds.")
 ]
 ScanOption = Annotated[
     list[str] | None,
@@ -86,8 +82,7 @@ SchedulerOption = Annotated[
     ),
 ]
 TilesOption = Annotated[
-    str | None,
-    typer.Option("--tiles", metavar="A:B", help="Only tiles A to B-1: a share, for job arrays."),
+    str | None, typer.Option("--tiles", metavar="A:B", help="Only tiles A to B-1: a share, for job arrays.")
 ]
 UntilOption = Annotated[
     str | None, typer.Option("--until", metavar="END", help='A later end, such as "2 h" or 5000.')
@@ -165,8 +160,6 @@ VariableOption = Annotated[
 AnalysisOption = Annotated[
     Path | None,
     typer.Option(
-        "--out",
-        metavar="FILE",
-        help="Dataset; default analysis.h5 in the run. The figure goes beside it.",
+        "--out", metavar="FILE", help="Dataset; default analysis.h5 in the run. The figure goes beside it."
     ),
 ]

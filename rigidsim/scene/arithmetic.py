@@ -89,11 +89,7 @@ def unit_vectors(context: Any) -> Matrix:
 
 def cross(a: Vector, b: Vector) -> Vector:
     """Cross product."""
-    return [
-        a[1] * b[2] - a[2] * b[1],
-        a[2] * b[0] - a[0] * b[2],
-        a[0] * b[1] - a[1] * b[0],
-    ]
+    return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 
 
 def parallel(context: Any, a: Vector, b: Vector) -> bool:

@@ -6,9 +6,10 @@ precision can't hold it, and an unstable equilibrium must not be left because of
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
+from rigidsim.errors import ConfigError
 from rigidsim.scene import rotations
 from rigidsim.scene.arithmetic import GUARD_BITS, Matrix, Vector, negligible, norm
 from rigidsim.scene.rotations import AXES, Rotations, parity, shepperd
@@ -16,6 +17,7 @@ from rigidsim.scene.rotations import AXES, Rotations, parity, shepperd
 __all__ = [
     "AXES",
     "euler_from_matrix",
+    "given_attitude",
     "parity",
     "product",
     "quaternion_from_euler",
@@ -96,3 +98,21 @@ def quaternion_from_matrix(context: Any, r: Matrix) -> Vector:
     q = [squares[n] if n == largest else pairs[min(n, largest), max(n, largest)] for n in range(4)]
     q = unit_quaternion(context, q)
     return q if q[0] >= 0 else [-x for x in q]
+
+
+def given_attitude(
+    context: Any, table: Any, sequence: str, refusal: Callable[[str, str], ConfigError]
+) -> tuple[Vector, Vector | None] | None:
+    """Unit quaternion of a table's ``quaternion`` or ``euler_angles``, and these; or None."""
+    if table.euler_angles is not None:
+        if table.quaternion is not None:
+            what = "given beside quaternion; only one attitude is allowed: remove one of them"
+            raise refusal("euler_angles", what)
+        angles = [x.at(context) for x in table.euler_angles]
+        return quaternion_from_euler(context, angles, sequence), angles
+    if table.quaternion is None:
+        return None
+    q = [x.at(context) for x in table.quaternion]
+    if all(x == 0 for x in q):
+        raise refusal("quaternion", "given zero; [w, x, y, z] with a norm that is not zero is allowed")
+    return unit_quaternion(context, q), None

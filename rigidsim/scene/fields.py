@@ -117,21 +117,23 @@ Four = Annotated[list[T], Field(min_length=4, max_length=4), _exactly(4)]
 
 @dataclass(frozen=True, eq=False)
 class OneOf:
-    """Annotation of a text that is one of some names, which may be registered later."""
+    """Annotation of a text that is one of some names, which may be registered later; ``more`` come first."""
 
     names: Iterable[str]
+    more: tuple[str, ...] = ()
 
     def _known(self, value: Any) -> str:
-        if isinstance(value, str) and value in self.names:
+        allowed = [*self.more, *self.names]
+        if isinstance(value, str) and value in allowed:
             return value
-        near = nearest(value if isinstance(value, str) else shown(value), self.names)
-        raise refuse(f"given {shown(value)}{near}; allowed: {', '.join(self.names)}")
+        near = nearest(value if isinstance(value, str) else shown(value), allowed)
+        raise refuse(f"given {shown(value)}{near}; allowed: {', '.join(allowed)}")
 
     def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> Any:
         return core_schema.no_info_plain_validator_function(self._known)
 
     def __get_pydantic_json_schema__(self, schema: Any, handler: Any) -> dict[str, Any]:
-        return {"type": "string", "enum": list(self.names)}
+        return {"type": "string", "enum": [*self.more, *self.names]}
 
 
 def _each_once(value: list[str]) -> list[str]:

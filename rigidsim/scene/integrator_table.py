@@ -4,21 +4,21 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal
 
-from pydantic import (
-    Field,
-    StrictBool,
-    StrictInt,
-    StrictStr,
-    ValidationInfo,
-    WithJsonSchema,
-    field_validator,
-)
+from pydantic import Field, StrictBool, StrictInt, WithJsonSchema, field_validator
 
-from rigidsim.scene.exact import parse_number
-from rigidsim.scene.fields import ConfigTable, Dimensionless, EulerSequence, Metre, number_schema, refuse
+from rigidsim.scene.exact import ExactNumber, parse_number
+from rigidsim.scene.fields import (
+    ConfigTable,
+    Dimensionless,
+    EulerSequence,
+    Metre,
+    OneOf,
+    number_schema,
+    refuse,
+)
 from rigidsim.scene.formulations import AUTO, FORMULATIONS
 from rigidsim.scene.methods import DEFAULT_METHOD, METHODS
-from rigidsim.scene.validation_messages import nearest, shown
+from rigidsim.scene.validation_messages import shown
 
 # A number is carried and stored as a sum of float64 parts, which end at 2^-1074: 250 digits (833 bits) leave
 # room for numbers down to 1e-70.
@@ -32,49 +32,40 @@ class Integrator(ConfigTable):
     precision: (
         Literal["single", "double", "extended", "quadruple"]
         | Annotated[StrictInt, WithJsonSchema({"type": "integer", "minimum": 1, "maximum": LARGEST_DIGITS})]
-    ) = Field(
-        default="double",
-        description="precision of the arithmetic: single, double, extended or quadruple (24, 53, 64 or "
-        "113 bits), or a number of decimal digits",
-        examples=["extended", 50],
-    )
+    ) = Field("double", examples=["extended", 50])
+    """precision of the arithmetic: single, double, extended or quadruple (24, 53, 64 or 113 bits), or a
+    number of decimal digits
+    """
     tolerance: Literal["auto"] | Dimensionless = Field(
-        default="auto",
-        description="error tolerance of each step, relative to the largest component of the state; auto "
-        "is epsilon in double precision, and an eighth of it in most others, where epsilon would "
-        "truncate the series slightly too early",
-        examples=["auto", 1e-12],
-        json_schema_extra={"x-above": 0, "x-at-most": 1},
+        "auto", examples=["auto", 1e-12], json_schema_extra={"x-above": 0, "x-at-most": 1}
     )
-    formulation: StrictStr = Field(
-        default=AUTO,
+    """error tolerance of each step, relative to the largest component of the state; auto is epsilon in double
+    precision, and an eighth of it in most others, where epsilon would truncate the series slightly too early
+    """
+    formulation: Annotated[str, OneOf(FORMULATIONS, (AUTO,))] = Field(
+        AUTO,
         description="the variables that are integrated; "
         + "; ".join(f"{name}: {known.told}" for name, known in FORMULATIONS.items() if known.told),
-        json_schema_extra=lambda schema: schema.update(enum=[AUTO, *FORMULATIONS]),
     )
-    euler_sequence: EulerSequence = Field(
-        default="zxz", description="axes of the intrinsic rotations, for [initial] and for recorded angles"
+    euler_sequence: EulerSequence = "zxz"
+    """axes of the intrinsic rotations, for [initial] and for recorded angles"""
+    method: Annotated[str, OneOf(METHODS)] = Field(
+        DEFAULT_METHOD, description="; ".join(f"{method.name}: {method.told}" for method in METHODS.values())
     )
-    method: StrictStr = Field(
-        default=DEFAULT_METHOD,
-        description="; ".join(f"{method.name}: {method.told}" for method in METHODS.values()),
-        json_schema_extra=lambda schema: schema.update(enum=list(METHODS)),
+    hold_invariants: StrictBool | Literal["auto"] = "auto"
+    """project the state onto its invariants, so that errors of long runs grow far more slowly; auto: from
+    step 8192 on, leaving shorter runs unchanged; in sweeps auto means false
+    """
+    accuracy: Annotated[Dimensionless, WithJsonSchema(number_schema("rad"))] | None = Field(
+        None, examples=[1e-9], json_schema_extra={"x-above": 0, "x-below": 3}
     )
-    hold_invariants: StrictBool | Literal["auto"] = Field(
-        default="auto",
-        description="project the state onto its invariants, so that errors of long runs grow far more "
-        "slowly; auto: from step 8192 on, leaving shorter runs unchanged; in sweeps auto "
-        "means false",
-    )
-
-    @field_validator("method", "formulation", mode="before")
-    @classmethod
-    def _known_name(cls, value: Any, info: ValidationInfo) -> Any:
-        allowed = METHODS if info.field_name == "method" else [AUTO, *FORMULATIONS]
-        if not isinstance(value, str) or value not in allowed:
-            near = nearest(value if isinstance(value, str) else shown(value), allowed)
-            raise refuse(f"given {shown(value)}{near}; allowed: {', '.join(allowed)}")
-        return value
+    """attitude error allowed at the end, instead of precision and tolerance; certified"""
+    accuracy_axis: Dimensionless | None = Field(None, examples=[1e-6])
+    """error (rad) allowed until the end in the directions of the angular momentum and the figure axis; with
+    [model] level = "auto" the cheapest model within it is chosen
+    """
+    accuracy_position: Metre | None = Field(None, examples=["1 um"], json_schema_extra={"x-above": 0})
+    """position error allowed at the end if the body flies; certified"""
 
     @property
     def has_steps(self) -> bool:
@@ -88,55 +79,29 @@ class Integrator(ConfigTable):
             return value
         raise refuse(f'given {shown(value)}; true, false or "auto" is allowed')
 
-    accuracy: Annotated[Dimensionless, WithJsonSchema(number_schema("rad"))] | None = Field(
-        default=None,
-        description="attitude error allowed at the end, instead of precision and tolerance; certified",
-        examples=[1e-9],
-        json_schema_extra={"x-above": 0, "x-below": 3},
-    )
-    accuracy_axis: Dimensionless | None = Field(
-        default=None,
-        description="error (rad) allowed until the end in the directions of the angular momentum and the "
-        'figure axis; with [model] level = "auto" the cheapest model within it is chosen',
-        examples=[1e-6],
-    )
-    accuracy_position: Metre | None = Field(
-        default=None,
-        description="position error allowed at the end if the body flies; certified",
-        examples=["1 um"],
-        json_schema_extra={"x-above": 0},
-    )
-
     @field_validator("precision", mode="before")
     @classmethod
     def _known_precision(cls, value: Any) -> Any:
-        if isinstance(value, int) and not isinstance(value, bool) and 1 <= value <= LARGEST_DIGITS:
-            return value
-        if isinstance(value, str) and value in PRECISION_NAMES:
+        whole = isinstance(value, int) and not isinstance(value, bool) and 1 <= value <= LARGEST_DIGITS
+        if whole or (isinstance(value, str) and value in PRECISION_NAMES):
             return value
         raise refuse(
             f"given {shown(value)}; allowed: {', '.join(PRECISION_NAMES)}, "
             f"or a number of decimal digits from 1 to {LARGEST_DIGITS}"
         )
 
-    @field_validator("accuracy", "accuracy_axis", mode="before")
+    @field_validator("accuracy", "accuracy_axis")
     @classmethod
-    def _possible_accuracy(cls, value: Any) -> Any:
-        if value is None:
-            return value
-        try:
-            number = parse_number(value, "rad")
-        except ValueError as error:
-            raise refuse(str(error)) from None
-        if not 0 < float(number) < 3:
-            raise refuse(f"given {shown(value)}; an angle above 0 and below pi is allowed, in rad")
+    def _possible_accuracy(cls, value: ExactNumber | None) -> ExactNumber | None:
+        if value is not None and not 0 < float(value) < 3:
+            raise refuse(f"given {float(value):g}; an angle above 0 and below pi is allowed, in rad")
         return value
 
     @field_validator("accuracy_position")
     @classmethod
-    def _possible_accuracy_of_position(cls, value: Any) -> Any:
+    def _possible_accuracy_of_position(cls, value: ExactNumber | None) -> ExactNumber | None:
         if value is not None and value.sign <= 0:
-            raise refuse(f"given {shown(value)}; a length above 0 is allowed, in m")
+            raise refuse(f"given {float(value):g}; a length above 0 is allowed, in m")
         return value
 
     @field_validator("tolerance", mode="before")

@@ -10,6 +10,7 @@ from pydantic import Field, StrictStr
 from rigidsim.scene.arithmetic import eccentric_anomaly
 from rigidsim.scene.exact import ZERO, ExactNumber
 from rigidsim.scene.fields import Angle, ConfigTable, Dimensionless, Metre, Rate, Second
+from rigidsim.scene.point_masses import ellipse_of
 from rigidsim.scene.registry import Surroundings
 from rigidsim.scene.validation_messages import nearest
 
@@ -180,16 +181,7 @@ def resolve_orbit(table: Orbit, strength: Any | None, around: Surroundings) -> K
     context = around.context
     if table.semi_major_axis is None:
         raise around.fault("orbit.semi_major_axis", "missing; it is needed")
-    axis, eccentricity = table.semi_major_axis.at(context), table.eccentricity.at(context)
-    if not axis > 0:
-        raise around.fault(
-            "orbit.semi_major_axis", f"given {context.nstr(axis, 8)} m; a positive length is allowed"
-        )
-    if not 0 <= eccentricity < 1:
-        raise around.fault(
-            "orbit.eccentricity",
-            f"given {context.nstr(eccentricity, 8)}; 0 (a circle) to below 1 is allowed",
-        )
+    axis, eccentricity = ellipse_of(table, context, lambda key, text: around.fault(f"orbit.{key}", text))
     motion = mean_motion(table, strength, around)
     node, node_rate = table.ascending_node.at(context), table.node_rate.at(context)
     periapsis, periapsis_rate = table.periapsis.at(context), table.periapsis_rate.at(context)

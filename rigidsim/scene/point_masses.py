@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -256,16 +256,7 @@ def _of_elements(number: int, orbit: StartingOrbit, strength: Any, context: Any)
     """Relative position and velocity from osculating elements (Murray & Dermott 1999, sections 2.4 and
     2.8).
     """
-    a, e = orbit.semi_major_axis.at(context), orbit.eccentricity.at(context)
-    if not a > 0:
-        raise _fault(
-            number,
-            "orbit.semi_major_axis",
-            f"given {context.nstr(a, 8)} m; a positive length is allowed",
-        )
-    if not 0 <= e < 1:
-        what = f"given {context.nstr(e, 8)}; 0 (a circle) to below 1 is allowed"
-        raise _fault(number, "orbit.eccentricity", what)
+    a, e = ellipse_of(orbit, context, lambda key, text: _fault(number, f"orbit.{key}", text))
     anomaly = eccentric_anomaly(context, orbit.mean_anomaly.at(context), e)
     c, s, root = context.cos(anomaly), context.sin(anomaly), context.sqrt(1 - e * e)
     angles = (orbit.ascending_node, orbit.inclination, orbit.periapsis)
@@ -276,6 +267,16 @@ def _of_elements(number: int, orbit: StartingOrbit, strength: Any, context: Any)
     place = [a * ((c - e) * x + root * s * y) for x, y in zip(p, q, strict=True)]
     moving = [speed * (root * c * y - s * x) for x, y in zip(p, q, strict=True)]
     return place, moving
+
+
+def ellipse_of(orbit: Any, context: Any, fault: Callable[[str, str], ConfigError]) -> tuple[Any, Any]:
+    """Semi-major axis (m) and eccentricity of a table (mpf), which describe an ellipse."""
+    a, e = orbit.semi_major_axis.at(context), orbit.eccentricity.at(context)
+    if not a > 0:
+        raise fault("semi_major_axis", f"given {context.nstr(a, 8)} m; a positive length is allowed")
+    if not 0 <= e < 1:
+        raise fault("eccentricity", f"given {context.nstr(e, 8)}; 0 (a circle) to below 1 is allowed")
+    return a, e
 
 
 def _about_barycentre(vectors: Sequence[Vector], strengths: Vector) -> list[Vector]:

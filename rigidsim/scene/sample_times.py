@@ -107,8 +107,7 @@ def sample_times(table: Time, context: Any) -> tuple[Any, Any, SampleTimes]:
                 raise _fail(f"times[{i + 1}]", f"given {shortly(b)} after {shortly(a)}; times must increase")
         if times[0] < start:
             raise _fail(
-                "times[0]",
-                f"given {shortly(times[0])} s; start ({shortly(start)} s) or later is allowed",
+                "times[0]", f"given {shortly(times[0])} s; start ({shortly(start)} s) or later is allowed"
             )
         end = table.end.fraction(context) if table.end is not None else times[-1]
         if times[-1] > end:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, TypeVar
 
 from rigidsim.errors import ConfigError, Problem
@@ -113,7 +114,7 @@ def build_scene(experiment: Experiment, context: Any = None) -> Scene:
     body = attempt(build_body, config.body, context, config.integrator.euler_sequence)
     orientation = attempt(_initial_attitude, config, context)
     times = attempt(sample_times, config.time, context)
-    attempt(_check_limits, config)
+    attempt(_check_limits, config.limits)
     if body is None or orientation is None or times is None or problems:
         raise ConfigError(problems, experiment.source)
     quaternion, angles = orientation
@@ -167,25 +168,9 @@ def _fail(table: str, key: str, text: str) -> ConfigError:
 
 
 def _initial_attitude(config: schema.Config, context: Any) -> tuple[Vector, Vector | None]:
-    table = config.initial
-    if table.quaternion is not None and table.euler_angles is not None:
-        raise _fail(
-            "initial",
-            "euler_angles",
-            "given beside quaternion; only one attitude is allowed: remove one of them",
-        )
-    if table.euler_angles is not None:
-        angles = [x.at(context) for x in table.euler_angles]
-        sequence = config.integrator.euler_sequence
-        return attitude.quaternion_from_euler(context, angles, sequence), angles
-    if table.quaternion is None:
-        return [context.one] + [context.zero] * 3, None
-    q = [x.at(context) for x in table.quaternion]
-    if all(x == 0 for x in q):
-        raise _fail(
-            "initial", "quaternion", "given zero; [w, x, y, z] with a norm that is not zero is allowed"
-        )
-    return attitude.unit_quaternion(context, q), None
+    sequence, refusal = config.integrator.euler_sequence, partial(_fail, "initial")
+    given = attitude.given_attitude(context, config.initial, sequence, refusal)
+    return given or ([context.one] + [context.zero] * 3, None)
 
 
 def _initial_rates(
@@ -194,36 +179,30 @@ def _initial_rates(
     table = config.initial
     if (table.angular_velocity is None) == (table.angular_momentum is None):
         given, joined = ("neither", "nor") if table.angular_velocity is None else ("both", "and")
-        raise _fail(
-            "initial",
-            "angular_velocity",
-            f"given {given} this {joined} angular_momentum; exactly one is needed",
-        )
+        what = f"given {given} this {joined} angular_momentum; exactly one is needed"
+        raise _fail("initial", "angular_velocity", what)
     if table.angular_velocity is not None:
-        rates = [x.at(context) for x in table.angular_velocity]
-        key = "angular_velocity"
+        key, rates = "angular_velocity", [x.at(context) for x in table.angular_velocity]
     else:
         assert table.angular_momentum is not None
         to_body = transpose(attitude.rotation_matrix(quaternion))
-        momentum = apply(to_body, [x.at(context) for x in table.angular_momentum])
+        key, momentum = "angular_momentum", apply(to_body, [x.at(context) for x in table.angular_momentum])
         rates = apply(inverse, momentum)
-        key = "angular_momentum"
-        for moment, axis in zip(body.principal_moments, body.principal_axes, strict=True):
-            if moment == 0 and abs(dot(axis, momentum)) > max(abs(m) for m in momentum) * 1e-14:
-                raise _fail(
-                    "initial",
-                    key,
-                    "has a part along the axis that has no moment of inertia; make that part zero",
-                )
-    for moment, axis in zip(body.principal_moments, body.principal_axes, strict=True):
-        if moment == 0 and abs(dot(axis, rates)) > max(abs(r) for r in rates) * 1e-14:
-            raise _fail(
-                "initial",
-                key,
-                "has a spin about the axis that has no moment of inertia, where a spin means nothing; "
-                "make that component zero",
-            )
+        if _along_massless(body, momentum):
+            what = "has a part along the axis that has no moment of inertia; make that part zero"
+            raise _fail("initial", key, what)
+    if _along_massless(body, rates):
+        what = "has a spin about the axis that has no moment of inertia, where a spin means nothing; "
+        raise _fail("initial", key, what + "make that component zero")
     return rates
+
+
+def _along_massless(body: RigidBody, vector: Vector) -> bool:
+    """Whether a vector has a part along an axis without inertia (a rod's)."""
+    axes = zip(body.principal_moments, body.principal_axes, strict=True)
+    return any(
+        moment == 0 and abs(dot(axis, vector)) > max(map(abs, vector)) * 1e-14 for moment, axis in axes
+    )
 
 
 def _resolve_loads(
@@ -237,11 +216,10 @@ def _resolve_loads(
 ) -> list[SceneLoad]:
     found = []
     tables = {name: table.text for name, table in config.tables.items()}
+    fixed = config.parameters, body.center_of_mass, free_flight, config.frame.axes, config.time.epoch
     for number, fields in enumerate(config.loads):
-        fixed = config.parameters, body.center_of_mass, free_flight, config.frame.axes, config.time.epoch
-        around = Surroundings(number, context, *fixed, tables, span, masses)
         kind = LOAD_KINDS[fields.kind]  # type: ignore[attr-defined]
-        found.append(kind.resolve(fields, around))
+        found.append(kind.resolve(fields, Surroundings(number, context, *fixed, tables, span, masses)))
     return found
 
 
@@ -271,8 +249,8 @@ def _translation(config: schema.Config, body: RigidBody, context: Any) -> tuple[
     return position, velocity
 
 
-def _check_limits(config: schema.Config) -> None:
+def _check_limits(limits: schema.Limits) -> None:
     for key in ("wall_time", "max_drift"):
-        value = getattr(config.limits, key)
+        value = getattr(limits, key)
         if value is not None and value.sign <= 0:
             raise _fail("limits", key, f"given {float(value):g}; a positive number is allowed")

@@ -75,11 +75,7 @@ def print_summary(summary: Brief, folder: str, out: Console | None = None, *, lo
 
 
 def print_understood(
-    body: UnderstoodBody | None,
-    start: Start | None,
-    time: Span | None,
-    on: Page,
-    loads: Sequence[str] = (),
+    body: UnderstoodBody | None, start: Start | None, time: Span | None, on: Page, loads: Sequence[str] = ()
 ) -> None:
     """Print body, start, time and loads as they were understood."""
     for label, text in understood(body, start, time, loads):

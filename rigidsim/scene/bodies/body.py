@@ -10,15 +10,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from rigidsim.scene import attitude
-from rigidsim.scene.arithmetic import (
-    Matrix,
-    Vector,
-    apply,
-    diagonal,
-    eigen,
-    multiply,
-    transpose,
-)
+from rigidsim.scene.arithmetic import Matrix, Vector, apply, diagonal, eigen, multiply, transpose
 from rigidsim.scene.bodies import table as body_table
 from rigidsim.scene.bodies.equal_moments import merged, rounding_of
 from rigidsim.scene.bodies.pieces import (

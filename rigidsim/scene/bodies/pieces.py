@@ -64,8 +64,7 @@ def reference_point(table: body_table.Body, source: str, center: Vector, context
         if table.reference not in landmarks:
             allowed = ", ".join(["center_of_mass", *landmarks])
             raise refusal(
-                "reference",
-                f"given {shown(table.reference)}; allowed here: {allowed}, or a point [x, y, z]",
+                "reference", f"given {shown(table.reference)}; allowed here: {allowed}, or a point [x, y, z]"
             )
         assert shape is not None
         dimensions = {}
@@ -135,20 +134,12 @@ def _solid(
 
 def _attitude_of(part: body_table.Part, sequence: str, place: str, context: Any) -> Vector | None:
     """Unit quaternion from the part's own axes to the body's; None if it isn't rotated."""
-    if part.quaternion is not None and part.euler_angles is not None:
-        what = "given beside quaternion; only one attitude is allowed: remove one of them"
-        raise refusal(f"{place}euler_angles", what)
     if part.euler_sequence is not None and part.euler_angles is None:
         raise refusal(f"{place}euler_sequence", "given without euler_angles; give them, or remove it")
-    if part.euler_angles is not None:
-        angles = [x.at(context) for x in part.euler_angles]
-        return attitude.quaternion_from_euler(context, angles, part.euler_sequence or sequence)
-    if part.quaternion is None:
-        return None
-    q = [x.at(context) for x in part.quaternion]
-    if all(x == 0 for x in q):
-        raise refusal(f"{place}quaternion", "given zero; a quaternion w x y z that is not zero is allowed")
-    return attitude.unit_quaternion(context, q)
+    turned = attitude.given_attitude(
+        context, part, part.euler_sequence or sequence, lambda key, text: refusal(f"{place}{key}", text)
+    )
+    return None if turned is None else turned[0]
 
 
 def drawn(solid: str, dimensions: dict[str, Any], position: Vector) -> dict[str, Any]:
