@@ -75,8 +75,7 @@ DEAR = ("central_gravity_dumbbell", "mars_precession")  # to compile
 
 
 @pytest.mark.parametrize(
-    "path",
-    [pytest.param(p, id=p.stem, marks=[pytest.mark.slow] * (p.stem in DEAR)) for p in CONFIGS],
+    "path", [pytest.param(p, id=p.stem, marks=[pytest.mark.slow] * (p.stem in DEAR)) for p in CONFIGS]
 )
 def test_the_numbers_are_those_of_every_machine(path: Path) -> None:
     saved: dict[str, Any] = json.loads(FILE.read_text())[path.stem]

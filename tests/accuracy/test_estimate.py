@@ -206,10 +206,7 @@ def test_what_part_of_a_long_run_was_examined_is_said() -> None:
     true = true_error(run, text)
     assert true <= COVERED * accuracy["estimated_attitude_error"] <= COVERED * HONEST * true
     whole = estimate_errors(
-        prepare(rigidsim.parse(text)),
-        run.summary["cost"]["steps"],
-        12000.0,
-        margins=Margins(all_steps=10**9),
+        prepare(rigidsim.parse(text)), run.summary["cost"]["steps"], 12000.0, margins=Margins(all_steps=10**9)
     )
     assert whole is not None
     assert whole.share == 1

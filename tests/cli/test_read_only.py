@@ -135,11 +135,7 @@ def test_a_partial_run_is_read_and_gone_on_with_later(
     "moment", cases(["a later segment", "the dataset", "the end of the segments"], ["the dataset"])
 )
 def test_a_folder_that_becomes_read_only_on_the_way(
-    moment: str,
-    config: Config,
-    rigidsim_command: Command,
-    remount: Remount,
-    monkeypatch: pytest.MonkeyPatch,
+    moment: str, config: Config, rigidsim_command: Command, remount: Remount, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     name = config(time="end = 8000\nsamples = 8001")
     assert rigidsim_command("run", name).exit_code == 0

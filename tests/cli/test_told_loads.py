@@ -42,59 +42,10 @@ SAID = {
         "above "
         "its surface, period 96.1 min, inclination 51.6 deg; torque up to 2.672e-06 N m",
     ),
-    "ellipse": (
-        lambda: gradient(
-            'orbit = {semi_major_axis = "384400 km", eccentricity = 0.0549, sidereal_period = "27.321661 '
-            'day", '
-            'node_rate = "-19.34 deg/yr", periapsis_rate = "60.0 deg/yr", inclination = "5.145 deg"}'
-        ),
-        "gravity gradient of the Earth (G M 3.986e+14 m^3/s^2), on an eccentric orbit of 363296 to "
-        "405504 km, "
-        "anomalistic period 27.55 d, sidereal 27.32 d, inclination 5.145 deg; torque up to 1.87e-11 N m",
-    ),
-    "numbers": (
-        lambda: gradient("orbit = {semi_major_axis = 1}", "gravitational_parameter = 1\n"),
-        "gravity gradient of a body of G M 1 m^3/s^2, on a circular orbit of 1 m, period 6.283 s; torque "
-        "up to "
-        "2.25 N m",
-    ),
-    "below": (
-        lambda: gradient("orbit = {semi_major_axis = 6950}"),
-        "gravity gradient of the Earth (G M 3.986e+14 m^3/s^2), on a circular orbit of 6950 m, below its "
-        "surface, period 182.3 ms; torque up to 2672 N m",
-    ),
-    "at rest": (
-        lambda: gradient('position = ["1 au", 0, 0]', "gravitational_parameter = 1.32712440018e20\n"),
-        "gravity gradient of the Sun (G M 1.327e+20 m^3/s^2), at rest, 1 au; torque up to 8.919e-14 N m",
-    ),
-    "series": (
-        lambda: gradient('ephemeris = "moon"', "gravitational_parameter = 4.9028e12\n"),
-        "gravity gradient of the Moon (G M 4.903e+12 m^3/s^2), from its series, about 384400 km; torque "
-        "up to "
-        "1.942e-13 N m",
-    ),
-    "flight": (
-        lambda: told(f'kind = "central_gravity"\n{EARTH}', initial=FLYING.format("7.6")),
-        "central gravity of the Earth (G M 3.986e+14 m^3/s^2), 7000 km, 621.9 km above its surface at the "
-        "start, on an orbit of 7000 to 7204 km, period 99.27 min; torque up to 2.615e-06 N m",
-    ),
-    "flyby": (
-        lambda: told(f'kind = "central_gravity"\n{EARTH}', initial=FLYING.format("12")),
-        "central gravity of the Earth (G M 3.986e+14 m^3/s^2), 7000 km, 621.9 km above its surface at the "
-        "start, unbound, no nearer than 7000 km; torque up to 2.615e-06 N m",
-    ),
     "top": (
         lambda: told('kind = "uniform_gravity"', body=TOP),
         # 0.3 kg * 9.80665 m/s^2 * 3/4 * 0.05 m
         "uniform gravity, 9.80665 m/s^2 down along -Z: torque about the fixed point up to 0.1103 N m",
-    ),
-    "fall": (
-        lambda: told('kind = "uniform_gravity"\nacceleration = [0, 3, -4]', initial="position = [0, 0, 0]"),
-        "uniform gravity, 5 m/s^2 along (0, 0.6, -0.8) in space axes: free fall",
-    ),
-    "nowhere": (
-        lambda: told('kind = "uniform_gravity"\nacceleration = [1.62, 0, 0]'),
-        "uniform gravity, 1.62 m/s^2 along +X: no effect about the centre of mass",
     ),
     "damping": (
         lambda: told('kind = "viscous_torque"\ncoefficients = [0.1, 0, 0.01]'),
@@ -106,33 +57,9 @@ SAID = {
         "torque [0, k*cos(t), 0.3] N m in body axes: 0.5 N m at the start, which in 10 s would add up to the "
         "angular momentum",
     ),
-    "no torque": (
-        lambda: told('kind = "torque"\ncomponents = ["sin(t)", "0", "0"]'),
-        "torque [sin(t), 0, 0] N m in body axes: zero at the start",
-    ),
-    "force": (
-        lambda: told(
-            'kind = "force"\ncomponents = ["0", "0", "8"]\npoint = [0.5, 0, 0]',
-            initial="position = [0, 0, 0]",
-        ),
-        # 8 N on 4 kg, and 4 N m on 5 kg m^2/s
-        "force [0, 0, 8] N in space axes: 8 N at the start, 2 m/s^2, torque 4 N m, which in 1.25 s would "
-        "add up "
-        "to the angular momentum",
-    ),
     "magnet": (
         lambda: told('kind = "magnetic_dipole"\nmoment = [0, 0, 0.5]\nfield = ["30 uT", 0, 0]'),
         "magnetic dipole of 0.5 A m^2 in a uniform field of 3e-05 T: torque up to 1.5e-05 N m",
-    ),
-    "magnet in orbit": (
-        lambda: told(
-            'kind = "magnetic_dipole"\nmoment = [0, 0, 0.5]\nsource_moment = [0, 0, 8e22]\n'
-            f'{EARTH}orbit = {{semi_major_axis = "7000 km"}}'
-        ),
-        # over the poles 2 * 1e-7 * 8e22 / 7e6^3 T
-        "magnetic dipole of 0.5 A m^2 in the field of a dipole of 8e+22 A m^2, on a circular orbit of "
-        "7000 km, "
-        "621.9 km above its surface, period 97.14 min; torque up to 2.332e-05 N m",
     ),
 }
 

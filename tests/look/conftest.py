@@ -37,12 +37,7 @@ def symmetric_top() -> Callable[..., xarray.Dataset]:
             axis=1,
         )
         in_body = momentum * np.stack(
-            [
-                np.sin(tilt) * np.sin(psi),
-                np.sin(tilt) * np.cos(psi),
-                np.full(count, np.cos(tilt)),
-            ],
-            axis=1,
+            [np.sin(tilt) * np.sin(psi), np.sin(tilt) * np.cos(psi), np.full(count, np.cos(tilt))], axis=1
         )
         rates = in_body / np.array([first, first, third]) / scale
         return xarray.Dataset(

@@ -31,11 +31,7 @@ CASES = {
     "cylinder": ({"radius": 2, "height": 3}, 12 * np.pi * POLYGON, (2, 2, 1.5)),
     "rod": ({"length": 2}, np.pi * 8 * THINNESS**2 * POLYGON, (2 * THINNESS, 2 * THINNESS, 1)),
     "disk": ({"radius": 1}, 2 * np.pi * 2 * THINNESS / 2 * POLYGON, (1, 1, THINNESS)),
-    "tube": (
-        {"inner_radius": 1, "outer_radius": 2, "height": 3},
-        9 * np.pi * POLYGON,
-        (2, 2, 1.5),
-    ),
+    "tube": ({"inner_radius": 1, "outer_radius": 2, "height": 3}, 9 * np.pi * POLYGON, (2, 2, 1.5)),
     # Pappus, for the inscribed polygon of the tube, turned about the axis in SEGMENTS steps.
     "torus": (
         {"major_radius": 2, "minor_radius": 0.5},

@@ -126,11 +126,7 @@ def test_the_page_shows_body_arrows_and_plots(tmp_path: Path) -> None:
         f"--window-size={SIZE[0]},{SIZE[1]}", "about:blank",
     ]  # fmt: skip
     quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
-    with (
-        log.open("w") as output,
-        running(view, stdout=output, stderr=output),
-        running(browser, **quiet),
-    ):
+    with log.open("w") as output, running(view, stdout=output, stderr=output), running(browser, **quiet):
         address = waited_for(lambda: re.search(r"http://\S+\?\S+", log.read_text()))[0]
         port = waited_for(lambda: (tmp_path / "profile" / "DevToolsActivePort").read_text().split())[0]
         picture, complaints = asyncio.run(seen(address, int(port)))

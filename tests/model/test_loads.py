@@ -498,6 +498,7 @@ SYMMETRIC = "principal_moments = [1, 1, 1.5]\nmass = 1"
 TWO = "\n[[loads]]\n"
 # body, loads, flight, invariants
 SCENES: dict[str, tuple[str, str, bool, set[str]]] = {
+    "free": (FREE, "", False, {"angular_momentum", "angular_momentum_norm", "energy"}),
     "circular orbit": (FREE, gradient(1.0, CIRCLE), False, {"jacobi_constant"}),
     "its period overridden": (FREE, gradient(1.0, CIRCLE | {"period": 5.0}), False, {"jacobi_constant"}),
     "symmetric on a circular orbit": (
@@ -583,10 +584,7 @@ def candidates(system: Any, states: np.ndarray, times: np.ndarray) -> dict[str, 
     in_space = np.einsum("nij,nj->ni", r, momentum)
     center = np.array(scene.body.center_of_mass, dtype=float)
     kinetic, potential = spinning.copy(), 0 * spinning
-    found = {
-        "angular_momentum": in_space,
-        "angular_momentum_norm": np.linalg.norm(in_space, axis=1),
-    }
+    found = {"angular_momentum": in_space, "angular_momentum_norm": np.linalg.norm(in_space, axis=1)}
     if tensor[0, 0] == tensor[1, 1]:
         found["angular_momentum_axial"] = momentum[:, 2]
     if scene.gravity is not None and not scene.free_flight:

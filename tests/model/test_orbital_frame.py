@@ -58,12 +58,7 @@ def initial(system: System) -> np.ndarray:
     start=st.sampled_from([0, -7.5, 1000]),
 )
 def test_the_attitude_in_space_is_that_of_nine_direction_cosines(
-    rates: list[float],
-    quaternion: list[float],
-    node: float,
-    inclination: float,
-    anomaly: float,
-    start: float,
+    rates: list[float], quaternion: list[float], node: float, inclination: float, anomaly: float, start: float
 ) -> None:
     """Two sets of equations with nothing in common but the body, in 128-bit arithmetic."""
     orbit = f"ascending_node = {node}, inclination = {inclination}, mean_anomaly = {anomaly}"

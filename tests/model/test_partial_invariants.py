@@ -64,10 +64,6 @@ L = "angular_momentum_"
 # body, start, loads, what is kept beside representations' own norms
 SCENES: dict[str, tuple[str, str, str, set[str]]] = {
     "source, general axes": (GENERAL, TURNING, gradient(SOURCE), {"energy", L + "source", "brun_constant"}),
-    "sources on one line": (
-        ASYMMETRIC, TURNING, several(gradient(SOURCE), gradient("[-2, -1, -0.6]", 3)),
-        {"energy", L + "source", "brun_constant"},
-    ),
     "sources in two directions": (
         GENERAL, TURNING, several(gradient(SOURCE), gradient("[0, -1, 0.6]", 2)),
         {"energy", "brun_constant", "bogoyavlensky_constant"},
@@ -77,52 +73,23 @@ SCENES: dict[str, tuple[str, str, str, set[str]]] = {
         {"energy", L + "source", "brun_constant", "bogoyavlensky_constant"},
     ),
     "source and weight": (ASYMMETRIC + HANGING, TURNING, several(GRAVITY, gradient(SOURCE)), {"energy"}),
-    "source above a weight": (
-        ASYMMETRIC + HANGING, TURNING, several(DOWN, gradient("[0, 0, -3]")), {"energy", L + "vertical"},
-    ),
-    "symmetric body and source": (
-        SYMMETRIC, TURNING, gradient(SOURCE), {"energy", L + "source", L + "axial", "brun_constant"},
-    ),
     "sphere and source": (
         SPHERE, TURNING, gradient(SOURCE), FREE | {"energy"},
-    ),
-    "damped beside a source": (
-        ASYMMETRIC, TURNING, several(gradient(SOURCE), 'kind = "viscous_torque"\ncoefficients = [1, 1, 1]'),
-        {"energy_balance"},
     ),
     "dipole": (ASYMMETRIC, TURNING, dipole("[1, 2, 3]", SOURCE), {"energy", L + "field"}),
     "dipole on the axis": (
         SYMMETRIC, TURNING, dipole("[0, 0, 3]", SOURCE), {"energy", L + "field", L + "axial"},
     ),
-    "dipole of a sphere": (
-        SPHERE, TURNING, dipole("[1, 2, 3]", SOURCE), {"energy", L + "field", L + "axial"},
-    ),
-    "dipole and weight": (
-        ASYMMETRIC + HANGING, TURNING, several(GRAVITY, dipole("[1, 2, 3]", SOURCE)), {"energy"},
-    ),
     "dipole towards the centre of mass": (
         ASYMMETRIC + HANGING, TURNING, several(GRAVITY, dipole("[0.6, 0.2, 1]", SOURCE)),
         {"energy", L + "field"},
-    ),
-    "dipole and weight in fields on one line": (
-        ASYMMETRIC + HANGING, TURNING, several(DOWN, dipole("[1, 2, 3]", "[0, 0, 1]")),
-        {"energy", L + "vertical"},
     ),
     "source along a dipole's field": (
         ASYMMETRIC, TURNING, several(gradient("[0, 2, 0]"), dipole("[1, 2, 3]", "[0, 1, 0]")),
         {"energy", L + "source"},
     ),
-    "torque across an axis": (
-        ASYMMETRIC, TURNING, applied("torque", '["sin(t)", 0, "wx"]'), {"energy_balance", L + "y"},
-    ),
     "torque along an axis": (
         ASYMMETRIC, TURNING, applied("torque", '[0, "sin(t)", 0]'), {"energy_balance", L + "x", L + "z"},
-    ),
-    "torque about the body's axis": (
-        SYMMETRIC, TURNING, applied("torque", '["sin(t)", "0.1", 0]', ""), {"energy_balance", L + "axial"},
-    ),
-    "torque about all of the body's axes": (
-        SYMMETRIC, TURNING, applied("torque", '["sin(t)", "0.1", "wx"]', ""), {"energy_balance"},
     ),
     "force on a point": (
         ASYMMETRIC, TURNING, applied("force", '[0, 0, "sin(t)"]', "point = [1, 2, 3]"),
@@ -136,27 +103,13 @@ SCENES: dict[str, tuple[str, str, str, set[str]]] = {
         ASYMMETRIC, TURNING, 'kind = "viscous_torque"\ncoefficients = [0.1, 0.175, 0.2]',
         {"energy_balance", L + "across"},
     ),
-    "damping otherwise": (
-        ASYMMETRIC, TURNING, 'kind = "viscous_torque"\ncoefficients = [0.1, 0.175, 0.25]', {"energy_balance"},
-    ),
-    "damping of the equator": (
-        SYMMETRIC, TURNING, 'kind = "viscous_torque"\ncoefficients = [0.1, 0.2, 0]',
-        {"energy_balance", L + "axial"},
-    ),
     "two sources on circles of one plane and period": (
         ASYMMETRIC, TURNING, several(orbiting(CIRCLE), orbiting(CIRCLE + ", mean_anomaly = 2")),
         {"jacobi_constant", "energy_balance"},
     ),
-    "two sources on circles of different periods": (
-        ASYMMETRIC, TURNING, several(orbiting(CIRCLE), orbiting(CIRCLE + ", period = 5")), {"energy_balance"},
-    ),
     "circular orbit and a field along its normal": (
         ASYMMETRIC, TURNING, several(orbiting(CIRCLE), dipole("[1, 2, 3]", "[0, 0.7, 0]")),
         {"jacobi_constant", "energy_balance"},
-    ),
-    "circular orbit and another field": (
-        ASYMMETRIC, TURNING, several(orbiting(CIRCLE), dipole("[1, 2, 3]", "[0, 0.7, 0.1]")),
-        {"energy_balance"},
     ),
     "circular orbit of a body in free fall": (
         ASYMMETRIC, FLYING, several(orbiting(CIRCLE), DOWN),
@@ -184,7 +137,7 @@ SCENES: dict[str, tuple[str, str, str, set[str]]] = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("name", cases(SCENES, list(SCENES)[::4]))
+@pytest.mark.parametrize("name", cases(SCENES, list(SCENES)[::3]))
 def test_they_are_found_where_they_hold_and_kept(name: str) -> None:
     body, start, loads, expected = SCENES[name]
     text = config(body, start, loads, "end = 10\nsamples = 41")

@@ -322,11 +322,7 @@ IN_SEVERAL: list[tuple[Any, ...]] = [
     ({"output": 'record = ["quaternion"]'} | RATES, "[output] record", "choose another formulation"),
     ({"initial": "angular_velocity = [1e-4000, 1, 0]"}, "config", "1.0e-4000", "check the units"),
     ({"body": "principal_moments = [1e4000, 1e4000, 1e4000]"}, "config", "angular_momentum"),
-    (
-        {"time": "end = 1\nsamples = 100_000_000"} | SINGLE,
-        "[time]",
-        "than single precision",
-    ),
+    ({"time": "end = 1\nsamples = 100_000_000"} | SINGLE, "[time]", "than single precision"),
     ({"time": "start = 1e9\nend = 1_000_000_001"} | SINGLE, "[time]", "samples 0 and 1 are closer together"),
 ]
 

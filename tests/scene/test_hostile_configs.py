@@ -34,8 +34,7 @@ def refused(text: str, match: str | None = None) -> None:
 
 
 @pytest.mark.parametrize(
-    "name",
-    ["../up", "/etc/passwd", ".", "", "a\\\\b", "nul\\u0000", "-rf", "~root", "é"],
+    "name", ["../up", "/etc/passwd", ".", "", "a\\\\b", "nul\\u0000", "-rf", "~root", "é"]
 )
 def test_a_name_can_not_leave_the_folder_of_runs(name: str, tmp_path: Path) -> None:
     text = BASE.replace('"base"', f'"{name}"')

@@ -8,15 +8,7 @@ import xarray
 
 from rigidsim.look.figures.scales import time_axis_of
 from rigidsim.scene.epochs import J2000, parse_epoch
-from rigidsim.scene.readable_time import (
-    DAY,
-    YEAR,
-    TimeWords,
-    instant_text,
-    named_unit,
-    span_text,
-    unit_for,
-)
+from rigidsim.scene.readable_time import DAY, YEAR, TimeWords, instant_text, named_unit, span_text, unit_for
 
 FLYBY = parse_epoch("2029-04-13T21:46:00 TDB")
 

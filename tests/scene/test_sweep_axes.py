@@ -160,18 +160,12 @@ REFUSED = {
         f'{RATE} = {{values = [1]}}\naxes."time.end" = {{values = [1], name = "angular_velocity_2"}}',
         "give one of them another name",
     ),
-    "one key within another": (
-        f'{RATE} = {{values = [1]}}\naxes."initial.angular_velocity" = {{values = [[1, 2, 3]], name = "w"}}',
-        "sweep one of them",
-    ),
     "zip of different lengths": (
         f'mode = "zip"\n{RATE} = {{values = [1, 2]}}\naxes."time.end" = {{values = [1]}}',
         "needs axes of one length",
     ),
     "no way": (f'{RATE} = {{name = "a"}}', "exactly one of linspace"),
-    "two ways": (f"{RATE} = {{values = [1], step = [0, 1, 2]}}", "exactly one of"),
     "random without count": (f"{RATE} = {{uniform = [0, 1]}}", "needs a count"),
-    "count without random": (f"{RATE} = {{values = [1], count = 3}}", "count is for random values"),
     "mixed units": (f'{RATE} = {{linspace = ["1 deg/s", 2, 3]}}', "write both in one unit"),
     "logspace through zero": (f"{RATE} = {{logspace = [0, 1, 3]}}", "above zero"),
     "kept what nobody knows": (f'keep = ["finale"]\n{RATE} = {{values = [1]}}', 'did you mean "final"'),
@@ -179,7 +173,6 @@ REFUSED = {
     "sphere for a number": (f"{RATE} = {{sphere = 1, count = 3}}", "take a vector"),
     "a count that is none": (f"{RATE} = {{linspace = [0, 1, 2.5]}}", "whole numbers from 1"),
     "unknown key": ('axes."initial.angular_velocty[2]" = {values = [1]}', 'did you mean "angular_velocity"'),
-    "a bad name": (f'{RATE} = {{values = [1], name = "a b"}}', "letters, digits and underscores"),
 }
 
 

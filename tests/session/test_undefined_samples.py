@@ -128,8 +128,7 @@ def test_a_run_that_does_not_fit_is_refused(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    "ending",
-    ["[limits]\nmax_steps = 5", '[[events]]\nname = "soon"\nexpression = "t - 2"\naction = "stop"'],
+    "ending", ["[limits]\nmax_steps = 5", '[[events]]\nname = "soon"\nexpression = "t - 2"\naction = "stop"']
 )
 def test_one_that_may_end_before_is_not(ending: str, tmp_path: Path) -> None:
     run = run_text(config(time=VAST, more=ending), tmp_path)

@@ -9,14 +9,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import xarray
 from support import angle_between, cases, law, run_text, same_bits, wide
 
 from rigidsim import resume
 from rigidsim.scene.attitude import AXES
 from rigidsim.scene.fields import EULER_SEQUENCES
 from rigidsim.session.session import Tuning
-from rigidsim.solve.precision import precision_of
 from rigidsim.solve.sampler import Pacing
 from rigidsim.solve.solvers.taylor.ways import Ways
 
@@ -194,77 +192,6 @@ def test_a_resumed_run_has_the_same_bits(precision: str, runs: Path) -> None:
     same_bits(whole, run)
     assert run.summary["chart_changes"] == whole.summary["chart_changes"]
     assert whole.summary["chart_changes"]["count"] > 2
-
-
-SCENES = {
-    "free": ("principal_moments = [1, 2, 3]", "angular_velocity = [0.3, 1.0, 0.5]", ""),
-    "heavy top": (
-        "principal_moments = [2, 2, 1]\nmass = 1\ncenter_of_mass = [0, 0, 0.5]",
-        "angular_velocity = [0.9, 0.2, 1.1]",
-        '[[loads]]\nkind = "uniform_gravity"\nacceleration = [0, 0, -1]',
-    ),
-    "gravity gradient": (
-        "principal_moments = [0.8, 0.9, 1]",
-        "angular_velocity = [0.05, 0.03, 1.02]",
-        '[[loads]]\nkind = "gravity_gradient"\ngravitational_parameter = 1\norbit = {semi_major_axis = 1}',
-    ),
-}
-
-
-@pytest.mark.parametrize(
-    ("scene", "sequence", "precision", "better", "end"),
-    [
-        ("free", "zxz", "double", "extended", 1000),
-        ("heavy top", "xyz", "double", "extended", 1000),
-        pytest.param("gravity gradient", "xyz", "double", "extended", 1000, marks=pytest.mark.slow),
-        pytest.param("heavy top", "zxz", "extended", "quadruple", 100, marks=pytest.mark.slow),
-        pytest.param("gravity gradient", "zxz", "extended", "quadruple", 100, marks=pytest.mark.slow),
-        ("free", "xyz", "quadruple", "40", 20),
-    ],
-)
-def test_it_is_as_accurate_as_the_quaternion(
-    scene: str, sequence: str, precision: str, better: str, end: int
-) -> None:
-    body, initial, loads = SCENES[scene]
-    text = f"""
-name = "scene"
-[body]
-{body}
-[initial]
-{initial}
-quaternion = [0.7, 0.4, 0.5, 0.3]
-{loads}
-[time]
-end = {end}
-samples = 41
-[integrator]
-euler_sequence = "{sequence}"
-"""
-    better = better if better.isdigit() else f'"{better}"'
-    only = 'output.record=["quaternion"]'
-    reference = run_text(text, 'name="x"', only, f"integrator.precision={better}").dataset
-    errors = {}
-    for formulation in ("quaternion", "euler_angles"):
-        settings = [only, f'integrator.formulation="{formulation}"', f'integrator.precision="{precision}"']
-        run = run_text(text, *settings)
-        assert run.status == "finished"
-        if formulation == "euler_angles":
-            assert run.summary["chart_changes"]["count"] > 0
-        errors[formulation] = error(run.dataset, reference)
-        floor = 8 * float(precision_of(precision).epsilon)  # of what a quaternion's components can show
-    assert errors["euler_angles"] <= 10 * max(errors["quaternion"], floor)
-
-
-def error(dataset: xarray.Dataset, reference: xarray.Dataset) -> float:
-    """Largest angle between attitudes, by exact differences of all parts."""
-    names = ["quaternion", "quaternion_lo", "quaternion_lo2"]
-    parts = [[d[n].values for n in names if n in d] for d in (dataset, reference)]
-    difference = parts[0][0] - parts[1][0]
-    for low in range(1, 3):
-        for sign, found in zip((1, -1), parts, strict=True):
-            if low < len(found):
-                difference = difference + sign * found[low]
-    return float(2 * np.sqrt((difference**2).sum(axis=1)).max())
 
 
 def test_events_are_found_in_both_charts() -> None:

@@ -98,10 +98,7 @@ def test_any_free_body_agrees_with_an_integration_in_quadruple_precision(
 @pytest.mark.slow
 @settings(max_examples=15, deadline=None)
 @given(
-    along=st.sampled_from([0.5, 1.0, 1.75, 1e-9]),
-    rates=vectors(3),
-    quaternion=vectors(4),
-    gravity=vectors(3),
+    along=st.sampled_from([0.5, 1.0, 1.75, 1e-9]), rates=vectors(3), quaternion=vectors(4), gravity=vectors(3)
 )
 def test_any_heavy_symmetric_top_agrees_with_an_integration_in_quadruple_precision(
     along: float, rates: list[float], quaternion: list[float], gravity: list[float]

@@ -66,10 +66,7 @@ def middle_at(sequence: str, end: int, away: str) -> str:
 def test_a_body_that_spins_about_z_from_the_default_attitude_has_its_angle_in_psi() -> None:
     found = run_text(FAULT.read_text()).dataset
     np.testing.assert_allclose(
-        found["euler_angles"].values,
-        np.outer(found["time"].values, [0, 0, 1]),
-        rtol=0,
-        atol=1e-14,
+        found["euler_angles"].values, np.outer(found["time"].values, [0, 0, 1]), rtol=0, atol=1e-14
     )
     assert worst_error(found, "zxz", 53) <= 1
 

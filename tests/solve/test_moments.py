@@ -159,10 +159,7 @@ def test_a_triangle_of_fifty_spacings() -> None:
 
 @pytest.mark.parametrize(
     ("torque", "precision"),
-    [
-        ("pulse(t, 700.3, 700.3 + 1e-20)*1e20", "extended"),
-        ("pulse(t, 700.3, 700.3 + 1e-40)*1e40", "double"),
-    ],
+    [("pulse(t, 700.3, 700.3 + 1e-20)*1e20", "extended"), ("pulse(t, 700.3, 700.3 + 1e-40)*1e40", "double")],
 )
 def test_pulses_beyond_two_numbers_are_refused_with_the_reason(torque: str, precision: str) -> None:
     text = LATE.format(spin=0, torque=torque, end=1000, precision=precision)

@@ -169,11 +169,7 @@ class Cut(BaseException):
     "target", ["00000000.h5", "00000003.h5", "dataset.h5", "checkpoint.h5", "summary.json"]
 )
 def test_a_crash_at_any_file(
-    moment: str,
-    target: str,
-    short: tuple[str, rigidsim.Run],
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
+    moment: str, target: str, short: tuple[str, rigidsim.Run], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The files of a run come into being one by one; between any two a process can die."""
     text, whole = short
