@@ -318,9 +318,9 @@ def build_system(plan: ModelPlan, number: Rounder) -> System:
     """
     system = System(plan, number)
     system.formulation.check_start(plan.scene, system.mechanics.attitude)
-    for value in system.initial:
-        number(value)
     variables: list[Recorded | Invariant] = [*system.recorded, *system.invariants]
+    for value in system.initial:  # after what is recorded, which may be refused for a better reason
+        number(value)
     for variable in variables:
         for exponent in variable.exponents:
             if abs(exponent) > _LARGEST_EXPONENT:

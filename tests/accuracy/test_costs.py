@@ -6,16 +6,13 @@ import io
 import json
 import time
 from pathlib import Path
-from typing import Any
 
 import pytest
 from rich.console import Console
 
 import rigidsim
-from rigidsim.accuracy.certificate import Certificate, certify
 from rigidsim.cli.screens import summary as report
 from rigidsim.session.guards import Observer
-from rigidsim.session.session import NOT_KEPT
 
 FREE = """name = "free"
 [body]
@@ -103,31 +100,3 @@ def test_an_interrupted_run_remembers_what_choosing_took(tmp_path: Path) -> None
     assert "choose" not in cost["cpu_by_phase"]  # nothing was chosen in this session
     assert cost["cpu_by_phase"]["certify"] > 0
     assert cost["cpu_seconds"] > 1.0  # of all sessions
-
-
-@pytest.mark.slow
-def test_an_attempt_that_did_not_keep_the_accuracy_is_part_of_the_cost(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """A first certificate that fails has a dearer setting run; the summary has the cost of both."""
-    asked = []
-
-    def first_fails(*given: Any, **more: Any) -> Any:
-        found = certify(*given, **more)
-        assert found is not None
-        asked.append(found)
-        if len(asked) > 1:
-            return found
-        burn(0.5)
-        return Certificate(1.0, found.end, found.how, found.times)
-
-    monkeypatch.setattr("rigidsim.workflows.certify.certify", first_fails)
-    began = time.process_time()
-    run = rigidsim.run(scene("integrator.accuracy=1e-9"), out=tmp_path)
-    everything = time.process_time() - began
-    assert len(asked) == 2
-    assert run.summary["accuracy"]["certified"] <= 1e-9
-    cost = run.summary["cost"]
-    assert cost["cpu_by_phase"][NOT_KEPT] > 0.5
-    assert cost["cpu_seconds"] == pytest.approx(everything, abs=0.1)
-    assert sum(cost["cpu_by_phase"].values()) == pytest.approx(cost["cpu_seconds"], abs=0.1)

@@ -205,20 +205,6 @@ def test_the_page_of_a_run_with_axes_alone_is_about_their_precession() -> None:
     assert titles(figures.figure(alone))[0] == titles(page)[0]
 
 
-def test_the_page_of_an_averaged_rotation_that_is_braked_says_what_is_left_of_it() -> None:
-    dataset = precessing().assign_attrs(formulation="spin_averaged")
-    left = np.exp(-np.linspace(0.0, 2.0, dataset.sizes["time"]))
-    recorded = {"angular_momentum_norm": 3.0 * left, "energy": 5.0 * left**2}
-    page = figures.figure(dataset.assign({name: ("time", values) for name, values in recorded.items()}))
-    assert titles(page)[0] == "What is left of the rotation"
-    momentum, energy = (line.get_ydata() for line in page.axes[0].get_lines())
-    np.testing.assert_allclose(momentum, left, rtol=1e-15)
-    np.testing.assert_allclose(energy, left**2, rtol=1e-15)
-    assert collisions(page) == []
-    steady = {name: ("time", np.full_like(left, values[0])) for name, values in recorded.items()}
-    assert titles(figures.figure(dataset.assign(steady)))[0].startswith("Obliquity")
-
-
 def test_nutation_ellipse_has_its_period_and_its_axes() -> None:
     page = figures.figure(precessing(years=60), "nutation")
     (axes,) = page.axes
@@ -286,15 +272,6 @@ def test_polhode_lies_on_both_surfaces_and_the_separatrix_on_its_plane(symmetric
         "Polhode: the surfaces of energy and momentum",
         "It rolls on the invariable plane (Poinsot)",
     ]
-
-
-def test_herpolhode_of_a_symmetric_body_is_a_circle(symmetric_top: Build) -> None:
-    plane = polhode.herpolhode_path(symmetric_top())
-    assert plane is not None
-    rates = symmetric_top()["angular_velocity"].values
-    along = rates**2 @ [1, 1, 2]  # 2 T, and L = 1
-    np.testing.assert_allclose(np.hypot(*plane.T), np.sqrt((rates**2).sum(axis=1) - along**2), rtol=1e-9)
-    np.testing.assert_allclose(np.hypot(*plane.T), np.hypot(*plane[0]), rtol=1e-9)
 
 
 def test_drifts_stand_over_the_band_of_rounding(symmetric_top: Build) -> None:

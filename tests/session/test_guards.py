@@ -219,37 +219,3 @@ def test_an_event_past_the_last_sample_ends_nothing(tmp_path: Path) -> None:
     assert (run.status, run.summary["events"]) == ("finished", {"late": 0})
     again = rigidsim.resume(run.folder.path, until="20")
     assert (again.status, again.summary["events"]) == ("finished: event", {"late": 1})
-
-
-PLUNGE = config(
-    body="inertia_tensor = [[2, 0.3, -0.2], [0.3, 1.5, 0.1], [-0.2, 0.1, 1.25]]\nmass = 1.75",
-    initial="angular_velocity = [0.4, -0.7, 0.9]\nquaternion = [0.3, -0.5, 0.2, 0.75]\n"
-    "position = [2, 1, 0.5]\nvelocity = [-0.2, 0.9, 0.3]",
-    loads='kind = "central_gravity"\ngravitational_parameter = 3\nposition = [0.5, -0.25, 0.125]',
-    time="end = 8\nsamples = 81",
-    integrator='precision = "extended"',
-)
-
-
-def test_a_plunge_ends_at_the_same_step_however_it_is_driven() -> None:
-    """Its steps shrink without end; they are given up after 32 that time doesn't resolve (2^-63 of it)."""
-    prepared = prepare(rigidsim.parse(PLUNGE))
-    parts = assemble(prepared)
-    begin, ends = parts.corrected.boundary(), set()
-    for pacing in DRIVES.values():
-        parts.corrected.back_to(begin)
-        progress = sampler(prepared, parts, Kept(parts.evaluator), pacing=pacing).run()
-        ends.add((progress.status, progress.steps, progress.time, progress.next_sample))
-    assert len(ends) == 1
-    status, steps, when, samples = ends.pop()
-    assert status is Status.COLLAPSED
-    assert steps < 1000
-    assert samples == int(when * 10) + 1
-    parts.corrected.back_to(begin)
-    position: Any = None
-    most = 0
-    while not most or progress.status is Status.MAX_STEPS:  # nor in how many sessions
-        most += 50
-        loop = sampler(prepared, parts, Kept(parts.evaluator), start=position, most_steps=most)
-        progress, position = loop.run(), loop.position()
-    assert (progress.status, progress.steps) == (Status.COLLAPSED, steps)

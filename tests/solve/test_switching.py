@@ -201,19 +201,6 @@ def test_an_event_on_a_surface_is_found_once() -> None:
     assert dataset["half_time"].values == pytest.approx([1 / 3, 5 / 3], rel=8 * EPSILON["double"])
 
 
-def test_an_event_on_a_surface_is_found_again_within_the_next_step() -> None:
-    """w = 1 - t until t = 1, then w = 2 (t - 1)^2 - (t - 1), back at zero at t = 1.5, where it sticks."""
-    text = config(
-        SPHERE,
-        "angular_velocity = [0, 0, 1]",
-        'kind = "torque"\ncomponents = ["0", "0", "-1 + 4*max(t - 1, 0)*step(-wz)"]',
-        "end = 3\nsamples = 3",
-        more='[[events]]\nname = "still"\nexpression = "wz"\n',
-    )
-    dataset = run_text(text).dataset
-    assert dataset["still_time"].values == pytest.approx([1, 1.5], rel=8 * EPSILON["double"])
-
-
 @pytest.mark.slow
 def test_a_certificate_knows_the_kink() -> None:
     """The scene on which the reference and the run once shared an error of 0.086 rad."""

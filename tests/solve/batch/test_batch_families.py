@@ -194,18 +194,6 @@ def test_what_a_batch_cannot_do_is_said(override: str, reason: Alone) -> None:
     assert batchable(parse(FREE), ["time.end"]) is Alone.KEY
 
 
-def test_switching_equations_and_full_tensors() -> None:
-    text = TORQUE.replace("k*sin(t)^2/2", "k*abs(wx)")
-    found = Families(Members(swept(text, {"parameters.k": "values = [0.1, 0.2]"}))).sort()
-    assert set(found.alone.values()) == {Alone.SWITCHING}
-    tensor = FREE.replace(
-        "principal_moments = [1, 2, 2.5]", "inertia_tensor = [[2, 0.1, 0], [0.1, 2.5, 0.2], [0, 0.2, 3]]"
-    )
-    sweep = swept(tensor, {"body.inertia_tensor[2][2]": "values = [3, 3.1]"})
-    assert set(Families(Members(sweep)).sort().alone.values()) == {Alone.UNTRACEABLE}
-    assert_own_numbers(swept(tensor, {"initial.angular_velocity[0]": "uniform = [0.1, 1], count = 6"}))
-
-
 def test_numbers_of_many_members_are_those_of_each_in_every_bit_of_the_scenes_arithmetic() -> None:
     axes = {
         "loads[0].orbit.eccentricity": "uniform = [0.01, 0.6], count = 3",
@@ -218,26 +206,3 @@ def test_numbers_of_many_members_are_those_of_each_in_every_bit_of_the_scenes_ar
         for node, value in enumerate(graph.values):
             found = np.broadcast_to(numbers.replay.number(node), len(numbers.members))[0]
             assert graph.context.mpf(str(found)) == value, graph.nodes[node]
-
-
-def test_a_member_belongs_to_its_family_whoever_represents_it() -> None:
-    axes = {
-        "parameters.k": "values = [0.05, 0.1, 0.2]",
-        "initial.angular_velocity[1]": "values = [0.1, 0.9, 0.4]",
-    }
-    sweep = swept(TORQUE, axes)
-    numbers = []
-    for order in ([0, 1, 2], [2, 1, 0]):
-        found = Families(Members(sweep, order)).sort()
-        rows = {}
-        for family, group in found.groups:
-            for place, member in enumerate(group.members.tolist()):
-                states = [repr(x) for _, x in family.traced.system.equations]
-                rows[order[member]] = (
-                    states,
-                    group.initial[:, place].tolist(),
-                    group.parameters[:, place].tolist(),
-                )
-        numbers.append(rows)
-    assert numbers[0] == numbers[1]
-    assert sorted(numbers[0]) == [0, 1, 2]
