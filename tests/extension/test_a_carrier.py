@@ -21,11 +21,9 @@ import rigidsim
 from rigidsim.model.kinematics import Kinematics
 from rigidsim.model.load import Load, Term
 from rigidsim.model.state_blocks import StateBlock
-from rigidsim.scene.fields import Moment, Triple, quantity
+from rigidsim.scene.fields import Moment, Momentum, Triple
 from rigidsim.scene.registry import LoadFields, Surroundings, register_load
 from rigidsim.scene.scene import Scene
-
-Momentum: Any = quantity("kg m^2/s")
 
 
 class RotorFields(LoadFields):
