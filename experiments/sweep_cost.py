@@ -37,7 +37,7 @@ from pathlib import Path
 import heyoka as hy
 
 from experiments.common import Check, table
-from rigidsim.accuracy.estimates.member_estimate import MemberEstimates
+from rigidsim.accuracy.estimates.members import MemberEstimates
 from rigidsim.scene.config import parse
 from rigidsim.scene.sweeps.sweep import Sweep
 from rigidsim.solve.batch.family import Families, Family, Numbers

@@ -6,8 +6,8 @@ import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 
+from rigidsim.accuracy.estimates.course import UNCERTAIN
 from rigidsim.accuracy.estimates.estimate import Estimate, estimate_errors
-from rigidsim.accuracy.estimates.growth import UNCERTAIN
 from rigidsim.accuracy.models.modelling import ModellingError, measure_modelling
 from rigidsim.accuracy.models.side_by_side import Unmeasured
 from rigidsim.scene.readable_time import TimeWords, span_text

@@ -18,10 +18,10 @@ from rigidsim.accuracy.setting import Setting
 from rigidsim.accuracy.trial import try_setting
 from rigidsim.solve.assembly import assemble, sampler
 from rigidsim.solve.effects.waypoints import Waypoints
-from rigidsim.solve.neighbours import lanes
 from rigidsim.solve.problem import prepare
 from rigidsim.solve.sample_block import SampleBlock
 from rigidsim.solve.sampler import SampleReceiver
+from rigidsim.solve.shadow import carriers
 from rigidsim.store.variables import parts_in
 
 COVERED = 3.0  # the campaign's measure (experiments/error_coverage.py): true at most 3 times the announced
@@ -103,13 +103,13 @@ def test_chaos_that_sets_in_late_leaves_no_digits() -> None:
 def test_nothing_is_compiled_for_what_is_soon_lost(monkeypatch: pytest.MonkeyPatch) -> None:
     """Chaos that leaves no digit after a thousand steps of 70,000: the run's own integrator shows it."""
     made: list[int] = []
-    compiled = lanes.BatchLanes.__init__
+    compiled = carriers.BatchCarrier.__init__
 
-    def noted(self: lanes.BatchLanes, *given: Any) -> None:
+    def noted(self: carriers.BatchCarrier, *given: Any) -> None:
         made.append(1)
         compiled(self, *given)
 
-    monkeypatch.setattr(lanes.BatchLanes, "__init__", noted)
+    monkeypatch.setattr(carriers.BatchCarrier, "__init__", noted)
     for load, least in ((GRADIENT, 0), (DRIVEN, 1)):
         made.clear()
         prepared = prepare(rigidsim.parse(scene("[1, 2, 2.5]", "[0.5, 0.25, 1]", "10000", load)))
@@ -129,13 +129,13 @@ class Unread(SampleReceiver):
 def test_a_motion_that_is_followed_loosely_is_held_against_the_run(monkeypatch: pytest.MonkeyPatch) -> None:
     """At 1e-6, in half the code; at 1e-8 where that has become another motion than the run's."""
     made: list[float] = []
-    compiled = lanes.BatchLanes.__init__
+    compiled = carriers.BatchCarrier.__init__
 
-    def noted(self: lanes.BatchLanes, system: Any, steps: float, tolerance: float) -> None:
+    def noted(self: carriers.BatchCarrier, system: Any, steps: float, tolerance: float) -> None:
         made.append(tolerance)
         compiled(self, system, steps, tolerance)
 
-    monkeypatch.setattr(lanes.BatchLanes, "__init__", noted)
+    monkeypatch.setattr(carriers.BatchCarrier, "__init__", noted)
     prepared = prepare(rigidsim.parse(scene("[1, 2, 2.5]", "[0.5, 0.25, 1]", "1000", DRIVEN)))
     parts = assemble(prepared)
     steps = sampler(prepared, parts, Unread()).run().steps
@@ -150,9 +150,9 @@ def test_a_motion_that_is_followed_loosely_is_held_against_the_run(monkeypatch: 
         assert estimate is not None
         assert estimate.share == 1
         found[name] = (estimate.leading, list(made))
-    assert found["run"][1] == [lanes.LOOSE]
-    assert found["elsewhere"][1] == [lanes.LOOSE, lanes.TOLERANCE]
-    assert found["unknown"][1] == [lanes.TOLERANCE]
+    assert found["run"][1] == [carriers.LOOSE]
+    assert found["elsewhere"][1] == [carriers.LOOSE, carriers.TOLERANCE]
+    assert found["unknown"][1] == [carriers.TOLERANCE]
     assert found["elsewhere"][0] == found["unknown"][0]
     # pushed at other times: the root mean square of three is from a third to 1.6 of what is expected
     assert 1 / 5 < found["run"][0] / found["unknown"][0] < 5

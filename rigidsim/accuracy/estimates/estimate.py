@@ -1,5 +1,5 @@
-"""Estimate of a run's errors until its end, from neighbours of its motion
-(``rigidsim.solve.neighbours.pushed``).
+"""Estimate of a run's errors until its end, from a shadow ensemble of its motion
+(``rigidsim.solve.shadow.ensemble``).
 
 The size of a step's errors is known: an epsilon's rounding of each state, and the truncation error of the
 series that the tolerance allows. Their growth is measured over the whole run or as much of it as the cost
@@ -16,15 +16,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from rigidsim.accuracy.error_law import CLOSED_FORM, closed_form_if_any, stable_law
-from rigidsim.accuracy.estimates.carriers import loose
-from rigidsim.accuracy.estimates.course import Course, Followed
+from rigidsim.accuracy.estimates.course import Course, Followed, exponential_growth, power_of_time
 from rigidsim.accuracy.estimates.exact_error import ExactError, exact_error
-from rigidsim.accuracy.estimates.following import follow, leading
-from rigidsim.accuracy.estimates.growth import exponential_growth, power_of_time
+from rigidsim.accuracy.estimates.following import follow
 from rigidsim.accuracy.estimates.margins import AS_LARGE, LABEL, LAST_BITS, MARGINS, Margins
 from rigidsim.solve.effects.waypoints import Waypoints
-from rigidsim.solve.neighbours.spread import Spread
 from rigidsim.solve.problem import InitialValueProblem
+from rigidsim.solve.shadow.measures import Spread
 from rigidsim.solve.taylor_stepper import TaylorStepper
 from rigidsim.solve.trail import SampleTrail
 
@@ -42,7 +40,7 @@ class Estimate:
         growth_rate: rate of exponential growth, 1/s; 0 if there is none.
         predictable_seconds: time after the start at which digits are gone; None if errors don't
             grow exponentially.
-        seconds, share: how far neighbours were followed from the start, in s and as a part of the run.
+        seconds, share: how far the ensemble was followed from the start, in s and as a part of the run.
         how: description of the method.
         closed_form: whether the scene has one, against which the run was held.
     """
@@ -175,35 +173,35 @@ def _conclusion(course: Course, followed: Followed, margins: Margins) -> Estimat
     level, carried = float(prepared.precision.epsilon), course.carried
     duration = math.ldexp(end - start, exponent)
     flight = "x" in system.states
-    if not spread.times:
-        unknown = math.pi if spread.whole is False else 0.0
+    times = spread.along("time") - start
+    if not len(times):
+        unknown = 0.0 if spread.whole[0] else math.pi
         return Estimate(
             unknown if carried else None, unknown, None, None, how="the motion could not be followed"
         )
-    times = np.array(spread.times) - start
-    errors = level * margins.safety * leading(spread, carried)
+    errors = level * margins.safety * course.leading(spread)
     longer = max((end - start) / times[-1], 1.0)
 
     def beyond(errors: np.ndarray) -> float:
         return float(longer ** min(max(power_of_time(times, errors), margins.power), margins.most_power))
 
     turned = beyond(errors)
-    moved = max(turned, beyond(np.array(spread.position))) if flight else turned
+    moved = max(turned, beyond(spread.along("position"))) if flight else turned
 
     label = math.ldexp(label_rounding(prepared, duration), -exponent)
     rate = math.ldexp(float(system.rate_bound), exponent)
 
     def at_end(name: str, size: float, most: float, pace: float = 0.0) -> float:
         further = (moved if name in ("position", "velocity") else turned) * followed.more.get(name, 1.0)
-        found = float(max(getattr(spread, name))) * level * margins.safety * further
-        known = spread.whole and math.isfinite(found)
+        found = float(spread.largest(name)[0]) * level * margins.safety * further
+        known = bool(spread.whole[0]) and math.isfinite(found)
         return float(min(found + LAST_BITS * level * size + label * pace, most)) if known else most
 
     lead = at_end("attitude" if carried else "rates", 1.0, sys.float_info.max, rate)
     law = _stable(course, spread, longer, float(system.rate_bound) * duration)
     amplification = lead / law if law > 0 else 1.0
     growth, horizon = exponential_growth(times, errors, exponent, margins.power, margins.exponential)
-    scaling, size, speed = system.scaling, spread.extent, spread.fastest
+    scaling, size, speed = system.scaling, *(float(spread.largest(x)[0]) for x in ("distance", "speed"))
     place = margins.path * at_end("position", size, AS_LARGE * size, speed)
     pace = margins.path * at_end("velocity", speed, AS_LARGE * speed)
     return Estimate(
@@ -221,31 +219,31 @@ def _conclusion(course: Course, followed: Followed, margins: Margins) -> Estimat
 
 
 def _stable(course: Course, spread: Spread, longer: float, turned: float) -> float:
-    """Error at the end (rad) if the motion amplifies none of what its neighbours are pushed by.
+    """Error at the end (rad) if the motion amplifies none of what its ensemble is perturbed by.
 
     Args:
         longer: ratio of the run's length to what was followed.
         turned: angle (rad) that the motion turns through.
     """
     prepared, epsilon = course.prepared, float(course.prepared.precision.epsilon)
-    # where steps end on surfaces, the tolerance itself is the size of pushes
+    # where steps end on surfaces, the tolerance itself is the size of perturbations
     level = prepared.law_tolerance if prepared.system.stepwise else epsilon
-    # neighbours may take more steps than the run, of short motions above all, and are pushed at the start
-    pushed = max(course.steps, round(spread.steps[-1] * longer) + 1)
+    # the ensemble may take more steps than the run, of short motions above all, and is perturbed at the start
+    steps = max(course.steps, round(float(spread.largest("steps")[0]) * longer) + 1)
     # truncation errors may add up one by one, and what they do to the rates with them: n^2 / 2 of phase
-    cut = epsilon * spread.cut[-1] * longer * math.hypot(1.0, turned / 2)
-    return math.hypot(stable_law(level, pushed, turned, 1.0), cut)
+    cut = epsilon * float(spread.largest("cut")[0]) * longer * math.hypot(1.0, turned / 2)
+    return math.hypot(stable_law(level, steps, turned, 1.0), cut)
 
 
 def _words(course: Course, followed: Followed) -> str:
     what = "neighbours of the motion, pushed at random as rounding does"
-    if loose(course.prepared):
+    if course.loose:
         what += " and as the tolerance lets the series do"
     if followed.share >= 1:
         return what + ", over the run"
     what += f", over the first {100 * followed.share:.2g} % of the run"
     spread = followed.spread
-    if not spread.whole or max(leading(spread, course.carried)) >= course.lost:
+    if not spread.whole[0] or course.leading(spread).max() >= course.lost:
         return what + ", after which no digit is left"
     if followed.windows:
         what += f" and in {followed.windows} windows beyond ({100 * followed.in_windows:.2g} %)"

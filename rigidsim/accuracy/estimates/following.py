@@ -1,40 +1,51 @@
-"""How far a run's neighbours are followed, and with which integrator, within a limited cost.
+"""How far a run's shadow ensemble is followed, and what carries it, within a limited cost.
 
 A run of some ten thousand steps is followed to its end. Of a longer one the beginning is, and windows that
 are spread over the rest; where errors grow in any of them by more than time makes them, the whole run is
-followed after all.
+followed after all. So it is where the slow motion of the body's axis makes them grow, with an e-folding time
+that is a good part of the run's length: longer than a beginning or windows can tell from growth in proportion
+to time. The run's average over the rotation and the orbits carries errors alike, and takes few steps.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 
 import numpy as np
 
-from rigidsim.accuracy.estimates.carriers import loose, neighbours_of, same_states
-from rigidsim.accuracy.estimates.course import Course, Followed
-from rigidsim.accuracy.estimates.growth import power_of_time
+from rigidsim.accuracy.estimates.course import Course, Followed, power_of_time
 from rigidsim.accuracy.estimates.margins import Margins
-from rigidsim.accuracy.estimates.slow_motion import power_of_slow_motion
+from rigidsim.accuracy.estimates.perturbations import ensemble_of
+from rigidsim.accuracy.models.carrying import carrying
+from rigidsim.accuracy.models.side_by_side import Unmeasured
+from rigidsim.errors import ConfigError
+from rigidsim.model.averaged.sources import sources_of
 from rigidsim.model.formulations.formulation import Rounding
+from rigidsim.scene.arithmetic import apply, norm
 from rigidsim.solve.compiled import interruptible
 from rigidsim.solve.effects.waypoints import Waypoint
-from rigidsim.solve.neighbours.lanes import (
+from rigidsim.solve.shadow.carriers import (
     LOOSE,
-    NEIGHBOURS,
     OWN_FIRST,
     TIGHT,
     TOLERANCE,
-    BatchLanes,
-    OwnLanes,
+    BatchCarrier,
+    OwnCarrier,
     borrowed,
 )
-from rigidsim.solve.neighbours.pushed import Neighbours
-from rigidsim.solve.neighbours.spread import Spread
+from rigidsim.solve.shadow.ensemble import PERTURBED, ShadowEnsemble
+from rigidsim.solve.shadow.measures import Spread
+
+_LEAST_FOLDS = 4.0
+"""e-foldings within the run that make constant errors grow with a power of time of 2.5 over its last three
+quarters: (e^x - 1) / (e^(x/4) - 1) = 4^2.5.
+"""
+_SMALL = 1e-100  # rad/s: errors that stay small however they grow
 
 
 def follow(course: Course, margins: Margins, go_on: Callable[[], bool]) -> Followed:
-    """Follow a run's neighbours.
+    """Follow a run's shadow ensemble.
 
     Args:
         go_on: polled repeatedly; False ends it.
@@ -47,14 +58,14 @@ def _follow_as_needed(course: Course, margins: Margins, go_on: Callable[[], bool
     part = min(1.0, _affordable(course, margins) / max(course.steps, 1))
     if part < 1 and not _waypoints(course, part, margins):
         part = max(part, min(1.0, margins.all_steps / course.steps))
-    if part < 1 and power_of_slow_motion(course, go_on) > margins.most_power:
+    if part < 1 and _power_of_slow_motion(course, go_on) > margins.most_power:
         part = 1.0
     found, tight = _follow_loosely(course, part, margins, go_on)
-    if found.windows and found.spread.whole and not same_states(course.prepared) and go_on():
+    if found.windows and found.spread.whole[0] and not course.same_states and go_on():
         # what sets in between windows, or shows in none: quaternions follow it, which lose less than momenta
         twin = _follow_loosely(course, _affordable_by_twin(course, margins), margins, go_on)
         spread = twin[0].spread
-        if _suspicious(spread, course.start, course.carried, margins.most_power):
+        if course.suspicious(spread, course.start, margins.most_power):
             found, tight = twin
     if not tight and go_on() and _drifted(course, found.spread, margins):
         found, *_ = _follow(course, 1.0, TIGHT, margins, go_on)
@@ -63,11 +74,12 @@ def _follow_as_needed(course: Course, margins: Margins, go_on: Callable[[], bool
 
 def _drifted(course: Course, spread: Spread, margins: Margins) -> bool:
     """Whether errors grow so much that a motion is to be followed tightly, but not so that all is lost."""
-    if not (spread.whole and spread.times and course.steps < margins.tight_steps):
+    largest = course.leading(spread).max(initial=0.0)
+    if not (spread.whole[0] and course.steps < margins.tight_steps):
         return False
-    if not margins.drifted < max(leading(spread, course.carried)) < margins.gone * course.lost:
+    if not margins.drifted < largest < margins.gone * course.lost:
         return False
-    return _suspicious(spread, course.start, course.carried, margins.most_power)
+    return course.suspicious(spread, course.start, margins.most_power)
 
 
 def _follow_loosely(
@@ -79,10 +91,10 @@ def _follow_loosely(
     if not _can_be_checked(course, part):
         return _follow(course, part, TOLERANCE, margins, go_on)[:2]
     found, tight, astray = _follow(course, part, LOOSE, margins, go_on)
-    if not same_states(course.prepared):
-        astray = not tight and _suspicious(found.spread, course.start, course.carried, margins.most_power)
+    if not course.same_states:
+        astray = not tight and course.suspicious(found.spread, course.start, margins.most_power)
     if astray and go_on():
-        by_itself = course.own is not None and not loose(course.prepared) and course.steps < margins.most_anew
+        by_itself = course.own is not None and not course.loose and course.steps < margins.most_anew
         tightly = by_itself or _drifted(course, found.spread, margins)
         found, tight, _ = _follow(course, part, TIGHT if tightly else TOLERANCE, margins, go_on)
     return found, tight
@@ -93,12 +105,7 @@ def _can_be_checked(course: Course, part: float) -> bool:
     if course.prepared.system.stepwise or course.waypoints is None:
         return False
     last = part * course.steps
-    return not same_states(course.prepared) or bool(course.waypoints.between(last / 2, last))
-
-
-def leading(spread: Spread, carried: bool) -> np.ndarray:
-    """Errors of the attitude, or of the rates if no attitude is carried."""
-    return np.array(spread.attitude if carried else spread.rates)
+    return not course.same_states or bool(course.waypoints.between(last / 2, last))
 
 
 def _affordable(course: Course, margins: Margins) -> float:
@@ -109,11 +116,11 @@ def _affordable(course: Course, margins: Margins) -> float:
     if dearer is None:
         return course.steps
     budget = margins.share * dearer * course.steps  # in steps of double precision
-    if course.own is not None and not same_states(course.prepared):
+    if course.own is not None and not course.same_states:
         canonical = course.prepared.system.formulation.rounding is Rounding.MOMENTA
         if course.steps > (margins.canonical_steps if canonical else margins.all_steps):
             # windows, which nothing else can look at
-            return max(margins.own_steps, budget / (NEIGHBOURS + 1))
+            return max(margins.own_steps, budget / (PERTURBED + 1))
     return _of_double(course, budget, margins)
 
 
@@ -121,7 +128,7 @@ def _of_double(course: Course, budget: float, margins: Margins) -> float:
     """Steps of the run that may be followed in double precision by code that is compiled for it."""
     passes = "x" in course.prepared.system.states and course.uneven > margins.uneven
     least = margins.passing_steps if passes else margins.all_steps
-    more = 1.0 if same_states(course.prepared) else margins.charts
+    more = 1.0 if course.same_states else margins.charts
     return more * max(least, (budget - margins.unrolling) / margins.lane)
 
 
@@ -136,83 +143,84 @@ def _follow(
     """Follow a part of a run, and all of it where that is called for; whether it was followed tightly, and
     whether it was given up since the motion, followed loosely, isn't the run's any more.
     """
-    start, steps, carried = course.start, course.steps, course.carried
+    start, steps, power = course.start, course.steps, margins.most_power
     waypoints = _waypoints(course, part, margins) if part < 1 else []
     first = part * margins.beginning if waypoints else part
-    neighbours = interruptible(lambda: neighbours_of(course, part, first, tolerance, margins))
+    ensemble = interruptible(lambda: ensemble_of(course, part, first, tolerance, margins))
+    spread = ensemble.spread
+
+    def go_to(share: float) -> bool:
+        ensemble.follow(course.at(share), go_on, course.lost)
+        return not ensemble.all_lost(course.lost)
+
     # what takes long to compile only where all isn't lost soon
     soon = OWN_FIRST / steps
-    own = neighbours.lanes if isinstance(neighbours.lanes, OwnLanes) else None
-    if own is not None and same_states(course.prepared) and first * steps > own.until:
-        spread = neighbours.follow(course.at(soon), go_on, course.lost)
-        while (
-            soon * steps < own.until / 2
-            and go_on()
-            and not neighbours.all_lost(course.lost)
-            and _suspicious(spread, start, carried, margins.most_power)
-        ):
+    own = ensemble.carrier if isinstance(ensemble.carrier, OwnCarrier) else None
+    if own is not None and course.same_states and first * steps > own.until:
+        going = go_to(soon)
+        while going and soon * steps < own.until / 2 and go_on() and course.suspicious(spread, start, power):
             soon += OWN_FIRST / steps
-            neighbours.follow(course.at(soon), go_on, course.lost)
-        if not neighbours.all_lost(course.lost):
-            _prepare(neighbours, steps * (first - soon), course.at(first))
-    on_course = _stay_on_course(course, neighbours, first, margins, go_on)
-    spread = neighbours.follow(course.at(first), go_on, course.lost) if on_course else neighbours.spread
+            going = go_to(soon)
+        if going:
+            _prepare(ensemble, steps * (first - soon))
+    on_course = _stay_on_course(course, ensemble, first, margins, go_on)
+    if on_course:
+        go_to(first)
     seen: list[Spread] = []
-    if first < 1 and spread.whole and on_course:
-        power = margins.wary_power if steps < margins.wary_steps else margins.most_power
-        whole = _suspicious(spread, start, carried, power)
+    if first < 1 and spread.whole[0] and on_course:
+        wary = margins.wary_power if steps < margins.wary_steps else power
+        whole = course.suspicious(spread, start, wary)
         if not whole and waypoints:
-            seen = _windows(course, neighbours, waypoints, part - first, go_on)
+            seen = _windows(course, ensemble, waypoints, part - first, go_on)
             beginnings = zip(seen, waypoints, strict=False)
-            whole = any(
-                _suspicious(s, waypoint.time, carried, margins.most_power) for s, waypoint in beginnings
-            )
+            whole = any(course.suspicious(s, waypoint.time, power) for s, waypoint in beginnings)
         for stage in (margins.stage / steps, 1.0) if whole else ():
-            if first < stage <= 1 and not neighbours.all_lost(course.lost):
-                _prepare(neighbours, steps * (stage - first), course.at(stage))
-                on_course = on_course and _stay_on_course(course, neighbours, stage, margins, go_on)
+            if first < stage <= 1 and not ensemble.all_lost(course.lost):
+                _prepare(ensemble, steps * (stage - first))
+                on_course = on_course and _stay_on_course(course, ensemble, stage, margins, go_on)
                 if on_course:
-                    spread, first = neighbours.follow(course.at(stage), go_on, course.lost), stage
-    tight = neighbours.tolerance <= TIGHT
+                    go_to(stage)
+                    first = stage
+    tight = (ensemble.carrier.tolerance or 0.0) <= TIGHT
     if first >= 1 or not seen or not on_course:
-        reached = (spread.times[-1] - start) / (course.end - start) if spread.times else 0.0
+        reached = (float(ensemble.time[0]) - start) / (course.end - start)
         return Followed(spread, min(first, reached)), tight, not on_course
     length = (part - first) / len(waypoints) * (course.end - start)
-    least = 1.0 if same_states(course.prepared) else margins.between_windows
+    least = 1.0 if course.same_states else margins.between_windows
     more = _more(spread, start + length, seen, least)
     return Followed(spread, first, len(seen), part - first, more), tight, False
 
 
 def _stay_on_course(
-    course: Course, neighbours: Neighbours, share: float, margins: Margins, go_on: Callable[[], bool]
+    course: Course, ensemble: ShadowEnsemble, share: float, margins: Margins, go_on: Callable[[], bool]
 ) -> bool:
     """Follow a run loosely past its waypoints until a share of it; False as soon as it is another motion."""
-    loosely = isinstance(neighbours.lanes, BatchLanes) and neighbours.tolerance == LOOSE
-    if course.waypoints is None or not (loosely and same_states(course.prepared)):
+    loosely = isinstance(ensemble.carrier, BatchCarrier) and ensemble.carrier.tolerance == LOOSE
+    if course.waypoints is None or not (loosely and course.same_states):
         return True
     there = course.waypoints.between(0, share * course.steps)
     for waypoint in reversed(there[:: -margins.looks]):
-        if waypoint.time <= neighbours.time:
+        if waypoint.time <= ensemble.time[0]:
             continue
-        spread = neighbours.follow(waypoint.time, go_on, course.lost)
-        if not spread.whole or neighbours.time < waypoint.time:
+        spread = ensemble.follow(waypoint.time, go_on, course.lost)
+        if not spread.whole[0] or ensemble.time[0] < waypoint.time:
             break  # lost, or stopped
-        grown = margins.safety * float(max(leading(spread, course.carried), default=0.0))
+        grown = margins.safety * float(course.leading(spread).max(initial=0.0))
         own_error = float(course.prepared.precision.epsilon) * grown
-        if neighbours.away_from(waypoint.state) > margins.strayed + own_error:
+        if ensemble.away_from(waypoint.state) > margins.strayed + own_error:
             return False
     return True
 
 
-def _prepare(neighbours: Neighbours, steps: float, end: float) -> None:
-    interruptible(lambda: neighbours.prepare_for(steps, end))
+def _prepare(ensemble: ShadowEnsemble, steps: float) -> None:
+    interruptible(lambda: ensemble.prepare_for(steps))
 
 
 def _waypoints(course: Course, part: float, margins: Margins) -> list[Waypoint]:
-    """Where windows begin; none if the neighbours' states differ from the run's."""
+    """Where windows begin; none if the ensemble's states differ from the run's."""
     system = course.prepared.system
     own = course.own is not None and part * course.steps < margins.most_own_steps
-    if course.waypoints is None or system.stepwise or not (own or same_states(course.prepared)):
+    if course.waypoints is None or system.stepwise or not (own or course.same_states):
         return []
     there = course.waypoints.between(part * course.steps, course.steps)
     count = int(part * course.steps * (1 - margins.beginning) / margins.window)
@@ -222,7 +230,7 @@ def _waypoints(course: Course, part: float, margins: Margins) -> list[Waypoint]:
 
 def _windows(
     course: Course,
-    neighbours: Neighbours,
+    ensemble: ShadowEnsemble,
     waypoints: list[Waypoint],
     share: float,
     go_on: Callable[[], bool],
@@ -232,30 +240,62 @@ def _windows(
     steps, seen = share * course.steps / len(waypoints), []
     for waypoint in waypoints:
         until = min(waypoint.time + length, course.end)
-        window = neighbours.elsewhere(waypoint.state, waypoint.time, until, steps)
+        window = ensemble.elsewhere(waypoint.state, waypoint.time, until, steps)
         seen.append(window.follow(until, go_on))
-        if not seen[-1].whole:
+        if not seen[-1].whole[0]:
             break
     return seen
 
 
 def _more(beginning: Spread, until: float, windows: list[Spread], least: float) -> dict[str, float]:
     """``Followed.more``, at least ``least``; the beginning counts up to a time."""
-    last = min(int(np.searchsorted(beginning.times, until)), len(beginning.times) - 1)
+    times = beginning.along("time")
+    last = min(int(np.searchsorted(times, until)), len(times) - 1)
     found = {}
     for name in ("rates", "attitude", "position", "velocity"):
-        known = max(getattr(beginning, name)[: last + 1])
-        grown = [max(getattr(window, name), default=0.0) for window in windows]
+        known = float(beginning.along(name)[: last + 1].max())
+        grown = [float(window.largest(name)[0]) for window in windows]
         share = np.sqrt(np.mean(np.square(grown))) / known if known > 0 else 1.0
         found[name] = max(least, float(share))
     return found
 
 
-def _suspicious(spread: Spread, start: float, carried: bool, power: float) -> bool:
-    """Whether errors grow faster than a power of time, or the motion couldn't be followed."""
-    if not (spread.whole and spread.times):
-        return not spread.whole
-    times, found = np.array(spread.times) - start, [leading(spread, carried)]
-    if spread.extent > 0:
-        found.append(np.array(spread.position))
-    return any(power_of_time(times, errors) > power for errors in found)
+def _power_of_slow_motion(course: Course, go_on: Callable[[], bool]) -> float:
+    """Power of time with which the run's slow motion makes errors of the axis grow over the last three
+    quarters of the run, if they are made all the time; 0 where they can't grow exponentially, or there is no
+    average over the orbits to tell.
+    """
+    if course.prepared.system.stepwise or _most_folds(course) < _LEAST_FOLDS:
+        return 0.0
+    try:
+        found = carrying(course.prepared, None, go_on)
+    except (ConfigError, Unmeasured):
+        return 0.0
+    times = found.seconds * np.arange(1, len(found.maps) + 1)
+    reached = times <= _seconds(course) * (1 + 1e-9)
+    errors = np.array(list(found.errors(_SMALL, _SMALL)))
+    return power_of_time(times[reached], errors[reached]) if reached.sum() > 1 else 0.0
+
+
+def _most_folds(course: Course) -> float:
+    """Bound of the e-foldings of errors of the axis s within the run, without computing its motion.
+
+    Each source with the normal n of its orbit makes it precess, s' = k (n . s) n x s. Of this motion's
+    tangent map, k (n . ds) (n x s) is all that stretches, by k / 2 at most. About a single n at rest s just
+    precesses.
+    """
+    scene, context = course.prepared.scene, course.prepared.scene.context
+    sources = sources_of(scene, course.prepared.system.plan.loads)
+    orbit = sources[0].orbit if len(sources) == 1 else None
+    if not all(source.has_elements for source in sources) or (orbit is not None and orbit.node_rate == 0):
+        return 0.0
+    momentum = float(norm(context, apply(scene.body.inertia, scene.angular_velocity)))
+    moments = [float(moment) for moment in scene.body.principal_moments]
+    if momentum == 0:
+        return 0.0
+    strength = sum(float(s.strength) * (1 - s.eccentricity**2) ** -1.5 / 2 for s in sources)
+    return strength * (max(moments) - min(moments)) / momentum / 2 * _seconds(course)
+
+
+def _seconds(course: Course) -> float:
+    return math.ldexp(course.end - course.start, course.prepared.system.scaling.time)

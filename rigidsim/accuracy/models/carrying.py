@@ -22,8 +22,9 @@ from rigidsim.errors import ConfigError
 from rigidsim.model.averaged.average import DIRECTION, Average
 from rigidsim.scene.methods import DEFAULT_METHOD
 from rigidsim.scene.model_table import ORBIT_AVERAGED
-from rigidsim.solve.neighbours.lanes import NEIGHBOURS, BatchLanes, Lanes, StepperLanes
 from rigidsim.solve.problem import InitialValueProblem, prepare_scene
+from rigidsim.solve.shadow.carriers import BatchCarrier, StepperCarrier
+from rigidsim.solve.shadow.ensemble import PERTURBED, Carrier
 from rigidsim.store.summary_parts import UnmeasuredCode
 
 _PART_OF_TURN = math.pi / 6
@@ -98,20 +99,20 @@ def carrying(
     turned = seconds * average.strength * abs(float(average.motion.excess / average.motion.momentum))
     count = int(min(max(turned / _PART_OF_TURN, _FEWEST), _MOST))
     ahead = min(1.0, _PART_OF_TURN * count / max(turned, 1e-300))  # of a stretch
-    lanes, edges = _lanes(problem), np.linspace(start, end, count + 1)
+    carrier, edges = _carrier(problem), np.linspace(start, end, count + 1)
     places = [system.states.index(name) for name in DIRECTION]
     state = np.array([float(x) for x in system.initial])
     bases, moved = [_basis(state[places], np.zeros(3))], []
     for begin, until in pairwise(edges):
         middle = float(begin + ahead * (until - begin))
-        states = np.repeat(state[:, None], NEIGHBOURS + 1, axis=1)
+        states = np.repeat(state[:, None], PERTURBED + 1, axis=1)
         pushed = bases[-1]
         states[places, 1:3] += _APART * pushed.T
         if not go_on():
             raise Unmeasured(UnmeasuredCode.INTERRUPTED, "the measurement was interrupted")
-        states = _to(lanes, states, float(begin), middle)
+        states = _to(carrier, states, float(begin), middle)
         bases[-1] = _basis(state[places], states[places, 0] - state[places], pushed[0])
-        states = _to(lanes, states, middle, float(until))
+        states = _to(carrier, states, middle, float(until))
         state = states[:, 0]
         apart = (states[places, 1:3] - state[places, None]) / _APART
         moved.append(apart @ pushed @ bases[-1].T)
@@ -144,29 +145,31 @@ def _problem(prepared: InitialValueProblem, average: Average | None) -> InitialV
     raise AssertionError
 
 
-def _lanes(problem: InitialValueProblem) -> Lanes:
+def _carrier(problem: InitialValueProblem) -> Carrier:
     system, clock = problem.system, problem.clock
     if system.stepwise:
         start, end = float(clock.start), float(clock.at(clock.count - 1))
-        return StepperLanes(system, start, end, 1)
+        return StepperCarrier(system, start, end, 1)
     average = system.formulation.average
     assert average is not None
-    return BatchLanes(system, 0 if average.over_orbits else _STEPS_OF_SPIN)
+    return BatchCarrier(system, 0 if average.over_orbits else _STEPS_OF_SPIN)
 
 
-def _to(lanes: Lanes, states: np.ndarray, begin: float, end: float) -> np.ndarray:
-    """States of all lanes at a later time.
+def _to(carrier: Carrier, states: np.ndarray, begin: float, end: float) -> np.ndarray:
+    """States (states, 1 + perturbed) at a later time.
 
     Raises:
         Unmeasured: one of them doesn't get there.
     """
-    every = np.ones(states.shape[1])
+    only, every = np.zeros(1, dtype=int), np.ones((1, states.shape[1]))
     while begin < end:
-        found = lanes.advance(states, begin * every, end * every, _STEPS)
-        if found is None or not np.isfinite(found[0]).all():
+        moved, _, reached = carrier.advance(
+            only, states[:, None], begin * every, end * every, np.array([_STEPS])
+        )
+        if not np.isfinite(moved).all():
             why = "motions beside the averaged one can't be followed to its end"
             raise Unmeasured(UnmeasuredCode.AVERAGED_STOPPED, why)
-        states, _, begin = found
+        states, begin = moved[:, 0], float(reached[0])
     return states
 
 

@@ -199,8 +199,8 @@ class BatchEngine:
         end: np.ndarray,
         longest: np.ndarray,
         most_steps: int,
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """States (states, n) and times (n,) of motions at most so many steps later.
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """States (states, n) and times (n,) of motions at most so many steps later, and these steps (n,).
 
         Args:
             states, parameters: (.., n); begin, end: (n,), internal units.
@@ -208,11 +208,14 @@ class BatchEngine:
         """
         integrator, given = self._integrator, (states, parameters, begin, end, longest)
         there, read, then, ends, bounds = (grouped(x, self.width) for x in given)
+        taken = np.empty(then.shape)
         for group in range(len(there)):
             self._set(there[group], read[group], then[group])
             integrator.propagate_until(ends[group], max_steps=most_steps, max_delta_t=bounds[group])
             there[group], then[group] = integrator.state, integrator.time
-        return np.concatenate(list(there), axis=1)[:, : len(begin)], then.ravel()[: len(begin)]
+            taken[group] = [outcome[3] for outcome in integrator.propagate_res]
+        count = len(begin)
+        return np.concatenate(list(there), axis=1)[:, :count], then.ravel()[:count], taken.ravel()[:count]
 
     def _set(self, states: np.ndarray, parameters: np.ndarray, begin: np.ndarray) -> None:
         self._integrator.set_time(begin)

@@ -11,7 +11,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from rigidsim.accuracy.estimates.member_estimate import MemberErrors, MemberEstimates
+from rigidsim.accuracy.estimates.members import MemberErrors, MemberEstimates
 from rigidsim.errors import ConfigError
 from rigidsim.scene.config import Experiment
 from rigidsim.scene.sweeps.sweep import Sweep

@@ -1,4 +1,6 @@
-"""What carries a run's neighbours, its own integrator or code compiled for them, and how they are pushed."""
+"""The shadow ensemble of a run: what carries it, its own integrator or code compiled for it, and how its
+motions are perturbed.
+"""
 
 from __future__ import annotations
 
@@ -13,20 +15,20 @@ from rigidsim.model.capabilities import Ahead, having, is_wide
 from rigidsim.model.formulations.formulation import Rounding
 from rigidsim.model.system import System
 from rigidsim.scene.transitions import acts_at_moments_alone
+from rigidsim.solve.compiled import TaylorEngine
 from rigidsim.solve.effects.angle_wrapping import STEPS_BETWEEN
-from rigidsim.solve.neighbours.lanes import (
+from rigidsim.solve.precision import precision_of
+from rigidsim.solve.problem import double_twin
+from rigidsim.solve.shadow.carriers import (
     TIGHT,
-    BatchLanes,
-    Lanes,
-    OwnLanes,
+    BatchCarrier,
+    OwnCarrier,
     SeriesErrors,
-    StepperLanes,
+    StepperCarrier,
     own_until,
 )
-from rigidsim.solve.neighbours.pushed import Neighbours, Pushes
-from rigidsim.solve.precision import precision_of
-from rigidsim.solve.problem import InitialValueProblem, double_twin
-from rigidsim.solve.taylor_stepper import TaylorStepper
+from rigidsim.solve.shadow.ensemble import Carrier, Perturbations, ShadowEnsemble
+from rigidsim.solve.shadow.measures import Measures, Starts
 
 _OF_SERIES = 2.0
 """Rounding of the arguments over that of time, both as errors of the time: the direction of the Moon in
@@ -36,91 +38,82 @@ _WITHIN_MONTH = 4.0
 """Steps at least in a quarter of the Moon's month, as long as the body turns no slower than it revolves."""
 
 
-def same_states(prepared: InitialValueProblem) -> bool:
-    """Whether neighbours have the run's states, which they do unless a loose tolerance would run into
-    singularities of these.
-    """
-    return prepared.system.formulation.variables.regular
-
-
-def _by_itself(course: Course, own: TaylorStepper, part: float, tolerance: float, margins: Margins) -> bool:
-    """Whether the run's own integrator carries its neighbours, at least at first."""
-    if tolerance <= TIGHT or (part < 1 and not same_states(course.prepared)):
-        return course.steps * part < margins.most_own_steps
-    if course.prepared.system.formulation.rounding is Rounding.MOMENTA:
-        return course.steps * part <= margins.canonical_steps
-    return same_states(course.prepared) or course.steps * part < own_until(own.integrator)
-
-
-def neighbours_of(
+def ensemble_of(
     course: Course, part: float, first: float, tolerance: float, margins: Margins
-) -> Neighbours:
-    """Neighbours at the start of a run.
+) -> ShadowEnsemble:
+    """The ensemble at the start of a run.
 
     Args:
         part, first: parts of the run to be followed, in all and from its start on.
     """
-    steps = course.steps * part
     prepared, own = course.prepared, course.own
     precision, system = prepared.precision, prepared.system
     series: SeriesErrors | None = None
     stand_in = False
-    follows = tolerance > TIGHT or not loose(prepared)  # it is as loose as the run
+    follows = tolerance > TIGHT or not course.loose  # it is as loose as the run
     if own is not None and own.system.stepwise:
-        lanes: Lanes = StepperLanes(system, course.start, course.end, course.steps, own)
-    elif own is not None and follows and _by_itself(course, own, part, tolerance, margins):
-        lanes = OwnLanes(system, own.integrator, tolerance if same_states(prepared) else None)
-        series = (
-            SeriesErrors(system, prepared.effective_tolerance, own.integrator) if loose(prepared) else None
-        )
+        carrier: Carrier = StepperCarrier(system, course.start, course.end, course.steps, own)
+    elif own is not None and follows and _by_itself(course, own.integrator, part, tolerance, margins):
+        carrier = OwnCarrier(system, own.integrator, tolerance if course.same_states else None)
+        if course.loose:
+            series = SeriesErrors(system, prepared.effective_tolerance, own.integrator)
     else:
-        same = same_states(prepared)
+        same = course.same_states
         system = system.rounded(precision_of("double").number) if same else double_twin(prepared)
         stand_in = not same and prepared.system.partner is None
         if system.stepwise:
-            lanes = StepperLanes(system, course.start, course.end, course.steps)
+            carrier = StepperCarrier(system, course.start, course.end, course.steps)
         else:
-            lanes = BatchLanes(system, steps, tolerance)
-        if loose(prepared) and not system.stepwise:
+            carrier = BatchCarrier(system, course.steps * part, tolerance)
+        if course.loose and not system.stepwise:
             series = SeriesErrors(system, prepared.effective_tolerance)
-    rounded = np.array([precision.exact(precision.number(x)) != x for x in system.initial])
-    pushes = _pushes(course, stand_in, margins)
-    return Neighbours(
-        system,
-        lanes,
-        course.start,
-        course.at(first),
-        course.steps * first,
-        pushes,
+    measures, exponents = Measures(system), system.state_exponents
+    units = [[math.ldexp(1.0, int(exponents[place]))] for place in measures.places["rates"]]
+    return ShadowEnsemble(
+        carrier,
+        measures,
+        Starts(
+            np.array([[float(x)] for x in system.initial]),
+            np.array([course.start]),
+            np.array([course.end]),
+            np.array([course.steps * first]),
+            np.array(units).reshape(-1, 1),
+            np.zeros((0, 1)),
+        ),
+        _perturbations(course, stand_in, margins),
         float(precision.epsilon),
-        rounded,
-        series,
+        rounded=np.array([precision.exact(precision.number(x)) != x for x in system.initial]),
+        series=None if series is None else series.of_step,
     )
 
 
-def loose(prepared: InitialValueProblem) -> bool:
-    """Whether the tolerance allows larger step errors than rounding causes."""
-    return prepared.effective_tolerance > 2 * float(prepared.precision.epsilon)
+def _by_itself(course: Course, own: TaylorEngine, part: float, tolerance: float, margins: Margins) -> bool:
+    """Whether the run's own integrator carries its ensemble, at least at first."""
+    if tolerance <= TIGHT or (part < 1 and not course.same_states):
+        return course.steps * part < margins.most_own_steps
+    if course.prepared.system.formulation.rounding is Rounding.MOMENTA:
+        return course.steps * part <= margins.canonical_steps
+    return course.same_states or course.steps * part < own_until(own)
 
 
-def plain_pushes(system: System) -> Pushes:
+def plain_perturbations(system: System) -> Perturbations:
     """Errors of a step in quaternions or rates at the precision's own tolerance."""
     ahead = max((x.seconds_ahead for x in having(Ahead, system.plan.loads)), key=abs, default=0.0)
-    plain = Pushes(ahead=math.ldexp(ahead, -system.scaling.time))
+    plain = Perturbations(ahead=math.ldexp(ahead, -system.scaling.time))
     if not any(map(is_wide, system.plan.loads)):
         return plain
     return replace(plain, clock=_OF_SERIES * plain.clock, together=_WITHIN_MONTH)
 
 
-def _pushes(course: Course, stand_in: bool, margins: Margins) -> Pushes:
+def _perturbations(course: Course, stand_in: bool, margins: Margins) -> Perturbations:
     """Errors of a step.
 
     Args:
         stand_in: whether quaternions take the place of the run's states.
     """
     prepared = course.prepared
-    plain, rounding = plain_pushes(prepared.system), prepared.system.formulation.rounding
-    if prepared.system.stepwise and loose(prepared):
+    plain, rounding = plain_perturbations(prepared.system), prepared.system.formulation.rounding
+    if prepared.system.stepwise and course.loose:
         plain = replace(
             plain, own=margins.cut_off * prepared.effective_tolerance / float(prepared.precision.epsilon)
         )

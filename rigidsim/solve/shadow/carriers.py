@@ -1,6 +1,4 @@
-"""Integrators that carry a motion and its neighbours side by side, and the error that a loose tolerance
-causes.
-"""
+"""What carries a motion and the perturbed ones beside it, and the error that a loose tolerance causes."""
 
 from __future__ import annotations
 
@@ -9,7 +7,7 @@ import math
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
-from typing import Any, Protocol
+from typing import Any
 
 import heyoka as hy
 import numpy as np
@@ -20,10 +18,10 @@ from rigidsim.model.system import System
 from rigidsim.solve.compiled import TaylorEngine
 from rigidsim.solve.precision import precision_of
 from rigidsim.solve.requirements import propagation
+from rigidsim.solve.shadow.ensemble import HOPELESS_STEPS, PERTURBED, Carrier
 from rigidsim.solve.steppers import stepper_of
 from rigidsim.solve.taylor_stepper import TaylorStepper
 
-NEIGHBOURS = 3
 _DOUBLE_ORDER = 20
 """Order of the series in double precision at its epsilon; the work of a step grows as its square."""
 LOOSE, TOLERANCE, TIGHT = 1e-6, 1e-8, 1e-14
@@ -33,22 +31,18 @@ grow so much that a loosely followed motion soon becomes a different one.
 """
 _TIGHT_UNTIL = 50_000
 _OWN_UNTIL, OWN_FIRST = 5_000, 500
-"""Steps up to which the run's own integrator, called for each lane, costs less than code compiled for all;
+"""Steps up to which the run's own integrator, called for each motion, costs less than code compiled for all;
 and the steps that it takes of longer motions, repeatedly as long as their errors grow exponentially, so that
 no code is compiled for a motion that is soon lost.
 """
-UNROLLED_FROM, LOOSELY_UNROLLED_FROM, OPTIMISED_FROM = 3_000, 1_500, 300_000
+_UNROLLED_FROM, _LOOSELY_UNROLLED_FROM, _OPTIMISED_FROM = 3_000, 1_500, 300_000
 """Steps to be taken from which code pays that takes longer to compile and less time to run. Of 66 and 126
 terms of the equations' decomposition, four lanes, tolerance 1e-8: compact 42 and 48 ms, 10 and 22 us a step;
 unrolled 60 and 132 ms, 2.2 and 5.4 us; unrolled and optimised 315 and 860 ms, 1.3 and 3.2 us. An own
 integrator takes 18 and 48 us for four lanes; on a quieter machine 6.6 and 15, where unrolled code takes 45
-and 83 ms to compile and 1.5 and 2.3 us a step. At 1e-6 half of that: of 59, 117 and 167 terms unrolled 29, 67
-and 77 ms, 0.8, 1.7 and 2.2 us a step (42, 107 and 191 ms, 1.2, 2.4 and 3.5 us at 1e-8), compact 29, 47 and
-55 ms, 4, 9 and 14 us. Of these times 6, 12 and 19 ms are no code generation: a batch that was compiled before
-takes so long to make.
+and 83 ms to compile and 1.5 and 2.3 us a step. At 1e-6 half of that. Of these times 6 to 19 ms are no code
+generation: a batch that was compiled before takes so long to make.
 """
-_HOPELESS_STEPS = 32_768
-"""Steps within one stretch after which the motion is given up, say on its way to a collision."""
 _UNEVEN, _FEW_STEPS = 2.5, 8
 """Ratio of longest to shortest step up to which steps count as alike, and a number of steps so small that it
 doesn't matter.
@@ -62,9 +56,9 @@ _ONE_ORDER = math.exp(2.0)
 """Typical gain of one more order, which is the tolerance's own step from order to order (Jorba & Zou 2005);
 the factor by which proportions can be wrong.
 """
-
 _PARTS = 4
 """Parts of a step, whose errors are at most a thousandth of its own: 4 to the power of the series' order."""
+Advanced = tuple[np.ndarray, np.ndarray, np.ndarray]
 
 
 @contextmanager
@@ -84,123 +78,115 @@ def borrowed(stepper: TaylorStepper | None) -> Iterator[None]:
 
 
 def own_until(integrator: TaylorEngine) -> float:
-    """Steps of a run up to which its own integrator costs less than code that is compiled for all lanes."""
+    """Steps of a run up to which its own integrator costs less than code that is compiled for all motions."""
     return _OWN_UNTIL * max(1.0, (_DOUBLE_ORDER / int(integrator.order)) ** 2)
 
 
-class Lanes(Protocol):
-    """A motion and its neighbours, integrated side by side.
-
-    Attributes:
-        tolerance: tolerance of their steps.
+class _SingleMotion:
+    """Carrier of one motion. A stretch ends when steps have become longer or shorter, as in a close passage:
+    errors made there count for more, and in other states.
     """
 
     tolerance: float
 
+    def __init__(self) -> None:
+        self._most_even = HOPELESS_STEPS
+
     def advance(
+        self, which: np.ndarray, states: np.ndarray, begin: np.ndarray, end: np.ndarray, steps: np.ndarray
+    ) -> Advanced:
+        """See ``Carrier``."""
+        found = self._onward(states[:, 0], begin[0], end[0], int(steps[0]))
+        if found is None:
+            return np.full_like(states, np.nan), np.ones(1), end[:, 0]
+        moved, taken, reached = found
+        return moved[:, None], np.array([max(taken, 1)]), np.array([reached])
+
+    def _onward(
         self, states: np.ndarray, begin: np.ndarray, end: np.ndarray, most: int
     ) -> tuple[np.ndarray, int, float] | None:
-        """States (states, lanes) at the ends of time intervals (lanes,), the steps that the first lane took,
-        and the time that it reached; None if a state isn't finite or steps don't end.
+        """The same of states (states, 1 + perturbed); None if they can't be followed."""
+        raise NotImplementedError
 
-        Args:
-            most: steps of the first lane after which all intervals end early alike; they end sooner if its
-                steps change in length.
-        """
-
-    def again(self, steps: float) -> Lanes:
-        """Lanes suited to the given number of further steps."""
-
-
-class _Evenly:
-    """Ends a stretch when steps have become longer or shorter, as in a close passage.
-
-    Errors made there count for more, and in other states.
-    """
-
-    def __init__(self) -> None:
-        self._most = _HOPELESS_STEPS
-
-    def go(self, go: Callable[[int], tuple[int, float, float]], most: int) -> int:
+    def _evenly(self, go: Callable[[int], tuple[Any, ...]], most: int) -> int:
         """Take steps while they are alike; returns how many.
 
         Args:
-            go: takes at most so many steps from the same place again; returns their number, the shortest and
-                the longest.
-            most: steps.
+            go: takes at most so many steps from the same place again; returns heyoka's outcome, the shortest
+                step, the longest and their number.
         """
-        tried = min(self._most, most)
+        tried = min(self._most_even, most)
         while True:
-            steps, shortest, longest = go(tried)
+            _, shortest, longest, steps, *_ = go(tried)
             if longest <= _UNEVEN * shortest or steps <= _FEW_STEPS:
-                self._most = 2 * max(tried, _FEW_STEPS)
-                return steps
+                self._most_even = 2 * max(tried, _FEW_STEPS)
+                return int(steps)
             tried = steps // 2
 
 
-class BatchLanes:
-    """All lanes in one call, in compiled code of their own.
+class BatchCarrier(_SingleMotion):
+    """All in one call, in compiled code of their own.
 
     States that nothing depends on, not even a step, stay constant: they would only cost compile time.
     """
 
     def __init__(self, system: System, steps: float, tolerance: float = TOLERANCE) -> None:
+        super().__init__()
         self._system, self.tolerance = system, tolerance
         self._level = self._level_for(steps, tolerance)
         self._carried = [i for i, n in enumerate(system.states) if not (n == WORK or n.startswith(TANGENT))]
         equations = [system.equations[i] for i in self._carried]
         initial = np.array([[float(system.initial[i])] for i in self._carried])
-        initial = np.repeat(initial, NEIGHBOURS + 1, axis=1)
         options: dict[str, Any] = {"compact_mode": True, "opt_level": 0}
         if self._level:
             options = {"compact_mode": system.wide, "opt_level": 1 if system.wide else self._level - 1}
-        self._integrator = hy.taylor_adaptive_batch(equations, initial, tol=tolerance, **options)
+        every = np.repeat(initial, 1 + PERTURBED, axis=1)
+        self._integrator = hy.taylor_adaptive_batch(equations, every, tol=tolerance, **options)
         self._propagate = propagation(system)
-        self._even = _Evenly()
 
     @staticmethod
     def _level_for(steps: float, tolerance: float) -> int:
         """0 for compact code, 1 for unrolled, 2 for optimised."""
-        unrolled = LOOSELY_UNROLLED_FROM if tolerance >= LOOSE else UNROLLED_FROM
-        return int(steps >= unrolled) + int(steps >= OPTIMISED_FROM)
+        unrolled = _LOOSELY_UNROLLED_FROM if tolerance >= LOOSE else _UNROLLED_FROM
+        return int(steps >= unrolled) + int(steps >= _OPTIMISED_FROM)
 
-    def again(self, steps: float) -> Lanes:
-        """See ``Lanes``."""
+    def again(self, steps: float) -> Carrier:
+        """See ``Carrier``."""
         if self._level_for(steps, self.tolerance) <= self._level:
             return self
-        return BatchLanes(self._system, steps, self.tolerance)
+        return BatchCarrier(self._system, steps, self.tolerance)
 
-    def advance(
+    def _onward(
         self, states: np.ndarray, begin: np.ndarray, end: np.ndarray, most: int
     ) -> tuple[np.ndarray, int, float] | None:
-        """See ``Lanes``."""
         integrator, carried = self._integrator, self._carried
 
-        def go(most: int) -> tuple[int, float, float]:
-            integrator.state[:] = states[carried]
-            integrator.set_time([float(t) for t in begin])
-            self._propagate(integrator, [float(t) for t in end], most)
-            _, shortest, longest, steps = integrator.propagate_res[0]
-            return steps, shortest, longest
+        def to(times: np.ndarray, most: int) -> tuple[Any, ...]:
+            self._propagate(integrator, times.tolist(), most)
+            return tuple(integrator.propagate_res[0])
 
-        steps, results = self._even.go(go, most), integrator.propagate_res
+        def go(most: int) -> tuple[Any, ...]:
+            integrator.state[:] = states[carried]
+            integrator.set_time(begin.tolist())
+            return to(end, most)
+
+        steps = self._evenly(go, most)
         reached = float(integrator.time[0])
-        if any(result[0] != hy.taylor_outcome.time_limit for result in results):
+        arrived = hy.taylor_outcome.time_limit
+        if any(result[0] != arrived for result in integrator.propagate_res):
             # the others took steps of almost the same lengths
-            self._propagate(integrator, [float(t) for t in end - end[0] + reached], _HOPELESS_STEPS)
-            results = integrator.propagate_res
-            if any(result[0] != hy.taylor_outcome.time_limit for result in results):
+            to(end - end[0] + reached, HOPELESS_STEPS)
+            if any(result[0] != arrived for result in integrator.propagate_res):
                 return None
         moved = states.copy()
         moved[carried] = integrator.state
         return moved, steps, reached
 
 
-class OwnLanes:
-    """Lanes one after the other, by an existing integrator: nothing has to be compiled.
+class OwnCarrier(_SingleMotion):
+    """One after the other, by a copy of a run's integrator in double precision: nothing has to be compiled.
 
     Args:
-        integrator: the system's integrator in double precision, of which a copy is used.
         then: tolerance where many more steps are to be taken; None for states that bear no loose one.
 
     Attributes:
@@ -208,49 +194,44 @@ class OwnLanes:
     """
 
     def __init__(self, system: System, integrator: TaylorEngine, then: float | None = TOLERANCE) -> None:
+        super().__init__()
         self._system, self._then = system, then
         self._integrator = copy.deepcopy(integrator)
         self._propagate = propagation(system)
         self.until = own_until(integrator)
         self.tolerance = float(integrator.tol)
-        self._even = _Evenly()
 
-    def again(self, steps: float) -> Lanes:
-        """See ``Lanes``."""
+    def again(self, steps: float) -> Carrier:
+        """See ``Carrier``."""
         if steps < self.until - OWN_FIRST:
             return self
         if self._then is not None:
-            return BatchLanes(self._system, steps, self._then)
-        return BatchLanes(self._system, steps, TIGHT if steps < _TIGHT_UNTIL else TOLERANCE)
+            return BatchCarrier(self._system, steps, self._then)
+        return BatchCarrier(self._system, steps, TIGHT if steps < _TIGHT_UNTIL else TOLERANCE)
 
-    def advance(
+    def _onward(
         self, states: np.ndarray, begin: np.ndarray, end: np.ndarray, most: int
     ) -> tuple[np.ndarray, int, float] | None:
-        """See ``Lanes``."""
-        integrator, result = self._integrator, np.empty_like(states)
+        integrator, moved = self._integrator, np.empty_like(states)
 
-        def go(most: int) -> tuple[int, float, float]:
-            integrator.time = float(begin[0])
-            integrator.state[:] = states[:, 0]
-            _, shortest, longest, steps, *_ = self._propagate(integrator, float(end[0]), most)
-            return steps, shortest, longest
-
-        steps = self._even.go(go, most)
-        result[:, 0] = integrator.state
-        reached = float(integrator.time)
-        early = float(end[0]) - reached
-        for lane in range(1, states.shape[1]):
+        def go(lane: int, until: float, most: int) -> tuple[Any, ...]:
             integrator.time = float(begin[lane])
             integrator.state[:] = states[:, lane]
-            outcome, *_ = self._propagate(integrator, float(end[lane]) - early, _HOPELESS_STEPS)
+            return tuple(self._propagate(integrator, until, most))
+
+        steps = self._evenly(lambda most: go(0, float(end[0]), most), most)
+        moved[:, 0] = integrator.state
+        reached = float(integrator.time)
+        for lane in range(1, states.shape[1]):
+            outcome, *_ = go(lane, float(end[lane] - (end[0] - reached)), HOPELESS_STEPS)
             if outcome != hy.taylor_outcome.time_limit:
                 return None
-            result[:, lane] = integrator.state
-        return result, steps, reached
+            moved[:, lane] = integrator.state
+        return moved, steps, reached
 
 
-class StepperLanes:
-    """Lanes one after the other, by a stepper that ends its steps on switching surfaces or at given times.
+class StepperCarrier(_SingleMotion):
+    """One after the other, by a stepper that ends its steps on switching surfaces or at given times.
 
     Args:
         start, end: times, internal units.
@@ -261,6 +242,7 @@ class StepperLanes:
     def __init__(
         self, system: System, start: float, end: float, steps: int, stepper: TaylorStepper | None = None
     ) -> None:
+        super().__init__()
         if stepper is None:
             precision = replace(precision_of("double"), compact=True)
             stepper = stepper_of(system, precision, None, precision.scalar(start))
@@ -270,17 +252,17 @@ class StepperLanes:
         self._reached = {start: self._begin}  # by the motion itself, which may slide
         self._pace = steps / (end - start)
 
-    def again(self, steps: float) -> Lanes:
-        """See ``Lanes``."""
+    def again(self, steps: float) -> Carrier:
+        """See ``Carrier``."""
         return self
 
-    def advance(
+    def _onward(
         self, states: np.ndarray, begin: np.ndarray, end: np.ndarray, most: int
     ) -> tuple[np.ndarray, int, float] | None:
-        """See ``Lanes``."""
-        stepper, result = self._stepper, np.empty_like(states)
-        # all lanes are on the sides, and have the signs, that the motion has
-        known = self._reached.get(float(begin[0]), self._begin)
+        stepper, moved = self._stepper, np.empty_like(states)
+        first, reached = float(begin[0]), min(float(end[0]), float(begin[0]) + most / self._pace)
+        # all are on the sides, and have the signs, that the motion has
+        known = self._reached.get(first, self._begin)
         for lane in range(states.shape[1]):
             state = states[:, lane]
             if lane == 0 and (known.state == state).all():
@@ -288,13 +270,12 @@ class StepperLanes:
             else:
                 stepper.back_to(replace(known, time=(float(begin[lane]), 0.0), state=state.copy()))
                 stepper.settle()
-            if not stepper.to(float(end[lane])):
+            if not stepper.to(float(end[lane] - (end[0] - reached))):
                 return None
-            result[:, lane] = stepper.state
+            moved[:, lane] = stepper.state
             if lane == 0:
-                mark = replace(stepper.mark(), time=(float(end[0]), 0.0))
-                self._reached = {float(begin[0]): known, float(end[0]): mark}
-        return result, max(round(float(end[0] - begin[0]) * self._pace), 1), float(end[0])
+                self._reached = {first: known, reached: replace(stepper.mark(), time=(reached, 0.0))}
+        return moved, round((reached - first) * self._pace), reached
 
 
 class SeriesErrors:
@@ -318,14 +299,8 @@ class SeriesErrors:
             return
         number: Any = np.longdouble if wide else float
         initial = [number(float(x)) for x in system.initial]
-        self._integrator = hy.taylor_adaptive(
-            system.equations,
-            initial,
-            tol=number(tried),
-            compact_mode=True,
-            opt_level=0,
-            fp_type=number,
-        )
+        options = {"compact_mode": True, "opt_level": 0, "fp_type": number}
+        self._integrator = hy.taylor_adaptive(system.equations, initial, tol=number(tried), **options)
 
     def of_step(self, state: np.ndarray, time: float) -> np.ndarray:
         """Error (states,) of the step that begins in the given state, as one of that state: what is wrong at

@@ -1,1 +1,0 @@
-"""Neighbouring motions, carried along to learn how a run's errors grow."""

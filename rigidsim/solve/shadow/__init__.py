@@ -1,0 +1,1 @@
+"""Shadow ensembles: perturbed motions carried beside motions, whose spread tells how errors grow."""
