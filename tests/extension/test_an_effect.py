@@ -116,7 +116,7 @@ def test_a_killed_run_resumes_bit_for_bit(method: str, tmp_path: Path) -> None:
 def test_errors_are_those_of_the_motion_without_it() -> None:
     """Which a closed form isn't: nothing is compared with that."""
     how = run_text(text("taylor"), estimate=True).summary["accuracy"]["estimated_how"]
-    assert "neighbours of the motion" in how
+    assert "motions beside this one" in how
     assert how.endswith("they are without the effects impulses")
 
 

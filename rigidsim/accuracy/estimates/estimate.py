@@ -236,7 +236,7 @@ def _stable(course: Course, spread: Spread, longer: float, turned: float) -> flo
 
 
 def _words(course: Course, followed: Followed) -> str:
-    what = "neighbours of the motion, pushed at random as rounding does"
+    what = "motions beside this one, perturbed at random as rounding does"
     if course.loose:
         what += " and as the tolerance lets the series do"
     if followed.share >= 1:

@@ -31,12 +31,10 @@ errors grow so much that the motion followed becomes another one: beside a separ
 ten times larger at the first.
 """
 _STRETCHES = 6
-_PERTURBED = 2
-"""Perturbed motions beside a member."""
 _DRIFTED = 1e-2
 """Tolerance times growth from which a motion followed so loosely becomes a different one."""
 _FASTER = 3.0
-"""Power of time from which errors are taken to grow exponentially; those of two perturbed motions scatter."""
+"""Power of time from which errors are taken to grow exponentially: those of three perturbed motions scatter."""
 _EARLY = 0.25
 """Part of the time by whose end growth is compared with that at the end."""
 _BY_CHANCE = 8.0
@@ -177,9 +175,7 @@ class MemberEstimates:
         def through(tolerance: float | None, which: np.ndarray) -> tuple[Spread, np.ndarray]:
             some = starts.of(which)
             carrier = MemberCarrier(self._through(tolerance), some)
-            ensemble = ShadowEnsemble(
-                carrier, self._measures, some, errors, epsilon, stretches=_STRETCHES, perturbed=_PERTURBED
-            )
+            ensemble = ShadowEnsemble(carrier, self._measures, some, errors, epsilon, stretches=_STRETCHES)
             spread = ensemble.follow(lost=lost)
             return spread, spread.largest(lead, quarter[which])
 

@@ -27,7 +27,7 @@ from rigidsim.solve.shadow.carriers import (
     StepperCarrier,
     own_until,
 )
-from rigidsim.solve.shadow.ensemble import Carrier, Perturbations, ShadowEnsemble
+from rigidsim.solve.shadow.ensemble import EnsembleCarrier, Perturbations, ShadowEnsemble
 from rigidsim.solve.shadow.measures import Measures, Starts
 
 _OF_SERIES = 2.0
@@ -52,7 +52,7 @@ def ensemble_of(
     stand_in = False
     follows = tolerance > TIGHT or not course.loose  # it is as loose as the run
     if own is not None and own.system.stepwise:
-        carrier: Carrier = StepperCarrier(system, course.start, course.end, course.steps, own)
+        carrier: EnsembleCarrier = StepperCarrier(system, course.start, course.end, course.steps, own)
     elif own is not None and follows and _by_itself(course, own.integrator, part, tolerance, margins):
         carrier = OwnCarrier(system, own.integrator, tolerance if course.same_states else None)
         if course.loose:

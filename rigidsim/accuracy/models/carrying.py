@@ -24,7 +24,7 @@ from rigidsim.scene.methods import DEFAULT_METHOD
 from rigidsim.scene.model_table import ORBIT_AVERAGED
 from rigidsim.solve.problem import InitialValueProblem, prepare_scene
 from rigidsim.solve.shadow.carriers import BatchCarrier, StepperCarrier
-from rigidsim.solve.shadow.ensemble import PERTURBED, Carrier
+from rigidsim.solve.shadow.ensemble import PERTURBED, EnsembleCarrier
 from rigidsim.store.summary_parts import UnmeasuredCode
 
 _PART_OF_TURN = math.pi / 6
@@ -145,7 +145,7 @@ def _problem(prepared: InitialValueProblem, average: Average | None) -> InitialV
     raise AssertionError
 
 
-def _carrier(problem: InitialValueProblem) -> Carrier:
+def _carrier(problem: InitialValueProblem) -> EnsembleCarrier:
     system, clock = problem.system, problem.clock
     if system.stepwise:
         start, end = float(clock.start), float(clock.at(clock.count - 1))
@@ -155,7 +155,7 @@ def _carrier(problem: InitialValueProblem) -> Carrier:
     return BatchCarrier(system, 0 if average.over_orbits else _STEPS_OF_SPIN)
 
 
-def _to(carrier: Carrier, states: np.ndarray, begin: float, end: float) -> np.ndarray:
+def _to(carrier: EnsembleCarrier, states: np.ndarray, begin: float, end: float) -> np.ndarray:
     """States (states, 1 + perturbed) at a later time.
 
     Raises:

@@ -10,7 +10,7 @@ import numpy as np
 
 from rigidsim.solve.batch.lanes import BatchEngine, BatchSystem
 from rigidsim.solve.batch.tracing import TracedSystem
-from rigidsim.solve.shadow.ensemble import Carrier
+from rigidsim.solve.shadow.ensemble import EnsembleCarrier
 from rigidsim.solve.shadow.measures import Starts, padded_function
 
 _LANES = 8
@@ -76,21 +76,21 @@ class ShadowLanes:
 
 
 class MemberCarrier:
-    """Carrier of members, all of whose stretches of as many steps go together (see ``Carrier``)."""
+    """Carrier of members, all of whose stretches of as many steps go together (see ``EnsembleCarrier``)."""
 
     def __init__(self, lanes: ShadowLanes, starts: Starts) -> None:
         self.tolerance, self._lanes = lanes.tolerance, lanes
         self._every, self._read, self._longest = starts.parameters, lanes.read(starts), lanes.longest(starts)
 
-    def again(self, steps: float) -> Carrier:
-        """See ``Carrier``."""
+    def again(self, steps: float) -> EnsembleCarrier:
+        """See ``EnsembleCarrier``."""
         return self
 
     def advance(
         self, which: np.ndarray, states: np.ndarray, begin: np.ndarray, end: np.ndarray, steps: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """See ``Carrier``. After as many steps lanes are at slightly different times, and the equations bring
-        them to one.
+        """See ``EnsembleCarrier``. After as many steps lanes are at slightly different times, and the
+        equations bring them to one.
         """
         beside = begin.shape[1]
         found, times, taken = np.empty_like(states), np.empty_like(begin), np.empty_like(begin)

@@ -18,7 +18,7 @@ from rigidsim.model.system import System
 from rigidsim.solve.compiled import TaylorEngine
 from rigidsim.solve.precision import precision_of
 from rigidsim.solve.requirements import propagation
-from rigidsim.solve.shadow.ensemble import HOPELESS_STEPS, PERTURBED, Carrier
+from rigidsim.solve.shadow.ensemble import HOPELESS_STEPS, PERTURBED, EnsembleCarrier
 from rigidsim.solve.steppers import stepper_of
 from rigidsim.solve.taylor_stepper import TaylorStepper
 
@@ -95,7 +95,7 @@ class _SingleMotion:
     def advance(
         self, which: np.ndarray, states: np.ndarray, begin: np.ndarray, end: np.ndarray, steps: np.ndarray
     ) -> Advanced:
-        """See ``Carrier``."""
+        """See ``EnsembleCarrier``."""
         found = self._onward(states[:, 0], begin[0], end[0], int(steps[0]))
         if found is None:
             return np.full_like(states, np.nan), np.ones(1), end[:, 0]
@@ -150,8 +150,8 @@ class BatchCarrier(_SingleMotion):
         unrolled = _LOOSELY_UNROLLED_FROM if tolerance >= LOOSE else _UNROLLED_FROM
         return int(steps >= unrolled) + int(steps >= _OPTIMISED_FROM)
 
-    def again(self, steps: float) -> Carrier:
-        """See ``Carrier``."""
+    def again(self, steps: float) -> EnsembleCarrier:
+        """See ``EnsembleCarrier``."""
         if self._level_for(steps, self.tolerance) <= self._level:
             return self
         return BatchCarrier(self._system, steps, self.tolerance)
@@ -201,8 +201,8 @@ class OwnCarrier(_SingleMotion):
         self.until = own_until(integrator)
         self.tolerance = float(integrator.tol)
 
-    def again(self, steps: float) -> Carrier:
-        """See ``Carrier``."""
+    def again(self, steps: float) -> EnsembleCarrier:
+        """See ``EnsembleCarrier``."""
         if steps < self.until - OWN_FIRST:
             return self
         if self._then is not None:
@@ -252,8 +252,8 @@ class StepperCarrier(_SingleMotion):
         self._reached = {start: self._begin}  # by the motion itself, which may slide
         self._pace = steps / (end - start)
 
-    def again(self, steps: float) -> Carrier:
-        """See ``Carrier``."""
+    def again(self, steps: float) -> EnsembleCarrier:
+        """See ``EnsembleCarrier``."""
         return self
 
     def _onward(
