@@ -34,7 +34,7 @@ _STRETCHES = 6
 _DRIFTED = 1e-2
 """Tolerance times growth from which a motion followed so loosely becomes a different one."""
 _FASTER = 3.0
-"""Power of time from which errors are taken to grow exponentially: those of three perturbed motions scatter."""
+"""Power of time from which errors are taken to grow exponentially; those of few perturbed motions scatter."""
 _EARLY = 0.25
 """Part of the time by whose end growth is compared with that at the end."""
 _BY_CHANCE = 8.0

@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from rigidsim.model.state_blocks import AttitudeStates
 from rigidsim.model.heyoka_expressions import TANGENT
+from rigidsim.model.state_blocks import AttitudeStates
 from rigidsim.model.system import System
 from rigidsim.solve.compiled import compiled_function
 
