@@ -25,13 +25,8 @@ _RESOLUTION = 1e-3  # of the smallest step: what a tick of the timeline may be a
 
 @dataclass(frozen=True)
 class Clock:
-    """Times of the rows as integers of a viewer timeline.
-
-    Attributes:
-        name: name of the timeline, with the unit if it isn't a duration.
-        ticks: (rows,) int64, strictly what the viewer gets.
-        seconds_per_tick: 1e-9 for a duration.
-        duration: True for nanoseconds, False for a sequence.
+    """Times of the rows as integers (rows,) of a viewer timeline: a duration in nanoseconds, or a sequence of
+    another tick, which the timeline's name says.
     """
 
     name: str
@@ -60,8 +55,12 @@ def build_clock(seconds: NDArray[np.float64]) -> Clock:
     smallest = float(steps.min()) if len(steps) else max(largest, 1.0)
 
     if largest < _LARGEST_NANOSECONDS * 1e-9 and smallest >= 1e-9 * (1 - 1e-6):
-        ticks = _nanoseconds(times)
-        if smallest * _RESOLUTION >= 1e-9 or _whole(times, ticks):
+        # Whole seconds apart, so that t*1e9 isn't rounded to float64 once more beyond 104 days.
+        floor = np.floor(times)
+        part = np.rint((times - floor) * 1e9)
+        ticks = floor.astype(np.int64) * 1_000_000_000 + part.astype(np.int64)
+        exact = bool((np.abs(ticks * 1e-9 - times) <= _EXACT * np.abs(times)).all())
+        if smallest * _RESOLUTION >= 1e-9 or exact:
             return Clock("time", ticks, 1e-9, True)
 
     for symbol, unit in _WHOLE:
@@ -76,16 +75,3 @@ def build_clock(seconds: NDArray[np.float64]) -> Clock:
     scaled = times * 10.0**-exponent if exponent < 0 else times / 10.0**exponent
     name = f"time [{_UNITS.get(exponent, f'1e{exponent} s')}]"
     return Clock(name, np.rint(scaled).astype(np.int64), 10.0**exponent, False)
-
-
-def _nanoseconds(times: NDArray[np.float64]) -> NDArray[np.int64]:
-    # Whole seconds apart, so that t*1e9 isn't rounded to float64 once more beyond 104 days.
-    whole = np.floor(times)
-    part = np.rint((times - whole) * 1e9)
-    return whole.astype(np.int64) * 1_000_000_000 + part.astype(np.int64)
-
-
-def _whole(times: NDArray[np.float64], ticks: NDArray[np.int64]) -> bool:
-    """Whether the ticks give the times back to the last bits of float64."""
-    error = np.abs(ticks * 1e-9 - times)
-    return bool((error <= _EXACT * np.abs(times)).all())

@@ -3,11 +3,17 @@
 from __future__ import annotations
 
 import io
+import os
+import subprocess
+import tempfile
+import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
-from rigidsim.look.viewer import HeadlessViewer
+from PIL import Image
+
+from rigidsim.look.viewer import LOOPBACK, QUIET, existing, free_port, viewer_binary
 
 FORMATS = (".png", ".gif", ".mp4")
 SIZE = (1600, 900)
@@ -17,10 +23,11 @@ SECONDS = 6.0
 PICTURED_AT = 0.4
 """Time of a single picture, as a fraction of the run: trails have begun, and curves go on."""
 _GIF_COLORS = 128
+_PATIENCE = 120.0  # seconds until a picture is given up
 
 
-class NoEncoder(RuntimeError):
-    """Raised if the library that writes films isn't installed."""
+class NoGraphics(RuntimeError):
+    """Raised if the machine has no Vulkan driver with which the headless viewer could draw."""
 
 
 def render(
@@ -40,32 +47,30 @@ def render(
     Raises:
         ValueError: another suffix.
         FileNotFoundError: no such recording, or no viewer.
-        NoGraphics: no Vulkan driver, see ``viewer.HeadlessViewer``.
-        NoEncoder: for an MP4 film without imageio-ffmpeg.
-        RuntimeError: the viewer failed.
+        NoGraphics: no Vulkan driver; Mesa's software driver will do.
+        RuntimeError: no imageio-ffmpeg for an MP4 film, or the viewer failed.
     """
     suffix = target.suffix.lower()
     if suffix not in FORMATS:
         raise ValueError(f"{target}: a picture or film must end in {', '.join(FORMATS)}")
-    if suffix == ".mp4":
-        _encoder()
+    encoder = _encoder() if suffix == ".mp4" else None
     with HeadlessViewer(path, size=SIZE) as viewer:
         if suffix == ".png":
             viewer.seek(PICTURED_AT)
             target.write_bytes(viewer.settled_picture())
             return target
-        count = max(round(seconds * FRAMES_PER_SECOND[suffix]), 2)
-        frames = _frames(viewer, count, told)
-        if suffix == ".gif":
-            _write_gif(target, frames, FRAMES_PER_SECOND[suffix])
+        rate = FRAMES_PER_SECOND[suffix]
+        frames = _frames(viewer, max(round(seconds * rate), 2), told)
+        if encoder is None:
+            _write_gif(target, frames, rate)
         else:
-            _write_mp4(target, frames, FRAMES_PER_SECOND[suffix])
+            _write_mp4(encoder, target, frames, rate)
     return target
 
 
-def _frames(viewer: HeadlessViewer, count: int, told: Callable[[int, int], None] | None) -> Iterator[Any]:
-    from PIL import Image
-
+def _frames(
+    viewer: HeadlessViewer, count: int, told: Callable[[int, int], None] | None
+) -> Iterator[Image.Image]:
     viewer.seek(0.0)
     viewer.settled_picture()  # the plots are read by then
     for number in range(count):
@@ -75,9 +80,7 @@ def _frames(viewer: HeadlessViewer, count: int, told: Callable[[int, int], None]
             told(number + 1, count)
 
 
-def _write_gif(target: Path, frames: Iterator[Any], rate: int) -> None:
-    from PIL import Image
-
+def _write_gif(target: Path, frames: Iterator[Image.Image], rate: int) -> None:
     first, *rest = (
         frame.resize(
             (GIF_WIDTH, round(GIF_WIDTH * frame.height / frame.width)), Image.Resampling.LANCZOS
@@ -87,27 +90,151 @@ def _write_gif(target: Path, frames: Iterator[Any], rate: int) -> None:
     first.save(target, save_all=True, append_images=rest, duration=round(1000 / rate), loop=0)
 
 
-def _write_mp4(target: Path, frames: Iterator[Any], rate: int) -> None:
-    encoder = _encoder()
-    first = next(frames)
-    width, height = (size - size % 2 for size in first.size)  # as the codec wants them
-    writer = encoder.write_frames(
-        str(target), (width, height), fps=rate, codec="libx264", quality=7, macro_block_size=2
-    )
-    writer.send(None)
+def _write_mp4(encoder: Any, target: Path, frames: Iterator[Image.Image], rate: int) -> None:
+    writer = None
     try:
-        writer.send(first.crop((0, 0, width, height)).tobytes())
         for frame in frames:
+            width, height = (size - size % 2 for size in frame.size)  # as the codec wants them
+            if writer is None:
+                options = {"fps": rate, "codec": "libx264", "quality": 7, "macro_block_size": 2}
+                writer = encoder.write_frames(str(target), (width, height), **options)
+                writer.send(None)
             writer.send(frame.crop((0, 0, width, height)).tobytes())
     finally:
-        writer.close()
+        if writer is not None:
+            writer.close()
 
 
 def _encoder() -> Any:
     try:
         import imageio_ffmpeg
     except ImportError:
-        raise NoEncoder(
+        raise RuntimeError(
             "an MP4 film needs imageio-ffmpeg: pip install 'rigidsim[film]'; a GIF needs nothing more"
         ) from None
     return imageio_ffmpeg
+
+
+class HeadlessViewer:
+    """The viewer without a screen, with a recording open in it and its time at rest; a context manager.
+
+    Args:
+        path: a `.rrd` file.
+        size: width and height of the window in points; a picture may have more pixels.
+
+    Attributes:
+        client: client of rerun, for what isn't offered here.
+        timeline: timeline that the page opened on.
+        start, end: its first and last integer.
+
+    Raises (on entering):
+        FileNotFoundError: no such recording, or no viewer.
+        NoGraphics: no Vulkan driver; Mesa's software driver will do
+            (Debian: `apt-get install mesa-vulkan-drivers`).
+        RuntimeError: the viewer failed or took longer than two minutes.
+    """
+
+    def __init__(self, path: Path, *, size: tuple[int, int] = SIZE) -> None:
+        self._path = existing(path)
+        self._size = size
+        self._deadline = time.monotonic() + _PATIENCE
+        self.client: Any = None
+        self.timeline = ""
+        self.start = self.end = 0
+
+    def __enter__(self) -> Self:
+        if not vulkan_drivers():
+            raise NoGraphics(
+                "no Vulkan driver found: a headless picture needs one, for example Mesa's lavapipe "
+                "(apt-get install mesa-vulkan-drivers)"
+            )
+        self._home = tempfile.TemporaryDirectory()
+        self._port = free_port()
+        command = [str(viewer_binary()), str(self._path.resolve()), "--headless"]
+        command += ["--bind", LOOPBACK, "--port", str(self._port)]
+        command += ["--window-size", f"{self._size[0]}x{self._size[1]}"]
+        # A home of its own: none of the user's settings, and nothing left among temporary files.
+        home = self._home.name
+        environment = os.environ | QUIET | {"TMPDIR": home}
+        environment |= {"HOME": home, "XDG_CONFIG_HOME": home, "XDG_DATA_HOME": home}
+        self._log = Path(home) / "viewer.log"
+        with self._log.open("wb") as output:
+            self.process = subprocess.Popen(command, env=environment, stdout=output, stderr=output)
+        try:
+            self._open()
+        except BaseException:
+            self.__exit__()
+            raise
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.process.terminate()
+        self.process.wait()
+        self._home.cleanup()
+
+    def seek(self, share: float) -> None:
+        """Go to a place in the run, 0 to 1, and stay there."""
+        self.seek_tick(self.start + round(share * (self.end - self.start)))
+
+    def seek_tick(self, tick: int) -> None:
+        """Go to a time of the timeline, as its integer, and stay there."""
+        # Integers of any timeline pass through `sequence` as they are.
+        self.client.set_time(self.timeline, sequence=tick, play_state="paused")
+
+    def picture(self) -> bytes:
+        """PNG of the window as it is."""
+        return bytes(self.client.take_screenshot())
+
+    def settled_picture(self) -> bytes:
+        """PNG of the window once it no longer changes: plots are read, and the opening notes have gone."""
+        settled, last = time.monotonic() + 4.0, b""
+        while time.monotonic() < self._deadline:
+            time.sleep(0.4)
+            picture = self.picture()
+            if picture == last and time.monotonic() > settled:
+                return picture
+            last = picture
+        raise self._failure("its picture never came to rest")
+
+    def _open(self) -> None:
+        """Wait until the recording is loaded.
+
+        The viewer's own --screenshot-to fires after a few frames, before the plots have been read.
+        """
+        from rerun.experimental import ViewerClient
+
+        reason = "no answer in time"
+        while time.monotonic() < self._deadline:
+            if self.process.poll() is not None:
+                raise self._failure(f"it ended with exit code {self.process.returncode}")
+            time.sleep(0.2)
+            try:
+                self.client = self.client or ViewerClient.connect(
+                    f"rerun+http://{LOOPBACK}:{self._port}/proxy"
+                )
+                state = self.client.get_state()
+            except Exception as problem:  # not listening yet; the client has no error of its own kind
+                reason, self.client = f"no answer in time ({problem})", None
+                continue
+            opened = [r for r in state.recordings if r.current_timeline and r.current_time is not None]
+            if not state.loading and opened:
+                found = next(t for t in opened[0].timelines if t.name == opened[0].current_timeline)
+                self.timeline, self.start, self.end = found.name, found.start or 0, found.end or 0
+                self.seek(0.0)
+                return
+        raise self._failure(reason)
+
+    def _failure(self, what: str) -> Exception:
+        said = self._log.read_text(errors="replace").strip()[-800:]
+        if "No graphics adapter" in said:
+            return NoGraphics(f"the Vulkan driver doesn't work: {said}")
+        return RuntimeError(f"the viewer made no picture: {what}. It said: {said}")
+
+
+def vulkan_drivers() -> list[Path]:
+    """Manifests of the installed Vulkan drivers (Linux), empty when there are none."""
+    named = os.environ.get("VK_DRIVER_FILES") or os.environ.get("VK_ICD_FILENAMES")
+    if named:
+        return [Path(name) for name in named.split(os.pathsep) if Path(name).is_file()]
+    folders = ["/usr/share/vulkan/icd.d", "/etc/vulkan/icd.d", "/usr/local/share/vulkan/icd.d"]
+    return [file for folder in folders for file in sorted(Path(folder).glob("*.json"))]

@@ -12,17 +12,11 @@ from rigidsim.look.roles import drifts, in_words, is_averaged, read_config, titl
 from rigidsim.scene.readable_time import TimeWords
 
 if TYPE_CHECKING:
-    from rigidsim.look.rows import Table, Variable
+    import xarray
 
 
-def summary_page(dataset: Table, thinned: Table, kind: str = "") -> str:
-    """Markdown page, short enough to be seen whole: what was run, and what was conserved.
-
-    Args:
-        dataset: the whole dataset (only its attributes and sizes are read).
-        thinned: its rows as shown, in memory.
-        kind: kind of scene that the picture shows.
-    """
+def summary_page(dataset: xarray.Dataset, thinned: xarray.Dataset) -> str:
+    """Markdown page, short enough to be seen whole: what was run, and what was conserved."""
     config = read_config(dataset)
     integrator = config.get("integrator", {})
     attributes = dataset.attrs
@@ -67,7 +61,7 @@ def notes_page(kind: str, notes: list[str]) -> str:
     return legible("\n".join([f"**Picture: {kind}**", "", *(f"- {note}" for note in notes), ""]))
 
 
-def config_page(dataset: Table) -> str:
+def config_page(dataset: xarray.Dataset) -> str:
     """Markdown page of the config that was run; empty if there is none."""
     text = str(dataset.attrs.get("config", "")).strip()
     return legible("\n".join(["```toml", text, "```", ""])) if text else ""
@@ -89,14 +83,14 @@ _RANGES = "".join(f"{re.escape(chr(low))}-{re.escape(chr(high))}" for low, high 
 _WITHOUT_GLYPH = re.compile(f"[^{_SINGLE}{_RANGES}]")
 
 
-def largest_drift(variable: Variable) -> float:
+def largest_drift(variable: xarray.DataArray) -> float:
     """Largest magnitude of a drift over the given rows; NaN if none is finite."""
     magnitude = np.abs(np.asarray(variable.values, dtype=np.float64))
     magnitude = magnitude[np.isfinite(magnitude)]
     return float(magnitude.max()) if magnitude.size else float("nan")
 
 
-def _invariants(thinned: Table) -> list[tuple[str, ...]]:
+def _invariants(thinned: xarray.Dataset) -> list[tuple[str, ...]]:
     rows: list[tuple[str, ...]] = []
     for base, drift in drifts(thinned).items():
         initial = ""
@@ -108,13 +102,13 @@ def _invariants(thinned: Table) -> list[tuple[str, ...]]:
     return rows
 
 
-def _span(dataset: Table, thinned: Table) -> str:
+def _span(dataset: xarray.Dataset, thinned: xarray.Dataset) -> str:
     start, end = (float(thinned["time"].values[i]) for i in (0, -1))
     words = TimeWords.of(dataset.attrs, start, end)
     return f"{words.moment(start)} to {words.moment(end)}"
 
 
-def _samples(dataset: Table, thinned: Table) -> str:
+def _samples(dataset: xarray.Dataset, thinned: xarray.Dataset) -> str:
     total, shown = dataset.sizes["time"], thinned.sizes["time"]
     return f"{total:,}" if total == shown else f"{total:,}, shown {shown:,}"
 

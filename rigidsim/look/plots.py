@@ -18,7 +18,7 @@ from rigidsim.look.roles import drift_of, in_words, is_averaged, put_back_of
 from rigidsim.scene.readable_units import angle_unit, si_scale
 
 if TYPE_CHECKING:
-    from rigidsim.look.rows import Table, Variable
+    import xarray
 
 Color = tuple[int, int, int]
 
@@ -29,14 +29,8 @@ GREY: Color = (170, 170, 175)
 _ERROR: Color = (165, 168, 176)  # seen on dark and on light ground
 _VECTOR = (RED, GREEN, BLUE)
 _PALETTE: tuple[Color, ...] = (
-    (240, 190, 60),
-    (80, 200, 215),
-    (225, 115, 190),
-    (150, 200, 90),
-    (165, 135, 235),
-    (235, 140, 80),
-    (120, 165, 200),
-    (200, 200, 120),
+    *((240, 190, 60), (80, 200, 215), (225, 115, 190), (150, 200, 90)),
+    *((165, 135, 235), (235, 140, 80), (120, 165, 200), (200, 200, 120)),
 )
 DRIFTS = "all"
 """Name of the drifts together."""
@@ -45,14 +39,9 @@ _MOST_SERIES = 16  # of one variable, so that a recorded matrix history stays re
 
 @dataclass(frozen=True)
 class Series:
-    """One variable as it is plotted, or several of one plot, whose rows then share their times.
+    """One variable as it is plotted, or ``DRIFTS``: (rows, components), each with a label and a colour.
 
-    Attributes:
-        name: variable of the dataset, or ``DRIFTS``.
-        labels: names of its curves, one per component.
-        colors: one per component.
-        values: (rows, components) float64.
-        error: (rows,) how uncertain they are, to both sides; None where that isn't known or can't be seen.
+    `error` (rows,) is how uncertain they are, to both sides; None where that isn't known or can't be seen.
     """
 
     name: str
@@ -105,14 +94,11 @@ class Plot:
         return low - margin, high + margin
 
 
-def plan_plots(dataset: Table, leading: Sequence[str] = ()) -> list[Plot]:
-    """Plots for every numeric variable along time, in the order in which they are shown.
+def plan_plots(dataset: xarray.Dataset, leading: Sequence[str] = ()) -> list[Plot]:
+    """Plots for every numeric variable along time, in the order in which they are shown: leading ones first.
 
     Drifts become log10 of their magnitude in a common plot. Scalars of the same unit share a plot; a vector
     has its own, and so has what leads. Angles are in the unit in which they read best.
-
-    Args:
-        leading: variables that the scene is about, which come first.
     """
     plots: dict[str, Plot] = {}
     variables = list(_variables(dataset))
@@ -141,23 +127,22 @@ def plan_plots(dataset: Table, leading: Sequence[str] = ()) -> list[Plot]:
         if place == "leading" and unit == "rad":
             series = replace(series, error=_uncertainty(dataset, series.values, factor))
         plot.series.append(series)
-    if "drift" in plots:
+    if "drift" in plots:  # curves that are drawn alike are one entity
         drift = plots["drift"]
-        plots["drift"] = replace(drift, series=[_together(drift.series)], levels=_announced(dataset))
+        together = Series(
+            DRIFTS,
+            [label for series in drift.series for label in series.labels],
+            [color for series in drift.series for color in series.colors],
+            np.concatenate([series.values for series in drift.series], axis=1),
+        )
+        plots["drift"] = replace(drift, series=[together], levels=_announced(dataset))
     order = {name: number for number, name in enumerate(first)}
     return sorted(
         plots.values(), key=lambda plot: (_ORDER.index(plot.place), order.get(plot.key, len(order)))
     )
 
 
-def _together(several: list[Series]) -> Series:
-    """Curves that are drawn alike as one entity."""
-    labels = [label for series in several for label in series.labels]
-    colors = [color for series in several for color in series.colors]
-    return Series(DRIFTS, labels, colors, np.concatenate([series.values for series in several], axis=1))
-
-
-def _reading(variable: Variable, unit: str) -> tuple[float, str]:
+def _reading(variable: xarray.DataArray, unit: str) -> tuple[float, str]:
     """Factor to, and symbol of, the unit that suits a variable."""
     if unit == "rad/s":
         divisor, prefixed = si_scale(_columns(variable), unit)
@@ -170,7 +155,9 @@ def _reading(variable: Variable, unit: str) -> tuple[float, str]:
     return found.per_radian, found.symbol
 
 
-def _uncertainty(dataset: Table, values: NDArray[np.float64], factor: float) -> NDArray[np.float64] | None:
+def _uncertainty(
+    dataset: xarray.Dataset, values: NDArray[np.float64], factor: float
+) -> NDArray[np.float64] | None:
     """The announced attitude error, growing like t^1.5 to its value at the end, if large enough to be
     seen.
     """
@@ -183,7 +170,7 @@ def _uncertainty(dataset: Table, values: NDArray[np.float64], factor: float) -> 
     return np.asarray(float(error) * factor * share**1.5)
 
 
-def _announced(dataset: Table) -> list[Level]:
+def _announced(dataset: xarray.Dataset) -> list[Level]:
     """The announced error at the end of the run beside the drifts: far above them where errors grew."""
     error = float(dataset.attrs.get("attitude_error", 0.0))
     if not (np.isfinite(error) and error > 0):
@@ -238,7 +225,7 @@ def _with_unit(text: str, unit: str) -> str:
     return f"{text} [{pretty_unit(unit)}]" if pretty_unit(unit) else text
 
 
-def _variables(dataset: Table) -> Iterator[Variable]:
+def _variables(dataset: xarray.Dataset) -> Iterator[xarray.DataArray]:
     # Angles before quaternions, because people read them; the rest as recorded.
     names = sorted(map(str, dataset.data_vars), key=lambda name: name != "euler_angles")
     for name in names:
@@ -247,12 +234,12 @@ def _variables(dataset: Table) -> Iterator[Variable]:
             yield variable.transpose("time", ...)
 
 
-def _columns(variable: Variable) -> NDArray[np.float64]:
+def _columns(variable: xarray.DataArray) -> NDArray[np.float64]:
     values = np.asarray(variable.values, dtype=np.float64).reshape(variable.shape[0], -1)
     return values[:, :_MOST_SERIES]
 
 
-def _series(variable: Variable, position: int, floor: float) -> Series:
+def _series(variable: xarray.DataArray, position: int, floor: float) -> Series:
     name = str(variable.name)
     values = _columns(variable)
     count = values.shape[1]
@@ -296,7 +283,7 @@ def _told_apart(
     return names, [colors[k] for k in kept], values[:, kept]
 
 
-def _colors(variable: Variable, count: int, position: int) -> list[Color]:
+def _colors(variable: xarray.DataArray, count: int, position: int) -> list[Color]:
     dimension = variable.dims[1] if variable.ndim == 2 else ""
     if dimension in ("body_axis", "space_axis") and count == 3:
         return list(_VECTOR)

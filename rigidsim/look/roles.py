@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from rigidsim.look.rows import Table, Variable
+    import xarray
 
 
 _ORBIT_NORM = re.compile(r"orbit_norm_(\d+)")
@@ -16,7 +16,7 @@ _AVERAGED = ("spin_averaged", "orbit_averaged")
 """Model levels whose datasets have axes but no attitude."""
 
 
-def read_config(dataset: Table) -> dict[str, Any]:
+def read_config(dataset: xarray.Dataset) -> dict[str, Any]:
     """The embedded config as a dictionary; empty when there is none or it can't be read."""
     try:
         return tomllib.loads(str(dataset.attrs.get("config", "")))
@@ -24,32 +24,32 @@ def read_config(dataset: Table) -> dict[str, Any]:
         return {}
 
 
-def title_of(dataset: Table) -> str:
+def title_of(dataset: xarray.Dataset) -> str:
     """Title of the run: attribute `title`, else the config's name."""
     return str(dataset.attrs.get("title") or read_config(dataset).get("name") or "rigid body")
 
 
-def is_residual(variable: Variable) -> bool:
+def is_residual(variable: xarray.DataArray) -> bool:
     """Whether a variable only holds the digits of another that don't fit its float64."""
     return "residual_of" in variable.attrs
 
 
-def drift_of(variable: Variable) -> str | None:
+def drift_of(variable: xarray.DataArray) -> str | None:
     """The invariant whose relative drift a variable is; None for any other variable."""
     return _named(variable, "drift_of")
 
 
-def put_back_of(variable: Variable) -> str | None:
+def put_back_of(variable: xarray.DataArray) -> str | None:
     """The projected invariant whose corrections put back a variable holds; None for any other variable."""
     return _named(variable, "put_back_of")
 
 
-def drifts(dataset: Table) -> dict[str, Variable]:
+def drifts(dataset: xarray.Dataset) -> dict[str, xarray.DataArray]:
     """The drifts of a dataset by the name of their invariant."""
     return _by_invariant(dataset, "drift_of")
 
 
-def put_backs(dataset: Table) -> dict[str, Variable]:
+def put_backs(dataset: xarray.Dataset) -> dict[str, xarray.DataArray]:
     """Corrections put back into projected invariants, by their name."""
     return _by_invariant(dataset, "put_back_of")
 
@@ -65,9 +65,9 @@ def is_averaged(attributes: Mapping[str, Any]) -> bool:
     return attributes.get("formulation") in _AVERAGED
 
 
-def _named(variable: Variable, attribute: str) -> str | None:
+def _named(variable: xarray.DataArray, attribute: str) -> str | None:
     return str(variable.attrs[attribute]) if attribute in variable.attrs else None
 
 
-def _by_invariant(dataset: Table, attribute: str) -> dict[str, Variable]:
+def _by_invariant(dataset: xarray.Dataset, attribute: str) -> dict[str, xarray.DataArray]:
     return {str(v.attrs[attribute]): v for v in dataset.data_vars.values() if attribute in v.attrs}

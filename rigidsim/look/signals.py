@@ -15,7 +15,7 @@ from rigidsim.look.roles import read_config
 from rigidsim.look.solids import rotation_matrix
 
 if TYPE_CHECKING:
-    from rigidsim.look.rows import Table
+    import xarray
 
 Array = NDArray[np.float64]
 
@@ -26,31 +26,31 @@ _STEADY = 1e-6  # a momentum that turns by less is fixed
 _SPREAD = 1e-5  # of the energy, up to which it counts as constant: more than rounding in single precision
 
 
-def values(dataset: Table, name: str) -> Array | None:
+def values(dataset: xarray.Dataset, name: str) -> Array | None:
     """A variable along time, time first; None if it wasn't recorded."""
     if name not in dataset or "time" not in dataset[name].dims:
         return None
     return np.asarray(dataset[name].transpose("time", ...).values, dtype=np.float64)
 
 
-def seconds(dataset: Table) -> Array:
+def seconds(dataset: xarray.Dataset) -> Array:
     """Sample times (rows,), s."""
     return np.asarray(dataset["time"].values, dtype=np.float64)
 
 
-def moments(dataset: Table) -> Array | None:
+def moments(dataset: xarray.Dataset) -> Array | None:
     """Principal moments (3,), kg m^2."""
     found = attribute(dataset, "principal_moments")
     return found if found is not None and found.shape == (3,) and (found > 0).all() else None
 
 
-def principal_axes(dataset: Table) -> Array:
+def principal_axes(dataset: xarray.Dataset) -> Array:
     """Principal axes as rows (3, 3), in body axes, in the order of the moments; right-handed."""
     found = attribute(dataset, "principal_axes")
     return found if found is not None and found.shape == (3, 3) else np.eye(3)
 
 
-def principal_rates(dataset: Table) -> Array | None:
+def principal_rates(dataset: xarray.Dataset) -> Array | None:
     """Angular velocity (rows, 3) along the principal axes, rad/s."""
     rates = values(dataset, "angular_velocity")
     return None if rates is None else turned(rates, principal_axes(dataset))
@@ -77,7 +77,7 @@ def norms(vectors: Array) -> Array:
     return np.asarray(np.sqrt(np.einsum("ij,ij->i", vectors, vectors)))
 
 
-def axis_names(dataset: Table) -> list[str]:
+def axis_names(dataset: xarray.Dataset) -> list[str]:
     """Names of the principal axes: those of body axes, or 1, 2, 3 if they aren't body axes."""
     axes = principal_axes(dataset)
     order = np.abs(axes).argmax(axis=1)
@@ -85,7 +85,7 @@ def axis_names(dataset: Table) -> list[str]:
     return ["xyz"[k] for k in order] if along.all() else ["1", "2", "3"]
 
 
-def polar_motion(dataset: Table) -> Array | None:
+def polar_motion(dataset: xarray.Dataset) -> Array | None:
     """m1, m2 (rows, 2), rad: the spin axis seen from the figure axis; None if the spin departs too far from
     it.
 
@@ -108,7 +108,7 @@ def polar_motion(dataset: Table) -> Array | None:
     return across / full[:, [k]]
 
 
-def near_axis(dataset: Table) -> bool:
+def near_axis(dataset: xarray.Dataset) -> bool:
     """Whether the body spins nearly about its figure axis, so that polar motion is of interest."""
     motion = polar_motion(dataset)
     if motion is None:
@@ -116,7 +116,7 @@ def near_axis(dataset: Table) -> bool:
     return bool(0 < np.nanmax(norms(motion)) < NEAR_AXIS)
 
 
-def figure_direction(dataset: Table) -> Array:
+def figure_direction(dataset: xarray.Dataset) -> Array:
     """Unit vector (3,) of the figure axis in body axes: as requested, else that of symmetry or largest
     moment.
     """
@@ -140,7 +140,7 @@ def figure_index(found: Array) -> int:
     return int(found.argmax())
 
 
-def energy_and_momentum(dataset: Table) -> tuple[Array, float, float] | None:
+def energy_and_momentum(dataset: xarray.Dataset) -> tuple[Array, float, float] | None:
     """Moments, twice the energy and the squared momentum of a free body; None where these aren't constant."""
     found, rates = moments(dataset), principal_rates(dataset)
     if found is None or rates is None:
@@ -154,13 +154,13 @@ def energy_and_momentum(dataset: Table) -> tuple[Array, float, float] | None:
     return found, float(twice.mean()), float(square.mean())
 
 
-def body_direction(dataset: Table, direction: Array) -> Array | None:
+def body_direction(dataset: xarray.Dataset, direction: Array) -> Array | None:
     """A body-fixed direction along time, (rows, 3), space axes."""
     quaternion = values(dataset, "quaternion")
     return None if quaternion is None else np.einsum("tij,j->ti", rotation_matrix(quaternion), direction)
 
 
-def pole(dataset: Table, axis: str) -> Array | None:
+def pole(dataset: xarray.Dataset, axis: str) -> Array | None:
     """Unit vectors (rows, 3), space axes, of the axis named figure, spin or momentum."""
     recorded = values(dataset, f"{axis}_axis")
     if recorded is not None:
@@ -176,7 +176,7 @@ def pole(dataset: Table, axis: str) -> Array | None:
     return _unit(np.einsum("tij,tj->ti", rotation_matrix(quaternion), rates))
 
 
-def steady_momentum(dataset: Table) -> Array | None:
+def steady_momentum(dataset: xarray.Dataset) -> Array | None:
     """Direction (3,) of the momentum if it is fixed in space; else None."""
     directions = pole(dataset, "momentum")
     if directions is None:
@@ -187,7 +187,7 @@ def steady_momentum(dataset: Table) -> Array | None:
     return np.asarray(directions.mean(axis=0) / np.linalg.norm(directions.mean(axis=0)))
 
 
-def orientation(dataset: Table, axis: str) -> tuple[Array, Array] | None:
+def orientation(dataset: xarray.Dataset, axis: str) -> tuple[Array, Array] | None:
     """Obliquity and node longitude (rows,) each, rad, of the axis named figure, spin or momentum.
 
     As recorded; otherwise against the XY plane of space, with a continuous longitude of the ascending node.
@@ -212,7 +212,7 @@ def orientation(dataset: Table, axis: str) -> tuple[Array, Array] | None:
     return tilt, longitude
 
 
-def is_top(dataset: Table) -> bool:
+def is_top(dataset: xarray.Dataset) -> bool:
     """Whether the scene is a body on a fixed point under uniform gravity, or a top's angles are recorded."""
     if "position" in dataset:
         return False
@@ -233,13 +233,13 @@ def angle_between(directions: Array, others: Array) -> Array:
     return np.asarray(np.arctan2(np.linalg.norm(np.cross(directions, others), axis=1), cosine))
 
 
-def load_kinds(dataset: Table) -> list[str]:
+def load_kinds(dataset: xarray.Dataset) -> list[str]:
     """The kinds of the scene's loads, from the embedded config."""
     loads: Any = read_config(dataset).get("loads", [])
     return [str(load.get("kind")) for load in loads if isinstance(load, dict)]
 
 
-def vertical(dataset: Table) -> Array:
+def vertical(dataset: xarray.Dataset) -> Array:
     """Unit vector (3,) against a uniform gravity; Z if the config gives no other direction in numbers."""
     for load in read_config(dataset).get("loads", []):
         if isinstance(load, dict) and load.get("kind") == "uniform_gravity" and "acceleration" in load:
@@ -256,7 +256,7 @@ def _unit(vectors: Array) -> Array:
     return np.asarray(vectors / norms(vectors)[:, None])
 
 
-def attribute(dataset: Table, name: str) -> Array | None:
+def attribute(dataset: xarray.Dataset, name: str) -> Array | None:
     """An attribute that is a JSON list of numbers, as an array; None if it is missing or something else."""
     try:
         return np.array(json.loads(str(dataset.attrs[name])), dtype=float)

@@ -21,7 +21,6 @@ from rigidsim.scene.bodies.shapes import (
     Arc,
     Box,
     Ellipsoid,
-    Outline,
     Revolved,
     StraightPiece,
 )
@@ -80,17 +79,13 @@ class Mesh:
 
 
 def solid_mesh(solid: str, dimensions: Mapping[str, Any]) -> Mesh:
-    """Mesh of one solid about its own centre of mass, in its own axes.
+    """Mesh of a solid of ``SHAPES`` about its own centre of mass, in its own axes; dimensions in metres.
 
-    Args:
-        solid: a name in ``rigidsim.scene.bodies.shapes.SHAPES``.
-        dimensions: metres, those of the shape.
+    A dimension of zero is drawn as a fiftieth of the largest one.
 
     Raises:
         ValueError: an unknown solid, a dimension that is missing, negative, too large or not finite, or a
             solid without any extent.
-
-    A dimension of zero is drawn as a fiftieth of the largest one.
     """
     if solid not in SHAPES:
         known = ", ".join(sorted([*SHAPES, POINT]))
@@ -115,12 +110,9 @@ def solid_mesh(solid: str, dimensions: Mapping[str, Any]) -> Mesh:
             sizes = f"{small} {given[small][0]:g} exceeds {large} {given[large][0]:g}"
             raise ValueError(f"drawing: {solid} {sizes}")
     # Ideal rods and plates have no thickness; a picture of them needs some.
-    return _mesh(
-        shape.outline({key: np.maximum(value, THINNESS * largest).tolist() for key, value in given.items()})
+    outline = shape.outline(
+        {key: np.maximum(value, THINNESS * largest).tolist() for key, value in given.items()}
     )
-
-
-def _mesh(outline: Outline) -> Mesh:
     match outline:
         case Box(x, y, z):
             return _box(x, y, z)
@@ -131,41 +123,34 @@ def _mesh(outline: Outline) -> Mesh:
 
 
 def body_meshes(drawing: str | None) -> list[Mesh]:
-    """Meshes of a body from the dataset's `drawing` attribute, placed in body axes.
+    """Meshes (metres) of a body from the dataset's `drawing` attribute, placed in body axes, one per solid.
 
     Args:
         drawing: JSON list of {"solid", "dimensions", "position", "quaternion"}: position of the
             solid's centre of mass in body axes from the reference point, metres; quaternion
             [w, x, y, z] turns the solid's axes to body axes. None or an empty list: a unit cube.
-
-    Returns:
-        One mesh per solid, metres. The radius of a `point` is chosen so that its volume goes
-        with its `mass_fraction` and the largest is a sixth of the body's reach.
+            The volume of a `point` goes with its `mass_fraction`; the largest radius is a sixth of the reach.
 
     Raises:
         ValueError: JSON that is not such a list, or see `solid_mesh`.
     """
-    solids = _parse(drawing)
-    placed = [_placement(entry) for entry in solids]
-    extended = [
-        None
-        if entry["solid"] == POINT
-        else solid_mesh(entry["solid"], entry.get("dimensions", {})).moved(*place)
-        for entry, place in zip(solids, placed, strict=True)
-    ]
+    solids = [(entry, entry.get("dimensions", {}), _placement(entry)) for entry in _parse(drawing)]
+    extended = {
+        number: solid_mesh(entry["solid"], dimensions).moved(*place)
+        for number, (entry, dimensions, place) in enumerate(solids)
+        if entry["solid"] != POINT
+    }
     reach = max(
-        mesh.reach() if mesh is not None else float(np.linalg.norm(shift))
-        for mesh, (_, shift) in zip(extended, placed, strict=True)
+        extended[number].reach() if number in extended else float(np.linalg.norm(shift))
+        for number, (_, _, (_, shift)) in enumerate(solids)
     )
     reach = reach or 1.0  # a single point at the reference point has no size of its own
-    meshes = []
-    for entry, place, mesh in zip(solids, placed, extended, strict=True):
-        if mesh is None:
-            fraction = float(entry.get("dimensions", {}).get("mass_fraction", 1.0))
+    for number, (_, dimensions, place) in enumerate(solids):
+        if number not in extended:
+            fraction = float(dimensions.get("mass_fraction", 1.0))
             radius = reach * max(np.cbrt(np.clip(fraction, 0.0, 1.0)) / 6, 0.03)
-            mesh = ball(radius, radius, radius, segments=32, rings=16).moved(*place)
-        meshes.append(mesh)
-    return meshes
+            extended[number] = ball(radius, radius, radius, segments=32, rings=16).moved(*place)
+    return [extended[number] for number in range(len(solids))]
 
 
 def point_positions(drawing: str | None) -> Array:

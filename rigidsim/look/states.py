@@ -13,7 +13,7 @@ from rigidsim.look.solids import rotation_matrix
 from rigidsim.look.stages.parts import PALE, PULL, Color, Plane
 
 if TYPE_CHECKING:
-    from rigidsim.look.rows import Table
+    import xarray
 
 MOST_EVENTS = 2000
 """Largest number of events of one kind in a lane; of more, the first are shown."""
@@ -27,13 +27,7 @@ _PREFERRED = ("libration", "polar_motion", "tip", "nadir", "angular_velocity", "
 
 @dataclass(frozen=True)
 class States:
-    """One lane of states.
-
-    Attributes:
-        seconds: (changes,), when a state begins.
-        values: names of the states.
-        colors: colours by name.
-    """
+    """One lane of states: when they begin (changes,), s, their names, and colours by name."""
 
     name: str
     seconds: NDArray[np.float64]
@@ -41,11 +35,9 @@ class States:
     colors: dict[str, Color]
 
 
-def states_of(dataset: Table, start: float, end: float) -> list[States]:
-    """Lanes: one for each event, which changes colour when it happens, and one for a run that was stopped.
-
-    Args:
-        start, end: times of the first and last sample, s.
+def states_of(dataset: xarray.Dataset, start: float, end: float) -> list[States]:
+    """Lanes: one for each event, which changes colour when it happens, and one for a run that was stopped,
+    from the first to the last sample's time, s.
     """
     lanes = []
     for name in events_of(dataset):
@@ -56,22 +48,17 @@ def states_of(dataset: Table, start: float, end: float) -> list[States]:
     status = str(dataset.attrs.get("status", ""))
     if status and status not in ("finished", "running"):
         words = status.replace("_", " ")
-        middle = "running", words
-        lanes.append(
-            States("run", np.array([start, end]), list(middle), {"running": _SHADES[0], words: PULL})
-        )
+        colors = {"running": _SHADES[0], words: PULL}
+        lanes.append(States("run", np.array([start, end]), list(colors), colors))
     return lanes
 
 
-def charts_of(dataset: Table) -> list[States]:
+def charts_of(dataset: xarray.Dataset) -> list[States]:
     """A lane for a run in Euler angles that shows which of its two sequences carried it.
 
     A chart is left at the first step after which its singular factor is below ``CHART_LEFT``. Of steps a
     dataset knows nothing: a change is shown at the first sample from which it is certain, and one that lies
     between two sparse samples isn't seen.
-
-    Args:
-        dataset: in memory, or its rows that are shown.
     """
     asked, partner = (
         str(dataset.attrs.get(f"euler_{word}", "")) for word in ("sequence", "partner_sequence")
@@ -94,7 +81,7 @@ def charts_of(dataset: Table) -> list[States]:
     return [States("chart", begins, values, dict(zip((asked, partner), _SHADES, strict=True)))]
 
 
-def events_of(dataset: Table) -> list[str]:
+def events_of(dataset: xarray.Dataset) -> list[str]:
     """Names of the events whose times the dataset has."""
     names = []
     for name in (*map(str, dataset.data_vars), *map(str, dataset.coords)):
@@ -105,7 +92,7 @@ def events_of(dataset: Table) -> list[str]:
     return names
 
 
-def sections_of(dataset: Table) -> list[Plane]:
+def sections_of(dataset: xarray.Dataset) -> list[Plane]:
     """For each frequent event, two components recorded there, as points."""
     planes = []
     for event in events_of(dataset):
@@ -128,13 +115,11 @@ def sections_of(dataset: Table) -> list[Plane]:
             points = values[:, [first, second]]
             # The origin is their middle, which the names tell: a small section would be a dot far off
             middle = (points.min(axis=0) + points.max(axis=0)) / 2
-            points = points - middle
-            names = tuple(
+            across, up = (
                 f"{labels[k]} (axes cross at {place:.4g})" if place else labels[k]
                 for k, place in zip((first, second), middle, strict=True)
             )
-            planes.append(
-                Plane(f"section_{event}", title, _SHADES[1], points, moves=False, names=(names[0], names[1]))
-            )
+            key, shown = f"section_{event}", points - middle
+            planes.append(Plane(key, title, _SHADES[1], shown, moves=False, names=(across, up)))
             break
     return planes

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from rigidsim.scene.known_bodies import KNOWN, known_body
 
 if TYPE_CHECKING:
-    from rigidsim.look.rows import Table
+    import xarray
 
 Array = NDArray[np.float64]
 Color = tuple[int, int, int]
@@ -29,13 +29,7 @@ GREY: Color = (150, 154, 162)
 
 @dataclass(frozen=True)
 class Globe:
-    """An attracting body as it is drawn.
-
-    Attributes:
-        called: its name in a sentence.
-        radius: m.
-        color: approximate colour of its disk.
-    """
+    """An attracting body as it is drawn: its name, also in a sentence, radius (m) and colour."""
 
     name: str
     called: str
@@ -58,7 +52,7 @@ _COLORS: dict[str, Color] = {
 GLOBES = tuple(Globe(one.name, one.called, one.radius, _COLORS[one.name]) for one in KNOWN)
 
 
-def told(dataset: Table, what: str) -> list[dict[str, Any]]:
+def told(dataset: xarray.Dataset, what: str) -> list[dict[str, Any]]:
     """The dataset's entries for one kind of surroundings; empty if there are none."""
     try:
         listed = json.loads(str(dataset.attrs.get("surroundings", "[]")))
@@ -67,7 +61,7 @@ def told(dataset: Table, what: str) -> list[dict[str, Any]]:
     return [one for one in listed if isinstance(one, dict) and one.get("what") == what]
 
 
-def gravity(dataset: Table) -> Array | None:
+def gravity(dataset: xarray.Dataset) -> Array | None:
     """Acceleration (3,) of a uniform field, m/s^2, space axes; None if there is none."""
     for one in told(dataset, "gravity"):
         pull = _vector(one.get("acceleration"))
@@ -93,12 +87,7 @@ def called(globe: Globe | None, unknown: str) -> str:
 
 
 def source_path(one: dict[str, Any], seconds: Array) -> Array | None:
-    """Positions of a source, (rows, 3), m, space axes, from the body; None if unknown.
-
-    Args:
-        one: as from ``told(dataset, "source")``.
-        seconds: (rows,), times of the scene, s.
-    """
+    """Positions (rows, 3), m, space axes, of a source that was told, from the body; None if unknown."""
     place = _vector(one.get("position"))
     if place is not None:
         return np.tile(place, (len(seconds), 1))

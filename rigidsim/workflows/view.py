@@ -83,7 +83,7 @@ def render(
     with _recording_of(named) as timeline, _new(target) as new:
         try:
             film.render(timeline, new, seconds=seconds or film.SECONDS, told=told)
-        except (FileNotFoundError, film.NoEncoder, RuntimeError, ValueError) as error:
+        except (FileNotFoundError, RuntimeError, ValueError) as error:
             raise RunFolderError(f"{target}: can't be drawn: {error}") from None
     return target
 

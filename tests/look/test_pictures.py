@@ -17,11 +17,11 @@ import pytest
 pytest.importorskip("rerun")
 
 import rigidsim
+from rigidsim.look.film import HeadlessViewer, NoGraphics, vulkan_drivers
 from rigidsim.look.thinning import thin, thinned_indices
 from rigidsim.look.timeline import write_timeline
 from rigidsim.look.timeline.drawn import DrawnRun
 from rigidsim.look.timeline.recording import recording_to
-from rigidsim.look.viewer import HeadlessViewer, NoGraphics, vulkan_drivers
 
 pytestmark = [
     pytest.mark.slow,

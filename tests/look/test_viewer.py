@@ -15,7 +15,7 @@ import xarray
 pytest.importorskip("rerun")
 import rerun as rr
 
-from rigidsim.look import viewer
+from rigidsim.look import film, viewer
 from rigidsim.look.timeline import write_timeline
 from rigidsim.look.timeline.comparison import MOST, write_comparison
 from rigidsim.look.timeline.writing import LiveRecording
@@ -35,8 +35,8 @@ def test_picture_of_a_run_shows_the_body_and_its_plots(
     monkeypatch.setenv("TMPDIR", str(temporary))
     monkeypatch.setattr(tempfile, "tempdir", None)
     try:
-        viewer.screenshot(tmp_path / "t.rrd", tmp_path / "t.png", size=(1200, 700), at=0.6)
-    except viewer.NoGraphics as reason:
+        film.render(tmp_path / "t.rrd", tmp_path / "t.png")
+    except film.NoGraphics as reason:
         pytest.skip(str(reason))
     assert not list(temporary.iterdir())
     picture = imread(tmp_path / "t.png")[..., :3]
@@ -53,7 +53,7 @@ def test_missing_file_is_named(tmp_path: Path) -> None:
     with pytest.raises(FileNotFoundError, match=r"no timeline at .*nothing\.rrd"):
         viewer.open_viewer(tmp_path / "nothing.rrd")
     with pytest.raises(FileNotFoundError, match="no timeline at"):
-        viewer.screenshot(tmp_path / "nothing.rrd", tmp_path / "x.png")
+        film.render(tmp_path / "nothing.rrd", tmp_path / "x.png")
 
 
 def test_viewer_listens_on_this_machine_only_and_sends_no_statistics(
@@ -87,9 +87,9 @@ def test_no_driver_is_said_plainly(
     symmetric_top: Build, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (tmp_path / "t.rrd").write_bytes(b"")
-    monkeypatch.setattr(viewer, "vulkan_drivers", lambda: [])
-    with pytest.raises(viewer.NoGraphics, match="mesa-vulkan-drivers"):
-        viewer.screenshot(tmp_path / "t.rrd", tmp_path / "t.png")
+    monkeypatch.setattr(film, "vulkan_drivers", lambda: [])
+    with pytest.raises(film.NoGraphics, match="mesa-vulkan-drivers"):
+        film.render(tmp_path / "t.rrd", tmp_path / "t.png")
 
 
 def test_importing_the_package_loads_neither_rerun_nor_matplotlib() -> None:

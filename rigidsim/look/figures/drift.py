@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     import xarray
     from matplotlib.axes import Axes
 
-    from rigidsim.look.rows import Variable
 
 Array = NDArray[np.float64]
 
@@ -45,7 +44,7 @@ def law(dataset: xarray.Dataset) -> Array | None:
 
 
 @panel(lambda dataset: drifts(dataset) or None)
-def drift(axes: Axes, dataset: xarray.Dataset, found: dict[str, Variable]) -> None:
+def drift(axes: Axes, dataset: xarray.Dataset, found: dict[str, xarray.DataArray]) -> None:
     """Magnitudes of all relative drifts on a logarithmic axis, over the band that rounding explains."""
     time, _ = clock(dataset)
     projected = put_backs(dataset)
@@ -85,7 +84,7 @@ def drift(axes: Axes, dataset: xarray.Dataset, found: dict[str, Variable]) -> No
     axes.set_ylabel("relative drift")
 
 
-def _magnitude(variable: Variable, rows: int) -> Array:
+def _magnitude(variable: xarray.DataArray, rows: int) -> Array:
     """The largest over the components, a gap where it is zero."""
     table = np.abs(np.asarray(variable.transpose("time", ...).values, dtype=np.float64)).reshape(rows, -1)
     largest = table.max(axis=1)

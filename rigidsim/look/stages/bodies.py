@@ -32,7 +32,7 @@ from rigidsim.look.stages.parts import (
 )
 
 if TYPE_CHECKING:
-    from rigidsim.look.rows import Table
+    import xarray
 
 FIELD = np.deg2rad(55.0)
 """Field of view from bottom to top (rad), the viewer's own."""
@@ -65,7 +65,7 @@ class Subject:
     solids: list[dict[str, Any]]
 
     @classmethod
-    def of(cls, dataset: Table) -> Subject:
+    def of(cls, dataset: xarray.Dataset) -> Subject:
         """The body of a dataset in memory.
 
         Raises:
@@ -120,14 +120,14 @@ class Subject:
         return axes[2] if spread[2] < _FLAT * spread[1] else None
 
 
-def column(dataset: Table, name: str, width: int) -> Array | None:
+def column(dataset: xarray.Dataset, name: str, width: int) -> Array | None:
     """A vector variable along time, (rows, width); None if there is none of that width."""
     found = values(dataset, name)
     return found if found is not None and found.ndim == 2 and found.shape[1] == width else None
 
 
 def vectors_of(
-    dataset: Table, subject: Subject, *, paths: bool = True
+    dataset: xarray.Dataset, subject: Subject, *, paths: bool = True
 ) -> tuple[list[Arrow], list[Trail], list[str]]:
     """Angular momentum and velocity, if wanted the paths of the latter's tip, and notes on their scales."""
     arrows: list[Arrow] = []
@@ -163,7 +163,7 @@ def vectors_of(
     return arrows, trails, notes
 
 
-def source_arrows(dataset: Table, subject: Subject, length: float) -> list[Arrow]:
+def source_arrows(dataset: xarray.Dataset, subject: Subject, length: float) -> list[Arrow]:
     """Directions in space to attracting bodies: from orbits, recorded point masses, or the recorded nadir."""
     arrows = []
     for key, globe, name, path in [*_masses(dataset), *_sources(dataset, subject)]:
@@ -178,7 +178,7 @@ _Towards = Iterator[tuple[str, surroundings.Globe | None, str, Array]]
 """Key, known body, name, and vectors (rows, 3), space axes, to attracting bodies."""
 
 
-def _sources(dataset: Table, subject: Subject) -> _Towards:
+def _sources(dataset: xarray.Dataset, subject: Subject) -> _Towards:
     listed = surroundings.told(dataset, "source")
     nadir = column(dataset, "nadir", 3)
     for number, one in enumerate(listed):
@@ -190,7 +190,7 @@ def _sources(dataset: Table, subject: Subject) -> _Towards:
             yield f"source{number}", surroundings.globe_of(one), name, path
 
 
-def _masses(dataset: Table) -> _Towards:
+def _masses(dataset: xarray.Dataset) -> _Towards:
     """Point masses whose positions were recorded, from the body if it is one of them."""
     positions = signals.values(dataset, "point_mass_position")
     body = read_config(dataset).get("body", {})

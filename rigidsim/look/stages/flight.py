@@ -12,10 +12,10 @@ from rigidsim.look.stages.bodies import FIELD, Subject, vectors_of, with_track
 from rigidsim.look.stages.parts import PALE, PULL, SPACE, Array, Camera, Picture, Spot, Vector, grid
 
 if TYPE_CHECKING:
-    from rigidsim.look.rows import Table
+    import xarray
 
 
-def picture(dataset: Table, subject: Subject) -> Picture | None:
+def picture(dataset: xarray.Dataset, subject: Subject) -> Picture | None:
     """Picture of a body with a position under a uniform gravity and without attractor; None for others."""
     pull, position = surroundings.gravity(dataset), subject.position
     if pull is None or position is None or surroundings.told(dataset, "attractor"):

@@ -40,13 +40,13 @@ from rigidsim.look.stages.parts import (
 )
 
 if TYPE_CHECKING:
-    from rigidsim.look.rows import Table
+    import xarray
 
 ENERGY: tuple[int, int, int] = (120, 150, 200)
 _LEADING = ("angular_velocity", "polar_motion", "nutation_angle")
 
 
-def picture(dataset: Table, subject: Subject) -> Picture | None:
+def picture(dataset: xarray.Dataset, subject: Subject) -> Picture | None:
     """Picture of a body whose energy and momentum are constant; None for others."""
     constants, rates = signals.energy_and_momentum(dataset), column(dataset, "angular_velocity", 3)
     if constants is None or rates is None or subject.position is not None:
@@ -79,7 +79,7 @@ def picture(dataset: Table, subject: Subject) -> Picture | None:
     return Picture("free rotation", stages, [], _LEADING, notes)
 
 
-def _shell(dataset: Table, radii: Array) -> Shell:
+def _shell(dataset: xarray.Dataset, radii: Array) -> Shell:
     # principal axes are rows: the rotation from these to body axes is the transpose
     turn = quaternion_of(signals.principal_axes(dataset).T[None])[0]
     return Shell("energy_ellipsoid", radii, ENERGY, BODY, turn[[1, 2, 3, 0]])
@@ -92,7 +92,7 @@ def _axis_name(axis: Array) -> str:
     return ("" if axis[k] > 0 else "−") + "xyz"[k]
 
 
-def _poinsot(dataset: Table, along: Array, radii: Array, rates: Array, body: Stage) -> Stage:
+def _poinsot(dataset: xarray.Dataset, along: Array, radii: Array, rates: Array, body: Stage) -> Stage:
     """The ellipsoid with these semi-axes on the plane across the momentum's direction."""
     scale = 1.0 / float(radii.max())
     velocity = next(arrow for arrow in body.arrows if arrow.name == "angular_velocity")

@@ -33,7 +33,7 @@ from rigidsim.look.surroundings import GREY, Globe, called
 from rigidsim.look.symbols import globe, graticule
 
 if TYPE_CHECKING:
-    from rigidsim.look.rows import Table
+    import xarray
 
 ORBIT_BODY = 0.11  # reach of the enlarged body, in units of the orbit's largest distance
 NORMAL: tuple[int, int, int] = (190, 150, 255)
@@ -43,7 +43,7 @@ _LARGE = 1e5  # m: a larger body is a planet, and what pulls it is far away
 _HORIZON, _BELOW = 9.0, 2.2  # radius of the planet drawn near the body, and its distance
 
 
-def free_orbit(dataset: Table, subject: Subject) -> Picture | None:
+def free_orbit(dataset: xarray.Dataset, subject: Subject) -> Picture | None:
     """Picture of a body with a position and one attracting point; None for others."""
     listed = surroundings.told(dataset, "attractor")
     if len(listed) != 1 or subject.position is None:
@@ -60,7 +60,7 @@ def free_orbit(dataset: Table, subject: Subject) -> Picture | None:
     return Picture("orbit about an attracting point", stages, [], leading, notes)
 
 
-def satellite(dataset: Table, subject: Subject) -> Picture | None:
+def satellite(dataset: xarray.Dataset, subject: Subject) -> Picture | None:
     """Picture of a small body with a single source on an orbit, its attitude known in space or in the local
     frame; None for others.
     """
@@ -140,7 +140,7 @@ def _orbit(subject: Subject, position: Array, planet: Globe | None, notes: list[
     )
 
 
-def _in_local_frame(dataset: Table, subject: Subject, local: Array, planet: Globe | None) -> Stage:
+def _in_local_frame(dataset: xarray.Dataset, subject: Subject, local: Array, planet: Globe | None) -> Stage:
     """The body above its planet, whose surface is drawn near it, not to scale, z down."""
     attitude = subject.attitude
     assert attitude is not None

@@ -34,7 +34,7 @@ from rigidsim.look.stages.parts import (
 from rigidsim.look.symbols import globe, graticule
 
 if TYPE_CHECKING:
-    from rigidsim.look.rows import Table
+    import xarray
 
 _LARGE = 1e5  # m: a smaller body is no globe
 _ROUND = 0.9  # of the smallest over the largest semi-axis
@@ -44,7 +44,7 @@ EQUATOR: Color = (150, 205, 110)
 _LEADING = ("polar_motion", "obliquity", "node_longitude", "wobble_angle", "rotation_angle")
 
 
-def picture(dataset: Table, subject: Subject) -> Picture | None:
+def picture(dataset: xarray.Dataset, subject: Subject) -> Picture | None:
     """Picture of a large, nearly round body that spins nearly about its figure axis; None for others."""
     axes = _semi_axes(subject)
     poles = signals.near_axis(dataset) or "obliquity" in dataset or "polar_motion" in dataset
@@ -118,7 +118,7 @@ def _semi_axes(subject: Subject) -> Array | None:
     return np.asarray(axes)
 
 
-def _in_its_own_axes(dataset: Table, stage: Stage, figure: Array, notes: list[str]) -> None:
+def _in_its_own_axes(dataset: xarray.Dataset, stage: Stage, figure: Array, notes: list[str]) -> None:
     """Draw figure axis and spin axis, their angle enlarged until it is visible."""
     notes.append("no attitude was recorded: the body is shown in its own axes and doesn't turn")
     stage.vectors.append(
@@ -144,7 +144,7 @@ def _in_its_own_axes(dataset: Table, stage: Stage, figure: Array, notes: list[st
     notes.append(f"the angle between spin axis and figure axis is drawn {times} too large")
 
 
-def _pole_planes(dataset: Table) -> list[Plane]:
+def _pole_planes(dataset: xarray.Dataset) -> list[Plane]:
     """Polar motion in the body, and the pole in space less its mean motion."""
     planes = precession.nutation_planes(dataset, "figure")
     motion = signals.polar_motion(dataset)

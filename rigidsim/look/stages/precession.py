@@ -37,7 +37,7 @@ from rigidsim.scene.readable_time import span_text
 from rigidsim.scene.readable_units import angle_unit
 
 if TYPE_CHECKING:
-    from rigidsim.look.rows import Table
+    import xarray
 
 ECLIPTIC: Color = (226, 196, 90)
 PRECESSION: Color = (190, 150, 255)
@@ -50,7 +50,7 @@ _UPRIGHT = 1e-9  # sine of the tilt, below which a pole has no node
 _SPARSE = 1.0  # rad of an orbit from one row to the next, from which a source can't be followed
 
 
-def picture(dataset: Table, subject: Subject) -> Picture | None:
+def picture(dataset: xarray.Dataset, subject: Subject) -> Picture | None:
     """Picture of a body without attitude and rates whose figure axis or momentum is known in space; None for
     others.
 
@@ -97,7 +97,7 @@ def eye_of_pole(height: float = 0.05, radius: float = 1.95) -> Camera:
     return eye_at(*view, radius, np.array([0.0, 0.0, height]))
 
 
-def axis_in_space(dataset: Table, axis: str) -> Array | None:
+def axis_in_space(dataset: xarray.Dataset, axis: str) -> Array | None:
     """Unit vectors (rows, 3), space axes, of the axis named figure or momentum; None where not all are known.
 
     As recorded, otherwise from its obliquity and node longitude if these refer to the XY plane.
@@ -108,12 +108,12 @@ def axis_in_space(dataset: Table, axis: str) -> Array | None:
     return found if found is not None and np.isfinite(found).all() else None
 
 
-def moving_plane(dataset: Table) -> bool:
+def moving_plane(dataset: xarray.Dataset) -> bool:
     """Whether obliquity and node longitude refer to a plane other than XY of space, which may move."""
     return bool(read_config(dataset).get("frame", {}).get("reference", "space") != "space")
 
 
-def _against_plane(dataset: Table, axis: str) -> Array | None:
+def _against_plane(dataset: xarray.Dataset, axis: str) -> Array | None:
     """Unit vectors (rows, 3) along the plane's X', Y' and normal, from obliquity and node longitude."""
     if "obliquity" not in dataset or "node_longitude" not in dataset:
         return None
@@ -124,7 +124,7 @@ def _against_plane(dataset: Table, axis: str) -> Array | None:
     return np.stack([np.sin(tilt) * np.sin(node), -np.sin(tilt) * np.cos(node), np.cos(tilt)], axis=1)
 
 
-def pointed(dataset: Table, subject: Subject, figure: Array, *, plane: bool = False) -> Subject:
+def pointed(dataset: xarray.Dataset, subject: Subject, figure: Array, *, plane: bool = False) -> Subject:
     """The subject with an attitude whose figure axis (3,), body axes, is the recorded one, without rotation
     about it; itself if none is known. With `plane`, relative to the reference plane, which may move in space.
     """
@@ -141,13 +141,13 @@ def pointed(dataset: Table, subject: Subject, figure: Array, *, plane: bool = Fa
     return replace(subject, attitude=attitude, quaternion=quaternion_of(attitude))
 
 
-def standing_note(dataset: Table, what: str) -> str:
+def standing_note(dataset: xarray.Dataset, what: str) -> str:
     """Why a body that was `pointed` doesn't turn."""
     why = "every rotation is averaged over" if is_averaged(dataset.attrs) else "no attitude was recorded"
     return f"{why}: the {what} points where its figure axis does, and doesn't turn about it"
 
 
-def followed_sources(dataset: Table, subject: Subject, notes: list[str]) -> list[Arrow]:
+def followed_sources(dataset: xarray.Dataset, subject: Subject, notes: list[str]) -> list[Arrow]:
     """Directions of sources that advance so little from row to row that the eye can follow.
 
     Some others would seem to stand still if samples are whole revolutions apart.
@@ -177,7 +177,9 @@ def reference_plane(stage: Stage) -> None:
     stage.spots.append(Spot("normal", "normal", FAINT, np.array([0.0, 0.0, 1.78])))
 
 
-def circle_of_precession(dataset: Table, stage: Stage, pole: Array, axis: str, notes: list[str]) -> None:
+def circle_of_precession(
+    dataset: xarray.Dataset, stage: Stage, pole: Array, axis: str, notes: list[str]
+) -> None:
     """Put on a stage the circle, with its period, that a pole (rows, 3), space axes, of the axis named figure
     or momentum describes about the normal, if it does.
     """
@@ -202,7 +204,7 @@ def circle_of_precession(dataset: Table, stage: Stage, pole: Array, axis: str, n
     stage.lines.append(Line("precession", PRECESSION, ring, SPACE, 2.0, 1.0, words))
 
 
-def nutation_planes(dataset: Table, axis: str) -> list[Plane]:
+def nutation_planes(dataset: xarray.Dataset, axis: str) -> list[Plane]:
     """The axis named figure or momentum less its mean motion, if the momentum moves: one plane, or none."""
     momentum = signals.steady_momentum(dataset) if "quaternion" in dataset else None
     found = signals.orientation(dataset, axis) if momentum is None else None

@@ -10,9 +10,9 @@ from rigidsim.look.stages.bodies import Subject, source_arrows, vectors_of, with
 from rigidsim.look.stages.parts import ARROW_REACH, Picture
 
 if TYPE_CHECKING:
-    from rigidsim.look.rows import Table
+    import xarray
 
-KINDS: tuple[Callable[[Table, Subject], Picture | None], ...] = (
+KINDS: tuple[Callable[[xarray.Dataset, Subject], Picture | None], ...] = (
     top.picture,
     orbits.free_orbit,
     flight.picture,
@@ -24,7 +24,7 @@ KINDS: tuple[Callable[[Table, Subject], Picture | None], ...] = (
 """Functions that return the picture of a scene of their kind, or None for others; the first that has one."""
 
 
-def build_picture(dataset: Table) -> tuple[Picture, Subject]:
+def build_picture(dataset: xarray.Dataset) -> tuple[Picture, Subject]:
     """The picture of a thinned dataset, in memory, and its body.
 
     Raises:
@@ -37,7 +37,7 @@ def build_picture(dataset: Table) -> tuple[Picture, Subject]:
     return found, subject
 
 
-def _any(dataset: Table, subject: Subject) -> Picture:
+def _any(dataset: xarray.Dataset, subject: Subject) -> Picture:
     """Any scene: the body with its momentum and angular velocity, and its track if it moves far."""
     arrows, trails, notes = vectors_of(dataset, subject)
     if subject.attitude is None:

@@ -30,13 +30,13 @@ from rigidsim.look.stages.parts import (
 from rigidsim.look.symbols import spinning_top
 
 if TYPE_CHECKING:
-    from rigidsim.look.rows import Table
+    import xarray
 
 TRACE = 1.0  # where on the axis the traced point is, in reaches
 _SYMMETRIC = 1e-9  # of the moments
 
 
-def picture(dataset: Table, subject: Subject) -> Picture | None:
+def picture(dataset: xarray.Dataset, subject: Subject) -> Picture | None:
     """Picture of a body about a fixed point off its centre of mass under a uniform gravity; None for
     others.
     """
@@ -95,7 +95,7 @@ def picture(dataset: Table, subject: Subject) -> Picture | None:
     return Picture("top on a fixed point", [stage], [_from_above(tip, up, across)], leading, notes)
 
 
-def _figure(dataset: Table, arm: Array) -> Array:
+def _figure(dataset: xarray.Dataset, arm: Array) -> Array:
     """The axis whose trace is shown: of symmetry if the centre of mass lies on it, else through that."""
     moments = signals.moments(dataset)
     if moments is not None:
@@ -106,7 +106,7 @@ def _figure(dataset: Table, arm: Array) -> Array:
     return np.asarray(arm / np.linalg.norm(arm))
 
 
-def _symbol(dataset: Table, subject: Subject, arm: Array, axis: Array) -> tuple[Mesh, float] | None:
+def _symbol(dataset: xarray.Dataset, subject: Subject, arm: Array, axis: Array) -> tuple[Mesh, float] | None:
     """A toy top (in metres) and its reach, if only the moments of a symmetric body are known; else None."""
     moments = signals.moments(dataset)
     mass = dataset.attrs.get("mass")

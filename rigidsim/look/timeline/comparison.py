@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from rigidsim.look.clock import Clock, build_clock
 from rigidsim.look.page import legible
-from rigidsim.look.plots import Plot, Series
+from rigidsim.look.plots import Color, Plot, Series
 from rigidsim.look.signals import values
 from rigidsim.look.thinning import thin, thinned_indices
 from rigidsim.look.timeline.blueprint import build_comparison
@@ -23,7 +23,7 @@ from rigidsim.look.timeline.plotting import legend_of
 from rigidsim.look.timeline.recording import chunks, recording_to
 
 if TYPE_CHECKING:
-    from rigidsim.look.rows import Table
+    import xarray
 
 MOST = 6
 """Largest number of runs shown side by side."""
@@ -33,11 +33,11 @@ COLORS = ((92, 148, 235), (240, 190, 60), (104, 190, 110), (225, 115, 190), (80,
 _FLOOR = 1e-18  # rad: below what a difference of attitudes in double precision can be
 
 
-def write_comparison(named: Sequence[tuple[str, Table]], path: Path, *, rows: int = ROWS) -> int:
-    """Write several datasets as one recording on one clock, their first stages side by side.
+def write_comparison(named: Sequence[tuple[str, xarray.Dataset]], path: Path, *, rows: int = ROWS) -> int:
+    """Write two to ``MOST`` datasets with their names as one recording on one clock, side by side.
 
     Args:
-        named: datasets with their names on the screen; two to ``MOST``.
+        named: names on the screen, and datasets.
         path: the file; it is whole when this returns.
         rows: largest number of rows of each.
 
@@ -95,8 +95,6 @@ def _named(run: DrawnRun, name: str, number: int) -> DrawnRun:
     ]
     plots = []
     for plot in run.plots:
-        if plot.place == "more":
-            continue
         series = [
             replace(
                 one,
@@ -106,26 +104,26 @@ def _named(run: DrawnRun, name: str, number: int) -> DrawnRun:
             )
             for one in plot.series
         ]
+        shade = _shade(COLORS[number], 1)
         levels = [
-            replace(
-                one, key=f"{root} {one.key}", label=f"{title}: {one.label}", color=_shade(COLORS[number], 1)
-            )
+            replace(one, key=f"{root} {one.key}", label=f"{title}: {one.label}", color=shade)
             for one in plot.levels
         ]
-        plots.append(replace(plot, series=series, levels=levels))
+        if plot.place != "more":
+            plots.append(replace(plot, series=series, levels=levels))
     pages = {f"{root}_{key}": text for key, text in run.pages.items() if key == "Summary"}
     picture = replace(run.picture, stages=stages, planes=[])
     return replace(run, picture=picture, plots=plots, planes=[], states=[], pages=pages)
 
 
-def _shade(color: tuple[int, int, int], number: int) -> tuple[int, int, int]:
+def _shade(color: Color, number: int) -> Color:
     """The colour of a run, brighter for its second curve and darker for its third."""
     part = (1.0, 0.62, 1.35, 0.8)[number % 4]
     red, green, blue = (min(round(part * x), 255) for x in color)
     return red, green, blue
 
 
-def attitude_differences(named: Sequence[tuple[str, Table]]) -> Plot | None:
+def attitude_differences(named: Sequence[tuple[str, xarray.Dataset]]) -> Plot | None:
     """log10 of the angle (rad) between the first run's attitude and each other's, at the first run's times.
 
     Between the samples of another run its quaternions are interpolated on the arc. None if the first has

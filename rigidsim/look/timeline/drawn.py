@@ -24,7 +24,7 @@ from rigidsim.look.timeline.blueprint import build_blueprint
 from rigidsim.scene.readable_time import TimeWords
 
 if TYPE_CHECKING:
-    from rigidsim.look.rows import Table
+    import xarray
 
 
 @dataclass(frozen=True)
@@ -54,7 +54,11 @@ class DrawnRun:
 
     @classmethod
     def of(
-        cls, dataset: Table, shown: Table, steps: NDArray[np.int64], clock: Clock | None = None
+        cls,
+        dataset: xarray.Dataset,
+        shown: xarray.Dataset,
+        steps: NDArray[np.int64],
+        clock: Clock | None = None,
     ) -> DrawnRun:
         """The drawing of a dataset from its rows in memory.
 
