@@ -11,7 +11,6 @@ import xarray
 
 from rigidsim.errors import RigidsimError, RunFolderError
 from rigidsim.look import film, live, viewer
-from rigidsim.look.timeline.comparison import write_comparison
 from rigidsim.scene.sweeps.sweep import Sweep
 from rigidsim.store import atomic
 from rigidsim.store.run import Run, SavedRun, open_run
@@ -108,6 +107,8 @@ def _recording_of(named: Sequence[tuple[str, Run]]) -> Iterator[Path]:
         with named[0][1].recording() as timeline:
             yield timeline
         return
+    from rigidsim.look.timeline.comparison import write_comparison  # which loads rerun, see look.live
+
     with tempfile.TemporaryDirectory(prefix="rigidsim-view-") as scratch, ExitStack() as opened:
         datasets = [(name, opened.enter_context(run.dataset)) for name, run in named]
         path = Path(scratch) / "timeline.rrd"
