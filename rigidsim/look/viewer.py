@@ -75,7 +75,7 @@ def _running(
     It makes a folder for its catalogue where temporary files go and leaves it there when it is ended, so that
     it is given a place that goes with it.
     """
-    if not web and not _has_display():
+    if not web and not has_display():
         raise NoDisplay(NO_DISPLAY)
     command = [str(viewer_binary()), *recording, "--bind", LOOPBACK]
     environment = os.environ | QUIET
@@ -95,7 +95,7 @@ def _running(
             process.wait()
 
 
-def _has_display() -> bool:
+def has_display() -> bool:
     """Whether a window can be opened; assumed on systems other than Linux."""
     return sys.platform != "linux" or bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
 

@@ -94,7 +94,7 @@ def test_no_driver_is_said_plainly(
 
 def test_importing_the_package_loads_neither_rerun_nor_matplotlib() -> None:
     code = (
-        "import sys, rigidsim.look.viewer, rigidsim.look.live, rigidsim.look.film, rigidsim.look.figure_names; "
+        "import sys; from rigidsim.look import figure_names, film, live, viewer; "
         "print(sorted({'rerun', 'matplotlib', 'xarray', 'pyarrow'} & set(sys.modules)))"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
