@@ -13,7 +13,6 @@ and the stability of a body that is pushed out of the plane isn't examined.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import heyoka as hy
@@ -40,29 +39,15 @@ control is relative), however often the body has turned.
 """
 
 
-@dataclass(frozen=True)
-class PlaneOfMotion:
-    """The plane of a planar motion.
-
-    Attributes:
-        axis: principal axis that the body turns about, unit, body axes (mpf).
-        normal: the same in space axes.
-        quaternion: attitude that takes the axis to the normal, from which the angle counts; the smallest
-            such rotation.
-        angle: initial angle, rad (mpf).
-    """
-
-    axis: Vector
-    normal: Vector
-    quaternion: Vector
-    angle: Any
-
-
 @formulates(FORMULATIONS["planar"])
 class Planar(Formulation):
     """The angle and its rate.
 
     Args:
+        axis: principal axis that the body turns about, unit, body axes (mpf).
+        origin: quaternion from which the angle counts: the smallest rotation that takes the axis to its
+            direction in space.
+        angle: initial angle, rad (mpf).
         why: what speaks for it where it wasn't asked for.
     """
 
@@ -70,45 +55,42 @@ class Planar(Formulation):
     unfelt_tangents = True
     twin = "planar"
 
-    def __init__(self, plane: PlaneOfMotion, why: str = "") -> None:
-        self._plane, self.why = plane, why
+    def __init__(self, axis: Vector, origin: Vector, angle: Any, why: str) -> None:
+        self._axis, self._origin, self._angle, self.why = axis, origin, angle, why
 
     @classmethod
-    def of(cls, scene: Scene, loads: Sequence[Load]) -> Planar:
+    def of(cls, scene: Scene, loads: Sequence[Load], why: str = "") -> Planar:
         try:
-            return cls(plane_of(scene, loads))
-        except Unsuited as why:
+            return cls(*_plane_of(scene, loads), why)
+        except Unsuited as against:
             for_what = "it is for a body that turns about a principal axis with every torque along it"
-            raise Unsuited(f'{why}; {for_what}, such as the normal of its orbit; choose "auto"') from None
+            raise Unsuited(f'{against}; {for_what}, such as the normal of its orbit; choose "auto"') from None
 
     @classmethod
     def by_gradients(cls, scene: Scene, loads: Sequence[Load]) -> Planar | None:
         """The formulation for a motion that gravity gradients keep in a plane; None for any other."""
-        if not any(map(has_source, loads)):
-            return None
         why = "the body turns about a principal axis, along which every torque points and stays "
         why += '(formulation = "quaternion" carries the full motion)'
         try:
-            return cls(plane_of(scene, loads), why)
+            return cls.of(scene, loads, why) if any(map(has_source, loads)) else None
         except Unsuited:
             return None
 
     def rotation(self, plan: ModelPlan, number: Rounder) -> tuple[list[Symbolic], AttitudeStates]:
-        context, plane = plan.scene.context, self._plane
         state, spin = hy.make_vars(ANGLE, SPIN)
         angle = 2.0**ANGLE_UNIT * state
-        axis = [as_factor(number(x)) for x in plane.axis]
-        base = [[as_factor(number(x)) for x in row] for row in attitude.rotation_matrix(plane.quaternion)]
-        about = _turn_about(plane.axis, angle, number)
+        axis = [as_factor(number(x)) for x in self._axis]
+        base = [[as_factor(number(x)) for x in row] for row in attitude.rotation_matrix(self._origin)]
+        about = _turn_about(self._axis, angle, number)
         half = 0.5 * angle
         c, s = hy.cos(half), hy.sin(half)
         quaternion = rotations.quaternion_product(
-            [as_factor(number(x)) for x in plane.quaternion], [c, *(x * s for x in axis)]
+            [as_factor(number(x)) for x in self._origin], [c, *(x * s for x in axis)]
         )
         states = AttitudeStates(
             [ANGLE],
             [2.0**-ANGLE_UNIT * spin],
-            [context.ldexp(plane.angle, -ANGLE_UNIT)],
+            [plan.scene.context.ldexp(self._angle, -ANGLE_UNIT)],
             rotations.multiply(base, about),
             quaternion,
             "wrapping",
@@ -120,7 +102,7 @@ class Planar(Formulation):
         return [x * spin for x in axis], states
 
     def blocks(self, m: Mechanics, plan: ModelPlan) -> list[StateBlock]:
-        states, axis, why = m.carried(m.attitude), self._plane.axis, plan.requirements.why["attitude"]
+        states, axis, why = m.carried(m.attitude), self._axis, plan.requirements.why["attitude"]
         spin = m.scene.context.ldexp(dot(m.scene.angular_velocity, axis), m.scaling.time)
         block = StateBlock(
             [*states.names, SPIN],
@@ -133,7 +115,7 @@ class Planar(Formulation):
 
     def _spin_equation(self, m: Mechanics) -> Symbolic:
         """Right-hand side of I_k spin' = torque . k, solved for spin'."""
-        axis, context = self._plane.axis, m.scene.context
+        axis, context = self._axis, m.scene.context
         moment = dot(axis, apply(m.numbers.inertia, axis))
         terms = []
         for vector, expression in m.torque:
@@ -143,8 +125,8 @@ class Planar(Formulation):
         return hy.sum(terms) if terms else hy.expression(0.0)
 
 
-def plane_of(scene: Scene, loads: Sequence[Load]) -> PlaneOfMotion:
-    """The plane that a motion stays in.
+def _plane_of(scene: Scene, loads: Sequence[Load]) -> tuple[Vector, Vector, Any]:
+    """Axis, origin and angle of a motion that stays in a plane.
 
     Raises:
         Unsuited: the motion isn't known to stay in a plane; says why.
@@ -168,7 +150,7 @@ def plane_of(scene: Scene, loads: Sequence[Load]) -> PlaneOfMotion:
         angle, turned = angle - 2 * context.pi, [-x for x in turned]
     elif angle <= -context.pi:
         angle, turned = angle + 2 * context.pi, [-x for x in turned]
-    return PlaneOfMotion(axis, normal, turned, angle)
+    return axis, turned, angle
 
 
 def _keeps(load: Load, scene: Scene, axis: Vector, normal: Vector) -> bool:
