@@ -36,28 +36,12 @@ def assemble_states(
         return assembled
     requirements, numbers = plan.requirements, plan.numbers
     rates, attitude = formulation.rotation(plan, number)
-    vertical = None
-    if attitude is not None and numbers.arm is not None:
-        vertical = numbers.vertical_of(attitude.matrix, number)
-    elif requirements.vertical:
-        vertical = list(hy.make_vars(*BODY.vertical))
     flies = requirements.flight
-    m = Mechanics(
-        plan.scene,
-        plan.scaling,
-        numbers,
-        rates,
-        attitude,
-        vertical,
-        list(hy.make_vars(*BODY.position)) if flies else None,
-        list(hy.make_vars(*BODY.velocity)) if flies else None,
-        number,
-        plan.orbit_tags,
-        plan.surfaces,
-        plan.tables,
-        plan.clocked,
-        loads=list(plan.loads),
-    )
+    m = Mechanics.built(
+        plan.scene, plan.scaling, numbers, rates, attitude, number,
+        vertical=requirements.vertical, flies=flies, loads=list(plan.loads), orbit_tags=plan.orbit_tags,
+        surfaces=plan.surfaces, tables=plan.tables, clocked=plan.clocked,
+    )  # fmt: skip
     blocks = formulation.blocks(m, plan)
     if flies:
         blocks.append(_flight_block(m, plan))

@@ -1,9 +1,10 @@
+# ruff: noqa: D102 (what a method gives is told by its protocol)
 """What a load may be able to do beside its torque, force and potential, one small protocol each.
 
 A load has a capability if it has its members; there is nothing to inherit or register. Who asks looks for it
 (``having``), and decides what a load without it means. Sizes from which scales are chosen are
 ``rigidsim.model.scaling.Sized``, ``Swift`` and ``BoundsFlight``; a load that carries angular momentum is a
-``rigidsim.model.carriers.Carrier``.
+``rigidsim.model.carriers.Carrier``. A member is None where a load of the kind doesn't have it after all.
 """
 
 from __future__ import annotations
@@ -33,42 +34,39 @@ def having(capability: type[C], loads: Iterable[object]) -> list[C]:
 
 @runtime_checkable
 class OnOrbit(Protocol):
-    """The prescribed orbit that its source moves on, or None; all loads on one orbit share its states."""
+    """Its source moves on a prescribed orbit; all loads on one orbit share its states."""
 
     orbit: KeplerOrbit | None
 
 
 @runtime_checkable
 class OnTable(Protocol):
-    """The tabulated orbit of its source, or None; loads on it share its states likewise."""
+    """Its source moves on a tabulated orbit, whose states are shared likewise."""
 
     table: TabulatedOrbit | None
 
 
 @runtime_checkable
 class Corotating(Protocol):
-    """A circular orbit in a fixed plane in whose frame its potential rests, or None: then there is Jacobi's
-    constant.
-    """
+    """Its potential rests in the frame of a circular orbit in a fixed plane: there is Jacobi's constant."""
 
     corotating_orbit: KeplerOrbit | None
 
 
 @runtime_checkable
 class Sourced(Protocol):
-    """A source whose direction is known if ``has_source``; nadir, roll and libration count from it."""
+    """If ``has_source``, the unit vector towards its source is known (body axes); nadir, roll and libration
+    count from it.
+    """
 
     has_source: bool
 
-    def source_direction(self, m: Kinematics) -> list[Symbolic] | None:
-        """Unit vector towards the source, body axes."""
+    def source_direction(self, m: Kinematics) -> list[Symbolic] | None: ...
 
 
 @runtime_checkable
 class InPlane(Protocol):
-    """Plane in which its source moves, or the body about its source, where that isn't the one of ``orbit``,
-    ``table`` or ``attracting_point``.
-    """
+    """Its source moves in a plane, or the body about its source, beside those of orbits and points."""
 
     plane: OrbitPlane | None
 
@@ -82,37 +80,37 @@ class WithoutPlane(Protocol):
 
 @runtime_checkable
 class Attracting(Protocol):
-    """Centre (mpf, m, space axes) to which its force always points."""
+    """Its force always points to a centre (mpf, m, space axes)."""
 
     attracting_point: Vector
 
 
 @runtime_checkable
 class AtRest(Protocol):
-    """A source at rest in space."""
+    """Its source is at rest in space: 3 G M / R^3 (mpf, 1/s^2), and the unit vector to it in space axes."""
 
-    def fixed_source(self, scene: Scene) -> tuple[Any, Vector] | None:
-        """3 G M / R^3 (mpf, 1/s^2) and unit vector (space axes); None if it moves after all."""
+    def fixed_source(self, scene: Scene) -> tuple[Any, Vector] | None: ...
 
 
 @runtime_checkable
 class GradientAlone(Protocol):
-    """Nothing but the gravity gradient of a distant body; None if that one isn't at a known place."""
+    """It is nothing but the gravity gradient of a distant body; None if that one isn't at a known place."""
 
     gradient_source: GradientSource | None
 
 
 @runtime_checkable
 class Reacting(Protocol):
-    """A source that is one of the point masses besides the body, and may feel it."""
+    """Its source is one of the point masses besides the body: accelerations that the body causes on them, as
+    ``PointMassStates.react`` takes them.
+    """
 
-    def reaction(self, m: Kinematics) -> list[tuple[int, Any, list[Symbolic]]]:
-        """Accelerations that the body causes on them, as ``PointMassStates.react`` takes them."""
+    def reaction(self, m: Kinematics) -> list[tuple[int, Any, list[Symbolic]]]: ...
 
 
 @runtime_checkable
 class Ahead(Protocol):
-    """By how many seconds the time that it counts in is ahead of the scene's, which rounds it more."""
+    """The time that it counts in is ahead of the scene's, which rounds it more."""
 
     seconds_ahead: float
 
@@ -122,34 +120,32 @@ class Ahead(Protocol):
 
 @runtime_checkable
 class KeepsAxial(Protocol):
-    """It knows whether it has a torque about a symmetry axis; of others the vectors of the torque tell."""
+    """Whether it has no torque about an axis of symmetry (mpf, body axes); otherwise its vectors tell."""
 
-    def keeps_axial(self, m: Kinematics, axis: Vector) -> bool:
-        """Whether it has none about this axis of symmetry (mpf, body axes)."""
+    def keeps_axial(self, m: Kinematics, axis: Vector) -> bool: ...
 
 
 @runtime_checkable
 class KeepsPlane(Protocol):
-    """Its torque may stay along a principal axis about which alone the body turns."""
+    """Whether its torque stays along a principal axis about which alone the body turns (unit, mpf), ``axis``
+    in body and ``normal`` in space axes.
+    """
 
-    def keeps_plane(self, scene: Scene, axis: Vector, normal: Vector) -> bool:
-        """Whether it does along a unit ``axis`` in body axes (mpf), which is ``normal`` in space axes."""
+    def keeps_plane(self, scene: Scene, axis: Vector, normal: Vector) -> bool: ...
 
 
 @runtime_checkable
 class TurnsAbout(Protocol):
-    """It knows about which axes in space it has a torque; not asked where its potential tells more."""
+    """Whether it may have a torque about a unit axis in space (mpf); not asked where its potential tells."""
 
-    def turns_about(self, m: Kinematics, axis: Vector) -> bool:
-        """Whether it may have one about a unit axis (mpf)."""
+    def turns_about(self, m: Kinematics, axis: Vector) -> bool: ...
 
 
 @runtime_checkable
 class LinearPotential(Protocol):
-    """A torque a x R^T f, of the potential -a . R^T f."""
+    """Vectors a in body and f in space axes (mpf, SI) of a torque a x R^T f, of the potential -a . R^T f."""
 
-    def linear_potential(self, scene: Scene) -> tuple[Vector, Vector] | None:
-        """Vectors a in body and f in space axes (mpf, SI); None if it isn't so in this scene."""
+    def linear_potential(self, scene: Scene) -> tuple[Vector, Vector] | None: ...
 
 
 # --- how it acts ------------------------------------------------------------------------------------------
@@ -157,30 +153,27 @@ class LinearPotential(Protocol):
 
 @runtime_checkable
 class Damping(Protocol):
-    """A torque -c_i w_i about the body axes."""
+    """Coefficients c_i (mpf, kg m^2/s) of a torque -c_i w_i about the body axes."""
 
-    def damping(self) -> Vector | None:
-        """The coefficients c_i (mpf, kg m^2/s); None if it isn't one after all."""
+    def damping(self) -> Vector | None: ...
 
 
 @runtime_checkable
 class Narrow(Protocol):
-    """It changes abruptly where one of some arguments vanishes, such as (t - t0) / width of a pulse.
+    """Arguments around whose zeros it changes abruptly, such as (t - t0) / width of a pulse or a switch.
 
     They are dimensionless expressions of ``seconds(m)`` and the states. Steps chosen by the motion alone
     would pass over such a zero; with them they shorten on the way there.
     """
 
-    def narrow(self, m: Kinematics) -> list[Symbolic]:
-        """The arguments."""
+    def narrow(self, m: Kinematics) -> list[Symbolic]: ...
 
 
 @runtime_checkable
 class Rooted(Protocol):
-    """Roots in it have radicands that may touch zero, where no step may pass over the kink."""
+    """Radicands in it that may touch zero, where no step may pass over the kink."""
 
-    def roots(self, m: Kinematics) -> list[Symbolic]:
-        """The radicands."""
+    def roots(self, m: Kinematics) -> list[Symbolic]: ...
 
 
 @runtime_checkable

@@ -23,18 +23,12 @@ from rigidsim.scene.arithmetic import Vector, apply, cross, dot, negligible, nor
 
 @dataclass(frozen=True)
 class EquatorialTop:
-    """A symmetric heavy top whose centre of mass lies in its equatorial plane.
+    """A symmetric heavy top whose centre of mass lies in its equatorial plane."""
 
-    Attributes:
-        frame: e1 (towards the centre of mass), e2, e3 (the axis of symmetry), body axes, mpf.
-        equatorial, axial: the moments A = B and C, SI.
-        strength: M g l, J.
-    """
-
-    frame: list[Vector]
-    equatorial: Any
-    axial: Any
-    strength: Any
+    frame: list[Vector]  # e1, e2, e3, body axes (mpf)
+    equatorial: Any  # moments A = B, SI
+    axial: Any  # moment C
+    strength: Any  # M g l, J
 
 
 def equatorial_top(m: Mechanics) -> EquatorialTop | None:

@@ -36,7 +36,6 @@ from rigidsim.model.capabilities import (
 from rigidsim.model.load import Load
 from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.rotations import Symbolic, apply, transpose
-from rigidsim.model.two_part import as_factor
 from rigidsim.scene.arithmetic import Matrix, Vector, cross, dot, eigen, negligible, norm, parallel
 
 
@@ -212,7 +211,7 @@ def _squares(m: Mechanics) -> tuple[list[tuple[Any, Vector, Symbolic]], Symbolic
         s = context.ldexp(value, 2 * m.scaling.time)
         if abs(s) <= context.ldexp(max(values), 2 * m.scaling.time) * negligible(context):
             continue
-        d = apply(transpose(m.matrix), [as_factor(m.number(x)) for x in axis])
+        d = apply(transpose(m.matrix), m.fixed(axis))
         terms = [
             m.number(inertia[i][j]) * (d[i] * d[j]) for i in range(3) for j in range(3) if inertia[i][j] != 0
         ]

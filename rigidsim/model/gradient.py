@@ -10,7 +10,7 @@ import heyoka as hy
 from rigidsim.model.kinematics import Kinematics
 from rigidsim.model.load import Term
 from rigidsim.model.orbits.ephemeris import MEAN_DISTANCE, SourcePosition, source_position
-from rigidsim.model.orbits.point_mass_pair import PointMassPair
+from rigidsim.model.orbits.point_mass_states import PointMassPair
 from rigidsim.model.rotations import Symbolic, transpose
 from rigidsim.scene.arithmetic import Vector, cross, norm, unit_vectors
 from rigidsim.scene.epochs import J2000, Epoch
@@ -30,11 +30,8 @@ def tidal_range(scene: Scene, strength: Any, distance: Any) -> Any:
 def gradient_terms(
     m: Kinematics, direction: list[Symbolic], strength: Any, factor: Symbolic | None = None
 ) -> list[Term]:
-    """Torque 3 strength factor c x (I c) for a unit direction c in body axes (MacCullagh).
-
-    Args:
-        strength: constant part (mpf), which becomes one coefficient with the moments.
-        factor: its varying part, as an expression.
+    """Torque 3 strength factor c x (I c) for a unit direction c in body axes (MacCullagh): the constant
+    strength (mpf) becomes one coefficient with the moments, the factor is an expression.
     """
     inertia = m.numbers.inertia
     units = unit_vectors(m.scene.context)
@@ -54,25 +51,15 @@ def gradient_terms(
 
 @dataclass(frozen=True)
 class GradientSource:
-    """Position of a distant attracting body; exactly one of the five ways to give it is used.
+    """Position of a distant attracting body; exactly one of five ways says where it is."""
 
-    Attributes:
-        gravitational_parameter: m^3/s^2 (mpf).
-        orbit: Kepler orbit on which it moves.
-        table: tabulated orbit on which it moves.
-        position: fixed position, space axes, m (mpf).
-        ephemeris: name of its analytic series.
-        epoch: date of the scene's time 0, for the series.
-        pair: the point mass that it is, and the one that the body is.
-    """
-
-    gravitational_parameter: Any
+    gravitational_parameter: Any  # m^3/s^2 (mpf)
     orbit: KeplerOrbit | None = None
     table: TabulatedOrbit | None = None
-    position: Vector | None = None
-    ephemeris: str | None = None
-    epoch: Epoch | None = None
-    pair: PointMassPair | None = None
+    position: Vector | None = None  # at rest, space axes, m (mpf)
+    ephemeris: str | None = None  # name of its analytic series
+    epoch: Epoch | None = None  # date of the scene's time 0, for the series
+    pair: PointMassPair | None = None  # the point mass that it is, and the one that the body is
 
     def distance(self, context: Any) -> Any:
         """Semi-major axis (that of the start for a point mass, or else the least distance of one that isn't

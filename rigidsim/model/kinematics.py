@@ -5,7 +5,7 @@ One object serves all of them, in internal units; what a scene doesn't carry is 
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, TypeVar
@@ -16,9 +16,10 @@ from rigidsim.model.body import BODY, RotatingBody
 from rigidsim.model.orbits.kepler_states import OrbitStates, orbit_states
 from rigidsim.model.orbits.point_mass_states import PointMassStates
 from rigidsim.model.orbits.table_states import TablePlace, table_states
-from rigidsim.model.rotations import Symbolic, SymbolicMatrix, apply, transpose
+from rigidsim.model.rotations import Symbolic, SymbolicMatrix, apply, length, transpose
 from rigidsim.model.scaling import Rounder, ScaledNumbers, Scaling
 from rigidsim.model.state_blocks import AttitudeStates, StateBlock
+from rigidsim.model.two_part import as_factor
 from rigidsim.scene.arithmetic import Vector, dot, negligible
 from rigidsim.scene.expressions.tree import Node
 from rigidsim.scene.orbit_tables.pieces import TabulatedOrbit
@@ -63,7 +64,8 @@ class Kinematics:
     _orbits: dict[KeplerOrbit | TabulatedOrbit, OrbitStates] = field(
         default_factory=dict, init=False, repr=False
     )
-    _seen_vectors: list[list[Symbolic]] = field(default_factory=list, init=False, repr=False)
+    seen_so_far: list[list[Symbolic]] = field(default_factory=list, init=False, repr=False, compare=False)
+    """Results of ``seen``; some may be there several times."""
 
     @cached_property
     def sides(self) -> Mapping[Node, Symbolic]:
@@ -98,7 +100,7 @@ class Kinematics:
         inverse distance (1/length).
         """
         offset = self.offset_from(point)
-        inverse = 1.0 / hy.sqrt(hy.sum([x * x for x in offset]))
+        inverse = 1.0 / length(offset)
         return [x * inverse for x in offset], inverse
 
     def offset_from(self, point: Vector) -> list[Symbolic]:
@@ -109,16 +111,15 @@ class Kinematics:
             offset.append(x - self.number(shift) if shift != 0 else x)
         return offset
 
+    def fixed(self, vector: Vector) -> list[Symbolic]:
+        """A constant vector (mpf) as factors of expressions; exact zeros and ones vanish from products."""
+        return [as_factor(self.number(x)) for x in vector]
+
     def seen(self, space: list[Symbolic]) -> list[Symbolic]:
         """A vector of space axes that doesn't depend on how the body turns, in body axes."""
         found = apply(transpose(self.matrix), space)
-        self._seen_vectors.append(found)
+        self.seen_so_far.append(found)
         return found
-
-    @property
-    def seen_so_far(self) -> Sequence[list[Symbolic]]:
-        """Results of ``seen``; some may be there several times."""
-        return self._seen_vectors
 
     @property
     def marked(self) -> Vector | None:

@@ -84,11 +84,7 @@ class Load(SceneLoad):
 
 
 def own_loads(given: Iterable[Load] | None) -> tuple[Load, ...]:
-    """Loads given from Python.
-
-    Raises:
-        ConfigError: something else than loads was given, or one reads what no motion has.
-    """
+    """Loads given from Python, refused where they are something else, or read what no motion has."""
     if given is None:
         return ()
     if isinstance(given, Load | str | Mapping) or not isinstance(given, Iterable):
@@ -115,11 +111,7 @@ def own_loads(given: Iterable[Load] | None) -> tuple[Load, ...]:
 
 
 def torque_terms(load: Load, m: Kinematics) -> list[Term]:
-    """A load's torque, as ``Load.torque`` gives it.
-
-    Raises:
-        ConfigError: the load gave something else than terms.
-    """
+    """A load's torque, as ``Load.torque`` gives it; refused if that isn't terms."""
     return _checked(load, "torque", load.torque(m))
 
 

@@ -55,11 +55,7 @@ _CLOCK = "t_of_drive"
 
 
 def estimate_drive(scene: Scene, loads: Sequence[Load], requirements: Requirements) -> Drive | None:
-    """Estimate of what these loads can add to the motion; None without any.
-
-    Args:
-        loads: the loads of unknown size.
-    """
+    """Estimate of what these loads, whose size is unknown, can add to the motion; None without any."""
     if not loads:
         return None
     m = probe(scene, requirements, loads)
@@ -78,8 +74,7 @@ def estimate_drive(scene: Scene, loads: Sequence[Load], requirements: Requiremen
     rates = samples.of(m.rates)
     power = (turned.values * rates).sum(axis=0)
     if m.velocity is not None:
-        speeds = samples.of(m.velocity)
-        power = power + (pushed.values * speeds).sum(axis=0)
+        power = power + (pushed.values * samples.of(m.velocity)).sum(axis=0)
     if np.any(power != 0) and power.max() <= 0:  # damping only removes energy
         return Drive(context.zero, context.zero)
     heaviest = float(np.linalg.norm(inverse, 2))
@@ -97,9 +92,8 @@ def estimate_drive(scene: Scene, loads: Sequence[Load], requirements: Requiremen
         peak = pushed.peak(without_mean=speed > 0)
         room = 2.0 ** (scaling.length - scaling.speed - scaling.time)
         speed += min(pushed.most, _CYCLE * peak * pushed.period, float(np.sqrt(2 * peak * room)))
-    return Drive(
-        context.ldexp(context.mpf(energy), scaling.energy), context.ldexp(context.mpf(speed), scaling.speed)
-    )
+    sizes = ((energy, scaling.energy), (speed, scaling.speed))
+    return Drive(*(context.ldexp(context.mpf(value), exponent) for value, exponent in sizes))
 
 
 def probe(scene: Scene, requirements: Requirements, loads: Sequence[Load]) -> Mechanics:
@@ -109,14 +103,10 @@ def probe(scene: Scene, requirements: Requirements, loads: Sequence[Load]) -> Me
     states = list(hy.make_vars(*BODY.rates))
     rates = in_common_unit(states, numbers.rate_units, float)
     attitude = quaternion_states(scene, rates) if requirements.attitude else None
-    vertical = list(hy.make_vars(*BODY.vertical)) if requirements.vertical else None
-    if attitude is not None and numbers.arm is not None:
-        vertical = numbers.vertical_of(attitude.matrix, float)
-    position = list(hy.make_vars(*BODY.position)) if requirements.flight else None
-    velocity = list(hy.make_vars(*BODY.velocity)) if requirements.flight else None
-    return Mechanics(
-        scene, scaling, numbers, states, attitude, vertical, position, velocity, float, loads=list(loads)
-    )
+    return Mechanics.built(
+        scene, scaling, numbers, states, attitude, float,
+        vertical=requirements.vertical, flies=requirements.flight, loads=list(loads),
+    )  # fmt: skip
 
 
 def start_of(m: Mechanics, loads: Sequence[Load]) -> tuple[list[str], np.ndarray]:
@@ -142,16 +132,11 @@ def start_of(m: Mechanics, loads: Sequence[Load]) -> tuple[list[str], np.ndarray
 
 @dataclass(frozen=True)
 class _Sampled:
-    """A vector sampled over times and states, shape (3, times, states).
+    """A vector sampled over times and states."""
 
-    Attributes:
-        most: impulse that it would give if it always pointed the same way.
-        period: inverse rate of its explicit change in time; infinite if it has none.
-    """
-
-    values: np.ndarray
-    most: float
-    period: float
+    values: np.ndarray  # shape (3, times, states)
+    most: float  # impulse that it would give if it always pointed the same way
+    period: float  # inverse rate of its explicit change in time; infinite if it has none
 
     def peak(self, *, without_mean: bool) -> float:
         """Largest norm; with ``without_mean``, of the vector less its mean over the states."""
@@ -222,9 +207,8 @@ class _Samples:
         """
         means, size = values.mean(axis=2), np.sqrt((values**2).sum(axis=0).mean(axis=1))
         steps = np.diff(self._times)
-        total = np.concatenate(
-            [np.zeros((3, 1)), np.cumsum((means[:, 1:] + means[:, :-1]) / 2 * steps, axis=1)], axis=1
-        )
+        sums = np.cumsum((means[:, 1:] + means[:, :-1]) / 2 * steps, axis=1)
+        total = np.concatenate([np.zeros((3, 1)), sums], axis=1)
         spread = means[:, self._uniform].std(axis=1)
         noise = _NOISE * self._span * float(np.linalg.norm(spread)) / np.sqrt(_TIMES)
         noise = max(noise, _LASTING * float(np.trapezoid(size, self._times)))
@@ -240,9 +224,8 @@ class _Samples:
             for _ in range(_NEWTON):
                 value, slope = argument(at, self._states[:, :1])[:, :, 0]
                 moves = slope != 0
-                at = at - np.clip(
-                    np.where(moves, value / np.where(moves, slope, 1), 0), -self._span, self._span
-                )
+                step = np.where(moves, value / np.where(moves, slope, 1), 0)
+                at = at - np.clip(step, -self._span, self._span)
             zeros = np.sort(at[np.abs(argument(at, self._states[:, :1])[0, :, 0]) < 1])
             zeros = zeros[np.diff(zeros, prepend=-np.inf) > 1e-9 * self._span][:_MOST_PULSES]
             found += [zero + sign * self._span * _AROUND for zero in zeros for sign in (-1, 1)]

@@ -8,15 +8,17 @@ from typing import Any
 
 import heyoka as hy
 
+from rigidsim.model.body import BODY
 from rigidsim.model.capabilities import KeepsAxial, having, linear_potential_of
 from rigidsim.model.carriers import Carrier, inner_torque, momentum_terms
 from rigidsim.model.kinematics import Kinematics
 from rigidsim.model.load import Load, Term, force_terms, torque_terms
 from rigidsim.model.rotations import Symbolic, apply
-from rigidsim.model.scaling import exponent
-from rigidsim.model.two_part import as_factor
-from rigidsim.scene.arithmetic import Vector, dot, negligible, norm
+from rigidsim.model.scaling import Rounder, ScaledNumbers, Scaling, exponent
+from rigidsim.model.state_blocks import AttitudeStates
+from rigidsim.scene.arithmetic import Vector, across
 from rigidsim.scene.arithmetic import apply as multiply
+from rigidsim.scene.scene import Scene
 
 
 @dataclass(frozen=True)
@@ -24,6 +26,28 @@ class Mechanics(Kinematics):
     """Kinematics together with all acting loads: the quantities observables and invariants are written in."""
 
     loads: list[Load] = field(default_factory=list)
+
+    @classmethod
+    def built(
+        cls,
+        scene: Scene,
+        scaling: Scaling,
+        numbers: ScaledNumbers,
+        rates: list[Symbolic],
+        attitude: AttitudeStates | None,
+        number: Rounder,
+        *,
+        vertical: bool,
+        flies: bool,
+        **more: Any,
+    ) -> Mechanics:
+        """Those of given rates and attitude; the vertical, where needed, follows from that or has states."""
+        up = list(hy.make_vars(*BODY.vertical)) if vertical else None
+        if attitude is not None and numbers.arm is not None:
+            up = numbers.vertical_of(attitude.matrix, number)
+        position = list(hy.make_vars(*BODY.position)) if flies else None
+        velocity = list(hy.make_vars(*BODY.velocity)) if flies else None
+        return cls(scene, scaling, numbers, rates, attitude, up, position, velocity, number, **more)
 
     @property
     def turning_rate(self) -> Any | None:
@@ -58,7 +82,7 @@ class Mechanics(Kinematics):
     @property
     def figure_space(self) -> list[Symbolic]:
         """Vector along the figure axis, space axes; not normalized."""
-        return apply(self.matrix, [as_factor(self.number(x)) for x in self.scene.figure.pole])
+        return apply(self.matrix, self.fixed(self.scene.figure.pole))
 
     @property
     def spin_space(self) -> list[Symbolic]:
@@ -227,13 +251,6 @@ class Mechanics(Kinematics):
     def _spares(self, torque: list[Term], axis: Vector) -> bool:
         """Whether the vectors of a torque have no part along an axis of the body."""
         context = self.scene.context
-        tiny = negligible(context)
-        none = (
-            hy.expression(0.0),
-            hy.expression(self.number(context.zero)),
-        )  # zeros of two types aren't equal
-        return all(
-            abs(dot(vector, axis)) <= tiny * norm(context, vector)
-            for vector, expression in torque
-            if expression not in none
-        )
+        # zeros of two types aren't equal
+        none = (hy.expression(0.0), hy.expression(self.number(context.zero)))
+        return all(across(context, vector, axis) for vector, expression in torque if expression not in none)

@@ -16,7 +16,7 @@ from typing import Any
 import heyoka as hy
 
 from rigidsim.model.kinematics import Kinematics, seconds
-from rigidsim.model.rotations import Symbolic, constant
+from rigidsim.model.rotations import Symbolic, constant, unit
 from rigidsim.scene.arithmetic import Vector, cross, norm
 from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.orbit_tables.pieces import TabulatedOrbit
@@ -128,9 +128,7 @@ class FlightPlane(OrbitPlane):
     flown = True
 
     def normal(self, m: Kinematics) -> list[Symbolic]:
-        found = cross(m.offset_from(self.point), m.carried(m.velocity))
-        size = hy.sqrt(hy.sum([c * c for c in found]))
-        return [c / size for c in found]
+        return unit(cross(m.offset_from(self.point), m.carried(m.velocity)))
 
     def at_start(self, scene: Scene) -> Vector:
         if scene.position is None or scene.velocity is None:

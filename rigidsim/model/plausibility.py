@@ -54,10 +54,8 @@ def implied_strength(orbit: KeplerOrbit) -> float:
 
 
 def about_strength(given: ExactNumber, distance: float, where: str) -> Iterator[Caution]:
-    """A gravitational parameter without a unit that is a known body's in km^3/s^2.
-
-    Args:
-        distance: of the body, m, by which a known one is told from one of a scene without units.
+    """A gravitational parameter without a unit that is a known body's in km^3/s^2; the distance (m) tells
+    that from one of a scene without units.
     """
     body = _in_kilometres(float(given), distance) if given.assumed else None
     if body is not None:
@@ -139,11 +137,7 @@ def about_start(scene: Scene, body: KnownBody | None, place: Vector, velocity: V
 def about_orbit(
     table: Orbit, orbit: KeplerOrbit, strength: ExactNumber | None, where: str, scene: Scene
 ) -> Iterator[Caution]:
-    """A prescribed orbit: its units, its altitude, and its period.
-
-    Args:
-        table, strength: the orbit and G M as given; what isn't given follows from Kepler's third law.
-    """
+    """A prescribed orbit as given (``table``) and in numbers: its units, its altitude, and its period."""
     given, axis = table.semi_major_axis, float(orbit.semi_major_axis)
     assert given is not None
     if strength is None:
@@ -220,11 +214,7 @@ def _about_period(
 def about_spin(
     table: Orbit, orbit: KeplerOrbit, strength: ExactNumber, where: str, scene: Scene
 ) -> Iterator[Caution]:
-    """A spin about a principal axis along the normal of an orbit.
-
-    Args:
-        table, strength: the orbit and G M as given.
-    """
+    """A spin about a principal axis along the normal of an orbit, which is given as ``table``."""
     found, motion = _spin(scene, orbit), float(orbit.mean_motion)
     if found is None or not motion > 0:
         return

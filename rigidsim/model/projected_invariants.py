@@ -22,17 +22,11 @@ from rigidsim.model.system import System
 
 @dataclass(frozen=True)
 class ProjectedScalar:
-    """One scalar equation of a projected invariant.
+    """One scalar equation of a projected invariant, in internal units."""
 
-    Attributes:
-        name: name of the invariant that it belongs to.
-        expression: expression of the states, internal units.
-        scale: size that its drift is relative to, internal units (mpf).
-    """
-
-    name: str
+    name: str  # of the invariant that it belongs to
     expression: Symbolic
-    scale: Any
+    scale: Any  # size that its drift is relative to (mpf)
 
 
 # invariant: (another one that stands for it if present, why it needn't be projected itself)
@@ -67,11 +61,7 @@ def conserves(system: System) -> bool:
 
 
 def projected_invariants(system: System) -> tuple[list[ProjectedScalar], list[tuple[str, str]]]:
-    """Scalars to project, and (invariant, why) for the invariants that are not projected themselves.
-
-    Raises:
-        ConfigError: nothing is conserved.
-    """
+    """Scalars to project, and (invariant, why) for the invariants that are not projected themselves."""
     m = system.mechanics
     context = m.scene.context
     present = {invariant.name for invariant in system.invariants}

@@ -22,6 +22,22 @@ def _length(x: Symbolic, y: Symbolic) -> Symbolic:
     return hy.sqrt(x * x + y * y)
 
 
+def along(a: list[Symbolic], b: list[Symbolic]) -> Symbolic:
+    """Scalar product a . b."""
+    return hy.sum([x * y for x, y in zip(a, b, strict=True)])
+
+
+def length(vector: list[Symbolic]) -> Symbolic:
+    """Euclidean length."""
+    return hy.sqrt(hy.sum([x * x for x in vector]))
+
+
+def unit(vector: list[Symbolic]) -> list[Symbolic]:
+    """The vector divided by its length; NaN for zero."""
+    size = length(vector)
+    return [x / size for x in vector]
+
+
 def _never(_: Symbolic) -> bool:
     return False  # an expression has no value yet: Euler angles are not defined in their singularity
 

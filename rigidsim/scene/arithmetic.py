@@ -92,6 +92,11 @@ def cross(a: Vector, b: Vector) -> Vector:
     return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 
 
+def across(context: Any, a: Vector, axis: Vector) -> bool:
+    """Whether a vector is perpendicular to a unit axis, up to rounding; zero is."""
+    return bool(abs(dot(a, axis)) <= negligible(context) * norm(context, a))
+
+
 def parallel(context: Any, a: Vector, b: Vector) -> bool:
     """Whether two vectors lie on one line, up to rounding."""
     return bool(norm(context, cross(a, b)) <= norm(context, a) * norm(context, b) * negligible(context))

@@ -13,7 +13,7 @@ from rigidsim.model.averaged.orbit_terms import Ellipse, nutation, second_order
 from rigidsim.model.averaged.sources import Source
 from rigidsim.model.averaged.sources_seen import SourcesSeen
 from rigidsim.model.load import Load, Term
-from rigidsim.model.orbits.point_mass_pair import PointMassPair
+from rigidsim.model.orbits.point_mass_states import PointMassPair
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.two_part import as_factor
 from rigidsim.scene.arithmetic import cross, dot

@@ -22,7 +22,7 @@ from rigidsim.model.averaged.spectrum import orbit_harmonics
 from rigidsim.model.capabilities import gradient_source_of
 from rigidsim.model.gradient import GradientSource
 from rigidsim.model.load import Load
-from rigidsim.model.orbits.point_mass_pair import PointMassPair
+from rigidsim.model.orbits.point_mass_states import PointMassPair
 from rigidsim.scene.arithmetic import Vector, eccentric_anomaly, norm
 from rigidsim.scene.orbit_tables.pieces import AXIS, TabulatedOrbit
 from rigidsim.scene.orbits import KeplerOrbit

@@ -9,20 +9,29 @@ On a circular orbit x points forward. The normal is that of
 
 If there are several sources, the first in the config counts. (Hughes, Spacecraft Attitude Dynamics, 1986,
 ch. 9; Wertz, Spacecraft Attitude Determination and Control, 1978, ch. 2.)
+
+The frame that turns with a circular orbit has Jacobi's constant H = w . I w / 2 - n o . I w + U, with o the
+orbit's normal and n its mean motion. U may be that of any number of sources on circles of one plane and one
+period, plus any potential that the frame's turning doesn't change, such as that of a uniform field along o.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from functools import reduce
+from operator import add
 
 import heyoka as hy
 
-from rigidsim.model.capabilities import Sourced, fixed_source_of, has_source, plane_of
+from rigidsim.model.capabilities import Sourced, corotating_orbit_of, fixed_source_of, has_source, plane_of
+from rigidsim.model.fixed_axes import keeps, parallel
 from rigidsim.model.load import Load, loads_of
 from rigidsim.model.mechanics import Mechanics
-from rigidsim.model.rotations import Symbolic, apply, transpose
+from rigidsim.model.rotations import Symbolic, along, apply, transpose, unit
+from rigidsim.model.two_part import as_factor
 from rigidsim.scene.arithmetic import cross, norm
+from rigidsim.scene.orbits import KeplerOrbit
 from rigidsim.scene.scene import Scene
 
 _SLOW = 2
@@ -31,17 +40,11 @@ _SLOW = 2
 
 @dataclass(frozen=True)
 class LocalFrame:
-    """Axes of the local frame as unit vectors in body axes.
+    """Axes of the local frame as unit vectors in body axes."""
 
-    Attributes:
-        down: z, towards the source.
-        normal: the orbit's normal, -y.
-        described: what the source and the normal are.
-    """
-
-    down: list[Symbolic]
-    normal: list[Symbolic]
-    described: str
+    down: list[Symbolic]  # z, towards the source
+    normal: list[Symbolic]  # the orbit's, -y
+    described: str  # what the source and the normal are
 
     @property
     def forward(self) -> list[Symbolic]:
@@ -91,7 +94,41 @@ def _normal(m: Mechanics, load: Load, down: list[Symbolic]) -> tuple[list[Symbol
     if fixed is not None and all(x == 0 for x in fixed[1][:2]):
         which, described = 0, "space X as the normal"
     pole = m.matrix[which]
-    part = hy.sum([a * b for a, b in zip(pole, down, strict=True)])
-    across = [a - part * b for a, b in zip(pole, down, strict=True)]
-    size = hy.sqrt(hy.sum([x * x for x in across]))
-    return [x / size for x in across], described
+    part = along(pole, down)
+    return unit([a - part * b for a, b in zip(pole, down, strict=True)]), described
+
+
+# --- the frame that turns with a circular orbit -------------------------------------------------------------
+
+
+def rotating_orbit(m: Mechanics) -> KeplerOrbit | None:
+    """An orbit with whose frame all potentials turn; None if there is none."""
+    orbits = [orbit for load in m.turning if (orbit := corotating_orbit_of(load)) is not None]
+    if not orbits or m.driven_within:
+        return None
+    context, first = m.scene.context, orbits[0]
+    normal = first.normal(context)
+    if not all(
+        orbit.mean_motion == first.mean_motion and parallel(context, normal, orbit.normal(context))
+        for orbit in orbits[1:]
+    ):
+        return None
+    others = [load for load in m.turning if corotating_orbit_of(load) is None]
+    if not all(load.conservative for load in others) or not keeps(m, normal, others):
+        return None
+    return first
+
+
+def jacobi_constant(m: Mechanics) -> Symbolic:
+    """H, internal units of energy."""
+    orbit, context = m.carried(rotating_orbit(m)), m.scene.context
+    motion = context.ldexp(orbit.mean_motion, m.scaling.time)
+    if m.attitude is not None and m.attitude.orbital is not None:
+        factor = as_factor(m.number(motion))
+        normal_body = m.attitude.orbital.normal
+        carried = [factor * (o * x) for o, x in zip(normal_body, m.momentum_body, strict=True)]
+    else:
+        pairs = zip(orbit.normal(context), m.momentum_space, strict=True)
+        carried = [m.number(motion * o) * x for o, x in pairs if o != 0]
+    potentials = [m.carried(load.potential(m)) for load in m.turning]
+    return m.rotational_energy - hy.sum(carried) + reduce(add, potentials)

@@ -14,15 +14,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-import heyoka as hy
-
 from rigidsim.errors import ConfigError, Problem
 from rigidsim.model.capabilities import WithoutPlane, having, plane_of
 from rigidsim.model.load import Load
 from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.orbit_planes import OrbitPlane
-from rigidsim.model.rotations import Symbolic
-from rigidsim.model.two_part import as_factor
+from rigidsim.model.rotations import Symbolic, along
 from rigidsim.scene.arithmetic import Vector, cross
 from rigidsim.scene.frame import ORBIT
 from rigidsim.scene.scene import Scene
@@ -30,33 +27,20 @@ from rigidsim.scene.scene import Scene
 
 @dataclass(frozen=True)
 class ReferencePlane:
-    """Reference plane as right-handed unit vectors, space axes.
+    """Reference plane as right-handed unit vectors, space axes."""
 
-    Attributes:
-        first: direction from which longitudes count.
-        normal: direction from which obliquities count.
-        described: which plane it is.
-    """
-
-    first: list[Symbolic]
+    first: list[Symbolic]  # from which longitudes count
     second: list[Symbolic]
-    normal: list[Symbolic]
-    described: str
+    normal: list[Symbolic]  # from which obliquities count
+    described: str  # which plane it is
 
     def components(self, vector: list[Symbolic]) -> list[Symbolic]:
         """Components along the plane's axes of a vector in space axes."""
-        return [
-            hy.sum([a * b for a, b in zip(axis, vector, strict=True)])
-            for axis in (self.first, self.second, self.normal)
-        ]
+        return [along(axis, vector) for axis in (self.first, self.second, self.normal)]
 
 
 def refuse_without_plane(scene: Scene, loads: Sequence[Load]) -> None:
-    """Refuse a scene that lacks the plane named by ``[frame] reference``.
-
-    Raises:
-        ConfigError: "orbit" in a scene without one.
-    """
+    """Refuse a scene that lacks the plane named by ``[frame] reference``."""
     if scene.reference is None:
         _orbit_plane(loads)
 
@@ -67,11 +51,7 @@ def flies_in_plane(scene: Scene, loads: Sequence[Load]) -> bool:
 
 
 def reference_plane(m: Mechanics) -> ReferencePlane:
-    """The plane named by ``[frame] reference``.
-
-    Raises:
-        ConfigError: "orbit" in a scene without one.
-    """
+    """The plane named by ``[frame] reference``."""
     scene, context = m.scene, m.scene.context
     if scene.reference is not None:
         described = "XY plane of the space axes"
@@ -115,7 +95,7 @@ def fixed_plane(m: Mechanics, normal: Vector, described: str) -> ReferencePlane:
     level = x == 0 and y == 0
     first = [one, zero, zero] if level else [one - x * x / (1 + z), -x * y / (1 + z), -x]
     axes = (first, cross(normal, first), normal)
-    first, second, normal = ([as_factor(m.number(a)) for a in axis] for axis in axes)
+    first, second, normal = map(m.fixed, axes)
     return ReferencePlane(first, second, normal, described)
 
 

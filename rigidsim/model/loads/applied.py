@@ -51,6 +51,10 @@ Formula = Annotated[
 ]
 
 
+def _axes(default: str) -> Any:
+    return Field(default=default, description="axes of the components: body or space")
+
+
 class TorqueFields(LoadFields):
     """A torque as expressions of t, the state and [parameters], N m."""
 
@@ -59,9 +63,7 @@ class TorqueFields(LoadFields):
         description="in N m: expressions of t, the state and [parameters], or numbers",
         examples=[["0", "0", "k*sin(t)^2"]],
     )
-    frame: Literal["body", "space"] = Field(
-        default="body", description="axes of the components: body or space"
-    )
+    frame: Literal["body", "space"] = _axes("body")
 
 
 class ForceFields(LoadFields):
@@ -74,9 +76,7 @@ class ForceFields(LoadFields):
         description="in N: expressions of t, the state and [parameters], or numbers",
         examples=[["0", "0", "-c*vz"]],
     )
-    frame: Literal["body", "space"] = Field(
-        default="space", description="axes of the components: body or space"
-    )
+    frame: Literal["body", "space"] = _axes("space")
     point: Triple[Metre] | None = Field(
         default=None,
         description="point of application, in body axes from the reference point; by default the centre "
@@ -87,23 +87,14 @@ class ForceFields(LoadFields):
 
 @dataclass(frozen=True)
 class Applied(Load):
-    """A torque or a force given by expressions; its work is integrated, since it need have no potential.
+    """A torque or a force given by expressions; its work is integrated, since it need have no potential."""
 
-    Attributes:
-        unit: SI unit of the components.
-        components: components of the torque (N m) or force (N).
-        frame: axes of the components, "body" or "space".
-        arm: from the reference point to the force's point of application, body axes, m (mpf).
-        pushes: whether it accelerates the centre of mass.
-        number: place in the config, for messages.
-    """
-
-    unit: ClassVar[str]
+    unit: ClassVar[str]  # of the components, SI
     components: tuple[Expression, Expression, Expression]
-    frame: str
-    arm: Vector
-    pushes: bool
-    number: int
+    frame: str  # axes of the components, "body" or "space"
+    arm: Vector  # from the reference point to the force's point, body axes, m (mpf)
+    pushes: bool  # whether it accelerates the centre of mass
+    number: int  # place in the config, for messages
 
     @classmethod
     def resolve(cls, fields: Any, around: Surroundings) -> Applied:
@@ -157,7 +148,11 @@ class Applied(Load):
     def _effect(self, scene: Scene, found: Vector) -> str:
         """What a torque or force of this size at the start would do, in words."""
         context = scene.context
-        turning = found if self.title == "torque" else self._moment(scene, found)
+        turning = found
+        if self.title == "force":
+            if self.frame == "space":
+                turning = apply_numbers(transposed(rotation_matrix(scene.quaternion)), found)
+            turning = cross(self.arm, turning)
         size = norm(context, turning)
         momentum = norm(context, apply_numbers(scene.body.inertia, scene.angular_velocity))
         said = ""
@@ -169,24 +164,16 @@ class Applied(Load):
             said += f", which in {span_words(momentum / size)} would add up to the angular momentum"
         return said
 
-    def _moment(self, scene: Scene, force: Vector) -> Vector:
-        """Torque arm x force, body axes."""
-        if self.frame == "space":
-            force = apply_numbers(transposed(rotation_matrix(scene.quaternion)), force)
-        return cross(self.arm, force)
-
     def _in_body(self, m: Kinematics) -> list[Symbolic]:
         found = self._heyoka(m, self.components)
         return apply(transpose(m.matrix), found) if self.frame == "space" else found
 
     def linear_potential(self, scene: Scene) -> tuple[Vector, Vector] | None:
         """Arm and force, if the force is constant in space; None otherwise."""
-        roots = [component.root for component in self.components]
-        if self.title != "force" or self.frame != "space":
+        found = [x.root.value for x in self.components if isinstance(x.root, Constant)]
+        if self.title != "force" or self.frame != "space" or len(found) < 3:
             return None
-        if not all(isinstance(root, Constant) for root in roots):
-            return None
-        return self.arm, [root.value.at(scene.context) for root in roots]  # type: ignore[union-attr]
+        return self.arm, [value.at(scene.context) for value in found]
 
     def turns_about(self, m: Kinematics, axis: Vector) -> bool:
         """Whether it may have a torque about the axis, as far as components in space axes tell: a torque has
@@ -195,9 +182,8 @@ class Applied(Load):
         if self.frame != "space":
             return True
         acting = [not _vanishes(component) for component in self.components]
-        if self.title == "torque":
-            return any(a and n != 0 for a, n in zip(acting, axis, strict=True))
-        return any(a and abs(n) != 1 for a, n in zip(acting, axis, strict=True))
+        turns = (lambda n: n != 0) if self.title == "torque" else (lambda n: abs(n) != 1)
+        return any(a and turns(n) for a, n in zip(acting, axis, strict=True))
 
     def narrow(self, m: Kinematics) -> list[Symbolic]:
         return self._parts(m, narrow_parts)

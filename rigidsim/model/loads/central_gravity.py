@@ -21,6 +21,7 @@ from rigidsim.scene.arithmetic import Vector, cross, norm, unit_vectors
 from rigidsim.scene.exact import ZERO
 from rigidsim.scene.fields import GravitationalParameter, Metre, Triple
 from rigidsim.scene.orbits import Orbit, attracting_body
+from rigidsim.scene.point_masses import closest
 from rigidsim.scene.registry import LoadFields, Surroundings, register_load
 from rigidsim.scene.scene import Scene
 from rigidsim.store.summary_parts import Caution
@@ -49,14 +50,10 @@ class CentralGravityFields(LoadFields):
 @register_load
 @dataclass(frozen=True)
 class CentralGravity(PointAttraction):
-    """A point at rest that attracts a free body.
-
-    Attributes:
-        position: position of the point, space axes, m (mpf).
-    """
+    """A point at rest that attracts a free body."""
 
     gravitational_parameter: Any
-    position: Vector
+    position: Vector  # space axes, m (mpf)
     Fields = CentralGravityFields
     title = "central_gravity"
     described = "a central-gravity load"
@@ -84,13 +81,9 @@ class CentralGravity(PointAttraction):
     def check(self, number: int, position: Vector | None) -> None:
         where = f"[[loads]] number {number + 1} kind"
         if position is None:
-            raise ConfigError(
-                Problem(
-                    where,
-                    'given "central_gravity" for a body without a position; give [initial] position and '
-                    'velocity, or use "gravity_gradient" for a prescribed orbit',
-                )
-            )
+            what = 'given "central_gravity" for a body without a position; give [initial] position and '
+            what += 'velocity, or use "gravity_gradient" for a prescribed orbit'
+            raise ConfigError(Problem(where, what))
         if position == self.position:
             raise ConfigError(Problem(where, "the body starts at the attracting point; start it elsewhere"))
 
@@ -115,42 +108,33 @@ class CentralGravity(PointAttraction):
 
     # --- estimates, from the Kepler orbit through the initial state --------------------------------------
 
-    def _relative(self, scene: Scene) -> tuple[Vector, Any]:
+    def _start(self, scene: Scene) -> tuple[Vector, Any, Any]:
+        """Position from the point (m), distance, and energy over mass (m^2/s^2) at the start."""
         assert scene.position is not None
         assert scene.velocity is not None
+        context = scene.context
         offset = [x - a for x, a in zip(scene.position, self.position, strict=True)]
-        return offset, norm(scene.context, scene.velocity)
+        distance = norm(context, offset)
+        return offset, distance, norm(context, scene.velocity) ** 2 / 2 - self.strength / distance
 
     def nearest_approach(self, scene: Scene) -> Any:
         """Pericentre distance, m: at least a thousandth of the initial distance, since a scale must not
         vanish for a plunging orbit.
         """
-        context = scene.context
-        offset, speed = self._relative(scene)
-        distance = norm(context, offset)
-        momentum = norm(context, cross(offset, scene.velocity or offset))
-        strength = self.gravitational_parameter
-        energy = speed**2 / 2 - strength / distance
-        e = context.sqrt(max(1 + 2 * energy * momentum**2 / strength**2, context.zero))
-        pericentre = momentum**2 / strength / (1 + e)
-        return max(min(pericentre, distance), distance / 1000)
+        return closest(scene.context, self._start(scene)[0], scene.velocity or [], self.strength)[0]
 
     def amplitude(self, scene: Scene) -> Any:
         return tidal_range(scene, self.gravitational_parameter, self.nearest_approach(scene))
 
     def fastest_rate(self, scene: Scene) -> Any:
-        offset, _ = self._relative(scene)
-        assert scene.velocity is not None
-        momentum = norm(scene.context, cross(offset, scene.velocity))
+        momentum = norm(scene.context, cross(self._start(scene)[0], scene.velocity or []))
         return momentum / self.nearest_approach(scene) ** 2
 
     def flight_bounds(self, scene: Scene, fed: Any) -> tuple[Any, Any]:
         context, strength = scene.context, self.gravitational_parameter
         assert scene.position is not None
         horizon = scene.end - scene.start
-        offset, speed = self._relative(scene)
-        distance = norm(context, offset)
-        energy = speed**2 / 2 - strength / distance
+        _, distance, energy = self._start(scene)
         swiftest = context.sqrt(2 * abs(energy + strength / self.nearest_approach(scene)))
         if energy < 0:
             farthest = strength / -energy  # twice the semi-major axis
@@ -160,10 +144,9 @@ class CentralGravity(PointAttraction):
 
     def told(self, scene: Scene) -> str:
         context, strength = scene.context, self.gravitational_parameter
-        offset, speed = self._relative(scene)
-        distance = norm(context, offset)
+        _, distance, energy = self._start(scene)
         source = f"{source_text(strength)}, {reach_text(strength, distance)} at the start"
-        energy, least = speed**2 / 2 - strength / distance, self.nearest_approach(scene)
+        least = self.nearest_approach(scene)
         path = f"unbound, no nearer than {length_text(float(least))}"
         if energy < 0:
             axis = -strength / (2 * energy)
@@ -174,8 +157,6 @@ class CentralGravity(PointAttraction):
     def cautions(self, fields: CentralGravityFields, where: str, scene: Scene) -> Iterator[Caution]:
         given = fields.gravitational_parameter
         assert given is not None
-        assert scene.velocity is not None
-        offset, _ = self._relative(scene)
-        distance = float(norm(scene.context, offset))
-        yield from about_strength(given, distance, where)
-        yield from about_start(scene, attracting(given, distance), offset, scene.velocity)
+        offset, distance, _ = self._start(scene)
+        yield from about_strength(given, float(distance), where)
+        yield from about_start(scene, attracting(given, float(distance)), offset, scene.velocity or [])

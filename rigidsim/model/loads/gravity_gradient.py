@@ -23,7 +23,7 @@ from rigidsim.model.orbits.kepler_states import OrbitStates
 from rigidsim.model.plausibility import about_distance, about_orbit, about_spin, about_strength, attracting
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.two_part import as_factor
-from rigidsim.scene.arithmetic import Vector, dot, negligible, norm, parallel
+from rigidsim.scene.arithmetic import Vector, across, norm, parallel
 from rigidsim.scene.epochs import J2000, Epoch
 from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.fields import GravitationalParameter, Metre, Triple
@@ -165,7 +165,7 @@ class GravityGradient(Load):
             return m.seen(moving.direction)
         assert self.position is not None
         length = norm(m.scene.context, self.position)
-        return m.seen([as_factor(m.number(x / length)) for x in self.position])
+        return m.seen(m.fixed([x / length for x in self.position]))
 
     def strength(self, m: Kinematics) -> tuple[Any, Symbolic | None]:
         """G M / R^3 in internal units: the value at a constant distance (mpf), and the factor by which it
@@ -207,8 +207,7 @@ class GravityGradient(Load):
             return False
         length = norm(scene.context, self.position)
         direction = [x / length for x in self.position]
-        across = abs(dot(direction, normal)) <= negligible(scene.context)
-        return across or parallel(scene.context, direction, normal)
+        return across(scene.context, direction, normal) or parallel(scene.context, direction, normal)
 
     def fixed_source(self, scene: Scene) -> tuple[Any, Vector] | None:
         """See ``Load``: the source, if it is at rest."""

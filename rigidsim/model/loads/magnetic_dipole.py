@@ -19,8 +19,7 @@ from rigidsim.model.load_words import length_text, orbit_text, value_text
 from rigidsim.model.loads.central_gravity import CentralGravity
 from rigidsim.model.plausibility import about_orbit, implied_strength
 from rigidsim.model.rotations import Symbolic
-from rigidsim.model.two_part import as_factor
-from rigidsim.scene.arithmetic import Vector, cross, dot, negligible, norm, unit_vectors
+from rigidsim.scene.arithmetic import Vector, across, cross, norm, unit_vectors
 from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.fields import GravitationalParameter, InUnit, Metre, Triple
 from rigidsim.scene.orbits import KeplerOrbit, Orbit, resolve_orbit
@@ -149,11 +148,7 @@ class MagneticDipole(Load):
         return scene.context.mpf(_FIELD_CONSTANT) * size / far**3
 
     def _centre(self, scene: Scene) -> Vector:
-        """Position of the dipole about which the body flies, m.
-
-        Raises:
-            ConfigError: it isn't given, and there isn't exactly one attracting point.
-        """
+        """Position of the dipole about which the body flies, m; refused if it isn't told."""
         if self.place:
             return self.place
         points = [load.attracting_point for load in having(Attracting, loads_of(scene))]
@@ -177,7 +172,7 @@ class MagneticDipole(Load):
     def _field(self, m: Kinematics) -> list[Symbolic]:
         """Field B divided by ``_size``, body axes."""
         length = norm(m.scene.context, self.source)
-        unit = [as_factor(m.number(x / length)) for x in self.source]
+        unit = m.fixed([x / length for x in self.source])
         if self.uniform:
             return m.seen(unit)
         if self.orbit is None:
@@ -201,9 +196,8 @@ class MagneticDipole(Load):
 
     def keeps_plane(self, scene: Scene, axis: Vector, normal: Vector) -> bool:
         """Whether moment and field are both perpendicular to the axis, in a uniform field."""
-        pairs = ((self.moment, axis), (self.source, normal))
-        tiny, context = negligible(scene.context), scene.context
-        return self.uniform and all(abs(dot(v, n)) <= tiny * norm(context, v) for v, n in pairs)
+        context = scene.context
+        return self.uniform and across(context, self.moment, axis) and across(context, self.source, normal)
 
     def potential(self, m: Kinematics) -> Symbolic | None:
         pairs = zip(self._moment(m), self._field(m), strict=True)
@@ -250,11 +244,7 @@ def _numbers(values: list[ExactNumber], around: Surroundings) -> Vector:
 
 
 def _refuse_contradictions(fields: MagneticDipoleFields, around: Surroundings) -> None:
-    """Require one field: uniform, of a dipole along an orbit, or in flight of a dipole where the body is.
-
-    Raises:
-        ConfigError: says what to give.
-    """
+    """Require one field: uniform, of a dipole along an orbit, or in flight of a dipole where the body is."""
     host = around.bodies is not None and around.bodies.host is not None
     if fields.orbit is not None and (around.free_flight or host):
         why = "is one of [[bodies]]; a uniform field is allowed"

@@ -10,8 +10,6 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
-import heyoka as hy
-
 from rigidsim.errors import ConfigError, Problem
 from rigidsim.model.gradient import GradientSource, tidal_range
 from rigidsim.model.kinematics import Kinematics
@@ -19,9 +17,9 @@ from rigidsim.model.load import Term
 from rigidsim.model.load_words import reach_text, source_text, value_text
 from rigidsim.model.loads.point_attraction import PointAttraction
 from rigidsim.model.orbit_planes import OrbitPlane
-from rigidsim.model.orbits.point_mass_pair import PointMassPair
+from rigidsim.model.orbits.point_mass_states import PointMassPair
 from rigidsim.model.plausibility import about_start, about_strength, attracting
-from rigidsim.model.rotations import Symbolic
+from rigidsim.model.rotations import Symbolic, length, unit
 from rigidsim.scene.arithmetic import Vector, cross, norm, unit_vectors
 from rigidsim.scene.point_masses import GRAVITATIONAL_CONSTANT, PointMasses, closest
 from rigidsim.scene.scene import Scene
@@ -32,15 +30,10 @@ _UNROLLED = 2
 
 @dataclass(frozen=True)
 class MovingSource(PointAttraction):
-    """A point mass that attracts the body.
+    """A point mass that attracts the body."""
 
-    Attributes:
-        masses: all point masses.
-        number: index of the one that attracts.
-    """
-
-    masses: PointMasses
-    number: int
+    masses: PointMasses  # all of them
+    number: int  # index of the one that attracts
 
     @property
     def described(self) -> str:  # type: ignore[override]
@@ -89,7 +82,7 @@ class MovingSource(PointAttraction):
 
     def seen(self, m: Kinematics) -> tuple[list[Symbolic], Symbolic]:
         place = self.place(m)
-        inverse = 1.0 / hy.sqrt(hy.sum([x * x for x in place]))
+        inverse = 1.0 / length(place)
         return [x * inverse for x in place], inverse
 
     def acceleration(self, m: Kinematics) -> list[Symbolic]:
@@ -217,9 +210,7 @@ class _OsculatingPlane(OrbitPlane):
     called = "normal of the osculating orbit"
 
     def normal(self, m: Kinematics) -> list[Symbolic]:
-        found = cross(self.source.place(m), self.source.motion(m))
-        size = hy.sqrt(hy.sum([c * c for c in found]))
-        return [c / size for c in found]
+        return unit(cross(self.source.place(m), self.source.motion(m)))
 
     def at_start(self, scene: Scene) -> Vector:
         return cross(*self.source.start(scene))

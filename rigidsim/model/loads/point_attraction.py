@@ -84,11 +84,7 @@ class PointAttraction(Load):
 
 
 def positive_strength(given: Any, around: Surroundings) -> Any:
-    """A gravitational parameter, m^3/s^2 (mpf).
-
-    Raises:
-        ConfigError: it is missing or isn't positive.
-    """
+    """A gravitational parameter, m^3/s^2 (mpf); refused if it is missing or isn't positive."""
     if given is None:
         raise around.fault("gravitational_parameter", "missing; it is needed")
     if given.sign <= 0:

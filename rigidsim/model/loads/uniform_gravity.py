@@ -14,7 +14,8 @@ from rigidsim.model.kinematics import Kinematics
 from rigidsim.model.load import Load, Term
 from rigidsim.model.load_words import direction_text, value_text
 from rigidsim.model.rotations import Symbolic
-from rigidsim.scene.arithmetic import Vector, cross, dot, negligible, norm, unit_vectors
+from rigidsim.model.scaling import potential_amplitude
+from rigidsim.scene.arithmetic import Vector, across, cross, norm, unit_vectors
 from rigidsim.scene.exact import ExactNumber, parse_number
 from rigidsim.scene.fields import Acceleration, Triple
 from rigidsim.scene.registry import LoadFields, Surroundings, register_load
@@ -47,15 +48,10 @@ class UniformGravityFields(LoadFields):
 @register_load
 @dataclass(frozen=True)
 class UniformGravity(Load):
-    """The sum of all uniform fields: a torque com x M R^T g about a fixed point, or free fall.
+    """The sum of all uniform fields: a torque com x M R^T g about a fixed point, or free fall."""
 
-    Attributes:
-        acceleration: space axes, m/s^2 (mpf).
-        pivoted: whether it turns the body about a fixed point.
-    """
-
-    acceleration: Vector
-    pivoted: bool = False
+    acceleration: Vector  # space axes, m/s^2 (mpf)
+    pivoted: bool = False  # whether it turns the body about a fixed point
     Fields = UniformGravityFields
     title = "uniform_gravity"
     conservative = True
@@ -78,13 +74,8 @@ class UniformGravity(Load):
         return frozenset({"vertical"} if self.pivoted else ())
 
     def amplitude(self, scene: Scene) -> Any:
-        """M g l, half the range of the potential energy about a fixed point; zero in free fall, which exerts
-        no torque.
-        """
-        arm = scene.torque_arm
-        if arm is None:
-            return scene.context.zero
-        return norm(scene.context, arm) * norm(scene.context, self.acceleration)
+        """M g l, half the range of the potential energy about a fixed point; zero in free fall."""
+        return potential_amplitude(scene)
 
     def torque(self, m: Kinematics) -> list[Term]:
         """Torque of the weight about the fixed point, vertical x arm."""
@@ -114,18 +105,11 @@ class UniformGravity(Load):
         return hy.sum(terms) if terms else None
 
     def keeps_plane(self, scene: Scene, axis: Vector, normal: Vector) -> bool:
-        """Whether both the pull and its arm are perpendicular to the axis, so that the torque points along
-        it.
-        """
-        context, arm = scene.context, scene.torque_arm
-        if arm is None or all(x == 0 for x in arm):
+        """Whether pull and arm are perpendicular to the axis, so that the torque points along it."""
+        arm, pull = scene.torque_arm, self.acceleration
+        if arm is None or all(x == 0 for x in arm) or all(x == 0 for x in pull):
             return True
-        length, strength = norm(context, arm), norm(context, self.acceleration)
-        if strength == 0:
-            return True
-        tiny = negligible(context)
-        across = abs(dot(arm, axis)) <= tiny * length
-        return bool(across and abs(dot(self.acceleration, normal)) <= tiny * strength)
+        return across(scene.context, arm, axis) and across(scene.context, pull, normal)
 
     def linear_potential(self, scene: Scene) -> tuple[Vector, Vector] | None:
         """M com (body axes) and g (space axes) about a fixed point; None in free fall."""

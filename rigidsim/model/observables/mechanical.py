@@ -16,7 +16,7 @@ from rigidsim.model.drift_scales import (
     total_momentum_scale,
 )
 from rigidsim.model.euler_poles import Poles, angles_of_matrix, squared_factor
-from rigidsim.model.frames.rotating import jacobi_constant
+from rigidsim.model.frames.local import jacobi_constant
 from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.observables.observable import (
     BODY,

@@ -14,6 +14,7 @@ from typing import Any
 import heyoka as hy
 
 from rigidsim.model.euler_poles import Poles
+from rigidsim.model.frames.reference_plane import reference_plane
 from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.needs import NEEDS
 from rigidsim.model.rotations import Symbolic
@@ -173,3 +174,20 @@ def same_unit(exponent: Callable[[Mechanics], int], count: int) -> Callable[[Mec
 MOMENTUM = lambda m: m.scaling.momentum  # noqa: E731
 ENERGY = lambda m: m.scaling.energy  # noqa: E731
 NO_UNIT = lambda m: 0  # noqa: E731
+
+
+def told(
+    convention: str | Callable[[Mechanics], str], *, figure: bool = False, plane: bool = False
+) -> Callable[[Mechanics], Mapping[str, str]]:
+    """Attributes that tell readers a convention, and the figure axis and reference plane if it uses them."""
+
+    def attributes(m: Mechanics) -> dict[str, str]:
+        found = {"convention": convention if isinstance(convention, str) else convention(m)}
+        if figure:
+            pole = ", ".join(m.scene.context.nstr(x, 17) for x in m.scene.figure.pole)
+            found["figure_axis"] = f"{m.scene.figure.described}: [{pole}] in body axes"
+        if plane:
+            found["reference_plane"] = reference_plane(m).described
+        return found
+
+    return attributes

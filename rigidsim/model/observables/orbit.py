@@ -29,8 +29,7 @@ from rigidsim.model.observables.observable import (
     register_all,
     same_unit,
 )
-from rigidsim.model.observables.vectors import along, in_body
-from rigidsim.model.rotations import Symbolic
+from rigidsim.model.rotations import Symbolic, along
 from rigidsim.scene.frame import unique_axis
 
 ROLL_PITCH_YAW = ("roll_pitch_yaw_component",)
@@ -53,7 +52,7 @@ def roll_pitch_yaw(m: Mechanics) -> list[Angle]:
 def libration(m: Mechanics) -> list[Angle]:
     """Libration angles of the long axis, in the orbit's plane and out of it."""
     frame = local_frame(m)
-    axis = in_body(m, m.carried(unique_axis(m.scene.body, m.scene.context, largest=False)))
+    axis = m.fixed(m.carried(unique_axis(m.scene.body, m.scene.context, largest=False)))
     x, z = along(axis, frame.forward), along(axis, frame.down)
     return [Angle(x, z), Angle(along(axis, frame.normal), hy.sqrt(x * x + z * z))]
 

@@ -7,7 +7,7 @@ body's own, or is CODATA's.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import heyoka as hy
@@ -40,16 +40,8 @@ def _moving(m: Mechanics) -> list[tuple[Any, list[Symbolic], list[Symbolic], Vec
     body if it flies and the masses feel it.
     """
     states, masses = m.carried(m.point_masses), _masses(m)
-    found = list(
-        zip(
-            _kilograms(m),
-            states.positions,
-            states.velocities,
-            masses.positions,
-            masses.velocities,
-            strict=True,
-        )
-    )
+    states_, starts = (states.positions, states.velocities), (masses.positions, masses.velocities)
+    found = list(zip(_kilograms(m), *states_, *starts, strict=True))
     if masses.full and masses.host is None:
         start = m.carried(m.scene.position), m.carried(m.scene.velocity)
         found.append((m.carried(m.scene.body.mass), m.carried(m.position), m.carried(m.velocity), *start))
@@ -115,27 +107,30 @@ def _energy(m: Mechanics) -> list[Symbolic]:
 
 
 def _angular(m: Mechanics) -> list[Symbolic]:
-    context, scaling, unit = m.scene.context, m.scaling, _ANGULAR(m)
-    terms: list[list[Symbolic]] = [[], [], []]
-    for mass, place, velocity, _, _ in _moving(m):
-        factor = m.number(context.ldexp(mass, scaling.length + scaling.speed - unit))
-        for found, x in zip(terms, cross(place, velocity), strict=True):
-            found.append(factor * x)
+    scaling, unit = m.scaling, _ANGULAR(m)
+    terms = _summed(m, scaling.length + scaling.speed - unit, cross)
     if _masses(m).full:
-        own = m.number(context.ldexp(context.one, scaling.momentum - unit))
+        own = m.number(m.scene.context.ldexp(m.scene.context.one, scaling.momentum - unit))
         for found, x in zip(terms, m.momentum_space, strict=True):
             found.append(own * x)
     return [hy.sum(found) for found in terms]
 
 
 def _linear(m: Mechanics) -> list[Symbolic]:
-    context, scaling, unit = m.scene.context, m.scaling, _LINEAR(m)
-    terms: list[list[Symbolic]] = [[], [], []]
-    for mass, _, velocity, _, _ in _moving(m):
-        factor = m.number(context.ldexp(mass, scaling.speed - unit))
-        for found, v in zip(terms, velocity, strict=True):
-            found.append(factor * v)
+    terms = _summed(m, m.scaling.speed - _LINEAR(m), lambda place, velocity: velocity)
     return [hy.sum(found) for found in terms]
+
+
+def _summed(
+    m: Mechanics, exponent: int, of: Callable[[list[Symbolic], list[Symbolic]], list[Symbolic]]
+) -> list[list[Symbolic]]:
+    """Terms of each component of the sum of masses times a vector of place and velocity."""
+    terms: list[list[Symbolic]] = [[], [], []]
+    for mass, place, velocity, _, _ in _moving(m):
+        factor = m.number(m.scene.context.ldexp(mass, exponent))
+        for found, x in zip(terms, of(place, velocity), strict=True):
+            found.append(factor * x)
+    return terms
 
 
 def _flat(vectors: Sequence[list[Symbolic]]) -> list[Symbolic]:

@@ -28,8 +28,7 @@ from rigidsim.model.frames.reference_plane import plane_drift
 from rigidsim.model.load import Load
 from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.observables.observable import Steady
-from rigidsim.model.observables.vectors import along, in_body, length
-from rigidsim.model.rotations import constant
+from rigidsim.model.rotations import along, constant, length
 from rigidsim.model.scaling import loads_amplitude, source_rate
 from rigidsim.scene.arithmetic import apply, cross, dot, norm
 
@@ -88,17 +87,11 @@ def is_nearly_axial(m: Mechanics) -> bool:
 
 @dataclass(frozen=True)
 class _Bounds:
-    """Bounds of a steady rotation; moments in kg m^2, rates in rad/s (mpf).
+    """Bounds of a steady rotation; moments in kg m^2, rates in rad/s (mpf)."""
 
-    Attributes:
-        wobble: largest angle between momentum and figure axis, rad.
-        drift: bound of the rate at which the momentum's direction turns, and of a rate's change.
-        polar, equatorial: the moment about the figure axis, and the two others.
-    """
-
-    wobble: Any
-    drift: Any
-    polar: Any
+    wobble: Any  # largest angle between momentum and figure axis, rad
+    drift: Any  # of the rate at which the momentum's direction turns, and of a rate's change
+    polar: Any  # about the figure axis
     equatorial: tuple[Any, Any]
 
 
@@ -154,7 +147,7 @@ def steady_rotation(m: Mechanics) -> Steady | None:
     size = norm(context, apply(m.scene.body.inertia, m.scene.angular_velocity))
     equatorial, polar = (m.number(context.ldexp(x, inertia)) for x in (inverse, 1 / found.polar))
     total = length(m.momentum_body)
-    axial = along(in_body(m, m.scene.figure.pole), m.momentum_body)
+    axial = along(m.fixed(m.scene.figure.pole), m.momentum_body)
     axial = hy.sqrt(axial * axial)
     rate = equatorial * (total - axial) + polar * axial
     if apart:

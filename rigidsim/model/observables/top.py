@@ -12,8 +12,6 @@ takes Z to the vertical.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-
 import heyoka as hy
 
 from rigidsim.model.frames.reference_plane import fixed_plane
@@ -27,9 +25,9 @@ from rigidsim.model.observables.observable import (
     continuous_angles,
     register_all,
     same_unit,
+    told,
 )
-from rigidsim.model.observables.vectors import along, figure_told, in_body
-from rigidsim.model.rotations import Symbolic, apply
+from rigidsim.model.rotations import Symbolic, along, apply
 from rigidsim.scene.arithmetic import Vector
 
 
@@ -37,7 +35,7 @@ def _vertical(m: Mechanics) -> list[Symbolic]:
     """Components of the upward vertical along the figure's equator (two) and the figure axis."""
     figure = m.scene.figure
     up = m.carried(m.vertical)
-    return [along(in_body(m, axis), up) for axis in (figure.first, figure.second, figure.pole)]
+    return [along(m.fixed(axis), up) for axis in (figure.first, figure.second, figure.pole)]
 
 
 def tilt(m: Mechanics) -> list[Symbolic]:
@@ -74,7 +72,7 @@ def tip(m: Mechanics) -> list[Symbolic]:
     """Position of the tip point, space axes."""
     context, length = m.scene.context, _tip_exponent(m)
     point = [context.ldexp(x, -length) for x in m.carried(tip_point(m))]
-    turned = apply(m.matrix, in_body(m, point))
+    turned = apply(m.matrix, m.fixed(point))
     if m.position is None:
         return turned
     return [x + a for x, a in zip(m.position, turned, strict=True)]
@@ -98,10 +96,6 @@ def _traced(m: Mechanics) -> bool:
     return _is_top(m) or m.scene.config.output.tip is not None
 
 
-def _told(convention: str) -> Callable[[Mechanics], Mapping[str, str]]:
-    return lambda m: {"convention": convention} | figure_told(m)
-
-
 def _tip_told(m: Mechanics) -> dict[str, str]:
     point = tip_point(m)
     told = "" if point is None else ", ".join(m.scene.context.nstr(x, 17) for x in point)
@@ -111,21 +105,24 @@ def _tip_told(m: Mechanics) -> dict[str, str]:
 register_all(
     Observable(
         "tilt", (), "rad", "angle of the figure axis from the upward vertical", tilt, same_unit(NO_UNIT, 1),
-        "", ("vertical",), by_default=_is_top, attributes=_told("from 0, upright, to pi, hanging"),
+        "", ("vertical",), by_default=_is_top,
+        attributes=told("from 0, upright, to pi, hanging", figure=True),
     ),
     continuous_angles(
         "precession_angle", (), "precession of the figure axis about the vertical", precession_angle,
         frame="space axes", needs=("attitude", "vertical"), by_default=_is_top,
-        attributes=_told(
+        attributes=told(
             "of the line of nodes from the horizontal X, about the upward vertical; turns counted; NaN where "
-            "the figure axis is vertical"
+            "the figure axis is vertical",
+            figure=True,
         ),
     ),
     continuous_angles(
         "spin_angle", (), "rotation about the figure axis", spin_angle,
         needs=("attitude", "vertical"), by_default=_is_top,
-        attributes=_told(
-            "of the body from the line of nodes; turns counted; NaN where the figure axis is vertical"
+        attributes=told(
+            "of the body from the line of nodes; turns counted; NaN where the figure axis is vertical",
+            figure=True,
         ),
     ),
     Observable(

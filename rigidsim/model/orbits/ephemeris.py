@@ -22,15 +22,10 @@ _DAY = 86400.0
 
 @dataclass(frozen=True)
 class SourcePosition:
-    """A geocentric direction and distance.
+    """A geocentric direction and distance."""
 
-    Attributes:
-        direction: unit vector, space axes.
-        inverse_distance: mean distance over distance.
-    """
-
-    direction: list[Symbolic]
-    inverse_distance: Symbolic
+    direction: list[Symbolic]  # unit vector, space axes
+    inverse_distance: Symbolic  # mean distance over distance
 
 
 MEAN_DISTANCE = {"sun": 149597870700, "moon": 384400000}
@@ -38,12 +33,7 @@ MEAN_DISTANCE = {"sun": 149597870700, "moon": 384400000}
 
 
 def source_position(body: str, seconds: Symbolic) -> SourcePosition:
-    """Position of the Sun or the Moon.
-
-    Args:
-        body: "sun" or "moon".
-        seconds: time since J2000, as an expression of the engine's time.
-    """
+    """Position of the Sun ("sun") or the Moon ("moon") at a time in seconds since J2000, an expression."""
     if body == "sun":
         millennia = seconds * (1.0 / (_DAY * 365250.0))
         earth = hy.model.vsop2013_cartesian(3, time_expr=millennia, thresh=_THRESHOLD)

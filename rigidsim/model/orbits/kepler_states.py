@@ -24,53 +24,43 @@ from rigidsim.scene.orbits import KeplerOrbit
 
 @dataclass(frozen=True)
 class OrbitStates:
-    """The part of a system of equations that carries an orbit.
+    """The part of a system of equations that carries an orbit; vectors in space axes."""
 
-    Attributes:
-        block: the states; its norms stay 1, since each pair of states is a cosine and a sine.
-        direction: unit vector towards the attracting body, space axes.
-        normal: unit normal of the orbit's plane, space axes; the attracting body moves about it directly.
-        inverse_distance: semi-major axis over distance, 1 for a circle.
-    """
-
-    block: StateBlock
-    direction: list[Symbolic]
-    normal: list[Symbolic]
-    inverse_distance: Symbolic
+    block: StateBlock  # its norms stay 1, since each pair of states is a cosine and a sine
+    direction: list[Symbolic]  # unit vector towards the attracting body
+    normal: list[Symbolic]  # of the plane; the attracting body moves about it directly
+    inverse_distance: Symbolic  # semi-major axis over distance, 1 for a circle
 
 
 def orbit_states(
     orbit: KeplerOrbit, tag: str, time_unit: Any, start: Any, context: Any, number: Rounder
 ) -> OrbitStates:
-    """Carry a Kepler orbit as states.
-
-    Args:
-        tag: suffix that makes the states' names unique, such as "1".
-        time_unit: internal unit of time, seconds (mpf).
-        start: time of the run's start, seconds (mpf).
-    """
+    """Carry a Kepler orbit as states, whose names end with a tag; start and unit of time in s (mpf)."""
     names: list[str] = []
     derivatives: list[Symbolic] = []
     initial: list[Any] = []
     norms: list[Symbolic] = []
 
+    def constant(value: Any) -> Symbolic:
+        return as_factor(number(value))  # exact 0 and 1 vanish from products
+
     def pair(name: str, angle: Any, rate: Symbolic | None) -> tuple[Symbolic, Symbolic]:
         """Cosine and sine of an angle: constants if it is fixed, two states if it moves."""
         if rate is None:
-            return _constant(context.cos(angle), number), _constant(context.sin(angle), number)
+            return constant(context.cos(angle)), constant(context.sin(angle))
         c, s = hy.make_vars(f"cos_{name}{tag}", f"sin_{name}{tag}")
-        names.extend((f"cos_{name}{tag}", f"sin_{name}{tag}"))
+        names.extend((str(c), str(s)))
         derivatives.extend((-(rate * s), rate * c))
         initial.extend((context.cos(angle), context.sin(angle)))
         norms.append(hy.sqrt(c * c + s * s))
         return c, s
 
     def uniform(rate: Any) -> Symbolic | None:
-        return None if rate == 0 else as_factor(number(rate * time_unit))
+        return None if rate == 0 else constant(rate * time_unit)
 
     e = orbit.eccentricity
     anomaly = orbit.eccentric_anomaly(context, start)
-    motion = as_factor(number(orbit.mean_motion * time_unit))
+    motion = constant(orbit.mean_motion * time_unit)
     if orbit.circular:
         c, s = pair("anomaly", anomaly, motion)
         inverse = hy.expression(1.0)
@@ -85,16 +75,10 @@ def orbit_states(
         "periapsis", orbit.periapsis + orbit.periapsis_rate * start, uniform(orbit.periapsis_rate)
     )
     n_c, n_s = pair("node", orbit.ascending_node + orbit.node_rate * start, uniform(orbit.node_rate))
-    i_c = _constant(context.cos(orbit.inclination), number)
-    i_s = _constant(context.sin(orbit.inclination), number)
+    i_c, i_s = constant(context.cos(orbit.inclination)), constant(context.sin(orbit.inclination))
     # R3(node) R1(inclination) R3(periapsis) (cos, sin, 0) of the true anomaly
     x = w_c * along - w_s * across
     y = w_s * along + w_c * across
     direction = [n_c * x - n_s * (i_c * y), n_s * x + n_c * (i_c * y), i_s * y]
     normal = [n_s * i_s, -(n_c * i_s), i_c]
     return OrbitStates(StateBlock(names, derivatives, initial, norms), direction, normal, inverse)
-
-
-def _constant(value: Any, number: Rounder) -> Symbolic:
-    """A constant as an expression; exact 0 and 1 vanish from products."""
-    return as_factor(number(value))

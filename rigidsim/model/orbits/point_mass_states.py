@@ -1,4 +1,4 @@
-"""Point masses under mutual gravity, carried as states beside the body.
+"""Point masses under mutual gravity, carried as states beside the body, and the orbit of one about it.
 
     x_i' = v_i,    v_i' = sum over j of G M_j (x_j - x_i) / |x_j - x_i|^3,
 
@@ -8,6 +8,7 @@ as well: what a load makes of the body's velocity is taken off theirs in proport
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -16,17 +17,14 @@ import heyoka as hy
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.scaling import Rounder, Scaling
 from rigidsim.model.state_blocks import StateBlock
+from rigidsim.scene.arithmetic import Vector, cross, norm
 from rigidsim.scene.point_masses import PointMasses
 
 _AXES = "xyz"
 
 
 class PointMassStates:
-    """Point masses' states as expressions.
-
-    Attributes:
-        masses: the point masses with their initial conditions.
-    """
+    """Point masses' states as expressions."""
 
     def __init__(self, masses: PointMasses, scaling: Scaling, context: Any, number: Rounder) -> None:
         self.masses, self._scaling, self._context, self._number = masses, scaling, context, number
@@ -57,11 +55,8 @@ class PointMassStates:
         return [b - a for a, b in zip(self.positions[i], self.positions[j], strict=True)]
 
     def react(self, pulls: list[tuple[int, Any, list[Symbolic]]]) -> None:
-        """Add accelerations besides the mutual attraction of the points.
-
-        Args:
-            pulls: accelerations of some masses as a number (mpf) times expressions in units of speed over
-                time.
+        """Add accelerations besides the mutual attraction of the points: of some masses (by index), as a
+        number (mpf) times expressions in units of speed over time.
         """
         self._pulls = pulls
 
@@ -98,3 +93,85 @@ class PointMassStates:
         if self._pulls:
             why += ", and that of the body's shape"
         return StateBlock(names, derivatives, initial, exponents=exponents, why=why)
+
+
+# --- a pair left to itself ----------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class PointMassPair:
+    """A point mass as seen from the one that the body is."""
+
+    masses: PointMasses  # one of them is the body's host
+    number: int
+
+    @property
+    def name(self) -> str:
+        """Name of the point mass."""
+        return self.masses.names[self.number]
+
+    @property
+    def host(self) -> int:
+        """Index of the one that the body is."""
+        assert self.masses.host is not None
+        return self.masses.host
+
+    @property
+    def place(self) -> Vector:
+        """Vector from the body to the point mass at the start, m (mpf)."""
+        here, there = self.masses.positions[self.host], self.masses.positions[self.number]
+        return [a - b for a, b in zip(there, here, strict=True)]
+
+    @property
+    def _moving(self) -> Vector:
+        here, there = self.masses.velocities[self.host], self.masses.velocities[self.number]
+        return [a - b for a, b in zip(there, here, strict=True)]
+
+    @property
+    def _attraction(self) -> Any:
+        """Sum of both gravitational parameters, m^3/s^2."""
+        return self.masses.strengths[self.host] + self.masses.strengths[self.number]
+
+    def semi_major_axis(self, context: Any) -> Any | None:
+        """Semi-major axis, m (mpf); None if they aren't bound to each other."""
+        speed = norm(context, self._moving)
+        inverse = 2 / norm(context, self.place) - speed * speed / self._attraction
+        return 1 / inverse if inverse > 0 else None
+
+    def eccentricity(self, context: Any) -> float:
+        """Eccentricity of the ellipse of a bound pair."""
+        axis = self.semi_major_axis(context)
+        assert axis is not None
+        momentum = norm(context, cross(self.place, self._moving))
+        squared = 1 - momentum * momentum / (self._attraction * axis)
+        return float(context.sqrt(squared)) if squared > 0 else 0.0
+
+    def mean_motion(self, context: Any) -> float:
+        """Mean motion of a bound pair, rad/s."""
+        axis = self.semi_major_axis(context)
+        assert axis is not None
+        return float(context.sqrt(self._attraction / axis) / axis)
+
+    def encounter(self, context: Any) -> tuple[Any, Any]:
+        """Least distance (m) and the angular rate there (rad/s), mpf."""
+        return self.masses.encounter(context, self.host, self.number)
+
+    def perturbation(self, context: Any) -> float:
+        """Sum of the accelerations by which the other masses change the relative motion, each with its own
+        sign left out, over the mutual attraction.
+        """
+        distance, total = norm(context, self.place), 0.0
+        for other, strength in enumerate(self.masses.strengths):
+            if other in (self.host, self.number):
+                continue
+            pulls = [self._pull(context, mass, other) for mass in (self.host, self.number)]
+            tide = [a - b for a, b in zip(*pulls, strict=True)]
+            total += float(strength * norm(context, tide) * distance**2 / self._attraction)
+        return total
+
+    def _pull(self, context: Any, mass: int, other: int) -> Vector:
+        """Acceleration of one mass by another one of unit strength, 1/m^2."""
+        ends = self.masses.positions[mass], self.masses.positions[other]
+        towards = [b - a for a, b in zip(*ends, strict=True)]
+        cubed = norm(context, towards) ** 3
+        return [x / cubed for x in towards]

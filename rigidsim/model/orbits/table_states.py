@@ -52,15 +52,10 @@ class Carried(Enum):
 
 @dataclass(frozen=True)
 class TablePlace:
-    """Positions of a table's states and parameters in the system.
+    """Positions of a table's states and parameters in the system."""
 
-    Attributes:
-        tag: suffix that makes the states' names unique, such as "1".
-        first: index of its first parameter.
-    """
-
-    tag: str
-    first: int
+    tag: str  # suffix that makes the states' names unique, such as "1"
+    first: int  # index of its first parameter
     longitude: Carried = Carried.ECCENTRIC
 
     def elements(self, orbit: TabulatedOrbit) -> list[str]:
@@ -92,23 +87,14 @@ def _name(element: str, tag: str) -> str:
 
 @dataclass(frozen=True)
 class ElementStates:
-    """Orbital elements as expressions; the semi-major axis in units of its mean.
-
-    Attributes:
-        block: states that carry the changing elements, and the mean longitude if requested.
-        values: axis, k, h, q, p; constants as factors.
-        rates: rates of changing elements (and longitude, if a column gives it) per internal time unit.
-        motion: rate of the mean longitude.
-        pace: mean motion by Kepler's third law, or by the period that was given.
-        mean_longitude: rad; None if it isn't carried.
-    """
+    """Orbital elements as expressions; the semi-major axis in units of its mean."""
 
     block: StateBlock
-    values: Mapping[str, Symbolic]
-    rates: Mapping[str, Symbolic]
-    motion: Symbolic
-    pace: Symbolic
-    mean_longitude: Symbolic | None
+    values: Mapping[str, Symbolic]  # axis, k, h, q, p; constants as factors
+    rates: Mapping[str, Symbolic]  # of changing elements, and of the longitude if a column gives it
+    motion: Symbolic  # rate of the mean longitude
+    pace: Symbolic  # mean motion by Kepler's third law, or by the period that was given
+    mean_longitude: Symbolic | None  # rad; None if it isn't carried
 
     @property
     def normal(self) -> list[Symbolic]:
@@ -121,12 +107,7 @@ class ElementStates:
 def element_states(
     orbit: TabulatedOrbit, place: TablePlace, time_exponent: int, start: Any, number: Rounder
 ) -> ElementStates:
-    """Carry the elements of an orbit.
-
-    Args:
-        time_exponent: binary exponent of the internal unit of time in seconds.
-        start: start time of the run, seconds (mpf).
-    """
+    """Carry the elements of an orbit from a start in s (mpf), in units of 2^time_exponent s."""
     context, tag = orbit.context, place.tag
     begin = orbit.at(start)
     past = _name("part", tag)
@@ -212,11 +193,7 @@ def _unit(orbit: TabulatedOrbit, element: str) -> Any:
 
 
 class Pieces:
-    """Pieces of the table: parameters, and states that are reset, at given times.
-
-    Attributes:
-        knots: ascending times after the start at which pieces begin (internal units, working precision).
-    """
+    """Pieces of the table that begin at ``knots`` (internal units): parameters, and states that are reset."""
 
     def __init__(
         self, places: Mapping[TabulatedOrbit, TablePlace], time_exponent: int, start: Any, number: Rounder
