@@ -81,6 +81,11 @@ class InUnit:
         return number_schema(self.unit)
 
 
+def quantity(unit: str) -> Any:
+    """Type of a key in an SI unit, for loads of your own: ``Joule = quantity("J")``."""
+    return Annotated[ExactNumber, InUnit(unit)]
+
+
 Dimensionless = Annotated[ExactNumber, InUnit("1")]
 Metre = Annotated[ExactNumber, InUnit("m")]
 Kilogram = Annotated[ExactNumber, InUnit("kg")]
