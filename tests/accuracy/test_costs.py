@@ -59,6 +59,7 @@ class Slow(Observer):
         self.told.append(f"{title}: {fraction:.0%}")
 
 
+@pytest.mark.slow
 def test_choosing_and_certifying_are_in_the_cpu_seconds(tmp_path: Path) -> None:
     slow, of = Slow(0.5), scene("integrator.accuracy=1e-9")
     began = time.process_time()

@@ -193,6 +193,7 @@ def test_an_instability_that_sets_in_after_half_of_a_long_run_is_seen() -> None:
     assert "attitude_uncertain" in run.summary["warning_codes"]
 
 
+@pytest.mark.slow
 def test_what_part_of_a_long_run_was_examined_is_said() -> None:
     """A slow push leaves no closed form, and nothing amplifies errors; windows show that they are made ever
     faster, as the body spins up.

@@ -43,6 +43,7 @@ def test_estimates_move_no_bit_of_the_motion(satellites: MemberResults) -> None:
         assert without.kept[name].values.tobytes() == satellites.kept[name].values.tobytes(), name
 
 
+@pytest.mark.slow
 def test_a_tolerance_is_part_of_the_error(satellites: MemberResults) -> None:
     loose = results_of("satellites, 1e-9").kept["attitude_error"].values
     assert (loose > 1e3 * satellites.kept["attitude_error"].values).all()

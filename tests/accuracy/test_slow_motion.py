@@ -39,6 +39,7 @@ def hyperbolic(number: int) -> tuple[str, float]:
     return "\n".join(text), draw.decades(-9, -6.3)
 
 
+@pytest.mark.slow
 def test_growth_that_no_window_shows_is_announced() -> None:
     # six e-foldings, of which the run's beginning and its windows cover two
     text, _ = hyperbolic(7)

@@ -143,6 +143,7 @@ def test_a_killed_run_opens_as_running(config: Config, start: Start) -> None:
     assert json.loads(out) == {"status": "running", "message": "the run is under way, or was killed"}
 
 
+@pytest.mark.slow
 def test_a_killed_run_keeps_its_segments(config: Config, start: Start) -> None:
     process = start(
         "run",

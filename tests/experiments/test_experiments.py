@@ -54,10 +54,7 @@ SLOW = {  # about how many seconds they take
 
 @pytest.mark.parametrize(
     "name",
-    [
-        pytest.param(name, marks=pytest.mark.slow(SLOW[name]) if name in SLOW else ())
-        for name in everything.STUDIES
-    ],
+    [pytest.param(name, marks=pytest.mark.slow(SLOW.get(name, 2.0))) for name in everything.STUDIES],
 )
 def test_study_passes_and_draws_and_the_guide_shows_its_rows(name: str, tmp_path: Path) -> None:
     checks, broken = everything.run_studies([name], False, tmp_path)

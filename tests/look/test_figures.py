@@ -329,17 +329,6 @@ def test_other_suffix_is_refused_with_those_allowed(symmetric_top: Build, tmp_pa
     assert not list(tmp_path.iterdir())
 
 
-def test_one_sample_and_nan_are_drawn(symmetric_top: Build) -> None:
-    assert collisions(figures.figure(symmetric_top().isel(time=[0]))) == []
-    broken = symmetric_top(count=30).copy(deep=True)
-    for name in ("quaternion", "angular_velocity", "energy_drift"):
-        broken[name][-3:] = np.nan
-    page = figures.figure(broken)
-    assert collisions(page) == []
-    shown = page.axes[0].get_lines()[0].get_ydata()
-    np.testing.assert_allclose(shown, broken["angular_velocity"].values[:, 0])
-
-
 # units and numbers
 
 

@@ -68,13 +68,14 @@ def full(moments: np.ndarray, rates: list[float], damping: np.ndarray, times: np
     return np.einsum("abt,bt->at", found[:9].reshape(3, 3, -1), moments[:, None] * found[9:])
 
 
-@pytest.mark.parametrize("rates", [RATES, [0.1, 1.5, 0.2]], ids=["short axis", "long axis"])
+@pytest.mark.parametrize("rates", [RATES], ids=["short axis"])
 def test_the_averaged_motion_starts_in_the_middle_of_the_full_one(rates: list[float]) -> None:
     """Direction and size of the momentum against means (Hann) of the full motion over some hundred turns."""
     start = f"angular_velocity = {rates}\nquaternion = {Q.tolist()}"
     level = '[model]\nlevel = "spin_averaged"'
     body = f"principal_moments = {MOMENTS}"
-    data = run_text(config(body, start, VISCOUS, "end = 50\nsamples = 11", more=level)).dataset
+    record = 'record = ["momentum_axis", "angular_momentum_norm"]'
+    data = run_text(config(body, start, VISCOUS, "end = 50\nsamples = 11", "", record, level)).dataset
     times = np.linspace(0, 400, 8001)
     momentum = full(np.array(MOMENTS), rates, np.array(DAMPING), times)
     weights = np.hanning(len(times))

@@ -30,6 +30,7 @@ def errors(run: rigidsim.Run, truth: np.ndarray) -> tuple[float, float]:
     return turned_by(dataset["quaternion"].values[-1], truth[6:10]), float(place)
 
 
+@pytest.mark.slow
 def test_a_small_drag_leaves_the_attitude_as_right_as_announced() -> None:
     """The other integrator's own errors: 1e-13 of each of some thousand steps, over a hundred radians."""
     run = rigidsim.run(rigidsim.load(FAULT, overrides=["output.timeline=false"]), out=None)

@@ -76,7 +76,7 @@ def test_a_pulse_gives_its_whole_impulse_and_work(form: str, width: str, precisi
         "tanh((t-5)/0.001)", "erf((t-5)/0.001)", "atan((t-5)/0.001)", "sigmoid(100*(sin(t)-0.5))",
         "cos(t)^64", "(2+cos(t))^-64", "exp(-50*cos(t)^2)", "exp(-1000*sin(t/7)^2)",
         "1/(1+((t-50)/1e-3)^2)^4", "(t/100)^40", "1/cosh(3*(t-50))",
-    ], ["tanh((t-5)/0.001)", "cos(t)^64", "exp(-1000*sin(t/7)^2)", "1/(1+((t-50)/1e-3)^2)^4"]),
+    ], ["tanh((t-5)/0.001)", "exp(-1000*sin(t/7)^2)"]),
 )  # fmt: skip
 def test_switches_and_combs(torque: str, runs: Path) -> None:
     """Against quadrature in pieces."""

@@ -63,6 +63,7 @@ samples = 601
 """
 
 
+@pytest.mark.slow
 def test_hyperion_tumbles_beyond_prediction() -> None:
     """Wisdom, Peale & Mignard 1984: errors grow e-fold in about 8 / n; double has 15 digits to lose."""
     chaotic = run_text(SATELLITE.format(rates="[0.01, 0.02, 1]", eccentricity=0.1))

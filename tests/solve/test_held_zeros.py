@@ -10,7 +10,7 @@ import math
 import mpmath
 import numpy as np
 import pytest
-from support import EPSILON, angle_between, config, law, run_text
+from support import EPSILON, angle_between, cases, config, law, run_text
 
 import rigidsim
 from rigidsim.solve.projection import LATE, STEPS_BETWEEN
@@ -78,7 +78,7 @@ def check_spun(run: rigidsim.Run, axis: int, rate: str, precision: str) -> None:
     assert error.max() < held_bound(precision, steps(run)) + 4 * EPSILON["double"]
 
 
-@pytest.mark.parametrize("formulation", CARRIED)
+@pytest.mark.parametrize("formulation", cases(CARRIED, list(CARRIED)[:1]))
 def test_a_body_on_its_intermediate_axis_stays_there(formulation: str) -> None:
     check_spun(spun(1, "1.1", formulation, "double", "true", 25, 400), 1, "1.1", "double")
 

@@ -212,6 +212,7 @@ time, semi_major_axis, eccentricity, inclination, periapsis
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("load", [DRIVEN, TABLED], ids=["of time", "by a table"])
 def test_equations_that_change_with_time_are_no_trouble(load: str) -> None:
     """The axial momentum of a symmetric body is kept whatever turns it across."""

@@ -42,7 +42,10 @@ def apart(angle: float, exact: mpmath.mpf) -> float:
         return abs(float(mpmath.fmod(angle - exact + 101 * mpmath.pi, 2 * mpmath.pi) - mpmath.pi))
 
 
-@pytest.mark.parametrize(("name", "width"), [("short_pulse", "1e-6"), ("short_pulse_ms", "1e-3")])
+@pytest.mark.parametrize(
+    ("name", "width"),
+    [("short_pulse", "1e-6"), pytest.param("short_pulse_ms", "1e-3", marks=pytest.mark.slow)],
+)
 def test_a_short_pulse_has_the_impulse_that_was_written(name: str, width: str) -> None:
     run = run_estimated((FAULTS / f"{name}.toml").read_text())
     assert run.dataset["angular_velocity"].values[-1].tolist() == [0, 0, 1]
@@ -79,6 +82,7 @@ def test_narrow_beside_the_last_digit_of_the_time(precision: str, kind: str) -> 
     assert abs(gained - exact) <= (4 if kind == "pulse" else 2 * math.sqrt(50)) * EPSILON[precision]
 
 
+@pytest.mark.slow
 def test_pulses_of_a_square_wave_don_t_wander() -> None:
     """Each switch is at its own exact time: after 1000 of them the rate is a triangle wave's."""
     text = LATE.format(spin=0, torque="sign(sin(pi*t))", end=1001, precision="double")

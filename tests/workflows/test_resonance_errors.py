@@ -14,6 +14,7 @@ from rigidsim.cli.screens.verdicts import verdict_line
 FAULT = Path(__file__).parents[1] / "data" / "faults" / "resonance_no_error.toml"
 
 
+@pytest.mark.slow
 def test_a_window_follows_the_resonance_that_the_run_keeps() -> None:
     """Taken by itself, the window in the middle of this libration would be refused for another resonance."""
     for axis in axes_of(rigidsim.load(FAULT)):
