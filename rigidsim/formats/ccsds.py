@@ -1,8 +1,13 @@
-"""Common parts of the CCSDS ephemeris messages: time tags, numbers and lines of their KVN syntax.
+"""CCSDS ephemeris messages in KVN syntax: attitudes (AEM, 504.0-B-2) and orbits (OEM, 502.0-B), version 2.0.
 
-Attitude Data Messages, CCSDS 504.0-B-2, section 6 (the orbit messages, CCSDS 502.0-B, agree with it): lines
-of at most 254 printable ASCII characters; numbers of at most 16 digits, so that a double is rounded to a
-few parts in 1e16; no nan, infinity or negative zero; text all upper case.
+Section 6 of 504.0-B-2, with which 502.0-B agrees: lines of at most 254 printable ASCII characters; numbers of
+at most 16 digits, so that a double is rounded to a few parts in 1e16; no nan, infinity or negative zero; text
+all upper case.
+
+The AEM's quaternion "from frame A to frame B" turns the axes of A into the axes of B (annex F2: a turn by 90
+degrees about Z is Q3 = QC = 0.7071, and [1, 0, 0] in A reads [0, -1, 0] in B). With the space axes as A and
+the body axes as B that is the dataset's own quaternion, which turns a vector from its body coordinates to its
+space coordinates; only the scalar goes last: Q1 Q2 Q3 QC = x y z w.
 """
 
 from __future__ import annotations
@@ -11,20 +16,56 @@ import re
 from collections.abc import Callable, Iterator, Sequence
 from datetime import UTC, datetime
 from decimal import Decimal
+from pathlib import Path
 
 import numpy as np
 
 from rigidsim.errors import RigidsimError
-from rigidsim.formats.decimals import decimals
-from rigidsim.formats.naming import Labels
-from rigidsim.formats.registry import TableSource
+from rigidsim.formats.digits import decimals
+from rigidsim.formats.naming import Labels, labels
+from rigidsim.formats.registry import Format, TableSource
 from rigidsim.formats.tables import Table, TableColumn
 from rigidsim.scene.epochs import DIGITS, Epoch
 
-LONGEST_LINE = 254
+_LONGEST_LINE = 254
+_KILO = -3  # metres to kilometres, exactly, as a shift of the decimal point
 
 
-def tag(epoch: Epoch, seconds: Decimal) -> str:
+def write_aem(table: Table, path: Path, source: TableSource) -> None:
+    """Write the attitude of one run, type QUATERNION."""
+    quaternion = _columns(table, "quaternion", "wxyz", "AEM")
+    named = labels(source.naming, source.attributes)
+    frames = [("REF_FRAME_A", named.frame), ("REF_FRAME_B", "SC_BODY_1")]
+    head = [*_opening("AEM", table, source, named, frames, "ATTITUDE_TYPE = QUATERNION"), "DATA_START"]
+
+    def scalar_last(state: list[Decimal]) -> list[Decimal]:
+        w, x, y, z = named.attitude(state)
+        return [x, y, z, w]
+
+    rows = _data_lines(table, quaternion, named.epoch, source.bits, scalar_last)
+    _write(path, head, rows, ["DATA_STOP"])
+
+
+def write_oem(table: Table, path: Path, source: TableSource) -> None:
+    """Write position and velocity of the centre of mass of one run, km and km/s."""
+    state = [c for name in ("position", "velocity") for c in _columns(table, name, "XYZ", "OEM")]
+    named = labels(source.naming, source.attributes)
+    frames = [("CENTER_NAME", source.naming.center), ("REF_FRAME", named.frame)]
+    head = _opening("OEM", table, source, named, frames)
+
+    def kilometres(state: list[Decimal]) -> list[Decimal]:
+        return [x.scaleb(_KILO) for x in [*named.vector(state[:3]), *named.vector(state[3:])]]
+
+    _write(path, head, _data_lines(table, state, named.epoch, source.bits, kilometres), [])
+
+
+def _write(path: Path, head: Sequence[str], rows: Iterator[str], end: Sequence[str]) -> None:
+    with path.open("w", encoding="ascii", newline="\n") as file:
+        for lines in (head, rows, end):
+            file.writelines(line + "\n" for line in lines)
+
+
+def _tag(epoch: Epoch, seconds: Decimal) -> str:
     """The time tag ``YYYY-MM-DDThh:mm:ss.d`` of a time of the scene, in the epoch's scale, to 1e-14 s."""
     try:
         return epoch.after(seconds).calendar()
@@ -34,45 +75,44 @@ def tag(epoch: Epoch, seconds: Decimal) -> str:
         ) from None
 
 
-def number(value: Decimal) -> str:
+def _number(value: Decimal) -> str:
     """Sixteen significant digits, as ``-1.234567890123456e-1``; zero without a sign."""
     return f"{value:.15e}" if value else "0.000000000000000e+0"
 
 
 def _keyword(name: str, value: str) -> str:
-    """A ``NAME = VALUE`` line."""
     text = value.upper()
     if not re.fullmatch(r"[\x21-\x7e]([\x20-\x7e]*[\x21-\x7e])?", text) or len(text) > 200:
         raise RigidsimError(f"{name}: given {value[:60]!a}; 1 to 200 printable ASCII characters are allowed")
     return f"{name} = {text}"
 
 
-def opening(
+def _opening(
     message: str,
     table: Table,
     source: TableSource,
-    labels: Labels,
+    named: Labels,
     frames: Sequence[tuple[str, str]],
     *ending: str,
 ) -> list[str]:
     """The lines above a message's data: header and metadata."""
-    naming = source.naming
-    start, stop = _span(table, labels.epoch, source.bits)
+    start, stop = _span(table, named.epoch, source.bits)
     notes = [
         f"rigidsim run {source.title}, numbers rounded to the 16 digits that the standard allows",
-        *labels.notes,
+        *named.notes,
     ]
+    plain = ("".join(c if " " <= c <= "~" else "?" for c in note) for note in notes)
     return [
         f"CCSDS_{message}_VERS = 2.0",
-        *_comments(notes),
+        *(f"COMMENT {note[: _LONGEST_LINE - 8]}" for note in plain),
         f"CREATION_DATE = {datetime.now(UTC).strftime('%Y-%m-%dT%H:%M:%S')}",
         "ORIGINATOR = RIGIDSIM",
         "",
         "META_START",
-        _keyword("OBJECT_NAME", naming.object_name or source.title),
-        _keyword("OBJECT_ID", naming.object_id),
+        _keyword("OBJECT_NAME", source.naming.object_name or source.title),
+        _keyword("OBJECT_ID", source.naming.object_id),
         *(_keyword(name, value) for name, value in frames),
-        f"TIME_SYSTEM = {labels.epoch.scale}",
+        f"TIME_SYSTEM = {named.epoch.scale}",
         f"START_TIME = {start}",
         f"STOP_TIME = {stop}",
         *ending,
@@ -81,15 +121,8 @@ def opening(
     ]
 
 
-def _comments(lines: Sequence[str]) -> list[str]:
-    """COMMENT lines, in printable ASCII, none too long."""
-    plain = ("".join(c if " " <= c <= "~" else "?" for c in line) for line in lines)
-    return [f"COMMENT {line[: LONGEST_LINE - 8]}" for line in plain]
-
-
-def columns_of(table: Table, variable: str, labels: Sequence[str], message: str) -> list[TableColumn]:
-    """The columns of a variable."""
-    found = [table.column(f"{variable}_{label}") for label in labels]
+def _columns(table: Table, variable: str, components: Sequence[str], message: str) -> list[TableColumn]:
+    found = [table.column(f"{variable}_{component}") for component in components]
     if any(column is None for column in found):
         raise RigidsimError(
             f"the run recorded no {variable}, which an {message} is made of; name it in [output] record (a "
@@ -107,34 +140,30 @@ def _span(table: Table, epoch: Epoch, bits: int) -> tuple[str, str]:
     for row in (0, -1):
         parts = [np.atleast_1d(table.dataset[part].isel(time=row).values) for part in time.parts]
         _refuse_non_finite([parts], "time", row)
-        ends.append(tag(epoch, decimals(parts, bits)[0]))
+        ends.append(_tag(epoch, decimals(parts, bits)[0]))
     return ends[0], ends[1]
 
 
-def data_lines(
+def _data_lines(
     table: Table,
     columns: Sequence[TableColumn],
     epoch: Epoch,
     bits: int,
     shown: Callable[[list[Decimal]], list[Decimal]],
 ) -> Iterator[str]:
-    """Data lines ``TAG NUMBER ...``.
-
-    Args:
-        shown: converts a row's numbers: units, order, axes.
-    """
+    """Data lines ``TAG NUMBER ...``; ``shown`` converts a row's numbers: units, order, axes."""
     previous, row = "", 0
     for block in table.blocks([table.columns[0], *columns]):
         _refuse_non_finite(block, "sample", row)
         times, *values = (decimals(parts, bits) for parts in block)
         for time, *state in zip(times, *values, strict=True):
-            now = tag(epoch, time)
+            now = _tag(epoch, time)
             if now == previous:
                 raise RigidsimError(
                     f"samples {row - 1} and {row} are closer than 1e-{DIGITS} s, which time tags can't "
                     "tell apart; export csv, or sample less often"
                 )
-            yield " ".join([now, *(number(value) for value in shown(state))])
+            yield " ".join([now, *(_number(value) for value in shown(state))])
             previous, row = now, row + 1
 
 
@@ -146,3 +175,6 @@ def _refuse_non_finite(block: Sequence[Sequence[np.ndarray]], what: str, row: in
                 f"{what} {row + int(bad[0])} holds a number that isn't finite, which no message can carry; "
                 "export csv"
             )
+
+
+AEM, OEM = Format(write_aem), Format(write_oem)

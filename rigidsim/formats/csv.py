@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-from rigidsim.formats.decimals import texts
+from rigidsim.formats.digits import texts
 from rigidsim.formats.naming import named_epoch
 from rigidsim.formats.registry import Format, TableSource
 from rigidsim.formats.tables import Table, TableColumn

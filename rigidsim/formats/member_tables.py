@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 import xarray
 
-from rigidsim.formats.angles import converted
+from rigidsim.formats.digits import converted
 from rigidsim.formats.tables import BLOCK_NUMBERS, Table, TableColumn, columns_of
 from rigidsim.scene.readable_units import AngleUnit
 from rigidsim.store.sweeps.dataset import boxes

@@ -1,6 +1,4 @@
-"""Epoch, axes and names for CCSDS messages, which no number of a run contains and none of which is
-invented.
-"""
+"""Epoch, axes and names for messages, which no number of a run contains and none of which is invented."""
 
 from __future__ import annotations
 
@@ -14,11 +12,9 @@ from typing import Any, get_args
 import mpmath
 
 from rigidsim.errors import RigidsimError
-from rigidsim.scene.arithmetic import apply
 from rigidsim.scene.epochs import Epoch, parse_epoch
-from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.frame import ECLIPTIC, EQUATOR, OBLIQUITY, SpaceAxes
-from rigidsim.scene.rotations import AXES, Rotations, product
+from rigidsim.scene.rotations import product
 from rigidsim.scene.validation_messages import nearest, shown
 
 _BITS = 160  # far beyond the 16 digits of a message
@@ -44,78 +40,54 @@ class Naming:
 
 
 @dataclass(frozen=True)
-class Turn:
-    """Rotation about X from the scene's axes to those of a message.
-
-    Attributes:
-        quaternion: attitude of the scene's axes in the message's, w x y z.
-        matrix: turns vectors of the scene's axes into the message's.
-    """
-
-    quaternion: list[Decimal]
-    matrix: list[list[Decimal]]
-    words: str
-
-    @classmethod
-    def by(cls, angle: ExactNumber, words: str) -> Turn:
-        """Rotation of the scene's axes about X by an angle (rad)."""
-        context = mpmath.MPContext()
-        context.prec = _BITS
-        whole = angle.at(context)
-        functions = context.sin, context.cos, context.atan2, context.hypot, context.mpf
-        matrix = Rotations(*functions, negligible=lambda x: x == 0).elementary(AXES.index("x"), whole)
-        half = [context.cos(whole / 2), context.sin(whole / 2), context.zero, context.zero]
-        return cls(_decimals(half), [_decimals(row) for row in matrix], words)
-
-
-@dataclass(frozen=True)
 class Labels:
     """Epoch and axes that a message names.
 
     Attributes:
         frame: axes of the message: the scene's, if the standard knows them.
-        turn: rotation from the scene's axes to the message's; None if they are the same.
+        turn: cosine and sine of the angle about X from the message's axes to the scene's, and of half of it;
+            None if they are the same.
+        notes: remarks for the message's comments.
     """
 
     epoch: Epoch
     frame: str
-    turn: Turn | None = None
-
-    @property
-    def notes(self) -> list[str]:
-        """Remarks for the message's comments."""
-        found = [f"{self.epoch} is time zero of the scene"]
-        return found if self.turn is None else [*found, self.turn.words]
+    notes: list[str]
+    turn: tuple[Decimal, Decimal, Decimal, Decimal] | None = None
 
     def attitude(self, quaternion: list[Decimal]) -> list[Decimal]:
         """Quaternions w x y z from body axes to the message's axes, given those to the scene's."""
         if self.turn is None:
             return quaternion
         with localcontext(_WIDE):
-            return product(self.turn.quaternion, quaternion)
+            return product([*self.turn[2:], Decimal(0), Decimal(0)], quaternion)
 
     def vector(self, components: list[Decimal]) -> list[Decimal]:
         """A vector in the scene's axes resolved along the message's."""
         if self.turn is None:
             return components
+        (x, y, z), (cosine, sine) = components, self.turn[:2]
         with localcontext(_WIDE):
-            return apply(self.turn.matrix, components)
-
-
-def _decimals(values: list[Any]) -> list[Decimal]:
-    return [Decimal(mpmath.nstr(x, 45)) for x in values]
+            return [x, cosine * y - sine * z, sine * y + cosine * z]
 
 
 def labels(naming: Naming, attributes: Mapping[str, Any]) -> Labels:
     """Epoch and axes of a message, from the options given and the run's own attributes."""
     epoch = named_epoch(naming, attributes)
     axes = _axes(naming.axes, str(attributes.get("axes", "")))
+    note = f"{epoch} is time zero of the scene"
     if axes != ECLIPTIC:
-        return Labels(epoch, axes)
+        return Labels(epoch, axes, [note])
     arcsec = float(OBLIQUITY) * 180 / math.pi * 3600
     words = f"turned about X by the obliquity to {EQUATOR}: {arcsec:.3f} arcsec (IAU 2006)"
-    turn = Turn.by(OBLIQUITY, f"its space axes, {axes}, were {words}")
-    return Labels(epoch, EQUATOR, turn)
+    context = mpmath.MPContext()
+    context.prec = _BITS
+    angle = OBLIQUITY.at(context)
+    c, s, c_half, s_half = (
+        Decimal(mpmath.nstr(f(x), 45)) for x in (angle, angle / 2) for f in (context.cos, context.sin)
+    )
+    notes = [note, f"its space axes, {axes}, were {words}"]
+    return Labels(epoch, EQUATOR, notes, (c, s, c_half, s_half))
 
 
 def named_epoch(naming: Naming, attributes: Mapping[str, Any]) -> Epoch:

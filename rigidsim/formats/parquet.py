@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import pyarrow as pa
+import pyarrow.parquet as pq
+
 from rigidsim.formats.registry import Format, TableSource
 from rigidsim.formats.tables import BLOCK_ROWS, Table
 
@@ -15,9 +18,6 @@ def write_parquet(table: Table, path: Path, source: TableSource) -> None:
         table: rows and columns; residuals become columns such as ``time_lo``.
         path: the file, which is replaced.
     """
-    import pyarrow as pa
-    import pyarrow.parquet as pq
-
     kinds = {"f": pa.float64(), "i": pa.int64(), "M": pa.timestamp("ns"), "U": pa.string()}
     fields = []
     for column in table.columns:
@@ -40,4 +40,4 @@ def write_parquet(table: Table, path: Path, source: TableSource) -> None:
             writer.write_table(pa.Table.from_arrays(arrays, schema=schema))
 
 
-FORMAT = Format(write_parquet, package="pyarrow", angles=True, side_tables=True)
+FORMAT = Format(write_parquet, angles=True, side_tables=True)

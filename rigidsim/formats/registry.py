@@ -38,24 +38,33 @@ class Format:
 
     Attributes:
         write: writes a table to a path that doesn't exist yet.
-        package: package that it needs besides rigidsim's own requirements.
         angles: whether it takes angles in any unit.
         side_tables: whether tables along other dimensions than time get files of their own.
         folder: what such a folder is called, and a file that identifies one; None if it writes a file.
     """
 
     write: Callable[[Table, Path, TableSource], None]
-    package: str = ""
     angles: bool = False
     side_tables: bool = False
     folder: tuple[str, str] | None = None
 
 
+_PLACES = {
+    "csv": ("csv", "FORMAT", ""),
+    "parquet": ("parquet", "FORMAT", "pyarrow"),
+    "zarr": ("zarr", "FORMAT", "zarr"),
+    "aem": ("ccsds", "AEM", ""),
+    "oem": ("ccsds", "OEM", ""),
+}
+"""Module and name of each ``Format``, and a package that it needs besides rigidsim's own requirements."""
+
+
 def format_named(name: str) -> Format:
-    """The format ``rigidsim.formats.NAME.FORMAT``."""
+    """A format by its name; its module, and the package that it needs, are loaded."""
     if name not in FORMATS:
         raise RigidsimError(f'--format: given "{name[:40]}"; allowed: {", ".join(FORMATS)}')
-    found: Format = import_module(f"rigidsim.formats.{name}").FORMAT
-    if found.package and importlib.util.find_spec(found.package) is None:
-        raise RigidsimError(f'{name} needs {found.package}, which is missing: pip install "rigidsim[export]"')
+    module, attribute, package = _PLACES[name]
+    if package and importlib.util.find_spec(package) is None:
+        raise RigidsimError(f'{name} needs {package}, which is missing: pip install "rigidsim[export]"')
+    found: Format = getattr(import_module(f"rigidsim.formats.{module}"), attribute)
     return found

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 import xarray
 
-from rigidsim.formats.angles import RADIAN, converted
+from rigidsim.formats.digits import RADIAN, converted
 from rigidsim.scene.readable_units import AngleUnit
 from rigidsim.store.netcdf import CHUNK_ROWS
 from rigidsim.store.variables import LABELS, parts_in

@@ -8,7 +8,7 @@ from typing import Any
 
 import xarray
 
-from rigidsim.formats.angles import RADIAN, converted
+from rigidsim.formats.digits import RADIAN, converted
 from rigidsim.formats.member_tables import MemberTable
 from rigidsim.formats.registry import Format, TableSource
 from rigidsim.formats.tables import Table
@@ -99,4 +99,4 @@ def _json(value: Any) -> Any:
     return value.item() if hasattr(value, "item") and getattr(value, "ndim", 1) == 0 else value
 
 
-FORMAT = Format(write_zarr, package="zarr", angles=True, folder=("Zarr store", ".zgroup"))
+FORMAT = Format(write_zarr, angles=True, folder=("Zarr store", ".zgroup"))

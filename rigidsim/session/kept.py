@@ -34,6 +34,18 @@ class KeptVariable:
     item: str = ALWAYS
 
 
+def kept(
+    values: np.ndarray,
+    units: str,
+    long_name: str,
+    item: str = ALWAYS,
+    dims: tuple[str, ...] = (),
+    **more: Any,
+) -> KeptVariable:
+    """A kept variable with its labels."""
+    return KeptVariable(dims, values, {"units": units, "long_name": long_name, **more}, item)
+
+
 Kept = dict[str, KeptVariable]
 """Kept variables by name."""
 
@@ -106,9 +118,9 @@ def _indicators(one: MemberSeries, times: np.ndarray, keep: Collection[str]) -> 
     found: Kept = {}
     for name, (units, long_name, values) in labels.items():
         if name in keep:
-            found[name] = KeptVariable((), values, {"units": units, "long_name": long_name}, name)
-            labelled = {"units": "s", "long_name": "time up to which the growth of a tangent vector is known"}
-            found["growth_time"] = KeptVariable((), told.until, labelled, name)
+            found[name] = kept(values, units, long_name, name)
+            until = "time up to which the growth of a tangent vector is known"
+            found["growth_time"] = kept(told.until, "s", until, name)
     return found
 
 
@@ -148,13 +160,12 @@ def _extremes(one: MemberSeries, times: np.ndarray) -> Kept:
         words = {"min": "smallest", "max": "largest"}[what]
         long_name = f"{words} {variable.attributes.get('long_name', variable.name)} at a sample"
         common = {k: v for k, v in variable.attributes.items() if k in ("frame", "euler_sequence", "angle")}
-        found[f"{variable.name}_{what}"] = KeptVariable(
-            variable.dims, one.shaped(extreme), {"units": units, "long_name": long_name, **common}, "extremes"
+        found[f"{variable.name}_{what}"] = kept(
+            one.shaped(extreme), units, long_name, "extremes", variable.dims, **common
         )
-        found[f"{variable.name}_{what}_time"] = KeptVariable(
-            variable.dims, one.shaped(when), {"units": "s", "long_name": f"time of the {long_name}"},
-            "extremes",
-        )  # fmt: skip
+        found[f"{variable.name}_{what}_time"] = kept(
+            one.shaped(when), "s", f"time of the {long_name}", "extremes", variable.dims
+        )
     return found
 
 
@@ -165,11 +176,9 @@ def _means(one: MemberSeries) -> Kept:
     # in the order of the samples: ``sum`` takes another order if a member is alone in its block
     total = sum(np.cumsum(np.where(present, part, 0), axis=1)[:, -1] for part in reversed(one.parts))
     mean = np.where(present.any(axis=1), total / count, np.nan)
-    attributes = {
-        "units": variable.attributes.get("units", "1"),
-        "long_name": f"mean of the {variable.attributes.get('long_name', variable.name)} over the samples",
-    }
-    return {f"{variable.name}_mean": KeptVariable(variable.dims, one.shaped(mean), attributes, "means")}
+    units = variable.attributes.get("units", "1")
+    long_name = f"mean of the {variable.attributes.get('long_name', variable.name)} over the samples"
+    return {f"{variable.name}_mean": kept(one.shaped(mean), units, long_name, "means", variable.dims)}
 
 
 def _drifts(one: MemberSeries, lengths: np.ndarray) -> Kept:
@@ -198,8 +207,7 @@ def _series(series: Sequence[MemberSeries], times: np.ndarray) -> Kept:
                 ("sample", *one.variable.dims), one.shaped(values), attributes, "series"
             )
     rows = np.broadcast_to(times, (len(next(iter(found.values())).values), times.shape[-1]))
-    labels = {"units": "s", "long_name": "time of the scene"}
-    found["time"] = KeptVariable(("sample",), np.array(rows), labels, "series")
+    found["time"] = kept(np.array(rows), "s", "time of the scene", "series", ("sample",))
     return found
 
 
@@ -217,29 +225,21 @@ def kept_events(
     """
     count = len(times)
     found: Kept = {}
+    along, first_times = (f"{name}_occurrence",), f"times of {name}, the first {most}"
+    table = _padded(times, most, ())
     if "events" in keep:
-        table = _padded(times, most, ())
-        found[f"{name}_count"] = KeptVariable(
-            (), np.array([len(t) for t in times], dtype=np.int64),
-            {"long_name": f"how often {name} happened", "units": "1"}, "events",
-        )  # fmt: skip
-        labels = {"units": "s", "long_name": f"times of {name}, the first {most}"}
-        found[f"{name}_times"] = KeptVariable((f"{name}_occurrence",), table, labels, "events")
+        counts = np.array([len(t) for t in times], dtype=np.int64)
+        found[f"{name}_count"] = kept(counts, "1", f"how often {name} happened", "events")
+        found[f"{name}_times"] = kept(table, "s", first_times, "events", along)
         first = table[:, 0] if most else np.full(count, np.nan)
-        labels = {"units": "s", "long_name": f"first time of {name}"}
-        found[f"{name}_first"] = KeptVariable((), first, labels, "events")
+        found[f"{name}_first"] = kept(first, "s", f"first time of {name}", "events")
     if "section" in keep:
         for what, (variable, values) in points.items():
             labels = {k: v for k, v in variable.attributes.items() if k in ("units", "frame", "angle")}
             labels["long_name"] = f"{variable.attributes.get('long_name', what)} at {name}"
-            found[f"{name}_{what}"] = KeptVariable(
-                (f"{name}_occurrence", *variable.dims), _padded(values, most, variable.shape), labels,
-                "section",
-            )  # fmt: skip
-        labels = {"units": "s", "long_name": f"times of {name}, the first {most}"}
-        found[f"{name}_time"] = KeptVariable(
-            (f"{name}_occurrence",), _padded(times, most, ()), labels, "section"
-        )
+            padded = _padded(values, most, variable.shape)
+            found[f"{name}_{what}"] = KeptVariable((*along, *variable.dims), padded, labels, "section")
+        found[f"{name}_time"] = kept(table, "s", first_times, "section", along)
     return found
 
 

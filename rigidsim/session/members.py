@@ -11,11 +11,11 @@ import numpy as np
 
 from rigidsim.errors import ConfigError, RigidsimError
 from rigidsim.session.kept import (
-    ALWAYS,
     Kept,
     KeptVariable,
     MemberSeries,
     joined,
+    kept,
     kept_events,
     kept_of_series,
 )
@@ -122,44 +122,31 @@ def plain_variables(
         modelling: error of the averaged model of a single member; None for the full model.
     """
     unknown = np.full(len(steps), np.nan)
-    placed: Kept = {}
-    if position_error is not None:
-        labels = {"long_name": "estimated error of the position at the last sample", "units": "m"}
-        placed["position_error"] = KeptVariable((), position_error, labels)
-    if modelling is not None:
-        placed |= _of_model(modelling)
-    return {
-        "steps": KeptVariable((), steps.astype(np.int64), {"long_name": "steps taken", "units": "1"}),
-        "time_reached": KeptVariable((), reached, {"long_name": "time of the last sample", "units": "s"}),
-        "drift_bound": KeptVariable(
-            (), bound, {"long_name": "relative drift that rounding alone explains", "units": "1"}
-        ),
-        "attitude_error": KeptVariable(
-            (),
+    found = {
+        "steps": kept(steps.astype(np.int64), "1", "steps taken"),
+        "time_reached": kept(reached, "s", "time of the last sample"),
+        "drift_bound": kept(bound, "1", "relative drift that rounding alone explains"),
+        "attitude_error": kept(
             unknown if attitude_error is None else attitude_error,
-            {"long_name": "estimated error of the attitude at the last sample; nan where none is estimated",
-             "units": "rad"},
+            "rad",
+            "estimated error of the attitude at the last sample; nan where none is estimated",
         ),
-        **placed,
-    }  # fmt: skip
-
-
-def _of_model(found: Modelling) -> Kept:
-    """Errors of a member's averaged model, nan where none is measured."""
-    errors = {
-        "modelling_error": (found.worst, "directions", "rad"),
-        "modelling_error_norm": (found.angular_momentum_norm, "angular_momentum_norm, relative", "1"),
-        "modelling_error_energy": (found.energy, "energy of rotation, relative", "1"),
     }
-    return {
-        name: KeptVariable(
-            (),
-            np.array([np.nan if error is None else error]),
-            {"long_name": f"largest error of the averaged model's {what} until the end", "units": units},
-        )
-        for name, (error, what, units) in errors.items()
-        if error is not None or name == "modelling_error"
-    }
+    if position_error is not None:
+        told = "estimated error of the position at the last sample"
+        found["position_error"] = kept(position_error, "m", told)
+    if modelling is not None:
+        errors = {
+            "modelling_error": (modelling.worst, "directions", "rad"),
+            "modelling_error_norm": (modelling.angular_momentum_norm, "angular_momentum_norm, relative", "1"),
+            "modelling_error_energy": (modelling.energy, "energy of rotation, relative", "1"),
+        }
+        for name, (error, what, units) in errors.items():
+            if error is not None or name == "modelling_error":
+                value = np.array([np.nan if error is None else error])
+                told = f"largest error of the averaged model's {what} until the end"
+                found[name] = kept(value, units, told)
+    return found
 
 
 def run_alone(
@@ -188,14 +175,14 @@ def run_alone(
     assert isinstance(summary, Summary)
     if summary.status == Status.INTERRUPTED.value:
         raise KeyboardInterrupt
-    kept = _kept_of_run(result, keep, hidden) | _events_of_run(result, keep, most_events, events)
+    results = _kept_of_run(result, keep, hidden) | _events_of_run(result, keep, most_events, events)
     bounds = [row.bound for row in summary.invariants.values()]
     error_at_end = summary.accuracy.estimated_attitude_error
     if summary.accuracy.certified is not None:
         error_at_end = summary.accuracy.certified
-    kept |= _ended(summary.status, summary.warning_codes)
+    results |= _ended(summary.status, summary.warning_codes)
     placed = summary.accuracy.estimated_position_error
-    kept |= plain_variables(
+    results |= plain_variables(
         steps=np.array([summary.cost.steps]),
         reached=np.array([summary.time_reached]),
         bound=np.array([max(bounds, default=np.nan)]),
@@ -204,10 +191,10 @@ def run_alone(
         modelling=summary.modelling,
     )
     if more is not None and result.blocks:
-        kept |= more(result)
+        results |= more(result)
     reasons = {} if summary.status in ENDED_WELL else {0: summary.message}
     spent = sum(summary.cost.cpu_by_phase.get(phase, 0.0) for phase in _ESTIMATING)
-    return MemberResults(kept, reasons, {"alone": 1}, estimating=spent)
+    return MemberResults(results, reasons, {"alone": 1}, estimating=spent)
 
 
 def _ended(status: str, warnings: Iterable[str]) -> Kept:
@@ -221,9 +208,9 @@ def _ended(status: str, warnings: Iterable[str]) -> Kept:
 def failed(outcome: Outcome, reason: str) -> MemberResults:
     """Results of a member that gave no samples."""
     nothing = np.array([np.nan])
-    kept = _ended(outcome.value, [])
-    kept |= plain_variables(steps=np.array([0]), reached=nothing, bound=nothing, attitude_error=nothing)
-    return MemberResults(kept, {0: reason}, {"alone": 1})
+    found = _ended(outcome.value, [])
+    found |= plain_variables(steps=np.array([0]), reached=nothing, bound=nothing, attitude_error=nothing)
+    return MemberResults(found, {0: reason}, {"alone": 1})
 
 
 def _kept_of_run(result: MemoryRun, keep: Sequence[str], hidden: Collection[str]) -> Kept:
@@ -260,6 +247,3 @@ def _events_of_run(result: MemoryRun, keep: Sequence[str], most_events: int, eve
         }
         found |= kept_events(name, [times], most_events, points, keep)
     return found
-
-
-__all__ = ["ALWAYS", "ENDED_WELL", "OUTCOMES", "WARNINGS", "MemberResults", "Outcome", "run_alone"]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import sys
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
+from typing import Any
 
 from rigidsim.model.capabilities import table_of
 from rigidsim.session.advice import advice_on
@@ -13,6 +13,7 @@ from rigidsim.session.dataset import unused_variables
 from rigidsim.session.diagnostics import Diagnostics
 from rigidsim.session.session import Effort, Phases
 from rigidsim.session.understood import body_of, cautions_of, span_of, start_of, told_loads
+from rigidsim.solve.lyapunov import LyapunovSpectrum
 from rigidsim.solve.problem import InitialValueProblem
 from rigidsim.solve.projection import LATE
 from rigidsim.solve.sampler import Progress
@@ -23,9 +24,7 @@ from rigidsim.store.summary_parts import (
     Accuracy,
     BitForBit,
     Caution,
-    ChartChanges,
     Cost,
-    EventTimes,
     InvariantDrift,
     Lyapunov,
     Modelling,
@@ -34,9 +33,6 @@ from rigidsim.store.summary_parts import (
     UnmeasuredCode,
 )
 
-if TYPE_CHECKING:
-    from rigidsim.solve.lyapunov import LyapunovSpectrum
-
 _NOT_CERTIFIED = "not certified against an independent solution"
 
 
@@ -44,21 +40,17 @@ def summarise(
     found: Diagnostics,
     spectrum: LyapunovSpectrum | None,
     *,
-    message: str,
     remarks: Sequence[Caution],
     initial: Mapping[str, list[float]],
-    cost: Cost,
     attributes: RootAttributes,
-    time_reached: float,
-    events: dict[str, int],
-    event_times: dict[str, EventTimes],
-    chart_changes: ChartChanges | None,
+    **ended: Any,
 ) -> Summary:
     """The summary without the digests of files that are still to be written.
 
     Args:
-        remarks: remarks on how the session began; they precede the warnings.
-        time_reached: time reached, s.
+        remarks: on how the session began; they precede the warnings.
+        initial: components of the invariants.
+        ended: fields that tell how the run ended, and what it cost.
     """
     prepared, progress = found.prepared, found.progress
     scene, system = prepared.scene, prepared.system
@@ -66,18 +58,15 @@ def summarise(
         name=scene.name,
         description=scene.description,
         status=progress.status.value,
-        message=message,
         exit_code=progress.status.exit_code,
         **as_fields([*remarks, *cautions_of(scene), *found.cautions()]),
         samples=progress.next_sample,
         samples_planned=progress.samples,
-        time_reached=time_reached,
         engine_time=progress.time,
         formulation=system.formulation.name,
         states=tuple(system.states),
         precision=prepared.precision.name,
         tolerance=prepared.effective_tolerance,
-        cost=cost,
         method=scene.config.integrator.method,
         hold_invariants=prepared.holds_invariants,
         hold_from_step=LATE if prepared.holds_late else None,
@@ -92,11 +81,9 @@ def summarise(
         loads=told_loads(prepared),
         bit_for_bit=_bit_for_bit(prepared, progress, attributes.mixed_provenance),
         provenance=attributes.of_use(Use.REPEATED),
-        events=events,
-        event_times=event_times,
-        chart_changes=chart_changes,
         advice=advice_on(found),
         undefined_samples={name: seen.count for name, seen in found.statistics.undefined.items()},
+        **ended,
     )
 
 
@@ -143,21 +130,16 @@ def _invariants(found: Diagnostics, initial: Mapping[str, list[float]]) -> dict[
 
 def _accuracy(found: Diagnostics) -> Accuracy:
     estimate, output = found.estimate, found.prepared.scene.config.output
+    uncertified: dict[str, Any] = {"requested": None, "certified": None, "how": _NOT_CERTIFIED}
     if estimate is None:
         why = "the run has not ended" if output.estimate else "[output] estimate = false"
         if output.estimate and found.progress.status.final and found.prepared.algorithm.own_errors:
             why = "its method tells no errors of its own"
-        return Accuracy(
-            requested=None,
-            estimated_attitude_error=None,
-            estimated_how=f"not estimated: {why}",
-            amplification=None,
-            certified=None,
-            how=_NOT_CERTIFIED,
-        )
+        unknown: dict[str, Any] = dict.fromkeys(("estimated_attitude_error", "amplification"))
+        return Accuracy(**uncertified, **unknown, estimated_how=f"not estimated: {why}")
     caveat = found.prepared.system.formulation.variables.caveat
     return Accuracy(
-        requested=None,
+        **uncertified,
         estimated_attitude_error=estimate.attitude,
         estimated_position_error=estimate.position,
         estimated_velocity_error=estimate.velocity,
@@ -169,8 +151,6 @@ def _accuracy(found: Diagnostics) -> Accuracy:
         examined_share=estimate.share,
         amplification_how="of the estimated error over that of a stable motion: the round-off law "
         "(eps/2) sqrt(steps) sqrt(4 + (|w| t)^2 / 3), and what the tolerance cuts off; 1 for a stable motion",
-        certified=None,
-        how=_NOT_CERTIFIED,
     )
 
 
@@ -191,26 +171,21 @@ def _modelling(found: Diagnostics) -> Modelling | None:
         return None
     known, output = found.modelling, found.prepared.scene.config.output
     asked = found.prepared.scene.config.integrator.accuracy_axis
-    requested = None if asked is None else float(asked)
-    resonance = "" if average.resonance is None else average.resonance.name
+    known_before: dict[str, Any] = {
+        "level": average.level,
+        "short_period": average.short_period,
+        "resonance": "" if average.resonance is None else average.resonance.name,
+        "requested": None if asked is None else float(asked),
+    }
     if known is None:
         code, why = UnmeasuredCode.NOT_ENDED, "the run has not reached its end"
         if not output.estimate:
             code, why = UnmeasuredCode.NOT_ASKED, "[output] estimate = false"
         elif found.unmeasured is not None:
             code, why = found.unmeasured.code, str(found.unmeasured)
-        return Modelling(
-            level=average.level,
-            short_period=average.short_period,
-            resonance=resonance,
-            requested=requested,
-            how=f"not measured: {why}",
-            unmeasured=code.value,
-        )
+        return Modelling(**known_before, how=f"not measured: {why}", unmeasured=code.value)
     return Modelling(
-        level=average.level,
-        short_period=average.short_period,
-        resonance=resonance,
+        **known_before,
         momentum_axis=known.momentum,
         figure_axis=known.figure,
         angular_momentum_norm=known.changes.get("angular_momentum_norm"),
@@ -218,7 +193,6 @@ def _modelling(found: Diagnostics) -> Modelling | None:
         growth=known.growth,
         oscillation=known.oscillation,
         whole=known.whole,
-        requested=requested,
         how=known.how,
         cpu_seconds=known.cpu_seconds,
         windows=tuple(

@@ -26,24 +26,21 @@ class Use(Enum):
 class RootAttributes(BaseModel):
     """Root attributes; those that are None, as some are in older versions and in segments, aren't written.
 
+    Tables are JSON texts; wall and CPU seconds are sums over all sessions; times are UTC.
+
     Attributes:
         config: the TOML text of what was run, one visible value per key; its digest is config_sha256.
         config_given: the text as it was given, before settings replaced values in it; older files have none,
             and keep settings in ``#:set`` comments at the end of config.
-        unit_exponents, principal_moments, principal_axes, inertia_tensor, drawing, put_back, table_errors:
-            JSON.
-        modelling_error: largest error of an averaged model's directions until the end, rad.
-        principal_moments, inertia_tensor: kg m^2.
-        center_of_mass: from the body's reference point to its centre of mass, body axes, m: JSON.
-        mass: the body's mass, kg, if known.
-        surroundings: objects around the body, for pictures (see ``rigidsim.look.surroundings``): JSON.
-        attitude_error: estimate for the end of the run, rad, if one was made.
+        config_set: the settings (KEY=VALUE), one per line.
+        modelling_error, attitude_error: largest error of an averaged model's directions until the end, and
+            estimate for the end of the run, rad.
+        principal_moments, inertia_tensor: kg m^2; center_of_mass: from the reference point, body axes, m.
+        surroundings: objects around the body, for pictures (see ``rigidsim.look.surroundings``).
         recorded: names of the variables along time, without drifts and residuals: if the config names none, a
             later version may record more by default.
         hold_from_step: natural steps after which invariants are projected; None if from the start.
-        axes: what the space axes are, if known.
-        time_unit: unit in which times are shown, if the config asks for one.
-        started_at, finished_at: UTC.
+        python_loads: class names of loads given from Python.
         mixed_provenance: what changed, if the run was resumed with other versions or on another machine.
         angles_wrapped_from: from this time on (s) Euler angles are within one turn, since nobody knows their
             turns; none where all are known.

@@ -10,81 +10,50 @@ import math
 import os
 import zlib
 from collections import deque
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager
-from dataclasses import dataclass
 
 import h5py
 import numpy as np
 from h5py import h5d, h5z
 
-Deflate = Callable[..., bytes]
-"""Compresses bytes at a level."""
-ZLIB: tuple[Deflate, int] = zlib.compress, 4
 try:
     from isal import isal_zlib
 
-    # levels 2 and 3 take 1.2 and 2.2 times as long for 0.02 and 0.2 % less
-    FASTEST: tuple[Deflate, int] = isal_zlib.compress, 1
+    _DEFLATE, _LEVEL = (
+        isal_zlib.compress,
+        1,
+    )  # the next levels take 1.2 and 2.2 times as long for 0.2 %
 except ImportError:
-    FASTEST = ZLIB
+    _DEFLATE, _LEVEL = zlib.compress, 4
+_MOST_THREADS = 4  # more wait for the disk
+_FEWEST = 250_000  # numbers to compress from which on threads are used: some milliseconds of work
+_WAITING = 64  # chunks of 64 kB per component that may wait to be written
 
 
-@dataclass(frozen=True)
-class Threads:
-    """When chunks are compressed in threads.
-
-    Attributes:
-        most: largest number of threads; more than four wait for the disk. None: as many as there are idle
-            processors, up to four.
-        fewest: numbers to compress from which on threads are used: some milliseconds of work.
-        waiting: chunks of 64 kB per component that may wait to be written.
-    """
-
-    most: int | None = None
-    fewest: int = 250_000
-    waiting: int = 64
-
-    @property
-    def count(self) -> int:
-        """Number of threads to begin with now."""
-        return min(4, _processors()) if self.most is None else self.most
-
-
-THREADS = Threads()
-
-
-def packed(values: np.ndarray, by: tuple[Deflate, int] = FASTEST) -> bytes:
+def packed(values: np.ndarray) -> bytes:
     """Doubles as stored in a chunk: all first bytes, all second bytes, ..., deflated."""
-    deflate, level = by
     octets = np.ascontiguousarray(values, "<f8").view(np.uint8).reshape(-1, 8)
-    return bytes(deflate(np.ascontiguousarray(octets.T), level))
+    return bytes(_DEFLATE(np.ascontiguousarray(octets.T), _LEVEL))
 
 
 class Compressor:
     """Compresses chunks, in threads as soon as there is enough to do; call ``close`` at the end."""
 
-    def __init__(self, threads: Threads = THREADS) -> None:
-        self.threads = threads
+    def __init__(self) -> None:
         self._pool: ThreadPoolExecutor | None = None
         self._numbers = 0
 
-    def packed(self, chunks: Sequence[np.ndarray]) -> list[Future[bytes]]:
-        """Compress whole chunks to what stands in a file, now or later.
-
-        Args:
-            chunks: one piece of work, ideally some hundred kB; must not be changed afterwards.
-        """
-        done: list[Future[bytes]] = [Future() for _ in chunks]
-        self._numbers += sum(chunk.size for chunk in chunks)
-        if self._pool is None and self._numbers > self.threads.fewest:
-            threads = self.threads.count
-            self._pool = ThreadPoolExecutor(threads, "rigidsim-chunks") if threads else None
+    def packed(self, chunk: np.ndarray) -> Future[bytes]:
+        """Compress a whole chunk, now or later; it mustn't change afterwards."""
+        self._numbers += chunk.size
+        if self._pool is None and self._numbers > _FEWEST and _processors():
+            self._pool = ThreadPoolExecutor(min(_MOST_THREADS, _processors()), "rigidsim-chunks")
         if self._pool is not None:
-            self._pool.submit(_pack, chunks, done)
-        else:
-            _pack(chunks, done)
+            return self._pool.submit(packed, chunk)
+        done: Future[bytes] = Future()
+        done.set_result(packed(chunk))
         return done
 
     def close(self) -> None:
@@ -94,30 +63,17 @@ class Compressor:
             self._pool, self._numbers = None, 0
 
 
-def _pack(chunks: Sequence[np.ndarray], done: Sequence[Future[bytes]]) -> None:
-    for chunk, future in zip(chunks, done, strict=True):
-        try:
-            future.set_result(packed(chunk))
-        except BaseException as error:  # raised where the result is asked for
-            future.set_exception(error)
-
-
 class ChunkWriter:
     """Writes chunks in the order in which they arrive, while later ones are being compressed."""
 
     def __init__(self, compressor: Compressor) -> None:
-        self._compressor, self._most = compressor, compressor.threads.waiting
+        self._compressor = compressor
         self._waiting: deque[tuple[h5d.DatasetID, tuple[int, ...], Future[bytes]]] = deque()
 
     def put(self, target: h5d.DatasetID, place: tuple[int, ...], values: np.ndarray) -> None:
-        """Compress a whole chunk and write it, now or later.
-
-        Args:
-            place: index of its first number.
-            values: must not be changed afterwards.
-        """
-        self._waiting.append((target, place, *self._compressor.packed([values])))
-        while self._waiting and (len(self._waiting) > self._most or self._waiting[0][2].done()):
+        """Compress a whole chunk and write it at an index, now or later; it mustn't change afterwards."""
+        self._waiting.append((target, place, self._compressor.packed(values)))
+        while self._waiting and (len(self._waiting) > _WAITING or self._waiting[0][2].done()):
             self._write_next()
 
     def finish(self) -> None:
@@ -250,11 +206,9 @@ def _packed_alike(saved: h5d.DatasetID) -> bool:
 
 
 @contextmanager
-def chunked(
-    variables: Mapping[str, h5d.DatasetID], threads: Threads = THREADS
-) -> Iterator[dict[str, ChunkedVariable]]:
+def chunked(variables: Mapping[str, h5d.DatasetID]) -> Iterator[dict[str, ChunkedVariable]]:
     """Compressed variables to which rows are added inside the block; everything is written when it ends."""
-    compressor = Compressor(threads)
+    compressor = Compressor()
     writer = ChunkWriter(compressor)
     chunks = {name: ChunkedVariable(target, writer) for name, target in variables.items()}
     try:

@@ -49,14 +49,10 @@ class CollectedRows:
         if not self._fitting:
             self._blocks.append(block)
             return
-        full: list[tuple[str, np.ndarray]] = []
         for variable in self._variables:
             for name, values in zip(variable.part_names(), block[variable.name], strict=True):
-                full += [(name, chunk) for chunk in self._cutters[name].cut(values)]
-        if full:
-            packed = self._compressor.packed([chunk for _, chunk in full])
-            for (name, _), content in zip(full, packed, strict=True):
-                self._packed[name].append(content)
+                for chunk in self._cutters[name].cut(values):
+                    self._packed[name].append(self._compressor.packed(chunk))
 
     def write(self, created: Created) -> None:
         """Write the rows into a segment whose variables were declared for this count, compressed or not."""
@@ -72,13 +68,10 @@ class CollectedRows:
                     write_rows(created[name], 0, values)
 
     def _write_chunks(self, created: Created) -> None:
-        last = {
-            name: self._compressor.packed([cutter.last.copy()] if cutter.filled else [])
-            for name, cutter in self._cutters.items()
-        }
         for name, cutter in self._cutters.items():
+            last = [self._compressor.packed(cutter.last.copy())] if cutter.filled else []
             beside = (0,) * (cutter.last.ndim - 1)
-            for number, chunk in enumerate(self._packed[name] + last[name]):
+            for number, chunk in enumerate(self._packed[name] + last):
                 created[name].write_direct_chunk((number * CHUNK_ROWS, *beside), chunk.result())
 
     def add_to(self, chunks: Mapping[str, ChunkedVariable]) -> None:

@@ -14,7 +14,7 @@ from rigidsim.errors import FORCE, OUT, RunFolderError, once_mended
 from rigidsim.look.figure_names import FIGURES
 from rigidsim.store import atomic, provenance, segments
 from rigidsim.store.summary import Brief, read_summary
-from rigidsim.store.work_folder import WorkFolder
+from rigidsim.store.work_folder import FileOf, WorkFolder
 
 _REOPENED = ".segments.reopened"
 
@@ -27,44 +27,22 @@ class RunFolder(WorkFolder):
     resumed = "continues from there"
     seen_by = fcntl.LOCK_SH
 
-    @property
-    def timeline(self) -> Path:
-        """The rerun recording."""
-        return self.path / "timeline.rrd"
-
-    @property
-    def figure(self) -> Path:
-        """Default file of ``rigidsim plot``."""
-        return self.path / "figure.png"
+    timeline = FileOf("timeline.rrd")
+    figure = FileOf("figure.png")
+    """Default file of ``rigidsim plot``."""
+    analysis = FileOf("analysis.h5")
+    spectrum = FileOf("analysis.png")
+    """Figure of the analysis."""
+    checkpoint = FileOf("checkpoint.h5")
+    """Checkpoint from which a finished run can be prolonged."""
+    segments = FileOf("segments")
+    """Folder of the segments that an unfinished run has saved."""
+    set_aside = FileOf("set_aside")
+    """Folder to which segments that don't belong to the run are moved."""
 
     def figure_of(self, what: str) -> Path:
         """Default file of ``rigidsim plot --what`` for a figure of that name."""
         return self.path / f"figure_{what}.png"
-
-    @property
-    def analysis(self) -> Path:
-        """Default file of ``rigidsim analyse``."""
-        return self.path / "analysis.h5"
-
-    @property
-    def spectrum(self) -> Path:
-        """Figure of the analysis."""
-        return self.path / "analysis.png"
-
-    @property
-    def checkpoint(self) -> Path:
-        """Checkpoint from which a finished run can be prolonged."""
-        return self.path / "checkpoint.h5"
-
-    @property
-    def segments(self) -> Path:
-        """Folder of the segments that an unfinished run has saved."""
-        return self.path / "segments"
-
-    @property
-    def set_aside(self) -> Path:
-        """Folder to which segments that don't belong to the run are moved."""
-        return self.path / "set_aside"
 
     def begin(self, config: str, *, force: bool) -> None:
         """Make the folder ready for a new run: write its config and mark it as under way."""

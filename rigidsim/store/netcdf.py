@@ -38,10 +38,12 @@ def declare(
     file.attributes(attributes)
     file.dimension("time", rows)
     for dim, labels in used_labels(variables).items():
-        file.labels(dim, labels, {"long_name": dim.replace("_", " ")})
-    options = {"chunk_rows": min(CHUNK_ROWS, rows), "gzip": GZIP_LEVEL} if compressed and rows else {}
+        file.texts(dim, dim, labels, {"long_name": dim.replace("_", " ")})
+    chunk, gzip = ((min(CHUNK_ROWS, rows),), GZIP_LEVEL) if compressed and rows else (None, None)
     return {
-        name: file.variable(name, ("time", *variable.dims), variable.part_attributes(part), **options)
+        name: file.variable(
+            name, ("time", *variable.dims), variable.part_attributes(part), chunk=chunk, gzip=gzip
+        )
         for variable in variables
         for part, name in enumerate(variable.part_names())
     }

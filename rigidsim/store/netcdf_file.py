@@ -72,46 +72,33 @@ class NetcdfFile:
         dims: Sequence[str],
         attributes: Mapping[str, Any],
         *,
-        chunk_rows: int | None = None,
+        chunk: Sequence[int] | None = None,
         gzip: int | None = None,
-    ) -> h5d.DatasetID:
-        """Create a variable of doubles along declared dimensions.
-
-        Args:
-            chunk_rows: rows per chunk along the first dimension; None for contiguous storage.
-            gzip: the level at which its chunks are compressed after a byte shuffle.
-        """
-        shape = tuple(self._sizes[dim] for dim in dims)
-        if chunk_rows is None and 0 in shape:
-            chunk_rows = _LEAST_CHUNK_ROWS
-        chunk = None if chunk_rows is None else (chunk_rows, *(max(1, size) for size in shape[1:]))
-        return self._created(name, dims, _DOUBLE, attributes, _new_dataset(chunk, gzip))
-
-    def table(
-        self,
-        name: str,
-        dims: Sequence[str],
-        attributes: Mapping[str, Any],
-        *,
-        chunk: Sequence[int] | None,
-        gzip: int | None,
         whole: bool = False,
     ) -> h5d.DatasetID:
-        """Create a variable of doubles or integers, in chunks of any shape."""
+        """Create a variable of doubles, or of integers, along declared dimensions.
+
+        Args:
+            attributes: texts and numbers.
+            chunk: shape of chunks; a single number for chunks of so many rows; None for contiguous storage.
+            gzip: the level at which its chunks are compressed after a byte shuffle.
+
+        Returns:
+            The variable, for ``write_rows`` and ``write_box``.
+        """
+        shape = tuple(self._sizes[dim] for dim in dims)
+        if chunk is None and 0 in shape:
+            chunk = (_LEAST_CHUNK_ROWS,)
+        if chunk is not None:
+            chunk = (*chunk, *(max(1, size) for size in shape[len(chunk) :]))
         how = _new_dataset(None if chunk is None else tuple(chunk), gzip)
         return self._created(name, dims, _INTEGER if whole else _DOUBLE, attributes, how)
 
     def texts(self, name: str, dim: str, texts: Sequence[str], attributes: Mapping[str, Any]) -> None:
-        """Write strings along a dimension that other variables may share."""
+        """Write strings along a dimension, of which they may be the labels."""
         self.dimension(dim, len(texts))
         created = self._created(name, (dim,), _TEXT, attributes, _new_dataset())
         _write(created, np.array(texts, dtype=_TEXT.numpy), _TEXT)
-
-    def labels(self, name: str, labels: Sequence[str], attributes: Mapping[str, Any]) -> None:
-        """Declare a dimension whose coordinate consists of strings."""
-        self.dimension(name, len(labels))
-        created = self._created(name, (name,), _TEXT, attributes, _new_dataset())
-        _write(created, np.array(labels, dtype=_TEXT.numpy), _TEXT)
 
     def attributes(self, attributes: Mapping[str, Any]) -> None:
         """Write attributes of the whole file: strings and numbers."""

@@ -13,6 +13,16 @@ from typing import ClassVar
 from rigidsim.errors import OUT, RESUME, RunFolderError, StoppedWritingError, once_mended
 
 
+class FileOf:
+    """A file of a folder, by its name there."""
+
+    def __init__(self, name: str) -> None:
+        self._name = name
+
+    def __get__(self, folder: WorkFolder, owner: type[WorkFolder]) -> Path:
+        return folder.path / self._name
+
+
 @dataclass(frozen=True)
 class WorkFolder:
     """Common base of the folders of runs and sweeps.
@@ -29,20 +39,12 @@ class WorkFolder:
     resumed: ClassVar[str]
     seen_by: ClassVar[int]
 
-    @property
-    def config(self) -> Path:
-        """The config that is run, one visible value per key."""
-        return self.path / "config.toml"
-
-    @property
-    def dataset(self) -> Path:
-        """The dataset, once the work is finished."""
-        return self.path / "dataset.h5"
-
-    @property
-    def summary(self) -> Path:
-        """The summary: how the work ended and what it cost."""
-        return self.path / "summary.json"
+    config = FileOf("config.toml")
+    """The config that is run, one visible value per key."""
+    dataset = FileOf("dataset.h5")
+    """The dataset, once the work is finished."""
+    summary = FileOf("summary.json")
+    """The summary: how the work ended and what it cost."""
 
     @contextmanager
     def locked(self, *, shared: bool = False) -> Iterator[None]:

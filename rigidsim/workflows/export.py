@@ -5,11 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+import xarray
 
 from rigidsim.errors import RESUME, RigidsimError, RunFolderError
 from rigidsim.formats import FOR_SWEEPS
-from rigidsim.formats.angles import angle_unit_named
+from rigidsim.formats.digits import angle_unit_named
 from rigidsim.formats.member_tables import member_tables
 from rigidsim.formats.naming import Naming
 from rigidsim.formats.registry import Format, TableSource, format_named
@@ -17,16 +19,11 @@ from rigidsim.formats.tables import BLOCK_NUMBERS, Table, tables_of
 from rigidsim.scene.arithmetic import working_bits
 from rigidsim.store import atomic
 from rigidsim.store.run import SavedRun
+from rigidsim.store.sweeps.run import SavedSweep
 from rigidsim.store.variables import parts_in
 from rigidsim.workflows.read import parse
 
 _PART_BITS = 53  # bits of a double: a value held by n of them has at most n times as many
-
-if TYPE_CHECKING:
-    import xarray
-
-    from rigidsim.scene.readable_units import AngleUnit
-    from rigidsim.store.sweeps.run import SavedSweep
 
 
 def export(
@@ -63,49 +60,35 @@ def export(
         RunFolderError: the run is damaged or empty, or the sweep isn't finished.
     """
     found = format_named(file_format)
-    unit = _unit(angle_unit, file_format, found)
-    target = Path(f"{_name(saved)}.{file_format}") if out is None else Path(out)
-    if isinstance(saved, SavedRun):
-        read = _run_read(saved, naming or Naming(), unit)
-    else:
-        _refuse_for_sweeps(saved, file_format, naming)
-        read = _sweep_read(saved, unit, block_numbers)
-    with read as (tables, source):
-        return _written(tables, target, found, source, force)
-
-
-def _name(saved: SavedRun | SavedSweep) -> str:
-    return saved.folder.path.resolve().name
-
-
-def _unit(name: str | None, file_format: str, found: Format) -> AngleUnit | None:
-    """The unit of angles; None for the format's own."""
-    unit = None if name is None else angle_unit_named(name)
+    unit = None if angle_unit is None else angle_unit_named(angle_unit)
     if unit is not None and not found.angles:
         raise RigidsimError(
-            f"--angle-unit: given {name}, but {file_format} prescribes its units; leave it out"
+            f"--angle-unit: given {angle_unit}, but {file_format} prescribes its units; leave it out"
         )
-    return unit
-
-
-Read = tuple[Sequence[Table], TableSource]
-"""Tables of an open dataset, the main one first, and their source."""
-
-
-@contextmanager
-def _run_read(run: SavedRun, naming: Naming, unit: AngleUnit | None) -> Iterator[Read]:
-    with run.opened(indexed=False) as dataset:  # sample times are not loaded as an index
-        bits = _bits(dataset)
-        attributes = dict(dataset.attrs, status=run.status)
-        yield tables_of(dataset, unit, bits), TableSource(_name(run), bits, attributes, naming, unit)
-
-
-@contextmanager
-def _sweep_read(sweep: SavedSweep, unit: AngleUnit | None, block_numbers: int) -> Iterator[Read]:
-    with sweep.dataset as dataset:
-        bits = _bits_of_members(dataset)
-        source = TableSource(_name(sweep), bits, dict(dataset.attrs), Naming(), unit)
-        yield member_tables(dataset, unit, bits, block_numbers), source
+    name = saved.folder.path.resolve().name
+    target = Path(f"{name}.{file_format}") if out is None else Path(out)
+    if isinstance(saved, SavedRun):
+        opened = saved.opened(indexed=False)  # sample times are not loaded as an index
+    else:
+        _refuse_for_sweeps(saved, file_format, naming)
+        opened = saved.dataset
+    with opened as dataset:
+        tables: Sequence[Table]
+        if isinstance(saved, SavedRun):
+            bits = _bits(dataset)
+            tables = tables_of(dataset, unit, bits)
+        else:
+            bits = _bits_of_members(dataset)
+            tables = member_tables(dataset, unit, bits, block_numbers)
+        attributes = dict(dataset.attrs, status=saved.status)
+        source = TableSource(name, bits, attributes, naming or Naming(), unit)
+        kept = {_beside(target, table): table for table in (tables if found.side_tables else tables[:1])}
+        for path in kept:
+            _refuse_existing(path, found, force)
+        for path, table in kept.items():
+            with _replacing(path, found) as new:
+                found.write(table, new, source)
+        return list(kept)
 
 
 def _refuse_for_sweeps(sweep: SavedSweep, file_format: str, naming: Naming | None) -> None:
@@ -123,19 +106,6 @@ def _refuse_for_sweeps(sweep: SavedSweep, file_format: str, naming: Naming | Non
         )
     if not sweep.finished:
         raise RunFolderError(f"{sweep.place}: the sweep is {sweep.status}; {RESUME} completes it")
-
-
-def _written(
-    tables: Sequence[Table], target: Path, found: Format, source: TableSource, force: bool
-) -> list[Path]:
-    """Write the tables that a format supports, the first to the target itself."""
-    kept = {_beside(target, table): table for table in (tables if found.side_tables else tables[:1])}
-    for path in kept:
-        _refuse_existing(path, found, force)
-    for path, table in kept.items():
-        with _replacing(path, found) as new:
-            found.write(table, new, source)
-    return list(kept)
 
 
 def _bits(dataset: xarray.Dataset) -> int:

@@ -20,9 +20,9 @@ def fill(file: NetcdfFile) -> None:
     """Every kind of thing that datasets hold."""
     file.attributes({"title": "a text, grüße", "empty": "", "count": 3, "size": 0.1, "many": [1.0, 2.5]})
     file.dimension("time", 10)
-    file.labels("axis", ["x", "y", "z"], {"long_name": "an axis"})
-    write_rows(file.variable("time", ("time",), {"units": "s"}, chunk_rows=4, gzip=4), 0, VALUES[:, 0])
-    rates = file.variable("rates", ("time", "axis"), {"units": "rad s-1"}, chunk_rows=4, gzip=4)
+    file.texts("axis", "axis", ["x", "y", "z"], {"long_name": "an axis"})
+    write_rows(file.variable("time", ("time",), {"units": "s"}, chunk=(4,), gzip=4), 0, VALUES[:, 0])
+    rates = file.variable("rates", ("time", "axis"), {"units": "rad s-1"}, chunk=(4,), gzip=4)
     write_rows(rates, 0, VALUES[:7])
     write_rows(rates, 7, VALUES[7:])
     file.dimension("event", 2)  # without a coordinate of its own

@@ -144,7 +144,7 @@ def _declared(
             attributes["coordinates"] = beside
         chunk = chunk_shape(sweep.shape, described.extra)
         small = math.prod(sweep.shape) * math.prod(described.extra) < 512
-        variable = file.table(
+        variable = file.variable(
             name, (*sweep.dims, *dims), attributes,
             chunk=None if small else chunk, gzip=None if small else _GZIP, whole=described.whole,
         )  # fmt: skip
@@ -155,7 +155,7 @@ def _declared(
 def file_labels(file: NetcdfFile, dim: str) -> None:
     """Write the labels of a dimension, once."""
     if not file.has(dim):
-        file.labels(dim, LABELS[dim], {"long_name": dim.replace("_", " ")})
+        file.texts(dim, dim, LABELS[dim], {"long_name": dim.replace("_", " ")})
 
 
 def chunk_shape(members: Sequence[int], extra: Sequence[int]) -> tuple[int, ...]:
@@ -222,7 +222,7 @@ def _write_reasons(file: NetcdfFile, reasons: Mapping[int, str]) -> None:
         return
     members = sorted(reasons)
     file.dimension("failed", len(members))
-    numbers = file.table(
+    numbers = file.variable(
         "failed_member", ("failed",), {"long_name": "which members didn't end well, the last axis fastest"},
         chunk=None, gzip=None, whole=True,
     )  # fmt: skip

@@ -18,7 +18,7 @@ from rigidsim.errors import FORCE, OUT, RESUME, RunFolderError
 from rigidsim.store import atomic
 from rigidsim.store.sweeps.generation import Generation
 from rigidsim.store.sweeps.tile import Tile, read_tile
-from rigidsim.store.work_folder import WorkFolder
+from rigidsim.store.work_folder import FileOf, WorkFolder
 
 KIND = "sweep"
 _GENERATION = re.compile(r"g(\d{3})\.json")
@@ -32,10 +32,8 @@ class SweepFolder(WorkFolder):
     resumed = "computes the others"
     seen_by = fcntl.LOCK_EX
 
-    @property
-    def tiles(self) -> Path:
-        """Folder of generations and their tiles."""
-        return self.path / "tiles"
+    tiles = FileOf("tiles")
+    """Folder of generations and their tiles."""
 
     @property
     def is_sweep(self) -> bool:

@@ -1,0 +1,105 @@
+"""Numbers as decimals from which the same bits can be restored, and angles in other units."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from decimal import ROUND_HALF_EVEN, Context, Decimal
+from functools import lru_cache, reduce
+
+import mpmath
+import numpy as np
+
+from rigidsim.errors import RigidsimError
+from rigidsim.scene.readable_units import ANGLE_UNITS, AngleUnit
+
+# Sums of doubles end at 2^-1074 and stay below 2^1025: 1,400 digits hold each exactly.
+_EXACT = Context(prec=1400, Emax=10**6, Emin=-(10**6))
+
+
+def texts(parts: Sequence[np.ndarray], bits: int) -> list[str]:
+    """Numbers with as many digits as their precision needs; ``nan``, ``inf`` and ``-0.0`` unchanged.
+
+    Args:
+        parts: float64 arrays of the same shape (rows,), the nearest double first.
+        bits: bits of the significand; up to 53, the shortest text that gives the same double is used.
+    """
+    if len(parts) == 1:
+        return [repr(value) for value in parts[0].tolist()]
+    enough = math.ceil(bits * math.log10(2)) + 1  # 10^(N-1) > 2^bits (Goldberg 1991, theorem 15)
+    contexts = [
+        Context(prec=max(digits, 17), rounding=ROUND_HALF_EVEN, Emax=10**6, Emin=-(10**6))
+        for digits in range(enough - 2, enough + 1)
+    ]
+    found = []
+    for row in zip(*(part.tolist() for part in parts), strict=True):
+        if math.isfinite(row[0]) and row[0] != 0.0:
+            exact = reduce(_EXACT.add, map(Decimal, reversed(row)))
+            value = _short(exact, row[0], bits, contexts)
+            found.append(f"{value:f}" if -7 <= value.adjusted() < 17 else f"{value:e}")
+        else:
+            found.append(repr(row[0]))
+    return found
+
+
+def _short(value: Decimal, lead: float, bits: int, contexts: Sequence[Context]) -> Decimal:
+    """The value with the fewest of these digits that still identify it: 0.3 rather than 0.2999...9996."""
+    quarter = _power_of_two(math.frexp(lead)[1] - bits - 2)  # of the spacing, also just below a power of two
+    for context in contexts[:-1]:
+        short = context.plus(value)
+        if abs(_EXACT.subtract(short, value)) < quarter:
+            return short.normalize(context)
+    return contexts[-1].plus(value).normalize(contexts[-1])
+
+
+@lru_cache(maxsize=4096)
+def _power_of_two(exponent: int) -> Decimal:
+    return _EXACT.power(Decimal(2), exponent)
+
+
+def decimals(parts: Sequence[np.ndarray], bits: int) -> list[Decimal]:
+    """The numbers of ``texts`` as decimals; callers have refused values that aren't finite."""
+    return [Decimal(text) for text in texts(parts, bits)]
+
+
+RADIAN = "rad"
+_GUARD_BITS = 64
+_PI = np.longdouble("3.141592653589793238462643383279502884")
+
+
+def angle_unit_named(name: str) -> AngleUnit:
+    """The unit of angle with the given name."""
+    if name not in ANGLE_UNITS:
+        raise RigidsimError(f'--angle-unit: given "{name[:40]}"; allowed: {", ".join(ANGLE_UNITS)}')
+    return ANGLE_UNITS[name]
+
+
+def converted(parts: Sequence[np.ndarray], unit: AngleUnit, bits: int) -> list[np.ndarray]:
+    """Angles in rad converted to a unit, rounded once to the run's precision.
+
+    Args:
+        parts: float64 arrays of one shape, whose sum is the value.
+        bits: bits of the run's precision; up to 53, one part is worked out in 64 bits.
+    """
+    if unit.per_turn is None:
+        return list(parts)
+    if len(parts) == 1:
+        factor = np.longdouble(unit.per_turn) / (2 * _PI)
+        return [(parts[0].astype(np.longdouble) * factor).astype(np.float64)]
+    context = mpmath.MPContext()
+    context.prec = bits + _GUARD_BITS
+    scale = unit.per_turn / (2 * context.pi)
+    found = [np.empty(parts[0].shape) for _ in parts]
+    for index in np.ndindex(parts[0].shape):
+        lead = float(parts[0][index])
+        if not np.isfinite(lead) or lead == 0.0:
+            for part, given in zip(found, parts, strict=True):
+                part[index] = given[index]
+            continue
+        value = context.fsum(float(part[index]) for part in parts) * scale
+        exponent = context.frexp(value)[1]
+        value = context.ldexp(context.nint(context.ldexp(value, bits - exponent)), exponent - bits)
+        for part in found:
+            part[index] = float(value)
+            value -= part[index]
+    return found
