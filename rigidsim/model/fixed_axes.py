@@ -54,13 +54,11 @@ def _size(context: Any, matrix: Matrix) -> Any:
 
 
 def _linear(m: Mechanics, loads: Sequence[Load]) -> list[tuple[Vector, Vector]]:
-    found = [linear_potential_of(load, m.scene) for load in loads]
-    return [pair for pair in found if pair is not None]
+    return [pair for load in loads if (pair := linear_potential_of(load, m.scene)) is not None]
 
 
 def _sources(m: Mechanics, loads: Sequence[Load]) -> list[tuple[Any, Vector]]:
-    found = [fixed_source_of(load, m.scene) for load in loads]
-    return [pair for pair in found if pair is not None]
+    return [pair for load in loads if (pair := fixed_source_of(load, m.scene)) is not None]
 
 
 def _source_matrix(sources: list[tuple[Any, Vector]]) -> Matrix:
@@ -142,33 +140,31 @@ def weight_axis(m: Mechanics) -> Vector | None:
     return m.numbers.up if m.numbers.arm is not None else None
 
 
+def _kept(m: Mechanics, axis: Vector | None, *others: Vector | None) -> Vector | None:
+    """The axis, if no torque acts about it and it is none of the others; None otherwise."""
+    named = [other for other in others if other is not None]
+    if axis is None or any(parallel(m.scene.context, axis, other) for other in named):
+        return None
+    return axis if keeps(m, axis) else None
+
+
 def free_axis(m: Mechanics, which: int) -> Vector | None:
     """Space axis without a torque about it, if some torque acts and the axis has no more specific name; None
     otherwise.
     """
     context = m.scene.context
     axis = [context.one if i == which else context.zero for i in range(3)]
-    named = [a for a in (weight_axis(m), source_axis(m), field_axis(m)) if a is not None]
-    if not m.torque or any(parallel(context, axis, a) for a in named):
-        return None
-    return axis if keeps(m, axis) else None
+    return _kept(m, axis, weight_axis(m), source_axis(m), field_axis(m)) if m.torque else None
 
 
 def kept_source_axis(m: Mechanics) -> Vector | None:
     """``source_axis`` if the momentum along it is conserved and it isn't the vertical; None otherwise."""
-    axis, weight = source_axis(m), weight_axis(m)
-    if axis is None or (weight is not None and parallel(m.scene.context, axis, weight)):
-        return None
-    return axis if keeps(m, axis) else None
+    return _kept(m, source_axis(m), weight_axis(m))
 
 
 def kept_field_axis(m: Mechanics) -> Vector | None:
     """``field_axis`` under the same condition, if it isn't a source's axis either; None otherwise."""
-    axis = field_axis(m)
-    others = [a for a in (weight_axis(m), source_axis(m)) if a is not None]
-    if axis is None or any(parallel(m.scene.context, axis, other) for other in others):
-        return None
-    return axis if keeps(m, axis) else None
+    return _kept(m, field_axis(m), weight_axis(m), source_axis(m))
 
 
 def along(m: Mechanics, axis: Vector) -> Symbolic:

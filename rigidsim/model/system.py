@@ -266,16 +266,9 @@ class System:
         """Arguments whose zeros are switching surfaces; the parameter of the same number holds the side, +1
         or -1.
         """
-        m = self.mechanics
+        m, found = self.mechanics, [surface.expression for surface in self.plan.surfaces.found]
         return [
-            to_heyoka(
-                surface.expression,
-                state_names(m, names_used(surface.expression)),
-                m.number,
-                m.scene.context,
-                m.sides,
-            )
-            for surface in self.plan.surfaces.found
+            to_heyoka(x, state_names(m, names_used(x)), m.number, m.scene.context, m.sides) for x in found
         ]
 
     @cached_property
