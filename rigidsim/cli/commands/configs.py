@@ -9,7 +9,8 @@ import rigidsim.workflows.check as validation
 import rigidsim.workflows.plan as planning
 import rigidsim.workflows.tradeoff as measuring
 from rigidsim.cli.screens.page import print_json
-from rigidsim.cli.screens.summary import print_checked, print_plan
+from rigidsim.cli.screens.plan import print_plan
+from rigidsim.cli.screens.summary import print_checked
 from rigidsim.cli.screens.sweeps import print_sweep_plan
 from rigidsim.cli.screens.tradeoff import print_tradeoff
 from rigidsim.scene.editor_schema import editor_schema

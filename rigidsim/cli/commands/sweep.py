@@ -7,7 +7,7 @@ from pathlib import Path
 
 import rigidsim.workflows.sweeps.sweep as workflow
 from rigidsim.cli.screens.page import print_json
-from rigidsim.cli.screens.sweeps import observer, print_sweep
+from rigidsim.cli.screens.sweeps import SweepProgress, print_sweep
 from rigidsim.errors import RigidsimError
 from rigidsim.scene.config import Experiment
 from rigidsim.store.sweeps.run import SavedSweep, open_sweep
@@ -28,7 +28,7 @@ def sweep(
     if scheduler is not None and workers > 1:
         raise RigidsimError("--workers are processes of this machine, --scheduler has its own: give one")
     experiment = load(config, overrides=overrides or [])
-    with observer() as watching:
+    with SweepProgress() as watching:
         result = workflow.sweep(
             experiment, out=out, force=force, workers=workers, scheduler=scheduler, tiles=share,
             observer=watching,
@@ -43,7 +43,7 @@ def run_scanned(
     """Sweep each config over the axes of ``run --sweep``."""
     worst = 0
     for experiment in experiments:
-        with observer() as watching:
+        with SweepProgress() as watching:
             result = workflow.sweep(scanned(experiment, scan), out=out, force=force, observer=watching)
         worst = worst or _print(result, as_json)
     return worst
@@ -51,7 +51,7 @@ def run_scanned(
 
 def resume(path: Path, workers: int, as_json: bool) -> int:
     """Go on with a sweep."""
-    with observer() as watching:
+    with SweepProgress() as watching:
         result = workflow.resume_sweep(path, workers=workers, observer=watching)
     return _print(result, as_json)
 

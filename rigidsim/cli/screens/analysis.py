@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 
 import mpmath
 from rich.box import SIMPLE_HEAD
-from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
@@ -52,72 +51,58 @@ def justified(value: Any, error: float, most: int) -> str:
     return text.rstrip(".")
 
 
-def print_analysis(analysis: Analysis, saved: Saved | None = None, out: Console | None = None) -> None:
+def print_analysis(analysis: Analysis, saved: Saved) -> None:
     """Print a table for each signal, with remarks."""
-    out = Page(out).console
-    nyquist = 2 * math.pi / analysis.nyquist
-    out.print(
-        Text.assemble(
-            (analysis.title or "dataset", "bold"),
-            f"  {span_text(analysis.length)} of samples, one every {span_text(analysis.spacing)}: periods "
-            f"from {span_text(nyquist)}",
-        )
-    )
+    on = Page()
+    span, spacing = span_text(analysis.length), span_text(analysis.spacing)
+    periods = f"periods from {span_text(2 * math.pi / analysis.nyquist)}"
+    on.say((analysis.title or "dataset", "bold"), f"  {span} of samples, one every {spacing}: {periods}")
     for signal in analysis.signals:
-        _print_signal(signal, out)
-    _print_secular(analysis.signals, out)
-    if analysis.known:
-        out.print(_known(analysis))
+        _print_signal(signal, on)
+    _print_secular(analysis.signals, on)
+    rows = []
+    for one in analysis.known:
+        period = span_text(2 * math.pi / abs(float(one.value)), 8)
+        rows.append([one.name, f"{'-' if float(one.value) < 0 else ''}{period}", one.source])
+    if rows:
+        on.table(["known frequency", "period", "from"], rows)
     if analysis.attitude_error is not None and analysis.rounding is not None:
-        out.print(
-            Text(
-                f"rounding  the run's own error of {analysis.attitude_error:.1e} rad at the end allows "
-                f"frequencies to {analysis.rounding:.1e} rad/s; errors above are of the analysis alone"
-            ),
-            soft_wrap=True,
+        on.say(
+            f"rounding  the run's own error of {analysis.attitude_error:.1e} rad at the end allows "
+            f"frequencies to {analysis.rounding:.1e} rad/s; errors above are of the analysis alone",
+            whole=True,
         )
-    if saved is not None:
-        out.print(Text(f"dataset   {saved.dataset}"), soft_wrap=True)
-        out.print(Text(f"figure    {saved.figure}"), soft_wrap=True)
+    on.say(f"dataset   {saved.dataset}", whole=True)
+    on.say(f"figure    {saved.figure}", whole=True)
 
 
-def _print_secular(signals: Sequence[SignalAnalysis], out: Console) -> None:
+def _print_secular(signals: Sequence[SignalAnalysis], on: Page) -> None:
     """Print once more, below all lines, the secular rates."""
     moving = [one for one in signals if one.rate is not None and abs(one.rate.real) > _SURE * one.rate_error]
     if moving:
-        out.print()
+        on.say("")
     for one in moving:
-        digits = max(int(one.bits * 0.30103), 15)
-        words = _rate(one, one.units == "rad", digits)
-        out.print(Text.assemble("secular   ", (one.name, "bold"), f"  {words}"), soft_wrap=True)
+        words = _rate(one, one.units == "rad", _digits(one))
+        on.say("secular   ", (one.name, "bold"), f"  {words}", whole=True)
 
 
-def _known(analysis: Analysis) -> Table:
-    table = Table(box=SIMPLE_HEAD, pad_edge=False, show_edge=False)
-    for name in ("known frequency", "period", "from"):
-        table.add_column(name, overflow="fold")
-    for one in analysis.known:
-        period = 2 * math.pi / abs(float(one.value))
-        sign = "-" if float(one.value) < 0 else ""
-        table.add_row(Text(one.name), sign + span_text(period, 8), Text(one.source))
-    return table
+def _digits(signal: SignalAnalysis) -> int:
+    return max(int(signal.bits * 0.30103), 15)
 
 
-def _print_signal(signal: SignalAnalysis, out: Console) -> None:
-    angle = signal.units == "rad"
-    digits = max(int(signal.bits * 0.30103), 15)
-    out.print()
-    out.print(Text.assemble((signal.name, "bold"), f"  {_secular(signal, angle, digits)}"), soft_wrap=True)
+def _print_signal(signal: SignalAnalysis, on: Page) -> None:
+    angle, digits = signal.units == "rad", _digits(signal)
+    on.say("")
+    on.say((signal.name, "bold"), f"  {_secular(signal, angle, digits)}", whole=True)
     if signal.lines:
-        out.print(_lines(signal, angle, digits, narrow=out.width < _WIDE))
+        on.console.print(_lines(signal, angle, digits, narrow=on.width < _WIDE))
     else:
-        out.print(Text("  no line stands out of what is left", style="dim"))
-    left = _with_unit(signal.left, signal.units)
-    level = _with_unit(signal.level, signal.units)
+        on.say(("  no line stands out of what is left", "dim"))
+    left, level = (_with_unit(size, signal.units) for size in (signal.left, signal.level))
     more = "; more lines than were asked for (--lines)" if signal.exhausted else ""
-    out.print(Text(f"  left: rms {left}, lines below {level} aren't seen{more}", style="dim"), soft_wrap=True)
+    on.say((f"  left: rms {left}, lines below {level} aren't seen{more}", "dim"), whole=True)
     for note in signal.notes:
-        out.print(Text(f"  {note}", style="yellow"), soft_wrap=True)
+        on.say((f"  {note}", "yellow"), whole=True)
 
 
 def _secular(signal: SignalAnalysis, angle: bool, digits: int) -> str:

@@ -58,9 +58,9 @@ class Page:
         widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
         return sum(widths) + _BETWEEN * (len(widths) - 1) <= self.width
 
-    def table(self, columns: Sequence[str], rows: Iterable[Sequence[Styled]]) -> None:
-        """Print a table under the names of its columns."""
-        table = Table(box=SIMPLE_HEAD, pad_edge=False, show_edge=False)
+    def table(self, columns: Sequence[str], rows: Iterable[Sequence[Styled]], *, ruled: bool = True) -> None:
+        """Print a table under the names of its columns, ``ruled`` off."""
+        table = Table(box=SIMPLE_HEAD if ruled else None, pad_edge=False, show_edge=False)
         for name in columns:
             table.add_column(Text(name), justify="right" if name in _NUMBERS else "left", overflow="fold")
         for row in rows:

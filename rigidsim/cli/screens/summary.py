@@ -1,4 +1,4 @@
-"""Tables that the commands print on stdout; the library never needs them."""
+"""Output of ``rigidsim run``, ``info``, ``check`` and ``verify``."""
 
 from __future__ import annotations
 
@@ -9,29 +9,18 @@ from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
 
-from rigidsim.cli.screens.equations import print_equations
-from rigidsim.cli.screens.models import interpolated, print_levels, print_modelling
 from rigidsim.cli.screens.page import Page, Styled
 from rigidsim.cli.screens.understood import understood
 from rigidsim.cli.screens.verdicts import advice_line, next_lines, verdict_line
 from rigidsim.errors import ConfigError
 from rigidsim.scene.formulations import variables_named
 from rigidsim.scene.methods import method_named
-from rigidsim.scene.readable_time import TimeWords, span_text
+from rigidsim.scene.readable_time import YEAR, TimeWords, span_text
 from rigidsim.store.summary import Brief, Span, Start, Summary, UnderstoodBody
-from rigidsim.store.summary_parts import ENGINE, Accuracy, InvariantDrift
+from rigidsim.store.summary_parts import ENGINE, Accuracy, InvariantDrift, Modelling, TableErrors
 
 if TYPE_CHECKING:
     from rigidsim.workflows.check import Checked
-    from rigidsim.workflows.plan import RunPlan
-
-
-def size(count: float) -> str:
-    """Bytes in a readable unit."""
-    for unit, factor in (("TB", 1e12), ("GB", 1e9), ("MB", 1e6), ("kB", 1e3)):
-        if count >= factor:
-            return f"{count / factor:.3g} {unit}"
-    return f"{count:.0f} B"
 
 
 def _initial(value: float | tuple[float, ...] | None) -> str:
@@ -82,7 +71,8 @@ def print_understood(
         on.line(label, text)
 
 
-def _from_step(step: int | None) -> str:
+def from_step(step: int | None) -> str:
+    """From which step on something is done, if that isn't all of them."""
     return "" if step is None else f" from step {step:,} on"
 
 
@@ -93,7 +83,7 @@ def _print_ended(summary: Summary, loads: Sequence[str], on: Page) -> None:
     if not method.has_steps:
         how = f"in {method.title}"
     if summary.held:
-        how += ", invariants projected" + _from_step(summary.hold_from_step)
+        how += ", invariants projected" + from_step(summary.hold_from_step)
     on.line(
         "model",
         f"{summary.formulation}, {len(summary.states)} states ({' '.join(summary.states)}), "
@@ -117,9 +107,9 @@ def _print_ended(summary: Summary, loads: Sequence[str], on: Page) -> None:
     if summary.held:
         on.line("held", "put back: what the drift would have been; held drifts are no independent check")
     _print_accuracy(summary.accuracy, on, "attitude" if summary.modelling is None else "axis")
-    print_modelling(summary.modelling, on)
+    _print_modelling(summary.modelling, on)
     for number, (name, found) in enumerate(summary.tables.items()):
-        on.line("" if number else "tables", interpolated(name, found))
+        on.line("" if number else "tables", _interpolated(name, found))
     for number, name in enumerate(summary.events):
         on.line("" if number else "events", _event(summary, name))
     if summary.undefined_samples:
@@ -213,66 +203,36 @@ def _print_accuracy(accuracy: Accuracy, on: Page, what: str) -> None:
         on.line("path", text)
 
 
-def print_plan(plan: RunPlan, out: Console | None = None) -> None:
-    """Print the result of ``rigidsim plan``."""
-    on = Page(out)
-    on.say((plan.name, "bold"), f"  {plan.state_count} states, {plan.formulation}")
-    parts = plan.body, plan.start, plan.time
-    print_understood(*parts, on, plan.loads)
-    for surface in plan.switching:
-        where = f"steps end on the kinks and jumps of {surface.surface} ({surface.where})"
-        on.say("  " + where)
-    if plan.turning:
-        on.say(f"  turns of {', '.join(plan.turning)} count: steps are taken one by one")
-    reasons: list[list[Styled]] = [[row.states, row.why] for row in plan.reasons]
-    reasons += [[(f"no {row.what}", "dim"), (row.why, "dim")] for row in plan.left_out]
-    on.table(["states", "carried because"], reasons)
-    print_equations(plan.shared_terms, plan.equations, on)
-    on.table(["invariant", "holds because"], [[row.name, row.why] for row in plan.invariants])
-    on.line("recorded", ", ".join(plan.recorded))
-    predicted, pilot = plan.predicted, plan.pilot
-    held = ", invariants held" + _from_step(plan.hold_from_step) if plan.hold_invariants else ""
-    order = "" if plan.taylor_order is None else f", Taylor order {plan.taylor_order}"
-    on.line("settings", f"{plan.precision} precision, tolerance {plan.tolerance:.3g}{order}{held}")
-    if not method_named(plan.method).has_steps:
-        on.line("method", f"{plan.closed_form}: no steps are taken")
-    elif plan.closed_form is not None:
-        on.line("closed", f'{plan.closed_form}: method = "closed_form" would take no steps')
-    print_levels(plan.levels, on)
-    if plan.accuracy is not None:
-        on.line("chosen", f"{plan.accuracy.chosen}: {plan.accuracy.why}")
-    first = "" if predicted.pace == 1 else " at first"
-    on.line(
-        "forecast",
-        f"{predicted.steps:.3g} steps of about {span_text(pilot.step)}{first} "
-        f"(pilot of {pilot.steps:.0f}), {span_text(predicted.total_seconds)}, "
-        f"{size(predicted.memory_bytes)} of memory, dataset {size(predicted.dataset_bytes)}, "
-        f"timeline {size(predicted.timeline_bytes)}",
+def _print_modelling(found: Modelling | None, on: Page) -> None:
+    """Print how far a reduced model is from the full one."""
+    if found is None:
+        return
+    if found.momentum_axis is None:
+        on.line("averaged", f"modelling error {found.how}")
+        return
+    text = f"momentum's direction within {found.momentum_axis:.1e} rad of the full model's"
+    if found.figure_axis is not None:
+        text += f", figure axis within {found.figure_axis:.1e} rad"
+    on.line("averaged", text)
+    if found.angular_momentum_norm is not None and found.energy is not None:
+        text = f"size of the angular momentum within {found.angular_momentum_norm:.1e} of itself, energy of "
+        on.line("", text + f"rotation within {found.energy:.1e}")
+    if not found.whole and found.growth is not None and found.oscillation is not None:
+        span = found.windows[0].end - found.windows[0].start
+        text = f"{len(found.windows)} windows of {span_text(span)} with every rotation: "
+        text += f"{found.oscillation:.1e} rad in each, growing by {found.growth * YEAR:.1e} rad/yr"
+        on.line("", text)
+    if not (found.short_period or found.resonance or found.energy is not None):
+        on.line("", "[model] short_period = true adds the nutation back that averaging removed")
+
+
+def _interpolated(name: str, found: TableErrors) -> str:
+    """Accuracy of a tabulated orbit's interpolation, in words."""
+    expected = found.direction * found.expected
+    return (
+        f'"{name}": interpolation misses the source by {found.direction:.1e} rad at most with every other '
+        f"row left out, by about {expected:.0e} rad with all rows"
     )
-    if predicted.pace is None:
-        on.line(
-            "", "at the pace of the start, which torques change: fewer steps where they brake the rotation"
-        )
-    elif predicted.pace != 1:
-        told = f"{predicted.pace:.2g} times as many a second as at first"
-        on.line("", f"torques change the rotation: steps are {told}, on average")
-    for warning in plan.warnings:
-        on.line("warning", warning, "bold red")
-    error = predicted.attitude_error_rad
-    if error is not None and math.isfinite(error):
-        factor = predicted.amplification
-        unstable = f", {factor:.1g} times amplified by the motion" if factor > 1 else ""
-        law = "invariants held" if predicted.held else "round-off law"
-        averaged = plan.formulation.endswith("_averaged")
-        words = "momentum's direction integrated to" if averaged else "attitude uncertain by"
-        on.line("accuracy", f"{words} about {error:.1e} rad at the end ({law}{unstable})")
-        seen = predicted.growth_seconds
-        if seen:
-            on.line(
-                "",
-                f"if errors go on growing as in the first {span_text(seen)}; what sets in later isn't seen "
-                "here, but by the run",
-            )
 
 
 def print_checked(found: Checked) -> None:

@@ -9,13 +9,11 @@ from pathlib import Path
 from typing import Any
 
 from rich.console import Console
-from rich.markup import escape
 from rich.progress import BarColumn, Progress, TextColumn
-from rich.table import Table
 
-from rigidsim.cli.screens.page import Page
+from rigidsim.cli.screens.page import Page, Styled
 from rigidsim.scene.sweeps.sweep import Sweep
-from rigidsim.store.sweeps.run import SavedSweep, SweepCost
+from rigidsim.store.sweeps.run import SavedSweep
 from rigidsim.workflows.sweeps.plan import SweepPlan
 from rigidsim.workflows.sweeps.sweep import SweepObserver
 
@@ -69,7 +67,7 @@ class SweepProgress(SweepObserver):
         now = time.perf_counter()
         rate = (done - self._before) / max(now - self._begin, 1e-9)
         said = f"{done:,} of {self._members:,} members, {rate:.3g} a second, "
-        said += f"{duration((self._members - done) / rate if rate else None)} left"
+        said += f"{_duration((self._members - done) / rate if rate else None)} left"
         if self._bar is not None:
             self._bar.update(self._task, completed=done, said=said)
         elif now - self._latest >= _LINE_EVERY:
@@ -91,12 +89,7 @@ class SweepProgress(SweepObserver):
             self._bar.console.print(f"{self._name}: {text}", highlight=False, markup=False)
 
 
-def observer() -> SweepProgress:
-    """The observer that suits stderr; use it in a ``with``."""
-    return SweepProgress()
-
-
-def duration(seconds: float | None) -> str:
+def _duration(seconds: float | None) -> str:
     """A duration as h:mm:ss."""
     if seconds is None:
         return "-:--:--"
@@ -114,83 +107,63 @@ _ERRORS = {
 }
 
 
-def _of_errors(cost: SweepCost) -> str:
-    seconds = cost.estimate_cpu_seconds
-    return f", {seconds:.3g} s of them for errors" if seconds else ""
-
-
 def print_sweep(result: SavedSweep) -> None:
     """Print how a sweep's members ended."""
-    told, screen = result.outcome, Page().console
-    screen.print(f"[bold]{told.name}[/] ({result.place}): {told.message}", highlight=False)
+    told, on = result.outcome, Page()
+    on.say((told.name, "bold"), f" ({result.place}): {told.message}")
+    place = shlex.quote(result.place)
     if not result.finished:
-        rate = told.members_per_second
-        if rate:
-            left = duration(told.seconds_left)
-            screen.print(
-                f"tiles    {told.tiles_done:,} of {told.tiles:,}; {rate:.3g} members a second, {left} left",
-                highlight=False,
-            )
-        elif told.tiles is not None:
-            screen.print(f"tiles    {told.tiles_done:,} of {told.tiles:,}", highlight=False)
+        done = f"{told.tiles_done:,} of {told.tiles:,}" if told.tiles is not None else ""
+        if told.members_per_second:
+            left = _duration(told.seconds_left)
+            on.line("tiles", f"{done}; {told.members_per_second:.3g} members a second, {left} left")
+        elif done:
+            on.line("tiles", done)
         if result.status == "interrupted":
-            screen.print(escape(f"next     rigidsim resume {shlex.quote(result.place)}"), highlight=False)
+            on.line("next", f"rigidsim resume {place}")
         return
-    shape = " x ".join(f"{name} {size:,}" for name, size in told.shape.items())
-    screen.print(f"axes     {shape}", highlight=False)
-    table = Table("ended", "members", box=None, pad_edge=False)
-    for status, number in told.outcomes.items():
-        table.add_row(status, f"{number:,}")
-    screen.print(table)
+    on.line("axes", " x ".join(f"{name} {size:,}" for name, size in told.shape.items()))
+    ended = [[status, f"{number:,}"] for status, number in told.outcomes.items()]
+    on.table(["ended", "members"], ended, ruled=False)
     cost = told.cost
     assert cost is not None
     engines = ", ".join(f"{number:,} {engine}" for engine, number in told.engines.items())
-    screen.print(
-        f"cost     {cost.steps:,} steps, {cost.cpu_seconds:.3g} s of CPU in {cost.tiles:,} tiles "
-        f"({engines})" + _of_errors(cost),
-        highlight=False,
-    )
-    errors = told.estimated_errors
-    for name, error in errors.items():
-        words = _INTEGRATED if name == "attitude" and "modelling" in errors else _ERRORS.get(name, name)
+    errors = f", {cost.estimate_cpu_seconds:.3g} s of them for errors" if cost.estimate_cpu_seconds else ""
+    spent = f"{cost.steps:,} steps, {cost.cpu_seconds:.3g} s of CPU in {cost.tiles:,} tiles"
+    on.line("cost", f"{spent} ({engines}){errors}")
+    for name, error in told.estimated_errors.items():
+        averaged = name == "attitude" and "modelling" in told.estimated_errors
+        words = _INTEGRATED if averaged else _ERRORS.get(name, name)
         units = "" if error.units == "1" else f" {error.units}"
-        screen.print(
-            f"error    {words}: {error.median:.2g}{units} in the median, at most "
-            f"{error.largest:.2g}, estimated of {error.members:,} members",
-            highlight=False,
-        )
+        sizes = f"{error.median:.2g}{units} in the median, at most {error.largest:.2g}"
+        on.line("error", f"{words}: {sizes}, estimated of {error.members:,} members")
     for name, drift in told.largest_drifts.items():
-        screen.print(f"drift    {name.removesuffix('_drift')}: at most {drift:.2g}", highlight=False)
+        on.line("drift", f"{name.removesuffix('_drift')}: at most {drift:.2g}")
     for text in told.warnings:
-        screen.print(f"[yellow]warning[/]  {escape(text)}", highlight=False)
-    place = shlex.quote(result.place)
-    screen.print(escape(f"next     rigidsim plot {place}"), highlight=False)
-    screen.print(escape(f"         rigidsim view {place} --member 0"), highlight=False)
-    screen.print(escape(f"         rigidsim export {place} --format csv"), highlight=False)
+        on.line("warning", text, "yellow")
+    on.line("next", f"rigidsim plot {place}")
+    on.line("", f"rigidsim view {place} --member 0")
+    on.line("", f"rigidsim export {place} --format csv")
 
 
 def print_sweep_plan(made: SweepPlan) -> None:
     """Print what a sweep would run, and what it would cost."""
-    screen = Page().console
-    screen.print(f"[bold]{made.name}[/]: {made.members:,} members ({made.mode})", highlight=False)
-    table = Table("axis", "key", "values", "from", "to", box=None, pad_edge=False)
+    on = Page()
+    on.say((made.name, "bold"), f": {made.members:,} members ({made.mode})")
+    rows: list[list[Styled]] = []
     for axis in made.axes:
         unit = axis.unit if axis.unit not in (None, "1") else ""
-        table.add_row(
-            axis.name, axis.key, f"{axis.count:,}", _brief(axis.first),
-            f"{_brief(axis.last)} {unit}",
-        )  # fmt: skip
-    screen.print(table)
+        ends = _brief(axis.first), f"{_brief(axis.last)} {unit}"
+        rows.append([axis.name, axis.key, f"{axis.count:,}", *ends])
+    on.table(["axis", "key", "values", "from", "to"], rows, ruled=False)
     predicted = made.predicted
-    screen.print(
-        f"keep     {', '.join(made.keep)}\n"
-        f"tiles    {made.tiles:,} of {made.tile:,} members\n"
-        f"time     {duration(predicted.total_seconds)} on one core, "
-        f"{predicted.seconds_per_member:.2g} s a member\n"
-        f"disk     about {predicted.dataset_bytes / 1e6:.3g} MB, and as much for the tiles\n\n"
-        "one member:",
-        highlight=False,
-    )
+    on.line("keep", ", ".join(made.keep))
+    on.line("tiles", f"{made.tiles:,} of {made.tile:,} members")
+    each = f"{predicted.seconds_per_member:.2g} s a member"
+    on.line("time", f"{_duration(predicted.total_seconds)} on one core, {each}")
+    on.line("disk", f"about {predicted.dataset_bytes / 1e6:.3g} MB, and as much for the tiles")
+    on.say("")
+    on.say("one member:")
 
 
 def _brief(text: str) -> str:

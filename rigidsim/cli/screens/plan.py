@@ -1,0 +1,126 @@
+"""Output of ``rigidsim plan``: what would be integrated, why, and at what cost."""
+
+from __future__ import annotations
+
+import math
+import re
+import textwrap
+from collections.abc import Sequence
+
+from rich.console import Console
+
+from rigidsim.cli.screens.page import Page, Styled
+from rigidsim.cli.screens.summary import from_step, print_understood
+from rigidsim.scene.methods import method_named
+from rigidsim.scene.readable_time import span_text
+from rigidsim.workflows.plan import RunPlan
+from rigidsim.workflows.plan_levels import LevelCost
+
+_MOST_LINES = 40  # of equations
+_DIGITS = 6
+_NUMBER = re.compile(r"(?<![\w.])\d+(?:\.\d*)?(?:e[+-]?\d+)?(?![\w.])")
+
+
+def print_plan(plan: RunPlan, out: Console | None = None) -> None:
+    """Print the result of ``rigidsim plan``."""
+    on = Page(out)
+    on.say((plan.name, "bold"), f"  {plan.state_count} states, {plan.formulation}")
+    print_understood(plan.body, plan.start, plan.time, on, plan.loads)
+    for surface in plan.switching:
+        on.say(f"  steps end on the kinks and jumps of {surface.surface} ({surface.where})")
+    if plan.turning:
+        on.say(f"  turns of {', '.join(plan.turning)} count: steps are taken one by one")
+    reasons: list[list[Styled]] = [[row.states, row.why] for row in plan.reasons]
+    reasons += [[(f"no {row.what}", "dim"), (row.why, "dim")] for row in plan.left_out]
+    on.table(["states", "carried because"], reasons)
+    _print_equations(plan.shared_terms, plan.equations, on)
+    on.table(["invariant", "holds because"], [[row.name, row.why] for row in plan.invariants])
+    on.line("recorded", ", ".join(plan.recorded))
+    predicted, pilot = plan.predicted, plan.pilot
+    held = ", invariants held" + from_step(plan.hold_from_step) if plan.hold_invariants else ""
+    order = "" if plan.taylor_order is None else f", Taylor order {plan.taylor_order}"
+    on.line("settings", f"{plan.precision} precision, tolerance {plan.tolerance:.3g}{order}{held}")
+    if not method_named(plan.method).has_steps:
+        on.line("method", f"{plan.closed_form}: no steps are taken")
+    elif plan.closed_form is not None:
+        on.line("closed", f'{plan.closed_form}: method = "closed_form" would take no steps')
+    _print_levels(plan.levels, on)
+    if plan.accuracy is not None:
+        on.line("chosen", f"{plan.accuracy.chosen}: {plan.accuracy.why}")
+    first = "" if predicted.pace == 1 else " at first"
+    on.line(
+        "forecast",
+        f"{predicted.steps:.3g} steps of about {span_text(pilot.step)}{first} "
+        f"(pilot of {pilot.steps:.0f}), {span_text(predicted.total_seconds)}, "
+        f"{_size(predicted.memory_bytes)} of memory, dataset {_size(predicted.dataset_bytes)}, "
+        f"timeline {_size(predicted.timeline_bytes)}",
+    )
+    if predicted.pace is None:
+        on.line(
+            "", "at the pace of the start, which torques change: fewer steps where they brake the rotation"
+        )
+    elif predicted.pace != 1:
+        told = f"{predicted.pace:.2g} times as many a second as at first"
+        on.line("", f"torques change the rotation: steps are {told}, on average")
+    for warning in plan.warnings:
+        on.line("warning", warning, "bold red")
+    error = predicted.attitude_error_rad
+    if error is not None and math.isfinite(error):
+        factor = predicted.amplification
+        unstable = f", {factor:.1g} times amplified by the motion" if factor > 1 else ""
+        law = "invariants held" if predicted.held else "round-off law"
+        averaged = plan.formulation.endswith("_averaged")
+        words = "momentum's direction integrated to" if averaged else "attitude uncertain by"
+        on.line("accuracy", f"{words} about {error:.1e} rad at the end ({law}{unstable})")
+        seen = predicted.growth_seconds
+        if seen:
+            on.line(
+                "",
+                f"if errors go on growing as in the first {span_text(seen)}; what sets in later isn't seen "
+                "here, but by the run",
+            )
+
+
+def _print_levels(levels: list[LevelCost], on: Page) -> None:
+    """Print what each model would cost, and leave out."""
+    rows: list[list[Styled]] = []
+    for row in levels:
+        known = row.steps is not None and row.cpu_seconds is not None
+        cost = [f"{row.steps:,.0f}", span_text(row.cpu_seconds or 0.0, 2)] if known else ["", ""]
+        error = "" if row.error_rad is None else f"{row.error_rad:.1e} rad" if row.error_rad else "none"
+        rows.append([row.level, *cost, error, row.why_not or ("taken", "bold")])
+    if rows:
+        on.table(["model", "steps", "CPU", "leaves out", ""], rows)
+
+
+def _print_equations(shared: Sequence[str], equations: Sequence[str], on: Page) -> None:
+    """Shared terms and the equations with them, with numbers to six digits; of many lines the first."""
+    on.say(("equations (internal units: powers of two)", "bold"))
+    lines: list[str] = []
+    for equation in [*shared, *equations]:
+        lines += textwrap.wrap(
+            _shortened(equation),
+            max(on.width, 40),
+            initial_indent="  ",
+            subsequent_indent=" " * 8,
+            break_long_words=False,
+            break_on_hyphens=False,
+        )
+    for line in lines[:_MOST_LINES]:
+        on.say(line, whole=True)
+    more = len(lines) - _MOST_LINES
+    if more > 0:
+        on.say((f"  and {more} more lines; `--json` has all of them, with all digits", "dim"))
+
+
+def _shortened(line: str) -> str:
+    """A line with its numbers to six significant digits."""
+    return _NUMBER.sub(lambda found: f"{float(found[0]):.{_DIGITS}g}", line)
+
+
+def _size(count: float) -> str:
+    """Bytes in a readable unit."""
+    for unit, factor in (("TB", 1e12), ("GB", 1e9), ("MB", 1e6), ("kB", 1e3)):
+        if count >= factor:
+            return f"{count / factor:.3g} {unit}"
+    return f"{count:.0f} B"
