@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-from pydantic import Field, StrictStr, field_validator
+from pydantic import Field, StrictStr
 
 from rigidsim.errors import ConfigError, Problem
 from rigidsim.scene.exact import ExactNumber
@@ -20,14 +19,13 @@ from rigidsim.scene.expressions.tree import (
     ExpressionError,
     names_used,
 )
-from rigidsim.scene.fields import ConfigTable, refuse
-from rigidsim.scene.validation_messages import shown
+from rigidsim.scene.fields import ConfigTable, VariableName
 
 
 class EventTable(ConfigTable):
     """``[[events]]``: where an expression of time and the state crosses zero."""
 
-    name: StrictStr = Field(examples=["flip"])
+    name: VariableName = Field(examples=["flip"])
     """prefix of the dataset's variables: NAME_time, NAME_quaternion, ..."""
     expression: StrictStr = Field(examples=["wy", "theta - pi/2"])
     """expression of t, the states (wx wy wz, qw qx qy qz, phi theta psi, x y z, vx vy vz) and [parameters],
@@ -37,15 +35,6 @@ class EventTable(ConfigTable):
     """direction of the crossing"""
     action: Literal["record", "stop"] = "record"
     """record the event, or stop the run at it"""
-
-    @field_validator("name")
-    @classmethod
-    def _variable_name(cls, value: str) -> str:
-        if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]{0,40}", value):
-            raise refuse(
-                f"given {shown(value)}; allowed: letters, digits and underscores, beginning with a letter"
-            )
-        return value
 
 
 @dataclass(frozen=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from itertools import product
@@ -14,6 +15,7 @@ from pydantic import (
     ConfigDict,
     Field,
     PlainValidator,
+    StrictStr,
     WithJsonSchema,
 )
 from pydantic_core import PydanticCustomError, core_schema
@@ -139,6 +141,23 @@ class OneOf:
 
     def __get_pydantic_json_schema__(self, schema: Any, handler: Any) -> dict[str, Any]:
         return {"type": "string", "enum": [*self.more, *self.names]}
+
+
+def named(pattern: str, allowed: str) -> AfterValidator:
+    """A validator of names of a pattern, told as what is ``allowed``."""
+
+    def validate(value: str) -> str:
+        if not re.fullmatch(pattern, value):
+            raise refuse(f"given {shown(value)}; allowed: {allowed}")
+        return value
+
+    return AfterValidator(validate)
+
+
+VariableName = Annotated[
+    StrictStr,
+    named(r"[A-Za-z][A-Za-z0-9_]{0,40}", "letters, digits and underscores, beginning with a letter"),
+]
 
 
 def _each_once(value: list[str]) -> list[str]:

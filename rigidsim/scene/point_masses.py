@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -20,6 +19,7 @@ from rigidsim.scene.fields import (
     Metre,
     Speed,
     Triple,
+    VariableName,
 )
 from rigidsim.scene.validation_messages import nearest, shown
 
@@ -29,7 +29,6 @@ _SAME_MASS = 0.01
 """Relative difference up to which a mass and a gravitational parameter mean the same body: G is uncertain by
 2e-5, and published masses of asteroids by per cents.
 """
-_MOST = 64
 _CLOSEST = 1000
 """A scale of distance is at least this part of the initial one: it must not vanish for a plunging orbit."""
 
@@ -56,7 +55,7 @@ class StartingOrbit(ConfigTable):
 class PointMassBody(ConfigTable):
     """A point mass under the gravity of all others."""
 
-    name: StrictStr = Field(examples=["sun"])
+    name: VariableName = Field(examples=["sun"])
     """letters, digits and underscores, beginning with a letter"""
     gravitational_parameter: GravitationalParameter = Field(examples=["1.32712440018e20 m^3/s^2"])
     """G M"""
@@ -154,17 +153,13 @@ def resolve_point_masses(
                 raise ConfigError(Problem(f"[body] {key}", what))
         return None
     names = [table.name for table in tables]
-    _check_names(names)
     at_host = _host(host, names, free_flight)
     full = coupling == "full"
     strengths = [table.gravitational_parameter.at(context) for table in tables]
     for number, strength in enumerate(strengths):
         if not strength > 0:
-            raise _fault(
-                number,
-                "gravitational_parameter",
-                f"given {context.nstr(strength, 8)}; a positive number is allowed",
-            )
+            what = f"given {context.nstr(strength, 8)}; a positive number is allowed"
+            raise _fault(number, "gravitational_parameter", what)
     if full and mass is None:
         what = 'missing; coupling = "full" needs it, since the bodies feel the forces of this one'
         raise ConfigError(Problem("[body] mass", what))
@@ -186,17 +181,6 @@ def resolve_point_masses(
             if positions[i] == positions[j]:
                 raise _fault(i, "position", f'the same as that of "{names[j]}"; start it elsewhere')
     return PointMasses(tuple(names), strengths, tuple(positions), tuple(velocities), at_host, full)
-
-
-def _check_names(names: Sequence[str]) -> None:
-    if len(names) > _MOST:
-        raise ConfigError(Problem("[[bodies]]", f"given {len(names)}; at most {_MOST} are allowed"))
-    for number, name in enumerate(names):
-        if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]{0,40}", name):
-            allowed = "letters, digits and underscores are allowed, beginning with a letter"
-            raise _fault(number, "name", f"given {shown(name)}; {allowed}")
-        if name in names[:number]:
-            raise _fault(number, "name", f'given "{name}", as another body; give each a name of its own')
 
 
 def _host(host: str | None, names: Sequence[str], free_flight: bool) -> int | None:

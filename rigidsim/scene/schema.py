@@ -10,7 +10,16 @@ import re
 from functools import lru_cache
 from typing import Annotated, Any, Union
 
-from pydantic import Field, StrictBool, StrictInt, StrictStr, create_model, field_validator, model_validator
+from pydantic import (
+    Field,
+    StrictBool,
+    StrictInt,
+    StrictStr,
+    ValidationInfo,
+    create_model,
+    field_validator,
+    model_validator,
+)
 
 from rigidsim.scene.bodies.table import Body
 from rigidsim.scene.events import EventTable
@@ -29,6 +38,7 @@ from rigidsim.scene.fields import (
     Second,
     Speed,
     Triple,
+    named,
     refuse,
 )
 from rigidsim.scene.frame import Frame
@@ -38,9 +48,11 @@ from rigidsim.scene.point_masses import PointMassBody
 from rigidsim.scene.registry import LOAD_KINDS, OBSERVABLES, LoadFields
 from rigidsim.scene.sample_times import Time
 from rigidsim.scene.sweep_table import SweepTable
-from rigidsim.scene.validation_messages import shown
 
 _FOLDER_NAME = "^[A-Za-z0-9._-]{1,100}$"
+_ABOUT_NAME = (
+    "1 to 100 letters, digits, dots, underscores and hyphens, not dots alone, since it names the run folder"
+)
 _ABOUT_LOADS = "loads that act on the body, each of a kind; without any the body rotates freely"
 STATE_NAMES = ("t", *RATE_NAMES, *ATTITUDE_NAMES, *FLIGHT_NAMES)
 
@@ -125,7 +137,9 @@ class TableText(ConfigTable):
 class Config(ConfigTable):
     """One experiment; ``config_model`` knows the kinds of loads beside."""
 
-    name: StrictStr = Field(examples=["intermediate_axis"], json_schema_extra={"pattern": _FOLDER_NAME})
+    name: Annotated[StrictStr, named(rf"(?!\.*$){_FOLDER_NAME}", _ABOUT_NAME)] = Field(
+        examples=["intermediate_axis"], json_schema_extra={"pattern": _FOLDER_NAME}
+    )
     """name of the run folder: letters, digits, dots, underscores and hyphens"""
     description: StrictStr = ""
     """free text, shown with the results"""
@@ -138,7 +152,7 @@ class Config(ConfigTable):
     initial: Initial
     """the state at the start"""
     loads: list[LoadFields] = Field(default_factory=list, description=_ABOUT_LOADS)
-    bodies: list[PointMassBody] = Field(default_factory=list)
+    bodies: list[PointMassBody] = Field(default_factory=list, max_length=64)
     """point masses under mutual gravity, integrated with the body"""
     events: list[EventTable] = Field(default_factory=list)
     """events: zero crossings of an expression of time and the state"""
@@ -161,13 +175,13 @@ class Config(ConfigTable):
     )
     """texts of tables that loads refer to; the text of files beside the config is copied here"""
 
-    @field_validator("events")
+    @field_validator("events", "bodies")
     @classmethod
-    def _event_names(cls, value: list[EventTable]) -> list[EventTable]:
-        names = [event.name for event in value]
+    def _different(cls, value: list[Any], info: ValidationInfo) -> list[Any]:
+        names = [table.name for table in value]
         for name in names:
             if names.count(name) > 1:
-                raise refuse(f'two events are named "{name}"; give each a name of its own')
+                raise refuse(f'two {info.field_name} are named "{name}"; give each a name of its own')
         return value
 
     @field_validator("parameters")
@@ -178,16 +192,6 @@ class Config(ConfigTable):
                 raise refuse(f'given the name "{name[:40]}"; allowed: letters, digits and underscores')
             if name in STATE_NAMES or name in RESERVED:
                 raise refuse(f'given the name "{name}", which expressions use already; rename it')
-        return value
-
-    @field_validator("name")
-    @classmethod
-    def _folder_name(cls, value: str) -> str:
-        if not re.fullmatch(_FOLDER_NAME, value) or not value.strip("."):
-            raise refuse(
-                f"given {shown(value)}; allowed: 1 to 100 letters, digits, dots, underscores and "
-                "hyphens, not dots alone, since it names the run folder"
-            )
         return value
 
 

@@ -33,6 +33,7 @@ _MEANT = {
 """Common names of things that have another name here."""
 _WORDS = {
     "too_short": "given an empty array; at least one entry is needed",
+    "too_long": "given {actual_length}; at most {max_length} are allowed",
     "kind_of_value": "given {given}; {msg}",
     "list_type": "given {given}; an array is allowed",
     "model_type": "given {given}; a table is allowed",

@@ -236,7 +236,7 @@ REFUSED = {
         planet("full").replace("5.97219e24", "6.5e24"),
         '[body] mass: given 6.5e+24 kg, but the gravitational parameter of its host "earth"',
     ),
-    "twice": (planet("full").replace('"moon"', '"earth"'), 'given "earth", as another body'),
+    "twice": (planet("full").replace('"moon"', '"earth"'), 'two bodies are named "earth"'),
     "about itself": (
         planet("full").replace('about = "sun"', 'about = "moon"'),
         "which goes about this body itself",

@@ -70,10 +70,8 @@ def build_body(table: body_table.Body, context: Any, sequence: str = "zxz") -> R
     if source in ("principal_moments", "inertia_tensor", "preset"):
         return _from_tensor(table, source, context)
     if table.center_of_mass is not None:
-        raise refusal(
-            "center_of_mass",
-            f"it follows from {source}; remove it, and say with reference what the body turns about",
-        )
+        what = f"it follows from {source}; remove it, and say with reference what the body turns about"
+        raise refusal("center_of_mass", what)
     if source != "shape" and table.mass is not None:
         raise refusal("mass", f"it follows from {source}; remove it")
     return _from_pieces(table, source, context, sequence)
@@ -81,11 +79,8 @@ def build_body(table: body_table.Body, context: Any, sequence: str = "zxz") -> R
 
 def _from_tensor(table: body_table.Body, source: str, context: Any) -> RigidBody:
     if table.reference is not None:
-        raise refusal(
-            "reference",
-            f"only shape, points and parts take it; {source} is taken about the point that the body "
-            "turns about already: remove it",
-        )
+        what = f"only shape, points and parts take it; {source} is taken about the point that the body turns "
+        raise refusal("reference", what + "about already: remove it")
     zero = [context.zero] * 3
     center = [x.at(context) for x in table.center_of_mass] if table.center_of_mass else zero
     mass = positive(table.mass, "mass", "mass", context) if table.mass is not None else None
