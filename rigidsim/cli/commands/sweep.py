@@ -10,10 +10,10 @@ from rigidsim.cli.screens.page import print_json
 from rigidsim.cli.screens.sweeps import SweepProgress, print_sweep
 from rigidsim.errors import RigidsimError
 from rigidsim.scene.config import Experiment
+from rigidsim.scene.sweeps.values import scanned
 from rigidsim.store.sweeps.run import SavedSweep, open_sweep
 from rigidsim.workflows.read import load
 from rigidsim.workflows.sweeps.members import single_member
-from rigidsim.workflows.sweeps.scan import scanned
 from rigidsim.workflows.sweeps.verify import verify_sweep
 
 __all__ = ["info", "resume", "run_scanned", "single_member", "sweep", "verify_sweep"]

@@ -130,36 +130,33 @@ class Numbers:
         members: indices of the members.
         initial: (states, members), internal units.
         parameters: (parameters of the traced system, members).
-        replay: evaluates anything else that follows from their numbers.
+        replay: evaluates anything else that follows from their numbers, for these and others.
+        places: of these members among those of ``replay``, (members,).
     """
 
     members: np.ndarray
     initial: np.ndarray
     parameters: np.ndarray
     replay: Replay
+    places: np.ndarray
 
     @classmethod
-    def of(cls, traced: TracedSystem, members: np.ndarray, replay: Replay) -> Numbers:
+    def of(cls, traced: TracedSystem, members: np.ndarray, replay: Replay, places: np.ndarray) -> Numbers:
         """Numbers of members that share a traced system."""
         number = traced.prepared.precision.number
         initial = np.empty((len(traced.system.initial), len(members)))
         for row, value in enumerate(traced.system.initial):
-            initial[row] = replay.doubles(value.node) if isinstance(value, Traced) else number(value)
+            traceable = isinstance(value, Traced)
+            initial[row] = replay.doubles(value.node)[places] if traceable else number(value)
         parameters = np.empty((len(traced.parameters.nodes), len(members)))
         for row, node in enumerate(traced.parameters.nodes):
-            parameters[row] = replay.doubles(node)
-        return cls(members, initial, parameters, replay)
-
-    def some(self, which: np.ndarray) -> Numbers:
-        """Those of some of the members."""
-        return Numbers(
-            self.members[which], self.initial[:, which], self.parameters[:, which], self.replay.of(which)
-        )
+            parameters[row] = replay.doubles(node)[places]
+        return cls(members, initial, parameters, replay, places)
 
     def doubles(self, value: Any) -> np.ndarray:
         """A number of the scene for each member, rounded once, (members,)."""
         if isinstance(value, Traced):
-            return self.replay.doubles(value.node)
+            return self.replay.doubles(value.node)[self.places]
         return np.full(len(self.members), float(value))
 
     def whole_numbers(self, value: Any) -> np.ndarray:
@@ -259,15 +256,15 @@ class Families:
             return waiting
         graph = family.traced.graph
         replay = Replay(graph, self._members.columns(candidates), len(candidates))
-        agree = replay.agreeing(list(graph.guards))
+        agree = np.flatnonzero(replay.agreeing(list(graph.guards)))
         taken = candidates[agree]
         if not len(taken):
             return waiting
-        numbers = Numbers.of(family.traced, taken, replay.of(agree))
+        numbers = Numbers.of(family.traced, taken, replay, agree)
         within = np.isfinite(numbers.initial).all(axis=0) & np.isfinite(numbers.parameters).all(axis=0)
         if not within.all():
             result.alone |= dict.fromkeys(taken[~within].tolist(), Alone.RANGE)
-            numbers = numbers.some(within)
+            numbers = Numbers.of(family.traced, taken[within], replay, agree[within])
         if len(numbers.members):
             result.groups.append((family, numbers))
         return waiting[~np.isin(waiting, taken)]

@@ -53,12 +53,8 @@ class LaneResults:
     def put(self, places: np.ndarray, others: LaneResults) -> None:
         """Replace the results of some members."""
         self.states[:, :, places] = others.states
-        for mine, theirs in (
-            (self.finite, others.finite),
-            (self.arrived, others.arrived),
-            (self.steps, others.steps),
-        ):
-            mine[places] = theirs
+        self.finite[places], self.arrived[places] = others.finite, others.arrived
+        self.steps[places] = others.steps
 
     def lost(self, inside: Sequence[int], taken: Sequence[int], gone: Sequence[bool]) -> list[int]:
         """Note the members whose state was lost, which stopped all lanes; returns the others, which have to
@@ -80,27 +76,6 @@ class LaneResults:
         return others
 
 
-def grouped(values: np.ndarray, width: int) -> np.ndarray:
-    """Values (.., n) of motions as (groups, .., width), the last group filled with the last motion."""
-    count = values.shape[-1]
-    groups = -(-count // width)
-    if groups * width > count:
-        values = values[..., np.minimum(np.arange(groups * width), count - 1)]
-    split = values.reshape(*values.shape[:-1], groups, width)
-    return np.array(np.moveaxis(split, -2, 0), order="C")
-
-
-def put_in_place(bundle: np.ndarray, states: np.ndarray) -> None:
-    """Groups (groups, samples, states, width) as members side by side, (samples, states, members)."""
-    groups, samples, count, width = bundle.shape
-    whole = min(states.shape[2] // width, groups)
-    states[:, :, : whole * width].reshape(samples, count, whole, width)[:] = bundle[:whole].transpose(
-        1, 2, 0, 3
-    )
-    if whole < groups and (left := states.shape[2] - whole * width):
-        states[:, :, whole * width :] = bundle[whole, :, :, :left]
-
-
 def until_next(
     moments: list[float],
     inside: list[int],
@@ -118,22 +93,11 @@ def until_next(
             to have as well; 0 where none did.
     """
     expected = []
-    # no min or max in here: this is done for every call of the integrator
     for member, moment, target, begin, before in zip(inside, moments, targets, begun, taken, strict=True):
         if member == IDLE:
             continue
-        if before and moment > begin:
-            steps = int((target - moment) / (moment - begin) * before) + 2
-        else:
-            steps = int((target - moment) * pace) if pace else _FIRST_STEPS
-        if steps < _LEAST_STEPS:
-            steps = _LEAST_STEPS
-        expected.append(steps if steps < most_steps - before else most_steps - before)
-    expected.sort()
-    last = expected[0] + _SHORTLY
-    found = 1
-    for steps in expected:
-        if steps > last:
-            break
-        found = steps
-    return found if found > 1 else 1
+        own = before / (moment - begin) if moment > begin else pace
+        steps = int((target - moment) * own) + 2 if own else _FIRST_STEPS
+        expected.append(min(max(steps, _LEAST_STEPS), most_steps - before))
+    soon = min(expected) + _SHORTLY
+    return max(1, *(steps for steps in expected if steps <= soon))

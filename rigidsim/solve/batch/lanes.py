@@ -14,15 +14,13 @@ from typing import Any
 import heyoka as hy
 import numpy as np
 
-from rigidsim.solve.batch.lane_results import IDLE, Found, LaneResults, grouped, put_in_place, until_next
+from rigidsim.solve.batch.lane_results import IDLE, Found, LaneResults, until_next
 from rigidsim.solve.compiled import Kept
 from rigidsim.solve.events import DIRECTIONS
 from rigidsim.solve.step_bounds import bounds_of_sparse_series, longest_step
 
 _GRID = 1 << 16
 """Samples at once; the step before the last of them is shortened, always at the same places."""
-_GROUPS = 8
-"""Groups put in place together, since the samples of one are scattered over all of a block's memory."""
 _ARRIVED, _LOST = hy.taylor_outcome.time_limit, hy.taylor_outcome.err_nf_state
 
 _engines: Kept[Any] = Kept(16)
@@ -50,10 +48,35 @@ def recommended_width() -> int:
     return int(hy.recommended_simd_size())
 
 
-def _parameters_used(system: BatchSystem) -> int:
-    """Number of parameters that equations and events read; recorded quantities may read more."""
-    read = [right for _, right in system.equations] + [expression for expression, _ in system.events]
-    return max((int(str(p).removeprefix("p")) + 1 for p in hy.get_params(read)), default=0)
+@dataclass(frozen=True)
+class _Motions:
+    """Motions to be integrated: initial and parameters (.., n), start (n,), times (samples, n), and bounds of
+    their steps (n,).
+    """
+
+    initial: np.ndarray
+    parameters: np.ndarray
+    start: np.ndarray
+    times: np.ndarray
+    longest: np.ndarray
+
+    def of(self, which: Sequence[int]) -> _Motions:
+        return _Motions(
+            self.initial[:, which],
+            self.parameters[:, which],
+            self.start[which],
+            self.times[:, which],
+            self.longest[which],
+        )
+
+
+def _grouped(values: np.ndarray, width: int) -> np.ndarray:
+    """Values (.., n) of motions as (groups, .., width), the last group filled with the last motion."""
+    count = values.shape[-1]
+    groups = -(-count // width)
+    filled = values[..., np.minimum(np.arange(groups * width), count - 1)]
+    split = filled.reshape(*values.shape[:-1], groups, width)
+    return np.array(np.moveaxis(split, -2, 0), order="C")
 
 
 class BatchEngine:
@@ -66,7 +89,9 @@ class BatchEngine:
     def __init__(self, system: BatchSystem, width: int) -> None:
         self.width = width
         self._system = system
-        self._used = _parameters_used(system)
+        # recorded quantities may read more parameters than equations and events
+        read = [right for _, right in system.equations] + [expression for expression, _ in system.events]
+        self._used = max((int(str(p).removeprefix("p")) + 1 for p in hy.get_params(read)), default=0)
         self._log: list[Found] = []
         described = (
             system.equations,
@@ -121,48 +146,22 @@ class BatchEngine:
         """
         count = initial.shape[1]
         result = LaneResults.empty(len(times), len(initial), count)
-        longest = self.longest(initial, parameters, start)
+        motions = _Motions(initial, parameters, start, times, self.longest(initial, parameters, start))
         if len(times) <= 2 and bool((times[:-1] == start).all()) and bool((times[-1] > start).all()):
             if len(times) == 2:
                 result.states[0] = initial
             result.states[-1] = np.nan  # of those that are lost on the way
-            self._in_turn(result, initial, parameters, start, times[-1], longest, most_steps)
+            self._in_turn(result, motions, most_steps)
             return result
-        bundle = np.empty((_GROUPS, len(times), len(initial), self.width))
         for first in range(0, count, self.width):
-            number = first // self.width % _GROUPS
             waiting = list(range(first, min(first + self.width, count)))
             while waiting:
-                chosen = np.array(waiting + [waiting[0]] * (self.width - len(waiting)))
-                lost = self._together(
-                    result,
-                    bundle[number],
-                    waiting,
-                    initial[:, chosen],
-                    parameters[:, chosen],
-                    start[chosen],
-                    times[:, chosen],
-                    longest[chosen],
-                    most_steps,
-                )
+                lost = self._together(result, waiting, motions, most_steps)
                 if not lost or len(waiting) == 1:
                     break
                 for member in lost:  # alone, so that it gets as far as possible
-                    only = np.full(self.width, member)
-                    self._together(
-                        result,
-                        bundle[number],
-                        [member],
-                        initial[:, only],
-                        parameters[:, only],
-                        start[only],
-                        times[:, only],
-                        longest[only],
-                        most_steps,
-                    )
+                    self._together(result, [member], motions, most_steps)
                 waiting = [member for member in waiting if member not in lost]
-            if number == _GROUPS - 1 or first + self.width >= count:
-                put_in_place(bundle, result.states[:, :, first - number * self.width :])
         return result
 
     def longest(self, initial: np.ndarray, parameters: np.ndarray, start: np.ndarray) -> np.ndarray:
@@ -171,25 +170,17 @@ class BatchEngine:
         Args:
             initial: (states, members); parameters likewise; start: (members,), internal units.
         """
-        count = initial.shape[1]
         terms = self._integrator.tc  # (states, terms, lanes)
-        series = np.empty((_GROUPS, *terms.shape))
-        sizes = np.empty((terms.shape[1], count))
         still = np.zeros(self.width)
-        for begin in range(0, count, _GROUPS * self.width):
-            end = min(begin + _GROUPS * self.width, count)
-            for group, first in enumerate(range(begin, end, self.width)):
-                lanes: Any = slice(first, first + self.width)
-                if first + self.width > count:
-                    lanes = np.minimum(np.arange(first, first + self.width), count - 1)
-                self._set(initial[:, lanes], parameters[:, lanes], start[lanes])
-                self._integrator.step(still, write_tc=True)  # compute a series without moving
-                series[group] = terms
-            groups = -(-(end - begin) // self.width)
-            found = np.abs(series[:groups]).max(axis=1)
-            sizes[:, begin:end] = np.moveaxis(found, 0, 1).reshape(len(sizes), -1)[:, : end - begin]
+        sizes = []
+        given = (_grouped(x, self.width) for x in (initial, parameters, start))
+        for states, read, begin in zip(*given, strict=True):
+            self._set(states, read, begin)
+            self._integrator.step(still, write_tc=True)  # compute a series without moving
+            sizes.append(np.abs(terms).max(axis=0))
         self._log.clear()
-        return np.minimum(bounds_of_sparse_series(sizes), self._longest)
+        found = np.concatenate(sizes, axis=1)[:, : len(start)]
+        return np.minimum(bounds_of_sparse_series(found), self._longest)
 
     def onward(
         self,
@@ -207,7 +198,7 @@ class BatchEngine:
             longest: bounds of steps, (n,).
         """
         integrator, given = self._integrator, (states, parameters, begin, end, longest)
-        there, read, then, ends, bounds = (grouped(x, self.width) for x in given)
+        there, read, then, ends, bounds = (_grouped(x, self.width) for x in given)
         taken = np.empty(then.shape)
         for group in range(len(there)):
             self._set(there[group], read[group], then[group])
@@ -223,25 +214,16 @@ class BatchEngine:
         if self._used:
             self._integrator.pars[:] = parameters[: self._used]
 
-    def _in_turn(
-        self,
-        result: LaneResults,
-        initial: np.ndarray,
-        parameters: np.ndarray,
-        start: np.ndarray,
-        end: np.ndarray,
-        longest: np.ndarray,
-        most_steps: int,
-    ) -> None:
+    def _in_turn(self, result: LaneResults, motions: _Motions, most_steps: int) -> None:
         """Run members of which only the end is wanted: each that arrives frees its lane for the next."""
-        integrator, width, used = self._integrator, self.width, self._used
+        integrator, width = self._integrator, self.width
         state, numbers = integrator.state, integrator.pars
-        # one lane at a time below: indices by lists cost ten times
-        waiting = deque(range(initial.shape[1]))
+        waiting = deque(range(motions.initial.shape[1]))
         inside, taken = [IDLE] * width, [0] * width
         target, bounds, begun = np.zeros(width), np.empty(width), [0.0] * width
         high, low = np.zeros(width), np.zeros(width)
-        starts, ends, bounded = start.tolist(), end.tolist(), longest.tolist()
+        # one lane at a time below: numbers out of arrays cost ten times
+        starts, ends, longest = motions.start.tolist(), motions.times[-1].tolist(), motions.longest.tolist()
         pace = 0.0
 
         def enter(lanes: Sequence[int]) -> None:
@@ -249,101 +231,79 @@ class BatchEngine:
             for lane in lanes:
                 member = waiting.popleft() if waiting else IDLE
                 there = max(member, 0)
-                state[:, lane] = initial[:, there]
-                if used:
-                    numbers[:, lane] = parameters[:used, there]
-                bounds[lane] = bounded[there]
+                state[:, lane] = motions.initial[:, there]
+                if self._used:
+                    numbers[:, lane] = motions.parameters[: self._used, there]
+                bounds[lane] = longest[there]
                 inside[lane], taken[lane] = member, 0
                 begun[lane] = high[lane] = starts[there]
                 low[lane], target[lane] = 0.0, starts[there] if member == IDLE else ends[there]
             integrator.set_dtime(high, low)
 
         enter(range(width))
-        moments, targets = high.tolist(), target.tolist()
         while inside.count(IDLE) < width:
             self._log.clear()
-            most = until_next(moments, inside, targets, begun, taken, most_steps, pace)
+            most = until_next(high.tolist(), inside, target.tolist(), begun, taken, most_steps, pace)
             integrator.propagate_until(target, max_steps=most, max_delta_t=bounds)
             outcomes = integrator.propagate_res
             high, low = map(np.array, integrator.dtime)
-            moments = high.tolist()
             taken = [before + now[3] for before, now in zip(taken, outcomes, strict=True)]
             for crossing in self._log:
                 if inside[crossing.lane] != IDLE:
                     result.found.setdefault(inside[crossing.lane], []).append(crossing)
-            if _LOST in [now[0] for now in outcomes]:
+            if any(now[0] == _LOST for now in outcomes):
                 waiting.extendleft(result.lost(inside, taken, [now[0] == _LOST for now in outcomes]))
-                lanes = list(range(width))
-            else:
-                lanes = [
-                    lane
-                    for lane, member in enumerate(inside)
-                    if member != IDLE and (moments[lane] == targets[lane] or taken[lane] >= most_steps)
-                ]
-                for lane in lanes:
-                    member, there = inside[lane], moments[lane] == targets[lane]
-                    result.steps[member], result.arrived[member] = taken[lane], there
-                    # nothing is known at the end about members that didn't arrive
-                    result.states[-1, :, member] = state[:, lane] if there else np.nan
-                    pace = taken[lane] / (moments[lane] - begun[lane]) if there else pace
-            if lanes:
-                enter(lanes)
-                moments, targets = high.tolist(), target.tolist()
+                enter(range(width))
+                continue
+            arrived = (high == target).tolist()
+            ended = [
+                lane
+                for lane, member in enumerate(inside)
+                if member != IDLE and (arrived[lane] or taken[lane] >= most_steps)
+            ]
+            for lane in ended:
+                member = inside[lane]
+                result.steps[member], result.arrived[member] = taken[lane], arrived[lane]
+                # nothing is known at the end about members that didn't arrive
+                result.states[-1, :, member] = state[:, lane] if arrived[lane] else np.nan
+                pace = taken[lane] / float(high[lane] - begun[lane]) if arrived[lane] else pace
+            if ended:
+                enter(ended)
 
     def _together(
-        self,
-        result: LaneResults,
-        states: np.ndarray,
-        members: list[int],
-        initial: np.ndarray,
-        parameters: np.ndarray,
-        start: np.ndarray,
-        times: np.ndarray,
-        longest: np.ndarray,
-        most_steps: int,
+        self, result: LaneResults, members: list[int], motions: _Motions, most_steps: int
     ) -> list[int]:
         """Run one group; returns the members whose state was lost, because of which the others must be
         repeated.
-
-        Args:
-            states: (samples, states, width), which is filled; each member has the lane of its place.
-            longest: bounds of steps, (width,).
         """
-        integrator = self._integrator
+        integrator, count = self._integrator, len(members)
+        here = motions.of(members + [members[0]] * (self.width - count))
         self._log.clear()
-        self._set(initial, parameters, start)
-        count = len(members)
-        consecutive = members[-1] - members[0] == count - 1
-        places: Any = slice(members[0], members[-1] + 1) if consecutive else members
-        begun = members[0] % self.width
-        lanes: Any = slice(begun, begun + count) if consecutive else [m % self.width for m in members]
+        self._set(here.initial, here.parameters, here.start)
         taken = np.zeros(count, dtype=np.int64)
         arrived, lost = np.ones(count, dtype=bool), np.zeros(count, dtype=bool)
-        first, begin, left = 0, start, most_steps
+        first, begin, left = 0, here.start, most_steps
         while True:
-            part = times[first : first + _GRID]
-            known = bool(first == 0 and (part[0] == start).all())
+            part = here.times[first : first + _GRID]
+            known = bool(first == 0 and (part[0] == here.start).all())
             if known and len(part) == 1:
                 found = np.array(integrator.state)[None]
             else:
                 grid = part if known else np.vstack([begin, part])
-                _, found = integrator.propagate_grid(grid, max_steps=left, max_delta_t=longest)
+                _, found = integrator.propagate_grid(grid, max_steps=left, max_delta_t=here.longest)
                 outcomes = integrator.propagate_res[:count]
                 taken += [now[3] for now in outcomes]
                 arrived[:] = [now[0] == _ARRIVED for now in outcomes]
                 lost[:] = [now[0] == _LOST for now in outcomes]
             skipped = 0 if known else 1
-            states[first : first + len(part), :, lanes] = found[skipped:, :, :count]
+            result.states[first : first + len(part), :, members] = found[skipped:, :, :count]
             first, begin, left = first + _GRID, part[-1], most_steps - int(taken.max())
-            if not arrived.all() or first >= len(times) or left <= 0:
+            if not arrived.all() or first >= len(here.times) or left <= 0:
                 break
-        states[first:, :, lanes] = np.nan
-        result.steps[places], result.finite[places] = taken, ~lost
-        result.arrived[places] = arrived & (first >= len(times))
-        if self._log:
+        result.states[first:, :, members] = np.nan
+        result.steps[members], result.finite[members] = taken, ~lost
+        result.arrived[members] = arrived & (first >= len(here.times))
+        if self._system.events:
             for place, member in enumerate(members):
                 result.found[member] = [crossing for crossing in self._log if crossing.lane == place]
-        elif self._system.events:
-            for member in members:
-                result.found.pop(member, None)
         return [member for member, gone in zip(members, lost.tolist(), strict=True) if gone]

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import lru_cache
-from typing import Any
 
 import heyoka as hy
 import numpy as np
@@ -13,7 +12,7 @@ from rigidsim.scene.config import Experiment
 from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.overrides import key_steps
 from rigidsim.scene.sweeps.sweep import Sweep
-from rigidsim.solve.batch.replay import real_of
+from rigidsim.solve.batch.replay import Spread, real_of
 from rigidsim.solve.batch.tracing import TRACED_TABLES
 
 _HELD = 1 << 16  # values of axes that are held, each worked out once for all members that share it
@@ -35,15 +34,15 @@ class AxisNumbers:
     def _reals_of(self, place: int, index: int) -> list[hy.real]:
         return [real_of(number) for number in self.sweep.axes[place].exact(index)]
 
-    def columns(self, place: int, which: np.ndarray) -> list[np.ndarray]:
-        """The numbers of an axis that members have, one column (members,) for each key.
+    def columns(self, place: int, which: np.ndarray) -> list[Spread]:
+        """The numbers of an axis that members have, one column for each key.
 
         Args:
             which: index of the axis value that each member has, (members,).
         """
         needed, index = np.unique(which, return_inverse=True)
         values = [self._reals(place, i) for i in needed.tolist()]
-        return [np.array(column)[index] for column in zip(*values, strict=True)]
+        return [Spread(np.array(column), index) for column in zip(*values, strict=True)]
 
     def codes(self, place: int, which: np.ndarray) -> np.ndarray:
         """Codes below the axis's length, equal for members whose axis values have the same text."""
@@ -93,9 +92,9 @@ class Members:
         """A member's exact numbers for ``keys``, SI."""
         return [x for place, which in self._traced for x in self.sweep.axes[place].exact(int(which[member]))]
 
-    def columns(self, members: np.ndarray) -> list[np.ndarray]:
-        """The numbers for each key, in the scene's arithmetic, (members,) each."""
-        found: list[Any] = []
+    def columns(self, members: np.ndarray) -> list[Spread]:
+        """The numbers of some members for each key, in the scene's arithmetic."""
+        found: list[Spread] = []
         for place, which in self._traced:
             found += self._axes.columns(place, which[members])
         return found

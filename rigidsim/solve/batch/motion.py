@@ -21,7 +21,7 @@ from rigidsim.solve.batch.lane_results import LaneResults
 from rigidsim.solve.batch.lanes import BatchEngine, BatchSystem
 from rigidsim.solve.batch.tracing import TracedSystem
 
-UNFELT = float(np.exp(LARGEST - SMALL * np.log(2.0)))
+_UNFELT = float(np.exp(LARGEST - SMALL * np.log(2.0)))
 """Largest component of a tangent vector that no step control notices."""
 
 _EVERY = 16
@@ -33,13 +33,10 @@ class BatchMotion:
     Args:
         crossings: the system's events.
         width: lanes of the integrators.
-        unfelt: largest component of tangent vectors up to which one integrator serves both.
     """
 
-    def __init__(
-        self, traced: TracedSystem, crossings: EventExpressions, width: int, unfelt: float = UNFELT
-    ) -> None:
-        self._traced, self._crossings, self._width, self._unfelt = traced, crossings, width, unfelt
+    def __init__(self, traced: TracedSystem, crossings: EventExpressions, width: int) -> None:
+        self._traced, self._crossings, self._width = traced, crossings, width
         self._tangents = len(traced.system.states) > traced.moving
         unfelt_beside = traced.system.formulation.unfelt_tangents
         self._runs = 0
@@ -106,7 +103,7 @@ class BatchMotion:
         if not self._may_share:
             return plain(everybody), along.states
         motion = replace(along, states=along.states[:, :moving])
-        felt = ~(np.abs(along.states[:, moving:]) < self._unfelt).all(axis=(0, 1))
+        felt = ~(np.abs(along.states[:, moving:]) < _UNFELT).all(axis=(0, 1))
         felt |= ~along.arrived | ~along.finite
         again, unfelt = np.flatnonzero(felt), np.flatnonzero(~felt)
         if len(unfelt):

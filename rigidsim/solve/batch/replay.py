@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import heyoka as hy
 import numpy as np
@@ -24,7 +24,16 @@ _BITS = _CONTEXT.prec
 _FAILURES = (ZeroDivisionError, ValueError, OverflowError, TypeError)
 """Errors of mpmath for numbers outside the range of an operation; the member's own build reports them."""
 
-Reals = Any  # an array of hy.real, (members,), or one hy.real for all members
+Reals = Any  # an array of hy.real, or one hy.real
+
+
+class Spread(NamedTuple):
+    """Numbers of members: the values that there are, and which of them each member has, (members,); None
+    where all have one.
+    """
+
+    values: Reals
+    which: np.ndarray | None = None
 
 
 def real_of(number: ExactNumber) -> hy.real:
@@ -63,88 +72,91 @@ def _reals(values: np.ndarray) -> Reals:
 class Replay:
     """A graph's numbers for some members; nan where an operation has no result.
 
+    Each operation is done once for the values that there are: in a product of axes members share most.
+
     Args:
-        columns: for each column of the graph the members' swept numbers, reals (members,).
+        columns: for each column of the graph the members' swept numbers; those of one axis share their index.
     """
 
-    def __init__(self, graph: Graph, columns: Sequence[np.ndarray], count: int) -> None:
+    def __init__(self, graph: Graph, columns: Sequence[Spread], count: int) -> None:
         self._graph, self._columns, self._count = graph, columns, count
-        self._numbers: dict[int, Reals] = {}
-
-    def of(self, which: np.ndarray) -> Replay:
-        """The numbers of some of the members."""
-        found = Replay(
-            self._graph, [column[which] for column in self._columns], len(np.arange(self._count)[which])
-        )
-        found._numbers = {node: x[which] if np.ndim(x) else x for node, x in self._numbers.items()}
-        return found
+        self._numbers: dict[int, Spread] = {}
+        self._each = np.arange(count)
 
     def agreeing(self, guards: Sequence[Guard]) -> np.ndarray:
         """Mask of the members that make all decisions as the representative does, (members,)."""
         found = np.ones(self._count, dtype=bool)
         for guard in guards:
-            left, right = self.number(guard.left), self.number(guard.right)
+            (left, right), index = self._together(guard.left, guard.right)
             decided = left < right if guard.kind == "<" else left == right
-            found &= (decided == guard.outcome) & np.isfinite(left) & np.isfinite(right)
+            agree = (decided == guard.outcome) & np.isfinite(left) & np.isfinite(right)
+            found &= agree if index is None else agree[index]
             if not found.any():
                 break
         return found
 
     def doubles(self, node: int) -> np.ndarray:
         """A number rounded once, (members,); nan if it is outside a double's range."""
-        exact = np.broadcast_to(self.number(node), self._count)
+        values, index = self.number(node)
+        exact = np.atleast_1d(values)
         with np.errstate(all="ignore"):
             found = exact.astype(np.float64) + 0.0  # zero without a sign
         found[(np.abs(found) < np.finfo(float).tiny) & (exact != hy.real(0.0, _BITS))] = np.nan
         found[np.isinf(found)] = np.nan
-        return found
+        return np.full(self._count, found[0]) if index is None else found[index]
 
-    def number(self, node: int) -> Reals:
+    def number(self, node: int) -> Spread:
         """A number of the graph."""
         if node not in self._numbers:
             with np.errstate(all="ignore"):
                 self._numbers[node] = self._worked_out(*self._graph.nodes[node])
         return self._numbers[node]
 
-    def _worked_out(self, operation: str, arguments: tuple[Any, ...]) -> Reals:
+    def _together(self, *nodes: int) -> tuple[list[Reals], np.ndarray | None]:
+        """Values of nodes by a common index."""
+        found = [self.number(node) for node in nodes]
+        indices = {id(index): index for _, index in found if index is not None}
+        if len(indices) <= 1:
+            return [values for values, _ in found], next(iter(indices.values()), None)
+        return [values if index is None else values[index] for values, index in found], self._each
+
+    def _worked_out(self, operation: str, arguments: tuple[Any, ...]) -> Spread:
         if operation == "constant":
-            return _real(arguments[0])
+            return Spread(_real(arguments[0]))
         if operation == "column":
             return self._columns[arguments[0]]
         if operation == "power":
             base, power = arguments
             if power == 2:
-                return self.number(base) * self.number(base)
+                return self._worked_out("multiply", (base, base))
             return self._one_by_one(lambda x: x**power, base)
         if operation == "call":
             function, *nodes = arguments
             return self._one_by_one(lambda *values: function(_CONTEXT, *values), *nodes)
-        values = [self.number(node) for node in arguments]
-        if operation in BINARY:
-            found = BINARY[operation](*values)
-            if operation == "divide":
-                found[np.broadcast_to(values[1] == hy.real(0.0, _BITS), self._count)] = hy.real(
-                    math.nan, _BITS
-                )
-            return found
-        if operation in _OF_ARRAYS:
-            return _OF_ARRAYS[operation](*values)
-        return self._one_by_one(getattr(_CONTEXT, operation), *arguments)
+        known = BINARY.get(operation) or _OF_ARRAYS.get(operation)
+        if known is None:
+            return self._one_by_one(getattr(_CONTEXT, operation), *arguments)
+        values, index = self._together(*arguments)
+        found = known(*values)
+        if operation == "divide":
+            found[np.broadcast_to(values[1] == hy.real(0.0, _BITS), found.shape)] = hy.real(math.nan, _BITS)
+        return Spread(found, index)
 
-    def _one_by_one(self, function: Callable[..., Any], *nodes: int) -> Reals:
-        """A function that arrays lack, once for each of the values that members have."""
-        values = [np.broadcast_to(self.number(node), self._count).tolist() for node in nodes]
-        known: dict[tuple[str, ...], hy.real] = {}
-        found = np.empty(self._count, dtype=hy.real)
-        for member, given in enumerate(zip(*values, strict=True)):
-            key = tuple(map(str, given))
-            if key not in known:
-                try:
-                    known[key] = _real(function(*map(_mpf, given)))
-                except _FAILURES:
-                    known[key] = hy.real(math.nan, _BITS)
-            found[member] = known[key]
-        return found
+    def _one_by_one(self, function: Callable[..., Any], *nodes: int) -> Spread:
+        """A function that arrays lack, once for each of the values that there are."""
+        values, index = self._together(*nodes)
+        codes: np.ndarray = np.zeros(1, dtype=np.int64)
+        for numbers in values:
+            distinct, code = np.unique(numbers, return_inverse=True)
+            codes = codes * len(distinct) + code
+        _, first, places = np.unique(codes, return_index=True, return_inverse=True)
+        found = []
+        for given in zip(*(np.broadcast_to(x, codes.shape)[first] for x in values), strict=True):
+            try:
+                found.append(_real(function(*map(_mpf, given))))
+            except _FAILURES:
+                found.append(hy.real(math.nan, _BITS))
+        return Spread(np.array(found)[places], index)
 
 
 def _exponent(value: Reals) -> Reals:

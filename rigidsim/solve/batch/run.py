@@ -13,7 +13,7 @@ from rigidsim.solve.batch.events import EventExpressions
 from rigidsim.solve.batch.family import Family, Numbers
 from rigidsim.solve.batch.lane_results import LaneResults
 from rigidsim.solve.batch.lanes import recommended_width
-from rigidsim.solve.batch.motion import UNFELT, BatchMotion
+from rigidsim.solve.batch.motion import BatchMotion
 from rigidsim.solve.batch.outputs import BatchOutputs, Values
 from rigidsim.solve.precision import precision_of
 from rigidsim.solve.sampling import SampleClock
@@ -87,26 +87,16 @@ class BatchRun:
 
     Args:
         width: lanes of the integrator; by default what the processor takes at once.
-        unfelt: largest component of tangent vectors, see ``BatchMotion``.
-        at_once: sample values evaluated together.
     """
 
-    def __init__(
-        self,
-        family: Family,
-        width: int | None = None,
-        unfelt: float = UNFELT,
-        at_once: int = _VALUES_AT_ONCE,
-    ) -> None:
-        self.family = family
+    def __init__(self, family: Family, width: int | None = None) -> None:
         self.width = width or recommended_width()
-        self._at_once = at_once
         self._traced = family.traced
         self._system = family.traced.system
         self._precision = precision_of("double")
         self._clocks: dict[int, SampleClock] = {}
         self._crossings = EventExpressions(family.traced)
-        self._motion = BatchMotion(family.traced, self._crossings, self.width, unfelt)
+        self._motion = BatchMotion(family.traced, self._crossings, self.width)
         self._outputs = BatchOutputs(family.traced)
 
     def compile(self) -> None:
@@ -115,14 +105,10 @@ class BatchRun:
         self._outputs.compile()
 
     def blocks(self, numbers: Numbers) -> Iterator[BatchBlock]:
-        """Run members, as many at a time as fit into memory.
-
-        Args:
-            numbers: numbers of members of this family.
-        """
+        """Run members of this family, as many at a time as fit into memory."""
         samples = self._traced.prepared.clock.count
         each = samples * (len(self._system.states) + len(self._system.outputs))
-        most = max(self._at_once // each // self.width, 1) * self.width
+        most = max(_VALUES_AT_ONCE // each // self.width, 1) * self.width
         # members with about as many steps run side by side, so that none waits for long
         order = np.argsort(numbers.doubles(self._system.rate_bound), kind="stable")
         for first in range(0, len(order), most):

@@ -18,7 +18,7 @@ from rigidsim.store.hdf5_sink import sink
 from rigidsim.store.netcdf_file import NetcdfFile, write_box, write_rows, writing
 from rigidsim.store.seal import seal
 from rigidsim.store.sweeps.gathered import Described, Gathered, TileReader
-from rigidsim.store.sweeps.sources import Sources, items_of, plain
+from rigidsim.store.sweeps.sources import Sources, plain
 from rigidsim.store.variables import LABELS
 
 _GZIP = 4
@@ -68,17 +68,13 @@ def write_dataset(
             beside = _coordinates(file, sweep)
             created = _declared(file, sweep, found, beside)
             for name, (target_variable, described) in created.items():
-                item = _item(sources, described.variable.item)
+                item = next(item for item in sources.found if plain(item) == described.variable.item)
                 for first, shape, flat in boxes(sweep.shape, math.prod(described.extra)):
                     values = _values(name, described, item, sources, reader, flat)
                     box = values.reshape(*shape, *described.extra)
                     write_box(target_variable, (*first, *(0 for _ in described.extra)), box)
             _write_reasons(file, found.reasons)
         return seal(temporary)[1]
-
-
-def _item(sources: Sources, name: str) -> str:
-    return next(item for item in sources.found if plain(item) == name)
 
 
 def _coordinates(file: NetcdfFile, sweep: Sweep) -> str:
@@ -135,8 +131,8 @@ def _declared(
         dims = [samples if dim == _SAMPLES else dim for dim in described.variable.dims]
         for dim, size in zip(dims, described.extra, strict=True):
             if dim in LABELS:
-                if dim not in created:
-                    file_labels(file, dim)
+                if not file.has(dim):
+                    file.texts(dim, dim, LABELS[dim], {"long_name": dim.replace("_", " ")})
             else:
                 file.dimension(dim, size)
         attributes = {k: v for k, v in described.variable.attributes.items() if v is not None}
@@ -150,12 +146,6 @@ def _declared(
         )  # fmt: skip
         created[name] = (variable, described)
     return created
-
-
-def file_labels(file: NetcdfFile, dim: str) -> None:
-    """Write the labels of a dimension, once."""
-    if not file.has(dim):
-        file.texts(dim, dim, LABELS[dim], {"long_name": dim.replace("_", " ")})
 
 
 def chunk_shape(members: Sequence[int], extra: Sequence[int]) -> tuple[int, ...]:
@@ -201,8 +191,7 @@ def _values(
 ) -> np.ndarray:
     source = sources.found[item]
     part = slice(flat.start, flat.stop)
-    keys = source.generation[part].astype(np.int64) << 32 | source.tile[part]
-    rows = source.row[part]
+    keys, rows = source.tile[part], source.row[part]
     values = np.full(
         (len(keys), *described.extra), 0 if described.whole else np.nan,
         dtype=np.int64 if described.whole else np.float64,
@@ -211,7 +200,7 @@ def _values(
     for low, high in pairwise(edges):
         if keys[low] < 0:
             continue
-        held = reader.tile(int(keys[low]) >> 32, int(keys[low]) & 0xFFFFFFFF).arrays.get(name)
+        held = reader.tile(int(keys[low])).arrays.get(name)
         if held is not None:
             values[(slice(low, high), *(slice(0, n) for n in held.shape[1:]))] = held[rows[low:high]]
     return values
@@ -228,8 +217,3 @@ def _write_reasons(file: NetcdfFile, reasons: Mapping[int, str]) -> None:
     )  # fmt: skip
     write_box(numbers, (0,), np.array(members, dtype=np.int64))
     file.texts("failed_reason", "failed", [reasons[m] for m in members], {"long_name": "why"})
-
-
-def kept_items(sweep: Sweep) -> tuple[str, ...]:
-    """Names of the items kept, for messages and attributes."""
-    return tuple(plain(item) for item in items_of(sweep))

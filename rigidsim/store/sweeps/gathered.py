@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections import OrderedDict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -12,7 +12,7 @@ import numpy as np
 from rigidsim.errors import RESUME, RunFolderError
 from rigidsim.store.sweeps.folder import SweepFolder
 from rigidsim.store.sweeps.generation import Generation
-from rigidsim.store.sweeps.sources import ALWAYS, Sources, plain
+from rigidsim.store.sweeps.sources import ALWAYS, Sources, plain, tile_of
 from rigidsim.store.sweeps.tile import Tile, TileVariable
 
 _TILES_IN_MEMORY = 96
@@ -53,28 +53,21 @@ class TileReader:
     def __init__(self, folder: SweepFolder, generations: Sequence[Generation]) -> None:
         self._folder = folder
         self._generations = {generation.number: generation for generation in generations}
-        self._held: OrderedDict[tuple[int, int], Tile] = OrderedDict()
+        self.tile = lru_cache(_TILES_IN_MEMORY)(self._read)
 
     @property
     def place(self) -> str:
         """Path of the sweep's folder."""
         return str(self._folder.path)
 
-    def tile(self, generation: int, tile: int) -> Tile:
-        """A tile, checked when it is read.
+    def _read(self, key: int) -> Tile:
+        """A tile, by its ``key_of``, checked when it is read.
 
         Raises:
             RunFolderError: the tile is damaged.
         """
-        key = generation, tile
-        if key in self._held:
-            self._held.move_to_end(key)
-            return self._held[key]
-        found = self._folder.read(self._generations[generation], tile)
-        self._held[key] = found
-        if len(self._held) > _TILES_IN_MEMORY:
-            self._held.popitem(last=False)
-        return found
+        generation, number = tile_of(key)
+        return self._folder.read(self._generations[generation], number)
 
 
 def gather(sources: Sources, reader: TileReader) -> Gathered:
@@ -90,8 +83,8 @@ def gather(sources: Sources, reader: TileReader) -> Gathered:
     common: np.ndarray | None = None
     alike = True
     always = sources.found[ALWAYS]
-    for (generation, number), wanted in _tiles(sources).items():
-        tile = reader.tile(generation, number)
+    for key, wanted in _tiles(sources).items():
+        tile = reader.tile(key)
         found.made.append(tile.made)
         for name, variable in tile.variables.items():
             if variable.item not in wanted:
@@ -102,14 +95,13 @@ def gather(sources: Sources, reader: TileReader) -> Gathered:
                 whole = values.dtype.kind == "i"
                 found.variables[name] = Described(variable, whole, values.shape[1:])
             elif known.variable.dims != variable.dims:
-                raise RunFolderError(f"tiles {generation} and {number} disagree about {name}")
+                raise RunFolderError(f"{reader.place}: tiles disagree about {name}")
             else:
                 known.extra = tuple(map(max, known.extra, values.shape[1:]))
         if "time" in tile.arrays and "series" in wanted and alike:
             common, alike = _common(common, tile.arrays["time"])
         if tile.reasons:
-            mine = (always.generation == generation) & (always.tile == number)
-            for member in np.flatnonzero(mine):
+            for member in np.flatnonzero(always.tile == key):
                 why = tile.reasons.get(int(always.row[member]))
                 if why is not None:
                     found.reasons[int(member)] = why
@@ -128,12 +120,10 @@ def _common(known: np.ndarray | None, rows: np.ndarray) -> tuple[np.ndarray | No
     return known, bool(agree.all()) and np.array_equal(known[: len(longest)], longest)
 
 
-def _tiles(sources: Sources) -> dict[tuple[int, int], set[str]]:
+def _tiles(sources: Sources) -> dict[int, set[str]]:
     """All tiles in which something is found, with the items found there, in order."""
-    found: dict[tuple[int, int], set[str]] = {}
+    found: dict[int, set[str]] = {}
     for item, source in sources.found.items():
-        there = ~source.missing
-        keys = source.generation[there].astype(np.int64) << 32 | source.tile[there]
-        for key in np.unique(keys).tolist():
-            found.setdefault((key >> 32, key & 0xFFFFFFFF), set()).add(plain(item))
+        for key in np.unique(source.tile[~source.missing]).tolist():
+            found.setdefault(key, set()).add(plain(item))
     return dict(sorted(found.items()))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -31,27 +32,27 @@ def plain(item: str) -> str:
 
 @dataclass(frozen=True)
 class ItemPlaces:
-    """Where each member's item is found, (members,): generation, tile, and place in the tile; -1 if
+    """Where each member's item is found, (members,): ``key_of`` its tile, and place in the tile; -1 if
     nowhere.
     """
 
-    generation: np.ndarray
     tile: np.ndarray
     row: np.ndarray
-
-    @classmethod
-    def nowhere(cls, count: int) -> ItemPlaces:
-        """Places of an item that no member has."""
-        return cls(
-            np.full(count, _NOWHERE, dtype=np.int16),
-            np.full(count, _NOWHERE, dtype=np.int32),
-            np.full(count, _NOWHERE, dtype=np.int32),
-        )
 
     @property
     def missing(self) -> np.ndarray:
         """Mask of the members that lack the item."""
-        return self.generation == _NOWHERE
+        return self.tile == _NOWHERE
+
+
+def key_of(generation: int, tile: Any) -> Any:
+    """One number for a tile of a generation, or an array of them for several."""
+    return generation << 32 | tile
+
+
+def tile_of(key: int) -> tuple[int, int]:
+    """Generation and number of a tile."""
+    return key >> 32, key & 0xFFFFFFFF
 
 
 @dataclass(frozen=True)
@@ -63,21 +64,15 @@ class Sources:
     @property
     def missing(self) -> np.ndarray:
         """Members that lack any item, ascending."""
-        lacking = [source.missing for source in self.found.values()]
-        return np.flatnonzero(np.logical_or.reduce(lacking))
+        return np.flatnonzero(np.logical_or.reduce([source.missing for source in self.found.values()]))
 
     def works(self) -> tuple[Work, ...]:
         """What is still to be computed; members that lack the same items go together."""
-        items = list(self.found)
-        if not items:
-            return ()
-        pattern = sum(
-            (source.missing.astype(np.int64) << bit for bit, source in enumerate(self.found.values())),
-            start=np.zeros(len(next(iter(self.found.values())).tile), dtype=np.int64),
-        )
+        missing = [source.missing.astype(np.int64) for source in self.found.values()]
+        pattern = np.sum([lacks << bit for bit, lacks in enumerate(missing)], axis=0)
         works = []
         for value in sorted(set(np.unique(pattern).tolist()) - {0}, reverse=True):
-            keep = tuple(item for bit, item in enumerate(items) if value >> bit & 1 and item != ALWAYS)
+            keep = tuple(item for bit, item in enumerate(self.found) if value >> bit & 1 and item != ALWAYS)
             works.append(Work(keep, ranges_of(np.flatnonzero(pattern == value))))
         return tuple(works)
 
@@ -94,7 +89,12 @@ def sources_of(
         generations: the folder's generations, with the sweeps that their configs describe.
         to_come: one whose tiles count whether they exist already or not.
     """
-    found = {item: ItemPlaces.nowhere(sweep.count) for item in (ALWAYS, *items_of(sweep))}
+    found = {
+        item: ItemPlaces(
+            np.full(sweep.count, _NOWHERE, dtype=np.int64), np.full(sweep.count, _NOWHERE, dtype=np.int32)
+        )
+        for item in (ALWAYS, *items_of(sweep))
+    }
     for generation, then in generations:
         old = positions(sweep, then)
         present = folder.present(generation)
@@ -108,8 +108,7 @@ def sources_of(
             for item, source in found.items():
                 if item == ALWAYS or item in work.keep:
                     new = there & source.missing
-                    source.generation[new] = generation.number
-                    source.tile[new] = tiles[new]
+                    source.tile[new] = key_of(generation.number, tiles[new])
                     source.row[new] = places[new] % generation.length
             before += count
     return Sources(found)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Callable, Iterable, Iterator
 
 from rigidsim.errors import ConfigError, Problem
@@ -33,111 +34,77 @@ Each = Callable[[Callable[[tuple[str, int, int]], Share], list[tuple[str, int, i
 
 
 def check_sweep(sweep: Sweep, *, every: bool = True, each: Each = map) -> InitialValueProblem:
-    """Refuse a sweep with a member that can't be run; returns the first member, prepared.
+    """Refuse a sweep with a member that can't be run; returns the first that can, prepared.
 
     Args:
-        every: check each member's numbers even if there are more than ``_ALL``: 10 s per million members.
+        every: check each member's numbers even if there are more than ``_ALL``: a minute per million members.
         each: like ``map``; may have others look at shares of the members meanwhile.
 
     Raises:
         ConfigError: names members and keys.
     """
-    check = SweepCheck(sweep, every=every, each=each)
-    check.finish()
-    return check.first
+    _refuse_names(sweep)
+    _refuse_what_none_has(sweep)
+    first = prepare(sweep.worked_out(first_possible(sweep)))
+    refuse_taken_names(first)
+    if sweep.table.impossible == "mark":
+        return first
+    given = _shares(sweep, each) if every else []  # others begin with them at once
+    problems = _worked_out(sweep, _FEW)
+    if not problems:
+        refused, accepted = _refused_or_accepted(given)
+        if accepted < sweep.count and sweep.count > _ALL:
+            problems = _worked_out(sweep, _OF_AN_AXIS)
+        if refused and not problems:
+            errors, _ = batches_of(sweep.experiment.text).refused(refused)
+            told = [sweep.blamed(member, errors[member]) for member in refused if member in errors]
+            problems = [problem for error in told for problem in error.problems]
+        if not problems and accepted < sweep.count <= _ALL and every:
+            problems = _worked_out(sweep, _FEW, equations=True)
+    if len(problems) >= _MOST_TOLD:
+        problems.append(Problem("[sweep]", "there may be more members of this kind; these came first"))
+    if problems:
+        raise ConfigError(markable(problems), sweep.experiment.source)
+    return first
 
 
-class SweepCheck:
-    """A check that others may have a part in: it begins at once, and ``finish`` tells what was found.
+def _worked_out(sweep: Sweep, most: int, *, equations: bool = False) -> list[Problem]:
+    """Problems of members that are worked out in full, see ``_tried``.
 
     Args:
-        every, each: see ``check_sweep``.
-
-    Attributes:
-        first: the first member that can be run, prepared; the first of all unless others may be marked.
-
-    Raises:
-        ConfigError: the first member can't be run, or nothing can that all members share.
+        equations: also build their equations, which takes some ten times as long.
     """
-
-    def __init__(self, sweep: Sweep, *, every: bool, each: Each) -> None:
-        _refuse_names(sweep)
-        _refuse_what_none_has(sweep)
-        self._sweep = sweep
-        self.first = prepare(sweep.worked_out(first_possible(sweep)))
-        refuse_taken_names(self.first)
-        every = every and sweep.table.impossible == "refuse"
-        self._every = every
-        self._shares = _of_families(sweep, each) if every else []
-
-    def finish(self) -> None:
-        """Look at members that are worked out in full, and wait for the shares of others.
-
-        Raises:
-            ConfigError: names members and keys.
-        """
-        sweep = self._sweep
-        if sweep.table.impossible == "mark":
-            return
-        problems = self._worked_out(_FEW)
-        if not problems:
-            shares = list(_as_far_as_told(self._shares))
-            known = sum(accepted for _, accepted in shares) == sweep.count
-            if not known and sweep.count > _ALL:
-                problems = self._worked_out(_OF_AN_AXIS)
-            problems = problems or self._found(shares)
-            if not (problems or known) and self._every and sweep.count <= _ALL:
-                problems = self._worked_out(_FEW, equations=True)
-        if len(problems) >= _MOST_TOLD:
-            problems.append(Problem("[sweep]", "there may be more members of this kind; these came first"))
-        if problems:
-            raise ConfigError(markable(problems), sweep.experiment.source)
-
-    def _worked_out(self, most: int, *, equations: bool = False) -> list[Problem]:
-        """Problems of members that are worked out in full, see ``_tried``.
-
-        Args:
-            equations: also build their equations, which takes some ten times as long.
-        """
-        problems: list[Problem] = []
-        for member in _tried(self._sweep, most):
-            try:
-                experiment = self._sweep.worked_out(member)
-                if equations:
-                    prepare(experiment)
-                else:
-                    check_start(build_scene(experiment))
-            except ConfigError as error:
-                problems += self._sweep.blamed(member, error).problems
-                if len(problems) >= _MOST_TOLD:
-                    break
-        return problems
-
-    def _found(self, shares: Iterable[Share]) -> list[Problem]:
-        """Problems of the first share that has any."""
-        sweep = self._sweep
-        for refused, _ in shares:
-            if refused:
-                errors, _ = batches_of(sweep.experiment.text).refused(refused)
-                told = [sweep.blamed(member, errors[member]) for member in refused if member in errors]
-                return [problem for error in told for problem in error.problems]
-        return []
+    problems: list[Problem] = []
+    for member in _tried(sweep, most):
+        try:
+            experiment = sweep.worked_out(member)
+            if equations:
+                prepare(experiment)
+            else:
+                check_start(build_scene(experiment))
+        except ConfigError as error:
+            problems += sweep.blamed(member, error).problems
+            if len(problems) >= _MOST_TOLD:
+                break
+    return problems
 
 
-def _as_far_as_told(shares: Iterable[Share]) -> Iterator[Share]:
-    """Shares up to the first that is refused, or that tells nothing."""
-    for refused, accepted in shares:
-        yield refused, accepted
-        if refused or not accepted:
-            return
-
-
-def _of_families(sweep: Sweep, each: Each) -> Iterable[Share]:
+def _shares(sweep: Sweep, each: Each) -> Iterable[Share]:
     """Which members no run accepts, if members share equations so that their numbers alone tell."""
     if why_alone(sweep, ()) not in ("", "wall_time", "asked"):
         return []
     edges = [*range(0, sweep.count, _AT_ONCE), sweep.count]
     return each(refused_of, [(sweep.experiment.text, *ends) for ends in itertools.pairwise(edges)])
+
+
+def _refused_or_accepted(shares: Iterable[Share]) -> Share:
+    """The first members that are refused, and how many are accepted, up to a share that tells of none."""
+    known = 0
+    for refused, accepted in shares:
+        known += accepted
+        if refused or not accepted:
+            return refused, known
+    return [], known
 
 
 def refused_of(share: tuple[str, int, int]) -> Share:
@@ -166,11 +133,7 @@ def _tried(sweep: Sweep, most: int) -> Iterator[int]:
         yield from range(step, sweep.count, step)
         yield sweep.count - 1
         return
-    strides: list[int] = []
-    stride = 1
-    for size in reversed(sweep.shape):
-        strides.insert(0, stride)
-        stride *= size
+    strides = [math.prod(sweep.shape[place + 1 :]) for place in range(len(sweep.shape))]
     for size, stride in zip(sweep.shape, strides, strict=True):
         step = max(1, size // most)
         yield from (index * stride for index in range(step, size, step))

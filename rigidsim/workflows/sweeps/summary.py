@@ -108,12 +108,10 @@ def _count(sources: Sources, reader: TileReader) -> _Counted:
     worst: dict[str, float] = {}
     estimated: dict[str, list[np.ndarray]] = {name: [] for name in _ERRORS}
     always = sources.found[ALWAYS]
-    keys = always.generation.astype(np.int64) << 32 | always.tile
-    order = np.argsort(keys, kind="stable")
-    edges = np.flatnonzero(np.diff(keys[order])) + 1
+    order = np.argsort(always.tile, kind="stable")
+    edges = np.flatnonzero(np.diff(always.tile[order])) + 1
     for group in np.split(order, edges):
-        key = int(keys[group[0]])
-        tile = reader.tile(key >> 32, key & 0xFFFFFFFF)
+        tile = reader.tile(int(always.tile[group[0]]))
         rows = always.row[group]
         ended = tile.arrays["status"][rows]
         outcomes += np.bincount(ended, minlength=len(OUTCOMES))

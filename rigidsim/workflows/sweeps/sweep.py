@@ -24,7 +24,7 @@ from rigidsim.store.sweeps.sources import sources_of
 from rigidsim.store.variables import SCHEMA_VERSION
 from rigidsim.workflows.read import Given, as_experiment
 from rigidsim.workflows.sweeps.batch import why_alone
-from rigidsim.workflows.sweeps.check import SweepCheck
+from rigidsim.workflows.sweeps.check import check_sweep
 from rigidsim.workflows.sweeps.cluster import Cluster
 from rigidsim.workflows.sweeps.members import batches_of, recording, sweep_of
 from rigidsim.workflows.sweeps.plan import refuse_untold_tiles, tile_length
@@ -157,9 +157,8 @@ def run_sweep(
             return done
     with way.ready_for(wanted):
         known = _known(wanted, folder)
-        check = SweepCheck(wanted, every=not known, each=way.each)
+        check_sweep(wanted, every=not known, each=way.each)
         length = None if known else tile_length(wanted)
-        check.finish()
         with folder.locked(shared=share is not None):
             if share is None:
                 folder.begin(force=force)
