@@ -12,7 +12,7 @@ from rigidsim.scene.config import Experiment
 from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.overrides import key_steps
 from rigidsim.scene.sweeps.sweep import Sweep
-from rigidsim.solve.batch.replay import Spread, real_of
+from rigidsim.solve.batch.replay import SharedReals, real_of
 from rigidsim.solve.batch.tracing import TRACED_TABLES
 
 _HELD = 1 << 16  # values of axes that are held, each worked out once for all members that share it
@@ -34,7 +34,7 @@ class AxisNumbers:
     def _reals_of(self, place: int, index: int) -> list[hy.real]:
         return [real_of(number) for number in self.sweep.axes[place].exact(index)]
 
-    def columns(self, place: int, which: np.ndarray) -> list[Spread]:
+    def columns(self, place: int, which: np.ndarray) -> list[SharedReals]:
         """The numbers of an axis that members have, one column for each key.
 
         Args:
@@ -42,7 +42,7 @@ class AxisNumbers:
         """
         needed, index = np.unique(which, return_inverse=True)
         values = [self._reals(place, i) for i in needed.tolist()]
-        return [Spread(np.array(column), index) for column in zip(*values, strict=True)]
+        return [SharedReals(np.array(column), index) for column in zip(*values, strict=True)]
 
     def codes(self, place: int, which: np.ndarray) -> np.ndarray:
         """Codes below the axis's length, equal for members whose axis values have the same text."""
@@ -92,9 +92,9 @@ class Members:
         """A member's exact numbers for ``keys``, SI."""
         return [x for place, which in self._traced for x in self.sweep.axes[place].exact(int(which[member]))]
 
-    def columns(self, members: np.ndarray) -> list[Spread]:
+    def columns(self, members: np.ndarray) -> list[SharedReals]:
         """The numbers of some members for each key, in the scene's arithmetic."""
-        found: list[Spread] = []
+        found: list[SharedReals] = []
         for place, which in self._traced:
             found += self._axes.columns(place, which[members])
         return found

@@ -27,7 +27,7 @@ _FAILURES = (ZeroDivisionError, ValueError, OverflowError, TypeError)
 Reals = Any  # an array of hy.real, or one hy.real
 
 
-class Spread(NamedTuple):
+class SharedReals(NamedTuple):
     """Numbers of members: the values that there are, and which of them each member has, (members,); None
     where all have one.
     """
@@ -78,9 +78,9 @@ class Replay:
         columns: for each column of the graph the members' swept numbers; those of one axis share their index.
     """
 
-    def __init__(self, graph: Graph, columns: Sequence[Spread], count: int) -> None:
+    def __init__(self, graph: Graph, columns: Sequence[SharedReals], count: int) -> None:
         self._graph, self._columns, self._count = graph, columns, count
-        self._numbers: dict[int, Spread] = {}
+        self._numbers: dict[int, SharedReals] = {}
         self._each = np.arange(count)
 
     def agreeing(self, guards: Sequence[Guard]) -> np.ndarray:
@@ -105,7 +105,7 @@ class Replay:
         found[np.isinf(found)] = np.nan
         return np.full(self._count, found[0]) if index is None else found[index]
 
-    def number(self, node: int) -> Spread:
+    def number(self, node: int) -> SharedReals:
         """A number of the graph."""
         if node not in self._numbers:
             with np.errstate(all="ignore"):
@@ -120,9 +120,9 @@ class Replay:
             return [values for values, _ in found], next(iter(indices.values()), None)
         return [values if index is None else values[index] for values, index in found], self._each
 
-    def _worked_out(self, operation: str, arguments: tuple[Any, ...]) -> Spread:
+    def _worked_out(self, operation: str, arguments: tuple[Any, ...]) -> SharedReals:
         if operation == "constant":
-            return Spread(_real(arguments[0]))
+            return SharedReals(_real(arguments[0]))
         if operation == "column":
             return self._columns[arguments[0]]
         if operation == "power":
@@ -140,9 +140,9 @@ class Replay:
         found = known(*values)
         if operation == "divide":
             found[np.broadcast_to(values[1] == hy.real(0.0, _BITS), found.shape)] = hy.real(math.nan, _BITS)
-        return Spread(found, index)
+        return SharedReals(found, index)
 
-    def _one_by_one(self, function: Callable[..., Any], *nodes: int) -> Spread:
+    def _one_by_one(self, function: Callable[..., Any], *nodes: int) -> SharedReals:
         """A function that arrays lack, once for each of the values that there are."""
         values, index = self._together(*nodes)
         codes: np.ndarray = np.zeros(1, dtype=np.int64)
@@ -156,7 +156,7 @@ class Replay:
                 found.append(_real(function(*map(_mpf, given))))
             except _FAILURES:
                 found.append(hy.real(math.nan, _BITS))
-        return Spread(np.array(found)[places], index)
+        return SharedReals(np.array(found)[places], index)
 
 
 def _exponent(value: Reals) -> Reals:
