@@ -164,7 +164,6 @@ def prepare_scene(
         if averaged and asked == "auto" and tolerance is None:
             step_control = _auto_of_averages(precision)
         _refuse_spectrum(system)
-        _refuse_spectrum_by_table(system)
         if loads:
             _refuse_non_finite_start(system, precision)
         algorithm = algorithm_of(scene, system, driven=bool(loads))
@@ -254,34 +253,19 @@ def _check_tolerance(tolerance: mpmath.mpf, precision: Precision) -> None:
 
 
 def _refuse_spectrum(system: System) -> None:
-    """Refuse a Lyapunov spectrum if the motion switches sides, where tangent vectors jump unknown to the
-    variational equations.
-
-    Raises:
-        ConfigError: Lyapunov exponents are asked for of such a motion.
+    """Refuse a Lyapunov spectrum where variational equations end unknown to it: where the motion switches
+    sides, and at the rows of tabulated orbits.
     """
     found = system.plan.surfaces.found
-    if system.scene.config.output.lyapunov and found:
-        what = (
-            f"given true, but the equations switch at a kink or jump of {found[0].text} ({found[0].where}), "
-            "where variational equations end; set it to false, or make the change smooth with tanh"
-        )
-        raise ConfigError(Problem("[output] lyapunov", what))
-
-
-def _refuse_spectrum_by_table(system: System) -> None:
-    """Refuse a Lyapunov spectrum with a tabulated orbit, whose states are reset at its rows unknown to the
-    variational equations.
-
-    Raises:
-        ConfigError: Lyapunov exponents are asked for of such a motion.
-    """
-    if system.scene.config.output.lyapunov and system.pieces is not None:
-        what = (
-            "given true, but an orbit goes by a table, at whose rows its states are set and variational "
-            "equations end; set it to false, or give the orbit by elements"
-        )
-        raise ConfigError(Problem("[output] lyapunov", what))
+    if not system.scene.config.output.lyapunov or (not found and system.pieces is None):
+        return
+    why = "an orbit goes by a table, at whose rows its states are set and variational equations end"
+    instead = "give the orbit by elements"
+    if found:
+        why = f"the equations switch at a kink or jump of {found[0].text} ({found[0].where}), where "
+        why += "variational equations end"
+        instead = "make the change smooth with tanh"
+    raise ConfigError(Problem("[output] lyapunov", f"given true, but {why}; set it to false, or {instead}"))
 
 
 def _refuse_non_finite_start(system: System, precision: Precision) -> None:
