@@ -15,7 +15,7 @@ os.environ.setdefault("CI", "1")  # rerun's viewer collects no statistics then
 sys.path.insert(0, str(Path(__file__).parent))
 sys.path.insert(0, str(Path(__file__).parents[1]))  # the studies are no installed package
 
-import rigidsim.workflows.read  # noqa: F401  (tests that read configs below need every kind of load)
+from rigidsim import parse  # noqa: F401  (tests that read configs below need every kind of load)
 
 TERMINAL = shutil.get_terminal_size().columns
 # Whatever terminal the tests are started from, and however long the path of their temporary folder: no line

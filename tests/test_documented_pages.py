@@ -94,6 +94,6 @@ def main(names: list[str]) -> None:
 
 if __name__ == "__main__":
     sys.path.insert(0, str(ROOT))
-    import rigidsim.workflows.read  # noqa: F401  (every kind of load)
+    from rigidsim import parse  # noqa: F401  (every kind of load)
 
     main(sys.argv[1:])

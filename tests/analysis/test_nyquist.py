@@ -11,14 +11,13 @@ import xarray
 from support import run_text
 
 import rigidsim
-from rigidsim.analysis.result import SignalAnalysis, SpectralLine
 
 FAULT = Path(__file__).parents[1] / "data/faults/nyquist_line.toml"
 WELL_APART = 1.2  # bins; lines closer than one can't be told apart
 HELD = 0.3  # bins from Nyquist's frequency: closer to its mirror image than lines that can be told apart
 
 
-def analysed(values: np.ndarray, lines: int = 8) -> SignalAnalysis:
+def analysed(values: np.ndarray, lines: int = 8) -> Any:
     """Real or complex samples, one a second."""
     time = np.arange(float(len(values)))
     if np.iscomplexobj(values):
@@ -30,12 +29,12 @@ def analysed(values: np.ndarray, lines: int = 8) -> SignalAnalysis:
     return rigidsim.analyse(dataset, lines=lines)["x"]
 
 
-def nearest(signal: SignalAnalysis, turns: float) -> SpectralLine:
+def nearest(signal: Any, turns: float) -> Any:
     """The line nearest to a frequency in turns per sample."""
     return min(signal.lines, key=lambda line: abs(float(line.frequency) / (2 * np.pi) - turns))
 
 
-def right(line: SpectralLine, turns: float, amplitude: float, errors: float = 3) -> bool:
+def right(line: Any, turns: float, amplitude: float, errors: float = 3) -> bool:
     """Whether frequency and amplitude are right within some of their errors, or rounding."""
     off = abs(float(line.frequency) / (2 * np.pi) - turns)
     return bool(

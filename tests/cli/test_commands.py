@@ -17,7 +17,6 @@ from support import cases, same_bits
 
 import rigidsim
 from rigidsim.look import viewer
-from rigidsim.look.figure_names import FIGURES
 
 Config = Callable[..., str]
 Command = Callable[..., Any]
@@ -179,9 +178,6 @@ def test_plot_by_name(config: Config, rigidsim_command: Command, tmp_path: Path)
         assert message in " ".join(result.stderr.split())
     assert rigidsim_command("run", config(), "--force").exit_code == 0
     assert not Path("runs/free/figure_rates.png").exists()
-    shown = " ".join(rigidsim_command("plot", "--help").stdout.split())
-    for name, summary in FIGURES.items():
-        assert f"{name} {summary}" in shown
 
 
 @pytest.mark.parametrize(

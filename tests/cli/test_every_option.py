@@ -15,9 +15,7 @@ import support
 import typer
 from typer.testing import CliRunner
 
-import rigidsim
 from rigidsim.cli.app import app
-from rigidsim.cli.screens.page import print_json
 from rigidsim.look import viewer
 
 # a line of the command's arguments, and the code it ends with
@@ -153,17 +151,3 @@ def test_a_long_line(line: str, made: Path, monkeypatch: pytest.MonkeyPatch) -> 
 
     monkeypatch.setattr(viewer, "open_viewer", closed_at_once)
     run_line(line, LONG[line], made, monkeypatch)
-
-
-def test_json_of_an_analysis_says_why_a_number_is_missing(
-    made: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    print_json(rigidsim.analyse(made / "runs/free", ["angular_velocity", "obliquity"], lines=3).as_dict())
-    (printed,) = strictly(capsys.readouterr().out)
-    signals = {signal["name"]: signal for signal in printed["signals"]}
-    assert signals["angular_velocity.x+iy"]["secular"] is None  # complex signals have lines alone
-    assert signals["angular_velocity.z"]["secular"]["value"] is not None
-    lines = [line for signal in printed["signals"] for line in signal["lines"]]
-    missing = [{key for key, value in line.items() if value is None} for line in lines]
-    assert any(missing)
-    assert [set(line["null_because"]) for line in lines] == missing
