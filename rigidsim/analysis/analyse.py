@@ -119,9 +119,7 @@ def _raw(signal: Signal, clock: EquidistantTimes, lines: int, floor: float, orde
 
 
 def _with_precession(known: Sequence[Known], raws: Sequence[_Raw], clock: EquidistantTimes) -> list[Known]:
-    """The known frequencies with the equinox's: it moves back with the measured precession, unless known
-    already.
-    """
+    """The known frequencies with the equinox's, unless known: it moves back with the measured precession."""
     names = list(known)
     if not known or any(k.name == "precession" for k in known):
         return names
@@ -176,16 +174,9 @@ def _line(raw: _Raw, clock: EquidistantTimes, known: Sequence[Known], n: int) ->
     if real and observed < 0:
         observed, amplitude = -observed, context.conj(amplitude)
     resolution = 2 * math.pi / float(clock.length)
-    name = label(
-        float(observed),
-        error,
-        known,
-        clock.nyquist,
-        real=real,
-        in_body=raw.signal.in_body,
-        blend=_BLEND * resolution,
-        resolution=resolution,
-    )
+    place = float(observed), error, known, clock.nyquist
+    blend, in_body = _BLEND * resolution, raw.signal.in_body
+    name = label(*place, real=real, in_body=in_body, blend=blend, resolution=resolution)
     frequency = observed + 2 * name.folds * context.pi / clock.spacing
     phase = context.arg(amplitude) - frequency * clock.middle
     # turning it by whole turns a sample changes nothing at the samples, but at the middle between two it does

@@ -50,9 +50,8 @@ class Decomposition:
     Attributes:
         sum: polynomial, and lines (of a real signal those of positive frequency: twice their real part).
         order: order of the window.
-        frequency_errors, amplitude_errors: one standard deviation each, from the remainder next to the line:
-            turns per sample, and the signal's unit.
-        polynomial_errors: the same for the polynomial's coefficients.
+        frequency_errors, amplitude_errors, polynomial_errors: one standard deviation each, from the remainder
+            next to the line: turns per sample, and the signal's unit.
         left: rms of the remainder.
         level: median size of the windowed remainder's spectrum: lines below it aren't seen.
         close: frequencies (turns per sample) at which something is left that is too close to a line, or to
@@ -74,13 +73,9 @@ class Decomposition:
 def decompose(
     samples: SignalSamples, lines: int, degree: int, floor: float, order: int | None = None
 ) -> Decomposition:
-    """Find the strongest lines and a polynomial.
+    """Find so many of the strongest lines, down to a share of the strongest, and a polynomial (-1: none).
 
-    Args:
-        lines: largest number of lines.
-        degree: degree of the polynomial; -1 for none.
-        floor: lines below this share of the strongest are left.
-        order: order of the window; by default as high as the distance of the lines allows.
+    The window's order is by default as high as the distance of the lines allows.
     """
     double = replace(samples, parts=samples.parts[:1], bits=min(samples.bits, 53))
     search: _Search | None = None
@@ -127,10 +122,7 @@ def _places(total: Sum, real: bool) -> Reals:
 
 def _merged(total: Sum, real: bool, limit: float) -> int | None:
     """Index of the weaker of two lines that have merged, of one that merged with the secular part, or of one
-    that several others cancel nearly everywhere; None if there is none.
-
-    Args:
-        limit: amplitude of an exponential that can't be in the samples.
+    above the limit, that several others cancel nearly everywhere; None if there is none.
     """
     lines = len(total.frequencies)
     places = _places(total, real)
@@ -272,11 +264,8 @@ def _judged(samples: SignalSamples, total: Sum, order: int, search: _Search) -> 
 
 
 def amplitude_spectrum(samples: SignalSamples, found: Decomposition, points: int) -> tuple[Reals, Reals]:
-    """Spectrum of the signal without its secular part, for a picture: frequencies (turns per sample) and
-    sizes.
-
-    Of neighbouring points the largest is kept, so that no line is lost. For a real signal, sizes are
-    amplitudes of the cosine.
+    """Spectrum of the signal without its secular part: frequencies (turns per sample) and sizes, of a real one
+    those of cosines. Of neighbouring points the largest is kept, so that no line is lost.
     """
     secular = replace(found.sum, frequencies=(), amplitudes=())
     left = remainder(replace(samples, parts=samples.parts[:1], bits=53), secular)

@@ -24,25 +24,6 @@ _GUARD = 40  # bits for the growth of rounding along a table, and for sums
 _ROWS = 64  # of blocks that are worked on at once, in a precision beyond double
 
 
-def block_length(count: int) -> int:
-    """Number of samples in a block: about the square root of the total."""
-    return 1 << max(math.ceil(math.log2(max(count, 2)) / 2), 1)
-
-
-def block_count(count: int) -> int:
-    """Number of blocks that hold all samples."""
-    return -(-count // block_length(count))
-
-
-def blocks(values: Any) -> Any:
-    """Samples (n,) as (blocks, block length), padded with zeros."""
-    count = len(values)
-    rows, width = block_count(count), block_length(count)
-    padded = np.zeros(rows * width, dtype=values.dtype)
-    padded[:count] = values
-    return padded.reshape(rows, width)
-
-
 def exponentials(frequencies: Sequence[Any], numbers: NDArray[np.int64]) -> Complexes:
     """exp(i pi f n), (numbers, frequencies), right to rounding for any numbers below 2^40.
 
@@ -64,19 +45,33 @@ def exponentials(frequencies: Sequence[Any], numbers: NDArray[np.int64]) -> Comp
 
 @dataclass(frozen=True)
 class Grid:
-    """Numbers of samples counted from the middle of a series."""
+    """Numbers of samples counted from the middle of a series, in blocks."""
 
     count: int
 
     @property
+    def width(self) -> int:
+        """Number of samples in a block: about the square root of the total."""
+        return 1 << max(math.ceil(math.log2(max(self.count, 2)) / 2), 1)
+
+    @property
+    def rows(self) -> int:
+        """Number of blocks that hold all samples."""
+        return -(-self.count // self.width)
+
+    def blocks(self, values: Any) -> Any:
+        """Samples (n,) as (blocks, block length), padded with zeros."""
+        return np.pad(values, (0, self.rows * self.width - self.count)).reshape(self.rows, self.width)
+
+    @property
     def first(self) -> NDArray[np.int64]:
         """Twice the number of each block's first sample."""
-        return 2 * block_length(self.count) * np.arange(block_count(self.count)) - (self.count - 1)
+        return 2 * self.width * np.arange(self.rows) - (self.count - 1)
 
     @property
     def within(self) -> NDArray[np.int64]:
         """Twice the number of each sample from its block's first."""
-        return 2 * np.arange(block_length(self.count))
+        return 2 * np.arange(self.width)
 
     def tables(self, frequencies: Sequence[Any]) -> tuple[Complexes, Complexes]:
         """exp(2 pi i f n) of the blocks' first samples and within blocks; frequencies in turns per sample."""
@@ -152,10 +147,10 @@ class _Wide:
     def difference(self) -> Complexes:
         """See ``Sum.left_of``."""
         left, right = self._factors()
-        count, width = self.total.count, block_length(self.total.count)
-        result = np.empty(count, dtype=np.complex128)
-        for row in range(0, block_count(count), _ROWS):
-            begin, end = row * width, min((row + _ROWS) * width, count)
+        grid = Grid(self.total.count)
+        result = np.empty(grid.count, dtype=np.complex128)
+        for row in range(0, grid.rows, _ROWS):
+            begin, end = row * grid.width, min((row + _ROWS) * grid.width, grid.count)
             for which, factor in enumerate(left):
                 values = self._chunk(factor[:, row : row + _ROWS], right, begin, end, which)
                 target = result.real if which == 0 else result.imag
@@ -183,7 +178,6 @@ class _Wide:
         context = type(total.context)()
         context.prec = self.bits + 20
         grid, one = Grid(total.count), 1 << self.bits
-        rows, width = len(grid.first), len(grid.within)
         real: list[list[int]] = []
         imaginary: list[list[int]] = []
         shared: list[list[int]] = []
@@ -191,8 +185,8 @@ class _Wide:
             turn = 2 * context.mpf(frequency)
             start = context.mpc(amplitude) * context.expjpi(turn * (1 - total.count) / 2)
             start = context.ldexp(start.real, -self.unit), context.ldexp(start.imag, -self.unit)
-            c, s = self._powers(context, start, turn * width, rows)
-            u, v = self._powers(context, (context.one, context.zero), turn, width)
+            c, s = self._powers(context, start, turn * grid.width, grid.rows)
+            u, v = self._powers(context, (context.one, context.zero), turn, grid.width)
             real += [c, [-x for x in s]]
             imaginary += [s, c]
             shared += [u, v]
@@ -202,7 +196,7 @@ class _Wide:
             y = [(int(n) << self.bits) // total.count for n in grid.within]
             for power in range(len(total.polynomial)):
                 for target, part in ((real, "real"), (imaginary, "imag")):
-                    column = [0] * rows
+                    column = [0] * grid.rows
                     for m in range(power, len(total.polynomial)):
                         number = getattr(context.mpc(total.polynomial[m]), part)
                         factor = int(context.ldexp(number * math.comb(m, power), self.bits - self.unit))

@@ -16,6 +16,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+Reals = NDArray[np.float64]
+
 _ORDERS = {1: 60, 2: 40, 3: 16, 4: 10, 5: 8, 6: 7}
 """Largest sum of abs(multipliers), by the number of known frequencies; 6 beyond."""
 _SIGMAS = 5.0
@@ -67,14 +69,12 @@ def named(multipliers: Sequence[int], known: Sequence[Known]) -> str:
     """A combination as text, the positive terms first."""
     if not any(multipliers):
         return "0"
-    terms = sorted(
-        ((m, k.name) for m, k in zip(multipliers, known, strict=True) if m), key=lambda term: term[0] < 0
-    )
+    terms = [(m, k.name) for m, k in zip(multipliers, known, strict=True) if m]
     words = []
-    for n, (m, name) in enumerate(terms):
-        sign = "-" if m < 0 else "+" if n else ""
+    for n, (m, name) in enumerate(sorted(terms, key=lambda term: term[0] < 0)):
+        sign = "- " if m < 0 else "+ "
         size = "" if abs(m) == 1 else f"{abs(m)} "
-        words.append(f"{sign} {size}{name}" if n else f"{sign}{size}{name}")
+        words.append((sign if n else sign.strip(" +")) + size + name)
     return " ".join(words)
 
 
@@ -128,9 +128,9 @@ def label(
     true = vectors @ values
     turns = np.round(true / (2 * nyquist))
     observed = true - turns * 2 * nyquist
-    allowed: NDArray[np.float64] = _SIGMAS * np.sqrt(
-        error**2 + (vectors**2) @ errors**2
-    ) + _ROUNDING * np.max(np.abs(vectors * values), axis=1)
+    allowed: Reals = _SIGMAS * np.sqrt(error**2 + (vectors**2) @ errors**2) + _ROUNDING * np.max(
+        np.abs(vectors * values), axis=1
+    )
     candidates = _Candidates(vectors, observed, turns, true, nyquist)
     found = candidates.named(frequency, allowed, known, real=real)
     if not found.multipliers and blend:
@@ -140,24 +140,16 @@ def label(
 
 @dataclass(frozen=True)
 class _Candidates:
-    """All combinations, with the frequency at which each is observed and the turns per sample lost by
-    folding.
-    """
+    """All combinations, the frequency at which each is observed, and the turns per sample lost by folding."""
 
     vectors: NDArray[np.int64]
-    observed: NDArray[np.float64]
-    turns: NDArray[np.float64]
-    true: NDArray[np.float64]
+    observed: Reals
+    turns: Reals
+    true: Reals
     nyquist: float
 
     def named(
-        self,
-        frequency: float,
-        allowed: NDArray[np.float64],
-        known: Sequence[Known],
-        *,
-        real: bool,
-        blended: bool = False,
+        self, frequency: float, allowed: Reals, known: Sequence[Known], *, real: bool, blended: bool = False
     ) -> Label:
         """The simplest combination that fits; others of nearly the same simplicity make it doubtful."""
         vectors, turns = self.vectors, self.turns
@@ -191,9 +183,7 @@ class _Candidates:
         return Label(multipliers, named(multipliers, known), folds, others)
 
     def _by_chance(self, frequency: float, allowed: float, cost: int) -> float:
-        """Expected number of equally simple combinations that would fit by chance, given their density
-        here.
-        """
+        """Expected number of equally simple combinations that fit by chance, given their density here."""
         width: float = max(200 * allowed, self.nyquist / 500)
         near = np.abs(self.observed - frequency) <= width
         near &= np.abs(self.vectors).sum(axis=1) <= cost
@@ -222,15 +212,15 @@ def settled(known: Sequence[Known], lines: Mapping[str, Sequence[tuple[Any, floa
         if not one.tolerance:
             found.append(one)
             continue
-        best: Known | None = None
-        strength = 0.0
-        for signal in lines.values():
-            largest = max((a for _, _, a in signal), default=0.0)
-            for frequency, error, amplitude in signal:
-                near = abs(abs(float(frequency)) - abs(value)) <= one.tolerance * abs(value)
-                if near and largest and amplitude / largest > strength:
-                    strength = amplitude / largest
-                    measured = abs(frequency) if value > 0 else -abs(frequency)
-                    best = replace(one, value=measured, error=error, source=f"{one.source}; measured")
-        found += [best] if best is not None else []
+        near = [
+            (amplitude / largest, frequency, error)
+            for signal in lines.values()
+            if (largest := max((a for _, _, a in signal), default=0.0))
+            for frequency, error, amplitude in signal
+            if abs(abs(float(frequency)) - abs(value)) <= one.tolerance * abs(value)
+        ]
+        strength, frequency, error = max(near, key=lambda line: line[0], default=(0.0, 0.0, 0.0))
+        if strength > 0:
+            measured = abs(frequency) if value > 0 else -abs(frequency)
+            found.append(replace(one, value=measured, error=error, source=f"{one.source}; measured"))
     return found

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from rigidsim.analysis.exponentials import Complexes, Grid, Reals, Sum, blocks
+from rigidsim.analysis.exponentials import Complexes, Grid, Reals, Sum
 from rigidsim.analysis.windows import hann, moments, positions
 
 _MOST_STEPS = 25
@@ -25,8 +25,7 @@ class SignalSamples:
     Attributes:
         parts: real and imaginary parts, (n,) float64; the value is the sum over the list.
         real: whether the signal is real by definition.
-        bits: bits of the precision.
-        context: mpmath context with more digits than that.
+        bits: bits of the precision; the mpmath context has more.
         late: by how much of a spacing samples are later than equidistant ones, (n,): times are rounded, in a
             pattern that would show up as lines.
     """
@@ -175,9 +174,10 @@ def _products(total: Sum, left: Complexes, order: int) -> Complexes:
     powers = [np.sum(weighted * x**m) for m in range(len(total.polynomial))]
     if not total.frequencies:
         return np.array(powers, dtype=np.complex128)
-    first, within = Grid(count).tables(total.frequencies)
+    grid = Grid(count)
+    first, within = grid.tables(total.frequencies)
     inner = [
-        np.sum(np.conj(first) * (blocks(values) @ np.conj(within)), axis=0)
+        np.sum(np.conj(first) * (grid.blocks(values) @ np.conj(within)), axis=0)
         for values in (weighted, weighted * x)
     ]
     return np.concatenate([np.array(powers, dtype=np.complex128), *inner])

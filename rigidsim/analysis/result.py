@@ -8,14 +8,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
+import mpmath
 import numpy as np
+import xarray
 from numpy.typing import NDArray
 
 from rigidsim.analysis.labels import Known, Label
 from rigidsim.store.variables import part_name
 
 if TYPE_CHECKING:
-    import xarray
     from matplotlib.figure import Figure
 
 TURN = 2 * np.pi
@@ -132,9 +133,7 @@ class Analysis:
 
     @property
     def rounding(self) -> float | None:
-        """Error of frequencies that comes from the run's own error, rad/s: a phase that is wrong by it at the
-        end.
-        """
+        """Error of frequencies from the run's own error, rad/s: a phase that is wrong by it at the end."""
         return None if self.attitude_error is None else self.attitude_error / self.length
 
     @property
@@ -175,8 +174,6 @@ class Analysis:
 
 def digits(value: Any, bits: int) -> str:
     """A number with as many digits as a precision has."""
-    import mpmath
-
     return str(mpmath.nstr(mpmath.mpf(value), max(int(bits * 0.30103), 17)))
 
 
@@ -240,8 +237,6 @@ def _number(value: Any) -> Any:
 
 
 def _dataset(analysis: Analysis) -> xarray.Dataset:
-    import xarray
-
     signals, known = analysis.signals, analysis.known
     longest = max((len(s.lines) for s in signals), default=0)
     shape = (len(signals), longest)
@@ -250,42 +245,33 @@ def _dataset(analysis: Analysis) -> xarray.Dataset:
     data: dict[str, tuple[Any, ...]] = {}
 
     def table(
-        name: str, units: str, long_name: str, of: Any, dtype: Any = np.float64, fill: Any = np.nan
+        name: str, units: str, long_name: str, of: Any = None, dtype: Any = np.float64, fill: Any = np.nan
     ) -> None:
         values = np.full(shape, fill, dtype=dtype)
         for row, signal in enumerate(signals):
-            for column, line in enumerate(signal.lines):
-                values[row, column] = of(line)
+            values[row, : len(signal.lines)] = [
+                getattr(line, name) if of is None else of(line) for line in signal.lines
+            ]
         data[name] = (dims, values, {"units": units, "long_name": long_name})
 
     def remainder(value: Any, part: int) -> float:
-        for _ in range(part):
-            value = value - float(value)
-        return float(value)
+        return float(value) if part == 0 else remainder(value - float(value), part - 1)
 
     for part in range(parts):
-        table(
-            part_name("frequency", part),
-            "rad s-1",
-            "angular frequency",
-            lambda x, p=part: remainder(x.frequency, p),
-        )
+        name = part_name("frequency", part)
+        table(name, "rad s-1", "angular frequency", lambda x, p=part: remainder(x.frequency, p))
         if part:
-            data[part_name("frequency", part)][2]["residual_of"] = "frequency"
-    table(
-        "frequency_error", "rad s-1", "one standard deviation of the frequency", lambda x: x.frequency_error
-    )
-    table("observed_frequency", "rad s-1", "frequency before it was unfolded", lambda x: float(x.observed))
-    table("amplitude", "", "amplitude, in the signal's unit", lambda x: float(x.amplitude))
-    table("amplitude_error", "", "one standard deviation of the amplitude", lambda x: x.amplitude_error)
-    table("phase", "rad", "phase at time zero", lambda x: float(x.phase))
-    table("phase_error", "rad", "one standard deviation of the phase at mid-span", lambda x: x.phase_error)
-    table("mismatch", "rad s-1", "frequency less that of its label", lambda x: x.mismatch)
+            data[name][2]["residual_of"] = "frequency"
+    table("frequency_error", "rad s-1", "one standard deviation of the frequency")
+    table("observed_frequency", "rad s-1", "frequency before it was unfolded", lambda x: x.observed)
+    table("amplitude", "", "amplitude, in the signal's unit")
+    table("amplitude_error", "", "one standard deviation of the amplitude")
+    table("phase", "rad", "phase at time zero")
+    table("phase_error", "rad", "one standard deviation of the phase at mid-span")
+    table("mismatch", "rad s-1", "frequency less that of its label")
     table("label", "", "combination of known frequencies", lambda x: x.label.text, object, "")
-    table(
-        "unfolded", "1", "1 where the frequency lies beyond Nyquist's", lambda x: int(x.unfolded), np.int8, 0
-    )
-    table("ambiguous", "1", "1 where several combinations fit", lambda x: int(x.ambiguous), np.int8, 0)
+    table("unfolded", "1", "1 where the frequency lies beyond Nyquist's", None, np.int8, 0)
+    table("ambiguous", "1", "1 where several combinations fit", None, np.int8, 0)
     multipliers = np.zeros((*shape, len(known)), dtype=np.int64)
     for row, signal in enumerate(signals):
         for column, line in enumerate(signal.lines):
@@ -301,24 +287,14 @@ def _dataset(analysis: Analysis) -> xarray.Dataset:
     def along(name: str, values: list[Any], units: str, long_name: str, dtype: Any = np.float64) -> None:
         data[name] = (("signal",), np.array(values, dtype=dtype), {"units": units, "long_name": long_name})
 
-    nan = float("nan")
+    values = [np.nan if s.value is None else float(s.value.real) for s in signals]
+    rates = [np.nan if s.rate is None else float(s.rate.real) for s in signals]
+    errors = [s.rate_error for s in signals]
     along("signal_units", [s.units for s in signals], "", "unit of the signal", object)
     along("real", [int(s.real) for s in signals], "1", "1 of a real signal", np.int8)
-    along(
-        "secular_value",
-        [nan if s.value is None else float(s.value.real) for s in signals],
-        "",
-        "secular part at mid-span",
-    )
-    along(
-        "secular_rate",
-        [nan if s.rate is None else float(s.rate.real) for s in signals],
-        "",
-        "rate of the secular part, per s",
-    )
-    along(
-        "secular_rate_error", [s.rate_error for s in signals], "", "one standard deviation of the rate, per s"
-    )
+    along("secular_value", values, "", "secular part at mid-span")
+    along("secular_rate", rates, "", "rate of the secular part, per s")
+    along("secular_rate_error", errors, "", "one standard deviation of the rate, per s")
     along("left", [s.left for s in signals], "", "rms of what is left without lines and secular part")
     along("noise_level", [s.level for s in signals], "", "amplitude below which lines aren't seen")
     along("window_order", [s.order for s in signals], "1", "order of the Hann window", np.int64)

@@ -51,11 +51,7 @@ def _table(order: int, power: int) -> Complexes:
 
 
 def moments(order: int, power: int, distance: Reals) -> Complexes:
-    """Mean of the window times x^power exp(i pi D x), to some 1e-5: the trace of one line at another.
-
-    Args:
-        distance: D in bins, any shape.
-    """
+    """Mean of the window times x^power exp(i pi D x), to some 1e-5, D in bins: a line at another."""
     table = _table(order, power)
     place = np.abs(distance) * (_FINE / _POINTS)
     low = np.minimum(place.astype(np.int64), len(table) - 2)
@@ -67,13 +63,8 @@ def moments(order: int, power: int, distance: Reals) -> Complexes:
 
 @dataclass(frozen=True)
 class Spectrum:
-    """Amplitude spectrum of a windowed signal.
-
-    Attributes:
-        frequencies: turns per sample, ascending.
-        sizes: sizes of the amplitudes; a line at such a frequency has exactly its own.
-        turned: the amplitudes as they are at the first sample, complex.
-        count: number of samples.
+    """Amplitude spectrum of so many windowed samples: frequencies in turns per sample, ascending; sizes, of
+    which a line at such a frequency has exactly its own; the complex amplitudes at the first sample.
     """
 
     frequencies: Reals
@@ -107,9 +98,7 @@ class Spectrum:
 
 
 def spectrum(values: Complexes, order: int, *, real: bool) -> Spectrum:
-    """Spectrum with two points per bin; for a real signal the positive half, with amplitudes of exp(i w
-    t).
-    """
+    """Spectrum with two points per bin; of a real signal the positive half, with amplitudes of exp(i w t)."""
     count = len(values)
     size = _smooth(2 * count)
     weights = hann(count, order) / count
