@@ -264,7 +264,7 @@ def _judged(samples: SignalSamples, total: Sum, order: int, search: _Search) -> 
 
 
 def amplitude_spectrum(samples: SignalSamples, found: Decomposition, points: int) -> tuple[Reals, Reals]:
-    """Spectrum of the signal without its secular part: frequencies (turns per sample) and sizes, of a real one
+    """Spectrum of a signal without its secular part: frequencies (turns per sample) and sizes; of a real one
     those of cosines. Of neighbouring points the largest is kept, so that no line is lost.
     """
     secular = replace(found.sum, frequencies=(), amplitudes=())
