@@ -55,11 +55,7 @@ class Experiment:
         return hashlib.sha256(self.text.encode()).hexdigest()
 
     def having(self, overrides: Sequence[str]) -> Experiment:
-        """The experiment with values replaced by the program rather than the user; see ``parse``.
-
-        Raises:
-            ConfigError: with every problem found.
-        """
+        """The experiment with values replaced by the program rather than the user; see ``parse``."""
         other = parse(self.text, source=self.source, overrides=overrides)
         return exchanged(other, given=self.given, settings=self.settings)
 

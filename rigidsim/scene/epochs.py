@@ -56,10 +56,8 @@ class Epoch:
         return f"{date.fromordinal(self.day)}T{clock}{'.' if digits else ''}{digits}"
 
     def after(self, seconds: Decimal) -> Epoch:
-        """The instant some seconds later, to 1e-14 s, in the same scale.
-
-        Raises:
-            ValueError: the result isn't between the years 1 and 9999, or UTC isn't known there.
+        """The instant some seconds later, to 1e-14 s, in the same scale; ``ValueError`` beyond the years 1 to
+        9999, or where UTC isn't known.
         """
         ticks = int(_WIDE.scaleb(seconds, DIGITS).to_integral_value(context=_WIDE))
         uniform = self._uniform() + ticks
@@ -115,10 +113,8 @@ J2000 = Epoch("TDB", date(2000, 1, 1).toordinal(), 43200 * _SECOND)
 
 
 def parse_epoch(text: str) -> Epoch:
-    """Read an instant as written in a config: ``2029-04-13T21:46:00 TDB``, or ``J2000``.
-
-    Raises:
-        ValueError: the text is no instant, or in UTC outside the table of leap seconds; says what is allowed.
+    """Read an instant as written in a config: ``2029-04-13T21:46:00 TDB``, or ``J2000``; ``ValueError`` says
+    what is allowed.
     """
     if text.strip() == "J2000":
         return J2000

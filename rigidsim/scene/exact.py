@@ -190,21 +190,16 @@ def _from_text(text: str, unit: str) -> ExactNumber:
 
 
 def parse_quantity(value: Any) -> ExactNumber:
-    """Read a TOML value as a number in SI: a ``Quantity`` if it has a unit, of whatever dimension.
-
-    Raises:
-        ValueError: see ``parse_number``.
+    """Read a TOML value as a number in SI: a ``Quantity`` if it has a unit, of whatever dimension; see
+    ``parse_number``.
     """
     number, unit = in_its_unit(value)
     return with_unit(number, unit, value) if unit else number
 
 
 def in_its_unit(value: Any) -> tuple[ExactNumber, str]:
-    """Read a TOML value as a number and the unit written after it (empty if there is none), without
-    conversion.
-
-    Raises:
-        ValueError: see ``parse_number``; the unit isn't looked at.
+    """Read a TOML value as a number (see ``parse_number``) and the unit written after it, which isn't looked
+    at; empty if there is none.
     """
     short = isinstance(value, str) and len(value) <= _LONGEST_TEXT
     match = _NUMBER_AND_UNIT.fullmatch(value) if short else None
@@ -240,14 +235,7 @@ def decimal_text(value: Fraction) -> str:
 
 
 def with_unit(number: ExactNumber, unit: str, text: str) -> Quantity:
-    """A number of some unit, in SI.
-
-    Args:
-        text: the text as written, for messages.
-
-    Raises:
-        ValueError: no such unit.
-    """
+    """A number of some unit, in SI; ``ValueError`` (with the ``text`` as written) if there is no such unit."""
     try:
         factor, turns = units.to_si(unit)
     except units.UnitError as error:

@@ -148,12 +148,9 @@ def rate_of(pace: tuple[str, ExactNumber], context: Any) -> Any:
 
 
 def mean_motion(table: Orbit, strength: Any | None, around: Surroundings) -> Any:
-    """Rate of the mean anomaly (mpf, rad/s): that of the pace that was given, or of Kepler's third law.
-
-    The mean longitude is ascending node + periapsis + mean anomaly.
-
-    Args:
-        strength: gravitational parameter (mpf, m^3/s^2) of Kepler's third law; None if unknown.
+    """Rate of the mean anomaly (mpf, rad/s): that of the pace that was given, or of Kepler's third law if the
+    gravitational parameter ``strength`` is known. Mean longitude is ascending node + periapsis + mean
+    anomaly.
     """
     context, pace = around.context, pace_of(table, around)
     if pace is None:
@@ -173,11 +170,7 @@ def mean_motion(table: Orbit, strength: Any | None, around: Surroundings) -> Any
 
 
 def resolve_orbit(table: Orbit, strength: Any | None, around: Surroundings) -> KeplerOrbit:
-    """Work out the orbit's elements.
-
-    Args:
-        strength: gravitational parameter (mpf, m^3/s^2) of Kepler's third law; None if unknown.
-    """
+    """Work out the orbit's elements; ``strength`` is the gravitational parameter (mpf, m^3/s^2), if known."""
     context = around.context
     if table.semi_major_axis is None:
         raise around.fault("orbit.semi_major_axis", "missing; it is needed")

@@ -22,11 +22,9 @@ FLAG = "--set"
 def apply_overrides(table: dict[str, Any], overrides: Sequence[str], what: str = FLAG) -> None:
     """Replace values of a config's tables, in order.
 
-    Args:
-        overrides: each a dotted key with optional [index], an equals sign and a TOML value (anything else,
-            such as a bare word or a number with its unit, is a string); nothing after the equals sign removes
-            the key.
-        what: what the overrides are called in messages.
+    Each override is a dotted key with optional [index], an equals sign and a TOML value (anything else, such
+    as a bare word or a number with its unit, is a string); nothing after the equals sign removes the key.
+    Messages call them ``what``.
     """
     if len(overrides) > _MOST_OVERRIDES:
         many = f"given {len(overrides)} values to set; at most {_MOST_OVERRIDES} are allowed"
@@ -36,11 +34,8 @@ def apply_overrides(table: dict[str, Any], overrides: Sequence[str], what: str =
 
 
 def written(text: str, overrides: Sequence[str], meant: dict[str, Any], source: str, what: str = FLAG) -> str:
-    """A config's text with values replaced in place, in the digits given; comments and order stay.
-
-    Args:
-        meant: the tables that the result must have.
-        what: what the values are called in messages.
+    """A config's text with values replaced in place, in the digits given, so that it has the tables
+    ``meant``; comments and order stay.
     """
     try:
         document = tomlkit.parse(text)

@@ -107,11 +107,8 @@ class PointMasses:
 
 
 def closest(context: Any, place: Vector, moving: Vector, strength: Any) -> tuple[Any, Any]:
-    """Least distance (m) of two masses left to themselves, and their angular rate there (rad/s).
-
-    Args:
-        place, moving: relative position and velocity.
-        strength: sum of their gravitational parameters.
+    """Least distance (m) of two masses left to themselves, and their angular rate there (rad/s), from
+    relative place and velocity and the sum of their gravitational parameters.
     """
     distance, speed = norm(context, place), norm(context, moving)
     momentum = norm(context, cross(place, moving))
@@ -139,12 +136,8 @@ def resolve_point_masses(
     *,
     free_flight: bool,
 ) -> PointMasses | None:
-    """Work out the initial states of ``[[bodies]]``; None if there are none.
-
-    Args:
-        host, coupling: the keys of ``[body]``.
-        mass: mass of the rigid body, kg (mpf).
-        free_flight: whether the rigid body has a position of its own.
+    """Work out the initial states of ``[[bodies]]``; None if there are none. ``mass`` (kg) is the rigid
+    body's, which has a position of its own in ``free_flight``.
     """
     if not tables:
         for key, given in (("host", host), ("coupling", coupling)):

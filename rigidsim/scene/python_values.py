@@ -22,12 +22,10 @@ _ALLOWED = (
 
 
 def toml_text(tables: Mapping[str, Any]) -> str:
-    """The TOML text of a config given as nested dictionaries.
+    """The TOML text of a config given as nested dictionaries; None counts as not given.
 
-    Args:
-        tables: as in a TOML file. Floats, numpy's too, count as the shortest decimal that denotes them,
-            which is how they print: ``0.1`` is one tenth. Decimals, fractions and mpmath's numbers count
-            exactly. A value that is None counts as not given.
+    Floats, numpy's too, count as the shortest decimal that denotes them, which is how they print: ``0.1`` is
+    one tenth. Decimals, fractions and mpmath's numbers count exactly.
     """
     document = tomlkit.document()
     for key, value in tables.items():
@@ -37,11 +35,8 @@ def toml_text(tables: Mapping[str, Any]) -> str:
 
 
 def assignments_of(changes: Mapping[str, Any]) -> list[str]:
-    """Values to replace as ``KEY=VALUE`` texts.
-
-    Args:
-        changes: dotted keys with optional [index] to values as in ``toml_text``; a dictionary as a value
-            changes those keys in its table that it has. None removes a key.
+    """Values to replace as ``KEY=VALUE`` texts; a dictionary as a value changes those keys in its table that
+    it has, None removes a key.
     """
     found = []
     for key, value in changes.items():

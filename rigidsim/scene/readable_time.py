@@ -50,11 +50,7 @@ def unit_for(span: float) -> TimeUnit:
 
 
 def named_unit(name: str) -> TimeUnit:
-    """The unit of a name in a config, such as ``day``.
-
-    Raises:
-        ValueError: the name is no unit of time.
-    """
+    """The unit of a name in a config, such as ``day``; ``ValueError`` for others."""
     return TimeUnit(name, float(time_unit(name)))
 
 

@@ -154,11 +154,7 @@ def register_load(kind: type[SceneLoad]) -> type[SceneLoad]:
 
 
 def register_observable(observable: Named) -> None:
-    """Register an observable, so that ``[output] record`` finds it.
-
-    Raises:
-        ValueError: its name is taken.
-    """
+    """Register an observable, so that ``[output] record`` finds it; ``ValueError`` if its name is taken."""
     if observable.name in OBSERVABLES:
         raise ValueError(f'an observable named "{observable.name}" is registered already')
     OBSERVABLES[observable.name] = observable

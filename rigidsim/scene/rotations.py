@@ -88,10 +88,8 @@ def outer_angles(sequence: str, r: Matrix) -> tuple[Pair, Pair]:
 
 def shared_turn(sequence: str, r: Matrix, side: Scalar) -> Pair:
     """Sine and cosine of a + side c, times 1 + abs(cosine) (proper sequences) or 1 + abs(sine) of the middle
-    angle, for the outer Euler angles a and c of R: what is left of them in the singularity.
-
-    Args:
-        side: sign of ``pole_side``.
+    angle, for the outer Euler angles a and c of R, and the sign ``side`` of ``pole_side``: what is left of
+    them in the singularity.
     """
     i, j, k = map(AXES.index, sequence)
     m, e = 3 - i - j, parity(i, j)

@@ -127,11 +127,7 @@ def random_states(scene: Scene) -> list[dict[str, Any]]:
 def changes(
     expression: Expression, states: Sequence[Mapping[str, Any]], moved: Mapping[str, Any], context: Any
 ) -> bool:
-    """Whether an expression changes when the values of names are changed.
-
-    Args:
-        moved: functions that change a value, by name.
-    """
+    """Whether an expression changes when values are changed by functions, ``moved``, of those names."""
     if not names_used(expression) & set(moved):
         return False
     compared = 0

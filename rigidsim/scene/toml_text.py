@@ -18,11 +18,7 @@ DEEP_KEY = re.compile(rf"(?<![\w.-]){_PART}(?:[ \t]*+\.[ \t]*+{_PART}){{{DEEPEST
 
 
 def decimal(text: str) -> Decimal:
-    """A number of a TOML text.
-
-    Raises:
-        ValueError: out of range.
-    """
+    """A number of a TOML text; ``ValueError`` if it is out of range."""
     try:
         return Decimal(text.replace("_", ""))
     except InvalidOperation:  # an exponent past what Decimal itself holds

@@ -127,20 +127,12 @@ _FAMILIAR = ("N m", "N", "N m s", "N/m", "N s", "W", "T", "A m^2", "V", "C")
 
 
 def powers(text: str) -> Powers:
-    """The dimension of a unit; empty for angles.
-
-    Raises:
-        UnitError: there is no such unit.
-    """
+    """The dimension of a unit; empty for angles."""
     return tuple(sorted(_to_si(text)[2].items()))
 
 
 def to_si(text: str) -> tuple[Fraction, int]:
-    """Exact factor from a unit to SI, as ``rational * pi**power``.
-
-    Raises:
-        UnitError: there is no such unit.
-    """
+    """Exact factor from a unit to SI, as ``rational * pi**power``."""
     return _to_si(text)[:2]
 
 
@@ -184,10 +176,8 @@ def known_units() -> str:
 
 
 def conversion(text: str, expected: str) -> tuple[Fraction, int]:
-    """Exact factor from the unit ``text`` to the SI unit ``expected``, as ``rational * pi**power``.
-
-    Raises:
-        UnitError: unknown unit, or another dimension than ``expected``.
+    """Exact factor from a unit to the SI unit ``expected``, as ``rational * pi**power``; ``UnitError`` if it
+    has another dimension.
     """
     factor, pi_power, dimensions = _to_si(text)
     if expected == "rad/s" and _HERTZ.search(text):
@@ -201,10 +191,8 @@ def conversion(text: str, expected: str) -> tuple[Fraction, int]:
 
 
 def time_unit(name: str) -> Fraction:
-    """Length in seconds of a named unit of time, such as ``day``, ``yr`` or ``kyr``.
-
-    Raises:
-        UnitError: there is no such unit.
+    """Length in seconds of a named unit of time, such as ``day``, ``yr`` or ``kyr``; ``UnitError`` for
+    others.
     """
     if not re.fullmatch(r"[^\W\d]+", name):
         raise UnitError(f'"{name[:40]}" is not the name of a unit of time')

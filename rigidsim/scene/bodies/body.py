@@ -55,10 +55,8 @@ class RigidBody:
 
 
 def build_body(table: body_table.Body, context: Any, sequence: str = "zxz") -> RigidBody:
-    """Work out the body that ``[body]`` describes, in the context's precision.
-
-    Args:
-        sequence: sequence of Euler angles for parts that name none.
+    """Work out the body that ``[body]`` describes; parts that name no ``sequence`` of Euler angles have this
+    one.
     """
     given = [name for name in SOURCES if getattr(table, name) is not None]
     if len(given) != 1:

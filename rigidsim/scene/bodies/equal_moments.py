@@ -35,10 +35,8 @@ def rounding_of(table: BaseModel) -> Fraction:
 def merged(
     context: Any, inertia: Matrix, moments: Vector, axes: Matrix, rounding: Fraction
 ) -> tuple[Matrix, Vector, Matrix]:
-    """A tensor, its principal moments and axes (rows), with moments made equal that differ by rounding only.
-
-    Args:
-        rounding: relative rounding of the numbers that the tensor is made of.
+    """A tensor, its principal moments and axes (rows), with moments made equal that differ by the relative
+    ``rounding`` of the numbers that they are made of.
     """
     tiny = _ROUNDINGS * context.mpf(rounding.numerator) / rounding.denominator * max(moments)
     low, middle, high = sorted(range(3), key=lambda i: moments[i])

@@ -29,12 +29,7 @@ class Piece:
 
 
 def pieces_of(table: body_table.Body, source: str, context: Any, sequence: str) -> list[Piece]:
-    """The pieces of ``points``, ``shape`` or ``parts``.
-
-    Args:
-        source: which of the three is given.
-        sequence: sequence of Euler angles for parts that name none.
-    """
+    """The pieces of ``points``, ``shape`` or ``parts``, whichever is the ``source``."""
     if source == "shape":
         return [_solid(table, table.mass, [context.zero] * 3, None, "", context)]
     pieces = []
@@ -77,12 +72,8 @@ def reference_point(table: body_table.Body, source: str, center: Vector, context
 
 
 def parallel_axis(inertia: Matrix, mass: Any, arm: Vector) -> Matrix:
-    """Tensor about a point from the tensor about the centre of mass (Steiner's theorem).
-
-    Args:
-        inertia: 3x3, about the centre of mass, kg m^2.
-        mass: kg.
-        arm: from the point to the centre of mass, m.
+    """Tensor (kg m^2) about a point from that about the centre of mass, an ``arm`` (m) away (Steiner's
+    theorem).
     """
     square = dot(arm, arm)
     return [

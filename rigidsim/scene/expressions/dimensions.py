@@ -58,10 +58,8 @@ class Measure:
         return Measure(_sorted({base: p * exponent.rational for base, p in self.powers}), self.written)
 
     def with_other(self, other: Measure) -> Measure:
-        """Dimension of a sum, or of anything else that takes values of one dimension.
-
-        Raises:
-            DimensionError: the dimensions differ, and a unit is written in either value.
+        """Dimension of a sum, or of anything else that takes values of one dimension; ``DimensionError`` if
+        they differ and a unit is written in either.
         """
         written = self.written or other.written
         if self.powers is None or other.powers is None or self.powers == other.powers:
@@ -99,11 +97,7 @@ def of_unit(unit: str) -> Measure:
 
 
 def of_function(name: str, arguments: Sequence[Measure]) -> Measure:
-    """Dimension of a function's value.
-
-    Raises:
-        DimensionError: the function can't have such arguments.
-    """
+    """Dimension of a function's value; ``DimensionError`` if it can't have such arguments."""
     common = arguments[0]
     for other in arguments[1:]:
         common = common.with_other(other)
@@ -120,11 +114,7 @@ def of_function(name: str, arguments: Sequence[Measure]) -> Measure:
 
 
 def check_unit(measure: Measure, needed: str) -> None:
-    """Check that a value can have the required dimension.
-
-    Raises:
-        DimensionError: its dimension differs, and a unit is written in it.
-    """
+    """Check that a value can have the required dimension; ``DimensionError`` otherwise."""
     if measure.written and measure.powers is not None and measure.powers != units.powers(needed):
         raise DimensionError(f'the expression is {measure}, where "{needed}" is needed')
 

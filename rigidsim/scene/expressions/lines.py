@@ -45,22 +45,14 @@ def line_of(operator: str, operands: Sequence[Any]) -> Any | None:
 
 
 def lines_in(expression: Expression, context: Any) -> list[LineInTime]:
-    """The longest lines in an expression.
-
-    Raises:
-        ExpressionError: a constant part has no finite value.
-    """
+    """The longest lines in an expression; ``ExpressionError`` for a constant part without a finite value."""
     found: list[LineInTime] = []
     whole = _folded(expression, context, found)
     return [whole] if isinstance(whole, LineInTime) else found
 
 
 def as_line(expression: Expression, context: Any) -> LineInTime | None:
-    """The line that an expression is as a whole; None if it is none.
-
-    Raises:
-        ExpressionError: a constant part has no finite value.
-    """
+    """The line that an expression is as a whole; None if it is none."""
     whole = _folded(expression, context, [])
     return whole if isinstance(whole, LineInTime) else None
 

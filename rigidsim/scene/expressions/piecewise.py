@@ -50,11 +50,8 @@ def power(base: Node, exponent: Node, span: Span) -> Node:
 def on_sides(
     expression: Expression, places: Mapping[Node, tuple[int, int]], sides: Sequence[int]
 ) -> Expression:
-    """An expression with every sign in it replaced by its value.
-
-    Args:
-        places: for each argument of a sign, the index of its surface, and the sign of their ratio.
-        sides: of each surface; a sign whose surface has neither 1 nor -1 stays.
+    """An expression with every sign in it replaced by its value: of the argument's surface, whose index and
+    ratio ``places`` gives; a sign stays where ``sides`` has neither 1 nor -1.
     """
 
     def combine(node: Node, operands: list[Node]) -> Node:

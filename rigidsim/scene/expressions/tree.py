@@ -184,10 +184,8 @@ def names_used(expression: Expression) -> frozenset[str]:
 
 
 def constant_value(expression: Expression, context: Any) -> Any:
-    """The value (mpf) of an expression without names; None if it contains a name.
-
-    Raises:
-        ExpressionError: a constant part has no finite value.
+    """The value (mpf) of an expression without names; None if it contains a name. ``ExpressionError`` as of
+    ``evaluate``.
     """
     return evaluate(expression, dict.fromkeys(names_used(expression)), context)
 
@@ -211,10 +209,8 @@ def evaluate(expression: Expression, values: Mapping[str, Any], context: Any) ->
 
 
 def operate(expression: Expression, node: Operation, operands: list[Any], context: Any) -> Any:
-    """Apply one operation to mpf operands.
-
-    Raises:
-        ExpressionError: the value isn't finite, or exceeds 2**20000.
+    """Apply one operation to mpf operands; ``ExpressionError`` if the value isn't finite, or exceeds
+    2**20000.
     """
     operator, first, last = node.operator, operands[0], operands[-1]
     refused, why = _REFUSED.get(operator, (None, ""))

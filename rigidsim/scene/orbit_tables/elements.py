@@ -64,14 +64,7 @@ class ElementTable:
 
 @lru_cache(8)
 def read_table(text: str, bits: int) -> ElementTable:
-    """Read a table's text.
-
-    Args:
-        bits: bits of the numbers' precision.
-
-    Raises:
-        TableError: with the line at fault.
-    """
+    """Read a table's text in numbers of so many bits; ``TableError`` tells the line at fault."""
     context = mpmath.MPContext()
     context.prec = bits
     lines = [

@@ -98,13 +98,8 @@ def _product(factors: Sequence[Any]) -> Any:
 
 
 def left_out(times: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Values that interpolation gives for every other row when these are left out.
-
-    Args:
-        times: (n,) float64, ascending; values: (n, columns).
-
-    Returns:
-        Numbers of the rows that were left out, and their values as interpolated, (rows, columns).
+    """Numbers of every other row, and the values (rows, columns) that interpolation gives there when these
+    are left out of float64 ``times`` (n,) and ``values`` (n, columns).
     """
     kept = Interpolation(list(times[::2]), values[::2])
     rows = np.arange(1, 2 * kept.pieces, 2)
@@ -134,15 +129,8 @@ class InterpolationError:
 def interpolation_error(
     times: Sequence[Any], elements: Mapping[str, Sequence[Any]], moving: Collection[str]
 ) -> InterpolationError:
-    """Measure the interpolation errors of a table.
-
-    Args:
-        times: mpf, s.
-        elements: elements of each row (mpf, SI); with the mean longitude if it is one that changes.
-        moving: names of those that change.
-
-    Raises:
-        TableError: rows so far apart that the table means little between them.
+    """Measure the interpolation errors of a table with ``elements`` of each row (mpf, SI), of which those
+    ``moving`` change; ``TableError`` for rows so far apart that the table means little between them.
     """
     begin = times[0]
     seconds = np.array([float(t - begin) for t in times])

@@ -23,17 +23,8 @@ def tabulated_orbit(
     constants: tuple[tuple[str, ExactNumber], ...],
     strength: tuple[Any, ...] | None,
 ) -> TabulatedOrbit:
-    """A tabulated orbit, made once however often a scene is built.
-
-    Args:
-        name, text: name and text of the table.
-        bits: bits of the scene's precision.
-        constants: elements that the table lacks, by name, and possibly the pace of the mean longitude.
-        strength: gravitational parameter of Kepler's third law, m^3/s^2, as the parts of an mpf; None if
-            none is known.
-
-    Raises:
-        TableError: says what is wrong with the table.
+    """A tabulated orbit, made once however often a scene is built, from the text of a table, the elements
+    that it lacks, and the parts of an mpf: the gravitational parameter of Kepler's third law, if known.
     """
     table = read_table(text, bits)
     context = table.context
@@ -67,10 +58,8 @@ _NO_CONSTANTS = ("table", "node_rate", "periapsis_rate")
 
 
 def resolve_tabulated_orbit(fields: Orbit, strength: Any | None, around: Surroundings) -> TabulatedOrbit:
-    """Work out the orbit of a table.
-
-    Args:
-        strength: gravitational parameter (mpf, m^3/s^2) of Kepler's third law; None if unknown.
+    """Work out the orbit of a table; ``strength`` is the gravitational parameter of Kepler's third law, if
+    known.
     """
     name = fields.table
     assert name is not None

@@ -282,11 +282,7 @@ class TabulatedOrbit:
 
     @cached_property
     def error(self) -> InterpolationError:
-        """Interpolation errors, see ``InterpolationError``.
-
-        Raises:
-            TableError: rows so far apart that the table means little between them.
-        """
+        """Interpolation errors, see ``interpolation_error``."""
         count = len(self.table.times)
         elements = {name: self._each(name) for name in (AXIS, *EXCENTRIC, *TILTED)}
         elements = {name: rows if len(rows) == count else rows * count for name, rows in elements.items()}
