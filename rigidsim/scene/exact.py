@@ -235,7 +235,7 @@ def decimal_text(value: Fraction) -> str:
 
 
 def with_unit(number: ExactNumber, unit: str, text: str) -> Quantity:
-    """A number of some unit, in SI; ``ValueError`` (with the ``text`` as written) if there is no such unit."""
+    """A number of some unit, in SI; ``ValueError`` (with the ``text`` written) if there is no such unit."""
     try:
         factor, turns = units.to_si(unit)
     except units.UnitError as error:
