@@ -22,12 +22,8 @@ from rigidsim.scene.epochs import DIGITS, Epoch
 
 
 def write_csv(table: Table, path: Path, source: TableSource) -> None:
-    """Write one table.
-
-    Args:
-        path: the file, which is replaced.
-    """
-    columns = [column for column in table.columns if not column.is_date]
+    """Write one table."""
+    columns = [column for column in table.columns if column.kind != "M"]
     dates = _dates(table, source)
     wide = any(len(column.parts) > 1 for column in columns if "significant_bits" not in column.attributes)
     head = [
@@ -64,11 +60,7 @@ def _shown(column: TableColumn, parts: list[np.ndarray], source: TableSource) ->
 
 @dataclass(frozen=True)
 class _DateColumns:
-    """Dates of a table's rows.
-
-    Attributes:
-        times: the column of times that they belong to.
-    """
+    """Dates of a table's rows."""
 
     epoch: Epoch
     times: TableColumn

@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 import xarray
@@ -34,6 +34,8 @@ class MemberTable(Table):
     another.
     """
 
+    main: ClassVar[str] = MEMBER
+    dated: ClassVar[bool] = False  # datasets of sweeps hold no dates
     members: tuple[str, ...] = ()
     values: tuple[TableColumn, ...] = ()
     reasons: dict[int, str] = field(default_factory=dict)
@@ -59,16 +61,6 @@ class MemberTable(Table):
         """Extent of the table, for the comment at a file's top."""
         told = f"{math.prod(self.shape)} members along {', '.join(self.members)}"
         return told if self.dim == MEMBER else f"{told}, each along {self.dim}"
-
-    @property
-    def is_main(self) -> bool:
-        """See ``Table.is_main``."""
-        return self.dim == MEMBER
-
-    @property
-    def dated(self) -> bool:
-        """False: datasets of sweeps hold no dates."""
-        return False
 
     def blocks(
         self, columns: Sequence[TableColumn] | None = None, rows: int = 0
@@ -137,11 +129,7 @@ def member_tables(
     bits: int = 53,
     block_numbers: int = BLOCK_NUMBERS,
 ) -> list[MemberTable]:
-    """The table of the members, then the long tables.
-
-    Args:
-        angle_unit: unit to which angles are converted.
-    """
+    """The table of the members, then the long tables."""
     members = tuple(map(str, dataset["status"].dims))
     axes = [str(name) for name, variable in dataset.variables.items() if "swept_key" in variable.attrs]
     axes.sort(key=lambda name: next((i for i, dim in enumerate(members) if name in (dim, f"{dim}_value")), 0))

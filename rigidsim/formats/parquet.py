@@ -12,12 +12,7 @@ from rigidsim.formats.tables import BLOCK_ROWS, Table
 
 
 def write_parquet(table: Table, path: Path, source: TableSource) -> None:
-    """Write one table; requires ``pyarrow``.
-
-    Args:
-        table: rows and columns; residuals become columns such as ``time_lo``.
-        path: the file, which is replaced.
-    """
+    """Write one table; residuals become columns such as ``time_lo``."""
     kinds = {"f": pa.float64(), "i": pa.int64(), "M": pa.timestamp("ns"), "U": pa.string()}
     fields = []
     for column in table.columns:
@@ -32,7 +27,7 @@ def write_parquet(table: Table, path: Path, source: TableSource) -> None:
                     column.part_name(n) for n in reversed(range(len(column.parts)))
                 )
             kind = kinds[column.kind]
-            fields.append(pa.field(column.part_name(part), kind, nullable=column.is_date, metadata=told))
+            fields.append(pa.field(column.part_name(part), kind, nullable=column.kind == "M", metadata=told))
     schema = pa.schema(fields, metadata={str(key): str(value) for key, value in source.attributes.items()})
     with pq.ParquetWriter(path, schema, compression="zstd", use_dictionary=False) as writer:
         for block in table.blocks(rows=8 * BLOCK_ROWS):

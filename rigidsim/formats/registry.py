@@ -18,12 +18,7 @@ from rigidsim.scene.readable_units import AngleUnit
 
 @dataclass(frozen=True)
 class TableSource:
-    """The run, or the sweep, that a table comes from.
-
-    Attributes:
-        naming: what the dataset may not say about itself.
-        angle_unit: unit of angles; None for rad.
-    """
+    """The run, or the sweep, that a table comes from."""
 
     title: str
     bits: int

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 import xarray
@@ -49,11 +49,6 @@ class TableColumn:
         return self.variable + self.suffix + self._unit
 
     @property
-    def is_date(self) -> bool:
-        """Whether it holds datetime64."""
-        return self.kind == "M"
-
-    @property
     def _unit(self) -> str:
         return "" if self.angle_unit is None else f"_{self.angle_unit.name}"
 
@@ -87,9 +82,12 @@ class Table:
     """Columns along one dimension.
 
     Attributes:
-        dataset: dataset from which the columns are read, block by block.
+        main: dimension of the table that carries the run's name.
+        dated: whether its times may be given as dates.
     """
 
+    main: ClassVar[str] = "time"
+    dated: ClassVar[bool] = True
     dim: str
     columns: tuple[TableColumn, ...]
     dataset: xarray.Dataset
@@ -103,12 +101,7 @@ class Table:
     @property
     def is_main(self) -> bool:
         """Whether it is the table that carries the run's name."""
-        return self.dim == "time"
-
-    @property
-    def dated(self) -> bool:
-        """Whether its times may be given as dates."""
-        return True
+        return self.dim == self.main
 
     @property
     def extent(self) -> str:
@@ -144,11 +137,7 @@ def _column(values: np.ndarray, index: tuple[int, ...]) -> np.ndarray:
 
 
 def tables_of(dataset: xarray.Dataset, angle_unit: AngleUnit | None = None, bits: int = 53) -> list[Table]:
-    """The table along time, then those along other dimensions.
-
-    Args:
-        angle_unit: unit to which angles are converted.
-    """
+    """The table along time, then those along other dimensions."""
     variables = dataset.variables
     names = [str(name) for name, found in variables.items() if found.dims and found.dtype.kind in "fM"]
     names.sort(key=lambda name: (name != "time", name not in dataset.coords))
@@ -161,11 +150,8 @@ def tables_of(dataset: xarray.Dataset, angle_unit: AngleUnit | None = None, bits
 def columns_of(
     dataset: xarray.Dataset, name: str, angle_unit: AngleUnit | None = None, rows: Sequence[str] = ()
 ) -> list[TableColumn]:
-    """Columns of a variable, one per component; none for a residual, which its value's columns include.
-
-    Args:
-        angle_unit: unit to which angles are converted.
-        rows: the dimensions that a table's rows run along; the variable's first by default.
+    """Columns of a variable, one per component; none for a residual, which its value's columns include. Rows
+    run along some dimensions, by default the variable's first.
     """
     variable = dataset[name]
     if "residual_of" in variable.attrs:

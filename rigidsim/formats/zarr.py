@@ -22,10 +22,8 @@ _SLAB_BLOCKS = 8  # 128 MB at once: each is an append
 
 
 def write_zarr(table: Table, path: Path, source: TableSource) -> None:
-    """Write a store, a folder that doesn't exist yet, block by block along time, or a sweep's first axis.
-
-    Args:
-        table: table along time, or of a sweep's members; its whole dataset is written.
+    """Write a table's whole dataset as a store, a new folder, block by block along time or a sweep's first
+    axis.
     """
     dataset = table.dataset
     attributes = {str(key): _json(value) for key, value in source.attributes.items()}

@@ -57,13 +57,8 @@ def advice_on(found: Diagnostics) -> tuple[Advice, ...]:
 
 
 def cheaper_model(found: Diagnostics, limits: AdviceLimits, go_on: Callable[[], bool]) -> Advice | None:
-    """The most averaged model that keeps the axes accurate, measured over the beginning of the run.
-
-    Args:
-        go_on: polled repeatedly; False ends the comparison.
-
-    Returns:
-        None if no model does, the run is short or has no estimate, or what is recorded needs every rotation.
+    """The most averaged model that keeps the axes accurate, measured over the beginning of the run; None if
+    none does, the run is short, or what is recorded needs every rotation.
     """
     prepared, estimate = found.prepared, found.estimate
     config, loads = prepared.scene.config, prepared.system.plan.loads

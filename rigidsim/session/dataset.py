@@ -130,10 +130,8 @@ def _of_invariant(name: str, invariant: Invariant, what: str, definition: str, o
 def event_variables(
     prepared: InitialValueProblem, log: EventLog, evaluator: Evaluator, last: float
 ) -> list[Extra]:
-    """``NAME_time``, dates and ``NAME_<variable>`` along a dimension ``NAME``, with residuals beyond double.
-
-    Args:
-        last: time of the run's last sample, internal units; steps and crossings may lie past it.
+    """``NAME_time``, dates and ``NAME_<variable>`` along a dimension ``NAME``, with residuals beyond double,
+    up to the run's last sample (internal units); steps and crossings may lie past it.
     """
     extras: list[Extra] = []
     variables, dates = recorded_variables(prepared), dates_of(prepared)
@@ -205,11 +203,7 @@ def event_times(prepared: InitialValueProblem, log: EventLog, last: float) -> di
 def root_attributes(
     prepared: InitialValueProblem, parts: Assembly, run_id: str, mixed: str = ""
 ) -> RootAttributes:
-    """Attributes of segments, and of a dataset before the end of its run is known.
-
-    Args:
-        mixed: what changed in versions or machine since the run began; empty if nothing did.
-    """
+    """Attributes of segments, and of a dataset before the end of its run is known."""
     scene, system = prepared.scene, prepared.system
     platform: dict[str, Any] = {f"version_{k}": v for k, v in provenance.versions().items()}
     platform |= {f"code_{k}": v for k, v in provenance.code_target(parts.evaluator.code).items()}

@@ -58,11 +58,8 @@ class Diagnostics:
         go_on: Callable[[], bool] = lambda: True,
         own: Callable[[], OwnErrors | None] = lambda: None,
     ) -> Diagnostics:
-        """The diagnostics with an estimate of the errors.
-
-        Args:
-            corrected: what took the run's steps; left as it was.
-            go_on: polled repeatedly; False ends the estimate without a result.
+        """The diagnostics with an estimate of the errors; a ``go_on`` that gives False ends it without a
+        result.
         """
         progress, stepper, beside = self.progress, None, ""
         if self.prepared.algorithm.own_errors:

@@ -92,11 +92,7 @@ def chart_changes(prepared: InitialValueProblem, parts: Assembly) -> ChartChange
 
 
 def _why_it_broke(prepared: InitialValueProblem, time: float) -> str:
-    """The reason in words, with what to do; empty if the loads show none.
-
-    Args:
-        time: of the last good state, s.
-    """
+    """Why a run broke down after a time (s), with what to do; empty if the loads show no reason."""
     scene, precision = prepared.scene, prepared.precision
     context, spacing = scene.context, float(precision.epsilon)
     for where, part in _parts(scene):

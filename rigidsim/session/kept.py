@@ -21,11 +21,8 @@ ALWAYS = "always"
 
 @dataclass(frozen=True)
 class KeptVariable:
-    """One variable for the members of a tile.
-
-    Attributes:
-        values: (members, ...), float64 or int64.
-        item: item of ``[sweep] keep`` that it belongs to, or ``ALWAYS``.
+    """One variable for the members of a tile, (members, ...), and the item of ``[sweep] keep`` that it
+    belongs to.
     """
 
     dims: tuple[str, ...]
@@ -52,10 +49,8 @@ Kept = dict[str, KeptVariable]
 
 @dataclass(frozen=True)
 class MemberSeries:
-    """The samples of some members.
-
-    Attributes:
-        parts: float64 parts, each (members, samples, components); missing samples at the end are nan.
+    """The samples of some members: parts of (members, samples, components); missing samples at the end are
+    nan.
     """
 
     variable: Variable
@@ -218,11 +213,7 @@ Points = Mapping[str, tuple[Variable, Sequence[np.ndarray]]]
 def kept_events(
     name: str, times: Sequence[np.ndarray], most: int, points: Points, keep: Collection[str]
 ) -> Kept:
-    """How often an event happened and when; only the first times that fit are kept.
-
-    Args:
-        times: times for each member, s.
-    """
+    """How often an event happened and when (s); only the first times that fit are kept."""
     count = len(times)
     found: Kept = {}
     along, first_times = (f"{name}_occurrence",), f"times of {name}, the first {most}"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import time
 from pathlib import Path
 
@@ -23,15 +24,7 @@ def spectrum_of(
     interruption: Interruption,
     save_seconds: float,
 ) -> LyapunovSpectrum | None:
-    """Integrate the variational equations, or what remains of them.
-
-    Args:
-        folder: the run's folder; None for a run in memory, which saves nothing.
-        save_seconds: interval between saves, s.
-
-    Returns:
-        The spectrum; None if it was interrupted, or stopped being finite.
-    """
+    """Integrate the variational equations, or what remains of them; None if interrupted or not finite."""
     clock = prepared.clock
     system = double_twin(prepared)
     path = None if folder is None else folder.segments / "lyapunov.h5"
@@ -51,7 +44,11 @@ def spectrum_of(
 
 def _save(path: Path, done: Convergence, run_id: str) -> None:
     labels = {"run_id": run_id, "schema_version": SCHEMA_VERSION}
-    content = sealed(netcdf.image([], None, labels, {"lyapunov": done.arrays()}))
+    buffer = io.BytesIO()
+    with netcdf.writing(buffer) as file:
+        file.attributes(labels)
+        file.group("lyapunov", done.arrays())
+    content = sealed(buffer)
     try:
         atomic.write_bytes(path, content)
     except OSError as error:

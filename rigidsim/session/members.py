@@ -20,7 +20,7 @@ from rigidsim.session.kept import (
     kept_of_series,
 )
 from rigidsim.solve.status import Status
-from rigidsim.store.collected import JoinedBlocks
+from rigidsim.store.chunks import JoinedBlocks
 from rigidsim.store.memory import MemoryRun
 from rigidsim.store.summary import Summary
 from rigidsim.store.summary_parts import Modelling, WarningCode
@@ -117,9 +117,6 @@ def plain_variables(
 ) -> Kept:
     """Variables that every member has besides its status, (members,) each; None for errors that aren't
     estimated, and for the position of a body without one.
-
-    Args:
-        modelling: error of the averaged model of a single member; None for the full model.
     """
     unknown = np.full(len(steps), np.nan)
     found = {
@@ -157,12 +154,7 @@ def run_alone(
     more: Callable[[MemoryRun], Kept] | None = None,
     hidden: Collection[str] = (),
 ) -> MemberResults:
-    """Run one member by itself; its failure is recorded.
-
-    Args:
-        run: function that runs it.
-        more: function that returns what else is to be kept of the run.
-    """
+    """Run one member by itself; its failure is recorded."""
     try:
         result = run()
     except ConfigError as error:

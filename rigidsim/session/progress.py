@@ -54,11 +54,7 @@ def _rate(value: float) -> str:
 
 
 class _Watching(Observer):
-    """An observer that knows how far the run is, and the pace of this session.
-
-    Args:
-        clock: returns the time, s.
-    """
+    """An observer that knows how far the run is, and the pace of this session."""
 
     def __init__(self, clock: Callable[[], float] = time.perf_counter) -> None:
         self._clock = clock
@@ -150,11 +146,7 @@ class LineObserver(_Watching):
 
 
 class TerminalObserver(_Watching):
-    """Draws one line: a bar, steps per second and time left, and simulated time if there is room.
-
-    Args:
-        console: console to draw on; stderr by default.
-    """
+    """Draws one line: a bar, steps per second and time left, and simulated time if there is room."""
 
     def __init__(
         self, console: Console | None = None, clock: Callable[[], float] = time.perf_counter
@@ -233,12 +225,7 @@ def observer(*, notebook: bool = False) -> TerminalObserver | LineObserver:
 
 @contextmanager
 def watched(given: Observer | None, progress: bool | None) -> Iterator[Observer]:
-    """The observer of a run.
-
-    Args:
-        given: the caller's own observer, if any.
-        progress: whether to show a bar if no observer is given; None: only in notebooks.
-    """
+    """The caller's own observer, or a new one if progress is to be shown; None: in notebooks only."""
     shell = sys.modules.get("IPython")
     notebook = shell is not None and hasattr(shell.get_ipython(), "kernel")
     if given is not None or not (notebook if progress is None else progress):

@@ -69,15 +69,7 @@ class Checkpoints:
 
 
 class Recorder(SampleReceiver):
-    """The receiver of a run's samples.
-
-    Attributes:
-        statistics: what the summary needs of all samples.
-
-    Args:
-        checkpoints: of the run, which begins or resumes.
-        start: where it resumes; None if it begins.
-    """
+    """The receiver of a run's samples, which begins or resumes at ``start``."""
 
     rows_together = CHUNK_ROWS
 

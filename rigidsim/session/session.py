@@ -45,11 +45,7 @@ NOT_KEPT = "attempts_not_kept"
 
 @dataclass
 class Effort:
-    """Cost of a run over all its sessions.
-
-    Attributes:
-        wall_seconds, cpu_seconds: seconds of the sessions before this one.
-    """
+    """Cost of a run over all its sessions; what is given counts those before this one."""
 
     sessions: int = 1
     wall_seconds: float = 0.0
@@ -131,10 +127,8 @@ class Phases:
 
 @dataclass
 class Session:
-    """The work of one process on a run: all of it, or what was left.
-
-    Attributes:
-        mixed: what changed in versions or machine since the run began; empty if nothing did.
+    """The work of one process on a run: all of it, or what was left. ``mixed`` tells what changed in versions
+    or machine since the run began.
     """
 
     observer: Observer

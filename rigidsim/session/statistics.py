@@ -14,10 +14,8 @@ from rigidsim.solve.checkpoint_arrays import Arrays, numbers
 
 @dataclass(frozen=True)
 class Undefined:
-    """Number of samples at which a recorded variable is NaN.
-
-    Attributes:
-        since: time of the first one after those (s); nan if there is none.
+    """Number of NaN samples of a recorded variable, how many of them lead, and the time (s) of the first
+    later one.
     """
 
     count: int = 0
@@ -48,22 +46,12 @@ class SampleStatistics:
     version: ClassVar[int] = 1
 
     def see(self, invariant: str, drifts: np.ndarray) -> None:
-        """Follow one invariant through a block of samples.
-
-        Args:
-            drifts: relative drifts, shape (samples,).
-        """
+        """Follow one invariant through a block of samples: relative drifts, (samples,)."""
         self.largest[invariant] = float(max(self.largest.get(invariant, 0.0), np.abs(drifts).max()))
         self.final[invariant] = float(drifts[-1])
 
     def see_undefined(self, variable: str, values: np.ndarray, first: int, times: np.ndarray) -> None:
-        """Count the samples in a block at which a recorded variable is undefined.
-
-        Args:
-            values: shape (samples, components).
-            first: index of the block's first sample.
-            times: seconds, shape (samples,).
-        """
+        """Count the samples of a block, (samples, components), at which a variable is undefined."""
         if not values.size or not math.isnan(values.min()):  # the minimum is NaN if one value is
             return
         bad = np.isnan(values).any(axis=1)
@@ -79,12 +67,7 @@ class SampleStatistics:
         self.undefined[variable] = Undefined(known.count + int(bad.sum()), leading, since)
 
     def see_singular(self, factors: np.ndarray, times: np.ndarray) -> None:
-        """Follow the distance from a formulation's singularity.
-
-        Args:
-            factors: singular factors, shape (samples,).
-            times: seconds, same shape.
-        """
+        """Follow the distance from a formulation's singularity: factors and times (s), (samples,) each."""
         size = np.abs(factors.astype(np.float64))
         nearest = int(np.argmin(size))
         if size[nearest] < self.nearest_singularity:

@@ -18,12 +18,7 @@ _TIMELINE_ROW_BYTES = 260.0  # measured; falls with repeated values
 
 @dataclass(frozen=True)
 class Storage:
-    """Predicted bytes.
-
-    Attributes:
-        row: bytes per sample in memory and in a segment.
-        segments: size of all segments, which are deleted once the dataset is complete.
-    """
+    """Predicted bytes: per sample, of the segments, which the complete dataset replaces, and of the files."""
 
     row: float
     segments: float

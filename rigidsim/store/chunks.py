@@ -1,4 +1,4 @@
-"""Chunks of rows compressed outside HDF5, several at a time, in the format of its shuffle and gzip filters.
+"""Rows on their way into files: collected, and compressed outside HDF5 in the format of its gzip filter.
 
 HDF5 compresses one chunk after the other with zlib, which is most of the CPU time of writing a dense run.
 ISA-L (through python-isal) gives the same format in a tenth of it; without it, zlib is used.
@@ -8,9 +8,8 @@ from __future__ import annotations
 
 import math
 import os
-import zlib
 from collections import deque
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager
 
@@ -18,15 +17,17 @@ import h5py
 import numpy as np
 from h5py import h5d, h5z
 
-try:
-    from isal import isal_zlib
+from rigidsim.store.netcdf import CHUNK_ROWS, Block, Created, write_rows
+from rigidsim.store.variables import Variable
 
-    _DEFLATE, _LEVEL = (
-        isal_zlib.compress,
-        1,
-    )  # the next levels take 1.2 and 2.2 times as long for 0.2 %
+try:
+    from isal.isal_zlib import compress as _deflate
+
+    _LEVEL = 1  # levels 2 and 3 take 1.2 and 2.2 times as long for 0.02 and 0.2 % less
 except ImportError:
-    _DEFLATE, _LEVEL = zlib.compress, 4
+    from zlib import compress as _deflate
+
+    _LEVEL = 4
 _MOST_THREADS = 4  # more wait for the disk
 _FEWEST = 250_000  # numbers to compress from which on threads are used: some milliseconds of work
 _WAITING = 64  # chunks of 64 kB per component that may wait to be written
@@ -35,7 +36,7 @@ _WAITING = 64  # chunks of 64 kB per component that may wait to be written
 def packed(values: np.ndarray) -> bytes:
     """Doubles as stored in a chunk: all first bytes, all second bytes, ..., deflated."""
     octets = np.ascontiguousarray(values, "<f8").view(np.uint8).reshape(-1, 8)
-    return bytes(_DEFLATE(np.ascontiguousarray(octets.T), _LEVEL))
+    return bytes(_deflate(np.ascontiguousarray(octets.T), _LEVEL))
 
 
 class Compressor:
@@ -94,14 +95,7 @@ def _processors() -> int:
 
 
 class RowCutter:
-    """Cuts rows into chunks as they arrive.
-
-    Attributes:
-        filled: rows that don't fill a chunk yet.
-
-    Args:
-        shape: shape of a chunk.
-    """
+    """Cuts rows into chunks of a shape as they arrive; ``filled`` rows don't fill one yet."""
 
     def __init__(self, shape: tuple[int, ...]) -> None:
         self._shape = shape
@@ -109,10 +103,8 @@ class RowCutter:
         self.filled = 0
 
     def cut(self, values: np.ndarray) -> Iterator[np.ndarray]:
-        """Take rows and yield the chunks that they complete.
-
-        Args:
-            values: doubles in any shape of that many numbers; must not be changed afterwards.
+        """Take rows of doubles, which must not be changed afterwards, and yield the chunks that they
+        complete.
         """
         rows = self._shape[0]
         values = np.asarray(values, "<f8").reshape(-1, *self._shape[1:])
@@ -218,3 +210,95 @@ def chunked(variables: Mapping[str, h5d.DatasetID]) -> Iterator[dict[str, Chunke
         writer.finish()
     finally:
         compressor.close()  # after an error or Ctrl-C nobody needs the waiting chunks
+
+
+class CollectedRows:
+    """The rows since the last segment; chunks are compressed if the first row begins one."""
+
+    def __init__(self, variables: Sequence[Variable], first: int, compressor: Compressor) -> None:
+        self.rows = 0
+        self._variables = variables
+        self._compressor = compressor
+        self._fitting = first % CHUNK_ROWS == 0
+        self._blocks: list[Block] = []
+        self._packed: dict[str, list[Future[bytes]]] = {}
+        self._cutters: dict[str, RowCutter] = {}
+        for variable in variables:
+            for name in variable.part_names():
+                self._packed[name] = []
+                self._cutters[name] = RowCutter((CHUNK_ROWS, *variable.shape))
+
+    @property
+    def compressed(self) -> bool:
+        """Whether the rows are written as chunks; less than one chunk isn't worth it."""
+        return self._fitting and self.rows >= CHUNK_ROWS
+
+    def add(self, block: Block) -> None:
+        """Take the rows that follow."""
+        self.rows += len(block["time"][0])
+        if not self._fitting:
+            self._blocks.append(block)
+            return
+        for variable in self._variables:
+            for name, values in zip(variable.part_names(), block[variable.name], strict=True):
+                for chunk in self._cutters[name].cut(values):
+                    self._packed[name].append(self._compressor.packed(chunk))
+
+    def write(self, created: Created) -> None:
+        """Write the rows into a segment whose variables were declared for this count, compressed or not."""
+        if self.compressed:
+            self._write_chunks(created)
+        elif self._fitting:
+            for name, cutter in self._cutters.items():
+                write_rows(created[name], 0, cutter.rest)
+        else:
+            joined = JoinedBlocks(self._blocks, self._variables)
+            for variable in self._variables:
+                for name, values in zip(variable.part_names(), joined[variable.name], strict=True):
+                    write_rows(created[name], 0, values)
+
+    def _write_chunks(self, created: Created) -> None:
+        for name, cutter in self._cutters.items():
+            last = [self._compressor.packed(cutter.last.copy())] if cutter.filled else []
+            beside = (0,) * (cutter.last.ndim - 1)
+            for number, chunk in enumerate(self._packed[name] + last):
+                created[name].write_direct_chunk((number * CHUNK_ROWS, *beside), chunk.result())
+
+    def add_to(self, chunks: Mapping[str, ChunkedVariable]) -> None:
+        """Append the rows of the given variables to a dataset that already has all segments."""
+        for block in self._blocks:
+            for variable in self._variables:
+                for name, values in zip(variable.part_names(), block[variable.name], strict=True):
+                    if name in chunks:
+                        chunks[name].add(values)
+        for name, cutter in self._cutters.items():
+            if name not in chunks:
+                continue
+            for chunk in self._packed[name]:
+                chunks[name].add_packed(chunk.result())
+            chunks[name].add(cutter.rest)
+
+
+class JoinedBlocks(Mapping[str, Sequence[np.ndarray]]):
+    """Concatenation of blocks; only the variable being read is in memory twice."""
+
+    def __init__(self, blocks: Sequence[Block], variables: Sequence[Variable]) -> None:
+        self._blocks = blocks
+        self._parts = {v.name: v.parts for v in variables}
+
+    def __getitem__(self, name: str) -> list[np.ndarray]:
+        return [self._column(name, part) for part in range(self._parts[name])]
+
+    def _column(self, name: str, part: int) -> np.ndarray:
+        """One part of a variable, row by row as it is stored in a file; blocks are stored column by
+        column.
+        """
+        pieces = [block[name][part] for block in self._blocks]
+        rows = sum(len(piece) for piece in pieces)
+        return np.concatenate(pieces, out=np.empty((rows, *pieces[0].shape[1:])))
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._parts)
+
+    def __len__(self) -> int:
+        return len(self._parts)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
-from rigidsim.store.collected import JoinedBlocks
+from rigidsim.store.chunks import JoinedBlocks
 from rigidsim.store.netcdf import Block
 from rigidsim.store.run import Run
 from rigidsim.store.summary import Brief

@@ -26,11 +26,7 @@ if TYPE_CHECKING:
 
 
 class Run:
-    """The result of a run, wherever its numbers are kept.
-
-    Attributes:
-        outcome: the contents of its summary; a ``Summary`` if the run ended.
-    """
+    """The result of a run, wherever its numbers are kept; its ``outcome`` is a ``Summary`` if it ended."""
 
     outcome: Brief
 
@@ -118,11 +114,7 @@ class Run:
 
 @dataclass(frozen=True, repr=False)
 class SavedRun(Run):
-    """A run on disk, finished or partial.
-
-    Attributes:
-        outcome: the contents of ``summary.json``; a ``Summary`` if the run ended.
-    """
+    """A run on disk, finished or partial."""
 
     folder: RunFolder
     outcome: Brief

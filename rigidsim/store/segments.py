@@ -7,6 +7,7 @@ that it belongs to and the seal of the one before, so that a missing, foreign or
 
 from __future__ import annotations
 
+import io
 import os
 import shutil
 import time
@@ -20,9 +21,8 @@ import numpy as np
 
 from rigidsim.errors import RESUME, RunFolderError, StoppedWritingError, once_mended
 from rigidsim.store import atomic, netcdf
-from rigidsim.store.chunks import ChunkedVariable, Compressor, chunked
-from rigidsim.store.collected import CollectedRows
-from rigidsim.store.hdf5_sink import sink
+from rigidsim.store.atomic import sink
+from rigidsim.store.chunks import ChunkedVariable, CollectedRows, Compressor, chunked
 from rigidsim.store.seal import check_seal, refuse_special, seal, seal_of, sealed
 from rigidsim.store.variables import Extra, Variable
 
@@ -115,11 +115,7 @@ class SegmentWriter:
         return (large and fitting) or time.monotonic() - self._saved >= self._limits.seconds
 
     def flush(self, checkpoint: Arrays, events: Arrays) -> None:
-        """Write the collected rows, possibly just the checkpoint; on return they are saved.
-
-        Args:
-            checkpoint: state from which the run continues after the last collected sample.
-        """
+        """Write the collected rows, possibly just the checkpoint; on return they are saved."""
         content = self._image(self._collected, checkpoint, events, self._place())
         path = self._folder / f"{self.count:08d}.h5"
         with self._writing():
@@ -139,9 +135,16 @@ class SegmentWriter:
     def _image(
         self, collected: CollectedRows, checkpoint: Arrays, events: Arrays, place: Mapping[str, Any]
     ) -> memoryview:
+        """A whole segment in memory."""
+        buffer, rows = io.BytesIO(), collected.rows
         attributes = {**self._attributes, **place}
-        groups = {"checkpoint": checkpoint, "events": events}
-        return sealed(netcdf.image(self._variables, collected, attributes, groups))
+        with netcdf.writing(buffer) as file:
+            created = netcdf.declare(file, self._variables, rows, attributes, compressed=collected.compressed)
+            if rows:
+                collected.write(created)
+            file.group("checkpoint", checkpoint)
+            file.group("events", events)
+        return sealed(buffer)
 
     @contextmanager
     def _writing(self) -> Iterator[None]:

@@ -47,10 +47,8 @@ _LARGEST_FILE = 16_000_000  # bytes; a summary has some kilobytes
 
 
 class UnderstoodBody(SummaryPart):
-    """Where the inertia came from; principal moments (kg m^2) and axes (rows, body axes), mass (kg).
-
-    Attributes:
-        center_of_mass: body axes, from the point that the body turns about, m.
+    """Where the inertia came from; principal moments (kg m^2) and axes (rows, body axes), mass (kg), and the
+    centre of mass from the point that the body turns about (body axes, m).
     """
 
     source: Text

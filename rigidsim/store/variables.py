@@ -117,10 +117,8 @@ def time_variable(parts: int) -> Variable:
 
 @dataclass(frozen=True)
 class Extra:
-    """A variable with dimensions of its own, small enough to be held in memory.
-
-    Attributes:
-        dims: names of dimensions; a variable named like its only dimension is that one's coordinate.
+    """A variable with dimensions of its own, small enough for memory; one named like its only dimension is a
+    coordinate.
     """
 
     name: str

@@ -48,10 +48,8 @@ class WorkFolder:
 
     @contextmanager
     def locked(self, *, shared: bool = False) -> Iterator[None]:
-        """Keep other processes out inside the block; the lock disappears with the process, however it ends.
-
-        Args:
-            shared: admit other processes that share the work.
+        """Keep out other processes (but those that share the work) inside the block; the lock disappears with
+        the process, however it ends.
         """
         try:
             self.refuse_a_file()

@@ -97,11 +97,7 @@ class Saved:
 
 
 def save(analysis: Analysis, out: Path, figure: Path | None = None) -> Saved:
-    """Write dataset and figure, each of which appears only when complete.
-
-    Args:
-        figure: PNG or SVG file; by default beside ``out``.
-    """
+    """Write dataset and figure, each of which appears only when complete."""
     from rigidsim.look.figures.spectrum import save_spectrum
 
     drawn = figure or out.with_suffix(".png")

@@ -22,14 +22,7 @@ from rigidsim.workflows.sweeps.members import recording
 
 @dataclass(frozen=True)
 class Checked:
-    """Result of a check.
-
-    Attributes:
-        problems: why it can't be run; empty for a valid config.
-        cautions: values that may have been meant differently.
-        body, start, time: how the config was understood; None if it can't be run.
-        loads: what acts on the body, in a reader's terms.
-    """
+    """Result of a check: problems, cautions, and how a config that can be run was understood."""
 
     source: str
     problems: tuple[Problem, ...] = ()

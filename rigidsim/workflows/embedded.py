@@ -35,9 +35,6 @@ def embedded(dataset: Path, *, overrides: Sequence[str] = ()) -> Experiment:
 def as_begun(experiment: Experiment, saved: Path) -> Experiment:
     """The experiment with the recording and projection of its begun run made explicit where the config leaves
     them open; the text stays as it is.
-
-    Args:
-        saved: a file of the run, which tells; one of an earlier version tells by its contents.
     """
     found = read_attributes(saved)
     experiment = _projecting(experiment, found)

@@ -39,11 +39,7 @@ _DELAUNAY_ERROR = 40.0  # arcsec a century: how much they change in a century
 
 
 def known_frequencies(scene: Scene, *, driven: bool = False) -> list[Known]:
-    """All known frequencies of a scene, rad/s.
-
-    Args:
-        driven: whether loads unknown to the scene act; there is no closed form then.
-    """
+    """All known frequencies of a scene, rad/s; loads unknown to the scene leave it no closed form."""
     closed = None if scene.free_flight and scene.loads else find_closed_form(scene, driven=driven)
     if closed is not None:
         found = _of_motion(closed.motion)

@@ -46,10 +46,8 @@ class LevelCost(SummaryPart):
 def compared_levels(
     experiment: Experiment, choice: LevelChoice | None, loads: Sequence[Load] = ()
 ) -> list[LevelCost]:
-    """All levels, the cheapest first, if the config says anything about models.
-
-    Args:
-        choice: result of ``level = "auto"``, whose measurements aren't repeated.
+    """All levels, the cheapest first, if the config says anything about models; a choice isn't measured
+    again.
     """
     if "model" not in experiment.config.model_fields_set:
         return []

@@ -87,49 +87,33 @@ def run(
         RunFolderError: the run folder is in use or can't be written, or the run doesn't fit on its disk or in
             memory.
     """
-    experiment = as_experiment(experiment, changes)
+    experiment, failed = as_experiment(experiment, changes), list[str]()
     with watched(observer, progress) as watching:
-        return _run_a_level(experiment, out, watching, force=force, loads=loads, tuning=tuning or Tuning())
 
+        def once(level: Experiment) -> Run:
+            session = Session(watching, tuning=tuning or Tuning())
+            return _run(level, session, out, force or bool(failed), loads)
 
-def _run_a_level(
-    experiment: Experiment,
-    out: str | Path | None,
-    observer: Observer,
-    *,
-    force: bool,
-    loads: Sequence[Load],
-    tuning: Tuning,
-) -> Run:
-    """Run the given level, or the cheapest one whose measured error is within the requested accuracy."""
-    failed: list[str] = []
-    while experiment.config.model.level == AUTO:
-        observer.choosing(experiment.config.name)
-        choice = choose_level(experiment, loads=loads, without=failed)
-        assert choice is not None
-        if choice.level == FULL:
-            experiment, force = choice.experiment, force or bool(failed)
-            break
-        result = _run(
-            choice.experiment, out, observer, force=force or bool(failed), loads=loads, tuning=tuning
-        )
-        codes = result.summary["warning_codes"]
-        if result.status != "finished" or WarningCode.MODEL_UNCERTAIN.value not in codes:
-            return result
-        failed.append(choice.level)
-    return _run(experiment, out, observer, force=force, loads=loads, tuning=tuning)
+        while experiment.config.model.level == AUTO:  # the cheapest whose error is within the accuracy
+            watching.choosing(experiment.config.name)
+            choice = choose_level(experiment, loads=loads, without=failed)
+            assert choice is not None
+            if choice.level == FULL:
+                experiment = choice.experiment
+                break
+            result = once(choice.experiment)
+            codes = result.summary["warning_codes"]
+            if result.status != "finished" or WarningCode.MODEL_UNCERTAIN.value not in codes:
+                return result
+            failed.append(choice.level)
+        return once(experiment)
 
 
 def _run(
-    experiment: Experiment,
-    out: str | Path | None,
-    observer: Observer,
-    *,
-    force: bool,
-    loads: Sequence[Load],
-    tuning: Tuning,
+    experiment: Experiment, session: Session, out: str | Path | None, force: bool, loads: Sequence[Load]
 ) -> Run:
-    session = Session(observer, tuning=tuning)
+    """Run a level, with other settings as long as the accuracy asked for isn't kept."""
+    observer = session.observer
     choice: Choice | None
     beyond: Setting | None = None
     result: Run | None = None

@@ -42,11 +42,7 @@ def described() -> dict[str, str]:
 
 
 def write_new(scene: str, name: str | None = None, folder: Path = Path()) -> Path:
-    """Write a template as ``NAME.toml``; an existing file is never replaced.
-
-    Args:
-        name: name of the experiment and its file; by default the scene's.
-    """
+    """Write a template as ``NAME.toml``; an existing file is never replaced."""
     text = template(scene)
     name = scene if name is None else name.removesuffix(".toml")
     if not re.fullmatch(r"[A-Za-z0-9._-]{1,100}", name) or not name.strip("."):

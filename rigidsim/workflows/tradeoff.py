@@ -32,12 +32,7 @@ DATASET, FIGURE = "tradeoff.h5", "tradeoff.png"
 
 @dataclass(frozen=True)
 class Tradeoff:
-    """A measurement as labelled data, and the advice drawn from it.
-
-    Attributes:
-        dataset: dimension ``setting``; see ``dataset_of``.
-        folder: where it was saved; None if it wasn't.
-    """
+    """A measurement as labelled data (see ``dataset_of``), and the advice drawn from it."""
 
     dataset: xarray.Dataset
     folder: Path | None = None

@@ -32,12 +32,7 @@ _ROWS_AT_ONCE = 65536
 
 @dataclass(frozen=True)
 class Difference:
-    """The first place where two datasets differ.
-
-    Attributes:
-        sample: index along the variable's first dimension.
-        saved, again: both values there; ``size`` is their distance.
-    """
+    """The first place where two datasets differ: sample, and both values there."""
 
     variable: str
     sample: int
@@ -227,11 +222,7 @@ def _first_difference(name: str, one: xarray.DataArray, other: xarray.DataArray)
 
 
 def _summary_problems(saved: Brief, again: Brief, folder: RunFolder, version: int) -> list[str]:
-    """The first claim of a summary that running again doesn't confirm, in words; empty if all hold.
-
-    Args:
-        saved, again: summaries; the saved one may be of an older version, which claimed less.
-    """
+    """The first claim of a summary that running again doesn't confirm, in words; empty if all hold."""
     if not isinstance(saved, Summary):
         return []  # a run that was killed claims nothing
     # once there is a dataset, an interruption can only have hit its timeline or its segments' removal

@@ -24,11 +24,7 @@ Told = Callable[[int, int], None]
 
 
 def runs_of(paths: Sequence[Path], members: Sequence[int] = ()) -> list[tuple[str, Run]]:
-    """Runs with their names on the screen, each different.
-
-    Args:
-        paths: run folders; with ``members``, the folder of one sweep.
-    """
+    """Runs with their names on the screen, each different; with ``members``, those of one sweep."""
     if members:
         return _members(paths, members)
     sweeps = [path for path in paths if is_sweep(path)]

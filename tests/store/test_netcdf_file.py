@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 import xarray
 
-from rigidsim.store.netcdf_file import NetcdfFile, write_rows, writing
+from rigidsim.store.netcdf import NetcdfFile, write_rows, writing
 
 VALUES = np.arange(30.0).reshape(10, 3)
 

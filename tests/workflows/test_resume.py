@@ -208,7 +208,7 @@ def test_a_crash_at_any_file(
 
 def test_a_full_disk_while_the_dataset_is_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """HDF5 would crash the process if it saw the error."""
-    from rigidsim.store.hdf5_sink import Sink
+    from rigidsim.store.atomic import Sink
 
     text = text_with("end = 300\nsamples = 20001")
     whole = rigidsim.run(rigidsim.parse(text), out=tmp_path / "whole")

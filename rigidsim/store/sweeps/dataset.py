@@ -14,8 +14,8 @@ from rigidsim.scene.sweeps.axes import Axis
 from rigidsim.scene.sweeps.sweep import Sweep
 from rigidsim.scene.sweeps.written import nearest_double
 from rigidsim.store import atomic
-from rigidsim.store.hdf5_sink import sink
-from rigidsim.store.netcdf_file import NetcdfFile, write_box, write_rows, writing
+from rigidsim.store.atomic import sink
+from rigidsim.store.netcdf import NetcdfFile, write_box, write_rows, writing
 from rigidsim.store.seal import seal
 from rigidsim.store.sweeps.gathered import Described, Gathered, TileReader
 from rigidsim.store.sweeps.sources import Sources, plain

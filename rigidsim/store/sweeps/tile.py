@@ -13,7 +13,7 @@ import h5py
 import numpy as np
 
 from rigidsim.errors import RunFolderError
-from rigidsim.store.netcdf_file import writing
+from rigidsim.store.netcdf import writing
 from rigidsim.store.seal import check_seal, refuse_special, sealed
 
 _FORMAT = 1
