@@ -51,9 +51,7 @@ class Mechanics(Kinematics):
 
     @property
     def turning_rate(self) -> Any | None:
-        """Bound of the rate (mpf, rad/s) at which axes turn in a motion averaged over rotations
-        (``rigidsim.model.averaged``); None for any other motion.
-        """
+        """Bound of the rate (mpf, rad/s) at which axes turn if rotations are averaged over, or None."""
         return None
 
     @property
@@ -63,15 +61,13 @@ class Mechanics(Kinematics):
 
     @property
     def kept_by_average(self) -> str | None:
-        """Why averaging over rotations keeps the size of the angular momentum constant; None if it
-        doesn't.
-        """
+        """Why averaging over rotations keeps the size of the angular momentum; None if it doesn't."""
         return None
 
     @property
     def commensurable_angle(self) -> tuple[Symbolic, Symbolic] | None:
-        """Sine and cosine, times a common size, of the resonant angle that survives an average over rotations
-        and orbits when the body's rotation is commensurable with its source's orbit; None elsewhere.
+        """Sine and cosine, times a common size, of the angle that a resonance keeps in an average over rotation
+        and orbit; None elsewhere.
         """
         return None
 

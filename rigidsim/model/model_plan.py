@@ -61,7 +61,7 @@ def plan_model(
             or a load that depends on the quaternion's sign.
     """
     if extra_loads:
-        scene = replace(scene, loads=(*scene.loads, *extra_loads))
+        scene = replace(scene, loads=(*scene.loads, *(load for load in extra_loads if load.acts())))
     loads: list[Load] = [*UniformGravity.of(scene), *loads_of(scene)]
     if like is None:
         refuse_second_orbits(scene, loads)

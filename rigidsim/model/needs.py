@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from rigidsim.model import central_forces, fixed_axes
+from rigidsim.model import fixed_axes
 from rigidsim.model.capabilities import Attracting, Damping, corotating_orbit_of
 from rigidsim.model.first_integrals import goryachev_chaplygin_top, kovalevskaya_top
 from rigidsim.model.frames.local import first_source, flies_about_source, rotating_orbit
@@ -142,10 +142,12 @@ NEEDS: dict[str, Need] = {
     "sources": Need(lambda m: m.attitude is not None and fixed_axes.sources_alone(m)),
     "several_sources": Need(lambda m: m.attitude is not None and fixed_axes.several_directions(m)),
     "attracting_line": Need(
-        lambda m: m.velocity is not None and m.attitude is not None and central_forces.line(m) is not None
+        lambda m: (
+            m.velocity is not None and m.attitude is not None and fixed_axes.attracting_line(m) is not None
+        )
     ),
     "point_masses": Need(lambda m: m.scene.bodies is not None, missing=_NO_POINT_MASSES),
-    "free_fall": Need(lambda m: m.velocity is not None and central_forces.falls_freely(m)),
+    "free_fall": Need(lambda m: m.velocity is not None and fixed_axes.falls_freely(m)),
     "attractor": Need(lambda m: m.velocity is not None and any(isinstance(x, Attracting) for x in m.loads)),
 }
 """All needs, by the names that ``Observable.needs`` uses."""

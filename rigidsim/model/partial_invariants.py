@@ -9,7 +9,7 @@ from typing import Any
 
 import heyoka as hy
 
-from rigidsim.model import central_forces, fixed_axes
+from rigidsim.model import fixed_axes
 from rigidsim.model.drift_scales import linear_momentum_scale, momentum_scale, total_momentum_scale
 from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.observables.mechanical import linear_momentum, mass_exponent, total_momentum
@@ -27,7 +27,7 @@ from rigidsim.scene.arithmetic import Vector, apply, norm
 
 
 def _total_momentum_along(m: Mechanics) -> list[Symbolic]:
-    pairs = zip(m.carried(central_forces.line(m)), total_momentum(m), strict=True)
+    pairs = zip(m.carried(fixed_axes.attracting_line(m)), total_momentum(m), strict=True)
     return [hy.sum([m.number(n) * x for n, x in pairs if n != 0])]
 
 

@@ -209,6 +209,17 @@ def test_a_wheel_of_states_of_its_own_trades_momentum_with_the_body() -> None:
     assert np.ptp(run.dataset["energy"].values) > 0.1
 
 
+def test_in_flight_only_a_rotor_left_to_itself_keeps_the_energy_of_rotation() -> None:
+    flight = {
+        "body": "principal_moments = [1, 2, 2.5]\nmass = 3",
+        "initial": "angular_velocity = [0.3, 1.0, 0.5]\nposition = [0, 0, 0]\nvelocity = [1, 0, 0]",
+        "time": "end = 3\nsamples = 7",
+    }
+    assert "rotational_energy" in run_text(text(**flight)).summary["invariants"]
+    driven = rigidsim.run(rigidsim.parse(text("", **flight)), out=None, loads=[Wheel("0.2", "0.25")])
+    assert {"energy", "rotational_energy"} & set(driven.summary["invariants"]) == set()
+
+
 def test_what_knows_the_body_alone_refuses_it() -> None:
     orbit = 'kind = "gravity_gradient"\ngravitational_parameter = 1\norbit = {semi_major_axis = 1}'
     for what in ('integrator.formulation="canonical"', 'model.level="spin_averaged"'):

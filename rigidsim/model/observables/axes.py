@@ -18,14 +18,12 @@ import heyoka as hy
 from rigidsim.model.frames.reference_plane import reference_plane
 from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.observables.observable import (
-    NO_UNIT,
     SPACE,
     Angle,
     Observable,
     continuous_angles,
     only_when_named,
     register_all,
-    same_unit,
     told,
 )
 from rigidsim.model.observables.steadiness import is_planet, steady_directions
@@ -90,17 +88,16 @@ _AT_REST = "unit vector; NaN where the body is at rest"
 
 register_all(
     Observable(
-        "figure_axis", SPACE, "1", "direction of the figure axis", figure_axis, same_unit(NO_UNIT, 3),
-        "space axes", ("attitude",), by_default=is_planet,
-        attributes=told("unit vector", figure=True),
+        "figure_axis", SPACE, "1", "direction of the figure axis", figure_axis,
+        frame="space axes", needs=("attitude",), by_default=is_planet, attributes=told("unit vector", figure=True),
     ),
     Observable(
-        "spin_axis", SPACE, "1", "direction of the angular velocity", spin_axis, same_unit(NO_UNIT, 3),
-        "space axes", ("attitude",), by_default=only_when_named, attributes=told(_AT_REST),
+        "spin_axis", SPACE, "1", "direction of the angular velocity", spin_axis,
+        frame="space axes", needs=("attitude",), by_default=only_when_named, attributes=told(_AT_REST),
     ),
     Observable(
         "momentum_axis", SPACE, "1", "direction of the angular momentum", momentum_axis,
-        same_unit(NO_UNIT, 3), "space axes", ("attitude",), by_default=only_when_named,
+        frame="space axes", needs=("attitude",), by_default=only_when_named,
         attributes=told(_AT_REST),
     ),
     continuous_angles(
@@ -112,13 +109,13 @@ register_all(
     Observable(
         "declination", AXIS, "rad", "declination of the figure, spin and momentum axes",
         lambda m: [_elevation(*axis) for axis in _on_sky(m)],
-        same_unit(NO_UNIT, 3), "space axes", ("attitude",), by_default=only_when_named,
+        frame="space axes", needs=("attitude",), by_default=only_when_named,
         attributes=_sky("positive north of the equator"),
     ),
     Observable(
         "obliquity", AXIS, "rad", "obliquity of the figure, spin and momentum axes",
         lambda m: [hy.atan2(hy.sqrt(u * u + v * v), s) for u, v, s in _on_plane(m)],
-        same_unit(NO_UNIT, 3), "space axes", ("attitude", "plane"), by_default=is_planet,
+        frame="space axes", needs=("attitude", "plane"), by_default=is_planet,
         attributes=told("angle from the reference plane's normal, 0 to pi", figure=True, plane=True),
     ),
     continuous_angles(

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import heyoka as hy
 
-from rigidsim.model import central_forces, first_integrals, fixed_axes
+from rigidsim.model import first_integrals, fixed_axes
 from rigidsim.model.drift_scales import (
     attracting_point,
     energy_scale,
@@ -22,7 +22,6 @@ from rigidsim.model.observables.observable import (
     BODY,
     ENERGY,
     MOMENTUM,
-    NO_UNIT,
     SPACE,
     Observable,
     register_all,
@@ -50,6 +49,10 @@ def _conservative(m: Mechanics) -> str | None:
     return "all loads have a potential that doesn't depend on time" if m.loads else "no load acts"
 
 
+def _rotation_alone(m: Mechanics) -> str | None:
+    return _torque_free(m) if m.scene.free_flight and not m.driven_within else None
+
+
 def _vertical_only(m: Mechanics) -> str | None:
     if not fixed_axes.keeps(m, m.carried(m.numbers.up)):
         return None
@@ -64,7 +67,7 @@ def _rests_in_orbit(m: Mechanics) -> str:
 
 
 def _central(m: Mechanics) -> str | None:
-    if not central_forces.one_point(m):
+    if not fixed_axes.one_point(m):
         return None
     return "the only load is a central force" if len(m.acting) == 1 else "all loads are forces to one point"
 
@@ -147,19 +150,19 @@ register_all(
     ),
     Observable(
         "quaternion", ("quaternion_component",), "1", "attitude quaternion, body to space",
-        lambda m: m.carried(m.attitude).quaternion, same_unit(NO_UNIT, 4), "body to space", ("attitude",),
+        lambda m: m.carried(m.attitude).quaternion, frame="body to space", needs=("attitude",),
         continuity=lambda m: {"state": "", "wrapping": "parity", "nearest": "nearest"}[
             m.carried(m.attitude).quaternion_sign
         ],
     ),
     Observable(
         "euler_angles", ("euler_angle",), "rad", "intrinsic Euler angles, body to space",
-        _euler, same_unit(NO_UNIT, 3), "body to space", ("attitude",), by_default=_in_states("euler_angles"),
+        _euler, frame="body to space", needs=("attitude",), by_default=_in_states("euler_angles"),
         continuity=lambda m: "wrapped" if _in_states("euler_angles")(m) else "unwrap", poles=_euler_poles,
     ),
     Observable(
         "rotation_matrix", ("space_axis", "body_axis"), "1", "rotation matrix, body to space",
-        lambda m: [x for row in m.matrix for x in row], same_unit(NO_UNIT, 9), "body to space", ("attitude",),
+        lambda m: [x for row in m.matrix for x in row], frame="body to space", needs=("attitude",),
         by_default=_in_states("rotation_matrix"),
     ),
     Observable(
@@ -223,7 +226,7 @@ register_all(
     Observable(
         "rotational_energy", (), "J", "kinetic energy of rotation",
         lambda m: [m.rotational_energy], same_unit(ENERGY, 1), "", (),
-        lambda m: _torque_free(m) if m.scene.free_flight else None, rotational_scale,
+        _rotation_alone, rotational_scale,
         by_default=lambda m: m.scene.free_flight,
     ),
     Observable(

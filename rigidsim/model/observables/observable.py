@@ -93,7 +93,7 @@ class Observable:
         long_name: description for readers.
         frame: "body axes", "space axes" or "".
         expressions: components as expressions of the state, in internal units (see ``Kinematics``).
-        exponents: binary exponents of the components' internal units; None where they are in SI.
+        exponents: binary exponents of the components' internal units; None where they are in SI or have none.
         needs: what the scene must have; names in ``rigidsim.model.needs.NEEDS``.
         conserved: why it is an invariant of this scene, or None where it isn't.
         drift_scale: scale of its drift in SI (mpf), and the name of that scale.
@@ -173,7 +173,6 @@ def same_unit(exponent: Callable[[Mechanics], int], count: int) -> Callable[[Mec
 
 MOMENTUM = lambda m: m.scaling.momentum  # noqa: E731
 ENERGY = lambda m: m.scaling.energy  # noqa: E731
-NO_UNIT = lambda m: 0  # noqa: E731
 
 
 def told(

@@ -22,12 +22,10 @@ from rigidsim.model.frames.local import local_frame, moves_slowly_in_orbit
 from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.observables.observable import (
     BODY,
-    NO_UNIT,
     Angle,
     Observable,
     continuous_angles,
     register_all,
-    same_unit,
 )
 from rigidsim.model.rotations import Symbolic, along
 from rigidsim.scene.frame import unique_axis
@@ -88,7 +86,7 @@ register_all(
         ),
     ),
     Observable(
-        "nadir", BODY, "1", "direction to the source", nadir, same_unit(NO_UNIT, 3), "body axes", _NEEDS,
+        "nadir", BODY, "1", "direction to the source", nadir, frame="body axes", needs=_NEEDS,
         by_default=moves_slowly_in_orbit, attributes=_told("unit vector"),
     ),
 )  # fmt: skip

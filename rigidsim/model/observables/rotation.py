@@ -24,7 +24,6 @@ from rigidsim.model.frames.reference_plane import initial_normal, reference_plan
 from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.observables.observable import (
     MOMENTUM,
-    NO_UNIT,
     Angle,
     Observable,
     continuous_angles,
@@ -208,18 +207,18 @@ _NO_SPIN = "0 to pi; NaN where the body is at rest"
 register_all(
     Observable(
         "polar_motion", ("polar_motion_component",), "rad", "polar motion", _polar_motion,
-        same_unit(NO_UNIT, 2), "body axes", by_default=is_nearly_axial, attributes=_polar_told,
+        frame="body axes", by_default=is_nearly_axial, attributes=_polar_told,
         absent=_no_polar_motion,
     ),
     Observable(
         "wobble_angle", (), "rad", "angle of the angular momentum from the axis of largest moment",
-        _wobble_angle, same_unit(NO_UNIT, 1), "body axes", by_default=is_nearly_axial,
+        _wobble_angle, frame="body axes", by_default=is_nearly_axial,
         attributes=told(_NO_SPIN), absent=_no_largest,
     ),
     Observable(
         "nutation_angle", (), "rad", "angle of the figure axis from the angular momentum",
         lambda m: [_angle_between(m.fixed(m.scene.figure.pole), m.momentum_body)],
-        same_unit(NO_UNIT, 1), "body axes", by_default=is_nearly_axial,
+        frame="body axes", by_default=is_nearly_axial,
         attributes=told(_NO_SPIN, figure=True),
     ),
 )  # fmt: skip

@@ -18,7 +18,6 @@ from rigidsim.model.frames.reference_plane import fixed_plane
 from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.observables.axes import figure_axis
 from rigidsim.model.observables.observable import (
-    NO_UNIT,
     SPACE,
     Angle,
     Observable,
@@ -104,9 +103,8 @@ def _tip_told(m: Mechanics) -> dict[str, str]:
 
 register_all(
     Observable(
-        "tilt", (), "rad", "angle of the figure axis from the upward vertical", tilt, same_unit(NO_UNIT, 1),
-        "", ("vertical",), by_default=_is_top,
-        attributes=told("from 0, upright, to pi, hanging", figure=True),
+        "tilt", (), "rad", "angle of the figure axis from the upward vertical", tilt,
+        needs=("vertical",), by_default=_is_top, attributes=told("from 0, upright, to pi, hanging", figure=True),
     ),
     continuous_angles(
         "precession_angle", (), "precession of the figure axis about the vertical", precession_angle,
