@@ -66,8 +66,8 @@ class Mechanics(Kinematics):
 
     @property
     def commensurable_angle(self) -> tuple[Symbolic, Symbolic] | None:
-        """Sine and cosine, times a common size, of the angle that a resonance keeps in an average over rotation
-        and orbit; None elsewhere.
+        """Sine and cosine, times a common size, of the angle that a resonance keeps if rotation and orbit are
+        averaged over; None elsewhere.
         """
         return None
 

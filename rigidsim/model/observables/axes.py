@@ -89,7 +89,8 @@ _AT_REST = "unit vector; NaN where the body is at rest"
 register_all(
     Observable(
         "figure_axis", SPACE, "1", "direction of the figure axis", figure_axis,
-        frame="space axes", needs=("attitude",), by_default=is_planet, attributes=told("unit vector", figure=True),
+        frame="space axes", needs=("attitude",), by_default=is_planet,
+        attributes=told("unit vector", figure=True),
     ),
     Observable(
         "spin_axis", SPACE, "1", "direction of the angular velocity", spin_axis,

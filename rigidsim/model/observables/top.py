@@ -104,7 +104,8 @@ def _tip_told(m: Mechanics) -> dict[str, str]:
 register_all(
     Observable(
         "tilt", (), "rad", "angle of the figure axis from the upward vertical", tilt,
-        needs=("vertical",), by_default=_is_top, attributes=told("from 0, upright, to pi, hanging", figure=True),
+        needs=("vertical",), by_default=_is_top,
+        attributes=told("from 0, upright, to pi, hanging", figure=True),
     ),
     continuous_angles(
         "precession_angle", (), "precession of the figure axis about the vertical", precession_angle,
