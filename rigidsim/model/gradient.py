@@ -10,6 +10,7 @@ import heyoka as hy
 from rigidsim.model.kinematics import Kinematics
 from rigidsim.model.load import Term
 from rigidsim.model.orbits.ephemeris import MEAN_DISTANCE, SourcePosition, source_position
+from rigidsim.model.orbits.kepler_states import OrbitStates
 from rigidsim.model.orbits.point_mass_states import PointMassPair
 from rigidsim.model.rotations import Symbolic, transpose
 from rigidsim.scene.arithmetic import Vector, cross, norm, unit_vectors
@@ -77,10 +78,22 @@ class GradientSource:
         assert self.position is not None
         return norm(context, self.position)
 
-    def of_series(self, m: Kinematics) -> SourcePosition:
-        """Where its series says that it is."""
-        assert self.ephemeris is not None
-        time = m.number(m.scene.context.ldexp(m.scene.context.one, m.scaling.time)) * hy.time
-        if self.epoch is not None and self.epoch != J2000:
-            time = time + m.number(ExactNumber(self.epoch.since_j2000()).at(m.scene.context))
-        return source_position(self.ephemeris, time)
+    def seen(self, m: Kinematics) -> tuple[list[Symbolic], Symbolic | None]:
+        """Unit vector to a source that isn't a point mass (space axes), and ``distance`` over its varying one."""
+        context = m.scene.context
+        if self.position is not None:
+            length = norm(context, self.position)
+            return m.fixed([x / length for x in self.position]), None
+        place: OrbitStates | SourcePosition
+        if self.orbit is not None:
+            place = m.orbit(self.orbit)
+        elif self.table is not None:
+            place = m.table(self.table)
+        else:
+            assert self.ephemeris is not None
+            time = m.number(context.ldexp(context.one, m.scaling.time)) * hy.time
+            if self.epoch is not None and self.epoch != J2000:
+                time = time + m.number(ExactNumber(self.epoch.since_j2000()).at(context))
+            place = source_position(self.ephemeris, time)
+        circular = self.orbit is not None and self.orbit.circular
+        return place.direction, None if circular else place.inverse_distance

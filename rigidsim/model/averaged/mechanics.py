@@ -120,7 +120,7 @@ class AveragedMechanics(SourcesSeen):
             return self._pull_in_plane(source, orbit, s)
         if source.pair is not None:
             return self._pull_of_mass(source, source.pair, s)
-        direction, inverse = self._seen(source)
+        direction, inverse = source.of.seen(self)
         factor = self._strength(source) * dot(direction, s)
         if inverse is not None:
             factor = factor * inverse**3

@@ -12,14 +12,12 @@ import heyoka as hy
 
 from rigidsim.model.averaged.average import Average
 from rigidsim.model.averaged.orbit_terms import OrbitPlace, plane_vectors
-from rigidsim.model.averaged.sources import Source
 from rigidsim.model.averaged.table_terms import TableTerms
 from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.orbits.kepler_states import OrbitStates
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.state_blocks import StateBlock
 from rigidsim.model.two_part import as_factor
-from rigidsim.scene.arithmetic import dot
 from rigidsim.scene.orbit_tables.pieces import TabulatedOrbit
 from rigidsim.scene.orbits import KeplerOrbit
 
@@ -114,19 +112,3 @@ class SourcesSeen(Mechanics):
     def table_block(self, table: TabulatedOrbit) -> StateBlock:
         """The states of a tabulated orbit."""
         return self.table(table).block
-
-    def _seen(self, source: Source) -> tuple[list[Symbolic], Symbolic | None]:
-        """Unit vector to a source, space axes, and a/r if it varies."""
-        context, of = self.scene.context, source.of
-        if of.position is not None:
-            length = context.sqrt(dot(of.position, of.position))
-            return [as_factor(self.number(x / length)) for x in of.position], None
-        if of.ephemeris is not None:
-            place = of.of_series(self)
-            return place.direction, place.inverse_distance
-        if source.table is not None:
-            by_table = self.table(source.table)
-            return by_table.direction, by_table.inverse_distance
-        assert source.orbit is not None
-        seen = self.orbit(source.orbit)
-        return seen.direction, None if source.orbit.circular else seen.inverse_distance

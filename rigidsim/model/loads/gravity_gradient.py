@@ -18,8 +18,6 @@ from rigidsim.model.load_words import orbit_text, reach_text, source_text, value
 from rigidsim.model.loads.moving_source import MovingGradient
 from rigidsim.model.loads.point_attraction import positive_strength
 from rigidsim.model.orbit_planes import EclipticPlane, OrbitPlane
-from rigidsim.model.orbits.ephemeris import SourcePosition
-from rigidsim.model.orbits.kepler_states import OrbitStates
 from rigidsim.model.plausibility import about_distance, about_orbit, about_spin, about_strength, attracting
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.two_part import as_factor
@@ -160,29 +158,16 @@ class GravityGradient(Load):
     def source_direction(self, m: Kinematics) -> list[Symbolic]:
         if m.attitude is not None and m.attitude.orbital is not None:
             return m.attitude.orbital.direction
-        moving = self._moving(m)
-        if moving is not None:
-            return m.seen(moving.direction)
-        assert self.position is not None
-        length = norm(m.scene.context, self.position)
-        return m.seen(m.fixed([x / length for x in self.position]))
+        return m.seen(self.gradient_source.seen(m)[0])
 
     def strength(self, m: Kinematics) -> tuple[Any, Symbolic | None]:
         """G M / R^3 in internal units: the value at a constant distance (mpf), and the factor by which it
         varies.
         """
-        context, moving = m.scene.context, self._moving(m)
+        context, (_, inverse) = m.scene.context, self.gradient_source.seen(m)
         distance = self.gradient_source.distance(context)
         value = context.ldexp(self.gravitational_parameter / distance**3, 2 * m.scaling.time)
-        return value, None if moving is None else moving.inverse_distance**3
-
-    def _moving(self, m: Kinematics) -> OrbitStates | SourcePosition | None:
-        """Direction and inverse distance of a source that moves."""
-        if self.orbit is not None:
-            return m.orbit(self.orbit)
-        if self.table is not None:
-            return m.table(self.table)
-        return None if self.ephemeris is None else self.gradient_source.of_series(m)
+        return value, None if inverse is None else inverse**3
 
     def torque(self, m: Kinematics) -> list[Term]:
         return gradient_terms(m, self.source_direction(m), *self.strength(m))
