@@ -5,17 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-import heyoka as hy
-
-from rigidsim.model.kinematics import Kinematics
+from rigidsim.model.kinematics import Kinematics, seconds
 from rigidsim.model.load import Term
 from rigidsim.model.orbits.ephemeris import MEAN_DISTANCE, SourcePosition, source_position
 from rigidsim.model.orbits.kepler_states import OrbitStates
 from rigidsim.model.orbits.point_mass_states import PointMassPair
 from rigidsim.model.rotations import Symbolic, transpose
 from rigidsim.scene.arithmetic import Vector, cross, norm, unit_vectors
-from rigidsim.scene.epochs import J2000, Epoch
-from rigidsim.scene.exact import ExactNumber
+from rigidsim.scene.epochs import Epoch
 from rigidsim.scene.orbit_tables.pieces import TabulatedOrbit
 from rigidsim.scene.orbits import KeplerOrbit
 from rigidsim.scene.scene import Scene
@@ -79,7 +76,7 @@ class GradientSource:
         return norm(context, self.position)
 
     def seen(self, m: Kinematics) -> tuple[list[Symbolic], Symbolic | None]:
-        """Unit vector to a source that isn't a point mass (space axes), and ``distance`` over its varying one."""
+        """Unit vector to a source other than a point mass (space axes), and ``distance`` over a varying one."""
         context = m.scene.context
         if self.position is not None:
             length = norm(context, self.position)
@@ -91,9 +88,6 @@ class GradientSource:
             place = m.table(self.table)
         else:
             assert self.ephemeris is not None
-            time = m.number(context.ldexp(context.one, m.scaling.time)) * hy.time
-            if self.epoch is not None and self.epoch != J2000:
-                time = time + m.number(ExactNumber(self.epoch.since_j2000()).at(context))
-            place = source_position(self.ephemeris, time)
+            place = source_position(self.ephemeris, seconds(m, since=self.epoch))
         circular = self.orbit is not None and self.orbit.circular
         return place.direction, None if circular else place.inverse_distance

@@ -21,6 +21,8 @@ from rigidsim.model.scaling import Rounder, ScaledNumbers, Scaling
 from rigidsim.model.state_blocks import AttitudeStates, StateBlock
 from rigidsim.model.two_part import as_factor
 from rigidsim.scene.arithmetic import Vector, dot, negligible
+from rigidsim.scene.epochs import Epoch
+from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.expressions.tree import Node
 from rigidsim.scene.orbit_tables.pieces import TabulatedOrbit
 from rigidsim.scene.orbits import KeplerOrbit
@@ -183,11 +185,17 @@ def in_common_unit(states: list[Symbolic], units: list[Any], number: Rounder) ->
     return [s if u == 1 else number(u) * s for s, u in zip(states, units, strict=True)]
 
 
-def seconds(m: Kinematics) -> Symbolic:
-    """The scene's time as an expression, s; heyoka's own is in internal units."""
+def seconds(m: Kinematics, since: Epoch | None = None) -> Symbolic:
+    """The scene's time as an expression, s; heyoka's own is in internal units.
+
+    Args:
+        since: date of time 0, to have the time since J2000 instead.
+    """
     context = m.scene.context
     unit = context.ldexp(context.one, m.scaling.time)
-    return hy.time if unit == 1 else m.number(unit) * hy.time
+    time = hy.time if unit == 1 else m.number(unit) * hy.time
+    begin = context.zero if since is None else ExactNumber(since.since_j2000()).at(context)
+    return time + m.number(begin) if begin != 0 else time
 
 
 def quadratic_form(m: Kinematics, direction: list[Symbolic]) -> Symbolic:

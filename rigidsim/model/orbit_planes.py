@@ -154,12 +154,8 @@ class EclipticPlane(OrbitPlane):
     described = "mean ecliptic of date (IAU 2006)"
 
     def normal(self, m: Kinematics) -> list[Symbolic]:
-        context, epoch = m.scene.context, m.scene.epoch
-        since = seconds(m)
-        if epoch is not None:
-            start = ExactNumber(epoch.since_j2000()).at(context)
-            since = since + m.number(start) if start != 0 else since
-        centuries = since * m.number(context.one / _CENTURY)
+        context = m.scene.context
+        centuries = seconds(m, since=m.scene.epoch) * m.number(context.one / _CENTURY)
 
         def series(terms: tuple[str, ...]) -> Symbolic:
             total: Any = constant(0.0)
