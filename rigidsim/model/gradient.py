@@ -76,7 +76,7 @@ class GradientSource:
         return norm(context, self.position)
 
     def seen(self, m: Kinematics) -> tuple[list[Symbolic], Symbolic | None]:
-        """Unit vector to a source other than a point mass (space axes), and ``distance`` over a varying one."""
+        """Unit vector to a source other than a point mass, space axes; ``distance`` over a varying one."""
         context = m.scene.context
         if self.position is not None:
             length = norm(context, self.position)
