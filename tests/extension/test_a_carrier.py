@@ -227,7 +227,7 @@ KEPT: dict[str, tuple[dict[str, str], str, set[str]]] = {
 
 @pytest.mark.parametrize("case", list(KEPT))
 def test_what_is_conserved_is_of_body_and_rotor_together(case: str) -> None:
-    """Neither an axial momentum nor the constants of special tops are claimed, which hold for a body alone."""
+    """Neither an axial momentum nor the constants of special tops are claimed, as of a body alone."""
     tables, load, expected = KEPT[case]
     given = config(loads=[rotor(), load], time="end = 5\nsamples = 21", **tables)
     rows = {name: row for name, row in run_text(given).summary["invariants"].items() if not row["numerical"]}
