@@ -20,6 +20,7 @@ import rigidsim
 from rigidsim.look.film import HeadlessViewer, NoGraphics, vulkan_drivers
 from rigidsim.look.thinning import thin, thinned_indices
 from rigidsim.look.timeline import write_timeline
+from rigidsim.look.timeline.blueprint import build_blueprint
 from rigidsim.look.timeline.drawn import DrawnRun
 from rigidsim.look.timeline.recording import recording_to
 
@@ -92,7 +93,7 @@ def _write_empty(dataset: rigidsim.Run, path: Path) -> None:
     shown = thin(dataset, ROWS)
     drawn = DrawnRun.of(dataset, shown, thinned_indices(dataset.sizes["time"], ROWS))
     with recording_to(path, "empty", len(drawn.seconds)) as recording:
-        recording.start(drawn.blueprint())
+        recording.start(build_blueprint(drawn))
         stages = [
             replace(stage, meshes=[], points=np.zeros((0, 3)), arrows=[], trails=[], axis_length=0.0)
             for stage in drawn.picture.stages

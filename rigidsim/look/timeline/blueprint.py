@@ -14,8 +14,16 @@ from rigidsim.look.clock import Clock
 from rigidsim.look.plots import Plot
 from rigidsim.look.stages.bodies import Subject, camera
 from rigidsim.look.stages.parts import Color, Plane, Stage
-from rigidsim.look.timeline.drawing import OLDER, fades, trail_path, trail_stride
-from rigidsim.look.timeline.plotting import LEGEND_LINE, legend_lines, plane_path, plane_reach, plot_path
+from rigidsim.look.timeline.drawing import OLDER, trail_path
+from rigidsim.look.timeline.drawn import DrawnRun
+from rigidsim.look.timeline.plotting import (
+    LEGEND_LINE,
+    legend_lines,
+    legend_of,
+    plane_path,
+    plane_reach,
+    plot_path,
+)
 
 SCREEN_SECONDS = 60.0  # the longest that playing a whole run may take
 TURN_SECONDS = 3.0  # per turn of the body, when the run has few enough turns for it
@@ -25,41 +33,19 @@ PIXELS = 800.0  # about the height of the page
 _DARK = (18, 20, 26)
 
 
-def build_blueprint(
-    stages: Sequence[Stage],
-    plots: Sequence[Plot],
-    clock: Clock,
-    turns: float,
-    *,
-    planes: Sequence[Plane] = (),
-    subject: Subject | None = None,
-    legend: Sequence[tuple[str, Color]] = (),
-    states: bool = False,
-    pages: Sequence[str] = ("Summary",),
-    following: bool = False,
-) -> rrb.Blueprint:
-    """The layout for a run.
-
-    Args:
-        stages: the first is the body's.
-        clock: timeline that the page opens on, at its start, and plays.
-        turns: how often the body turns during the run, for the playback speed.
-        planes: plane figures beside the stages.
-        subject: the body, for the eye's place.
-        states: whether there are lanes of states.
-        pages: names of text pages.
-        following: stay at the end of a run that goes on.
-    """
+def build_blueprint(run: DrawnRun, *, following: bool = False) -> rrb.Blueprint:
+    """The layout for a run, which opens at its start and plays, or stays at the end of one that goes on."""
+    stages, planes, clock = run.picture.stages, run.planes, run.clock
     narrow = len(stages) > 1
     spaces: list[rrb.View | rrb.Container] = [
-        space_view(stage, clock, narrow=narrow, subject=subject) for stage in stages
+        space_view(stage, clock, narrow=narrow, subject=run.subject) for stage in stages
     ]
     beside = [tabs([plane_view(plane) for plane in planes])] if planes else []
     shares = [3.0] * len(spaces) + [1.6] * len(beside)
     scene = spaces[0] if len(shares) == 1 else rrb.Horizontal(*spaces, *beside, column_shares=shares)
-    left = left_side(scene, legend, {page.lower(): page for page in pages})
+    left = left_side(scene, legend_of(stages), {page.lower(): page for page in run.pages})
     views = {
-        place: [plot_view(plot) for plot in plots if plot.place == place]
+        place: [plot_view(plot) for plot in run.plots if plot.place == place]
         for place in ("leading", "drift", "more")
     }
     right: list[rrb.View | rrb.Container] = [*views["leading"]]
@@ -67,33 +53,20 @@ def build_blueprint(
     if views["drift"] or views["more"]:
         right.append(tabs([*views["drift"], *views["more"]]))
         heights.append(1.8)
-    if states:
+    if run.states:
         right.append(rrb.StateTimelineView(origin="/states", name="Events"))
         heights.append(1.2)
-    return page_of(left, right, time_panel(clock, turns, following=following), heights)
+    return page_of(left, right, time_panel(clock, run.turns, following=following), heights)
 
 
 def build_comparison(
-    spaces: Sequence[tuple[Stage, Clock, Subject]],
-    plots: Sequence[Plot],
-    clock: Clock,
-    turns: float,
-    *,
-    legend: Sequence[tuple[str, Color]],
-    pages: Mapping[str, str],
-    difference: Plot | None,
+    named: Sequence[tuple[str, DrawnRun]], clock: Clock, difference: Plot | None
 ) -> rrb.Blueprint:
-    """The layout for runs side by side.
-
-    Args:
-        spaces: the stage of each run, under names of its own, its part of the common clock, and its body.
-        plots: plots of all runs, of which those with the same key are drawn as one.
-        clock: clock of all times.
-        turns: turns of the body that turns most.
-        pages: names of text pages by their entities.
-        difference: distances between the runs' attitudes, if known.
+    """The layout for runs side by side on a common clock, each with one stage, under names of its own, and
+    the distances between their attitudes, if known.
     """
-    eyes = [space_view(stage, own, narrow=True, subject=subject) for stage, own, subject in spaces]
+    runs = [run for _, run in named]
+    eyes = [space_view(run.picture.stages[0], run.clock, narrow=True, subject=run.subject) for run in runs]
     half = -(-len(eyes) // 2)
     scene = (
         rrb.Horizontal(*eyes)
@@ -101,7 +74,7 @@ def build_comparison(
         else rrb.Vertical(rrb.Horizontal(*eyes[:half]), rrb.Horizontal(*eyes[half:]))
     )
     common: dict[str, Plot] = {}
-    for plot in plots:
+    for plot in (plot for run in runs for plot in run.plots):
         found = common.get(plot.key)
         series, levels = (found.series, found.levels) if found else ([], [])
         common[plot.key] = replace(
@@ -110,7 +83,12 @@ def build_comparison(
     views = [] if difference is None else [plot_view(difference)]
     views += [plot_view(plot) for plot in common.values() if plot.place == "leading"][: 4 - len(views)]
     views += [plot_view(plot) for plot in common.values() if plot.place == "drift"]
-    return page_of(left_side(scene, legend, pages), views, time_panel(clock, turns, following=False))
+    left = left_side(
+        scene,
+        legend_of(runs[0].picture.stages),
+        {page.lower(): name for name, run in named for page in run.pages},
+    )
+    return page_of(left, views, time_panel(clock, max(run.turns for run in runs), following=False))
 
 
 def page_of(
@@ -176,13 +154,10 @@ def space_view(stage: Stage, clock: Clock, *, narrow: bool, subject: Subject | N
     for trail in stage.trails:
         path = trail_path(stage, trail)
         # A piece of the older part ends where its row is: it must not stand out over the bright one.
-        stride = trail_stride(trail)
-        fading = fades(trail, stride)
-        shown = round(RECENT * rows) if fading else rows
+        shown = round(RECENT * rows) if trail.line else rows
         overrides[f"{path}/recent"] = rrb.VisibleTimeRanges(_window(clock, shown))
-        if fading:
-            piece = OLDER * stride
-            overrides[f"{path}/older"] = rrb.VisibleTimeRanges(_window(clock, max(rows, 2 * piece)))
+        if trail.line:
+            overrides[f"{path}/older"] = rrb.VisibleTimeRanges(_window(clock, max(rows, 2 * OLDER)))
     origin = f"/{stage.root}/{stage.looked_from}" if stage.looked_from else f"/{stage.root}"
     return rrb.Spatial3DView(
         origin=origin,

@@ -19,7 +19,6 @@ from rigidsim.look.signals import values
 from rigidsim.look.thinning import thin, thinned_indices
 from rigidsim.look.timeline.blueprint import build_comparison
 from rigidsim.look.timeline.drawn import DrawnRun
-from rigidsim.look.timeline.plotting import legend_of
 from rigidsim.look.timeline.recording import chunks, recording_to
 
 if TYPE_CHECKING:
@@ -59,15 +58,8 @@ def write_comparison(named: Sequence[tuple[str, xarray.Dataset]], path: Path, *,
         run = DrawnRun.of(dataset, table, steps, clock=_part(clock, seconds[number]))
         drawn.append(_named(run, name, number))
     apart = attitude_differences([(name, table) for name, _, table in shown])
-    blueprint = build_comparison(
-        [(run.picture.stages[0], run.clock, run.subject) for run in drawn],
-        [plot for run in drawn for plot in run.plots],
-        clock,
-        max(run.turns for run in drawn),
-        legend=legend_of(drawn[0].picture.stages),
-        pages={f"run{number}_summary": legible(name) for number, (name, _) in enumerate(named)},
-        difference=apart,
-    )
+    titles = [legible(name) for name, _ in named]
+    blueprint = build_comparison(list(zip(titles, drawn, strict=True)), clock, apart)
     with recording_to(path, " and ".join(name for name, _ in named), sum(map(len, seconds))) as recording:
         recording.start(blueprint)
         for run in drawn:

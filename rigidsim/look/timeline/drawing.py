@@ -6,7 +6,7 @@ the viewer then shows their own colours from all sides, and edges tell the faces
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
@@ -22,11 +22,6 @@ Columns = Iterable[rr.ComponentColumn]
 
 OLDER = 16
 """Rows in one piece of a trail's older part."""
-SCENE_ROWS = 20_000
-"""Number of rows above which arrows and trails are thinned, if their motion allows it."""
-_STILL = 0.01  # of an arrow's length, by which it may move between rows that are drawn
-_SMOOTH = 0.2  # of a trail's radius, between its corners: some thirty a turn
-_CHORDS = 5000  # of a trail that are looked at, to know how smooth it is
 _EDGE: Color = (12, 14, 20)
 _AXIS_COLORS = [(235, 70, 60), (90, 200, 90), (80, 130, 250)]
 _FADED, _DIM = 0.5, 0.26  # of a trail's brightness: its older part, and the whole curve
@@ -51,23 +46,16 @@ def draw_static(recording: rr.RecordingStream, stages: Sequence[Stage]) -> None:
         if len(stage.points):
             sticks = np.stack([np.zeros_like(stage.points), stage.points], axis=1)
             width = 0.014 * (float(np.abs(stage.points).max()) or 1.0)
-            recording.log(
-                f"{root}/body/sticks",
-                rr.LineStrips3D(sticks, colors=[(190, 190, 190)], radii=width),
-                static=True,
-            )
+            drawn = rr.LineStrips3D(sticks, colors=[(190, 190, 190)], radii=width)
+            recording.log(f"{root}/body/sticks", drawn, static=True)
         if stage.axis_length:
             _draw_axes(recording, stage)
         for arrow in stage.arrows:
-            style: list[rr.AsComponents] = [
-                rr.Arrows3D.from_fields(colors=[arrow.color], radii=[arrow.radius])
-            ]
+            colors = [arrow.color]
+            style: list[rr.AsComponents] = [rr.Arrows3D.from_fields(colors=colors, radii=[arrow.radius])]
             if arrow.label:  # at its tip, of the same entity: an entity of its own would repeat every time
-                style.append(
-                    rr.Points3D.from_fields(
-                        colors=[arrow.color], labels=[arrow.label], show_labels=True, radii=[0.0]
-                    )
-                )
+                words: dict[str, Any] = {"labels": [arrow.label], "show_labels": True}
+                style.append(rr.Points3D.from_fields(colors=colors, radii=[0.0], **words))
             recording.log(_arrow_path(stage, arrow), *style, static=True)
         for trail in stage.trails:
             _draw_trail_static(recording, trail_path(stage, trail), trail)
@@ -94,13 +82,8 @@ def _draw_axes(recording: rr.RecordingStream, stage: Stage) -> None:
     recording.log(f"/{stage.root}/body/axes", axes, static=True)
     if stage.arrows or stage.frames:
         # Labels of arrows sit at their middle, inside the body: invisible points carry them.
-        labels = rr.Points3D(
-            np.eye(3) * length * 1.07,
-            colors=_AXIS_COLORS,
-            labels=["x", "y", "z"],
-            show_labels=True,
-            radii=0.0,
-        )
+        words: dict[str, Any] = {"labels": ["x", "y", "z"], "show_labels": True}
+        labels = rr.Points3D(np.eye(3) * length * 1.07, colors=_AXIS_COLORS, radii=0.0, **words)
         recording.log(f"/{stage.root}/body/axes/labels", labels, static=True)
 
 
@@ -194,20 +177,8 @@ def _dimmed(color: Color, part: float) -> tuple[int, int, int]:
     return red, green, blue
 
 
-def strides_of(stage: Stage) -> dict[str, int]:
-    """Strides between drawn rows for each arrow and each trail, by entity."""
-    found = {_arrow_path(stage, arrow): still_stride(arrow.vectors) for arrow in stage.arrows}
-    return found | {trail_path(stage, trail): trail_stride(trail) for trail in stage.trails}
-
-
-def stage_columns(
-    stage: Stage, rows: slice, strides: Mapping[str, int]
-) -> Iterable[tuple[str, slice, Columns]]:
-    """Entities of a stage with their rows (of the run) and columns, for the rows of one chunk.
-
-    Args:
-        strides: as from ``strides_of``.
-    """
+def stage_columns(stage: Stage, rows: slice) -> Iterable[tuple[str, slice, Columns]]:
+    """Entities of a stage with their rows (of the run) and columns, for the rows of one chunk."""
     root = f"/{stage.root}"
     # Translation and rotation in one call: apart, the viewer would see states that never were.
     transform: dict[str, Any] = {}
@@ -223,92 +194,29 @@ def stage_columns(
     for name, turning in stage.frames.items():
         yield f"{root}/{name}", rows, rr.Transform3D.columns(quaternion=turning[rows])
     for arrow in stage.arrows:
-        path = _arrow_path(stage, arrow)
-        picked = _every(rows, strides[path])
-        vectors = arrow.vectors[picked].astype(np.float32)
-        if len(vectors):
-            columns = [*rr.Arrows3D.columns(vectors=vectors)]
-            if arrow.label:
-                columns += rr.Points3D.columns(positions=vectors * np.float32(arrow.label_at))
-            yield path, picked, columns
+        vectors = arrow.vectors[rows].astype(np.float32)
+        columns = [*rr.Arrows3D.columns(vectors=vectors)]
+        if arrow.label:
+            columns += rr.Points3D.columns(positions=vectors * np.float32(arrow.label_at))
+        yield _arrow_path(stage, arrow), rows, columns
     for trail in stage.trails:
         path = trail_path(stage, trail)
-        yield from _trail_columns(path, trail, rows, strides[path])
-
-
-def _trail_columns(path: str, trail: Trail, rows: slice, stride: int) -> Iterable[tuple[str, slice, Columns]]:
-    if trail.line:
-        picked = _every(rows, stride)
-        if picked.start < rows.stop:
-            strips = _pieces(trail.points, picked, stride, 1)
-            yield f"{path}/recent", picked, rr.LineStrips3D.columns(strips=strips)
-        older = _every(rows, OLDER * stride)
-        if fades(trail, stride) and older.start < rows.stop:
-            strips = _pieces(trail.points, older, stride, OLDER)
-            yield f"{path}/older", older, rr.LineStrips3D.columns(strips=strips)
-    else:
-        picked = _every(rows, stride)
-        if picked.start < rows.stop:
-            positions = trail.points[picked].astype(np.float32)
-            yield f"{path}/recent", picked, rr.Points3D.columns(positions=positions)
-    if trail.head:
-        yield f"{path}/head", rows, rr.Points3D.columns(positions=trail.points[rows].astype(np.float32))
-
-
-def still_stride(vectors: NDArray[np.float64]) -> int:
-    """Stride between rows that have to be drawn so that an arrow never visibly lags behind its motion."""
-    count = len(vectors)
-    if count <= SCENE_ROWS:
-        return 1
-    size = float(np.abs(vectors).max())
-    if not np.isfinite(size):
-        size = float(np.nanmax(np.abs(vectors))) if np.isfinite(vectors).any() else 0.0
-    for stride in (64, 16, 4):
-        # a stretch of rows at a time: the motion within it is what is left out
-        part = vectors[: count // stride * stride].reshape(-1, stride, 3)
-        apart = np.abs(part[:, [stride // 2, -1]] - part[:, :1]).max(initial=0.0)
-        if not apart <= _STILL * size:  # seen at once in most motions
+        points = rr.Points3D.columns(positions=trail.points[rows].astype(np.float32))
+        if trail.head:
+            yield f"{path}/head", rows, points
+        if not trail.line:
+            yield f"{path}/recent", rows, points
             continue
-        if np.isfinite(part).all() and float(np.abs(part - part[:, :1]).max()) <= _STILL * size:
-            return stride
-    return 1
+        yield f"{path}/recent", rows, rr.LineStrips3D.columns(strips=_pieces(trail.points, rows, 1))
+        older = slice(-(-rows.start // OLDER) * OLDER, rows.stop, OLDER)
+        if older.start < rows.stop:
+            yield f"{path}/older", older, rr.LineStrips3D.columns(strips=_pieces(trail.points, older, OLDER))
 
 
-def trail_stride(trail: Trail) -> int:
-    """Stride between the ends of a trail's pieces: several rows if the curve stays smooth."""
-    count = len(trail.points)
-    if count <= SCENE_ROWS:
-        return 1
-    if not trail.line:  # a cloud of points needs no more of them
-        return -(-count // SCENE_ROWS)
-    some = trail.points[:: max(count // _CHORDS, 1)]
-    some = some[np.isfinite(some).all(axis=1)]
-    radius = float(np.abs(some - some.mean(axis=0)).max()) if len(some) else 0.0
-    for stride in (16, 8, 4, 2):
-        looked = np.arange(0, count - stride, max(count // _CHORDS, 1))
-        chords = np.abs(trail.points[looked + stride] - trail.points[looked]).max(axis=1)
-        if np.isfinite(chords).all() and float(np.percentile(chords, 99)) <= _SMOOTH * radius:
-            return stride
-    return 1
-
-
-def fades(trail: Trail, stride: int) -> bool:
-    """Whether a trail has a darker older part; a long trail of a fast motion is heavy enough without."""
-    return trail.line and (stride > 2 or len(trail.points) <= SCENE_ROWS)
-
-
-def _every(rows: slice, stride: int) -> slice:
-    first = -(-rows.start // stride) * stride
-    return slice(first, rows.stop, stride)
-
-
-def _pieces(points: NDArray[np.float64], rows: slice, stride: int, length: int) -> pa.Array:
-    """For each row, a strip of `length` + 1 points up to that row, `stride` rows apart; built at once in
-    Arrow.
-    """
+def _pieces(points: NDArray[np.float64], rows: slice, length: int) -> pa.Array:
+    """For each row, a strip of `length` + 1 points up to that row; built at once in Arrow."""
     ends = np.arange(rows.start, rows.stop, rows.step or 1)
-    back = stride * np.arange(length, -1, -1)
-    places = np.maximum(ends[:, None] - back[None, :], 0)
+    places = np.maximum(ends[:, None] - np.arange(length, -1, -1), 0)
     flat = points[places].astype(np.float32).ravel()
     kind = rr.components.LineStrip3DBatch._ARROW_DATATYPE
     offsets = pa.array(np.arange(len(ends) + 1, dtype=np.int32) * (length + 1))

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 import rerun as rr
-import rerun.blueprint as rrb
 from numpy.typing import NDArray
 
 from rigidsim.look import signals
@@ -20,7 +19,6 @@ from rigidsim.look.stages.registry import build_picture
 from rigidsim.look.states import States, charts_of, sections_of, states_of
 from rigidsim.look.thinning import thinned_indices
 from rigidsim.look.timeline import drawing, plotting
-from rigidsim.look.timeline.blueprint import build_blueprint
 from rigidsim.scene.readable_time import TimeWords
 
 if TYPE_CHECKING:
@@ -36,7 +34,6 @@ class DrawnRun:
         pages: markdown by name.
         words: wording of its times.
         turns: turns of the body during the run, from its mean rate; 0 if the rate isn't known.
-        strides: of arrows and trails, by the stage's root and their entity.
     """
 
     picture: Picture
@@ -50,7 +47,6 @@ class DrawnRun:
     pages: dict[str, str]
     words: TimeWords
     turns: float
-    strides: dict[str, dict[str, int]] = field(default_factory=dict)
 
     @classmethod
     def of(
@@ -102,21 +98,6 @@ class DrawnRun:
             turns=mean * abs(end - start) / (2 * np.pi),
         )
 
-    def blueprint(self, *, following: bool = False) -> rrb.Blueprint:
-        """The page layout."""
-        return build_blueprint(
-            self.picture.stages,
-            self.plots,
-            self.clock,
-            self.turns,
-            planes=self.planes,
-            subject=self.subject,
-            legend=plotting.legend_of(self.picture.stages),
-            states=bool(self.states),
-            pages=list(self.pages),
-            following=following,
-        )
-
     def draw_static(self, recording: rr.RecordingStream, *, legend: bool = True) -> None:
         """Draw what holds for all times; with the legend and its clock, if wanted."""
         for name, text in self.pages.items():
@@ -139,9 +120,7 @@ class DrawnRun:
         """Draw what changes, for some rows."""
         times = self._times(rows)
         for stage in self.picture.stages:
-            if stage.root not in self.strides:
-                self.strides[stage.root] = drawing.strides_of(stage)
-            for path, picked, columns in drawing.stage_columns(stage, rows, self.strides[stage.root]):
+            for path, picked, columns in drawing.stage_columns(stage, rows):
                 mine = times if picked == rows else self._times(picked)
                 recording.send_columns(path, indexes=mine, columns=columns)
         plotting.draw_plot_rows(recording, self.plots, times, rows)

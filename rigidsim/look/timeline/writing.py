@@ -13,6 +13,7 @@ import rerun as rr
 from rigidsim.look.page import legible
 from rigidsim.look.roles import title_of
 from rigidsim.look.thinning import thin, thinned_indices
+from rigidsim.look.timeline.blueprint import build_blueprint
 from rigidsim.look.timeline.drawn import DrawnRun
 from rigidsim.look.timeline.recording import check_room, chunks, recording_to, strict
 
@@ -45,7 +46,7 @@ def write_timeline(dataset: xarray.Dataset, path: Path, *, rows: int = 100_000) 
     count = shown.sizes["time"]
     run = DrawnRun.of(dataset, shown, thinned_indices(dataset.sizes["time"], rows))
     with recording_to(path, title_of(dataset), count) as recording:
-        recording.start(run.blueprint())
+        recording.start(build_blueprint(run))
         run.draw_static(recording.stream)
         for part in chunks(0, count):
             check_room(path, count - part.start)
@@ -81,7 +82,7 @@ class LiveRecording:
             scales = _scales_of(run)
             if scales != self._scales:
                 self._scales, self._last = scales, -1
-                self._stream.send_blueprint(run.blueprint(following=True))
+                self._stream.send_blueprint(build_blueprint(run, following=True))
                 self._stream.send_recording_name(legible(title_of(dataset)))
             run.draw_static(self._stream)
             first = int(np.searchsorted(steps, self._last, side="right"))
