@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import xarray
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import rigidsim
@@ -61,6 +61,7 @@ POINTS = st.lists(
 )
 
 
+@settings(max_examples=20, deadline=None)
 @given(POINTS)
 def test_the_advice_is_the_cheapest_that_keeps_the_accuracy(points: list[tuple[float, float, str]]) -> None:
     error, cost, status = (list(column) for column in zip(*points, strict=True))

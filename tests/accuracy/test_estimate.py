@@ -275,6 +275,7 @@ def test_estimates_can_be_turned_off_and_change_no_bit() -> None:
         assert all(one[name].values.tobytes() == other[name].values.tobytes() for name in one.data_vars)
 
 
+@pytest.mark.slow
 def test_an_estimate_is_the_same_each_time_and_after_resuming(runs: Path) -> None:
     text = scene("[1, 2, 3]", "[0.5, 0.25, 1]", "200", GRADIENT)
     whole = run_text(text, out=runs).summary["accuracy"]

@@ -98,7 +98,10 @@ def test_plan_json(config: Config, rigidsim_command: Command) -> None:
 
 @pytest.mark.parametrize(
     ("time", "integrator"),
-    [("end = 20000\nsamples = 11", ""), ("end = 300\nsamples = 4", 'precision = "quadruple"')],
+    [
+        ("end = 20000\nsamples = 11", ""),
+        pytest.param("end = 300\nsamples = 4", 'precision = "quadruple"', marks=pytest.mark.slow),
+    ],
 )
 def test_plan_predicts_the_steps(
     time: str, integrator: str, config: Config, rigidsim_command: Command

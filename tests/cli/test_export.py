@@ -76,7 +76,7 @@ def exact(dataset: Any, name: str, row: int, column: int) -> Decimal:
         return sum(values, Decimal(0))
 
 
-@pytest.mark.parametrize(("precision", "bits"), [("double", 53), ("extended", 64), ("quadruple", 113)])
+@pytest.mark.parametrize(("precision", "bits"), [("quadruple", 113)])
 def test_csv_holds_every_digit(precision: str, bits: int, exported: Callable[..., Path]) -> None:
     path = exported("csv", f'precision = "{precision}"')
     lines = [line for line in path.read_text().splitlines() if not line.startswith("#")]

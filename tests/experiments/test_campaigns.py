@@ -37,6 +37,7 @@ def finished(tmp_path_factory: pytest.TempPathFactory) -> RunFolder:
     return rigidsim.run(rigidsim.parse(SHORT), out=tmp_path_factory.mktemp("runs")).folder
 
 
+@pytest.mark.slow
 def test_lost_rows_and_changed_bits_are_failures(finished: RunFolder) -> None:
     tally = Tally()
     with rigidsim.open_run(finished.path).dataset as dataset:

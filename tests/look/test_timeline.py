@@ -243,7 +243,7 @@ def test_dataset_without_samples_is_refused(symmetric_top: Build, tmp_path: Path
 # ---- which variables of a recorded run are shown as variables of their own
 
 
-@pytest.mark.parametrize(("digits", "parts"), [("50", 4), ("120", 8)])
+@pytest.mark.parametrize(("digits", "parts"), [("50", 4)])
 def test_no_residual_is_a_variable_of_its_own(
     digits: str, parts: int, free_body: Callable[..., str], tmp_path: Path
 ) -> None:

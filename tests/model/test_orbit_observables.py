@@ -138,6 +138,7 @@ def test_in_free_flight_they_count_from_the_path(runs: Path) -> None:
     assert "libration" not in everything  # only when named
 
 
+@pytest.mark.slow
 def test_a_source_at_rest_and_an_ephemeris_count_from_space_z(runs: Path) -> None:
     """And of several sources the first counts."""
     rest = GRADIENT + "position = [3, 4, 5]"

@@ -55,6 +55,7 @@ def test_the_motion_is_the_same_with_and_without() -> None:
         assert (without.quaternion.values == along.quaternion.values).all()
 
 
+@pytest.mark.slow
 def test_growth_agrees_with_the_spectrum_and_with_128_bits() -> None:
     """The largest exponent of a chaotic spin, within what its convergence leaves open."""
     time = "end = 600\nsamples = 2401"

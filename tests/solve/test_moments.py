@@ -8,7 +8,7 @@ from pathlib import Path
 import mpmath
 import numpy as np
 import pytest
-from support import EPSILON, run_estimated, run_text, wide
+from support import EPSILON, cases, run_estimated, run_text, wide
 
 from experiments.coverage.families import FAMILIES, coverage_scene
 from experiments.coverage.judging import judge
@@ -136,7 +136,7 @@ def impulse(shape: str, spacings: float, precision: str) -> float:
     return float(abs(wide(run.dataset, "angular_velocity")[-1, 2] - exact)) / EPSILON[precision] / exact
 
 
-@pytest.mark.parametrize("shape", ["triangle", "ramps", "parabola"])
+@pytest.mark.parametrize("shape", cases(["triangle", "ramps", "parabola"], ["triangle"]))
 def test_nested_kinks_are_met_however_narrow(shape: str) -> None:
     """Also within the spacing of the times: nothing is passed over, no zero is taken for its neighbour."""
     # two moments in two numbers, each to half a spacing of the second, and two roundings of the rate

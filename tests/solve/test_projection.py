@@ -67,7 +67,7 @@ def rounding(precision: str = "double") -> float:
     return (8 + math.sqrt(10 * STEPS_BETWEEN)) * EPSILON[precision]
 
 
-@pytest.mark.parametrize("formulation", cases(FORMULATIONS, [f for f in FORMULATIONS if f != "canonical"]))
+@pytest.mark.parametrize("formulation", cases(FORMULATIONS, ["quaternion", "euler_angles"]))
 @pytest.mark.parametrize("parts", [FREE, LAGRANGE, KOVALEVSKAYA], ids=["free", "lagrange", "kovalevskaya"])
 def test_invariants_stay_within_rounding(parts: Scene, formulation: str) -> None:
     found = run(parts, 500, f'hold_invariants = true\nformulation = "{formulation}"')

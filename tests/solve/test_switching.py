@@ -166,6 +166,7 @@ SCENES = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scene", cases(SCENES, list(SCENES)[:1]))
 def test_all_formulations_agree(scene: str) -> None:
     """Within 1e-11 rad of extended precision: the law gives some 1e-14 for 20 rad, and these motions amplify

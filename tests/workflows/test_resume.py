@@ -108,9 +108,7 @@ def resumed_to_the_end(run: rigidsim.Run, *overrides: str, most: int = 400) -> t
 # the others in code that compiles faster: whether a run is cut or not, it is the same code
 UNROLLED = ("single", "double, dense", "double, sparse", "double, Euler angles", "quadruple")
 USUAL = (
-    "double, dense",
     "double, sparse, derived angles",
-    "double, ended by an event",
     "30 digits, tiny components",
 )
 
@@ -166,7 +164,11 @@ class Cut(BaseException):
 
 @pytest.mark.parametrize("moment", cases(MOMENTS, ("before the name",)))
 @pytest.mark.parametrize(
-    "target", ["00000000.h5", "00000003.h5", "dataset.h5", "checkpoint.h5", "summary.json"]
+    "target",
+    cases(
+        ["00000000.h5", "00000003.h5", "dataset.h5", "checkpoint.h5", "summary.json"],
+        ["00000003.h5", "dataset.h5"],
+    ),
 )
 def test_a_crash_at_any_file(
     moment: str, target: str, short: tuple[str, rigidsim.Run], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
