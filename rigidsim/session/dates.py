@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from datetime import date
 from fractions import Fraction
 from functools import cached_property
 
@@ -172,8 +173,6 @@ class Dates:
 
 
 def _last_day_of_utc() -> str:
-    from datetime import date
-
     return f"{date.fromordinal(leap_seconds()[2] - 1)} UTC"
 
 

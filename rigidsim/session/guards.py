@@ -7,6 +7,7 @@ import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from rigidsim.session.statistics import SampleStatistics
@@ -86,6 +87,7 @@ class Interruption:
             take_up()
 
 
+@dataclass
 class Guards:
     """The checks between chunks; ``wall_time`` starts anew in each session of a run.
 
@@ -93,32 +95,24 @@ class Guards:
     earlier session are checked.
     """
 
-    def __init__(
-        self,
-        prepared: InitialValueProblem,
-        statistics: SampleStatistics,
-        interruption: Interruption,
-        observer: Observer,
-    ) -> None:
-        limits = prepared.scene.config.limits
-        self._wall = None if limits.wall_time is None else float(limits.wall_time)
-        self._drift = None if limits.max_drift is None else float(limits.max_drift)
-        self._statistics = statistics
-        self._interruption = interruption
-        self._observer = observer
-        self._started = time.monotonic()
-        self._reported = 0.0
+    prepared: InitialValueProblem
+    statistics: SampleStatistics
+    interruption: Interruption
+    observer: Observer
+    started: float = field(default_factory=time.monotonic)
+    reported: float = 0.0
 
     def __call__(self, progress: Progress) -> Status | None:
         """The status that ends the run now; None if nothing does."""
-        now = time.monotonic()
-        if now - self._reported > 0.05:
-            self._reported = now
-            self._observer.progressed(progress)
-        if self._interruption.requested:
+        now, limits = time.monotonic(), self.prepared.scene.config.limits
+        if now - self.reported > 0.05:
+            self.reported = now
+            self.observer.progressed(progress)
+        if self.interruption.requested:
             return Status.INTERRUPTED
-        if self._wall is not None and now - self._started > self._wall:
+        if limits.wall_time is not None and now - self.started > float(limits.wall_time):
             return Status.WALL_TIME
-        if self._drift is not None and max(self._statistics.largest.values(), default=0.0) > self._drift:
+        drift = max(self.statistics.largest.values(), default=0.0)
+        if limits.max_drift is not None and drift > float(limits.max_drift):
             return Status.MAX_DRIFT
         return None

@@ -20,8 +20,6 @@ from xarray.core import indexing
 
 from rigidsim.errors import RunFolderError
 from rigidsim.store.netcdf import reading, root_attributes
-from rigidsim.store.provenance import file_sha256
-from rigidsim.store.seal import check_whole, read_seal
 from rigidsim.store.variables import LABELS, OF_THE_RUN, SCHEMA_VERSION, is_bare_dimension
 
 _MOST_VARIABLES = 10_000
@@ -59,37 +57,6 @@ def open_dataset(
         text = str(error).strip() or type(error).__name__
         raise RunFolderError(f"{path}: can't be read ({text.splitlines()[0][:200]})") from None
     return opened
-
-
-def refuse_damaged(path: Path, expected: str | None) -> None:
-    """Check a run's complete dataset against its seal; those of the first schema version have none.
-
-    Args:
-        expected: SHA-256 of the file, if the summary beside it gives one.
-    """
-    try:
-        unsealed = read_seal(path) is None
-        digest = file_sha256(path) if unsealed else check_whole(path)[1]
-    except OSError as error:
-        raise RunFolderError(f"{path}: can't be read: {error.strerror or error}") from None
-    labels = root_attributes(path)
-    version = labels.get("schema_version")
-    if not isinstance(version, int) or version > SCHEMA_VERSION:
-        raise RunFolderError(
-            f"{path}: has schema version {version}; this rigidsim reads versions up to {SCHEMA_VERSION}; "
-            "install a newer one"
-        )
-    if version > 1 and unsealed:
-        raise RunFolderError(f"{path}: is torn or was edited: its end holds no seal of rigidsim")
-    if "segment" in labels:
-        raise RunFolderError(f"{path}: is a segment of an unfinished run, no complete dataset")
-    refuse_other(path, digest, expected)
-
-
-def refuse_other(path: Path, digest: str, expected: str | None) -> None:
-    """Refuse a whole dataset that isn't the one of the summary beside it."""
-    if expected not in (None, digest):
-        raise RunFolderError(f"{path}: isn't the dataset that summary.json beside it was written for")
 
 
 def inspect(path: Path) -> None:

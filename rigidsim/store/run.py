@@ -17,6 +17,7 @@ from rigidsim.errors import FORCE, RESUME, RunFolderError, either
 from rigidsim.look import viewer
 from rigidsim.store import atomic, segments
 from rigidsim.store.folder import RunFolder, find_run
+from rigidsim.store.seal import refuse_damaged
 from rigidsim.store.summary import Brief, Summary
 from rigidsim.store.sweeps.folder import is_sweep
 
@@ -158,8 +159,6 @@ class SavedRun(Run):
 
     def refuse_damaged(self) -> None:
         """Check a complete dataset against its seal and the summary, which reads the whole file."""
-        from rigidsim.store.reader import refuse_damaged
-
         if self.folder.dataset.exists():
             # a run completed again after a crash still has the summary of the first time, or none
             claimed = None if self.folder.segments.exists() else self.outcome.dataset_digest

@@ -12,6 +12,9 @@ import stat
 from pathlib import Path
 
 from rigidsim.errors import RunFolderError
+from rigidsim.store.netcdf import root_attributes
+from rigidsim.store.provenance import file_sha256
+from rigidsim.store.variables import SCHEMA_VERSION
 
 _MARK = b"\nrigidsim sha256 "
 _LENGTH = len(_MARK) + 64 + 1
@@ -92,3 +95,29 @@ def check_whole(path: Path) -> tuple[str, str]:
     if found != claimed:
         raise RunFolderError(f"{path}: is damaged or was edited: its content isn't what its seal says")
     return claimed, running.hexdigest()
+
+
+def refuse_damaged(path: Path, expected: str | None) -> None:
+    """Check a run's complete dataset against its seal; those of the first schema version have none.
+
+    Args:
+        expected: SHA-256 of the file, if the summary beside it gives one.
+    """
+    try:
+        unsealed = read_seal(path) is None
+        digest = file_sha256(path) if unsealed else check_whole(path)[1]
+    except OSError as error:
+        raise RunFolderError(f"{path}: can't be read: {error.strerror or error}") from None
+    labels = root_attributes(path)
+    version = labels.get("schema_version")
+    if not isinstance(version, int) or version > SCHEMA_VERSION:
+        raise RunFolderError(
+            f"{path}: has schema version {version}; this rigidsim reads versions up to {SCHEMA_VERSION}; "
+            "install a newer one"
+        )
+    if version > 1 and unsealed:
+        raise RunFolderError(f"{path}: is torn or was edited: its end holds no seal of rigidsim")
+    if "segment" in labels:
+        raise RunFolderError(f"{path}: is a segment of an unfinished run, no complete dataset")
+    if expected not in (None, digest):
+        raise RunFolderError(f"{path}: isn't the dataset that summary.json beside it was written for")
