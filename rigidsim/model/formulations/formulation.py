@@ -114,7 +114,6 @@ class Formulation:
         resolves_rotation: whether every rotation is followed, rather than averaged over. A motion averaged
             over has an error of its model, which is measured beside it.
         rounding: how the states' rounding moves the motion.
-        unfelt_tangents: whether a tangent vector beside it, however compiled, changes no bit of its steps.
         twin: formulation in which questions about the motion itself, such as its stability, are asked in
             double precision; None for this one.
         sequence: sequence of the Euler angles that are states; empty for other states.
@@ -129,7 +128,6 @@ class Formulation:
     carries_rates: ClassVar[bool] = True
     resolves_rotation: ClassVar[bool] = True
     rounding: ClassVar[Rounding] = Rounding.PLAIN
-    unfelt_tangents: ClassVar[bool] = False
     twin: ClassVar[str | None] = DEFAULT_FORMULATION
     sequence: str = ""
     partner: Formulation | None = None

@@ -52,7 +52,6 @@ class Planar(Formulation):
     """
 
     carries_rates = False
-    unfelt_tangents = True
     twin = "planar"
 
     def __init__(self, axis: Vector, origin: Vector, angle: Any, why: str) -> None:

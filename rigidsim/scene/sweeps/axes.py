@@ -51,12 +51,7 @@ class Axis:
 
 
 def axis_name(key: str, given: str | None) -> str:
-    """The name of an axis: the one given, or the last part of its key; all of it where the last part is the
-    name of something recorded, such as ``initial_angular_velocity``.
-
-    Raises:
-        ValueError: it can't name a dimension.
-    """
+    """The name given, or the last part of an axis's key: all of it where that is something recorded."""
     name = given
     if name is None:
         parts = [re.sub(r"\[(\d+)\]", r"_\1", re.sub("[\"']", "", part)) for part in key.split(".")]
@@ -69,12 +64,7 @@ def axis_name(key: str, given: str | None) -> str:
 
 
 def clashes(axes: Sequence[Axis], events: Sequence[str], *, product: bool) -> list[Problem]:
-    """Names that the dataset would need twice, and keys that contain one another.
-
-    Args:
-        events: names of the experiment's events, from which further names are derived.
-        product: whether each axis is a dimension.
-    """
+    """Names that the dataset would need twice (events give some, too), and keys that contain one another."""
     problems: list[Problem] = []
     names: dict[str, str] = {}
     keys: dict[str, tuple[str | int, ...]] = {}

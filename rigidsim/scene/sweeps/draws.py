@@ -56,11 +56,7 @@ def _normal(seed: int, key: str, component: int) -> _Draw:
 
 
 def random_values(way: str, given: Sequence[Any], count: int, key: str, seed: int, length: int) -> AxisValues:
-    """Values drawn at random; ``way`` is "uniform" or "normal".
-
-    Raises:
-        ValueError: says what is wrong with what was given.
-    """
+    """Values drawn at random; ``way`` is "uniform" or "normal". Raises ValueError for what can't be."""
     vectors = [value for value in given if isinstance(value, list)]
     components = len(vectors[0]) if vectors else 0
     if any(len(vector) != components for vector in vectors):

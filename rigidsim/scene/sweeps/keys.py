@@ -47,14 +47,7 @@ def unit_and_length(key: str, tables: Mapping[str, Any]) -> tuple[str, int]:
 
 
 def refuse_unsettable(key: str, tables: dict[str, Any]) -> None:
-    """Refuse a key that a config has no place for, or whose value changes nothing.
-
-    Args:
-        tables: tables of the config; the key is set there.
-
-    Raises:
-        ValueError, ConfigError: says what there is instead.
-    """
+    """Refuse a key that a config (``tables``) has no place for, or whose value changes nothing."""
     steps = key_steps(key, "axes")
     if steps[0] == "parameters" and len(steps) == 2:
         name, known = str(steps[1]), list(tables.get("parameters", {}))

@@ -144,11 +144,7 @@ class Sweep:
         return [f"{axis.key}={text}" for axis, text in zip(self.axes, self.texts(member), strict=True)]
 
     def experiment_of(self, member: int) -> Experiment:
-        """The member as a single experiment.
-
-        Raises:
-            ConfigError: a key doesn't take its value; names the member.
-        """
+        """The member as a single experiment; ConfigError names a member that a key doesn't take."""
         try:
             return self.base.having(self.overrides(member))
         except ConfigError as error:
@@ -199,11 +195,7 @@ def shown_text(text: str) -> str:
 
 
 def _plain_key(key: str) -> str:
-    """A key without blanks.
-
-    Raises:
-        ConfigError, ValueError: members have no such key.
-    """
+    """A key without blanks; refused if members have no such key."""
     steps = key_steps(key, "axes")
     first = str(steps[0])
     if first in _SAME_FOR_ALL:

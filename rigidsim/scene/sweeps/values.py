@@ -88,12 +88,7 @@ def _counted(count: Any) -> int:
 
 
 def _listed(given: Sequence[Any], *, products: bool) -> AxisValues:
-    """A list's values: numbers or vectors if all can be read as such, otherwise anything that a config may
-    hold.
-
-    Args:
-        products: whether ``2*t`` may be twice the time, instead of two tons.
-    """
+    """A list's numbers or vectors, otherwise words; ``products``: whether ``2*t`` may be twice the time."""
     if len(given) > LARGEST_AXIS:
         raise ValueError(f"given {len(given)} values; at most 1e7 are allowed")
     try:

@@ -31,20 +31,12 @@ class Written:
 
     @classmethod
     def of(cls, value: Any) -> Written:
-        """Read a TOML value as a number.
-
-        Raises:
-            ValueError: it is none.
-        """
+        """Read a TOML value as a number; ValueError if it is none."""
         return cls(*in_its_unit(value))
 
     @property
     def exact(self) -> ExactNumber:
-        """The number in SI units.
-
-        Raises:
-            ValueError: no such unit.
-        """
+        """The number in SI units; ValueError for an unknown unit."""
         return with_unit(self.number, self.unit, self.unit) if self.unit else self.number
 
     @property
@@ -127,11 +119,7 @@ Rational = tuple[Fraction, int, str]
 
 
 def alike(*given: Any) -> tuple[Rational, ...]:
-    """Numbers in a common unit, times a common power of pi.
-
-    Raises:
-        ValueError: there is no such common form.
-    """
+    """Numbers in a common unit, times a common power of pi; ValueError if there is none."""
     written = [Written.of(value) for value in given]
     in_one_unit = f"given {' and '.join(map(shown, given))}; write both in one unit"
     if len({w.unit for w in written}) > 1 or len({w.number.pi_power for w in written if w.number.sign}) > 1:

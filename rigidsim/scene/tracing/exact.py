@@ -12,11 +12,7 @@ from rigidsim.scene.tracing.numbers import Graph, Traced
 
 
 class TracedExact(ExactNumber):
-    """A swept number as written in a config.
-
-    Attributes:
-        exact: the representative's number.
-    """
+    """A swept number as written in a config; ``exact`` is the representative's."""
 
     def __init__(self, traced: Traced, exact: ExactNumber) -> None:
         for name, value in (("traced", traced), ("exact", exact), ("assumed", exact.assumed)):

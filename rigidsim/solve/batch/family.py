@@ -76,12 +76,7 @@ def reason_of_experiment(experiment: Experiment) -> Alone | None:
 
 
 def batchable(experiment: Experiment, keys: Sequence[str]) -> Alone | None:
-    """Why members of an experiment with swept numbers can't run in a batch, as far as can be told before any
-    member is examined; None if they can.
-
-    Args:
-        keys: keys of the swept numbers.
-    """
+    """Why members can't run in a batch, as far as experiment and swept keys tell; None if they can."""
     reason = reason_of_experiment(experiment)
     if reason is not None:
         return reason
@@ -112,11 +107,7 @@ def _reason_of_system(traced: TracedSystem) -> Alone | None:
 
 @dataclass
 class Family:
-    """Members that share the equations of one traced system.
-
-    Attributes:
-        kind: what else its members share, see ``Members.kinds``.
-    """
+    """Members that share the equations of a traced system, and their kind (see ``Members``)."""
 
     traced: TracedSystem
     kind: int
@@ -226,11 +217,7 @@ class Families:
 
     @cached_property
     def _drive(self) -> Drive | None:
-        """The load estimate as the base experiment's build makes it.
-
-        Raises:
-            Untraceable: the base experiment can't be built.
-        """
+        """The load estimate as the base experiment's build makes it."""
         try:
             return prepare(self._members.sweep.base).system.scaling.drive
         except ConfigError as error:

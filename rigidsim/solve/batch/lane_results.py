@@ -57,12 +57,7 @@ class LaneResults:
         self.steps[places] = others.steps
 
     def lost(self, inside: Sequence[int], taken: Sequence[int], gone: Sequence[bool]) -> list[int]:
-        """Note the members whose state was lost, which stopped all lanes; returns the others, which have to
-        begin again.
-
-        Args:
-            inside, taken, gone: each lane's member, its steps, and whether its state was lost.
-        """
+        """Note lanes' members whose state is gone, which stopped all; returns the others, to begin again."""
         others = []
         for member, steps, lost in zip(inside, taken, gone, strict=True):
             if member == IDLE:

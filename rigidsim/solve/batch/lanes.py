@@ -80,11 +80,7 @@ def _grouped(values: np.ndarray, width: int) -> np.ndarray:
 
 
 class BatchEngine:
-    """A compiled batch integrator.
-
-    Args:
-        width: number of lanes of the batch.
-    """
+    """A compiled batch integrator of ``width`` lanes."""
 
     def __init__(self, system: BatchSystem, width: int) -> None:
         self.width = width
@@ -165,11 +161,7 @@ class BatchEngine:
         return result
 
     def longest(self, initial: np.ndarray, parameters: np.ndarray, start: np.ndarray) -> np.ndarray:
-        """Bounds of members' steps (members,), from all terms of the series at their start.
-
-        Args:
-            initial: (states, members); parameters likewise; start: (members,), internal units.
-        """
+        """Bounds of members' steps (members,), from all terms of the series at their start."""
         terms = self._integrator.tc  # (states, terms, lanes)
         still = np.zeros(self.width)
         sizes = []
@@ -191,12 +183,7 @@ class BatchEngine:
         longest: np.ndarray,
         most_steps: int,
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """States (states, n) and times (n,) of motions at most so many steps later, and these steps (n,).
-
-        Args:
-            states, parameters: (.., n); begin, end: (n,), internal units.
-            longest: bounds of steps, (n,).
-        """
+        """States (states, n) and times (n,) of motions at most so many steps later, internal units."""
         integrator, given = self._integrator, (states, parameters, begin, end, longest)
         there, read, then, ends, bounds = (_grouped(x, self.width) for x in given)
         taken = np.empty(then.shape)

@@ -35,11 +35,7 @@ class AxisNumbers:
         return [real_of(number) for number in self.sweep.axes[place].exact(index)]
 
     def columns(self, place: int, which: np.ndarray) -> list[SharedReals]:
-        """The numbers of an axis that members have, one column for each key.
-
-        Args:
-            which: index of the axis value that each member has, (members,).
-        """
+        """The numbers that members have, a column for each key; ``which``: index of each one's value."""
         needed, index = np.unique(which, return_inverse=True)
         values = [self._reals(place, i) for i in needed.tolist()]
         return [SharedReals(np.array(column), index) for column in zip(*values, strict=True)]

@@ -1,54 +1,97 @@
-"""Members' motions and their tangent vectors, which change no bit of the motions.
+"""Members' motions with their events, and tangent vectors beside them.
 
-The motion's numbers are always those of an integrator without tangent vectors. Compiled with them, its
-equations may be rounded otherwise; where a system is small they aren't, and one integrator does for both:
-some lanes are taken by both, and where these differ in any bit, or a vector has grown so far that steps would
-know of it, the motion is taken from the integrator without. How an operation is rounded is a matter of the
-compiled code, not of the numbers, so that a difference shows in the first lanes that are compared: these are
-some of the first block and of every ``_EVERY``-th after it.
+As in a single run an event's expression is given a unit in which it is of order one, and is taken off a zero
+that the motion begins at (``rigidsim.solve.events``). Both depend on the member, so that they are parameters.
 """
 
 from __future__ import annotations
 
-from dataclasses import replace
 from functools import cached_property
+from typing import Any
 
+import heyoka as hy
 import numpy as np
 
-from rigidsim.model.tangents import LARGEST, SMALL
-from rigidsim.solve.batch.events import EventExpressions
 from rigidsim.solve.batch.lane_results import LaneResults
 from rigidsim.solve.batch.lanes import BatchEngine, BatchSystem
 from rigidsim.solve.batch.tracing import TracedSystem
+from rigidsim.solve.compiled import compiled_function
+from rigidsim.solve.events import BESIDE, STATES, TIMES, exponents_of
 
-_UNFELT = float(np.exp(LARGEST - SMALL * np.log(2.0)))
-"""Largest component of a tangent vector that no step control notices."""
+_BITS = 53
 
-_EVERY = 16
+
+class EventExpressions:
+    """Events of a family, with ``parameters`` beside those shared with the equations."""
+
+    def __init__(self, traced: TracedSystem) -> None:
+        self._traced = traced
+        self._meant = [hy.expression(c.expression) for c in traced.system.crossings]
+        self.parameters = 2 * len(self._meant)
+
+    def over_parameters(self) -> list[tuple[Any, int]]:
+        """Expressions with their directions, each with a shift and a factor as parameters."""
+        first = len(self._traced.in_equations)
+        expressions = self._traced.as_parameters(self._meant)
+        return [
+            ((expression + hy.par[first + 2 * n]) * hy.par[first + 2 * n + 1], crossing.direction)
+            for n, (expression, crossing) in enumerate(
+                zip(expressions, self._traced.system.crossings, strict=True)
+            )
+        ]
+
+    @cached_property
+    def _function(self) -> Any:
+        moving = self._traced.system.variables[: self._traced.moving]
+        variables = [*moving, *self._traced.parameters.variables]
+        return compiled_function(self._meant, variables, compact_mode=True)
+
+    def values(
+        self, initial: np.ndarray, swept: np.ndarray, start: np.ndarray, end: np.ndarray
+    ) -> np.ndarray:
+        """Parameters (2 * events, members) for states (.., members), at internal times (members,)."""
+        members = initial.shape[1]
+        found = np.zeros((self.parameters, members))
+        if not self.parameters:
+            return found
+        at_start = self._evaluated(initial, swept, start)
+        found[0::2] = np.where(at_start == 0, 2.0 ** (-_BITS - BESIDE), 0.0)
+        random = np.random.default_rng(0).uniform(-1.0, 1.0, (STATES, len(initial)))
+        largest = np.zeros(at_start.shape)
+        for part in TIMES:
+            for row in range(STATES):
+                states = initial if row == 0 else np.repeat(random[row][:, None], members, axis=1)
+                values = self._evaluated(states, swept, start + part * (end - start))
+                largest = np.fmax(largest, np.where(np.isfinite(values), np.abs(values), 0.0))
+        found[1::2] = np.ldexp(1.0, -exponents_of(largest))
+        return found
+
+    def _evaluated(self, states: np.ndarray, swept: np.ndarray, times: np.ndarray) -> np.ndarray:
+        """Values (events, members), in compact mode, where they don't depend on a member's place."""
+        inputs = np.ascontiguousarray(np.concatenate([states, swept]))
+        options = {"time": np.ascontiguousarray(times)} if self._function.is_time_dependent else {}
+        with np.errstate(all="ignore"):
+            return np.asarray(self._function(inputs, **options))
 
 
 class BatchMotion:
-    """Integrators of a traced system.
+    """Integrators of a traced system with its events, of ``width`` lanes.
 
-    Args:
-        crossings: the system's events.
-        width: lanes of the integrators.
+    The motion's numbers are those of an integrator without tangent vectors: compiled with them, its equations
+    may be rounded otherwise.
     """
 
     def __init__(self, traced: TracedSystem, crossings: EventExpressions, width: int) -> None:
         self._traced, self._crossings, self._width = traced, crossings, width
-        self._tangents = len(traced.system.states) > traced.moving
-        unfelt_beside = traced.system.formulation.unfelt_tangents
-        self._runs = 0
-        self._may_share = self._tangents and unfelt_beside and not traced.system.crossings
 
     @cached_property
     def _plain(self) -> BatchEngine:
         return self._engine(self._traced.moving, with_events=True)
 
     @cached_property
-    def _along(self) -> BatchEngine:
-        return self._engine(len(self._traced.system.states), with_events=False)
+    def _along(self) -> BatchEngine | None:
+        states = len(self._traced.system.states)
+        return self._engine(states, with_events=False) if states > self._traced.moving else None
 
     def _engine(self, states: int, *, with_events: bool) -> BatchEngine:
         system, tolerance = self._traced.system, self._traced.prepared.tolerance
@@ -64,7 +107,7 @@ class BatchMotion:
 
     def compile(self) -> None:
         """Compile the integrators that ``run`` uses."""
-        for engine in ("_plain", "_along") if self._tangents else ("_plain",):
+        for engine in ("_plain", "_along"):
             getattr(self, engine)
 
     def run(
@@ -75,57 +118,17 @@ class BatchMotion:
         times: np.ndarray,
         most_steps: int,
     ) -> tuple[LaneResults, np.ndarray | None]:
-        """Take members to their last samples.
+        """Take members to their last samples; returns the motion's lanes, and the states of motion and
+        tangent vector (samples, states, members), None where the scene has none.
 
         Args:
             initial: (states, members), tangent vectors included; parameters: (parameters, members), those of
                 events after those of the equations.
             start: (members,), times: (samples, members), internal units.
             most_steps: largest number of steps of a member.
-
-        Returns:
-            the motion's lanes, and the states of motion and tangent vector, (samples, states, members); None
-            where the scene has none.
         """
-
-        moving = self._traced.moving
-
-        def plain(which: np.ndarray) -> LaneResults:
-            return self._plain.run(
-                initial[:moving, which], parameters[:, which], start[which], times[:, which], most_steps
-            )
-
-        everybody = np.arange(initial.shape[1])
-        if not self._tangents:
-            return plain(everybody), None
+        motion = self._plain.run(initial[: self._traced.moving], parameters, start, times, most_steps)
+        if self._along is None:
+            return motion, None
         read = parameters[: len(self._traced.in_equations)]
-        along = self._along.run(initial, read, start, times, most_steps)
-        if not self._may_share:
-            return plain(everybody), along.states
-        motion = replace(along, states=along.states[:, :moving])
-        felt = ~(np.abs(along.states[:, moving:]) < _UNFELT).all(axis=(0, 1))
-        felt |= ~along.arrived | ~along.finite
-        again, unfelt = np.flatnonzero(felt), np.flatnonzero(~felt)
-        if len(unfelt):
-            if self._runs % _EVERY == 0:
-                tried = unfelt[np.unique(np.linspace(0, len(unfelt) - 1, self._width).astype(np.int64))]
-                self._may_share = _same_bits(plain(tried), motion, tried)
-            self._runs += 1
-        if not self._may_share:
-            return plain(everybody), along.states
-        if len(again):
-            motion = replace(motion, states=motion.states.copy())
-            motion.put(again, plain(again))
-        return motion, along.states
-
-
-def _same_bits(some: LaneResults, whole: LaneResults, which: np.ndarray) -> bool:
-    """Whether members came out the same in both results.
-
-    Args:
-        which: their places in the whole, in the order of ``some``.
-    """
-    there = np.ascontiguousarray(whole.states[:, :, which])
-    return np.ascontiguousarray(some.states).tobytes() == there.tobytes() and bool(
-        (some.steps == whole.steps[which]).all()
-    )
+        return motion, self._along.run(initial, read, start, times, most_steps).states

@@ -69,11 +69,7 @@ class BatchOutputs:
             self._compiled(growth, len(self._system.states))
 
     def begun(self, initial: np.ndarray, swept: np.ndarray, start: np.ndarray) -> np.ndarray:
-        """Initial values of the invariants' components, (components, m).
-
-        Args:
-            initial: initial states of the motion, (states, m).
-        """
+        """Invariants' components at the start (components, m), for the motion's states (states, m)."""
         return self._evaluated(self._components, initial[None], swept, start[None])[:, 0]
 
     def at(
@@ -118,11 +114,7 @@ class BatchOutputs:
         return values, drifts
 
     def named_at_events(self, found: Sequence[np.ndarray], numbers: Numbers, members: np.ndarray) -> Values:
-        """Outputs at crossings, each (1, n), as recorded variables (n, components), SI.
-
-        Args:
-            members: places of the members that cross.
-        """
+        """Outputs at members' crossings, (1, n) each, as recorded variables (n, components), SI."""
         return {
             variable.name: _at_events(variable, found, numbers, members) for variable in self._system.recorded
         }
@@ -147,12 +139,7 @@ class BatchOutputs:
         times: np.ndarray,
         begun: np.ndarray | None = None,
     ) -> np.ndarray:
-        """Values (expressions, samples, m).
-
-        Args:
-            states: (samples, states, m); times: (samples, m), internal units.
-            begun: initial values of the invariants' components, (components, m).
-        """
+        """Values (expressions, samples, m) for states (samples, states, m) and times (samples, m)."""
         samples, count, m = states.shape
         if not expressions:
             return np.empty((0, samples, m))

@@ -55,11 +55,7 @@ def _real(value: Any) -> hy.real:
 
 
 def _mpf(value: hy.real) -> Any:
-    """The same number as an mpf of the scene's context.
-
-    Raises:
-        ValueError, OverflowError: it isn't finite, or is far outside a double's range.
-    """
+    """The same number as an mpf; ValueError or OverflowError far outside a double's range."""
     places = _BITS - math.frexp(float(value))[1]
     whole = int(value * hy.real(math.ldexp(1.0, places), _BITS))
     return _CONTEXT.make_mpf(from_man_exp(whole, -places))

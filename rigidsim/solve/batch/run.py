@@ -9,11 +9,10 @@ from fractions import Fraction
 
 import numpy as np
 
-from rigidsim.solve.batch.events import EventExpressions
 from rigidsim.solve.batch.family import Family, Numbers
 from rigidsim.solve.batch.lane_results import LaneResults
 from rigidsim.solve.batch.lanes import recommended_width
-from rigidsim.solve.batch.motion import BatchMotion
+from rigidsim.solve.batch.motion import BatchMotion, EventExpressions
 from rigidsim.solve.batch.outputs import BatchOutputs, Values
 from rigidsim.solve.precision import precision_of
 from rigidsim.solve.sampling import SampleClock
@@ -83,11 +82,7 @@ class BatchBlock:
 
 
 class BatchRun:
-    """Runs members of a family with integrators and functions compiled once.
-
-    Args:
-        width: lanes of the integrator; by default what the processor takes at once.
-    """
+    """Runs a family's members with what is compiled once; by default with the processor's own width."""
 
     def __init__(self, family: Family, width: int | None = None) -> None:
         self.width = width or recommended_width()

@@ -32,11 +32,7 @@ _PARAMETER = "swept_"
 
 @dataclass
 class Parameters:
-    """Coefficients that depend on swept numbers, each a variable of the expressions that contain it.
-
-    Attributes:
-        nodes: their nodes in the graph.
-    """
+    """Coefficients that depend on swept numbers (graph ``nodes``), each a variable where it occurs."""
 
     nodes: list[int] = field(default_factory=list)
     _names: dict[int, Any] = field(default_factory=dict)

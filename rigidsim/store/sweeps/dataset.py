@@ -57,11 +57,7 @@ def write_dataset(
     found: Gathered,
     attributes: Mapping[str, Any],
 ) -> str:
-    """Write the dataset atomically; returns the digest of the file.
-
-    Raises:
-        OSError: the file can't be written.
-    """
+    """Write the dataset atomically; returns the digest of the file."""
     with atomic.replacing(path) as temporary:
         with sink(temporary) as target, writing(target) as file:
             file.attributes(attributes)

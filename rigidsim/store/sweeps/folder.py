@@ -49,11 +49,7 @@ class SweepFolder(WorkFolder):
         return content if isinstance(content, dict) else {}
 
     def generations(self) -> list[Generation]:
-        """All of them, the oldest first.
-
-        Raises:
-            RunFolderError: a generation is damaged.
-        """
+        """All of them, the oldest first; RunFolderError for a damaged one."""
         if not self.tiles.is_dir():
             return []
         found = [(path, _GENERATION.fullmatch(path.name)) for path in sorted(self.tiles.iterdir())]
@@ -113,11 +109,7 @@ class SweepFolder(WorkFolder):
         return there
 
     def read(self, generation: Generation, tile: int) -> Tile:
-        """Read and check a tile.
-
-        Raises:
-            RunFolderError: the tile is damaged, or isn't the one that belongs there.
-        """
+        """Read and check a tile; RunFolderError if it is damaged, or isn't the one that belongs there."""
         path = self.tile(generation, tile)
         again = f"remove it, and {RESUME} computes it again"
         try:
@@ -133,11 +125,7 @@ class SweepFolder(WorkFolder):
         atomic.write_bytes(self.tile(generation, tile), image)
 
     def begin(self, *, force: bool) -> None:
-        """Make the folder ready for a sweep.
-
-        Raises:
-            RunFolderError: the folder holds something else, or can't be written.
-        """
+        """Make the folder ready; RunFolderError if it holds something else, or can't be written."""
         ours = {"config.toml", "tiles", "dataset.h5", "summary.json"}
         try:
             self.refuse_a_file()

@@ -20,11 +20,7 @@ _TILES_IN_MEMORY = 96
 
 @dataclass
 class Described:
-    """A variable as described by the tiles.
-
-    Attributes:
-        extra: sizes of the dimensions besides the members', the largest in any tile.
-    """
+    """A variable as tiles describe it; ``extra``: largest sizes of dimensions besides the members'."""
 
     variable: TileVariable
     whole: bool
@@ -61,21 +57,13 @@ class TileReader:
         return str(self._folder.path)
 
     def _read(self, key: int) -> Tile:
-        """A tile, by its ``key_of``, checked when it is read.
-
-        Raises:
-            RunFolderError: the tile is damaged.
-        """
+        """A tile, by its ``key_of``; RunFolderError if it is damaged."""
         generation, number = tile_of(key)
         return self._folder.read(self._generations[generation], number)
 
 
 def gather(sources: Sources, reader: TileReader) -> Gathered:
-    """Read once every tile that is used.
-
-    Raises:
-        RunFolderError: a tile is gone or damaged, or two describe a variable differently.
-    """
+    """Read once every tile that is used; RunFolderError if one is gone, damaged, or disagrees with others."""
     found = Gathered()
     if len(sources.missing):
         gone = len(sources.missing)

@@ -19,12 +19,7 @@ from rigidsim.errors import FORCE, RunFolderError
 
 @dataclass(frozen=True)
 class Work:
-    """Members for which the same items are to be computed.
-
-    Attributes:
-        keep: items that are kept.
-        ranges: [first, stop) of the members, ascending.
-    """
+    """Members, by ranges [first, stop), ascending, for which the same items are to be computed."""
 
     keep: tuple[str, ...]
     ranges: tuple[tuple[int, int], ...]
@@ -127,11 +122,7 @@ class Generation:
 
     @classmethod
     def read(cls, path: Path, number: int) -> Generation:
-        """Read a ``gNNN.json``.
-
-        Raises:
-            RunFolderError: the file is damaged.
-        """
+        """Read a ``gNNN.json``; RunFolderError if it is damaged."""
         try:
             content = json.loads(path.read_text(encoding="utf-8"))
             works = tuple(

@@ -83,12 +83,7 @@ def sources_of(
     generations: Sequence[tuple[Generation, Sweep]],
     to_come: Generation | None = None,
 ) -> Sources:
-    """Find everything that a sweep asks for; the oldest copy counts.
-
-    Args:
-        generations: the folder's generations, with the sweeps that their configs describe.
-        to_come: one whose tiles count whether they exist already or not.
-    """
+    """Find all that a sweep asks for in its folder's generations, or ``to_come``; the oldest counts."""
     found = {
         item: ItemPlaces(
             np.full(sweep.count, _NOWHERE, dtype=np.int64), np.full(sweep.count, _NOWHERE, dtype=np.int32)

@@ -21,12 +21,7 @@ _FORMAT = 1
 
 @dataclass(frozen=True)
 class TileVariable:
-    """Description of a variable in a tile.
-
-    Attributes:
-        dims: dimensions besides the members'.
-        item: item of ``[sweep] keep`` that it belongs to.
-    """
+    """A variable in a tile: dimensions besides the members', and the item of ``keep`` that it is of."""
 
     dims: tuple[str, ...]
     attributes: Mapping[str, Any]
@@ -77,14 +72,7 @@ class Tile:
 
 
 def read_tile(path: Path, config_sha256: str) -> Tile:
-    """Read a tile and check its seal.
-
-    Args:
-        config_sha256: SHA-256 of the config that its members belong to.
-
-    Raises:
-        RunFolderError: the file is torn, damaged, foreign, or of another sweep.
-    """
+    """Read a tile; RunFolderError if it is torn, damaged, foreign, or of another config."""
     refuse_special(path)
     check_seal(path)
     try:

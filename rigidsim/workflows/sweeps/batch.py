@@ -153,11 +153,7 @@ class BatchTiles:
                 self._estimate_of(family, run).compile()
 
     def run(self, members: Sequence[int], keep: Sequence[str], apart: bool | None = None) -> Batched:
-        """Run all members that can be run together.
-
-        Args:
-            apart: whether none can, if it was judged before, when the sweep may have had fewer members.
-        """
+        """Run all members that can be run together; none if they were found to run ``apart`` before."""
         if apart or (apart is None and self.apart is not None):
             why = self.apart or Alone.FAMILIES
             return Batched([], [], list(range(len(members))), why.name.lower())
@@ -180,15 +176,7 @@ class BatchTiles:
         return done
 
     def refused(self, members: Sequence[int], most: int | None = None) -> tuple[dict[int, ConfigError], int]:
-        """Members that no run accepts; nothing is integrated.
-
-        Args:
-            most: number after which the search stops.
-
-        Returns:
-            What is wrong with each, and how many members share their equations with others and can be run;
-            nothing is known about the rest.
-        """
+        """Members that no run accepts, up to ``most``, why, and how many share equations and can be run."""
         if self.apart is not None:
             return {}, 0
         found = self._sorted(members, most, _MOST_UNTRACED)
@@ -286,11 +274,7 @@ def rows_of(kept: Kept, rows: np.ndarray) -> Kept:
 
 
 def in_order(parts: Sequence[MemberResults], members: Sequence[np.ndarray]) -> MemberResults:
-    """Groups of a tile's members joined, each member at its place.
-
-    Args:
-        members: places of the members of each group.
-    """
+    """Groups of a tile's members joined, each member at its place (``members``: the places of each)."""
     places = np.concatenate(members)
     whole = MemberResults.together(parts)
     order = np.argsort(places, kind="stable")

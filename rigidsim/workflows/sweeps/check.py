@@ -69,11 +69,7 @@ def check_sweep(sweep: Sweep, *, every: bool = True, each: Each = map) -> Initia
 
 
 def _worked_out(sweep: Sweep, most: int, *, equations: bool = False) -> list[Problem]:
-    """Problems of members that are worked out in full, see ``_tried``.
-
-    Args:
-        equations: also build their equations, which takes some ten times as long.
-    """
+    """Problems of members worked out in full (``_tried``), with equations in ten times the time."""
     problems: list[Problem] = []
     for member in _tried(sweep, most):
         try:
@@ -108,23 +104,14 @@ def _refused_or_accepted(shares: Iterable[Share]) -> Share:
 
 
 def refused_of(share: tuple[str, int, int]) -> Share:
-    """Members of a share of a sweep that no run accepts, at most ``_MOST_TOLD``, and how many can be run and
-    share their equations with others.
-
-    Args:
-        share: the sweep's config, the first member, and the one after the last.
-    """
+    """Of a share (config, first, stop): members that no run accepts, and how many can be run together."""
     config, begin, end = share
     refused, accepted = batches_of(config).refused(range(begin, end), _MOST_TOLD)
     return sorted(refused)[:_MOST_TOLD], accepted
 
 
 def _tried(sweep: Sweep, most: int) -> Iterator[int]:
-    """Members that are worked out in full before anything runs.
-
-    Args:
-        most: number of values of an axis that are tried of many.
-    """
+    """Members that are worked out in full before anything runs; ``most``: of the values of a long axis."""
     if sweep.count <= _ALL:
         yield from range(1, sweep.count)
         return

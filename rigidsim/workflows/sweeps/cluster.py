@@ -114,22 +114,14 @@ class Cluster:
 
 
 class _ClusterWorkers:
-    """Workers of a scheduler, and since when there have been none.
-
-    Args:
-        alone: seconds that this may last.
-    """
+    """Workers of a scheduler, which may be none for ``alone`` seconds."""
 
     def __init__(self, client: Any, address: str, alone: float) -> None:
         self._client, self._address, self._alone = client, address, alone
         self._since: float | None = None
 
     def threads(self) -> int:
-        """Total number of their threads.
-
-        Raises:
-            StoppedError: there has been no worker for too long.
-        """
+        """Total number of their threads; StoppedError if there has been no worker for too long."""
         threads = sum(self._client.nthreads().values())
         if threads:
             self._since = None
@@ -146,11 +138,7 @@ class _ClusterWorkers:
 
 
 def _fetched(future: Any, workers: _ClusterWorkers) -> bytes:
-    """Bytes of a finished tile; if its worker is gone, the tile is computed again first.
-
-    Raises:
-        StoppedError: there has been no worker for too long.
-    """
+    """Bytes of a finished tile; if its worker is gone, the tile is computed again first."""
     fetched: Future[bytes] = Future()
 
     def fetch() -> None:

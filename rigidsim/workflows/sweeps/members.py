@@ -39,11 +39,7 @@ def sweep_of(config: str) -> Sweep:
 
 
 def first_possible(sweep: Sweep) -> int:
-    """The first member that can be run; without ``impossible = "mark"`` it has to be the first of all.
-
-    Raises:
-        ConfigError: the first can't be run, or none of ``_MOST_TRIED`` if such members are marked.
-    """
+    """The first member that can be run: the first of all, unless ``impossible = "mark"``."""
     marking = sweep.table.impossible == "mark"
     refused: ConfigError | None = None
     for member in range(min(sweep.count, _MOST_TRIED) if marking else 1):
@@ -65,11 +61,7 @@ def markable(problems: Sequence[Problem]) -> list[Problem]:
 
 
 def recording(sweep: Sweep) -> Sweep:
-    """The sweep with its members recording everything that is to be kept.
-
-    Raises:
-        ConfigError: the base experiment can't be run, so that its recorded variables are unknown.
-    """
+    """The sweep with its members recording everything that is to be kept."""
     output = sweep.base.config.output
     if not set(sweep.table.keep) & set(INDICATORS) or GROWTH in (output.record or ()):
         return sweep
@@ -87,16 +79,7 @@ def hidden_of(sweep: Sweep) -> tuple[str, ...]:
 
 
 def tile_image(config: str, members: Sequence[int], keep: Sequence[str], apart: bool | None) -> bytes:
-    """Run some members; returns the sealed file of their tile.
-
-    Args:
-        config: the sweep's config text.
-        keep: items to be kept, as in ``items_of``.
-        apart: see ``run_members``.
-
-    Raises:
-        KeyboardInterrupt: the computation was interrupted.
-    """
+    """Run members of a sweep's config and keep items (``items_of``): the sealed file of their tile."""
     began, cpu = time.perf_counter(), time.process_time()
     sweep = sweep_of(config)
     results = run_members(sweep, members, [plain(item) for item in keep], apart)
@@ -123,11 +106,7 @@ def tile_image(config: str, members: Sequence[int], keep: Sequence[str], apart: 
 def run_members(
     sweep: Sweep, members: Sequence[int], keep: Sequence[str], apart: bool | None = None
 ) -> MemberResults:
-    """Run some members of a sweep and keep the items asked for.
-
-    Args:
-        apart: see ``Generation``; judged by the config if it isn't known.
-    """
+    """Run some members of a sweep and keep the items asked for; ``apart``: see ``Generation``."""
     events = [event.name for event in sweep.base.config.events]
     most = sweep.table.most_events
     more = frequencies_of if "frequencies" in keep else None
@@ -171,13 +150,8 @@ def single_member(experiment: Experiment, member: int) -> Experiment:
     return sweep.experiment_of(member).having([f'name="{name}"'])
 
 
-def alone(sweep: Sweep, member: int) -> Experiment:
-    """The experiment of a member run by itself."""
-    return sweep.experiment_of(member)
-
-
 def _run_alone(sweep: Sweep, member: int) -> MemoryRun:
-    return run(alone(sweep, member), out=None)
+    return run(sweep.experiment_of(member), out=None)
 
 
 def frequencies_of(result: MemoryRun) -> Kept:

@@ -13,7 +13,7 @@ from rigidsim.store.summary_parts import SummaryPart
 from rigidsim.workflows.plan import RunPlan, plan
 from rigidsim.workflows.sweeps.batch import why_alone
 from rigidsim.workflows.sweeps.check import QUICK, check_sweep
-from rigidsim.workflows.sweeps.members import alone, batches_of, first_possible, recording
+from rigidsim.workflows.sweeps.members import batches_of, first_possible, recording
 
 _SECONDS_OF_A_TILE, _LEAST_SECONDS = 5.0, 2.0
 _SHARE_OF_A_TILE = 32
@@ -30,11 +30,7 @@ _ESTIMATED = 2.5  # cost ratio of a batch member with estimated errors to one wi
 
 
 def refuse_untold_tiles(sweep: Sweep) -> None:
-    """Refuse shares of tiles whose number depends on how fast a machine is.
-
-    Raises:
-        ConfigError: ``[sweep] tile`` is missing.
-    """
+    """Refuse shares of tiles whose number depends on how fast a machine is."""
     if sweep.table.tile is None and sweep.count > _FEW:
         length = max(_FEW, sweep.count // 1000)
         what = (
@@ -52,7 +48,7 @@ def tile_length(sweep: Sweep) -> int:
     if sweep.count <= _FEW:
         return max(1, -(-sweep.count // _TILES_OF_FEW))
     first = first_possible(sweep)
-    made = plan(alone(sweep, first), pilot_seconds=0.05)
+    made = plan(sweep.experiment_of(first), pilot_seconds=0.05)
     size = bytes_of_member(sweep, prepare(sweep.worked_out(first)))
     return _length(sweep, _member_seconds(sweep, made), size)
 
@@ -157,7 +153,7 @@ def plan_sweep(sweep: Sweep) -> SweepPlan:
     """
     sweep = recording(sweep)
     first = check_sweep(sweep, every=sweep.count <= QUICK)
-    made = plan(alone(sweep, first_possible(sweep)))
+    made = plan(sweep.experiment_of(first_possible(sweep)))
     seconds, size = _member_seconds(sweep, made), bytes_of_member(sweep, first)
     length = sweep.table.tile
     if length is None:

@@ -41,11 +41,7 @@ class _Counted:
 def summary_of(
     wanted: Sweep, sources: Sources, reader: TileReader, found: Gathered, wall: float, cpu: float
 ) -> SweepSummary:
-    """Contents of ``summary.json`` for a complete sweep.
-
-    Args:
-        wall, cpu: seconds of this process.
-    """
+    """Contents of ``summary.json`` for a complete sweep; seconds of this process."""
     counted = _count(sources, reader)
     outcomes = {OUTCOMES[i]: int(n) for i, n in enumerate(counted.outcomes) if n}
     failing = wanted.count - sum(outcomes.get(status, 0) for status in ENDED_WELL)

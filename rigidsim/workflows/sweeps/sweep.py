@@ -227,12 +227,7 @@ def identity(sweep: Sweep) -> str:
 
 
 def _generation(wanted: Sweep, folder: SweepFolder, length: int | None, *, exclusive: bool) -> Generation:
-    """The generation to work on: the latest if it is of this config and has all that is missing, otherwise a
-    new one.
-
-    Args:
-        length: members of a tile of a new one, if known already.
-    """
+    """The latest generation if it is of this config and has all that is missing, otherwise a new one."""
     generations = folder.generations()
     latest = [g for g in generations[-1:] if g.config_sha256 == wanted.experiment.sha256]
     if latest and len(generations) == 1:

@@ -88,11 +88,7 @@ def _problems(saved: SavedSweep, dataset: xarray.Dataset, sweep: Sweep) -> list[
 def _differences(
     dataset: xarray.Dataset, sweep: Sweep, members: Sequence[int], again: Kept, held: dict[str, np.ndarray]
 ) -> list[tuple[str, int, float, float]]:
-    """For each variable the first member in which any bit differs: its place, and both numbers.
-
-    Args:
-        held: variables that have been read already.
-    """
+    """For each variable the first member in which any bit differs: its place, and both numbers."""
     found = []
     for name, variable in sorted(again.items()):
         here = np.asarray(variable.values, dtype=variable.values.dtype)

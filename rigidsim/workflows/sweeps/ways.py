@@ -79,11 +79,7 @@ class OneProcess:
 
 
 class Workers:
-    """Worker processes that compute tiles, which this process saves.
-
-    Args:
-        count: number of processes.
-    """
+    """``count`` worker processes that compute tiles, which this process saves."""
 
     def __init__(self, count: int) -> None:
         self._count = count
@@ -112,11 +108,7 @@ class Workers:
         return _rest_here(function, tasks, given)
 
     def images(self, generation: Generation, tiles: Sequence[int]) -> Iterator[tuple[int, bytes]]:
-        """See ``Way``.
-
-        Raises:
-            StoppedError: workers die repeatedly at the same tile.
-        """
+        """See ``Way``; StoppedError if workers die repeatedly at the same tile."""
         waiting = list(reversed(tiles))
         deaths: Counter[int] = Counter()
         while waiting:
