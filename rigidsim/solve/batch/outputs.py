@@ -9,16 +9,12 @@ from typing import Any
 import heyoka as hy
 import numpy as np
 
-from rigidsim.model.outputs import Recorded
 from rigidsim.model.tangents import GROWTH
-from rigidsim.scene.tracing.numbers import Traced
 from rigidsim.solve.batch.family import Numbers
 from rigidsim.solve.batch.tracing import TracedSystem
 from rigidsim.solve.compiled import compiled_function
 
 _GROUP = 64  # a multiple of every SIMD width: padded to it, a column's bits don't depend on its place
-
-_NORMAL = 1000  # exponents of powers of two that are normal numbers
 
 Values = dict[str, np.ndarray]
 
@@ -99,13 +95,7 @@ class BatchOutputs:
         """Outputs, each (samples, m), as recorded variables (samples, m, components), SI, and drifts by
         invariant.
         """
-        values: Values = {}
-        for variable in self._system.recorded:
-            columns = [
-                _to_si(found[variable.first + k], numbers, variable.exponents[k], part)
-                for k in range(variable.count)
-            ]
-            values[variable.name] = np.stack(columns, axis=2)
+        values = self._in_si(found, numbers, part)
         first = len(self._system.outputs) - len(self._system.invariants)
         drifts = {
             f"{invariant.name}_drift": found[first + n] for n, invariant in enumerate(self._system.invariants)
@@ -115,9 +105,17 @@ class BatchOutputs:
 
     def named_at_events(self, found: Sequence[np.ndarray], numbers: Numbers, members: np.ndarray) -> Values:
         """Outputs at members' crossings, (1, n) each, as recorded variables (n, components), SI."""
-        return {
-            variable.name: _at_events(variable, found, numbers, members) for variable in self._system.recorded
-        }
+        return {name: values[0] for name, values in self._in_si(found, numbers, members).items()}
+
+    def _in_si(self, found: Sequence[np.ndarray], numbers: Numbers, members: np.ndarray) -> Values:
+        values: Values = {}
+        for variable in self._system.recorded:
+            columns = [
+                np.ldexp(found[variable.first + k], numbers.whole_numbers(exponent)[members])
+                for k, exponent in enumerate(variable.exponents)
+            ]
+            values[variable.name] = np.stack(columns, axis=2)
+        return values
 
     def _join(self, values: Values, numbers: Numbers, part: np.ndarray) -> None:
         """Give each quaternion the sign nearest to the one before, as in a single run."""
@@ -163,24 +161,3 @@ class BatchOutputs:
         rows = [states[:, n] if n < count else swept[n - count] for n in read]
         found = np.asarray(function(spread(rows), **arguments))
         return found[:, :columns].reshape(len(expressions), samples, m)
-
-
-def _to_si(values: np.ndarray, numbers: Numbers, exponent: Any, part: np.ndarray) -> np.ndarray:
-    if not isinstance(exponent, Traced):
-        return np.ldexp(values, int(exponent)) if exponent else values
-    exponents = numbers.whole_numbers(exponent)[part]
-    if (
-        np.abs(exponents).max(initial=0) < _NORMAL
-    ):  # where a product with a power of two is rounded like ldexp,
-        return np.asarray(values * np.ldexp(1.0, exponents))  # at a tenth of its cost
-    return np.ldexp(values, exponents)
-
-
-def _at_events(
-    variable: Recorded, at: Sequence[np.ndarray], numbers: Numbers, chosen: np.ndarray
-) -> np.ndarray:
-    columns = [
-        np.ldexp(at[variable.first + k][0], numbers.whole_numbers(variable.exponents[k])[chosen])
-        for k in range(variable.count)
-    ]
-    return np.stack(columns, axis=1)

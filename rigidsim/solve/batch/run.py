@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from fractions import Fraction
 
 import numpy as np
 
@@ -59,7 +58,6 @@ class BatchBlock:
         reached: samples that each got to, (m,).
         steps: steps taken, (m,).
         drift_bound: relative drift that rounding alone explains, (m,).
-        radians_between: largest angle by which each body turns between neighbouring samples, (m,).
         events: crossings of each event.
         width: lanes of the integrator, on which the last bits depend.
     """
@@ -76,7 +74,6 @@ class BatchBlock:
     reached: np.ndarray
     steps: np.ndarray
     drift_bound: np.ndarray
-    radians_between: np.ndarray
     events: list[BatchEvents]
     width: int
 
@@ -138,7 +135,6 @@ class BatchRun:
             _reached(lanes),
             lanes.steps,
             self._traced.prepared.drift_bound(lanes.steps),
-            self._turned(numbers, part),
             self._events(lanes, swept, numbers, part, units, begun),
             self.width,
         )
@@ -171,14 +167,6 @@ class BatchRun:
         found[~lanes.arrived & ~lanes.finite] = Status.NON_FINITE
         return found
 
-    def _turned(self, numbers: Numbers, part: np.ndarray) -> np.ndarray:
-        samples = self._traced.prepared.scene.samples
-        spacing = samples.step
-        if samples.times is not None:
-            pairs = zip(samples.times, samples.times[1:], strict=False)
-            spacing = max((b - a for a, b in pairs), default=Fraction(0))
-        return numbers.doubles(self._system.rate_bound)[part] * float(spacing)
-
     # --- events and guards ----------------------------------------------------------------------------------
 
     def _events(
@@ -196,7 +184,7 @@ class BatchRun:
             rows.sort(key=lambda row: (row[0], row[1].time))
             place = np.array([m for m, _ in rows], dtype=np.int64)
             times = np.array([f.time for _, f in rows])
-            values: Values = {}
+            values = {v.name: np.zeros((0, v.count)) for v in self._system.recorded}
             if rows:
                 states = np.array([f.state for _, f in rows]).T[None]
                 at = self._outputs.at(states, swept[:, place], times[None], begun[:, place])

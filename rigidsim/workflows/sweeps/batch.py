@@ -13,7 +13,6 @@ import numpy as np
 
 from rigidsim.accuracy.estimates.members import MemberErrors, MemberEstimates
 from rigidsim.errors import ConfigError
-from rigidsim.scene.config import Experiment
 from rigidsim.scene.sweeps.sweep import Sweep
 from rigidsim.session.dataset import dataset_variables
 from rigidsim.session.kept import Kept, KeptVariable, MemberSeries, Points, kept_events, kept_of_series
@@ -49,14 +48,8 @@ _MOST_UNTRACED = 8
 
 @dataclass
 class Batched:
-    """Result of running a tile's members in batches.
-
-    Attributes:
-        results: results of members that were run, or that no run accepts.
-        members: places of those members in the tile.
-        left: places of members still to be run one by one.
-        why: reason why the first of these is left; empty if none is.
-        estimating: CPU seconds spent on error estimates.
+    """Results of a tile's members that were run in batches, or that no run accepts, with their places; places
+    of those still to be run one by one, and why the first of them is left; CPU seconds of error estimates.
     """
 
     results: list[MemberResults]
@@ -80,6 +73,20 @@ def why_alone(sweep: Sweep, keep: Sequence[str]) -> str:
     return "" if reason is None else reason.name.lower()
 
 
+@dataclass(frozen=True)
+class _FamilyRun:
+    """What is compiled for a family, and the variables that its members record."""
+
+    family: Family
+    run: BatchRun
+    variables: list[Variable]
+
+    @cached_property
+    def estimates(self) -> MemberEstimates:
+        """Estimates of its members' errors."""
+        return MemberEstimates(self.family, self.run.width)
+
+
 class BatchTiles:
     """Families of a sweep, traced and compiled once per process.
 
@@ -95,8 +102,7 @@ class BatchTiles:
         self._hidden = hidden
         self.axes = AxisNumbers(sweep)
         self._known: list[Family] = []
-        self._runs: dict[int, tuple[BatchRun, list[Variable]]] = {}
-        self._estimates: dict[int, MemberEstimates] = {}
+        self._runs: dict[int, _FamilyRun] = {}
 
     @cached_property
     def apart(self) -> Alone | None:
@@ -136,7 +142,6 @@ class BatchTiles:
         if len(self._known) > _MOST_HELD:  # whoever represents a family, it has the same numbers
             self._known.clear()
             self._runs.clear()
-            self._estimates.clear()
         families = Families(Members(self._sweep, members, self.axes), most_refused, most_untraced)
         families.known = self._known
         return families.sort()
@@ -147,10 +152,10 @@ class BatchTiles:
             return
         some, found = self._sample
         for family, numbers in found.groups[:_MOST_AHEAD]:
-            run, _ = self._run_of(family, some[int(numbers.members[0])])
-            run.compile()
+            compiled = self._run_of(family, some[int(numbers.members[0])])
+            compiled.run.compile()
             if self._estimated:
-                self._estimate_of(family, run).compile()
+                compiled.estimates.compile()
 
     def run(self, members: Sequence[int], keep: Sequence[str], apart: bool | None = None) -> Batched:
         """Run all members that can be run together; none if they were found to run ``apart`` before."""
@@ -166,12 +171,12 @@ class BatchTiles:
             done.results.append(failed(Outcome.REFUSED, reason))
             done.members.append(np.array([place]))
         for family, numbers in found.groups:
-            run, variables = self._run_of(family, int(members[int(numbers.members[0])]))
-            for block in run.blocks(numbers):
+            compiled = self._run_of(family, int(members[int(numbers.members[0])]))
+            for block in compiled.run.blocks(numbers):
                 before = time.process_time()
-                errors = self._estimate_of(family, run).of(numbers, block) if self._estimated else None
+                errors = compiled.estimates.of(numbers, block) if self._estimated else None
                 done.estimating += time.process_time() - before
-                self._take(block, errors, variables, keep, done)
+                self._take(block, errors, compiled.variables, keep, done)
         done.left.sort()
         return done
 
@@ -183,21 +188,16 @@ class BatchTiles:
         accepted = sum(len(numbers.members) for _, numbers in found.groups)
         return {int(members[place]): error for place, error in found.refused.items()}, accepted
 
-    def _run_of(self, family: Family, member: int) -> tuple[BatchRun, list[Variable]]:
+    def _run_of(self, family: Family, member: int) -> _FamilyRun:
         if id(family) not in self._runs:
-            experiment: Experiment = self._sweep.worked_out(member)
-            variables = [v for v in dataset_variables(prepare(experiment)) if "units" in v.attributes]
-            self._runs[id(family)] = BatchRun(family), variables
+            prepared = prepare(self._sweep.worked_out(member))
+            variables = [v for v in dataset_variables(prepared) if "units" in v.attributes]
+            self._runs[id(family)] = _FamilyRun(family, BatchRun(family), variables)
         return self._runs[id(family)]
 
     @property
     def _estimated(self) -> bool:
         return self._sweep.base.config.output.estimate
-
-    def _estimate_of(self, family: Family, run: BatchRun) -> MemberEstimates:
-        if id(family) not in self._estimates:
-            self._estimates[id(family)] = MemberEstimates(family, run.width)
-        return self._estimates[id(family)]
 
     def _take(
         self,
@@ -309,11 +309,5 @@ def _kept(
             for name, values in event.values.items()
             if name in recorded
         }
-        if not event.values:
-            empty = [np.zeros((0, max(1, int(np.prod(v.shape))))) for v in recorded.values()]
-            points = {
-                name: (variable, [nothing] * len(block.members))
-                for (name, variable), nothing in zip(recorded.items(), empty, strict=True)
-            }
         kept |= kept_events(event.name, times, most_events, points, keep)
     return kept
