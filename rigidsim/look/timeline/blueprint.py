@@ -14,7 +14,7 @@ from rigidsim.look.clock import Clock
 from rigidsim.look.plots import Plot
 from rigidsim.look.stages.bodies import Subject, camera
 from rigidsim.look.stages.parts import Color, Plane, Stage
-from rigidsim.look.timeline.drawing import OLDER, trail_path
+from rigidsim.look.timeline.drawing import OLDER, fades, trail_path, trail_stride
 from rigidsim.look.timeline.drawn import DrawnRun
 from rigidsim.look.timeline.plotting import (
     LEGEND_LINE,
@@ -153,11 +153,14 @@ def space_view(stage: Stage, clock: Clock, *, narrow: bool, subject: Subject | N
     overrides: dict[Any, Any] = {}
     for trail in stage.trails:
         path = trail_path(stage, trail)
-        # A piece of the older part ends where its row is: it must not stand out over the bright one.
-        shown = round(RECENT * rows) if trail.line else rows
+        stride = trail_stride(trail)
+        fading = fades(trail, stride)
+        shown = round(RECENT * rows) if fading else rows
         overrides[f"{path}/recent"] = rrb.VisibleTimeRanges(_window(clock, shown))
-        if trail.line:
-            overrides[f"{path}/older"] = rrb.VisibleTimeRanges(_window(clock, max(rows, 2 * OLDER)))
+        if fading:
+            # A piece of the older part ends where its row is: it must not stand out over the bright one.
+            longest = max(rows, 2 * OLDER * stride)
+            overrides[f"{path}/older"] = rrb.VisibleTimeRanges(_window(clock, longest))
     origin = f"/{stage.root}/{stage.looked_from}" if stage.looked_from else f"/{stage.root}"
     return rrb.Spatial3DView(
         origin=origin,

@@ -6,7 +6,7 @@ the viewer then shows their own colours from all sides, and edges tell the faces
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -22,6 +22,9 @@ Columns = Iterable[rr.ComponentColumn]
 
 OLDER = 16
 """Rows in one piece of a trail's older part."""
+SCENE_ROWS = 20_000  # above which arrows and trails are thinned, if their motion allows it
+_STILL = 0.01  # of an arrow's length, by which it may move between rows that are drawn
+_SMOOTH = 0.2  # of a trail's radius, between its corners: some thirty a turn
 _EDGE: Color = (12, 14, 20)
 _AXIS_COLORS = [(235, 70, 60), (90, 200, 90), (80, 130, 250)]
 _FADED, _DIM = 0.5, 0.26  # of a trail's brightness: its older part, and the whole curve
@@ -177,7 +180,36 @@ def _dimmed(color: Color, part: float) -> tuple[int, int, int]:
     return red, green, blue
 
 
-def stage_columns(stage: Stage, rows: slice) -> Iterable[tuple[str, slice, Columns]]:
+def stride_of(points: NDArray[np.float64], share: float) -> int:
+    """Stride between drawn rows: several in a long run whose points move by at most a share of their size."""
+    if len(points) > SCENE_ROWS:
+        for stride in (16, 4):
+            if np.abs(points[stride:] - points[:-stride]).max() <= share * np.abs(points).max():
+                return stride
+    return 1
+
+
+def trail_stride(trail: Trail) -> int:
+    """Stride between the ends of a trail's pieces; a cloud of points needs no more of them."""
+    if trail.line:
+        return stride_of(trail.points - trail.whole.mean(axis=0), _SMOOTH)
+    return -(-len(trail.points) // SCENE_ROWS)
+
+
+def fades(trail: Trail, stride: int) -> bool:
+    """Whether a trail has a darker older part; a long trail of a fast motion is heavy enough without."""
+    return trail.line and (stride > 1 or len(trail.points) <= SCENE_ROWS)
+
+
+def strides_of(stage: Stage) -> dict[str, int]:
+    """Strides between drawn rows for each arrow and each trail, by entity."""
+    found = {_arrow_path(stage, arrow): stride_of(arrow.vectors, _STILL) for arrow in stage.arrows}
+    return found | {trail_path(stage, trail): trail_stride(trail) for trail in stage.trails}
+
+
+def stage_columns(
+    stage: Stage, rows: slice, strides: Mapping[str, int]
+) -> Iterable[tuple[str, slice, Columns]]:
     """Entities of a stage with their rows (of the run) and columns, for the rows of one chunk."""
     root = f"/{stage.root}"
     # Translation and rotation in one call: apart, the viewer would see states that never were.
@@ -194,29 +226,39 @@ def stage_columns(stage: Stage, rows: slice) -> Iterable[tuple[str, slice, Colum
     for name, turning in stage.frames.items():
         yield f"{root}/{name}", rows, rr.Transform3D.columns(quaternion=turning[rows])
     for arrow in stage.arrows:
-        vectors = arrow.vectors[rows].astype(np.float32)
+        path = _arrow_path(stage, arrow)
+        picked = _every(rows, strides[path])
+        vectors = arrow.vectors[picked].astype(np.float32)
         columns = [*rr.Arrows3D.columns(vectors=vectors)]
         if arrow.label:
             columns += rr.Points3D.columns(positions=vectors * np.float32(arrow.label_at))
-        yield _arrow_path(stage, arrow), rows, columns
+        yield path, picked, columns
     for trail in stage.trails:
         path = trail_path(stage, trail)
-        points = rr.Points3D.columns(positions=trail.points[rows].astype(np.float32))
+        stride = strides[path]
+        picked, older = _every(rows, stride), _every(rows, OLDER * stride)
         if trail.head:
-            yield f"{path}/head", rows, points
+            head = trail.points[rows].astype(np.float32)
+            yield f"{path}/head", rows, rr.Points3D.columns(positions=head)
         if not trail.line:
-            yield f"{path}/recent", rows, points
+            points = trail.points[picked].astype(np.float32)
+            yield f"{path}/recent", picked, rr.Points3D.columns(positions=points)
             continue
-        yield f"{path}/recent", rows, rr.LineStrips3D.columns(strips=_pieces(trail.points, rows, 1))
-        older = slice(-(-rows.start // OLDER) * OLDER, rows.stop, OLDER)
-        if older.start < rows.stop:
-            yield f"{path}/older", older, rr.LineStrips3D.columns(strips=_pieces(trail.points, older, OLDER))
+        strips = _pieces(trail.points, picked, stride, 1)
+        yield f"{path}/recent", picked, rr.LineStrips3D.columns(strips=strips)
+        if fades(trail, stride) and older.start < rows.stop:
+            strips = _pieces(trail.points, older, stride, OLDER)
+            yield f"{path}/older", older, rr.LineStrips3D.columns(strips=strips)
 
 
-def _pieces(points: NDArray[np.float64], rows: slice, length: int) -> pa.Array:
-    """For each row, a strip of `length` + 1 points up to that row; built at once in Arrow."""
+def _every(rows: slice, stride: int) -> slice:
+    return slice(-(-rows.start // stride) * stride, rows.stop, stride)
+
+
+def _pieces(points: NDArray[np.float64], rows: slice, stride: int, length: int) -> pa.Array:
+    """For each row, a strip of `length` + 1 points up to it, `stride` rows apart; built at once in Arrow."""
     ends = np.arange(rows.start, rows.stop, rows.step or 1)
-    places = np.maximum(ends[:, None] - np.arange(length, -1, -1), 0)
+    places = np.maximum(ends[:, None] - stride * np.arange(length, -1, -1), 0)
     flat = points[places].astype(np.float32).ravel()
     kind = rr.components.LineStrip3DBatch._ARROW_DATATYPE
     offsets = pa.array(np.arange(len(ends) + 1, dtype=np.int32) * (length + 1))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -33,6 +33,7 @@ class DrawnRun:
         steps: (rows,), which rows of the dataset these are.
         pages: markdown by name.
         words: wording of its times.
+        strides: of arrows and trails, by the stage's root and their entity.
         turns: turns of the body during the run, from its mean rate; 0 if the rate isn't known.
     """
 
@@ -47,6 +48,7 @@ class DrawnRun:
     pages: dict[str, str]
     words: TimeWords
     turns: float
+    strides: dict[str, dict[str, int]] = field(default_factory=dict)
 
     @classmethod
     def of(
@@ -120,7 +122,9 @@ class DrawnRun:
         """Draw what changes, for some rows."""
         times = self._times(rows)
         for stage in self.picture.stages:
-            for path, picked, columns in drawing.stage_columns(stage, rows):
+            if stage.root not in self.strides:
+                self.strides[stage.root] = drawing.strides_of(stage)
+            for path, picked, columns in drawing.stage_columns(stage, rows, self.strides[stage.root]):
                 mine = times if picked == rows else self._times(picked)
                 recording.send_columns(path, indexes=mine, columns=columns)
         plotting.draw_plot_rows(recording, self.plots, times, rows)
