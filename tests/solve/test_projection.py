@@ -200,7 +200,7 @@ def put_back_of(dataset: xarray.Dataset) -> dict[str, np.ndarray]:
 
 
 @pytest.mark.optimised  # two motions that part by chance: rounding decides by how much
-@pytest.mark.parametrize("formulation", ["quaternion", "euler_angles", "rates"])
+@pytest.mark.parametrize("formulation", cases(["quaternion", "euler_angles", "rates"], ["quaternion"]))
 def test_what_was_put_back_along_time_is_what_the_drift_would_have_been(formulation: str) -> None:
     """At a tolerance whose truncation errors stand far above rounding, and bias the invariants."""
     tolerance, end = 1e-6, 3000
@@ -232,9 +232,7 @@ def test_what_was_put_back_along_time_is_what_the_drift_would_have_been(formulat
 
 @pytest.mark.parametrize(
     "precision",
-    cases(
-        ['"single"', '"double"', '"extended"', '"quadruple"', "25"], ['"single"', '"double"', '"extended"']
-    ),
+    cases(['"single"', '"double"', '"extended"', '"quadruple"', "25"], ['"double"']),
 )
 def test_what_was_put_back_does_not_depend_on_when_it_is_looked_at(precision: str) -> None:
     """Dense samples come in grids, single ones after skipped steps: the same bits at the same times."""

@@ -106,7 +106,7 @@ SAYS = {
 }
 
 
-@pytest.mark.parametrize("kind", cases(DAMAGES, list(DAMAGES)[::2]))
+@pytest.mark.parametrize("kind", cases(DAMAGES, list(DAMAGES)[::3]))
 def test_a_damaged_segment(kind: str, originals: dict[str, rigidsim.Run], tmp_path: Path) -> None:
     folder = shutil.copytree(originals["begun"].folder.path, tmp_path / "d")
     damage: Callable[[Path, Path], None] = DAMAGES[kind]

@@ -210,7 +210,7 @@ REFUSED = {
         'axes."time.end" = {values = [1], name = "w_component"}',
         'axes."time.end": is named "w_component" like axes."initial.angular_velocity"',
     ),
-    "too few": ('axes."time.end" = {linspace = [1, 2]}', "given [1, 2]; an array of 3 is allowed"),
+    "too few": ('axes."time.end" = {linspace = [1, 2]}', "given 2 entries; exactly 3 are needed"),
     "a misspelt way": (
         'axes."time.end" = {value = [1]}',
         'axes."time.end".value: unknown key; did you mean "values"?',

@@ -194,7 +194,7 @@ EDITS: dict[str, tuple[Callable[[dict[str, Any]], Any], str]] = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("what", cases(EDITS, list(EDITS)[::4]))
+@pytest.mark.parametrize("what", cases(EDITS, list(EDITS)[::7]))
 def test_a_summary_that_was_edited_by_hand(what: str, complete: Path, tmp_path: Path) -> None:
     folder = shutil.copytree(complete, tmp_path / "run")
     edited(folder, EDITS[what][0])
