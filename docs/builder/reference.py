@@ -299,6 +299,8 @@ def python_page() -> str:
 
 def _directive(kind: str, name: str, *, members: bool = False) -> str:
     options = "   :members:\n" if members else ""
+    if kind == "automodule":  # of protocols, which tell about their members themselves
+        options += "   :undoc-members:\n"
     return f"```{{eval-rst}}\n.. {kind}:: {name}\n{options}```"
 
 
