@@ -7,8 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 import rigidsim
-from rigidsim.accuracy.cost import cost
-from rigidsim.accuracy.setting import Setting
+from rigidsim.accuracy.setting import Setting, cost
 from rigidsim.accuracy.trial import Trial, try_setting
 
 _REPEATS = 5
@@ -32,7 +31,7 @@ class Unit:
     Attributes:
         what: of one step, or of so many samples.
         measured: median.
-        counted: by ``rigidsim.accuracy.cost.cost``.
+        counted: by ``rigidsim.accuracy.setting.cost``.
     """
 
     what: str

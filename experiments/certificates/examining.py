@@ -14,10 +14,9 @@ import rigidsim
 from experiments.certificates.searching import Search, truth_setting
 from experiments.random_scenes import RandomScene
 from rigidsim.accuracy.comparison import angles_between, exact_times, parts_of
-from rigidsim.accuracy.cost import cost
 from rigidsim.accuracy.motion import motion_of
 from rigidsim.accuracy.reference import references
-from rigidsim.accuracy.setting import Setting, setting_of
+from rigidsim.accuracy.setting import Setting, cost, setting_of
 from rigidsim.accuracy.trial import try_setting
 from rigidsim.errors import ConfigError
 from rigidsim.scene.config import Experiment, parse

@@ -1,6 +1,6 @@
 """The truth about a scene, and the cheapest setting that keeps an accuracy.
 
-Costs are counted, since clocks jitter: ``rigidsim.accuracy.cost.cost`` of the steps that were really taken.
+Costs are counted, since clocks jitter: ``rigidsim.accuracy.setting.cost`` of the steps really taken.
 """
 
 from __future__ import annotations
@@ -12,10 +12,9 @@ import mpmath
 
 from experiments.random_scenes import RandomScene
 from rigidsim.accuracy.comparison import angles_between
-from rigidsim.accuracy.cost import cost
 from rigidsim.accuracy.error_law import closed_form_if_any
 from rigidsim.accuracy.reference import ReferenceKind
-from rigidsim.accuracy.setting import Setting, epsilon
+from rigidsim.accuracy.setting import Setting, cost, epsilon
 from rigidsim.accuracy.trial import Trial, Trials, trial_scene
 from rigidsim.scene.config import Experiment
 

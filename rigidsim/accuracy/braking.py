@@ -42,9 +42,6 @@ def is_braked(prepared: InitialValueProblem) -> bool:
 def mean_pace(prepared: InitialValueProblem) -> float | None:
     """Mean number of steps per second over the whole run, relative to that at its start.
 
-    Args:
-        prepared: a full motion that ``is_braked``.
-
     Returns:
         None if the course of its average isn't known until the end.
     """

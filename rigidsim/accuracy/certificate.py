@@ -9,9 +9,8 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING
 
-import mpmath
 import numpy as np
 
 from rigidsim.accuracy.comparison import (
@@ -47,8 +46,6 @@ class Certificate:
     Attributes:
         error: bound of the attitude error at the times compared, the end among them, rad.
         end: the difference found at the end itself, rad.
-        how: description of the reference.
-        times: number of times compared.
         place: bound of the position error at the same times, m; None if no accuracy of it was asked for.
     """
 
@@ -65,40 +62,14 @@ class Certificate:
 
     def as_dict(self) -> dict[str, float | str | int]:
         """Values for the summary."""
-        place: dict[str, float | str | int] = {}
-        if self.place is not None:
-            place["certified_position"] = self.place
-        return place | {
+        place = {} if self.place is None else {"certified_position": self.place}
+        return {
+            **place,
             "certified": self.error,
             "difference_at_end": self.end,
             "how": self.how,
             "times_compared": self.times,
         }
-
-
-@dataclass(frozen=True)
-class Shortfall:
-    """A requested accuracy that was not certified.
-
-    Attributes:
-        asked, certified: rad.
-        how: description of the reference.
-        key: key of ``[integrator]`` that asked for it.
-    """
-
-    code: ClassVar[str] = "accuracy_not_certified"
-    asked: float
-    certified: float
-    how: str
-    key: str = "accuracy"
-
-    @property
-    def message(self) -> str:
-        """Message for the user."""
-        return (
-            f"{self.key} = {self.asked:.3g} rad was asked for, but only {self.certified:.2g} rad could be "
-            f"certified ({self.how}); choose a higher precision or a nearer end"
-        )
 
 
 def certify(
@@ -115,13 +86,8 @@ def certify(
     """Compare a finished run with an independent solution.
 
     Args:
-        dataset: dataset of the run.
-        experiment: the experiment that was run.
         accuracy: requested accuracy, rad, which decides how good the reference must be.
         accuracy_position: requested accuracy, m; None if the path need not be compared.
-        known: what is known of the motion, if it was examined before.
-        told: receives the progress of comparisons, as in ``try_setting``.
-        policy: policy for references.
 
     Returns:
         None if the run recorded too little to be compared.
@@ -144,13 +110,7 @@ def certify(
 
 
 class _Compared:
-    """A run's recorded attitudes, and other solutions at the same times.
-
-    Attributes:
-        setting: setting of the run.
-        largest: largest difference from the latest reference, rad.
-        own: bound of that reference's own error, rad.
-    """
+    """A run's recorded attitudes, and other solutions at the same times."""
 
     def __init__(self, dataset: xarray.Dataset, trials: Trials, motion: KnownMotion, policy: Policy) -> None:
         self.setting = setting_of(trials.experiment)
@@ -192,8 +152,8 @@ class _Compared:
         difference = angles_between([part[places] for part in self._parts], attitudes)
 
         def distance(other: Setting) -> float:
-            found = self._attitudes(other, times)
-            return math.inf if found is None else float(angles_between(found, attitudes).max())
+            found = self._trials.whole(other, times)
+            return math.inf if found is None else float(angles_between(found.attitudes, attitudes).max())
 
         self.largest = float(difference.max())
         self.own = own_error(reference, self.setting, self.largest, self._motion, distance, policy)
@@ -221,21 +181,6 @@ class _Compared:
             share = policy.as_bad
         return (safety + min(policy.as_bad, share)) * apart
 
-    def _attitudes(self, setting: Setting, times: Sequence[mpmath.mpf]) -> list[np.ndarray] | None:
-        trial = self._trials.whole(setting, times)
-        return None if trial is None else trial.attitudes
-
-
-def shortfall(certificate: Certificate, accuracy: float, key: str = "accuracy") -> Shortfall | None:
-    """By what a requested accuracy (rad) was missed; None if it was certified.
-
-    Args:
-        key: key of ``[integrator]`` that asked for it.
-    """
-    if certificate.error <= accuracy:
-        return None
-    return Shortfall(accuracy, min(certificate.error, math.pi), certificate.how, key)
-
 
 def verdict(
     certificate: Certificate,
@@ -250,14 +195,12 @@ def verdict(
     Args:
         key: key of ``[integrator]`` that asked for the accuracy of the attitude.
     """
-    short = None if accuracy is None else shortfall(certificate, accuracy, key)
-    if short is not None:
-        return short.message
+    remedy = f"could be certified ({certificate.how}); choose a higher precision or a nearer end"
+    if accuracy is not None and certificate.error > accuracy:
+        found = f"only {min(certificate.error, math.pi):.2g} rad"
+        return f"{key} = {accuracy:.3g} rad was asked for, but {found} {remedy}"
     place = certificate.place
     if accuracy_position is None or (place is not None and place <= accuracy_position):
         return None
     found = "nothing" if place is None else f"only {place:.2g} m"
-    return (
-        f"accuracy_position = {accuracy_position:.3g} m was asked for, but {found} could be certified "
-        f"({certificate.how}); choose a higher precision or a nearer end"
-    )
+    return f"accuracy_position = {accuracy_position:.3g} m was asked for, but {found} {remedy}"

@@ -14,11 +14,18 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from rigidsim.accuracy.asked import asked_of_attitude, leaves_choice, wanted
-from rigidsim.accuracy.cost import MEASURED, cost
 from rigidsim.accuracy.forecast import Forecasts
 from rigidsim.accuracy.motion import KnownMotion
-from rigidsim.accuracy.setting import Setting, epsilon, setting_of
+from rigidsim.accuracy.setting import (
+    MEASURED,
+    Setting,
+    asked_of_attitude,
+    cost,
+    epsilon,
+    leaves_choice,
+    setting_of,
+    wanted,
+)
 from rigidsim.accuracy.trial import Told
 from rigidsim.errors import ConfigError, Problem
 from rigidsim.model.load import Load
@@ -61,9 +68,6 @@ class Choice:
 
     Attributes:
         forecast: forecast attitude error at the end, rad.
-        steps: approximate number of natural steps.
-        why: one sentence for the summary.
-        known: what is known of the motion.
     """
 
     setting: Setting
@@ -87,9 +91,7 @@ def chosen(
     same run again.
 
     Args:
-        loads: loads given from Python.
         beyond: a setting that was run and missed the accuracy; only more costly ones are considered.
-        told: receives the progress of trials, as in ``try_setting``.
 
     Raises:
         ConfigError: no setting reaches the accuracy; says what can be reached.
@@ -121,8 +123,6 @@ def choose(
 
     Args:
         accuracy: attitude accuracy at the end, rad.
-        beyond, told: as in ``chosen``.
-        key: key of ``[integrator]`` that asks for it.
 
     Raises:
         ConfigError: no setting does.

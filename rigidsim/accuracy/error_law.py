@@ -69,11 +69,7 @@ def held_error(
 
 
 def closed_form_if_any(scene: Scene, *, driven: bool = False) -> tuple[ClosedForm | None, str]:
-    """The closed form of a scene's motion, or None and the reason why there is none.
-
-    Args:
-        driven: whether loads unknown to the scene are given from Python.
-    """
+    """The closed form of a scene's motion, or None and the reason why there is none."""
     from rigidsim.solve.closed_form import NoClosedForm, closed_form_of
 
     try:

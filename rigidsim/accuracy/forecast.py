@@ -60,7 +60,6 @@ class Extrapolation:
 
         Args:
             early, late: largest errors over the first quarter of a trial, and over all of it.
-            part: part of the run that was tried.
         """
         early = max(early, late * 1e-300)
         power = math.log(late / early) / math.log(4)
@@ -76,13 +75,7 @@ LAW = Extrapolation()
 
 
 class Forecasts:
-    """Errors of settings, measured if that is cheap, otherwise forecast from what was measured.
-
-    Attributes:
-        motion: what is known of the motion.
-        samples: number of samples of the run.
-        part: part of the run that is tried.
-    """
+    """Errors of settings, measured if that is cheap, otherwise forecast from what was measured."""
 
     def __init__(
         self,
@@ -94,12 +87,7 @@ class Forecasts:
         law: Extrapolation = LAW,
         policy: Policy = STANDARD,
     ) -> None:
-        """Examine a motion's beginning.
-
-        Args:
-            accuracy: requested accuracy, rad; a setting obviously within it isn't tried.
-            loads, told: as in ``try_setting``.
-        """
+        """Examine a motion's beginning."""
         self._experiment, self._accuracy, self._law, self._policy = experiment, accuracy, law, policy
         self._trials = Trials(experiment, loads, told)
         self.motion = motion_of(experiment, loads=loads, pilot_steps=law.steps)

@@ -25,14 +25,7 @@ _FEWEST_STEPS = 16  # for the law of rounding, which is one of many steps
 
 @dataclass(frozen=True)
 class Pilot:
-    """A motion's first steps, as a pilot.
-
-    Attributes:
-        taken: number of steps taken.
-        step: their mean length, internal units.
-        whole: natural steps of the whole motion, extrapolated.
-        seconds_per_step: CPU seconds per step.
-    """
+    """A motion's first steps, as a pilot."""
 
     taken: int
     step: float
@@ -54,12 +47,9 @@ def run_pilot(
     """Take the first steps of a motion.
 
     Args:
-        stepper: at the motion's start, which is the clock's.
         skip: takes a number of steps, with anything done between them; the stepper's own by default.
         steps: largest number of steps, give or take a chunk; none after the last sample.
-        seconds: largest CPU time, s, give or take a chunk.
         chunk: steps taken at once, at first; doubled each time up to ``largest_chunk``.
-        warming: steps before those whose cost is measured.
     """
     skip = skip or stepper.skip
     begin, end = float(clock.start), float(clock.at(clock.count - 1))
@@ -86,12 +76,7 @@ class KnownMotion:
     """What is known of a motion before its long run.
 
     Attributes:
-        steps: steps of double precision at its epsilon over the whole run.
         rate: bound of the angular velocity, rad/s.
-        seconds: the run's length.
-        growth: amplification of errors by the motion itself.
-        holds: whether it has invariants to project, if only the quaternion's norm.
-        exact: method that gives it without steps; empty if it has no closed form.
     """
 
     steps: float

@@ -116,7 +116,6 @@ def references(
     """References for a whole run, from cheap to costly.
 
     Args:
-        setting: setting of the run.
         accuracy: requested accuracy, rad, which decides how good those with many digits must be.
     """
     loose = setting.has_steps and setting.tolerance is not None
@@ -150,11 +149,7 @@ def digits_beyond(precision: str | int) -> int:
 
 
 def exact_beyond(precision: str | int, method: str) -> Reference:
-    """The closed form with more digits than a precision; it costs the same at any horizon.
-
-    Args:
-        method: which gives the motion exactly (``KnownMotion.exact``).
-    """
+    """The closed form with more digits than a precision; it costs the same at any horizon."""
     return exact_to("quadruple" if working_bits(precision) <= 64 else digits_beyond(precision), method)
 
 
@@ -167,9 +162,6 @@ def stepped_reference(
 ) -> Setting:
     """An integration at a precision's epsilon. Invariants are projected where that is right: with more digits
     than 64 bits rounding doesn't matter, nor does it over a short way in double precision.
-
-    Args:
-        steps: approximate number of steps.
     """
     projected = working_bits(precision) <= 64 and (precision != "double" or steps > policy.extended_steps)
     return Setting(precision, formulation=formulation, hold_invariants=projected and motion.holds)
@@ -252,8 +244,6 @@ def own_error(
     A pilot may not have seen how strongly the motion amplifies errors; differences have.
 
     Args:
-        setting: setting of the run being judged.
-        difference: largest difference of the run from the reference.
         distance: largest distance of the reference from another setting's solution; inf if there is none.
     """
     if reference.kind is ReferenceKind.CLOSED_FORM:

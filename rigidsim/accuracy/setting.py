@@ -1,15 +1,20 @@
-"""A setting: the keys of ``[integrator]`` that trade speed for accuracy, and its errors per step."""
+"""Settings: the keys of ``[integrator]`` that trade speed for accuracy, their errors per step, and their cost
+as a count, so that no clock decides what is chosen; and the accuracy that a config asks for.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Collection
-from dataclasses import dataclass
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
 
+from rigidsim.errors import ConfigError, Problem
 from rigidsim.scene.arithmetic import working_bits
 from rigidsim.scene.config import Experiment
 from rigidsim.scene.formulations import DEFAULT_FORMULATION, attitude_variables
 from rigidsim.scene.methods import DEFAULT_METHOD, METHODS
+from rigidsim.scene.scene import build_scene
 from rigidsim.solve.problem import auto_tolerance
 
 
@@ -18,8 +23,6 @@ class Setting:
     """A way to integrate.
 
     Attributes:
-        precision: precision as in a config.
-        tolerance: None for "auto".
         hold_invariants: whether invariants are projected from the start; otherwise not at all in trials, and
             late in runs, as "auto" does.
     """
@@ -65,11 +68,7 @@ class Setting:
         return max(2, math.ceil(1 - math.log(self.step_tolerance) / 2))
 
     def overrides(self, *, without: Collection[str] = ()) -> list[str]:
-        """The setting as ``KEY=VALUE`` texts for ``rigidsim.load``.
-
-        Args:
-            without: keys of ``[integrator]`` to leave out.
-        """
+        """The setting as ``KEY=VALUE`` texts for ``rigidsim.load``."""
         keys = {
             "precision": f"{self.precision}" if isinstance(self.precision, int) else f'"{self.precision}"',
             "tolerance": '"auto"' if self.tolerance is None else f"{self.tolerance!r}",
@@ -106,3 +105,98 @@ def setting_of(experiment: Experiment) -> Setting:
         integrator.hold_invariants is True,  # "auto" begins plainly, and does no worse than that
         integrator.method,
     )
+
+
+_STEPS: Mapping[str | int, float] = MappingProxyType(
+    {"single": 1.25, "double": 1.0, "extended": 9.0, "quadruple": 135.0}
+)
+
+
+@dataclass(frozen=True)
+class UnitCosts:
+    """Costs in steps of double precision at its epsilon.
+
+    The defaults were measured by ``experiments/accuracy_certificates.py --calibrate``, which says where they
+    are off by more than 1.3.
+
+    Attributes:
+        steps: cost of a step over the square of its Taylor order, relative to double precision.
+        digits_step: the same at 50 digits, proportional to the digits beyond.
+        projected: cost factor of a step after which invariants are projected.
+        closed_start, closed_sample: cost of a closed form's first sample, and of each one, to 53 bits.
+        wide_closed_sample, digits_closed_sample: cost of each to 64 or 113 bits, and to 50 digits.
+        seconds: duration of the unit for a free body on one core; for messages only.
+    """
+
+    steps: Mapping[str | int, float] = field(default_factory=lambda: _STEPS)
+    digits_step: float = 155.0
+    projected: float = 1.05
+    closed_start: float = 800.0
+    closed_sample: float = 0.4
+    wide_closed_sample: float = 1400.0
+    digits_closed_sample: float = 1900.0
+    seconds: float = 1e-6
+
+
+MEASURED = UnitCosts()
+
+
+def cost(setting: Setting, steps: float, samples: int, *, units: UnitCosts = MEASURED) -> float:
+    """Approximate cost in steps of double precision at its epsilon.
+
+    A step's work goes with the square of the Taylor order; steps are about as long at any tolerance.
+    """
+    digits = max(1.0, setting.precision / 50) if isinstance(setting.precision, int) else None
+    if not setting.has_steps:
+        if setting.bits <= 53:
+            return units.closed_start + samples * units.closed_sample
+        if digits is not None:
+            return samples * units.digits_closed_sample * digits
+        return samples * units.wide_closed_sample
+    step = units.steps[setting.precision] if digits is None else units.digits_step * digits
+    projected = units.projected if setting.hold_invariants else 1.0
+    return steps * step * (setting.taylor_order / 20) ** 2 * projected
+
+
+_MOST = 1.0  # rad: for a path that may be anywhere
+
+
+def leaves_choice(experiment: Experiment) -> bool:
+    """Whether ``accuracy`` is given and precision, tolerance or method are left open to be chosen for it."""
+    integrator = experiment.config.integrator
+    fixed = {"precision", "tolerance", "method"} <= integrator.model_fields_set
+    return wanted(experiment) is not None and not fixed
+
+
+def asked_of_attitude(experiment: Experiment) -> tuple[str, float] | None:
+    """The key of ``[integrator]`` that asks most of the attitude, and the accuracy, rad; None if none does.
+
+    The full model keeps ``accuracy_axis`` by its attitude: no axis errs by more than that.
+    """
+    integrator = experiment.config.integrator
+    found: list[tuple[str, float]] = []
+    if integrator.accuracy is not None:
+        found.append(("accuracy", float(integrator.accuracy)))
+    if integrator.accuracy_axis is not None and not experiment.config.model.reduced:
+        found.append(("accuracy_axis", float(integrator.accuracy_axis)))
+    return min(found, key=lambda asked: asked[1], default=None)
+
+
+def wanted(experiment: Experiment) -> float | None:
+    """Accuracy of the attitude for which settings are chosen, rad; None if none is asked for.
+
+    Errors of the path are, relative to its size, about those of the attitude; the certificate tells what
+    they are, and a more costly setting is chosen if they are larger.
+    """
+    integrator = experiment.config.integrator
+    of_attitude = asked_of_attitude(experiment)
+    found = [] if of_attitude is None else [of_attitude[1]]
+    if integrator.accuracy_position is not None:
+        scene = build_scene(experiment)
+        if scene.position is None or scene.velocity is None:
+            what = "given, but the scene has no position; give [initial] position or velocity"
+            raise ConfigError(Problem("[integrator] accuracy_position", what), experiment.source)
+        seconds = float(scene.samples.last - scene.start)
+        size = math.hypot(*map(float, scene.position)) or math.hypot(*map(float, scene.velocity)) * seconds
+        found.append(min(float(integrator.accuracy_position) / (size or 1.0), _MOST))
+    return min(found) if found else None

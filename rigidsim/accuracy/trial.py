@@ -34,14 +34,10 @@ class Trial:
     """Result of a trial.
 
     Attributes:
-        setting: setting of the trial.
         attitudes: float64 parts of the quaternions, each (samples, 4).
         places: float64 parts of the positions, m, each (samples, 3); empty if the body has none.
-        drifts: largest relative drift of each invariant at the samples.
         cpu_seconds, compile_seconds: CPU time of the integration alone, and of compiling.
-        order: of the Taylor series; 0 for a closed form.
         work: steps times Taylor order squared times states: a count that doesn't jitter.
-        rows: number of samples reached.
         histories: relative drift (samples,) of each invariant.
     """
 
@@ -59,26 +55,23 @@ class Trial:
     places: list[np.ndarray] = field(default_factory=list)
 
 
-class _Collected(SampleReceiver):
-    """Keeps everything in memory."""
+class Collected(SampleReceiver):
+    """Keeps recorded variables in memory."""
 
-    def __init__(self, prepared: InitialValueProblem, evaluator: Evaluator) -> None:
-        self._prepared, self._evaluator = prepared, evaluator
-        self.pieces: list[list[np.ndarray]] = []
-        self.places: list[list[np.ndarray]] = []
-        self.drifts: dict[str, float] = {}
-        self.histories: dict[str, list[np.ndarray]] = {}
+    def __init__(self, evaluator: Evaluator, names: Sequence[str]) -> None:
+        self._evaluator = evaluator
+        self._pieces: dict[str, list[Sequence[np.ndarray]]] = {name: [] for name in names}
 
     def take(self, block: SampleBlock) -> None:
+        """See ``SampleReceiver``."""
         recorded = self._evaluator.evaluate(block)
-        self.pieces.append(recorded["quaternion"])
-        if "position" in recorded:
-            self.places.append(recorded["position"])
-        for invariant in self._prepared.system.invariants:
-            drift = recorded[f"{invariant.name}_drift"][0]
-            self.histories.setdefault(invariant.name, []).append(np.asarray(drift, dtype=np.float64).ravel())
-            largest = float(np.max(np.abs(drift)))
-            self.drifts[invariant.name] = max(largest, self.drifts.get(invariant.name, 0.0))
+        for name, pieces in self._pieces.items():
+            pieces.append(recorded[name])
+
+    def parts(self, name: str) -> list[np.ndarray]:
+        """Float64 parts of a variable, its samples first."""
+        found = [np.concatenate(part) for part in zip(*self._pieces[name], strict=True)]
+        return [np.asarray(part, dtype=np.float64) for part in found]
 
 
 def trial_scene(
@@ -92,7 +85,6 @@ def trial_scene(
     accuracy of that is asked for.
 
     Args:
-        times: sample times, s (mpf), ascending; None keeps the experiment's.
         repeating: whether invariants are held as the experiment holds them, late by default.
 
     Raises:
@@ -136,13 +128,9 @@ def try_setting(
 
     Args:
         experiment: gives the scene; its own ``[integrator]`` is replaced by the setting.
-        times: sample times, s (mpf); None keeps the experiment's.
-        loads: loads given from Python.
-        go_on: called between chunks; a status ends the trial.
         told: receives the title and the trial's progress (0 to 1), some tens of times per second.
         compact: compile in a tenth of the time to code that takes up to twice as long per step in double
             precision, and as long in the others; rounding differs.
-        repeating: as in ``trial_scene``.
 
     Raises:
         ConfigError: the scene can't be integrated with it (no closed form, nothing to project, ...).
@@ -158,7 +146,9 @@ def try_setting(
     if compact:
         prepared = compactly(prepared)
     parts = assemble(prepared)
-    receiver = _Collected(prepared, parts.evaluator)
+    invariants = [invariant.name for invariant in prepared.system.invariants]
+    recorded = [r.name for r in prepared.system.recorded if r.name in ("quaternion", "position")]
+    receiver = Collected(parts.evaluator, [*recorded, *(f"{name}_drift" for name in invariants)])
     check = go_on or (lambda _: None)
     if told is not None:
         told(setting.title, 0.0)
@@ -168,31 +158,26 @@ def try_setting(
     progress = loop.run()
     ended = time.process_time()
     order = parts.order or 0
-    attitudes = [np.concatenate(part)[early:] for part in zip(*receiver.pieces, strict=True)]
+    histories = {x: drift.ravel() for x in invariants for drift in receiver.parts(f"{x}_drift")[:1]}
     return Trial(
         setting=setting,
         status=progress.status,
-        attitudes=attitudes,
-        drifts=receiver.drifts,
+        attitudes=[part[early:] for part in receiver.parts("quaternion")],
+        drifts={name: float(np.abs(drift).max(initial=0.0)) for name, drift in histories.items()},
         steps=progress.steps,
         order=order,
         cpu_seconds=ended - built,
         compile_seconds=built - started,
         work=float(progress.steps) * order**2 * len(prepared.system.states),
         rows=max(progress.next_sample - early, 0),
-        histories={name: np.concatenate(pieces) for name, pieces in receiver.histories.items()},
-        places=[np.concatenate(part)[early:] for part in zip(*receiver.places, strict=True)],
+        histories=histories,
+        places=[part[early:] for part in receiver.parts("position")] if "position" in recorded else [],
     )
 
 
 @dataclass(frozen=True)
 class Trials:
-    """Trials of one motion, in compact code.
-
-    Attributes:
-        loads: loads given from Python.
-        told: receives the progress of each trial, as in ``try_setting``.
-    """
+    """Trials of one motion, in compact code."""
 
     experiment: Experiment
     loads: Sequence[Load] = ()

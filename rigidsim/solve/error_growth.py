@@ -42,11 +42,8 @@ class Growth:
     Attributes:
         factor: largest growth of an offset in rates and attitude, over the linear growth |w| t / sqrt 3 of
             a stable motion; 1 where it is no larger than a few times that.
-        seconds: length of the motion examined, s.
         rate: rate of exponential growth beyond each comparison's window, 1/s; zero for linear growth.
-        window: length of a comparison, s.
         saturated: whether ``factor`` is a lower bound only, since an offset became as large as the motion.
-        passing_rate: median growth rate of the offsets that saturated, 1/s.
     """
 
     factor: float
@@ -70,7 +67,6 @@ def measure_growth(system: System, precision: Precision, start: float, end: floa
 
     Args:
         system: built for ``precision``, which should be double: stability has no precision.
-        start, end: start and end of the run, internal units.
     """
     apart = ("x", "y", "z", "vx", "vy", "vz", "pace")
     followed = [i for i, name in enumerate(system.states) if name not in apart]

@@ -35,7 +35,6 @@ class LyapunovSpectrum:
     Attributes:
         times: times since the run's start, s, shape (rows,).
         exponents: 1/s, largest first, shape (rows, states of the motion).
-        states: names of the motion's states.
     """
 
     times: np.ndarray
@@ -71,10 +70,7 @@ class Convergence:
     """Progress of a spectrum: plain float64 arrays with everything needed to resume with the same bits.
 
     Attributes:
-        number: number of intervals done.
         state: state of the system and the orthogonalised tangent vectors; empty at the start.
-        sums: sums of the logarithms of lengths, in the order of the vectors.
-        times, exponents: estimates so far.
     """
 
     number: int = 0
@@ -115,10 +111,7 @@ def lyapunov_spectrum(
     """Integrate the variational equations over a run.
 
     Args:
-        system: a system built for double precision.
-        start, end: internal units.
         go_on: called with the progress at each orthogonalisation; False ends the integration.
-        done: earlier progress to continue from, with the same bits as in one go.
 
     Returns:
         The spectrum; None if it was ended early, the tangent vectors stopped being finite, or steps became

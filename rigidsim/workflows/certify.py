@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any, TypeVar
 
-from rigidsim.accuracy.asked import asked_of_attitude, wanted
 from rigidsim.accuracy.certificate import certify, verdict
 from rigidsim.accuracy.choice import Choice
+from rigidsim.accuracy.setting import asked_of_attitude, wanted
 from rigidsim.model.load import Load
 from rigidsim.scene.config import Experiment
 from rigidsim.session.session import Session

@@ -7,10 +7,9 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, overload
 
-from rigidsim.accuracy.asked import leaves_choice, wanted
 from rigidsim.accuracy.choice import Choice, chosen
 from rigidsim.accuracy.models.level import choose_level
-from rigidsim.accuracy.setting import Setting
+from rigidsim.accuracy.setting import Setting, leaves_choice, wanted
 from rigidsim.errors import ConfigError
 from rigidsim.model.load import Load
 from rigidsim.scene.model_table import AUTO, FULL

@@ -15,8 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rigidsim.accuracy.bench.advice import BestSetting, advice
-from rigidsim.accuracy.bench.dataset import TOLD, dataset_of
+from rigidsim.accuracy.bench.dataset import TOLD, BestSetting, advice, dataset_of
 from rigidsim.accuracy.bench.measure import measure
 from rigidsim.errors import RunFolderError
 from rigidsim.scene.config import Experiment

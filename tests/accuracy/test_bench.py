@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import rigidsim
-from rigidsim.accuracy.bench.advice import advice
+from rigidsim.accuracy.bench.dataset import advice
 from rigidsim.accuracy.bench.measure import RowStatus
 from rigidsim.accuracy.bench.plan import make_plan
 

@@ -1,16 +1,17 @@
-"""A measurement of settings as labelled data, and its Pareto front."""
+"""A measurement of settings as labelled data, its Pareto front, and the advice that follows from it."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from rigidsim.accuracy.bench.measure import Measurement, RowStatus
 from rigidsim.accuracy.bench.plan import DEFAULT
-from rigidsim.accuracy.setting import Setting, precision_title
+from rigidsim.accuracy.setting import Setting, precision_title, precision_titled
 from rigidsim.scene.methods import METHODS
 
 if TYPE_CHECKING:
@@ -53,12 +54,13 @@ def dataset_of(measured: Measurement) -> xarray.Dataset:
             cost[n] = measured.cost(row)
     final = np.array([e[np.isfinite(e)][-1] if np.isfinite(e).any() else np.nan for e in error])
     largest = np.array([np.nanmax(e) if np.isfinite(e).any() else np.nan for e in error])
-    text = {"setting": [r.setting.title for r in rows]}
-    text |= {"status": [r.status.value for r in rows], "reason": [r.problem for r in rows]}
     known = [r.measured for r in rows]
 
     def numbers(values: Sequence[float]) -> np.ndarray:
         return np.where(known, np.array(values, dtype=np.float64), np.nan)
+
+    def words(values: Sequence[object]) -> np.ndarray:
+        return np.array([str(value) for value in values], dtype=object)
 
     def variable(
         values: ArrayLike, units: str, long_name: str, dims: Sequence[str] = ("setting",)
@@ -68,8 +70,8 @@ def dataset_of(measured: Measurement) -> xarray.Dataset:
     relative = "relative to the default setting, per simulated second"
     data = xarray.Dataset(
         {
-            "status": variable(np.array(text["status"], dtype=object), "1", "what became of the setting"),
-            "reason": variable(np.array(text["reason"], dtype=object), "1", "why it was not measured"),
+            "status": variable(words([r.status.value for r in rows]), "1", "what became of the setting"),
+            "reason": variable(words([r.problem for r in rows]), "1", "why it was not measured"),
             "attitude_error": variable(error, "rad", "attitude error", ("setting", "time")),
             "attitude_error_final": variable(final, "rad", "attitude error at the end of what was measured"),
             "attitude_error_largest": variable(largest, "rad", "largest attitude error"),
@@ -96,24 +98,18 @@ def dataset_of(measured: Measurement) -> xarray.Dataset:
             ),
         },
         coords={
-            "setting": ("setting", np.array(text["setting"], dtype=object), {"long_name": "setting"}),
+            "setting": ("setting", words([r.setting.title for r in rows]), {"long_name": "setting"}),
             "precision": variable(
-                np.array([precision_title(r.setting.precision) for r in rows], dtype=object),
-                "1",
-                "arithmetic",
+                words([precision_title(r.setting.precision) for r in rows]), "1", "arithmetic"
             ),
             "tolerance": variable([_tolerance(r.setting) for r in rows], "1", "of the step control"),
-            "formulation": variable(
-                np.array([r.setting.formulation for r in rows], dtype=object), "1", "of the attitude"
-            ),
+            "formulation": variable(words([r.setting.formulation for r in rows]), "1", "of the attitude"),
             "held": variable(
                 np.array([r.setting.hold_invariants for r in rows], dtype=np.int8), "1", "invariants put back"
             ),
-            "method": variable(
-                np.array([r.setting.method for r in rows], dtype=object), "1", " or ".join(METHODS)
-            ),
+            "method": variable(words([r.setting.method for r in rows]), "1", " or ".join(METHODS)),
             "time": ("time", np.array(plan.times), {"units": "s", "long_name": "since start of the scene"}),
-            "invariant": ("invariant", np.array(names, dtype=object), {"long_name": "invariant"}),
+            "invariant": ("invariant", words(names), {"long_name": "invariant"}),
         },
         attrs={
             "title": measured.experiment.config.name,
@@ -160,3 +156,85 @@ def on_front(dataset: xarray.Dataset) -> np.ndarray:
         if error[n] < best:
             best, result[n] = error[n], True
     return result
+
+
+@dataclass(frozen=True)
+class BestSetting:
+    """For an attitude error of at most ``at_most`` and more than ``more_than``: the cheapest setting.
+
+    Attributes:
+        error: its largest attitude error, rad.
+        less: whether that is less than for the other settings, so that costs don't compare.
+    """
+
+    at_most: float
+    more_than: float
+    title: str
+    error: float
+    cost: float
+    seconds: float
+    less: bool
+    keys: tuple[str, ...]
+
+
+def advice(dataset: xarray.Dataset) -> list[BestSetting]:
+    """For each decade of accuracy from 1 rad on, the cheapest setting that reaches it.
+
+    A setting that was measured over less of the motion is named only if no other reaches the accuracy.
+    """
+    error, cost = trusted_error(dataset), dataset["cpu_ratio"].values
+    status = dataset["status"].values
+    known = np.isfinite(error) & np.isfinite(cost)
+    if not known.any():
+        return []
+    smallest = max(float(error[known].min()), 1e-60)
+    found: list[tuple[int, int, bool]] = []  # exponent, setting, measured over less
+    for exponent in range(0, math.floor(math.log10(smallest)) - 1, -1):
+        for kind in (RowStatus.MEASURED, RowStatus.SHORT):
+            fit = np.nonzero(known & (status == kind.value) & (error <= 10.0**exponent))[0]
+            if len(fit):
+                found.append((exponent, int(min(fit, key=lambda n: cost[n])), kind is RowStatus.SHORT))
+                break
+    result: list[BestSetting] = []
+    for position, (exponent, n, less) in enumerate(found):
+        if position and found[position - 1][1] == n:
+            continue
+        last = exponent
+        for later, other, _ in found[position:]:
+            if other != n:
+                break
+            last = later
+        result.append(_advice_of(dataset, n, exponent, last, less, float(error[n])))
+    return result
+
+
+def _advice_of(
+    dataset: xarray.Dataset, n: int, first: int, last: int, less: bool, error: float
+) -> BestSetting:
+    one = dataset.isel(setting=n)
+    return BestSetting(
+        at_most=10.0**first,
+        more_than=10.0 ** (last - 1),
+        title=str(one["setting"].item()),
+        error=error,
+        cost=float(one["cpu_ratio"]),
+        seconds=float(one["measured_time"]),
+        less=less,
+        keys=_keys(one),
+    )
+
+
+def _keys(one: xarray.Dataset) -> tuple[str, ...]:
+    """The setting as lines for ``[integrator]``."""
+    precision = precision_titled(str(one["precision"].item()))
+    keys = [f"precision = {precision}" if isinstance(precision, int) else f'precision = "{precision}"']
+    default, method, tolerance = Setting(precision), one["method"].item(), float(one["tolerance"])
+    if method != default.method:
+        keys.append(f'method = "{method}"')
+    if math.isfinite(tolerance) and tolerance != default.step_tolerance:
+        keys.append(f"tolerance = {tolerance:.0e}")
+    if one["formulation"].item() != default.formulation:
+        keys.append(f'formulation = "{one["formulation"].item()}"')
+    if one["held"].item():
+        keys.append("hold_invariants = true")
+    return tuple(keys)

@@ -21,8 +21,15 @@ from enum import StrEnum
 
 import numpy as np
 
-from rigidsim.accuracy.bench.plan import DEFAULT, Plan, every_setting, make_plan
-from rigidsim.accuracy.bench.solutions import ReferenceSolution, ReferenceThread, attitude_task
+from rigidsim.accuracy.bench.plan import (
+    DEFAULT,
+    Plan,
+    ReferenceSolution,
+    ReferenceThread,
+    attitude_task,
+    every_setting,
+    make_plan,
+)
 from rigidsim.accuracy.bench.worker import Task, ask
 from rigidsim.accuracy.comparison import angles_between
 from rigidsim.accuracy.setting import Setting
@@ -156,13 +163,7 @@ def measure(
     """Measure the settings of a scene.
 
     Args:
-        budget: approximate time limit, s.
-        repeats: number of fresh processes in which speeds are measured.
-        plan: what to measure over; None for as much as the budget allows.
         reference: "best", or "extended" to use that setting if nothing better is possible in time.
-        full: measure every tolerance in every formulation and precision.
-        settings: settings to compare with the default; None for every kind.
-        told: called with a description of each stage.
 
     Raises:
         ConfigError: the config can't be run.
@@ -214,7 +215,7 @@ def _explore(
         if answer.problem is not None:
             row.status, row.problem = RowStatus.FAILED, answer.problem
         if answer.values:
-            row.attitudes = [np.array(part) for part in answer.values["attitudes"]]
+            row.attitudes = answer.values["attitudes"]
             row.drifts = answer.values["drifts"]
             row.steps, row.order = answer.values["steps"], answer.values["order"]
             row.work = answer.values["work"]

@@ -1,15 +1,34 @@
-"""A run whose shadow ensemble is followed to learn how its errors grow, and what was learnt."""
+"""A run whose shadow ensemble is followed to learn how its errors grow: what carries it, the run's own
+integrator or code compiled for it, how its motions are perturbed, and what was learnt.
+"""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from rigidsim.accuracy.estimates.margins import Margins
+from rigidsim.model.capabilities import Ahead, having, is_wide
+from rigidsim.model.formulations.formulation import Rounding
+from rigidsim.model.system import System
+from rigidsim.scene.transitions import acts_at_moments_alone
+from rigidsim.solve.compiled import TaylorEngine
+from rigidsim.solve.effects.angle_wrapping import STEPS_BETWEEN
 from rigidsim.solve.effects.waypoints import Waypoints
-from rigidsim.solve.problem import InitialValueProblem
-from rigidsim.solve.shadow.measures import Spread
+from rigidsim.solve.precision import precision_of
+from rigidsim.solve.problem import InitialValueProblem, double_twin
+from rigidsim.solve.shadow.carriers import (
+    TIGHT,
+    BatchCarrier,
+    OwnCarrier,
+    SeriesErrors,
+    StepperCarrier,
+    own_until,
+)
+from rigidsim.solve.shadow.ensemble import EnsembleCarrier, Perturbations, ShadowEnsemble
+from rigidsim.solve.shadow.measures import Measures, Spread, Starts
 from rigidsim.solve.taylor_stepper import TaylorStepper
 
 UNCERTAIN = 1e-2
@@ -21,13 +40,8 @@ class Course:
     """A run whose errors are to be followed.
 
     Attributes:
-        start, end: times, internal units.
-        steps: steps that it took.
-        waypoints: some of its step boundaries; None if there are none.
         stepper: the run's stepper; it, or copies of its engine, are used if good enough.
         nearest: smallest singular factor of the run's chart; 1 for charts that are changed.
-        uneven: ratio of its longest step to its shortest.
-        lost: errors in epsilons past which nothing can be learnt.
     """
 
     prepared: InitialValueProblem
@@ -119,8 +133,6 @@ def exponential_growth(
     Args:
         times: times since the start, internal units, whose binary exponent is ``exponent``.
         errors: rad, or relative.
-        stable: power of time with which errors of stable motions grow.
-        least: power of time up to which growth doesn't count as exponential.
     """
     largest = np.maximum.accumulate(errors)
     gone = int(np.searchsorted(largest, UNCERTAIN))
@@ -137,3 +149,118 @@ def exponential_growth(
     if rate > 0 and gone >= len(times):
         seconds += math.log(UNCERTAIN / largest[last]) / rate
     return max(rate, 0.0), seconds
+
+
+_OF_SERIES = 2.0
+"""Rounding of the arguments over that of time, both as errors of the time: the direction of the Moon in
+single precision is wrong by 1.5e-4 rad (root mean square, 1973 to 1982), where time is by half of that.
+"""
+_WITHIN_MONTH = 4.0
+"""Steps at least in a quarter of the Moon's month, as long as the body turns no slower than it revolves."""
+
+
+def ensemble_of(
+    course: Course, part: float, first: float, tolerance: float, margins: Margins
+) -> ShadowEnsemble:
+    """The ensemble at the start of a run."""
+    prepared, own = course.prepared, course.own
+    precision, system = prepared.precision, prepared.system
+    series: SeriesErrors | None = None
+    stand_in = False
+    follows = tolerance > TIGHT or not course.loose  # it is as loose as the run
+    if own is not None and own.system.stepwise:
+        carrier: EnsembleCarrier = StepperCarrier(system, course.start, course.end, course.steps, own)
+    elif own is not None and follows and _by_itself(course, own.integrator, part, tolerance, margins):
+        carrier = OwnCarrier(system, own.integrator, tolerance if course.same_states else None)
+        if course.loose:
+            series = SeriesErrors(system, prepared.effective_tolerance, own.integrator)
+    else:
+        same = course.same_states
+        system = system.rounded(precision_of("double").number) if same else double_twin(prepared)
+        stand_in = not same and prepared.system.partner is None
+        if system.stepwise:
+            carrier = StepperCarrier(system, course.start, course.end, course.steps)
+        else:
+            carrier = BatchCarrier(system, course.steps * part, tolerance)
+        if course.loose and not system.stepwise:
+            series = SeriesErrors(system, prepared.effective_tolerance)
+    measures, exponents = Measures(system), system.state_exponents
+    units = [[math.ldexp(1.0, int(exponents[place]))] for place in measures.places["rates"]]
+    return ShadowEnsemble(
+        carrier,
+        measures,
+        Starts(
+            np.array([[float(x)] for x in system.initial]),
+            np.array([course.start]),
+            np.array([course.end]),
+            np.array([course.steps * first]),
+            np.array(units).reshape(-1, 1),
+            np.zeros((0, 1)),
+        ),
+        _perturbations(course, stand_in, margins),
+        float(precision.epsilon),
+        rounded=np.array([precision.exact(precision.number(x)) != x for x in system.initial]),
+        series=None if series is None else series.of_step,
+    )
+
+
+def _by_itself(course: Course, own: TaylorEngine, part: float, tolerance: float, margins: Margins) -> bool:
+    """Whether the run's own integrator carries its ensemble, at least at first."""
+    if tolerance <= TIGHT or (part < 1 and not course.same_states):
+        return course.steps * part < margins.most_own_steps
+    if course.prepared.system.formulation.rounding is Rounding.MOMENTA:
+        return course.steps * part <= margins.canonical_steps
+    return course.same_states or course.steps * part < own_until(own)
+
+
+def plain_perturbations(system: System) -> Perturbations:
+    """Errors of a step in quaternions or rates at the precision's own tolerance."""
+    ahead = max((x.seconds_ahead for x in having(Ahead, system.plan.loads)), key=abs, default=0.0)
+    plain = Perturbations(ahead=math.ldexp(ahead, -system.scaling.time))
+    if not any(map(is_wide, system.plan.loads)):
+        return plain
+    return replace(plain, clock=_OF_SERIES * plain.clock, together=_WITHIN_MONTH)
+
+
+def _perturbations(course: Course, stand_in: bool, margins: Margins) -> Perturbations:
+    """Errors of a step."""
+    prepared = course.prepared
+    plain, rounding = plain_perturbations(prepared.system), prepared.system.formulation.rounding
+    if prepared.system.stepwise and course.loose:
+        plain = replace(
+            plain, own=margins.cut_off * prepared.effective_tolerance / float(prepared.precision.epsilon)
+        )
+    if prepared.system.clocked and acts_at_moments_alone(prepared.scene):
+        plain = replace(plain, clock=0.0)
+    if rounding is Rounding.PLAIN:
+        return plain
+    series = margins.angle_series
+    if prepared.system.clocked:
+        # steps are relative to the largest state, which angles are until they are brought back into one turn;
+        # where the few steps through a spike decide, nothing averages that
+        turned = float(prepared.system.rate_bound) * (course.end - course.start) / max(course.steps, 1)
+        series *= 2 * math.pi + STEPS_BETWEEN * math.ldexp(turned, prepared.system.scaling.time)
+    angles = replace(plain, own=plain.own * margins.angles, series=series)
+    if rounding is Rounding.ANGLES:
+        return angles
+    # momenta: the nearer the singularity, the more do they lose in passing it
+    more = min(max(margins.near / max(course.nearest, 1e-150), 1.0), margins.angles)
+    more *= max(1.0, min(margins.very_near / max(course.nearest, 1e-150), 10.0))
+    carried = replace(angles, own=plain.own * more)
+    if not stand_in:
+        return carried
+    return replace(carried, shared=plain.own * _condition(course), series=margins.momentum_series)
+
+
+def _condition(course: Course) -> float:
+    """Amplification of a rounding error by canonical momenta, root mean square over the steps.
+
+    Rates are I^-1 K^T p: a rounded momentum is of the size of the largest moment and is divided by the
+    smallest, and K has the inverse of the singular factor s in it. In passing the singularity the rates that
+    remain are of the order s, and their derivatives lose as much once more: some steps that lose s^-2, among
+    all others that lose little.
+    """
+    moments = [float(m) for m in course.prepared.scene.body.principal_moments if m != 0]
+    nearest = max(course.nearest, 1e-150)
+    passing = math.sqrt(1.0 + 1 / nearest**2 / nearest**2 / max(course.steps, 1))
+    return max(moments) / min(moments) * min(passing, 1 / nearest)

@@ -79,14 +79,7 @@ def estimate_errors(
     """Estimate the errors of a run.
 
     Args:
-        steps: steps that it took.
-        reached: the time that it reached, s.
-        trail: some of the run's samples, to be compared with a closed form.
         waypoints: some of its step boundaries, where growth is examined besides the beginning.
-        stepper: the run's stepper; used if good enough, and left as it was.
-        nearest: smallest singular factor of the run's chart.
-        uneven: ratio of its longest step to its shortest.
-        go_on: polled repeatedly; False ends the estimate.
 
     Returns:
         None if ``go_on`` ended it.
@@ -219,12 +212,7 @@ def _conclusion(course: Course, followed: Followed, margins: Margins) -> Estimat
 
 
 def _stable(course: Course, spread: Spread, longer: float, turned: float) -> float:
-    """Error at the end (rad) if the motion amplifies none of what its ensemble is perturbed by.
-
-    Args:
-        longer: ratio of the run's length to what was followed.
-        turned: angle (rad) that the motion turns through.
-    """
+    """Error at the end (rad) if the motion amplifies none of what its ensemble is perturbed by."""
     prepared, epsilon = course.prepared, float(course.prepared.precision.epsilon)
     # where steps end on surfaces, the tolerance itself is the size of perturbations
     level = prepared.law_tolerance if prepared.system.stepwise else epsilon

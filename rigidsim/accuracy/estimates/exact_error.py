@@ -23,7 +23,6 @@ class ExactError:
 
     Attributes:
         attitude: rad; None if none is carried.
-        rates: relative to their size; None if they aren't states.
         position, velocity: m and m/s; None if the body has no position.
     """
 
@@ -36,10 +35,6 @@ class ExactError:
 def exact_error(prepared: InitialValueProblem, form: ClosedForm, trail: SampleTrail) -> ExactError:
     """Compare a run's samples with the closed form of its motion, evaluated in the run's precision or better,
     which rounds only a few times at any time.
-
-    Args:
-        form: closed form of the scene.
-        trail: some samples, at least one.
     """
     precision = precision_of("double") if prepared.precision.narrow else prepared.precision
     there_system = double_twin(prepared)

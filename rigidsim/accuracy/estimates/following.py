@@ -14,9 +14,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from rigidsim.accuracy.estimates.course import Course, Followed, power_of_time
+from rigidsim.accuracy.estimates.course import Course, Followed, ensemble_of, power_of_time
 from rigidsim.accuracy.estimates.margins import Margins
-from rigidsim.accuracy.estimates.perturbations import ensemble_of
 from rigidsim.accuracy.models.carrying import carrying
 from rigidsim.accuracy.models.side_by_side import Unmeasured
 from rigidsim.errors import ConfigError
@@ -45,11 +44,7 @@ _SMALL = 1e-100  # rad/s: errors that stay small however they grow
 
 
 def follow(course: Course, margins: Margins, go_on: Callable[[], bool]) -> Followed:
-    """Follow a run's shadow ensemble.
-
-    Args:
-        go_on: polled repeatedly; False ends it.
-    """
+    """Follow a run's shadow ensemble."""
     with borrowed(course.stepper):
         return _follow_as_needed(course, margins, go_on)
 

@@ -16,9 +16,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rigidsim.accuracy.estimates.course import UNCERTAIN
+from rigidsim.accuracy.estimates.course import UNCERTAIN, plain_perturbations
 from rigidsim.accuracy.estimates.margins import AS_LARGE, LABEL, LAST_BITS, MARGINS, Margins
-from rigidsim.accuracy.estimates.perturbations import plain_perturbations
 from rigidsim.solve.batch.family import Family, Numbers
 from rigidsim.solve.batch.run import BatchBlock
 from rigidsim.solve.batch.shadow_lanes import MemberCarrier, ShadowLanes
@@ -50,7 +49,6 @@ class MemberErrors:
 
     Attributes:
         attitude: rad, at most pi; None without an attitude.
-        rates: error of the angular velocity, relative to its size.
         position, velocity: m and m/s; None if the body has no position.
     """
 
@@ -66,11 +64,7 @@ class MemberErrors:
 
 
 class MemberEstimates:
-    """Estimates for a family's members, with what they need compiled once.
-
-    Args:
-        width: number of lanes of the batch that ran them.
-    """
+    """Estimates for a family's members, with what they need compiled once."""
 
     def __init__(self, family: Family, width: int, margins: Margins = MARGINS) -> None:
         self._traced, self._width, self._margins = family.traced, width, margins
@@ -86,11 +80,7 @@ class MemberEstimates:
             self._through(self._prepared.effective_tolerance * _TIGHTER)
 
     def of(self, numbers: Numbers, block: BatchBlock) -> MemberErrors:
-        """Errors of a block's members.
-
-        Args:
-            numbers: numbers from which the block was run.
-        """
+        """Errors of a block's members."""
         ran = np.array([status is not None for status in block.status]) & (block.reached > 0)
         some = np.flatnonzero(ran)
         found = np.full((4, len(ran)), np.nan)

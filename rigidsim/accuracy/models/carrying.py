@@ -42,7 +42,6 @@ class Carrying:
     """Tangent maps of an averaged motion's direction.
 
     Attributes:
-        seconds: length of each stretch, s.
         maps: (stretches, 2, 2) from its beginning to its end, in components along the path and across it.
     """
 
@@ -82,7 +81,6 @@ def carrying(
 
     Args:
         average: the run's own; None for a run of the full model, whose average over the orbits is taken.
-        go_on: polled repeatedly; False ends the work.
 
     Raises:
         ConfigError: a run of the full model has no average over the orbits.
@@ -174,12 +172,7 @@ def _to(carrier: EnsembleCarrier, states: np.ndarray, begin: float, end: float) 
 
 
 def _basis(direction: np.ndarray, towards: np.ndarray, otherwise: np.ndarray | None = None) -> np.ndarray:
-    """Unit vectors (2, 3) across a direction, the first of them along a path, the second across it.
-
-    Args:
-        towards: where the path leads.
-        otherwise: takes its place where the path stands still.
-    """
+    """Unit vectors (2, 3) across a direction, the first of them along a path, the second across it."""
     along = towards - (towards @ direction) * direction
     if np.linalg.norm(along) < _STANDS:
         along = np.eye(3)[int(np.argmin(np.abs(direction)))] if otherwise is None else otherwise

@@ -24,7 +24,6 @@ class Considered:
 
     Attributes:
         error: forecast of its modelling error from the beginning of the span, rad; None if there is none.
-        why_not: why it isn't taken; empty for the one that is.
         seconds: CPU time, s, of measuring that error after a run; None if it can't be measured.
     """
 
@@ -51,9 +50,6 @@ def choose_level(
 
     Recording something that no average provides, such as a quaternion, leaves the full model, whose attitude
     is then held to the same accuracy.
-
-    Args:
-        without: levels that were tried and missed it.
 
     Returns:
         None if the level is given.

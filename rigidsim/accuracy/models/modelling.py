@@ -89,7 +89,6 @@ def measure_modelling(
 
     Args:
         trail: some of the run's samples; without them, there is only a window at the beginning.
-        go_on: polled repeatedly; False ends the measurement.
 
     Raises:
         Unmeasured: ``go_on`` ended it, or one of the models can't be followed.
@@ -195,12 +194,7 @@ def _extrapolated(
     started: float,
     carried: Carrying | None,
 ) -> ModellingError:
-    """Error at the end from that in windows.
-
-    Args:
-        started: CPU time at which the measurement began, s.
-        carried: how the averaged motion carries errors; None for precession at a steady rate.
-    """
+    """Error at the end from that in windows."""
     rates = np.array([w.growth for w in windows])
     doubt = max(w.doubt for w in windows)
     mean = np.abs(rates.mean(axis=0)) + (rates.max(axis=0) - rates.min(axis=0)) / 2

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from rigidsim.accuracy.trial import compactly
+from rigidsim.accuracy.trial import Collected, compactly
 from rigidsim.errors import ConfigError
 from rigidsim.model.averaged.average import Average, osculating
 from rigidsim.model.averaged.free_motion import FreeMotion
@@ -22,10 +22,8 @@ from rigidsim.scene.model_table import FULL
 from rigidsim.scene.sample_times import SampleTimes
 from rigidsim.scene.scene import Scene
 from rigidsim.solve.assembly import assemble, sampler
-from rigidsim.solve.evaluate import Evaluator
 from rigidsim.solve.problem import InitialValueProblem, prepare_scene
-from rigidsim.solve.sample_block import SampleBlock
-from rigidsim.solve.sampler import Progress, SampleReceiver
+from rigidsim.solve.sampler import Progress
 from rigidsim.solve.status import Status
 from rigidsim.store.summary_parts import UnmeasuredCode
 
@@ -52,14 +50,7 @@ class Unmeasured(Exception):
 
 @dataclass(frozen=True)
 class Change:
-    """Difference of a changing quantity between both models, relative to its value.
-
-    Attributes:
-        largest: the largest difference.
-        mean: the mean one, without what oscillates.
-        growth: its growth, 1/s.
-        doubt: difference of growth between the window's parts, 1/s.
-    """
+    """Difference of a changing quantity between both models, relative to its value."""
 
     largest: float
     mean: float
@@ -72,8 +63,6 @@ class Window:
     """A window over which both models ran side by side.
 
     Attributes:
-        start, end: times, s.
-        steps, reduced_steps: steps of the full and of the reduced model.
         momentum, figure: largest distance between the directions of the angular momentum and of the figure
             axis, with what averaging removed added back, rad; None if the body tumbles.
         recorded, recorded_figure: the same for the directions as the run records them.
@@ -101,11 +90,7 @@ def rotation_rates(motion: FreeMotion) -> list[float]:
 
 
 def motion_at(average: Average, states: Sequence[Any], exponent: int) -> FreeMotion:
-    """Free motion at these states of an averaged motion.
-
-    Args:
-        exponent: binary exponent of the internal unit of angular momentum.
-    """
+    """Free motion at these states of an averaged motion."""
     if average.driven is None:
         return average.motion
     context = average.driven.torques.scene.context
@@ -150,10 +135,7 @@ def side_by_side(
     times = np.linspace(0.0, end - begin, count)
     apart = true["momentum_axis"] - reduced[1]["momentum_axis"]
     basis = _basis(plain[1]["momentum_axis"])
-    parts = apart @ basis.T
-    third = count // 3
-    growth = _slope(times, parts)
-    first, last = _slope(times[: 2 * third], parts[: 2 * third]), _slope(times[third:], parts[third:])
+    growth, doubt = _growth(times, apart @ basis.T)
     return Window(
         begin,
         end,
@@ -163,7 +145,7 @@ def side_by_side(
         _largest(true["momentum_axis"] - plain[1]["momentum_axis"]),
         _largest(true["figure_axis"] - plain[1]["figure_axis"]) if average.figure else None,
         (float(growth[0]), float(growth[1])),
-        float(np.linalg.norm(first - last)) / 2,
+        doubt,
         reduced[0],
         _changes(times, true, reduced[1]) if average.driven is not None else {},
     )
@@ -172,8 +154,7 @@ def side_by_side(
 def _changes(
     times: np.ndarray, true: Mapping[str, np.ndarray], reduced: Mapping[str, np.ndarray]
 ) -> dict[str, Change]:
-    third, found = len(times) // 3, {}
-    weights = np.hanning(len(times))
+    found, weights = {}, np.hanning(len(times))
     ratios = {
         SIZE: true[SIZE].ravel() / reduced[SIZE].ravel(),
         ENERGY: true[_OF_ROTATION].ravel() / reduced[ENERGY].ravel(),
@@ -181,11 +162,9 @@ def _changes(
     ratios[SHAPE] = ratios[ENERGY] / ratios[SIZE] ** 2
     for name, ratio in ratios.items():
         apart = ratio - 1
-        parts = apart[:, None]
-        first, last = _slope(times[: 2 * third], parts[: 2 * third]), _slope(times[third:], parts[third:])
-        growth = float(_slope(times, parts)[0])
+        (growth,), doubt = _growth(times, apart[:, None])
         mean = float(weights @ apart / weights.sum())
-        found[name] = Change(float(np.abs(apart).max()), mean, growth, float(abs(first[0] - last[0])) / 2)
+        found[name] = Change(float(np.abs(apart).max()), mean, float(growth), doubt)
     return found
 
 
@@ -201,11 +180,6 @@ def _starting(
     """The full scene from a time on: the body as at its start, turned by the smallest rotation that brings
     its momentum to the present one; in a resonance, as given by the slow motion; under torques of the body
     alone, on the present polhode.
-
-    Args:
-        states: states of the averaged motion.
-        exponent: binary exponent of the internal unit of angular momentum.
-        count: number of samples.
     """
     context = scene.context
     instant = fraction_of(context.mpf(begin)) if begin != float(scene.start) else scene.samples.begin
@@ -250,23 +224,6 @@ def with_bodies(scene: Scene, prepared: InitialValueProblem, states: Sequence[An
     return replace(scene, bodies=masses, loads=tuple(load.among(masses) for load in scene.loads))
 
 
-class _AsDoubles(SampleReceiver):
-    """Keeps recorded variables in memory, as doubles."""
-
-    def __init__(self, evaluator: Evaluator, names: Sequence[str]) -> None:
-        self._evaluator = evaluator
-        self._pieces: dict[str, list[np.ndarray]] = {name: [] for name in names}
-
-    def take(self, block: SampleBlock) -> None:
-        recorded = self._evaluator.evaluate(block)
-        for name, pieces in self._pieces.items():
-            pieces.append(np.asarray(recorded[name][0], dtype=np.float64))
-
-    def of(self, name: str) -> np.ndarray:
-        """A recorded variable, its samples first."""
-        return np.concatenate(self._pieces[name])
-
-
 def _followed(
     prepared: InitialValueProblem,
     scene: Scene,
@@ -276,9 +233,6 @@ def _followed(
     go_on: Callable[[], bool],
 ) -> tuple[int, dict[str, np.ndarray]]:
     """Steps, and the variables asked for at all samples.
-
-    Args:
-        average: the average that the run follows; None for the full model.
 
     Raises:
         Unmeasured: the motion is refused, or doesn't reach the end.
@@ -301,7 +255,7 @@ def _followed(
         raise Unmeasured(code, f"{words} can't be followed beside the run: {why}") from None
     problem = compactly(begun)
     parts = assemble(problem)
-    receiver = _AsDoubles(parts.evaluator, names)
+    receiver = Collected(parts.evaluator, names)
 
     def check(_: Progress) -> Status | None:
         return None if go_on() else Status.INTERRUPTED
@@ -312,7 +266,7 @@ def _followed(
     if progress.status is not Status.FINISHED:
         code = UnmeasuredCode.FULL_STOPPED if average is None else UnmeasuredCode.AVERAGED_STOPPED
         raise Unmeasured(code, f"{words}, beside the run, ended early: {progress.status.message}")
-    return progress.steps, {name: receiver.of(name) for name in names}
+    return progress.steps, {name: receiver.parts(name)[0] for name in names}
 
 
 def _basis(path: np.ndarray) -> np.ndarray:
@@ -324,6 +278,13 @@ def _basis(path: np.ndarray) -> np.ndarray:
         along = np.cross(np.eye(3)[int(np.argmin(np.abs(middle)))], middle)
     along = along / np.linalg.norm(along)
     return np.array([along, np.cross(middle, along)])
+
+
+def _growth(times: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, float]:
+    """Slope of each column, and half of the distance of those over the first two thirds and the last two."""
+    third = len(times) // 3
+    first, last = _slope(times[: 2 * third], values[: 2 * third]), _slope(times[third:], values[third:])
+    return _slope(times, values), float(np.linalg.norm(first - last)) / 2
 
 
 def _slope(times: np.ndarray, values: np.ndarray) -> np.ndarray:

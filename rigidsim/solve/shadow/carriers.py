@@ -109,12 +109,7 @@ class _SingleMotion:
         raise NotImplementedError
 
     def _evenly(self, go: Callable[[int], tuple[Any, ...]], most: int) -> int:
-        """Take steps while they are alike; returns how many.
-
-        Args:
-            go: takes at most so many steps from the same place again; returns heyoka's outcome, the shortest
-                step, the longest and their number.
-        """
+        """Take steps while they are alike; returns how many."""
         tried = min(self._most_even, most)
         while True:
             _, shortest, longest, steps, *_ = go(tried)

@@ -127,7 +127,7 @@ class ShadowEnsemble:
         *,
         rounded: np.ndarray | None = None,
         series: Callable[[np.ndarray, float], np.ndarray] | None = None,
-        stretches: int = 32,
+        stretches: int = 16,
     ) -> None:
         self.carrier, self._measures, self._errors = carrier, measures, perturbations
         self._epsilon, self._series, self._stretches = epsilon, series, stretches
@@ -250,7 +250,7 @@ class ShadowEnsemble:
         if angles := self._measures.angles:  # which grow, and step control with them
             found[angles] -= self._measures.turn * np.rint(found[angles, :, :1] / self._measures.turn)
         self._states[:, going] = found
-        self._perturb(going, sizes, taken, reached < until, normal[1:])
+        self._perturb(going, sizes, taken, growth, reached < until, normal[1:])
         self._draw_in(going)
         self._note(going)
 
@@ -262,7 +262,13 @@ class ShadowEnsemble:
         self.spread.whole[which] &= self._factor[which] > _NEAREST
 
     def _perturb(
-        self, which: np.ndarray, sizes: np.ndarray, taken: np.ndarray, going: np.ndarray, normal: np.ndarray
+        self,
+        which: np.ndarray,
+        sizes: np.ndarray,
+        taken: np.ndarray,
+        growth: np.ndarray,
+        going: np.ndarray,
+        normal: np.ndarray,
     ) -> None:
         """Add errors of half of the steps taken, and of half of those ahead.
 
@@ -276,7 +282,8 @@ class ShadowEnsemble:
         ahead = np.where(going, np.minimum(self._stride[which], left) / 2, 0.0)
         steps = np.maximum(taken - self._ahead[which], 0.0) + ahead
         self._ahead[which] = ahead
-        root = np.sqrt(steps)[:, None]
+        # of errors made all along a stretch of exponential growth g a part 1 / ln g grows as much (variances)
+        root = np.sqrt(steps / np.clip(np.log(growth), 1.0, math.log(_WILD)))[:, None]
         added = errors.own * (root.T * sizes)[:, :, None] * normal[1 : 1 + states, None]
         if errors.shared:
             size = errors.shared * root[:, 0] * sizes[self._measures.felt].max(axis=0, initial=0.0)
