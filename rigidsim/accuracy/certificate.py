@@ -23,8 +23,7 @@ from rigidsim.accuracy.comparison import (
 from rigidsim.accuracy.motion import KnownMotion, motion_of
 from rigidsim.accuracy.reference import (
     INCOMPARABLE,
-    STANDARD,
-    Policy,
+    POLICY,
     Reference,
     ReferenceKind,
     own_error,
@@ -81,7 +80,6 @@ def certify(
     loads: Sequence[Load] = (),
     known: KnownMotion | None = None,
     told: Told | None = None,
-    policy: Policy = STANDARD,
 ) -> Certificate | None:
     """Compare a finished run with an independent solution.
 
@@ -95,9 +93,9 @@ def certify(
     if dataset.sizes["time"] == 0:
         return None
     motion = known or motion_of(experiment, loads=loads)
-    compared = _Compared(dataset, Trials(experiment, loads, told), motion, policy)
+    compared = _Compared(dataset, Trials(experiment, loads, told), motion)
     best: Certificate | None = None
-    for reference in references(compared.setting, motion, accuracy, policy):
+    for reference in references(compared.setting, motion, accuracy):
         found = compared.against(reference)
         if found is None:
             continue
@@ -112,11 +110,11 @@ def certify(
 class _Compared:
     """A run's recorded attitudes, and other solutions at the same times."""
 
-    def __init__(self, dataset: xarray.Dataset, trials: Trials, motion: KnownMotion, policy: Policy) -> None:
+    def __init__(self, dataset: xarray.Dataset, trials: Trials, motion: KnownMotion) -> None:
         self.setting = setting_of(trials.experiment)
-        self._trials, self._motion, self._policy = trials, motion, policy
+        self._trials, self._motion = trials, motion
         self._count = dataset.sizes["time"]
-        self._rows = {most: rows_to_compare(dataset, most) for most in (policy.times, policy.wide_times)}
+        self._rows = {most: rows_to_compare(dataset, most) for most in (POLICY.times, POLICY.wide_times)}
         everything = np.unique(np.concatenate(list(self._rows.values())))
         self._place = {row: n for n, row in enumerate(everything)}
         self._times = exact_times(dataset, everything)
@@ -138,11 +136,10 @@ class _Compared:
 
     def against(self, reference: Reference) -> Certificate | None:
         """The certificate that a reference gives; None if it is impossible."""
-        policy = self._policy
-        rows = self._rows[policy.wide_times if reference.kind is ReferenceKind.CLOSED_FORM else policy.times]
-        safety = policy.safety if len(rows) == self._count else policy.picked_safety
+        rows = self._rows[POLICY.wide_times if reference.kind is ReferenceKind.CLOSED_FORM else POLICY.times]
+        safety = POLICY.safety if len(rows) == self._count else POLICY.picked_safety
         if reference.kind is ReferenceKind.PEER:
-            safety = policy.peer_safety
+            safety = POLICY.peer_safety
         places = [self._place[row] for row in rows]
         times = [self._times[place] for place in places]
         better = self._trials.whole(reference.setting, times)
@@ -156,7 +153,7 @@ class _Compared:
             return math.inf if found is None else float(angles_between(found.attitudes, attitudes).max())
 
         self.largest = float(difference.max())
-        self.own = own_error(reference, self.setting, self.largest, self._motion, distance, policy)
+        self.own = own_error(reference, self.setting, self.largest, self._motion, distance)
         # recorded values can't be compared more closely than a quaternion's last bit
         floor = 2.0 ** (2 - self.setting.bits)
         error = safety * self.largest + self.own + floor
@@ -175,11 +172,11 @@ class _Compared:
         """
         if reference.kind is ReferenceKind.CLOSED_FORM:
             return safety * apart
-        policy, own = self._policy, reference.setting
-        share = own.level * policy.scatter_of(own, self._motion.steps) / self.setting.level
+        own = reference.setting
+        share = own.level * POLICY.scatter_of(own, self._motion.steps) / self.setting.level
         if own.bits <= self.setting.bits:
-            share = policy.as_bad
-        return (safety + min(policy.as_bad, share)) * apart
+            share = POLICY.as_bad
+        return (safety + min(POLICY.as_bad, share)) * apart
 
 
 def verdict(

@@ -116,7 +116,6 @@ def choose(
     loads: Sequence[Load] = (),
     beyond: Setting | None = None,
     told: Told | None = None,
-    margins: ChoiceMargins = MARGINS,
     key: str = "accuracy",
 ) -> Choice:
     """The cheapest setting whose forecast keeps an accuracy, within what the config leaves open.
@@ -134,11 +133,11 @@ def choose(
         return cost(setting, motion.steps, forecasts.samples)
 
     candidates = sorted(_candidates(experiment, motion), key=counted)
-    most = accuracy / margins.safety
-    hope = accuracy * (margins.hope_long if forecasts.part < 1 else margins.hope)
+    most = accuracy / MARGINS.safety
+    hope = accuracy * (MARGINS.hope_long if forecasts.part < 1 else MARGINS.hope)
     if beyond is not None:
         hope = 0.0
-        most = min(most, margins.progress * forecasts.error(beyond))
+        most = min(most, MARGINS.progress * forecasts.error(beyond))
         spent = counted(beyond)
         candidates = [s for s in candidates if counted(s) > spent]
     while True:

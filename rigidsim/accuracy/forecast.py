@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 from rigidsim.accuracy.comparison import angles_between, spread_times
 from rigidsim.accuracy.motion import PILOT_STEPS, motion_of
-from rigidsim.accuracy.reference import STANDARD, Policy, exact_beyond, stepped_reference
+from rigidsim.accuracy.reference import exact_beyond, stepped_reference
 from rigidsim.accuracy.setting import Setting, epsilon
 from rigidsim.accuracy.trial import Told, Trial, Trials
 from rigidsim.model.load import Load
@@ -83,17 +83,14 @@ class Forecasts:
         accuracy: float,
         loads: Sequence[Load] = (),
         told: Told | None = None,
-        *,
-        law: Extrapolation = LAW,
-        policy: Policy = STANDARD,
     ) -> None:
         """Examine a motion's beginning."""
-        self._experiment, self._accuracy, self._law, self._policy = experiment, accuracy, law, policy
+        self._experiment, self._accuracy = experiment, accuracy
         self._trials = Trials(experiment, loads, told)
-        self.motion = motion_of(experiment, loads=loads, pilot_steps=law.steps)
+        self.motion = motion_of(experiment, loads=loads, pilot_steps=LAW.steps)
         self.samples = build_scene(experiment).samples.count
-        self.part = min(1.0, law.steps / self.motion.steps)
-        self._times = spread_times(experiment, law.times, self.part)
+        self.part = min(1.0, LAW.steps / self.motion.steps)
+        self._times = spread_times(experiment, LAW.times, self.part)
         self._measured: dict[Setting, float] = {}
         self._references: dict[Setting, Trial | None] = {}
 
@@ -129,10 +126,10 @@ class Forecasts:
     def _closed_error(self, setting: Setting) -> float:
         """Error of a closed form, compared over the whole run since it costs the same at any horizon."""
         if setting not in self._measured:
-            floor = self._law.closed_floor * epsilon(setting.precision)
+            floor = LAW.closed_floor * epsilon(setting.precision)
             self._measured[setting] = math.inf
             if floor <= self._accuracy:
-                times = spread_times(self._experiment, self._law.closed_times)
+                times = spread_times(self._experiment, LAW.closed_times)
                 better = exact_beyond(setting.precision, setting.method).setting
                 one, other = (self._trials.whole(s, times) for s in (setting, better))
                 if one is not None and other is not None:
@@ -142,7 +139,7 @@ class Forecasts:
 
     def _obvious(self, setting: Setting) -> bool:
         """Whether rounding is clearly negligible."""
-        return self.motion.rounding(setting.precision) * self._law.clearly <= self._accuracy
+        return self.motion.rounding(setting.precision) * LAW.clearly <= self._accuracy
 
     def _rounding(self, setting: Setting) -> float:
         if self._obvious(setting):
@@ -176,12 +173,12 @@ class Forecasts:
             return math.inf
         errors = angles_between(trial.attitudes, reference.attitudes)
         late = float(errors.max())
-        if late > self._law.saturated:  # no longer small: only the law tells how large it would be
+        if late > LAW.saturated:  # no longer small: only the law tells how large it would be
             return max(late, self.motion.error(setting.level))
         late = max(late, epsilon(setting.precision))
         if self.part >= 1.0:
             return late
-        return self._law.at_end(float(errors[: len(errors) // 4].max()), late, self.part, setting)
+        return LAW.at_end(float(errors[: len(errors) // 4].max()), late, self.part, setting)
 
     def _reference(self, setting: Setting) -> Trial | None:
         """The trial against which a setting's trial is compared: in double precision if rounding is
@@ -189,7 +186,7 @@ class Forecasts:
         """
         precision = "double" if self._obvious(setting) else "extended"
         steps = self.motion.steps * self.part
-        best = stepped_reference(precision, self.motion, steps, self._policy, setting.formulation)
+        best = stepped_reference(precision, self.motion, steps, setting.formulation)
         if best not in self._references:
             self._references[best] = self._trials.whole(best, self._times)
         return self._references[best]

@@ -79,7 +79,7 @@ class Policy:
         return self.scatter + self.scatter_of_series * math.sqrt(steps)
 
 
-STANDARD = Policy()
+POLICY = Policy()
 
 
 class ReferenceKind(Enum):
@@ -110,9 +110,7 @@ class Reference:
 # --- which references there are --------------------------------------------------------------------------
 
 
-def references(
-    setting: Setting, motion: KnownMotion, accuracy: float, policy: Policy = STANDARD
-) -> list[Reference]:
+def references(setting: Setting, motion: KnownMotion, accuracy: float) -> list[Reference]:
     """References for a whole run, from cheap to costly.
 
     Args:
@@ -120,14 +118,14 @@ def references(
     """
     loose = setting.has_steps and setting.tolerance is not None
     stepped: list[str | int] = []
-    if setting.bits <= 53 and loose and motion.steps > policy.extended_steps:
+    if setting.bits <= 53 and loose and motion.steps > POLICY.extended_steps:
         stepped.append("double")
-    if setting.bits <= 53 and (motion.steps <= policy.extended_steps or not motion.exact):
+    if setting.bits <= 53 and (motion.steps <= POLICY.extended_steps or not motion.exact):
         stepped.append("extended")
     costly: list[Reference] = []
     if motion.exact and setting.has_steps:
         costly.append(exact_beyond(setting.precision, motion.exact))
-    elif motion.steps <= policy.wide_steps:
+    elif motion.steps <= POLICY.wide_steps:
         stepped += ["quadruple"] * (setting.bits <= 64)
         stepped.append(digits_beyond(setting.precision))
     elif motion.exact:  # too long for steps: the closed form must check itself, with many more digits
@@ -136,9 +134,9 @@ def references(
         other = variables_named(setting.formulation).checked_by
         peer = replace(setting, formulation=other, tolerance=None)
         costly.append(Reference(peer, ReferenceKind.PEER))
-    finer = [stepped_reference(p, motion, motion.steps, policy) for p in stepped]
+    finer = [stepped_reference(p, motion, motion.steps) for p in stepped]
     return [
-        *(Reference(_only_as_good(s, setting, motion, accuracy, policy)) for s in finer),
+        *(Reference(_only_as_good(s, setting, motion, accuracy)) for s in finer),
         *costly,
     ]
 
@@ -157,25 +155,22 @@ def stepped_reference(
     precision: str | int,
     motion: KnownMotion,
     steps: float,
-    policy: Policy,
     formulation: str = DEFAULT_FORMULATION,
 ) -> Setting:
     """An integration at a precision's epsilon. Invariants are projected where that is right: with more digits
     than 64 bits rounding doesn't matter, nor does it over a short way in double precision.
     """
-    projected = working_bits(precision) <= 64 and (precision != "double" or steps > policy.extended_steps)
+    projected = working_bits(precision) <= 64 and (precision != "double" or steps > POLICY.extended_steps)
     return Setting(precision, formulation=formulation, hold_invariants=projected and motion.holds)
 
 
-def _only_as_good(
-    reference: Setting, setting: Setting, motion: KnownMotion, accuracy: float, policy: Policy
-) -> Setting:
+def _only_as_good(reference: Setting, setting: Setting, motion: KnownMotion, accuracy: float) -> Setting:
     """A multi-precision reference with no more accuracy than needed."""
     if reference.bits <= 64:
         return reference
-    tolerance = policy.clearly * accuracy / max(1.0, motion.error(1.0))
-    tolerance /= policy.scatter_with_series(motion.steps)
-    tolerance = min(tolerance, policy.clearly * setting.level)
+    tolerance = POLICY.clearly * accuracy / max(1.0, motion.error(1.0))
+    tolerance /= POLICY.scatter_with_series(motion.steps)
+    tolerance = min(tolerance, POLICY.clearly * setting.level)
     return replace(reference, tolerance=tolerance) if tolerance > epsilon(reference.precision) else reference
 
 
@@ -237,7 +232,6 @@ def own_error(
     difference: float,
     motion: KnownMotion,
     distance: Callable[[Setting], float],
-    policy: Policy,
 ) -> float:
     """Bound of a reference's own error, rad.
 
@@ -249,17 +243,17 @@ def own_error(
     if reference.kind is ReferenceKind.CLOSED_FORM:
         return 0.0  # dozens of digits more than the run
     own = reference.setting
-    level = own.level * policy.scatter_of(own, motion.steps)
+    level = own.level * POLICY.scatter_of(own, motion.steps)
     estimate = math.inf
     if setting.has_steps:
-        estimate = difference * min(policy.as_bad, level / setting.level)
+        estimate = difference * min(POLICY.as_bad, level / setting.level)
         if own.bits <= setting.bits:  # rounded coefficients and initial values are the same in both
             return max(estimate, motion.rounding(own.precision))
-        if level <= policy.much_better * setting.level:
+        if level <= POLICY.much_better * setting.level:
             return estimate
     for precision in ("double", "extended"):
         probe = Setting(precision)
-        if own.level > policy.much_better * probe.level:
+        if own.level > POLICY.much_better * probe.level:
             break
         found = distance(probe)
         if found < INCOMPARABLE:

@@ -141,7 +141,7 @@ class UnitCosts:
 MEASURED = UnitCosts()
 
 
-def cost(setting: Setting, steps: float, samples: int, *, units: UnitCosts = MEASURED) -> float:
+def cost(setting: Setting, steps: float, samples: int) -> float:
     """Approximate cost in steps of double precision at its epsilon.
 
     A step's work goes with the square of the Taylor order; steps are about as long at any tolerance.
@@ -149,12 +149,12 @@ def cost(setting: Setting, steps: float, samples: int, *, units: UnitCosts = MEA
     digits = max(1.0, setting.precision / 50) if isinstance(setting.precision, int) else None
     if not setting.has_steps:
         if setting.bits <= 53:
-            return units.closed_start + samples * units.closed_sample
+            return MEASURED.closed_start + samples * MEASURED.closed_sample
         if digits is not None:
-            return samples * units.digits_closed_sample * digits
-        return samples * units.wide_closed_sample
-    step = units.steps[setting.precision] if digits is None else units.digits_step * digits
-    projected = units.projected if setting.hold_invariants else 1.0
+            return samples * MEASURED.digits_closed_sample * digits
+        return samples * MEASURED.wide_closed_sample
+    step = MEASURED.steps[setting.precision] if digits is None else MEASURED.digits_step * digits
+    projected = MEASURED.projected if setting.hold_invariants else 1.0
     return steps * step * (setting.taylor_order / 20) ** 2 * projected
 
 

@@ -158,7 +158,6 @@ def measure(
     full: bool = False,
     settings: Sequence[Setting] | None = None,
     told: Callable[[str], None] = lambda _: None,
-    timing: Timing = TIMING,
 ) -> Measurement:
     """Measure the settings of a scene.
 
@@ -180,34 +179,32 @@ def measure(
     if settings is None:
         settings = every_setting(plan.exact, full=full)
     rows = [Row(s) for s in dict.fromkeys([DEFAULT, *settings])]
-    explored = begun + timing.exploring * budget
-    references = ReferenceThread(experiment, plan, explored, timing.grace, wanted=reference == "best")
+    explored = begun + TIMING.exploring * budget
+    references = ReferenceThread(experiment, plan, explored, TIMING.grace, wanted=reference == "best")
     references.start()
     told(f"attitudes of {len(rows)} settings")
-    _explore(experiment, plan, rows, budget, explored, timing)
+    _explore(experiment, plan, rows, budget, explored)
     told("the reference")
     references.join()
     found, wide = references.found({row.setting: row.attitudes for row in rows if row.measured})
     told("speeds")
-    done = _time(experiment, plan, rows, repeats, begun + 1.1 * budget, timing, told)
+    done = _time(experiment, plan, rows, repeats, begun + 1.1 * budget, told)
     return Measurement(experiment, plan, rows, found, wide, done, time.monotonic() - begun)
 
 
 # --- attitudes -------------------------------------------------------------------------------------------
 
 
-def _explore(
-    experiment: Experiment, plan: Plan, rows: list[Row], budget: float, deadline: float, timing: Timing
-) -> None:
+def _explore(experiment: Experiment, plan: Plan, rows: list[Row], budget: float, deadline: float) -> None:
     """Fill in attitudes, drifts and counts."""
     tasks = []
     for row in rows:
         wide = row.setting.precision == "quadruple" and row.setting.has_steps
         row.part = plan.short if wide else plan.part
-        tasks.append(attitude_task(plan, row.setting, timing.single * budget, wide=wide))
+        tasks.append(attitude_task(plan, row.setting, TIMING.single * budget, wide=wide))
         row.problem = f"left out: the budget of {budget:g} s was used up before its turn"
     # without the default there is no comparison: on a busy machine it may be late
-    first_by = time.monotonic() + timing.grace
+    first_by = time.monotonic() + TIMING.grace
     for answer in ask(experiment, tasks, deadline=deadline, first_by=first_by):
         row = rows[answer.index]
         row.status = RowStatus.MEASURED if row.part >= plan.part else RowStatus.SHORT
@@ -235,7 +232,6 @@ def _time(
     rows: list[Row],
     repeats: int,
     deadline: float,
-    timing: Timing,
     told: Callable[[str], None],
 ) -> int:
     """Measure speeds in fresh processes, in a different order in each; returns how many completed."""
@@ -247,10 +243,10 @@ def _time(
         random.Random(repeat).shuffle(order)
         middle = len(order) // 2
         turns = [rows[0], *order[:middle], rows[0], *order[middle:], rows[0]]
-        tasks = [Task(row.setting, "speed", plan.times, timing.passes, max(1, row.steps)) for row in turns]
+        tasks = [Task(row.setting, "speed", plan.times, TIMING.passes, max(1, row.steps)) for row in turns]
         seconds: dict[int, float] = {}
         limit = deadline if repeat else max(deadline, time.monotonic() + 30.0)
-        first_by = 0.0 if repeat else time.monotonic() + timing.grace
+        first_by = 0.0 if repeat else time.monotonic() + TIMING.grace
         for answer in ask(experiment, tasks, deadline=limit, first_by=first_by):
             if answer.problem is None:
                 seconds[answer.index] = answer.values["seconds"]

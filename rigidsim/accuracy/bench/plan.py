@@ -132,7 +132,7 @@ def every_setting(exact: str = "", *, full: bool = False) -> list[Setting]:
     return list(dict.fromkeys(listed))
 
 
-def make_plan(experiment: Experiment, budget: float, how: Budgeting = BUDGETING) -> Plan:
+def make_plan(experiment: Experiment, budget: float) -> Plan:
     """Make a plan from a short pilot of the default setting.
 
     Raises:
@@ -143,19 +143,19 @@ def make_plan(experiment: Experiment, budget: float, how: Budgeting = BUDGETING)
     prepared = prepare_scene(experiment, trial_scene(experiment, DEFAULT))
     corrected = assemble(prepared).steps()
     pilot = run_pilot(
-        corrected.stepper, prepared.clock, corrected.skip, steps=how.pilot_steps, warming=_WARMING
+        corrected.stepper, prepared.clock, corrected.skip, steps=BUDGETING.pilot_steps, warming=_WARMING
     )
     whole = pilot.whole * pilot.seconds_per_step
     exact, why = exact_method(scene)
-    part = min(1.0, how.all_share * budget / (whole * how.all_cost))
-    short = how.quadruple_share * budget / (whole * how.quadruple_cost)
+    part = min(1.0, BUDGETING.all_share * budget / (whole * BUDGETING.all_cost))
+    short = BUDGETING.quadruple_share * budget / (whole * BUDGETING.quadruple_cost)
     if not exact:
-        part = min(part, how.reference_share * budget / (whole * how.reference_cost))
-        short = min(short, how.digits_share * budget / (whole * how.digits_cost))
+        part = min(part, BUDGETING.reference_share * budget / (whole * BUDGETING.reference_cost))
+        short = min(short, BUDGETING.digits_share * budget / (whole * BUDGETING.digits_cost))
     short = min(part, short)
-    short_times = grid(start, end, short, how.short_samples) if short < part else ()
+    short_times = grid(start, end, short, BUDGETING.short_samples) if short < part else ()
     # the start is a sample, so that the motion begins there
-    times = tuple(sorted({start, *short_times, *grid(start, end, part, how.samples)}))
+    times = tuple(sorted({start, *short_times, *grid(start, end, part, BUDGETING.samples)}))
     limit = short_times[-1] if short_times else times[-1]
     return Plan(
         start=start,

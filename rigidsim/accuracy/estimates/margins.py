@@ -60,7 +60,7 @@ class Margins:
         exponential: power of time past which growth counts as exponential.
     """
 
-    safety: float = 3.0
+    safety: float = 2.75
     drifted: float = 1e6
     gone: float = 1e6
     tight_steps: int = 50_000
