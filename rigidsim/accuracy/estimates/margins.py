@@ -20,8 +20,8 @@ class Margins:
     (``experiments/error_coverage.py``).
 
     Attributes:
-        safety, path: factor on the root mean square of three perturbed motions; further factor for position and
-            velocity.
+        safety, path: factor on the root mean square of three perturbed motions; further factor for
+            position and velocity.
         drifted, gone, tight_steps: growth of a step's error from which a loosely followed motion becomes a
             different one; growth, over that which leaves no digit, from which this doesn't matter; largest
             number of steps of a run that is followed tightly.
