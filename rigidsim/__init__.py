@@ -11,8 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from rigidsim.errors import ConfigError, RigidsimError, RunFolderError
-    from rigidsim.store.memory import MemoryRun
-    from rigidsim.store.run import Run, SavedRun, open_run
+    from rigidsim.store.run import MemoryRun, Run, SavedRun, open_run
     from rigidsim.store.sweeps.run import SavedSweep, open_sweep
     from rigidsim.workflows.analyse import analyse
     from rigidsim.workflows.plan import plan
@@ -31,7 +30,7 @@ _PLACES = {
     "Experiment": "rigidsim.workflows.read",
     "load": "rigidsim.workflows.read",
     "parse": "rigidsim.workflows.read",
-    "MemoryRun": "rigidsim.store.memory",
+    "MemoryRun": "rigidsim.store.run",
     "Run": "rigidsim.store.run",
     "SavedRun": "rigidsim.store.run",
     "open_run": "rigidsim.store.run",

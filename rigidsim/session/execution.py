@@ -28,8 +28,7 @@ from rigidsim.solve.trail import SampleTrail
 from rigidsim.store import provenance
 from rigidsim.store.attributes import RootAttributes
 from rigidsim.store.folder import RunFolder
-from rigidsim.store.memory import MemoryRun, MemoryWriter
-from rigidsim.store.run import Run, SavedRun
+from rigidsim.store.run import MemoryRun, MemoryWriter, Run, SavedRun
 from rigidsim.store.segments import Arrays, Chain, SegmentWriter
 from rigidsim.store.summary import Summary
 from rigidsim.store.summary_parts import Cost

@@ -21,7 +21,7 @@ from rigidsim.session.kept import (
 )
 from rigidsim.solve.status import Status
 from rigidsim.store.chunks import JoinedBlocks
-from rigidsim.store.memory import MemoryRun
+from rigidsim.store.run import MemoryRun
 from rigidsim.store.summary import Summary
 from rigidsim.store.summary_parts import Modelling, WarningCode
 from rigidsim.store.variables import Variable

@@ -23,8 +23,8 @@ from rigidsim.solve.sample_block import SampleBlock
 from rigidsim.solve.sampler import SampleReceiver
 from rigidsim.solve.trail import SampleTrail
 from rigidsim.store import netcdf
-from rigidsim.store.memory import MemoryWriter
 from rigidsim.store.netcdf import CHUNK_ROWS
+from rigidsim.store.run import MemoryWriter
 from rigidsim.store.segments import Chain, SegmentWriter
 
 

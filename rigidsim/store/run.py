@@ -1,4 +1,4 @@
-"""Runs, finished or partial, opened for reading."""
+"""Runs on disk, finished or partial, opened for reading, and runs in memory."""
 
 from __future__ import annotations
 
@@ -6,20 +6,25 @@ import html
 import sys
 import tempfile
 from abc import abstractmethod
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
+import numpy as np
+
 from rigidsim.errors import FORCE, RESUME, RunFolderError, either
 from rigidsim.look import viewer
 from rigidsim.store import atomic, segments
+from rigidsim.store.chunks import JoinedBlocks
 from rigidsim.store.folder import RunFolder, find_run
+from rigidsim.store.netcdf import Block
 from rigidsim.store.seal import refuse_damaged
 from rigidsim.store.summary import Brief, Summary
 from rigidsim.store.sweeps.folder import is_sweep
+from rigidsim.store.variables import Extra, Variable, used_labels
 
 if TYPE_CHECKING:
     import xarray
@@ -181,6 +186,66 @@ class SavedRun(Run):
             what = f"its dataset.h5 is missing; run it again with {FORCE}" if lost else "nothing was saved"
             raise RunFolderError(f"{self.folder.path}: {what}")
         return open_dataset(*chain.paths, status=self.status, indexed=indexed)
+
+
+class MemoryWriter:
+    """Takes what a ``SegmentWriter`` takes, and keeps it in memory."""
+
+    due = False
+
+    def __init__(self) -> None:
+        self.blocks: list[Block] = []
+
+    def add(self, block: Block) -> None:
+        """Take a block of samples."""
+        if len(block["time"][0]):
+            self.blocks.append(block)
+
+    def flush(self, checkpoint: Mapping[str, np.ndarray], events: Mapping[str, np.ndarray]) -> None:
+        """Do nothing: a run in memory can't be resumed."""
+
+
+@dataclass(frozen=True, repr=False)
+class MemoryRun(Run):
+    """A run in memory; ``dataset`` equals the one that ``dataset.h5`` would hold, attribute for attribute."""
+
+    outcome: Brief
+    variables: Sequence[Variable]
+    blocks: Sequence[Block]
+    extras: Sequence[Extra]
+    attributes: Mapping[str, Any]
+
+    @property
+    def place(self) -> str:
+        """Description of where the run is kept."""
+        return "memory"
+
+    @cached_property
+    def dataset(self) -> xarray.Dataset:
+        """The dataset, in memory."""
+        import xarray
+
+        joined = JoinedBlocks(self.blocks, self.variables)
+        found: dict[str, xarray.Variable] = {}
+        for variable in self.variables:
+            parts = joined[variable.name] if self.blocks else [np.empty(0)] * variable.parts
+            for part, (name, values) in enumerate(zip(variable.part_names(), parts, strict=True)):
+                shaped = values.reshape(-1, *variable.shape)
+                attributes = variable.part_attributes(part)
+                found[name] = xarray.Variable(("time", *variable.dims), shaped, attributes)
+        for extra in self.extras:
+            found[extra.name] = xarray.Variable(extra.dims, extra.values, dict(extra.attributes))
+        coordinates = {"time": found.pop("time")}
+        for dim, names in used_labels(self.variables).items():
+            labels = np.array(names)
+            coordinates[dim] = xarray.Variable((dim,), labels, {"long_name": dim.replace("_", " ")})
+        coordinates |= {n: found.pop(n) for n in list(found) if found[n].dims == (n,)}
+        told = xarray.Dataset(found, coords=coordinates, attrs=dict(self.attributes))
+        return xarray.decode_cf(told)  # dates, and coordinates besides time
+
+    def concluded(self, outcome: Brief) -> Self:
+        """The same run with another summary."""
+        return replace(self, outcome=outcome)
 
 
 def open_run(path: str | Path) -> SavedRun:

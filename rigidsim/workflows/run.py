@@ -21,8 +21,7 @@ from rigidsim.session.session import Session, Tuning
 from rigidsim.session.storage import refuse_too_large, refuse_too_large_for_memory
 from rigidsim.solve.problem import InitialValueProblem, prepare
 from rigidsim.store.folder import RunFolder
-from rigidsim.store.memory import MemoryRun
-from rigidsim.store.run import Run, SavedRun
+from rigidsim.store.run import MemoryRun, Run, SavedRun
 from rigidsim.store.summary_parts import WarningCode
 from rigidsim.workflows.certify import certified
 from rigidsim.workflows.read import Experiment, Given, as_experiment

@@ -16,9 +16,9 @@ import numpy as np
 
 from rigidsim.errors import FORCE, OUT, RESUME, RunFolderError
 from rigidsim.store import atomic
+from rigidsim.store.folder import FileOf, WorkFolder
 from rigidsim.store.sweeps.generation import Generation
 from rigidsim.store.sweeps.tile import Tile, read_tile
-from rigidsim.store.work_folder import FileOf, WorkFolder
 
 KIND = "sweep"
 _GENERATION = re.compile(r"g(\d{3})\.json")

@@ -20,7 +20,7 @@ from rigidsim.session.kept import Kept, KeptVariable
 from rigidsim.session.members import MemberResults, run_alone
 from rigidsim.solve.problem import prepare
 from rigidsim.store import provenance
-from rigidsim.store.memory import MemoryRun
+from rigidsim.store.run import MemoryRun
 from rigidsim.store.sweeps.sources import plain
 from rigidsim.store.sweeps.tile import Tile, TileVariable
 from rigidsim.workflows.analyse import analyse
