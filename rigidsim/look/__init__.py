@@ -12,7 +12,7 @@ Two folders load what draws, and are imported only where a picture is drawn: `ti
 | `plots`, `page`, `states` | variables to plots; the summary page; lanes of events, and sections |
 | `signals`, `roles` | what pictures show, recorded or worked out; what a dataset tells of itself |
 | `surroundings` | what stands around the body, from the dataset's attributes |
-| `solids`, `symbols`, `coasts` | meshes of bodies; toy tops, globes and edges; the Earth's continents |
+| `solids`, `symbols` | meshes of bodies; toy tops, globes with their continents, edges |
 | `thinning`, `clock` | a bounded number of rows of any dataset; seconds to the viewer's integer timelines |
 | `viewer`, `live`, `film` | the viewer; following a run that goes on; pictures and films of a timeline |
 """

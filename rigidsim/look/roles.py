@@ -36,22 +36,22 @@ def is_residual(variable: xarray.DataArray) -> bool:
 
 def drift_of(variable: xarray.DataArray) -> str | None:
     """The invariant whose relative drift a variable is; None for any other variable."""
-    return _named(variable, "drift_of")
+    return variable.attrs.get("drift_of")
 
 
 def put_back_of(variable: xarray.DataArray) -> str | None:
     """The projected invariant whose corrections put back a variable holds; None for any other variable."""
-    return _named(variable, "put_back_of")
+    return variable.attrs.get("put_back_of")
 
 
 def drifts(dataset: xarray.Dataset) -> dict[str, xarray.DataArray]:
     """The drifts of a dataset by the name of their invariant."""
-    return _by_invariant(dataset, "drift_of")
+    return {name: v for v in dataset.data_vars.values() if (name := drift_of(v))}
 
 
 def put_backs(dataset: xarray.Dataset) -> dict[str, xarray.DataArray]:
     """Corrections put back into projected invariants, by their name."""
-    return _by_invariant(dataset, "put_back_of")
+    return {name: v for v in dataset.data_vars.values() if (name := put_back_of(v))}
 
 
 def in_words(name: str) -> str:
@@ -63,11 +63,3 @@ def in_words(name: str) -> str:
 def is_averaged(attributes: Mapping[str, Any]) -> bool:
     """Whether a dataset with these attributes is of an averaged model: it has axes, but no attitude."""
     return attributes.get("formulation") in _AVERAGED
-
-
-def _named(variable: xarray.DataArray, attribute: str) -> str | None:
-    return str(variable.attrs[attribute]) if attribute in variable.attrs else None
-
-
-def _by_invariant(dataset: xarray.Dataset, attribute: str) -> dict[str, xarray.DataArray]:
-    return {str(v.attrs[attribute]): v for v in dataset.data_vars.values() if attribute in v.attrs}

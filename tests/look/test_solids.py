@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 
 import rigidsim
-from rigidsim.look.coasts import coasts, land_map
 from rigidsim.look.solids import (
     MINOR_SEGMENTS,
     SEGMENTS,
     body_meshes,
     solid_mesh,
 )
+from rigidsim.look.symbols import coasts, land_map
 from rigidsim.scene.bodies.shapes import SHAPES, THINNESS, Arc, Revolved, Shape, StraightPiece
 from rigidsim.scene.scene import build_scene
 

@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rigidsim.look import signals, surroundings
-from rigidsim.look.coasts import earth
 from rigidsim.look.stages import precession
 from rigidsim.look.stages.bodies import Subject, column, source_arrows
 from rigidsim.look.stages.parts import (
@@ -31,7 +30,7 @@ from rigidsim.look.stages.parts import (
     circle,
     trail,
 )
-from rigidsim.look.symbols import globe, graticule
+from rigidsim.look.symbols import earth, globe, graticule
 
 if TYPE_CHECKING:
     import xarray
