@@ -8,6 +8,7 @@ from enum import Enum
 from functools import cached_property
 from typing import Any
 
+import heyoka as hy
 import numpy as np
 
 from rigidsim.errors import ConfigError
@@ -32,6 +33,7 @@ class Alone(Enum):
     """Why a member can't run in a batch and is run by itself; the value is shown to users."""
 
     PRECISION = "batches compute in double precision only"
+    ARITHMETIC = "heyoka on this machine has no numbers of many digits"
     CLOSED_FORM = "the closed form takes no steps"
     METHOD = "batches take the steps of Taylor series only"
     EFFECT = "a registered effect acts between steps"
@@ -51,36 +53,24 @@ class Alone(Enum):
     RANGE = "a coefficient is outside the range of double precision"
 
 
-def reason_of_experiment(experiment: Experiment) -> Alone | None:
-    """Why no member of such an experiment can run in a batch, as far as its config tells; None if some
-    may.
-    """
+def batchable(experiment: Experiment, keys: Sequence[str]) -> Alone | None:
+    """Why members can't run in a batch, as far as experiment and swept keys tell; None if they can."""
     config = experiment.config
     integrator = config.integrator
     asked = integrator.accuracy, integrator.accuracy_axis, integrator.accuracy_position
-    if any(accuracy is not None for accuracy in asked):
-        return Alone.ACCURACY
-    if integrator.precision != "double":
-        return Alone.PRECISION
-    if not integrator.has_steps:
-        return Alone.CLOSED_FORM
-    if integrator.method != DEFAULT_METHOD:
-        return Alone.METHOD
-    if integrator.hold_invariants is True:
-        return Alone.HELD
-    if not variables_named(integrator.formulation).regular:
-        return Alone.CHART
-    if config.model.level != FULL:
-        return Alone.AVERAGED
-    return Alone.LYAPUNOV if config.output.lyapunov else None
-
-
-def batchable(experiment: Experiment, keys: Sequence[str]) -> Alone | None:
-    """Why members can't run in a batch, as far as experiment and swept keys tell; None if they can."""
-    reason = reason_of_experiment(experiment)
-    if reason is not None:
-        return reason
-    return None if all(key_steps(key, "axes")[0] in TRACED_TABLES for key in keys) else Alone.KEY
+    reasons = {
+        Alone.ACCURACY: any(accuracy is not None for accuracy in asked),
+        Alone.PRECISION: integrator.precision != "double",
+        Alone.ARITHMETIC: not hasattr(hy, "real"),
+        Alone.CLOSED_FORM: not integrator.has_steps,
+        Alone.METHOD: integrator.method != DEFAULT_METHOD,
+        Alone.HELD: integrator.hold_invariants is True,
+        Alone.CHART: not variables_named(integrator.formulation).regular,
+        Alone.AVERAGED: config.model.level != FULL,
+        Alone.LYAPUNOV: config.output.lyapunov,
+        Alone.KEY: any(key_steps(key, "axes")[0] not in TRACED_TABLES for key in keys),
+    }
+    return next((reason for reason, holds in reasons.items() if holds), None)
 
 
 def _reason_of_system(traced: TracedSystem) -> Alone | None:
