@@ -23,53 +23,31 @@ if TYPE_CHECKING:
 
 __version__ = "0.1.0"
 
-_PLACES = {
-    "ConfigError": "rigidsim.errors",
-    "RigidsimError": "rigidsim.errors",
-    "RunFolderError": "rigidsim.errors",
-    "Experiment": "rigidsim.workflows.read",
-    "load": "rigidsim.workflows.read",
-    "parse": "rigidsim.workflows.read",
-    "MemoryRun": "rigidsim.store.run",
-    "Run": "rigidsim.store.run",
-    "SavedRun": "rigidsim.store.run",
-    "open_run": "rigidsim.store.run",
-    "run": "rigidsim.workflows.run",
-    "resume": "rigidsim.workflows.resume",
-    "SavedSweep": "rigidsim.store.sweeps.run",
-    "open_sweep": "rigidsim.store.sweeps.run",
-    "sweep": "rigidsim.workflows.sweeps.sweep",
-    "verify": "rigidsim.workflows.verify",
-    "plan": "rigidsim.workflows.plan",
-    "analyse": "rigidsim.workflows.analyse",
-}
-
 __all__ = [
-    "ConfigError",
-    "Experiment",
-    "MemoryRun",
-    "RigidsimError",
-    "Run",
-    "RunFolderError",
-    "SavedRun",
-    "SavedSweep",
-    "analyse",
-    "load",
-    "open_run",
-    "open_sweep",
-    "parse",
-    "plan",
-    "resume",
-    "run",
-    "sweep",
-    "verify",
-]
+    "ConfigError", "Experiment", "MemoryRun", "RigidsimError", "Run", "RunFolderError", "SavedRun",
+    "SavedSweep", "analyse", "load", "open_run", "open_sweep", "parse", "plan", "resume",
+    "run", "sweep", "verify",
+]  # fmt: skip
+
+_NAMES = {
+    "errors": ("ConfigError", "RigidsimError", "RunFolderError"),
+    "store.run": ("MemoryRun", "Run", "SavedRun", "open_run"),
+    "store.sweeps.run": ("SavedSweep", "open_sweep"),
+    "workflows.analyse": ("analyse",),
+    "workflows.plan": ("plan",),
+    "workflows.read": ("Experiment", "load", "parse"),
+    "workflows.resume": ("resume",),
+    "workflows.run": ("run",),
+    "workflows.sweeps.sweep": ("sweep",),
+    "workflows.verify": ("verify",),
+}
+_MODULES = {name: f"rigidsim.{module}" for module, names in _NAMES.items() for name in names}
 
 
 def __getattr__(name: str) -> Any:
-    if name not in _PLACES:
+    if name not in _MODULES:
         raise AttributeError(f"module 'rigidsim' has no attribute {name!r}")
-    value = getattr(import_module(_PLACES[name]), name)
+    value = getattr(import_module(_MODULES[name]), name)
     globals()[name] = value
     return value
 

@@ -1,4 +1,4 @@
-"""Arguments and options that several commands share, and what the shell offers for them on Tab."""
+"""Arguments and options of the commands, and what the shell offers for them on Tab."""
 
 from __future__ import annotations
 
@@ -41,7 +41,6 @@ SetOption = Annotated[
 ]
 OutOption = Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder of the run folders.")]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON for machines.")]
-
 SceneArgument = Annotated[
     str | None,
     typer.Argument(
