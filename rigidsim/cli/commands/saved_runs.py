@@ -3,23 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
-from types import ModuleType
 
 import rigidsim.workflows.resume as resuming
 import rigidsim.workflows.verify as verifying
+from rigidsim.cli.commands import sweep as sweeps
 from rigidsim.cli.commands.run import print_run
 from rigidsim.cli.screens.page import print_json
 from rigidsim.cli.screens.summary import print_verdict
 from rigidsim.errors import RigidsimError
 from rigidsim.session import progress
 from rigidsim.store.sweeps.folder import is_sweep
-
-
-def _sweeps() -> ModuleType:
-    """What is done with sweeps, a room of its own."""
-    from rigidsim.cli.commands import sweep
-
-    return sweep
 
 
 def resume(
@@ -35,14 +28,13 @@ def resume(
             "resume: --until and --set are for single runs; change the config of a sweep and give rigidsim "
             "sweep CONFIG again, which computes only what is new"
         )
-    code: int = _sweeps().resume(run_path, workers, as_json)
-    return code
+    return sweeps.resume(run_path, workers, as_json)
 
 
 def verify(run_path: Path, members: int, as_json: bool) -> int:
     """Integrate again and compare."""
     if is_sweep(run_path):
-        verdict, what = _sweeps().verify_sweep(run_path, members=members), "member"
+        verdict, what = sweeps.verify_sweep(run_path, members=members), "member"
     else:
         with progress.observer() as observer:
             verdict, what = verifying.verify(run_path, observer=observer), "sample"
