@@ -36,7 +36,7 @@ class Trial:
     Attributes:
         attitudes: float64 parts of the quaternions, each (samples, 4).
         places: float64 parts of the positions, m, each (samples, 3); empty if the body has none.
-        cpu_seconds, compile_seconds: CPU time of the integration alone, and of compiling.
+        cpu_seconds: CPU time of the integration alone.
         work: steps times Taylor order squared times states: a count that doesn't jitter.
         histories: relative drift (samples,) of each invariant.
     """
@@ -48,7 +48,6 @@ class Trial:
     steps: int
     order: int
     cpu_seconds: float
-    compile_seconds: float
     work: float
     rows: int = field(default=0)
     histories: dict[str, np.ndarray] = field(default_factory=dict)
@@ -135,7 +134,6 @@ def try_setting(
     Raises:
         ConfigError: the scene can't be integrated with it (no closed form, nothing to project, ...).
     """
-    started = time.process_time()
     scene = trial_scene(experiment, setting, times, repeating=repeating)
     samples, early = scene.samples, 0
     if samples.times is not None and samples.times[0] > samples.begin:
@@ -167,7 +165,6 @@ def try_setting(
         steps=progress.steps,
         order=order,
         cpu_seconds=ended - built,
-        compile_seconds=built - started,
         work=float(progress.steps) * order**2 * len(prepared.system.states),
         rows=max(progress.next_sample - early, 0),
         histories=histories,
