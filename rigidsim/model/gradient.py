@@ -1,13 +1,22 @@
-"""The gravity gradient of a distant body (MacCullagh): torque, range of the potential energy, and source."""
+"""The gravity gradient of a distant body (MacCullagh): torque, range of the potential energy, and source.
+
+Positions of Sun and Moon are heyoka's analytic series: the Sun from VSOP2013 (Simon et al. 2013, A&A 557,
+A49: the heliocentric place of the barycentre of Earth and Moon, reversed: it stands for the Earth's, 4,670 km
+or 3e-5 of the distance away), the Moon from ELP2000 (Chapront-Touze & Chapront 1983), both in the mean
+ecliptic and equinox of J2000, with time counted from J2000 (TDB). Terms below 1e-6 of the distance are left
+out. With the barycentre the Sun's torque is right to 1e-4, the Moon's to some 3e-6. The series are explicit
+functions of time in double precision, whatever the run's.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from typing import Any
 
+import heyoka as hy
+
 from rigidsim.model.kinematics import Kinematics, seconds
 from rigidsim.model.load import Term
-from rigidsim.model.orbits.ephemeris import MEAN_DISTANCE, SourcePosition, source_position
 from rigidsim.model.orbits.kepler_states import OrbitStates
 from rigidsim.model.orbits.point_mass_states import PointMassPair
 from rigidsim.model.rotations import Symbolic, transpose
@@ -16,6 +25,35 @@ from rigidsim.scene.epochs import Epoch
 from rigidsim.scene.orbit_tables.pieces import TabulatedOrbit
 from rigidsim.scene.orbits import KeplerOrbit
 from rigidsim.scene.scene import Scene
+
+_THRESHOLD = 1e-6
+_DAY = 86400.0
+
+
+@dataclass(frozen=True)
+class SourcePosition:
+    """A geocentric direction and distance."""
+
+    direction: list[Symbolic]  # unit vector, space axes
+    inverse_distance: Symbolic  # mean distance over distance
+
+
+MEAN_DISTANCE = {"sun": 149597870700, "moon": 384400000}
+"""Metres; the mean distance that ``SourcePosition.inverse_distance`` is relative to."""
+
+
+def source_position(body: str, seconds: Symbolic) -> SourcePosition:
+    """Position of the Sun ("sun") or the Moon ("moon") at a time in seconds since J2000, an expression."""
+    if body == "sun":
+        millennia = seconds * (1.0 / (_DAY * 365250.0))
+        earth = hy.model.vsop2013_cartesian(3, time_expr=millennia, thresh=_THRESHOLD)
+        position: list[Any] = [-x for x in earth[:3]]  # astronomical units
+    else:
+        centuries = seconds * (1.0 / (_DAY * 36525.0))
+        kilometres = hy.model.elp2000_cartesian_e2000(time_expr=centuries, thresh=_THRESHOLD)
+        position = [x * (1.0 / 384400.0) for x in kilometres]
+    inverse = 1.0 / hy.sqrt(hy.sum([x * x for x in position]))
+    return SourcePosition([x * inverse for x in position], inverse)
 
 
 def tidal_range(scene: Scene, strength: Any, distance: Any) -> Any:

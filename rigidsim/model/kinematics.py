@@ -12,13 +12,12 @@ from typing import Any, TypeVar
 
 import heyoka as hy
 
-from rigidsim.model.body import BODY, RotatingBody
 from rigidsim.model.orbits.kepler_states import OrbitStates, orbit_states
 from rigidsim.model.orbits.point_mass_states import PointMassStates
 from rigidsim.model.orbits.table_states import TablePlace, table_states
 from rigidsim.model.rotations import Symbolic, SymbolicMatrix, apply, length, transpose
 from rigidsim.model.scaling import Rounder, ScaledNumbers, Scaling
-from rigidsim.model.state_blocks import AttitudeStates, StateBlock
+from rigidsim.model.state_blocks import BODY, AttitudeStates, RotatingBody, StateBlock
 from rigidsim.model.two_part import as_factor
 from rigidsim.scene.arithmetic import Vector, dot, negligible
 from rigidsim.scene.epochs import Epoch

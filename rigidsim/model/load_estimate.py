@@ -16,7 +16,6 @@ from itertools import product
 import heyoka as hy
 import numpy as np
 
-from rigidsim.model.body import BODY
 from rigidsim.model.capabilities import Narrow, having
 from rigidsim.model.carriers import Carrier
 from rigidsim.model.formulations.formulation import Requirements
@@ -27,6 +26,7 @@ from rigidsim.model.load import Load, Term, force_terms, torque_terms
 from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.scaling import Drive, choose_scaling, scaled_numbers
+from rigidsim.model.state_blocks import BODY
 from rigidsim.scene import attitude as numeric
 from rigidsim.scene.arithmetic import apply, transpose
 from rigidsim.scene.expressions.tree import names_used

@@ -8,14 +8,13 @@ from typing import Any
 
 import heyoka as hy
 
-from rigidsim.model.body import BODY
 from rigidsim.model.capabilities import KeepsAxial, having, linear_potential_of
 from rigidsim.model.carriers import Carrier, inner_torque, momentum_terms
 from rigidsim.model.kinematics import Kinematics
 from rigidsim.model.load import Load, Term, force_terms, torque_terms
 from rigidsim.model.rotations import Symbolic, apply
 from rigidsim.model.scaling import Rounder, ScaledNumbers, Scaling, exponent
-from rigidsim.model.state_blocks import AttitudeStates
+from rigidsim.model.state_blocks import BODY, AttitudeStates
 from rigidsim.scene.arithmetic import Vector, across
 from rigidsim.scene.arithmetic import apply as multiply
 from rigidsim.scene.scene import Scene

@@ -22,7 +22,7 @@ from rigidsim.model.formulations.formulation import (
 from rigidsim.model.formulations.planar import Planar
 from rigidsim.model.formulations.quaternion import Quaternion
 from rigidsim.model.formulations.rates import Rates
-from rigidsim.model.frames.reference_plane import refuse_without_plane
+from rigidsim.model.frames import refuse_without_plane
 from rigidsim.model.load import Load, loads_of
 from rigidsim.model.load_estimate import estimate_drive
 from rigidsim.model.loads.uniform_gravity import UniformGravity

@@ -8,8 +8,7 @@ from dataclasses import dataclass
 from rigidsim.model import fixed_axes
 from rigidsim.model.capabilities import Attracting, Damping, corotating_orbit_of
 from rigidsim.model.first_integrals import goryachev_chaplygin_top, kovalevskaya_top
-from rigidsim.model.frames.local import first_source, flies_about_source, rotating_orbit
-from rigidsim.model.frames.reference_plane import flies_in_plane
+from rigidsim.model.frames import first_source, flies_about_source, flies_in_plane, rotating_orbit
 from rigidsim.model.load import loads_of
 from rigidsim.model.mechanics import Mechanics
 from rigidsim.scene.arithmetic import negligible

@@ -10,9 +10,15 @@ from typing import Any
 import heyoka as hy
 
 from rigidsim.model import fixed_axes
-from rigidsim.model.drift_scales import linear_momentum_scale, momentum_scale, total_momentum_scale
 from rigidsim.model.mechanics import Mechanics
-from rigidsim.model.observables.mechanical import linear_momentum, mass_exponent, total_momentum
+from rigidsim.model.observables.mechanical import (
+    linear_momentum,
+    linear_momentum_scale,
+    mass_exponent,
+    momentum_scale,
+    total_momentum,
+    total_momentum_scale,
+)
 from rigidsim.model.observables.observable import (
     MOMENTUM,
     SPACE,

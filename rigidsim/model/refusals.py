@@ -14,11 +14,11 @@ import heyoka as hy
 import numpy as np
 
 from rigidsim.errors import ConfigError, Problem
-from rigidsim.model.body import BODY
 from rigidsim.model.capabilities import GradientAlone, Reacting
 from rigidsim.model.formulations.formulation import Requirements
 from rigidsim.model.load import Load, force_terms, torque_terms
 from rigidsim.model.load_estimate import probe, start_of
+from rigidsim.model.state_blocks import BODY
 from rigidsim.scene.scene import Scene
 
 _SAME_BODY = 1e-3

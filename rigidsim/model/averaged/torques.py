@@ -20,13 +20,13 @@ import heyoka as hy
 import numpy as np
 
 from rigidsim.model.averaged.polhode import Polhodes, mean_square_sine, means_needed, nodes_needed
-from rigidsim.model.body import BODY
 from rigidsim.model.capabilities import Damping, Reacting, has_source, orbit_of, table_of
 from rigidsim.model.carriers import Carrier
 from rigidsim.model.load import Load
 from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.scaling import Rounder, ScaledNumbers, Scaling
+from rigidsim.model.state_blocks import BODY
 from rigidsim.model.two_part import as_factor
 from rigidsim.scene.arithmetic import Vector, dot
 from rigidsim.scene.scene import Scene

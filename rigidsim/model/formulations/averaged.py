@@ -15,7 +15,7 @@ from rigidsim.model.averaged.driven_mechanics import AMPLITUDES, DrivenMechanics
 from rigidsim.model.averaged.mechanics import AveragedMechanics
 from rigidsim.model.averaged.resonant_mechanics import RESONANT_ANGLE, SLOW, ResonantMechanics
 from rigidsim.model.formulations.formulation import Formulation, ModelPlan, Requirements
-from rigidsim.model.frames.reference_plane import refuse_without_plane
+from rigidsim.model.frames import refuse_without_plane
 from rigidsim.model.load import Load
 from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.rotations import Symbolic

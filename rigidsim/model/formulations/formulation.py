@@ -14,7 +14,6 @@ from typing import Any, ClassVar, TypeVar
 import heyoka as hy
 
 from rigidsim.model.averaged.average import Average
-from rigidsim.model.body import BODY
 from rigidsim.model.capabilities import is_wide
 from rigidsim.model.kinematics import in_common_unit
 from rigidsim.model.load import Load, Term
@@ -22,7 +21,7 @@ from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.orbits.table_states import Carried, TablePlace
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.scaling import Rounder, ScaledNumbers, Scaling, largest_rates
-from rigidsim.model.state_blocks import AttitudeStates, StateBlock
+from rigidsim.model.state_blocks import BODY, AttitudeStates, StateBlock
 from rigidsim.scene.arithmetic import dot, negligible
 from rigidsim.scene.formulations import DEFAULT_FORMULATION, FORMULATIONS, Variables
 from rigidsim.scene.orbit_tables.pieces import TabulatedOrbit

@@ -7,13 +7,12 @@ from collections.abc import Sequence
 import heyoka as hy
 
 from rigidsim.model import rotations
-from rigidsim.model.body import BODY
 from rigidsim.model.formulations.formulation import Formulation, ModelPlan, formulates
 from rigidsim.model.formulations.orbital_frame import OrbitalQuaternion
 from rigidsim.model.load import Load
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.scaling import Rounder
-from rigidsim.model.state_blocks import AttitudeStates
+from rigidsim.model.state_blocks import BODY, AttitudeStates
 from rigidsim.scene.formulations import DEFAULT_FORMULATION, FORMULATIONS
 from rigidsim.scene.scene import Scene
 

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from rigidsim.model.body import BODY
 from rigidsim.model.formulations.formulation import Formulation, ModelPlan, formulates, rate_block
 from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.scaling import Rounder
-from rigidsim.model.state_blocks import StateBlock
+from rigidsim.model.state_blocks import BODY, StateBlock
 from rigidsim.scene.arithmetic import apply, cross, transpose
 from rigidsim.scene.attitude import rotation_matrix
 from rigidsim.scene.formulations import FORMULATIONS

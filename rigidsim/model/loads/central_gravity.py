@@ -13,8 +13,7 @@ from rigidsim.model.gradient import tidal_range
 from rigidsim.model.kinematics import Kinematics
 from rigidsim.model.load import Load, Term
 from rigidsim.model.load_words import length_text, reach_text, source_text, span_words, value_text
-from rigidsim.model.loads.moving_source import MovingAttractor
-from rigidsim.model.loads.point_attraction import PointAttraction, positive_strength
+from rigidsim.model.loads.point_attraction import MovingAttractor, PointAttraction, positive_strength
 from rigidsim.model.plausibility import about_start, about_strength, attracting
 from rigidsim.model.rotations import Symbolic
 from rigidsim.scene.arithmetic import Vector, cross, norm, unit_vectors

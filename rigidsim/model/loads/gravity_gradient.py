@@ -15,8 +15,7 @@ from rigidsim.model.gradient import GradientSource, gradient_terms, tidal_range
 from rigidsim.model.kinematics import Kinematics, quadratic_form
 from rigidsim.model.load import Load, Term
 from rigidsim.model.load_words import orbit_text, reach_text, source_text, value_text
-from rigidsim.model.loads.moving_source import MovingGradient
-from rigidsim.model.loads.point_attraction import positive_strength
+from rigidsim.model.loads.point_attraction import MovingGradient, positive_strength
 from rigidsim.model.orbit_planes import EclipticPlane, OrbitPlane
 from rigidsim.model.plausibility import about_distance, about_orbit, about_spin, about_strength, attracting
 from rigidsim.model.rotations import Symbolic

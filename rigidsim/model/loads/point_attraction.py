@@ -1,18 +1,31 @@
-"""Attraction of the body by a point, to second degree (MacCullagh):
+"""Attraction of the body by a point, to second degree (MacCullagh), and by one that moves besides the body:
 
 U = -G M m / r - (G M / 2 r^3) (tr I - 3 c . I c),   c = R^T r/|r| from the point to the body.
+
+A moving one is what a ``gravity_gradient`` or ``central_gravity`` with ``orbit = {body = ..}`` becomes. Where
+the body itself is one of the point masses, their mutual gravity includes its attraction as a point.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 from typing import Any
 
-from rigidsim.model.gradient import gradient_terms
+from rigidsim.errors import ConfigError, Problem
+from rigidsim.model.gradient import GradientSource, gradient_terms, tidal_range
 from rigidsim.model.kinematics import Kinematics, inertia_times, quadratic_form
 from rigidsim.model.load import Load, Term
-from rigidsim.model.rotations import Symbolic, apply, transpose
-from rigidsim.scene.arithmetic import Vector
+from rigidsim.model.load_words import reach_text, source_text, value_text
+from rigidsim.model.orbit_planes import OrbitPlane
+from rigidsim.model.orbits.point_mass_states import PointMassPair
+from rigidsim.model.plausibility import about_start, about_strength, attracting
+from rigidsim.model.rotations import Symbolic, apply, length, transpose, unit
+from rigidsim.scene.arithmetic import Vector, cross, norm, unit_vectors
+from rigidsim.scene.point_masses import GRAVITATIONAL_CONSTANT, PointMasses, closest
 from rigidsim.scene.registry import Surroundings
+from rigidsim.scene.scene import Scene
+from rigidsim.store.summary_parts import Caution
 
 
 class PointAttraction(Load):
@@ -90,3 +103,200 @@ def positive_strength(given: Any, around: Surroundings) -> Any:
     if given.sign <= 0:
         raise around.fault("gravitational_parameter", f"given {float(given):g}; a positive number is allowed")
     return given.at(around.context)
+
+
+_UNROLLED = 2
+
+
+@dataclass(frozen=True)
+class MovingSource(PointAttraction):
+    """A point mass that attracts the body."""
+
+    masses: PointMasses  # all of them
+    number: int  # index of the one that attracts
+
+    @property
+    def described(self) -> str:  # type: ignore[override]
+        return f"a {self.title} load"
+
+    @property
+    def reads(self) -> frozenset[str]:  # type: ignore[override]
+        return frozenset({"attitude", "flight"} if self.masses.host is None else {"attitude"})
+
+    @property
+    def wide(self) -> bool:
+        """Whether there are three or more masses: their equations take ten seconds to compile unrolled, one
+        otherwise.
+        """
+        return len(self.masses.names) > _UNROLLED
+
+    @property
+    def strength(self) -> Any:
+        return self.masses.strengths[self.number]
+
+    @property
+    def name(self) -> str:
+        """Name of the mass."""
+        return self.masses.names[self.number]
+
+    @property
+    def plane(self) -> OrbitPlane:
+        return _OsculatingPlane(self)
+
+    def among(self, masses: PointMasses) -> MovingSource:
+        return replace(self, masses=masses)
+
+    def place(self, m: Kinematics) -> list[Symbolic]:
+        """Vector from the mass to the body, space axes, units of length."""
+        states = m.carried(m.point_masses)
+        if self.masses.host is not None:
+            return states.between(self.number, self.masses.host)
+        return [x - a for x, a in zip(m.carried(m.position), states.positions[self.number], strict=True)]
+
+    def motion(self, m: Kinematics) -> list[Symbolic]:
+        """Velocity of the body as seen from the mass, space axes, units of speed."""
+        states = m.carried(m.point_masses)
+        host = self.masses.host
+        own = m.carried(m.velocity) if host is None else states.velocities[host]
+        return [x - a for x, a in zip(own, states.velocities[self.number], strict=True)]
+
+    def seen(self, m: Kinematics) -> tuple[list[Symbolic], Symbolic]:
+        place = self.place(m)
+        inverse = 1.0 / length(place)
+        return [x * inverse for x in place], inverse
+
+    def acceleration(self, m: Kinematics) -> list[Symbolic]:
+        """Acceleration of the body by its shape, space axes."""
+        return _less(self.pull(m, as_point=False))
+
+    def reaction(self, m: Kinematics) -> list[tuple[int, Any, list[Symbolic]]]:
+        if not self.masses.full:
+            return []
+        pull, host, context = self.acceleration(m), self.masses.host, m.scene.context
+        if host is None:
+            own = context.mpf(GRAVITATIONAL_CONSTANT) * m.carried(m.scene.body.mass)
+            return [(self.number, -own / self.strength, pull)]
+        ratio = self.masses.strengths[host] / self.strength
+        return [(host, context.one, pull), (self.number, -ratio, pull)]
+
+    def potential(self, m: Kinematics) -> Symbolic | None:
+        return -self.second_degree(m)
+
+    # --- estimates, from the Kepler orbit of the body and this mass alone ---------------------------------
+
+    def encounter(self, scene: Scene) -> tuple[Any, Any]:
+        """Least distance (m), and the angular rate there (rad/s)."""
+        masses, own = self.masses, scene.context.zero
+        if masses.host is not None:
+            own = masses.strengths[masses.host]
+        return closest(scene.context, *self.start(scene), self.strength + own)
+
+    def start(self, scene: Scene) -> tuple[Vector, Vector]:
+        """Position and velocity of the body as seen from the mass, m and m/s (mpf)."""
+        masses, n = self.masses, self.number
+        if masses.host is None:
+            own = scene.position or [], scene.velocity or []
+        else:
+            own = masses.positions[masses.host], masses.velocities[masses.host]
+        there = masses.positions[n], masses.velocities[n]
+        place, moving = ([x - a for x, a in zip(*pair, strict=True)] for pair in zip(own, there, strict=True))
+        return place, moving
+
+    def amplitude(self, scene: Scene) -> Any:
+        return tidal_range(scene, self.strength, self.encounter(scene)[0])
+
+    def fastest_rate(self, scene: Scene) -> Any:
+        return self.encounter(scene)[1]
+
+    def told(self, scene: Scene) -> str:
+        distance, largest = norm(scene.context, self.start(scene)[0]), self.amplitude(scene)
+        return (
+            f'{self.title.replace("_", " ")} of the moving point mass "{self.name}", '
+            f"{source_text(self.strength)}, {reach_text(self.strength, distance)} at the start; "
+            f"torque up to {value_text(largest, 'N m')}"
+        )
+
+    def cautions(self, fields: Any, where: str, scene: Scene) -> Iterator[Caution]:
+        given, distance = self._given(scene)
+        yield from about_strength(given, distance, f"[[bodies]] number {self.number + 1}")
+
+    def _given(self, scene: Scene) -> tuple[Any, float]:
+        """The strength as it was given, and the distance at the start, m."""
+        given = scene.config.bodies[self.number].gravitational_parameter
+        return given, float(norm(scene.context, self.start(scene)[0]))
+
+
+class MovingGradient(MovingSource):
+    """The torque of a point mass on a body that is a point mass itself, or flies without its force."""
+
+    title = "gravity_gradient"
+
+    @property
+    def gradient_source(self) -> GradientSource | None:
+        """The mass as the source of a gradient alone; None for a body that flies by itself."""
+        if self.masses.host is None:
+            return None
+        return GradientSource(self.strength, pair=PointMassPair(self.masses, self.number))
+
+    def check(self, number: int, position: Vector | None) -> None:
+        if self.masses.host is None and self.masses.full:
+            what = 'given "gravity_gradient" for a body that flies by itself under coupling = "full"; give '
+            what += '"central_gravity", whose force the bodies feel'
+            raise ConfigError(Problem(f"[[loads]] number {number + 1} kind", what))
+
+    def told(self, scene: Scene) -> str:
+        return super().told(scene) + ("; the bodies feel its shape" if self.masses.full else "")
+
+
+class MovingAttractor(MovingSource):
+    """The torque and force of a point mass on a body with a position of its own."""
+
+    title = "central_gravity"
+
+    def check(self, number: int, position: Vector | None) -> None:
+        if self.masses.host is not None:
+            what = 'given "central_gravity", but [body] host makes the body one of [[bodies]], which attract '
+            what += 'each other anyway; give "gravity_gradient"'
+            raise ConfigError(Problem(f"[[loads]] number {number + 1} kind", what))
+
+    def acceleration(self, m: Kinematics) -> list[Symbolic]:
+        """Acceleration of the body, by its shape and as a point."""
+        return _less(self.pull(m, as_point=True))
+
+    def force(self, m: Kinematics) -> list[Term]:
+        return list(zip(unit_vectors(m.scene.context), self.acceleration(m), strict=True))
+
+    def potential(self, m: Kinematics) -> Symbolic | None:
+        return -self.second_degree(m) - self.as_point(m)
+
+    def told(self, scene: Scene) -> str:
+        return super().told(scene) + ("; the bodies feel the forces of this one" if self.masses.full else "")
+
+    def cautions(self, fields: Any, where: str, scene: Scene) -> Iterator[Caution]:
+        yield from super().cautions(fields, where, scene)
+        yield from about_start(scene, attracting(*self._given(scene)), *self.start(scene))
+
+
+def _less(pull: tuple[list[Symbolic], list[Symbolic]]) -> list[Symbolic]:
+    return [-x - y for x, y in zip(*pull, strict=True)]
+
+
+@dataclass(frozen=True)
+class _OsculatingPlane(OrbitPlane):
+    """Osculating plane of the body's motion about a moving point mass."""
+
+    source: MovingSource
+    described = "osculating plane of the source's orbit"
+    called = "normal of the osculating orbit"
+
+    def normal(self, m: Kinematics) -> list[Symbolic]:
+        return unit(cross(self.source.place(m), self.source.motion(m)))
+
+    def at_start(self, scene: Scene) -> Vector:
+        return cross(*self.source.start(scene))
+
+    def drift(self, scene: Scene) -> None:
+        return None
+
+    def rate(self, scene: Scene) -> Any:
+        return self.source.encounter(scene)[1]

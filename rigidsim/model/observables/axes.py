@@ -1,7 +1,7 @@
 """Directions of the figure, spin and momentum axes in space, and their angles against the reference plane.
 
 With a unit axis a = (u, v, s) along the plane's X', Y' and normal n
-(``rigidsim.model.frames.reference_plane``):
+(``rigidsim.model.frames``):
 
     obliquity = atan2(|n x a|, n . a),    node longitude = atan2(u, -v),
 
@@ -15,7 +15,7 @@ from collections.abc import Callable, Mapping
 
 import heyoka as hy
 
-from rigidsim.model.frames.reference_plane import reference_plane
+from rigidsim.model.frames import reference_plane
 from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.observables.observable import (
     SPACE,

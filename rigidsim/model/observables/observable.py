@@ -14,7 +14,7 @@ from typing import Any
 import heyoka as hy
 
 from rigidsim.model.euler_poles import Poles
-from rigidsim.model.frames.reference_plane import reference_plane
+from rigidsim.model.frames import reference_plane
 from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.needs import NEEDS
 from rigidsim.model.rotations import Symbolic

@@ -18,7 +18,7 @@ from collections.abc import Callable, Mapping
 
 import heyoka as hy
 
-from rigidsim.model.frames.local import local_frame, moves_slowly_in_orbit
+from rigidsim.model.frames import local_frame, moves_slowly_in_orbit
 from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.observables.observable import (
     BODY,

@@ -13,8 +13,8 @@ from typing import Any
 import heyoka as hy
 
 from rigidsim.model.capabilities import Reacting
-from rigidsim.model.drift_scales import rotational_scale
 from rigidsim.model.mechanics import Mechanics
+from rigidsim.model.observables.mechanical import rotational_scale
 from rigidsim.model.observables.observable import SPACE, Observable, register_all, same_unit
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.scaling import exponent

@@ -20,7 +20,7 @@ from collections.abc import Mapping
 
 import heyoka as hy
 
-from rigidsim.model.frames.reference_plane import initial_normal, reference_plane
+from rigidsim.model.frames import initial_normal, reference_plane
 from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.observables.observable import (
     MOMENTUM,

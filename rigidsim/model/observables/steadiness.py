@@ -24,7 +24,7 @@ from typing import Any
 import heyoka as hy
 
 from rigidsim.model.capabilities import Reacting, gradient_source_of, orbit_of, table_of
-from rigidsim.model.frames.reference_plane import plane_drift
+from rigidsim.model.frames import plane_drift
 from rigidsim.model.load import Load
 from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.observables.observable import Steady

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import heyoka as hy
 
-from rigidsim.model.frames.reference_plane import fixed_plane
+from rigidsim.model.frames import fixed_plane
 from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.observables.axes import figure_axis
 from rigidsim.model.observables.observable import (

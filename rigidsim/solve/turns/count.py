@@ -26,7 +26,7 @@ from dataclasses import dataclass, replace
 import heyoka as hy
 import numpy as np
 
-from rigidsim.model.frames.reference_plane import plane_drift
+from rigidsim.model.frames import plane_drift
 from rigidsim.model.outputs import Recorded
 from rigidsim.model.scaling import source_rate
 from rigidsim.model.system import System

@@ -11,8 +11,8 @@ from dataclasses import replace
 import heyoka as hy
 import numpy as np
 
-from rigidsim.model.body import BODY
 from rigidsim.model.formulations.quaternion import Quaternion
+from rigidsim.model.state_blocks import BODY
 from rigidsim.model.system import System
 from rigidsim.solve.compiled import CompiledFunction, interruptible
 from rigidsim.solve.precision import precision_of
