@@ -37,7 +37,6 @@ class Assembly:
     """The parts of an integration.
 
     Attributes:
-        stride: largest number of natural steps between corrections.
         corrected: what takes the steps of the problem's algorithm, and effects in between; where it has none,
             the start.
     """
@@ -70,9 +69,6 @@ class Assembly:
 
 def assemble(prepared: InitialValueProblem, *, stride: int = STRIDE) -> Assembly:
     """Compile everything that a prepared scene needs to run from its start; Ctrl-C is heeded meanwhile.
-
-    Args:
-        stride: largest number of natural steps between corrections (``CorrectedStepper``).
 
     Raises:
         ConfigError: invariants are to be projected but there are none.
@@ -131,17 +127,7 @@ def sampler(
     most_steps: int | None = None,
     progress: Progress | None = None,
 ) -> Driver:
-    """What takes a prepared scene through its samples.
-
-    Args:
-        parts: the assembled parts.
-        receiver: receives the samples in order.
-        check: called repeatedly with the progress; a status ends the run.
-        start: where to continue; None starts at the beginning.
-        most_steps: limit of natural steps, counted from the run's beginning; a closed form
-            takes none.
-        progress: with what earlier sessions counted.
-    """
+    """What takes a prepared scene through its samples."""
     clock = prepared.clock
     if parts.evaluator.sparse:
         check = _following(check, parts.evaluator, clock)

@@ -85,11 +85,7 @@ class TaylorEngine(Protocol):
 
 
 class Kept(Generic[T]):
-    """Cache of the latest objects made, by the description they were made from.
-
-    Args:
-        most: how many are kept.
-    """
+    """Cache of the latest objects made, by the description they were made from."""
 
     def __init__(self, most: int) -> None:
         self._most = most

@@ -33,12 +33,7 @@ less than a hundredth of it.
 
 @dataclass(frozen=True)
 class StepBoundary:
-    """A natural step boundary of a run, with everything the integration needs to resume with the same bits.
-
-    Attributes:
-        mark: the engine's time and state, and counts.
-        memories: those of the effects, in their order.
-    """
+    """A natural step boundary of a run, with all that the integration needs to resume with the same bits."""
 
     mark: Mark
     memories: tuple[Any, ...]
@@ -52,9 +47,7 @@ class CorrectedStepper:
     """Takes steps and applies effects when they are due.
 
     Attributes:
-        effects: in the order in which they are applied.
         whole_times: whether time is a single number at each stride's start.
-        stride: natural steps between corrections at present.
 
     Args:
         stride: largest number of natural steps between corrections; affects results within rounding.
@@ -174,12 +167,7 @@ class CorrectedStepper:
         return True
 
     def samples(self, first: int, times: np.ndarray, states: np.ndarray) -> SampleBlock:
-        """Samples within the steps of the latest call, taken before the corrections that follow it.
-
-        Args:
-            first: index of the first sample.
-            times, states: those of each sample, as in ``SampleBlock``.
-        """
+        """Samples within the steps of the latest call, taken before the corrections that follow it."""
         known: dict[str, Any] = {}
         for effect in self.effects:
             known |= effect.of_samples(times)

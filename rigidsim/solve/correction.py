@@ -27,10 +27,8 @@ def correction(
 
     Args:
         states: n of them, the variables.
-        freedoms: of each state (``freedoms_of``).
         residuals: (value - initial) / scale of each of the m projected scalars.
         lacking: of each state's derivative (``lacking_rates``); empty where nothing is.
-        damping: see ``damping_between``.
 
     Returns:
         The inputs: states, the time since the latest correction, one over the interval that the next is
@@ -103,9 +101,6 @@ def damping_between(low: int, high: int, context: mpmath.MPContext) -> mpmath.mp
     Residuals are known to some eps_high, so that the correction in a direction of singular value s is
     known to eps_high / s; damped by d it errs by at most eps_high / (2 sqrt d), which is to stay below
     an eighth of eps. The Gram matrix must stay positive after its own rounding.
-
-    Args:
-        low, high: bits of the working precision and of the one that residuals are evaluated in.
     """
     two = context.mpf(2)
     return max(two ** (2 * (2 + low - high)), two ** (9 - high))
@@ -118,7 +113,6 @@ def least_correction(
 
     Args:
         gradients: J, one row for each residual, of order one.
-        wanted: r.
     """
     m = len(wanted)
     pairs = [[zip(gradients[a], gradients[b], strict=True) for b in range(m)] for a in range(m)]

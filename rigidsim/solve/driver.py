@@ -16,15 +16,9 @@ from rigidsim.solve.status import Status
 class Driver:
     """Has a solver advance, looks after guards and Ctrl-C, and hands over and saves what it finds.
 
-    Attributes:
-        progress: how far the run is, and how it ended.
-
     Args:
-        receiver: receives finished samples in order, and may name the last one that it wants.
         check: called in each round, at least every tenth of a second or after each single step.
-        start: where to continue; None starts at the beginning.
         most_steps: limit of natural steps, counted from the run's beginning, that is never exceeded.
-        progress: with what earlier sessions counted.
     """
 
     def __init__(

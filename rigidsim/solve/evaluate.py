@@ -20,8 +20,7 @@ from rigidsim.solve.effects.angle_wrapping import AngleWrapping
 from rigidsim.solve.effects.charts import Lift
 from rigidsim.solve.precision import Precision
 from rigidsim.solve.sample_block import SampleBlock
-from rigidsim.solve.turns.continuity import Continuity
-from rigidsim.solve.turns.joined import JoinedAngles
+from rigidsim.solve.turns.joined import Continuity, JoinedAngles
 
 RecordedParts = dict[str, list[np.ndarray]]
 """Float64 parts (n, components) by variable, whose sum is the value in SI (``Precision.parts``)."""
@@ -65,12 +64,7 @@ class _PartnerChart:
         initial: np.ndarray,
         wrapping: AngleWrapping,
     ) -> tuple[np.ndarray, np.ndarray | None]:
-        """All outputs (outputs, n), and the recorded Euler angles of the requested sequence (n, 3), if any.
-
-        Args:
-            states, times, reference: as in ``SampleBlock``.
-            initial: initial values of the invariants' components.
-        """
+        """All outputs (outputs, n), and the recorded angles of the requested sequence (n, 3), if any."""
         if self._angles is None:
             return evaluate_rows(self._outputs, states, initial if len(initial) else None, times), None
         plain = states[:, self._positions].astype(np.float64)
@@ -101,9 +95,6 @@ class Evaluator:
 
     Attributes:
         initial: initial values of the invariants' components, in internal units.
-        continuity: what joins the next block to the last.
-        sparse: whether angles are followed along the motion, since the samples are too sparse to tell turns.
-        dense: whether the samples tell the turns of all angles.
         code: one of the compiled functions, for provenance.
 
     Args:
@@ -137,11 +128,7 @@ class Evaluator:
         self._singular = None if factor is None else self._compile([factor])
 
     def singular_factors(self, states: np.ndarray, chart: np.ndarray) -> np.ndarray | None:
-        """Factors that vanish in the singularity of the chart in use, (n,); None in formulations without one.
-
-        Args:
-            states, chart: as in ``SampleBlock``.
-        """
+        """Factors that vanish in the singularity of the chart in use, (n,); None without one."""
         if self._singular is None:
             return None
         factors = evaluate_rows(self._singular, states)[0]
@@ -264,19 +251,13 @@ class Evaluator:
         return block
 
     def follow(self, time: float) -> None:
-        """Count turns from the latest sample up to where the run is, for at most a fifth of a second.
-
-        Args:
-            time: time that the run has reached, internal units.
-        """
+        """Count turns from the latest sample up to where the run is, for at most a fifth of a second."""
         self._angles.follow(self.continuity, time)
 
     def pack(self) -> Arrays:
-        """See ``SavedPart``."""
         return self.continuity.pack()
 
     def restore(self, arrays: Mapping[str, np.ndarray]) -> None:
-        """See ``SavedPart``."""
         self.continuity = Continuity.unpacked(arrays)
 
     def initial_invariants(self) -> dict[str, list[float]]:

@@ -39,7 +39,6 @@ class FoundEvent:
     """One crossing of an event.
 
     Attributes:
-        index: index of the event among the system's.
         time, state: internal units, in the run's precision; the state is of shape (states,).
         angles: what the angle states stood for at the beginning of the step that contains it.
     """
@@ -55,8 +54,6 @@ class EventLog:
     """All crossings so far, in order of time.
 
     Attributes:
-        stops: for each of the system's events, whether it ends the run.
-        angles: what the angle states stand for now.
         stop: time of the first crossing that ends the run, or None.
         quiet_until: time up to which crossings are already known; None if there are none.
         muted: whether a step is being repeated whose crossings are already known.
@@ -187,9 +184,6 @@ def pack_events(found: Sequence[FoundEvent], precision: Precision) -> Arrays:
 def unpack_events(arrays: Mapping[str, np.ndarray], precision: Precision, states: int) -> list[FoundEvent]:
     """Crossings restored from packed arrays.
 
-    Args:
-        states: number of states.
-
     Raises:
         ValueError: the arrays don't belong together.
     """
@@ -214,7 +208,6 @@ def of_order_one(
     """Expressions scaled for the engine by powers of two; their zeros are unchanged.
 
     Args:
-        expressions: expressions of the states, the time and parameters.
         meant: the same without the small offsets that keep them off a zero.
     """
     if not expressions:

@@ -55,11 +55,7 @@ class LyapunovSpectrum:
         return float(later.max() - later.min())
 
     def chaotic(self, rate: float) -> bool:
-        """Whether offsets grew far more than linearly, which is all that a stable motion allows.
-
-        Args:
-            rate: angular rate of the motion, rad/s.
-        """
+        """Whether offsets grew far more than linearly, which is all that a stable motion allows."""
         duration = float(self.times[-1])
         regular = math.log1p(rate * duration)
         return self.largest * duration > 2 * regular + 3

@@ -41,7 +41,6 @@ class Precision:
 
     Attributes:
         name: as in the config ("double", or "50 digits").
-        bits: bits of the significand.
         scalar: heyoka's ``fp_type`` and the arrays' dtype.
         cheap: whether a step costs about as much as a Python call (then blocks of steps are taken at once).
         compact: whether the integrator is compiled in compact mode (unrolled code of the widest types takes

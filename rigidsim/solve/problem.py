@@ -57,8 +57,6 @@ class InitialValueProblem:
 
     Attributes:
         tolerance: scalar of the precision, or None for its epsilon; "auto" becomes one of these.
-        algorithm: what solves it.
-        python_loads: loads given from Python, unknown to the config.
         holds_late: whether invariants are projected only after a number of steps.
     """
 
@@ -139,7 +137,6 @@ def prepare_scene(
     """Like ``prepare``, for a scene that differs from the experiment's own.
 
     Args:
-        tolerance: tolerance in place of the config's.
         along: the average, already chosen, of a motion that this scene is a part of.
 
     Raises:

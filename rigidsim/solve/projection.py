@@ -62,11 +62,7 @@ _STEPS_BETWEEN_IN_SINGLE = 256  # whose steps cost a quarter as much
 
 
 def steps_between(precision: Precision, *, late: bool = False) -> int:
-    """Natural steps from one correction to the next.
-
-    Args:
-        late: whether projection begins at ``LATE``.
-    """
+    """Natural steps from one correction to the next."""
     if late:
         return LATE_BETWEEN
     return _STEPS_BETWEEN_IN_SINGLE if precision.scalar is np.float32 else STEPS_BETWEEN
@@ -89,7 +85,6 @@ def put_back_by_invariant(names: Sequence[str], rows: np.ndarray) -> dict[str, n
     drifts are recorded.
 
     Args:
-        names: name of the invariant that each projected scalar belongs to.
         rows: (n, projected scalars), as ``Projection.corrections``.
 
     Returns:
@@ -120,15 +115,11 @@ class Projection:
     Attributes:
         names: the invariant that each projected scalar belongs to.
         left_out: (invariant, why) of those not projected themselves.
-        late: whether it begins at ``LATE``.
         memory: all that later corrections depend on, changed in place and part of a checkpoint; float64
             (3 m + 3,): of each projected scalar its residual's integral over time, what was put back, and its
             residual after the latest correction; the time of that and the longest interval so far (internal
             units), and the count of corrections left out since they were not small; where it is ``late``,
             whether it has begun, and the states noted until then. It means the same in another chart.
-
-    Args:
-        late: whether it is to note states until it is told to ``begin``.
     """
 
     def __init__(self, system: System, precision: Precision, start: Scalar, *, late: bool = False) -> None:
@@ -223,12 +214,7 @@ class Projection:
         self._loaded = self._chart
 
     def project(self, state: np.ndarray, time: Scalar) -> None:
-        """Correct a state in place, at a natural step boundary; a function of it, the time and ``memory``.
-
-        Args:
-            state: (states,), internal units, working precision.
-            time: of the boundary, internal units.
-        """
+        """Correct a state in place, at a natural step boundary; a function of it, the time and ``memory``."""
         self.load()
         now, times = float(time), self._times
         elapsed = now - times[0]

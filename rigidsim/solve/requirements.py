@@ -78,7 +78,6 @@ class SecondNumber:
         self._place = place
 
     def meet(self, integrator: TaylorEngine) -> None:
-        """See ``Requirement``."""
         integrator.pars[self._place] = integrator.dtime[1]
 
 

@@ -67,7 +67,6 @@ class SampleBlock:
         """Samples between which turns, chart and corrections don't change.
 
         Args:
-            angles: angle state of all samples.
             put_back: (projected scalars,), corrections for all samples; not copied.
             reference: one row for each sample; None if it doesn't change either.
         """

@@ -18,12 +18,7 @@ _GROWTH = 4  # largest growth of the waiting rows from one hand-over to the next
 
 
 class SampleBuffer:
-    """Collects samples and hands them over in blocks of bounded size and, as far as is known, duration.
-
-    Attributes:
-        handed: samples handed over so far.
-        count: samples found so far.
-    """
+    """Collects samples and hands them over in blocks of bounded size and, as far as is known, duration."""
 
     def __init__(self, clock: SampleClock, receiver: SampleReceiver, pacing: Pacing, first: int = 0) -> None:
         self._clock = clock

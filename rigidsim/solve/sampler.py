@@ -17,13 +17,10 @@ class Progress:
     """Progress of a run; its one mutable record.
 
     Attributes:
-        samples: total number of samples.
         next_sample: index of the first sample that isn't handed over yet.
-        steps: natural steps taken.
         time: time that the integration has reached, s.
         smallest_step, largest_step: extremes of the natural steps so far, internal units.
         redone_steps: steps taken back because they went past a sample.
-        integration_seconds: wall time in the engine, without recording.
         last_good: last step boundary with a finite state, for a run that broke down.
         detail: why it broke down, if more is known.
     """

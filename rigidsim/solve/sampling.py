@@ -28,8 +28,6 @@ class SampleClock:
         part_count: number of float64 that hold a label together with its residual to the integration's time.
 
     Args:
-        samples: the sample times.
-        precision: the run's precision.
         exponent: binary exponent of the internal unit of time.
 
     Raises:
@@ -81,9 +79,6 @@ class SampleClock:
     def parts(self, first: int, times: np.ndarray) -> list[np.ndarray]:
         """Labels of samples from ``first`` on (s) and their residuals, whose sum, smallest first, is exactly
         the time of the integration.
-
-        Args:
-            times: times of these samples, as from ``internal``.
         """
         exact = times / self._per_second
         if self._precision.bits == 53:

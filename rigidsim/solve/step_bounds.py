@@ -25,9 +25,6 @@ def longest_step(order: int, number: type) -> float:
 
     Events are found on a step's polynomials, scaled by the powers of its size up to the order: where those
     overflow, as 2^30 to the 10th does in single precision, heyoka silently finds none.
-
-    Args:
-        number: type of the states.
     """
     if not issubclass(number, np.floating):  # quadruple and beyond have far more than a thousand exponents
         return 2.0**_LONGEST_BITS

@@ -22,7 +22,6 @@ class Mark:
     Attributes:
         time: two numbers whose sum it is, internal units.
         state: (states,), internal units.
-        events, steps: numbers of events found and steps taken so far.
         memory: whatever else the stepper's later steps depend on, as a value that stays as it is.
     """
 

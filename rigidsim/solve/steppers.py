@@ -19,7 +19,6 @@ def stepper_of(
 
     Args:
         tolerance: None for the precision's epsilon.
-        start: start time, internal units.
         log: log of events; without one, none are looked for.
     """
     if not system.switches:

@@ -33,11 +33,7 @@ _LONGEST_FOLLOWED = 1.0  # a turn by 1 rad or less: in the partner chart angles 
 
 
 class TaylorStepper(Stepper):
-    """A compiled integrator and its count of steps; the partner's equations are compiled when needed.
-
-    Attributes:
-        begun: the boundary at which the motion begins.
-    """
+    """A compiled integrator and its count of steps; the partner's equations are compiled when needed."""
 
     single_steps = False
     changes_charts = True
@@ -100,7 +96,6 @@ class TaylorStepper(Stepper):
         return hy.taylor_adaptive(system.equations, initial, nt_events=events, **options)
 
     def use(self, chart: int) -> None:
-        """Continue in the system (0) or its partner (1), whose time and state must be set afterwards."""
         if chart not in self._charts:
             wanted = self.system if chart == 0 else self.system.partner
             assert wanted is not None
@@ -109,7 +104,6 @@ class TaylorStepper(Stepper):
         self._longest = self._bounds[chart]
 
     def enter(self, chart: int, state: np.ndarray) -> None:
-        """See ``Stepper``."""
         time = self._integrator.dtime
         self.use(chart)
         self._integrator.dtime = time
@@ -135,26 +129,21 @@ class TaylorStepper(Stepper):
 
     @property
     def chart(self) -> int:
-        """0 in the system, 1 in its partner."""
         return self._chart
 
     @property
     def time(self) -> Scalar:
-        """Current time (high part), internal units."""
         return self._integrator.time
 
     @property
     def state(self) -> np.ndarray:
-        """Current state, a view that can be assigned to."""
         return self._integrator.state
 
     def mark(self) -> Mark:
-        """Remember this boundary."""
         engine, found = self._integrator, len(self.log.found)
         return Mark(engine.dtime, np.array(engine.state), found, self.steps, self._tiny)
 
     def back_to(self, mark: Mark) -> None:
-        """Return to a boundary."""
         self._integrator.dtime = mark.time
         self._integrator.state[:] = mark.state
         self.log.back_to(mark.events)
@@ -165,7 +154,6 @@ class TaylorStepper(Stepper):
         return {"rhythm_tiny": np.array([memory], dtype=np.int64)}
 
     def unpack(self, arrays: Mapping[str, np.ndarray]) -> int:
-        """See ``Stepper``."""
         return int(arrays.get("rhythm_tiny", np.zeros(1))[0])
 
     @property
@@ -229,7 +217,6 @@ class TaylorStepper(Stepper):
         return True
 
     def dense(self, time: Scalar) -> np.ndarray:
-        """State at a time within the step just taken by ``step``, shape (states,)."""
         return np.array(self._integrator.update_d_output(time))  # heyoka reuses its buffer
 
     def skip(self, count: int) -> bool:

@@ -46,7 +46,6 @@ class AnomalySums:
         moments: (3,), the largest, 1, last.
         strength: 3 G M / (a^3 n^2).
         multiple: k = 2 p.
-        points: number of points per turn.
     """
 
     moments: np.ndarray
@@ -89,12 +88,7 @@ class AnomalySums:
         return np.asarray(x * along[..., None, :] + y * across[..., None, :])
 
     def rates(self, source: np.ndarray, momentum: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """W, its periodic part alone, and the torque, all (.., n, 3) along the frame's axes.
-
-        Args:
-            source: place of the source, axes of the frame.
-            momentum: angular momentum, the same axes.
-        """
+        """W, its periodic part alone, and the torque, all (.., n, 3) along the frame's axes."""
         size = np.linalg.norm(momentum, axis=-1, keepdims=True)
         about = momentum / size
         body = self._turned(source, about, -1.0)

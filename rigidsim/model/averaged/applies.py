@@ -126,9 +126,6 @@ def refuse_frequencies(
         moving: for a rotation that torques change, its harmonics at another time, and how many seconds lie
             between: resonances that it passes too fast to be captured are no reason to refuse it.
 
-    Returns:
-        The spin-orbit resonance that an average over the orbits can keep; None without one.
-
     Raises:
         ConfigError: names a resonance that no average can keep, or what is too fast.
     """

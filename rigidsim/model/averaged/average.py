@@ -67,15 +67,10 @@ class Average:
     """An averaged motion; numbers are mpf, SI.
 
     Attributes:
-        level: "spin_averaged" or "orbit_averaged".
-        short_period: whether what averaging removed is added back.
         start: initial direction of the momentum, unit vector, space axes.
-        energy: energy of the free rotation, J.
         swing: angle (rad) by which the terms removed by averaging over the rotation swing the momentum.
         figure: +1 or -1 if the figure axis is the circled one or its opposite and stays near the momentum,
             0 elsewhere.
-        resonance: spin-orbit resonance whose angle is kept; None without one.
-        slow: start of the resonant motion; None without a resonance.
         driven: what torques of the body alone do; None without such torques. Then ``motion`` and ``energy``
             are those of the start.
     """
@@ -170,7 +165,6 @@ def average_of(
     """The averaged motion that a scene's ``[model] level`` asks for.
 
     Args:
-        scaling: internal units, all rates in the same.
         along: the average whose motion has come to this scene's start: it is the same one from there, with
             its resonance, and its frequencies were checked where it began.
 
@@ -247,12 +241,7 @@ def _driven(
     scaling: Scaling,
     along: Average | None,
 ) -> Average:
-    """The average under torques of the body alone as well.
-
-    Args:
-        alone: loads that aren't gradients.
-        direction: of the momentum at the start, less what the gradients let oscillate.
-    """
+    """The average under torques of the body alone as well."""
     context, table = scene.context, scene.config.model
     epsilon = 2.0 ** (1 - working_bits(scene.config.integrator.precision))
     driven = driven_by(scene, scaling, alone, epsilon)
@@ -305,12 +294,7 @@ def _left_out_at_start(
 
 
 def osculating(scene: Scene, average: Average, mean: Sequence[Any], time: Any) -> Vector:
-    """Unit direction (mpf) of the momentum including the nutation with the orbits' periods.
-
-    Args:
-        mean: direction that the averaged motion carries.
-        time: seconds (mpf).
-    """
+    """Unit direction (mpf) of the momentum with the nutation of the orbits' periods, at a time in seconds."""
     context = scene.context
     found = list(mean)
     for source in average.sources if average.over_orbits else ():

@@ -68,7 +68,6 @@ class Wave:
         wobble, precession: rates l (signed) and g, rad per unit of time.
         harmonics: Fourier coefficients over the amplitude of the torque across the momentum, turned back by
             the mean precession, over L times the rate of the amplitude: rad.
-        orders: their orders j.
         phase: of the precession less its mean course, at the amplitudes.
     """
 
@@ -142,9 +141,6 @@ class PolhodeCourse:
     """P and Q along the run; internal units.
 
     Attributes:
-        times: (n,).
-        amplitudes: (n, 2).
-        nodes: see ``DrivingTorques.nodes``.
         parameter: largest k^2.
         fastest: largest rate at which torques change P, Q or the momentum, relative to their sizes.
         scatter: sum of the angles (rad) by which passing resonances turn the momentum.
@@ -182,11 +178,6 @@ def follow(
     torques: DrivingTorques, start: Sequence[float], begin: float, end: float, epsilon: float
 ) -> PolhodeCourse:
     """Follow the mean torques over the run.
-
-    Args:
-        start: P and Q.
-        begin, end: times, internal units.
-        epsilon: of the run's precision, to which torques are averaged.
 
     Raises:
         NoCourse: no average applies; says from when on, and why.

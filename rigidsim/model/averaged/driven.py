@@ -34,10 +34,7 @@ class Driven:
     """What torques of the body alone do to an averaged motion; numbers are mpf, SI.
 
     Attributes:
-        titles: of these loads.
-        axial, transverse: P and Q at the start.
         amplitude: f at the start, rad.
-        epsilon: to which torques are averaged.
         direction: periodic part of the momentum's direction at the start.
         passed: sum of the angles (rad) by which resonances with gradients turn the momentum.
     """
@@ -116,9 +113,6 @@ class Driven:
 
 def driven_by(scene: Scene, scaling: Scaling, loads: Sequence[Load], epsilon: float) -> Driven:
     """What these loads, functions of the rates, do to a body that turns as the scene starts.
-
-    Args:
-        epsilon: of the run's precision.
 
     Raises:
         Separatrix: the body turns about its intermediate axis.

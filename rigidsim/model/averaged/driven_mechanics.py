@@ -29,7 +29,6 @@ class DrivenMechanics(AveragedMechanics):
 
     @property
     def kept_by_average(self) -> str | None:
-        """See ``Mechanics``."""
         return None
 
     @property
@@ -57,14 +56,12 @@ class DrivenMechanics(AveragedMechanics):
 
     @cached_property
     def momentum_size(self) -> Symbolic:
-        """Size of the angular momentum, internal units."""
         axial, transverse = self.amplitudes
         ratio = as_factor(self.number(self.driven.polhodes.ratio))
         return hy.sqrt(axial * axial + ratio * (transverse * transverse))
 
     @cached_property
     def derivatives(self) -> list[Symbolic]:
-        """Derivatives of the momentum's direction, per internal unit of time."""
         if not self.of.sources:
             return [hy.expression(0.0)] * 3
         s = self.direction
@@ -97,7 +94,6 @@ class DrivenMechanics(AveragedMechanics):
 
     @cached_property
     def rotational_energy(self) -> Symbolic:
-        """Energy of the free rotation."""
         context, polhodes = self.scene.context, self.driven.polhodes
         first, _, third = (context.ldexp(x, -self.scaling.inertia) for x in polhodes.moments)
         axial, transverse = self.amplitudes

@@ -33,8 +33,6 @@ class FreeMotion:
     """A free rotation; numbers are mpf, SI.
 
     Attributes:
-        momentum: size of the angular momentum, kg m^2/s.
-        moments: I1, I2, I3 as above.
         axes: the axes of these moments: unit, right-handed, body axes, with L . third positive.
         parameter: k^2; 0 for a symmetric body, and for a rotation about a principal axis.
         squares: means of the squared components of m along the axes.
@@ -87,7 +85,6 @@ def free_motion(context: Any, body: RigidBody, momentum: Vector, size: Any = Non
     """The free motion of a body.
 
     Args:
-        momentum: angular momentum, body axes (mpf); not zero.
         size: another size of the momentum, in the same direction in the body; None keeps its own.
 
     Raises:

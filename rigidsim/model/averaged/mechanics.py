@@ -26,16 +26,13 @@ class AveragedMechanics(SourcesSeen):
 
     @property
     def turning_rate(self) -> Any:
-        """See ``Mechanics``."""
         return self.of.rate_bound
 
     def tells(self, name: str) -> bool:
-        """See ``Mechanics``."""
         return name in TOLD
 
     @property
     def kept_by_average(self) -> str | None:
-        """See ``Mechanics``."""
         return "averaged over the free rotation, a gravity gradient has no torque along the momentum"
 
     @property
@@ -201,13 +198,11 @@ class AveragedMechanics(SourcesSeen):
 
     @cached_property
     def momentum_size(self) -> Any:
-        """Size of the angular momentum, internal units."""
         context = self.scene.context
         return self.number(context.ldexp(self.of.motion.momentum, -self.scaling.momentum))
 
     @cached_property
     def momentum_space(self) -> list[Symbolic]:
-        """Angular momentum, space axes."""
         return [self.momentum_size * x for x in self._axes[0]]
 
     @cached_property
@@ -222,12 +217,10 @@ class AveragedMechanics(SourcesSeen):
 
     @property
     def spin_space(self) -> list[Symbolic]:
-        """See ``Mechanics``."""
         return self._axes[2]
 
     @cached_property
     def rates(self) -> list[Symbolic]:
-        """Angular velocity at which the momentum turns, space axes."""
         return self.derivatives
 
     @cached_property

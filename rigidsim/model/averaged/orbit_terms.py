@@ -78,7 +78,6 @@ class Ellipse:
     Attributes:
         square: e^2.
         root: sqrt(1 - e^2).
-        motion: mean motion.
         circular: whether e is known to be zero.
     """
 

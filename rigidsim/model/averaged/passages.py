@@ -77,10 +77,8 @@ def _when(scene: Scene, seconds: float) -> str:
 
 
 def _passed(before: BodySpectrum, after: BodySpectrum, source: Source, seconds: float) -> tuple[float, bool]:
-    """Angle (rad) by which all resonances passed turn the momentum, and whether one might capture it.
-
-    Args:
-        seconds: between both.
+    """Angle (rad) by which resonances passed within so many seconds turn the momentum, and whether one may
+    capture it.
     """
     if source.motion == 0:
         return 0.0, False

@@ -31,13 +31,7 @@ _STRIPS = 64  # of complex amplitudes, over which the bound of a sum's error is 
 
 @dataclass(frozen=True)
 class Polhodes:
-    """All polhodes of a body about one axis; numbers are mpf, SI.
-
-    Attributes:
-        moments, axes: see ``FreeMotion``.
-        ratio: r.
-        root: sqrt(r).
-    """
+    """All polhodes of a body about one axis; r is ``ratio``, sqrt(r) ``root``; numbers are mpf, SI."""
 
     moments: Vector
     axes: Matrix
@@ -81,7 +75,6 @@ def mean_square_sine(parameter: Any, root: Callable[[Any], Any], means: int) -> 
 
     Args:
         parameter: k^2: a number, an array or an expression.
-        root: square root of such.
         means: how many means are taken; see ``means_needed``.
     """
     smaller = root(1.0 - parameter)

@@ -35,12 +35,10 @@ class ResonantMechanics(AveragedMechanics):
     """Mechanics of an average that keeps the resonant angle."""
 
     def tells(self, name: str) -> bool:
-        """See ``Mechanics``."""
         return name in TOLD or name == RESONANT_ANGLE
 
     @property
     def kept_by_average(self) -> str | None:
-        """See ``Mechanics``."""
         return None
 
     @property
@@ -63,7 +61,6 @@ class ResonantMechanics(AveragedMechanics):
 
     @cached_property
     def momentum_size(self) -> Symbolic:
-        """Size L of the angular momentum, internal units."""
         return hy.sqrt(hy.sum([x * x for x in self.slow_momentum]))
 
     @cached_property
@@ -73,7 +70,6 @@ class ResonantMechanics(AveragedMechanics):
 
     @cached_property
     def direction(self) -> list[Symbolic]:
-        """Direction s of the momentum, space axes."""
         return apply(self.slow_matrix, self.about)
 
     @cached_property
@@ -249,7 +245,6 @@ class ResonantMechanics(AveragedMechanics):
 
     @cached_property
     def derivatives(self) -> list[Symbolic]:
-        """Derivative of the momentum's direction, per internal unit of time."""
         s, change = self.about, self._momentum_rates
         level = dot(change, s)
         own = [(x - level * y) / self.momentum_size for x, y in zip(change, s, strict=True)]
@@ -258,6 +253,5 @@ class ResonantMechanics(AveragedMechanics):
 
     @cached_property
     def rotational_energy(self) -> Symbolic:
-        """Rotational energy m . I^-1 m / 2."""
         pairs = zip(self._inverse_moments, self.slow_momentum, strict=True)
         return 0.5 * hy.sum([inverse * (x * x) for inverse, x in pairs])

@@ -71,9 +71,7 @@ class Source:
 
     Attributes:
         number: position of its ``[[loads]]`` table, from 1.
-        of: its orbit, table, position or ephemeris.
         strength: 3 G M / a^3 (mpf, 1/s^2), a being ``GradientSource.distance``.
-        osculating: how a point mass moves against the body; None for any other source.
     """
 
     number: int

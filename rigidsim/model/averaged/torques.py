@@ -52,9 +52,7 @@ class DrivingTorques:
     """The torques of a body alone, as functions of its rates.
 
     Attributes:
-        scaling: units of everything below.
         damping: coefficients d (mpf) of viscous torques about the principal axes.
-        others: all other loads.
     """
 
     scene: Scene
@@ -145,9 +143,6 @@ class DrivingTorques:
         in double precision, which tells the smoothness of the torque itself, and in proportion to the digits
         beyond.
 
-        Args:
-            amplitudes: P and Q, (n, 2).
-
         Raises:
             ArithmeticError: a torque that too many nodes don't resolve.
         """
@@ -196,12 +191,7 @@ class DrivingTorques:
     def rates(
         self, axial: Symbolic, transverse: Symbolic, number: Rounder, nodes: int, sines: Symbolic
     ) -> list[Symbolic]:
-        """P' and Q' as expressions of P and Q, per internal unit of time.
-
-        Args:
-            nodes: over which the other torques are summed.
-            sines: <sin^2 f>; see ``mean_square``.
-        """
+        """P' and Q' as expressions of P and Q, per internal unit of time."""
         first, second, third = (as_factor(number(x)) for x in self._decay)
         parameter = self.parameter(axial, transverse, number)
         p = [-(axial * (third + parameter * sines * (second - third)))] if any(self.damping) else []

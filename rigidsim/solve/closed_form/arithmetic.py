@@ -66,7 +66,6 @@ class Digits:
         self.sqrt, self.floor = context.sqrt, context.floor
 
     def number(self, value: Any) -> Any:
-        """The constant, in this context."""
         return self._context.mpf(value)
 
     def sinh_scaled(self, k: int, z: Any, grown: Any, shrunk: Any) -> Any:
@@ -78,11 +77,9 @@ class Digits:
         return context.sinh(k * z) / context.cosh(k * z) * (grown + shrunk) / 2
 
     def elapsed(self, time: Any) -> Any:
-        """The time itself."""
         return time
 
     def reduced(self, time: Any, rate: Any, offset: Any) -> Pair:
-        """See ``Arithmetic``."""
         whole = self.number(rate) * time + self.number(offset)
         count = self._context.nint(whole)
         return count, whole - count
@@ -99,7 +96,6 @@ class Doubles:
     exp, cos, sin, sqrt, floor = np.exp, np.cos, np.sin, np.sqrt, np.floor
 
     def number(self, value: Any) -> float:
-        """The nearest double."""
         return float(value)
 
     def sinh_scaled(self, k: int, z: Any, grown: Any, shrunk: Any) -> Any:
@@ -107,11 +103,9 @@ class Doubles:
         return np.tanh(k * z) * (grown + shrunk) / 2
 
     def elapsed(self, time: Pair) -> Any:
-        """The high part, which is the nearest double."""
         return time[0]
 
     def reduced(self, time: Pair, rate: Any, offset: Any) -> Pair:
-        """See ``Arithmetic``."""
         high, low = sum_of(product_of(_pair(rate), time), _pair(offset))
         count = np.rint(high)
         high, low = two_sum(high - count, low)  # the difference is exact

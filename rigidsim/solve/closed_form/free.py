@@ -21,8 +21,18 @@ from typing import Any
 from rigidsim.scene.arithmetic import Matrix, Vector, dot
 from rigidsim.solve.closed_form.arithmetic import Arithmetic
 from rigidsim.solve.closed_form.motion import Motion, NoClosedForm, WhyNot, right_handed
-from rigidsim.solve.closed_form.theta import Lattice, Theta, first_kind, lattice, theta
-from rigidsim.solve.closed_form.theta_quotients import Argument, Jacobi, jacobi, phase_slope, turn
+from rigidsim.solve.closed_form.theta import (
+    Argument,
+    Jacobi,
+    Lattice,
+    Theta,
+    first_kind,
+    jacobi,
+    lattice,
+    phase_slope,
+    theta,
+    turn,
+)
 
 
 @dataclass(frozen=True)
@@ -30,7 +40,6 @@ class SymmetricFree(Motion):
     """Free motion with two equal moments (a sphere, a rod), or of any body that turns about a principal axis.
 
     Attributes:
-        tilt_cosine, tilt_sine: cosine and sine of half the angle between axis 3 and L.
         transverse: rate across axis 3.
         axial: w3.
         sum_rate: s'.
@@ -48,7 +57,6 @@ class SymmetricFree(Motion):
     title = "free body with two equal moments, or in rotation about a principal axis: circular functions"
 
     def at(self, arithmetic: Arithmetic, time: Any) -> tuple[list[Any], list[Any]]:
-        """See ``Motion``."""
         number = arithmetic.number
         zero = self.spin * 0
         count = arithmetic.elapsed(time) * 0
@@ -68,13 +76,10 @@ class AsymmetricFree(Motion):
     """Free motion with three different moments: w = (W1 cn, W2 sn, W3 dn)(u), L circling axis 3.
 
     Attributes:
-        argument: the argument u.
         amplitudes: W1, W2, W3.
         leans: amplitudes of L1 / 2L, L2 / 2L and L3 / L.
-        functions: cn, sn, dn.
         phase: theta function whose phase is that of alpha; it has a variable of its own.
         rate, step: mean rate of s/2 and its change per half period, as in ``Strand``.
-        momentum: abs(L).
         moments: I1, I2, I3; I2 lies between the others.
     """
 
@@ -111,7 +116,6 @@ class AsymmetricFree(Motion):
         return 2 * self.rate + (2 * self.step + sense * self.lattice.context.pi) * self.argument.turn_rate
 
     def at(self, arithmetic: Arithmetic, time: Any) -> tuple[list[Any], list[Any]]:
-        """See ``Motion``."""
         number = arithmetic.number
         count, rest = self.argument.reduced(arithmetic, time)
         cn, sn, dn = self.functions.at(arithmetic, count, rest)
@@ -142,8 +146,6 @@ def free_motion(context: Any, moments: Vector, axes: Matrix, rates: Vector, tiny
     Args:
         context: mpmath context to work in, with at least twice the digits wanted.
         moments: principal moments; one may be zero (a rod's), whose axis then keeps its rate.
-        axes: the principal unit axes, in body axes.
-        rates: initial angular velocity, body axes.
         tiny: relative size below which a difference of moments, or a component of L, is rounding.
 
     Raises:

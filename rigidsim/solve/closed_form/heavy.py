@@ -19,8 +19,17 @@ from typing import Any
 from rigidsim.scene.arithmetic import Matrix, Vector, cross, dot
 from rigidsim.solve.closed_form.arithmetic import Arithmetic
 from rigidsim.solve.closed_form.motion import Motion
-from rigidsim.solve.closed_form.theta import Lattice, Theta, first_kind, lattice, theta
-from rigidsim.solve.closed_form.theta_quotients import Argument, Quotient, Strand, phase_slope
+from rigidsim.solve.closed_form.theta import (
+    Argument,
+    Lattice,
+    Quotient,
+    Strand,
+    Theta,
+    first_kind,
+    lattice,
+    phase_slope,
+    theta,
+)
 
 
 @dataclass(frozen=True)
@@ -32,7 +41,6 @@ class HeavyTop(Motion):
         roots: u1 <= u2 <= 1 <= u3 of the cubic.
         alpha, beta: spinor of the attitude (axis 3 along the top's axis, space Z against gravity).
         across: w1 + i w2.
-        axial: w3.
     """
 
     argument: Argument
@@ -58,7 +66,6 @@ class HeavyTop(Motion):
         return a.rate + b.rate + (a.step + b.step) * self.argument.turn_rate
 
     def at(self, arithmetic: Arithmetic, time: Any) -> tuple[list[Any], list[Any]]:
-        """See ``Motion``."""
         count, rest = self.argument.reduced(arithmetic, time)
         a, b, w = (f.at(arithmetic, time, count, rest) for f in (self.alpha, self.beta, self.across))
         rates = [w[0], w[1], arithmetic.number(self.axial) + 0 * rest]
@@ -96,7 +103,6 @@ def heavy_motion(
         moments: across and along the axis, about the fixed point; the second may be zero, and axis 3 then
             keeps its rate.
         pull: M g l > 0, in units that agree with those of moments and rates.
-        rates: initial angular velocity, body axes.
         vertical: unit vector against gravity at the start, body axes.
     """
     a, c = moments

@@ -20,11 +20,7 @@ class WhyNot(Enum):
 
 
 class NoClosedForm(ValueError):
-    """Raised if a scene has no closed form here; the message says why, as the rest of a sentence.
-
-    Attributes:
-        why: the kind of reason.
-    """
+    """Raised if a scene has no closed form here; the message says why, as the rest of a sentence."""
 
     def __init__(self, why: WhyNot, words: str) -> None:
         super().__init__(words)

@@ -25,10 +25,6 @@ STEPS_BETWEEN = 32
 class AngleWrapping(Effect):
     """Counts the full turns removed from the angle states.
 
-    Attributes:
-        positions: indices of the angles among the states; empty if there are none.
-        angles: what the angle states stand for now.
-
     Args:
         context: mpmath context with more digits than the precision.
         unit: binary exponent of the angle states' unit, rad.
@@ -66,36 +62,29 @@ class AngleWrapping(Effect):
 
     @property
     def limit(self) -> int:
-        """See ``Effect``."""
         return STEPS_BETWEEN
 
     def apply(self, stepper: Stepper, stride: int) -> bool:
-        """See ``Effect``."""
         self.wrap(stepper.state)
         return True
 
     @property
     def memory(self) -> AngleState:
-        """See ``Effect``."""
         return self.angles
 
     def back_to(self, memory: AngleState, stepper: Stepper) -> None:
-        """See ``Effect``."""
         self.angles = memory
 
     def pack(self, memory: AngleState) -> dict[str, np.ndarray]:
-        """See ``Effect``."""
         return {"rhythm_turns": pack_angles([memory])[0]}
 
     def unpack(self, arrays: Mapping[str, np.ndarray]) -> AngleState:
-        """See ``Effect``."""
         [angles] = unpack_angles(arrays.get("rhythm_turns", np.zeros(0, dtype=np.int64))[None, :])
         if len(angles.turns) != len(self.angles.turns):
             raise ValueError("the checkpoint has other angles")
         return angles
 
     def of_samples(self, times: np.ndarray) -> dict[str, Any]:
-        """See ``Effect``."""
         return {"angles": self.angles}
 
     def unwrapped(self, angles: np.ndarray, turns: np.ndarray) -> np.ndarray:

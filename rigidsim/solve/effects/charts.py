@@ -65,10 +65,6 @@ class Lift:
     def __call__(self, before: Sequence[float], angles: Angles) -> tuple[Angles, int, float]:
         """The requested angles nearest to some shortly before.
 
-        Args:
-            before: requested angles, continuous.
-            angles: angles of the partner sequence.
-
         Returns:
             The requested angles; +1 or -1 within rounding of their singularity (else 0): whether the sum or
             the difference of the outer ones is all that is known; and how far the first one swung if the
@@ -105,9 +101,6 @@ class Charts(Effect):
 
     Called by the engine after each natural step. Which chart it is, and the requested angles, are in the
     memory of the wrapping, which comes before it.
-
-    Attributes:
-        changes: changes of chart so far.
 
     Args:
         whole: puts time on a single number before a change; None where it may be two.
@@ -210,7 +203,6 @@ class Charts(Effect):
         return self.near(stepper.state)
 
     def apply(self, stepper: Stepper, stride: int) -> bool:
-        """See ``Effect``."""
         if self._whole is not None and not self._whole.apply(stepper, stride):
             return False
         self._enter_other(stepper)
@@ -222,24 +214,19 @@ class Charts(Effect):
 
     @property
     def memory(self) -> int:
-        """See ``Effect``."""
         return self.changes
 
     def back_to(self, memory: int, stepper: Stepper) -> None:
-        """See ``Effect``."""
         self.changes = memory
         stepper.use(self.chart)
 
     def pack(self, memory: int) -> dict[str, np.ndarray]:
-        """See ``Effect``."""
         return {"rhythm_chart_changes": np.array([memory], dtype=np.int64)}
 
     def unpack(self, arrays: Mapping[str, np.ndarray]) -> int:
-        """See ``Effect``."""
         return int(arrays.get("rhythm_chart_changes", np.zeros(1))[0])
 
     def of_samples(self, times: np.ndarray) -> dict[str, Any]:
-        """See ``Effect``."""
         return {"reference": self.references(times)}
 
     # --- changing ---------------------------------------------------------------------------------------

@@ -20,18 +20,13 @@ coefficients have two parts; 1 adds at each correction what the coefficients lac
 
 
 class HeldInvariants(Effect):
-    """Projection from the beginning, or from ``LATE`` steps on, until when states are noted.
-
-    Args:
-        interval: largest number of natural steps between projections.
-    """
+    """Projection from the beginning, or from ``LATE`` steps on, until when states are noted."""
 
     def __init__(self, projection: Projection, interval: int) -> None:
         self._projection, self._interval = projection, interval
 
     @property
     def limit(self) -> int:
-        """See ``Effect``."""
         return self._interval if self._projection.holding else sys.maxsize
 
     def due(self, stepper: Stepper, stride: int) -> bool:
@@ -42,7 +37,6 @@ class HeldInvariants(Effect):
         return stepper.steps // stride % strides == 0
 
     def apply(self, stepper: Stepper, stride: int) -> bool:
-        """See ``Effect``."""
         projection, state, time = self._projection, stepper.state, stepper.time
         projection.use(stepper.chart)
         if projection.holding:
@@ -60,11 +54,9 @@ class HeldInvariants(Effect):
         return self._projection.memory.copy()
 
     def back_to(self, memory: np.ndarray, stepper: Stepper) -> None:
-        """See ``Effect``."""
         self._projection.memory[...] = memory
 
     def pack(self, memory: np.ndarray) -> dict[str, np.ndarray]:
-        """See ``Effect``."""
         return {"rhythm_held": memory, "late_projection": np.array([_LATE_PROJECTION], dtype=np.int64)}
 
     def unpack(self, arrays: Mapping[str, np.ndarray]) -> np.ndarray:

@@ -33,7 +33,6 @@ class Waypoints(Effect):
     memory: Kept = {}, 1
 
     def apply(self, stepper: Stepper, stride: int) -> bool:
-        """See ``Effect``."""
         steps = stepper.steps
         self.note(steps // stride, steps, stepper.time, stepper.state, stepper.chart)
         return True
@@ -52,11 +51,9 @@ class Waypoints(Effect):
         self.memory = kept, spacing
 
     def back_to(self, memory: Kept, stepper: Stepper) -> None:
-        """See ``Effect``."""
         self.memory = memory
 
     def pack(self, memory: Kept) -> dict[str, np.ndarray]:
-        """See ``Effect``."""
         kept, spacing = memory
         rows = [(number, spacing, found.steps, found.chart) for number, found in kept.items()]
         places = [[found.time, *found.state] for found in kept.values()]

@@ -111,9 +111,6 @@ def solves(method: Method) -> Callable[[A], A]:
 def algorithm_of(scene: Scene, system: System, *, driven: bool) -> Algorithm:
     """The algorithm that a scene's ``[integrator] method`` asks for.
 
-    Args:
-        driven: whether loads given from Python act.
-
     Raises:
         ConfigError: it can't solve the scene.
     """

@@ -35,12 +35,10 @@ class AtStart(Stepper):
 
     @property
     def time(self) -> Scalar:
-        """See ``Stepper``."""
         return self._time
 
     @property
     def state(self) -> np.ndarray:
-        """See ``Stepper``."""
         return self._state
 
     def back_to(self, mark: Mark) -> None:
@@ -55,14 +53,12 @@ class ClosedFormSolver(Solver):
         self._start = corrected.boundary()
 
     def boundary(self) -> StepBoundary:
-        """See ``Solver``."""
         return self._start
 
     def back_to(self, boundary: StepBoundary) -> None:
-        """See ``Solver``."""
+        pass
 
     def advance(self, boundary: StepBoundary, most: int | None) -> Status | None:
-        """See ``Solver``."""
         begin, buffer = self._corrected.stepper, self.buffer
         narrow, last = begin.precision.narrow, self.clock.at(self.clock.count - 1)
         times = buffer.until(last, self._rows if narrow else min(self._rows, _WIDE_ROWS))
@@ -72,7 +68,6 @@ class ClosedFormSolver(Solver):
         return Status.FINISHED if buffer.complete else None
 
     def settle(self, boundary: StepBoundary, moment: Scalar) -> None:
-        """See ``Solver``."""
         self.progress.time = float(moment) * 2.0**self.clock.exponent
 
 
@@ -86,7 +81,6 @@ class InClosedForm(Algorithm):
 
     @classmethod
     def of(cls, scene: Scene, system: System, *, driven: bool) -> InClosedForm:
-        """See ``Algorithm``."""
         from rigidsim.solve.closed_form import NoClosedForm, closed_form_of
 
         integrator = scene.config.integrator
@@ -103,15 +97,12 @@ class InClosedForm(Algorithm):
 
     @property
     def title(self) -> str:
-        """See ``Algorithm``."""
         return self.form.title
 
     def stepper(
         self, system: System, precision: Precision, tolerance: Scalar | None, start: Scalar, log: EventLog
     ) -> Stepper:
-        """See ``Algorithm``."""
         return AtStart(system, precision, start)
 
     def solver(self, corrected: CorrectedStepper, pacing: Pacing) -> Solver:
-        """See ``Algorithm``."""
         return ClosedFormSolver(self.form, corrected, pacing)

@@ -47,7 +47,6 @@ class Solver:
         """Go on for about the time of a chunk, or until the buffer is full.
 
         Args:
-            boundary: ``boundary()``.
             most: natural steps that are allowed; None for any number.
 
         Returns:

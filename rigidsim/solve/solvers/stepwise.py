@@ -26,12 +26,7 @@ States = Callable[[np.ndarray], np.ndarray]
 
 @dataclass(frozen=True)
 class Reach:
-    """Steps just taken whose samples are still to be taken: one step can hold any number of them.
-
-    Attributes:
-        boundary: boundary before the steps.
-        states: their dense output.
-    """
+    """Steps just taken whose samples are still to be taken: one step can hold any number of them."""
 
     boundary: StepBoundary
     states: States
@@ -55,7 +50,6 @@ class StepwiseSolver(Solver):
     def begin(
         self, clock: SampleClock, buffer: SampleBuffer, progress: Progress, start: StepBoundary | None
     ) -> None:
-        """See ``Solver``."""
         super().begin(clock, buffer, progress, start)
         self._last = clock.at(clock.count - 1)
         self._unit = float(np.ldexp(1.0, clock.exponent))
@@ -65,22 +59,18 @@ class StepwiseSolver(Solver):
         self._account()
 
     def boundary(self) -> StepBoundary:
-        """See ``Solver``."""
         return self._before or (self._reach.boundary if self._reach else self.corrected.boundary())
 
     def back_to(self, boundary: StepBoundary) -> None:
-        """See ``Solver``."""
         self._reach = self._before = None
         self.corrected.back_to(boundary)
         self._account()
 
     @property
     def pending(self) -> bool:
-        """See ``Solver``."""
         return self._reach is not None
 
     def advance(self, boundary: StepBoundary, most: int | None) -> Status | None:
-        """See ``Solver``."""
         finite = True
         if self._reach is not None:
             self._take_reached()
@@ -192,13 +182,11 @@ class StepwiseSolver(Solver):
             self.corrected.correct()
 
     def settle(self, boundary: StepBoundary, moment: Scalar) -> None:
-        """See ``Solver``."""
         self._reach = None
         self._before = self.corrected.arrive(boundary, moment)
         self._account()
 
     def stop(self) -> None:
-        """See ``Solver``."""
         if self._reach is not None and not self.buffer.complete:
             self.back_to(self._reach.boundary)
 

@@ -88,7 +88,6 @@ class SwitchedEngines(TaylorStepper):
         return self._probes[self._chart]
 
     def mark(self) -> Mark:
-        """Remember this boundary."""
         mark = super().mark()
         sides = (
             *map(float, self._modes),
@@ -101,7 +100,6 @@ class SwitchedEngines(TaylorStepper):
         return replace(mark, memory=(mark.memory, sides))
 
     def back_to(self, mark: Mark) -> None:
-        """Return to a boundary."""
         tiny, sides = mark.memory
         memory = list(sides)
         s, a, q = len(self._modes), len(self._angles), len(self._quaternion)
@@ -114,12 +112,10 @@ class SwitchedEngines(TaylorStepper):
         super().back_to(replace(mark, memory=tiny))
 
     def pack(self, memory: Any) -> dict[str, np.ndarray]:
-        """See ``Stepper``."""
         tiny, sides = memory
         return super().pack(tiny) | {"rhythm_switching": np.array(sides)}
 
     def unpack(self, arrays: Mapping[str, np.ndarray]) -> Any:
-        """See ``Stepper``."""
         _, known = self.begun.memory
         sides = np.asarray(arrays.get("rhythm_switching", np.zeros(0)), dtype=np.float64)
         if sides.shape != (len(known),):
@@ -127,9 +123,6 @@ class SwitchedEngines(TaylorStepper):
         return super().unpack(arrays), tuple(sides.tolist())
 
     def use(self, chart: int) -> None:
-        """Continue in the system (0) or its partner (1) at the same time; the state must be set
-        afterwards.
-        """
         self._chart = chart
         self._enter()
         self._longest = self._bounds[chart]

@@ -55,9 +55,6 @@ class Moments:
     def near(self, time: Scalar, modes: Sequence[int]) -> tuple[Scalar, Scalar] | None:
         """The moment in two numbers (internal units) next to one found in one number; None if the surface
         depends on the state too, or isn't crossed there.
-
-        Args:
-            modes: the sides of all surfaces on which the motion is.
         """
         found = self._exactly_near(time, modes)
         return None if found is None else in_two_numbers(found, self._precision.number, self._context)

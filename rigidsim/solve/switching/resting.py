@@ -42,8 +42,6 @@ class Meeting:
 
     Attributes:
         at: looks at the surfaces on given sides and at states nearby.
-        state, time: state and time of the meeting, internal units.
-        epsilon: epsilon of the precision.
     """
 
     at: LookAt

@@ -75,7 +75,6 @@ class SurfaceRoots(SwitchedEngines):
         """Repeat the step up to a root, closer to it; returns the step's size.
 
         Args:
-            size: distance of the root.
             moment: its time in two numbers, if that is known from the surface's expression.
         """
         engine = self._integrator
@@ -102,11 +101,7 @@ class SurfaceRoots(SwitchedEngines):
         return size
 
     def _seen(self, j: int, begun: tuple[Scalar, Scalar], before: np.ndarray) -> Scalar | None:
-        """A time within the latest step at which an argument has the sign of its side, or None.
-
-        Args:
-            begun, before: time in two numbers, and state, at the step's beginning.
-        """
+        """A time within the latest step at which an argument has the sign of its side, or None."""
         begin, end, mode = begun[0], self._integrator.time, self._modes[j]
         look = self._look(before, *begun)
         known = self._probe.noise(look, j, [before])

@@ -37,11 +37,9 @@ class Look:
     """Surfaces and field at a state.
 
     Attributes:
-        u: (surfaces,), the arguments.
         by_time: (surfaces,), their partial derivatives.
         gradients: (surfaces, states).
         field: (states,), derivatives of the states.
-        time: time, internal units.
     """
 
     u: np.ndarray
@@ -141,7 +139,6 @@ class Continuation:
 
     Attributes:
         modes: for each surface 1, -1 or ``SLIDES``; None if there is no way, or more than one.
-        why: the reason in that case.
     """
 
     modes: Mapping[int, int] | None

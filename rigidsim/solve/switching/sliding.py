@@ -26,7 +26,6 @@ class Sliding:
     """The motion along some surfaces.
 
     Attributes:
-        equations: (variable, right-hand side).
         sides: value in place of each surface's side; the motion leaves the surface when it reaches 1 or -1.
     """
 

@@ -40,7 +40,6 @@ class SwitchingStepper(SurfaceRoots):
     """Stepper of a system with surfaces, or with angles whose turns matter.
 
     Attributes:
-        switches: number of arrivals on surfaces so far, in this process.
         begun: the boundary at which the motion begins, on the sides to which it leads.
     """
 
@@ -80,7 +79,6 @@ class SwitchingStepper(SurfaceRoots):
         return True
 
     def to(self, time: float) -> bool:
-        """See ``Stepper``."""
         for _ in range(100_000):
             high, low = self._integrator.dtime
             left = (time - high) - low
@@ -91,7 +89,6 @@ class SwitchingStepper(SurfaceRoots):
         return False
 
     def dense(self, time: Scalar) -> np.ndarray:
-        """See ``Stepper``."""
         return np.array(self._dense.update_d_output(time))
 
     def settle(self) -> None:

@@ -14,6 +14,9 @@ which have to be looked at either way, 0.7 us.
 
 Near a pole of the angles two of them swing by up to half a turn at once; there the path is followed in ever
 smaller parts. A pass nearer than that resolves has no direction of its own, and the nearest one is taken.
+
+Euler angles and their momenta have singularities, near which a run changes its chart. Following the motion
+needs neither: a twin in quaternions carries the same motion, and its states are functions of the run's.
 """
 
 from __future__ import annotations
@@ -21,22 +24,25 @@ from __future__ import annotations
 import math
 import time as clock_time
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import heyoka as hy
 import numpy as np
 
+from rigidsim.model.formulations.quaternion import Quaternion
 from rigidsim.model.frames import plane_drift
 from rigidsim.model.outputs import Recorded
 from rigidsim.model.scaling import source_rate
+from rigidsim.model.state_blocks import BODY
 from rigidsim.model.system import System
 from rigidsim.scene.rotations import is_proper
 from rigidsim.scene.scene import SampleTimes
 from rigidsim.solve.compiled import CompiledFunction, compiled_engine, compiled_function, interruptible
 from rigidsim.solve.precision import precision_of
+from rigidsim.solve.sample_block import SampleBlock
 from rigidsim.solve.steppers import stepper_of
 from rigidsim.solve.taylor_stepper import TaylorStepper
-from rigidsim.solve.turns.shared import AngleSteps
+from rigidsim.solve.turns.steps import AngleSteps, Place
 
 DENSE = 1.0
 """Largest angle (rad) by which a body turns between samples whose angles are joined to the nearest."""
@@ -57,21 +63,6 @@ _SLOWER = 64.0  # than its bound, at most: the next chunk is not to be an age
 _WORTH_BUILDING = 2e5  # rad: code that builds in a tenth of the time runs half as fast
 MOST_OF_A_CLOSED_FORM = 1e6
 """Angle between samples of a closed form up to which turns are counted: about a second's work."""
-
-
-@dataclass(frozen=True)
-class Place:
-    """A sample from which turns are counted.
-
-    Attributes:
-        time: time, internal units.
-        state: (states,) float64, internal units.
-        angles: float64, the run's angles without turns.
-    """
-
-    time: float
-    state: np.ndarray
-    angles: np.ndarray
 
 
 def radians_between(samples: SampleTimes, rate: float) -> float:
@@ -156,11 +147,7 @@ class _Stepwise:
 
 
 class TurnCounter:
-    """Follows angles from sample to sample.
-
-    Args:
-        angles: the recorded variables with the angles.
-    """
+    """Follows angles from sample to sample."""
 
     def __init__(self, system: System, angles: Sequence[Recorded]) -> None:
         self._exact, self._angles, self._steps = system, angles, AngleSteps(angles)
@@ -292,3 +279,45 @@ class TurnCounter:
         for i in np.flatnonzero(np.abs(jumps).max(axis=1) > _DOUBTFUL):
             jumps[i] = self._looked_at(times[i], states[i], times[i + 1], jumps[i], depth - 1)
         return jumps.sum(axis=0)
+
+
+class FollowedSystem:
+    """The system that is followed in place of a given one."""
+
+    def __init__(self, system: System) -> None:
+        self._own = system
+        self._charts: list[CompiledFunction] = []
+        self.system: System | None = system
+        plan = system.plan
+        if not plan.formulation.variables.regular:
+            twin = System(replace(plan, formulation=Quaternion()), system.number)
+            self.system = None if system.switches else twin
+
+    def states(self, block: SampleBlock) -> np.ndarray:
+        """States of the followed system, float64, at the samples of a block, (n, states)."""
+        states = block.states.astype(np.float64)
+        if self.system is None or self.system is self._own:
+            return states
+        if not self._charts:
+            twin = self.system
+            self._charts = interruptible(lambda: self._compiled(twin))
+        charts = [np.asarray(chart(np.ascontiguousarray(states.T))).T for chart in self._charts]
+        return np.where(block.chart[:, None] == 0, charts[0], charts[-1])
+
+    def _compiled(self, twin: System) -> list[CompiledFunction]:
+        own = self._own.rounded(precision_of("double").number)
+        return [
+            hy.cfunc(_twin_states(twin, chart), chart.variables, compact_mode=True)
+            for chart in (own, own.partner)
+            if chart is not None
+        ]
+
+
+def _twin_states(twin: System, chart: System) -> list[hy.expression]:
+    """States of the twin as expressions of the states of a chart."""
+    m = chart.mechanics
+    attitude = m.carried(m.attitude)
+    known = dict(zip(chart.states, chart.variables, strict=True))
+    known |= dict(zip(m.carried(twin.mechanics.attitude).names, attitude.quaternion, strict=True))
+    known |= dict(zip(BODY.rates, m.rate_states, strict=True))
+    return [known[name] for name in twin.states]

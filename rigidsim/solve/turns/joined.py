@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import heyoka as hy
@@ -14,15 +14,58 @@ import numpy as np
 from rigidsim.model.euler_poles import UNDEFINED
 from rigidsim.model.outputs import Recorded
 from rigidsim.model.system import System
+from rigidsim.solve.checkpoint_arrays import Arrays
 from rigidsim.solve.compiled import CompiledFunction, evaluate_rows, interruptible
 from rigidsim.solve.effects.angle_wrapping import AngleWrapping
 from rigidsim.solve.precision import Precision
 from rigidsim.solve.sample_block import SampleBlock
-from rigidsim.solve.turns.continuity import Continuity
-from rigidsim.solve.turns.count import Place, TurnCounter, angles_to_join, doubtful_rows, is_sparse
-from rigidsim.solve.turns.followed import FollowedSystem
-from rigidsim.solve.turns.shared import AngleSteps, at_poles
-from rigidsim.solve.turns.steady import SteadyAngles, advances_steadily
+from rigidsim.solve.turns.count import FollowedSystem, TurnCounter, angles_to_join, doubtful_rows, is_sparse
+from rigidsim.solve.turns.steps import AngleSteps, Place, SteadyAngles, advances_steadily, at_poles
+
+
+@dataclass
+class Continuity:
+    """What joins the variables of a block of samples to those of the block before.
+
+    Attributes:
+        turns: full turns added to the joined angles, (angles,).
+        last_angles, last_quaternion: latest sample's values, float64, the angles before those turns; None
+            before the first block.
+        last_time, last_state: the latest sample's, float64, internal units, if turns are counted from it.
+        wrapped_from: time (internal units) of the first sample with unknown turns: from there on, angles
+            are recorded within one turn; nan if all are known, and -inf for states that aren't samples.
+    """
+
+    turns: np.ndarray = field(default_factory=lambda: np.zeros(3, dtype=np.int64))
+    last_angles: np.ndarray | None = None
+    last_quaternion: np.ndarray | None = None
+    last_time: float = math.nan
+    last_state: np.ndarray | None = None
+    wrapped_from: float = math.nan
+
+    def pack(self) -> Arrays:
+        """It as arrays of a checkpoint."""
+        arrays = {"joined_turns": self.turns, "joined_wrapped": np.array([self.wrapped_from])}
+        if self.last_angles is not None:
+            arrays["joined_angles"] = self.last_angles
+        if self.last_quaternion is not None:
+            arrays["joined_quaternion"] = self.last_quaternion
+        if self.last_state is not None:
+            arrays |= {"joined_state": self.last_state, "joined_time": np.array([self.last_time])}
+        return arrays
+
+    @classmethod
+    def unpacked(cls, arrays: Mapping[str, np.ndarray]) -> Continuity:
+        """Restored from them."""
+        return cls(
+            np.asarray(arrays.get("joined_turns", np.zeros(3)), dtype=np.int64),
+            arrays.get("joined_angles"),
+            arrays.get("joined_quaternion"),
+            float(arrays.get("joined_time", [math.nan])[0]),
+            arrays.get("joined_state"),
+            float(arrays.get("joined_wrapped", [math.nan])[0]),
+        )
+
 
 _LOOKED_AT = 2.0**-16  # singular factor, in double precision, below which it is worked out in the run's own
 _DOUBTFUL = 2.0  # rad, as in ``turn_count``
@@ -40,11 +83,8 @@ class JoinedAngles:
     Attributes:
         dense: whether the samples tell all turns.
         sparse: whether angles are followed along the motion, since the samples are too sparse to tell turns.
-        columns: columns of the system's outputs, one for each angle.
 
     Args:
-        compiled: compiles expressions of the states.
-        precision: the run's.
         countable: whether the motion between sparse samples can be followed.
     """
 
@@ -102,7 +142,6 @@ class JoinedAngles:
         """Angles (n, angles) with their turns, and what the next block is joined to.
 
         Args:
-            angles: angles without turns.
             sizes: squared sizes of those that have one, (their number, n).
         """
         squared = self._all_sizes(sizes, len(angles))
@@ -129,11 +168,7 @@ class JoinedAngles:
         return found, known
 
     def follow(self, known: Continuity, time: float) -> None:
-        """Count turns from the latest sample up to where the run is, for at most a fifth of a second.
-
-        Args:
-            time: time that the run has reached, internal units.
-        """
+        """Count turns from the latest sample up to where the run is, for at most a fifth of a second."""
         latest = _latest(known)
         if self._counter is not None and latest is not None and math.isnan(known.wrapped_from):
             self._counter.begin(_of(latest, self._columns_of(self._others)))

@@ -34,12 +34,10 @@ class TaylorSolver(StepwiseSolver):
     def begin(
         self, clock: SampleClock, buffer: SampleBuffer, progress: Progress, start: StepBoundary | None
     ) -> None:
-        """See ``Solver``."""
         super().begin(clock, buffer, progress, start)
         self.ways = WayFinder(self.corrected, self.stepper, clock, self.pacing)
 
     def go_on(self, boundary: StepBoundary, most: int | None) -> bool:
-        """See ``StepwiseSolver``."""
         if not self.ways.known:
             self.ways.look_ahead(boundary)
         started, before = time.perf_counter(), self.stepper.steps
@@ -126,10 +124,8 @@ class Taylor(Algorithm):
     def stepper(
         self, system: System, precision: Precision, tolerance: Scalar | None, start: Scalar, log: EventLog
     ) -> TaylorStepper:
-        """See ``Algorithm``."""
         return stepper_of(system, precision, tolerance, start, log)
 
     def solver(self, corrected: CorrectedStepper, pacing: Pacing) -> Solver:
-        """See ``Algorithm``."""
         assert isinstance(corrected.stepper, TaylorStepper)
         return TaylorSolver(corrected, corrected.stepper, pacing)

@@ -83,7 +83,6 @@ class WayFinder:
     """Chooses the way for each chunk from the recent steps.
 
     Attributes:
-        numbers: parameters of the choice.
         longest: longest recent step, internal units; 0 before the first.
     """
 
@@ -140,9 +139,6 @@ class WayFinder:
         """How to continue, and for how many steps at most.
 
         The last sample is only ever skipped to, since what a grid goes past it would be taken once more.
-
-        Args:
-            following, upcoming: index and time of the next sample.
         """
         corrected, stepper, ways = self._corrected, self._stepper, self.numbers
         # steps of a tumbling body vary a lot: predict with the longest recent one, which fades slowly
