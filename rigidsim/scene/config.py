@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import html
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -105,7 +104,9 @@ class Experiment:
         return f"<Experiment {self.config.name!r} ({self.source}): {loads}{until}, {precision}>"
 
     def _repr_html_(self) -> str:
-        return f"<b>{html.escape(self.config.name)}</b><pre>{html.escape(self.text)}</pre>"
+        from html import escape  # which only notebooks need
+
+        return f"<b>{escape(self.config.name)}</b><pre>{escape(self.text)}</pre>"
 
 
 def parse(text: str, *, source: str = "config", overrides: Overrides = ()) -> Experiment:

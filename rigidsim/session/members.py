@@ -20,7 +20,7 @@ from rigidsim.session.kept import (
     kept_of_series,
 )
 from rigidsim.solve.status import Status
-from rigidsim.store.chunks import JoinedBlocks
+from rigidsim.store.netcdf import joined_parts
 from rigidsim.store.run import MemoryRun
 from rigidsim.store.summary import Summary
 from rigidsim.store.summary_parts import Modelling, WarningCode
@@ -208,17 +208,17 @@ def failed(outcome: Outcome, reason: str) -> MemberResults:
 def _kept_of_run(result: MemoryRun, keep: Sequence[str], hidden: Collection[str]) -> Kept:
     if not result.blocks:
         return {}
-    joined_blocks = JoinedBlocks(result.blocks, result.variables)
-    series = []
+    series, times = [], np.zeros(0)
     for variable in result.variables:
+        if variable.name == "time":
+            times = np.reshape(joined_parts(result.blocks, variable)[0], -1)
         if variable.name == "time" or "units" not in variable.attributes or _is_date(variable):
             continue
         parts = [
-            np.asarray(part, dtype=np.float64).reshape(1, -1, max(1, int(np.prod(variable.shape))))
-            for part in joined_blocks[variable.name]
+            part.reshape(1, -1, max(1, int(np.prod(variable.shape))))
+            for part in joined_parts(result.blocks, variable)
         ]
         series.append(MemberSeries(variable, parts))
-    times = np.asarray(joined_blocks["time"][0], dtype=np.float64).reshape(-1)
     return kept_of_series(series, times, np.array([len(times)]), keep, hidden)
 
 

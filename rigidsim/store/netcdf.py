@@ -1,26 +1,36 @@
-"""Datasets and segments as netCDF-4 files, written with HDF5's own calls, for any reader of netCDF.
+"""Datasets and segments as netCDF-4 files, written with h5py, for any reader of netCDF.
 
 What makes an HDF5 file a netCDF-4 file is a handful of conventions: named dimensions are dimension scales
 (HDF5 Dimension Scale specification), which refer to the variables along them and these to them;
 ``_Netcdf4Dimid`` and ``_Netcdf4Coordinates`` number them; objects keep the order of their creation;
 ``_NCProperties`` names the writer (NetCDF Users' Guide, appendix "File Format Specifications").
+
+HDF5 compresses with zlib, which is most of the time of writing a dense run. ISA-L (through python-isal) gives
+the same format in a tenth of it, so that whole chunks are compressed here; without it, zlib is used.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
-from functools import cache
 from pathlib import Path
 from typing import Any
 
 import h5py
 import numpy as np
-from h5py import h5a, h5d, h5ds, h5g, h5p, h5s, h5t
+from h5py import h5ds
 
 from rigidsim.errors import RunFolderError
 from rigidsim.store.variables import BARE_DIMENSION, Extra, Variable, used_labels
+
+try:
+    from isal.isal_zlib import compress as _deflate
+
+    _LEVEL = 1  # levels 2 and 3 take 1.2 and 2.2 times as long for 0.02 and 0.2 % less
+except ImportError:
+    from zlib import compress as _deflate
+
+    _LEVEL = 4
 
 CHUNK_ROWS = 8192
 GZIP_LEVEL = 4  # with shuffle: every reader opens it (other filters fail in some)
@@ -28,41 +38,20 @@ Block = Mapping[str, Sequence[np.ndarray]]
 """Float64 parts by variable name, each of shape (rows, components)."""
 
 
-Created = Mapping[str, h5d.DatasetID]
+Created = Mapping[str, h5py.Dataset]
 """Variables in a file under construction, by the names of their parts."""
 _LEAST_CHUNK_ROWS = 1024  # for variables along a dimension that can grow
-
-
-@dataclass(frozen=True)
-class _Type:
-    """A type as numpy names it, as it is stored in files, and as HDF5 finds it in numpy's arrays."""
-
-    numpy: np.dtype[Any]
-    stored: Any
-    held: Any
-
-    @classmethod
-    def of(cls, what: Any) -> _Type:
-        dtype = np.dtype(what)
-        return cls(dtype, h5t.py_create(dtype, logical=True), h5t.py_create(dtype))
-
-
-_DOUBLE = _Type.of("<f8")
-_INTEGER = _Type.of("<i8")
-_ID = _Type.of("<i4")
-_TEXT = _Type.of(h5py.string_dtype())
-_IN_ORDER = h5p.CRT_ORDER_TRACKED | h5p.CRT_ORDER_INDEXED
-_ONE_VALUE = h5s.create(h5s.SCALAR)
 
 
 class NetcdfFile:
     """A netCDF-4 file under construction, in a new, empty HDF5 file; see ``writing``."""
 
     def __init__(self, file: h5py.File) -> None:
-        self._root = file.id
+        self._file = file
         self._sizes: dict[str, int] = {}
-        self._variables: dict[str, tuple[h5d.DatasetID, tuple[str, ...]]] = {}
-        _attribute(self._root, "_NCProperties", _properties(), _Type.of(f"S{len(_properties())}"))
+        self._variables: dict[str, tuple[h5py.Dataset, tuple[str, ...]]] = {}
+        writer = f"version=2,h5py={h5py.__version__},hdf5={h5py.version.hdf5_version}"
+        file.attrs["_NCProperties"] = np.bytes_(writer)
 
     def dimension(self, name: str, size: int) -> None:
         """Declare a dimension, possibly again; size 0 makes it unlimited, since netCDF has no empty ones."""
@@ -81,82 +70,72 @@ class NetcdfFile:
         chunk: Sequence[int] | None = None,
         gzip: int | None = None,
         whole: bool = False,
-    ) -> h5d.DatasetID:
+    ) -> h5py.Dataset:
         """Create a variable of doubles, or of integers, along declared dimensions.
 
         Args:
             attributes: texts and numbers.
             chunk: shape of chunks; a single number for chunks of so many rows; None for contiguous storage.
             gzip: the level at which its chunks are compressed after a byte shuffle.
-
-        Returns:
-            The variable, for ``write_rows`` and ``write_box``.
         """
         shape = tuple(self._sizes[dim] for dim in dims)
         if chunk is None and 0 in shape:
             chunk = (_LEAST_CHUNK_ROWS,)
         if chunk is not None:
             chunk = (*chunk, *(max(1, size) for size in shape[len(chunk) :]))
-        how = _new_dataset(None if chunk is None else tuple(chunk), gzip)
-        return self._created(name, dims, _INTEGER if whole else _DOUBLE, attributes, how)
+        filters = {} if gzip is None else {"compression": "gzip", "compression_opts": gzip, "shuffle": True}
+        return self._created(name, dims, "<i8" if whole else "<f8", attributes, chunks=chunk, **filters)
 
     def texts(self, name: str, dim: str, texts: Sequence[str], attributes: Mapping[str, Any]) -> None:
         """Write strings along a dimension, of which they may be the labels."""
         self.dimension(dim, len(texts))
-        created = self._created(name, (dim,), _TEXT, attributes, _new_dataset())
-        _write(created, np.array(texts, dtype=_TEXT.numpy), _TEXT)
+        kind = h5py.string_dtype()
+        self._created(name, (dim,), kind, attributes)[...] = np.array(texts, dtype=kind)
 
     def attributes(self, attributes: Mapping[str, Any]) -> None:
         """Write attributes of the whole file: strings and numbers."""
-        _attributes(self._root, attributes)
+        _attributes(self._file, attributes)
 
     def group(self, name: str, arrays: Mapping[str, np.ndarray]) -> None:
         """Write arrays of numbers as a group without labels; an empty group isn't written."""
-        group = h5g.create(self._root, name.encode(), gcpl=_new_group())
+        group = self._file.create_group(name, track_order=True)
         for key, values in arrays.items():
             if values.size:
-                of = _INTEGER if values.dtype.kind == "i" else _DOUBLE
-                space = h5s.create_simple(values.shape) if values.ndim else _ONE_VALUE
-                _write(h5d.create(group, key.encode(), of.stored, space, dcpl=_new_dataset()), values, of)
+                stored = np.asarray(values, "<i8" if values.dtype.kind == "i" else "<f8")
+                group.create_dataset(key, data=stored, track_order=True)
 
     def _created(
-        self, name: str, dims: Sequence[str], of: _Type, attributes: Mapping[str, Any], how: Any
-    ) -> h5d.DatasetID:
-        shape = tuple(self._sizes[dim] for dim in dims)
-        most = tuple(size or h5s.UNLIMITED for size in shape)
-        created = h5d.create(self._root, name.encode(), of.stored, h5s.create_simple(shape, most), dcpl=how)
+        self, name: str, dims: Sequence[str], dtype: Any, attributes: Mapping[str, Any], **how: Any
+    ) -> h5py.Dataset:
+        created = self._dataset(name, tuple(self._sizes[dim] for dim in dims), dtype, **how)
         self._variables[name] = created, tuple(dims)
-        numbers = np.array([list(self._sizes).index(dim) for dim in dims])
-        _attribute(created, "_Netcdf4Dimid", numbers[0], _ID)
-        _attribute(created, "_Netcdf4Coordinates", numbers, _ID)
+        numbers = np.array([list(self._sizes).index(dim) for dim in dims], dtype="<i4")
+        created.attrs["_Netcdf4Dimid"] = numbers[0]
+        created.attrs["_Netcdf4Coordinates"] = numbers
         _attributes(created, attributes)
         return created
 
+    def _dataset(self, name: str, shape: tuple[int, ...], dtype: Any, **how: Any) -> h5py.Dataset:
+        most = tuple(size or None for size in shape) if 0 in shape else None
+        return self._file.create_dataset(name, shape, dtype, maxshape=most, track_order=True, **how)
+
     def finish(self) -> None:
         """Connect variables and dimensions once all of them are there."""
-        scales: dict[str, h5d.DatasetID] = {}
+        scales: dict[str, h5py.Dataset] = {}
         for number, (dim, size) in enumerate(self._sizes.items()):
             own, dims = self._variables.get(dim, (None, ()))
             if own is not None and dims == (dim,):
-                h5ds.set_scale(own, dim.encode())
+                own.make_scale(dim)
                 scales[dim] = own
-            else:
-                scales[dim] = self._bare(dim, size, number)
+            else:  # a variable, never written, stands for a dimension without a coordinate
+                chunks = None if size else (_LEAST_CHUNK_ROWS,)
+                scales[dim] = self._dataset(dim, (size,), ">f4", chunks=chunks)
+                scales[dim].make_scale(f"{BARE_DIMENSION}{size:10}")
+                scales[dim].attrs["_Netcdf4Dimid"] = np.int32(number)
         for name, (created, dims) in self._variables.items():
             for axis, dim in enumerate(dims):
                 if dims != (name,):
-                    h5ds.attach_scale(created, scales[dim], axis)
-
-    def _bare(self, dim: str, size: int, number: int) -> h5d.DatasetID:
-        """Create the variable, never written, that stands in the file for a dimension without a
-        coordinate.
-        """
-        how = _new_dataset(None if size else (_LEAST_CHUNK_ROWS,))
-        space = h5s.create_simple((size,), (size or h5s.UNLIMITED,))
-        scale = h5d.create(self._root, dim.encode(), h5t.IEEE_F32BE, space, dcpl=how)
-        h5ds.set_scale(scale, f"{BARE_DIMENSION}{size:10}".encode())
-        _attribute(scale, "_Netcdf4Dimid", np.array(number), _ID)
-        return scale
+                    created.dims[axis].attach_scale(scales[dim])
 
 
 @contextmanager
@@ -168,72 +147,60 @@ def writing(target: Any) -> Iterator[NetcdfFile]:
         made.finish()
 
 
-def write_rows(variable: h5d.DatasetID, first: int, values: np.ndarray) -> None:
-    """Write rows ``first ...`` of a variable; values are doubles, in any shape of that many numbers."""
-    shape = variable.shape[1:]
-    values = np.ascontiguousarray(values, "<f8").reshape(-1, *shape)
-    there = variable.get_space()
-    there.select_hyperslab((first, *(0 for _ in shape)), values.shape)
-    variable.write(h5s.create_simple(values.shape), there, values, mtype=_DOUBLE.held)
-
-
-def write_box(variable: h5d.DatasetID, first: Sequence[int], values: np.ndarray) -> None:
-    """Write a box of a variable whose first corner is given."""
-    of = _INTEGER if values.dtype.kind == "i" else _DOUBLE
-    values = np.ascontiguousarray(values, of.numpy)
-    there = variable.get_space()
-    there.select_hyperslab(tuple(first), values.shape)
-    variable.write(h5s.create_simple(values.shape), there, values, mtype=of.held)
-
-
-def _write(created: h5d.DatasetID, values: np.ndarray, of: _Type) -> None:
-    created.write(h5s.ALL, h5s.ALL, np.asarray(values, of.numpy, order="C"), mtype=of.held)
-
-
 def _attributes(owner: Any, attributes: Mapping[str, Any]) -> None:
     """Write attributes: strings, and numbers as netCDF writes them, always as an array."""
     for name, value in attributes.items():
         if isinstance(value, str):
-            _attribute(owner, name, value, _TEXT)
-        else:
-            numbers = np.atleast_1d(np.asarray(value))
-            if numbers.dtype.kind not in "if":
-                raise TypeError(f"attribute {name}: {value!r} is neither a text nor made of numbers")
-            _attribute(owner, name, numbers, _INTEGER if numbers.dtype.kind == "i" else _DOUBLE)
+            owner.attrs[name] = value
+            continue
+        numbers = np.atleast_1d(np.asarray(value))
+        if numbers.dtype.kind not in "if":
+            raise TypeError(f"attribute {name}: {value!r} is neither a text nor made of numbers")
+        owner.attrs[name] = numbers.astype("<i8" if numbers.dtype.kind == "i" else "<f8")
 
 
-def _attribute(owner: Any, name: str, value: Any, of: _Type) -> None:
-    values = np.asarray(value, of.numpy)
-    space = h5s.create_simple(values.shape) if values.ndim else _ONE_VALUE
-    h5a.create(owner, name.encode(), of.stored, space).write(values, mtype=of.held)
+class ChunkedVariable:
+    """Fills a compressed variable with rows as they arrive, a whole chunk at once."""
+
+    def __init__(self, variable: h5py.Dataset) -> None:
+        self._variable = variable
+        self._chunk = np.zeros(variable.chunks)
+        self._filled = self._written = 0
+
+    def add(self, values: np.ndarray) -> None:
+        """Take rows: doubles in any shape of that many numbers."""
+        values = np.reshape(values, (-1, *self._chunk.shape[1:]))
+        while len(values):
+            taken = values[: len(self._chunk) - self._filled]
+            self._chunk[self._filled : self._filled + len(taken)] = taken
+            self._filled, values = self._filled + len(taken), values[len(taken) :]
+            if self._filled == len(self._chunk):
+                self.finish()
+
+    def add_zeros(self, count: int) -> None:
+        """Append rows of zeros."""
+        self.add(np.zeros((count, *self._chunk.shape[1:])))
+
+    def finish(self) -> None:
+        """Write the rows that wait, as a chunk: all first bytes, all second bytes, ..., deflated."""
+        if not self._filled:
+            return
+        self._chunk[self._filled :] = 0.0  # it has full size in the file however few rows there are
+        octets = self._chunk.view(np.uint8).reshape(-1, 8)
+        place = (self._written, *(0 for _ in self._chunk.shape[1:]))
+        content = bytes(_deflate(np.ascontiguousarray(octets.T), _LEVEL))
+        self._variable.id.write_direct_chunk(place, content)
+        self._written, self._filled = self._written + len(self._chunk), 0
 
 
-@cache
-def _new_dataset(chunk: tuple[int, ...] | None = None, gzip: int | None = None) -> Any:
-    """Creation properties of a dataset that tracks the order of its attributes but no times."""
-    how = h5p.create(h5p.DATASET_CREATE)
-    how.set_attr_creation_order(_IN_ORDER)
-    how.set_obj_track_times(False)
-    if chunk is not None:
-        how.set_chunk(chunk)
-    if gzip is not None:
-        how.set_shuffle()
-        how.set_deflate(gzip)
-    return how
-
-
-@cache
-def _new_group() -> Any:
-    how = h5p.create(h5p.GROUP_CREATE)
-    how.set_attr_creation_order(_IN_ORDER)
-    how.set_link_creation_order(_IN_ORDER)
-    return how
-
-
-@cache
-def _properties() -> bytes:
-    """Description of the writer, for ``_NCProperties``."""
-    return f"version=2,h5py={h5py.__version__},hdf5={h5py.version.hdf5_version}".encode()
+def joined_parts(blocks: Sequence[Block], variable: Variable) -> list[np.ndarray]:
+    """Parts of a variable along all blocks, row by row as in a file; blocks are stored column by column."""
+    found = []
+    for part in range(variable.parts):
+        pieces = [block[variable.name][part] for block in blocks]
+        rows = sum(len(piece) for piece in pieces)
+        found.append(np.concatenate(pieces, out=np.empty((rows, *pieces[0].shape[1:]))))
+    return found
 
 
 def declare(
@@ -264,7 +231,7 @@ def add_extras(file: NetcdfFile, extras: Sequence[Extra]) -> None:
     for extra in extras:
         for dim, size in zip(extra.dims, extra.values.shape, strict=True):
             file.dimension(dim, size)
-        write_rows(file.variable(extra.name, extra.dims, extra.attributes), 0, extra.values)
+        file.variable(extra.name, extra.dims, extra.attributes)[...] = extra.values
 
 
 @contextmanager

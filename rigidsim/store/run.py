@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import html
 import sys
 import tempfile
 from abc import abstractmethod
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -18,9 +17,8 @@ import numpy as np
 from rigidsim.errors import FORCE, RESUME, RunFolderError, either
 from rigidsim.look import viewer
 from rigidsim.store import atomic, segments
-from rigidsim.store.chunks import JoinedBlocks
 from rigidsim.store.folder import RunFolder, find_run
-from rigidsim.store.netcdf import Block
+from rigidsim.store.netcdf import Block, joined_parts
 from rigidsim.store.seal import refuse_damaged
 from rigidsim.store.summary import Brief, Summary
 from rigidsim.store.sweeps.folder import is_sweep
@@ -114,8 +112,10 @@ class Run:
         return f"<Run {self.outcome.name!r} ({self.place}): {self.status}>"
 
     def _repr_html_(self) -> str:
-        title = f"{html.escape(self.outcome.name)}: {html.escape(self.status)}"
-        return f"<b>{title}</b> ({html.escape(self.place)}){_table(self.outcome)}"
+        from html import escape  # which only notebooks need
+
+        title = f"{escape(self.outcome.name)}: {escape(self.status)}"
+        return f"<b>{title}</b> ({escape(self.place)}){_table(self.outcome, escape)}"
 
 
 @dataclass(frozen=True, repr=False)
@@ -225,10 +225,9 @@ class MemoryRun(Run):
         """The dataset, in memory."""
         import xarray
 
-        joined = JoinedBlocks(self.blocks, self.variables)
         found: dict[str, xarray.Variable] = {}
         for variable in self.variables:
-            parts = joined[variable.name] if self.blocks else [np.empty(0)] * variable.parts
+            parts = joined_parts(self.blocks, variable) if self.blocks else [np.empty(0)] * variable.parts
             for part, (name, values) in enumerate(zip(variable.part_names(), parts, strict=True)):
                 shaped = values.reshape(-1, *variable.shape)
                 attributes = variable.part_attributes(part)
@@ -261,11 +260,11 @@ def open_run(path: str | Path) -> SavedRun:
     return SavedRun(folder, folder.read_summary())
 
 
-def _table(outcome: Brief) -> str:
+def _table(outcome: Brief, escape: Callable[[str], str]) -> str:
     """HTML table of a summary's warnings, attitude error and invariants, for a notebook."""
     if not isinstance(outcome, Summary):
-        return f"<p>{html.escape(outcome.message)}</p>"
-    lines = [f"warning: {html.escape(text)}" for text in outcome.warnings]
+        return f"<p>{escape(outcome.message)}</p>"
+    lines = [f"warning: {escape(text)}" for text in outcome.warnings]
     accuracy = outcome.accuracy
     error, how = accuracy.estimated_attitude_error, "estimated"
     if accuracy.certified is not None:
@@ -274,7 +273,7 @@ def _table(outcome: Brief) -> str:
         lines.append(f"attitude at the end: {how} error {error:.2g} rad")
     lines.append(f"{outcome.cost.steps} steps, {outcome.samples} samples, {outcome.precision} precision")
     rows = "".join(
-        f"<tr><td>{html.escape(name)}</td><td>{_short(kept.largest_drift)}</td>"
+        f"<tr><td>{escape(name)}</td><td>{_short(kept.largest_drift)}</td>"
         f"<td>{_short(kept.final_drift)}</td><td>{_short(kept.bound)}</td></tr>"
         for name, kept in outcome.invariants.items()
     )

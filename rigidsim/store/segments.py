@@ -22,7 +22,7 @@ import numpy as np
 from rigidsim.errors import RESUME, RunFolderError, StoppedWritingError, once_mended
 from rigidsim.store import atomic, netcdf
 from rigidsim.store.atomic import sink
-from rigidsim.store.chunks import ChunkedVariable, CollectedRows, Compressor, chunked
+from rigidsim.store.netcdf import ChunkedVariable
 from rigidsim.store.seal import check_seal, refuse_special, seal, seal_of, sealed
 from rigidsim.store.variables import Extra, Variable
 
@@ -37,8 +37,7 @@ class SegmentLimits:
     """When a segment is due.
 
     Attributes:
-        bytes: size of the collected rows before compression; as much again, compressed, is in memory while a
-            segment is assembled.
+        bytes: size of the collected rows; as much again is in memory while a segment is assembled.
         seconds: time since the latest one, which is what a crash can cost. A segment takes some 20 ms.
     """
 
@@ -67,9 +66,6 @@ class Chain:
 class SegmentWriter:
     """Collects blocks and writes them as segments.
 
-    Attributes:
-        dataset_sha256: SHA-256 of the complete dataset's file, once there is one.
-
     Args:
         folder: ``segments/`` of a run folder; created.
         attributes: root attributes that make a segment readable on its own; ``run_id`` among them.
@@ -88,60 +84,60 @@ class SegmentWriter:
         self._folder = folder
         self._variables = variables
         self._attributes = dict(attributes)
-        self._compressor = Compressor()
-        self._collected = CollectedRows(variables, chain.rows, self._compressor)
+        self._blocks: list[netcdf.Block] = []
         self._saved = time.monotonic()
         self._row_bytes = 8 * sum(v.parts * int(np.prod(v.shape)) for v in variables)
         self._seal = chain.seal
         self.saved_rows = chain.rows
         self.count = len(chain.paths)
-        self.dataset_sha256 = ""
+        self.dataset_sha256 = ""  # of the complete dataset's file, once there is one
         with self._writing():
             folder.mkdir(parents=True, exist_ok=True)
             atomic.sync_folder(folder.parent)
 
     def add(self, block: netcdf.Block) -> None:
         """Take a block of samples."""
-        self._collected.add(block)
+        self._blocks.append(block)
+
+    @property
+    def _rows(self) -> int:
+        return sum(len(block["time"][0]) for block in self._blocks)
 
     @property
     def due(self) -> bool:
-        """Whether a segment is due: the collected rows are large (and end with a chunk, if they fill any), or
-        the last segment is old.
-        """
-        rows = self._collected.rows
-        large = rows * self._row_bytes >= self._limits.bytes
-        fitting = rows < netcdf.CHUNK_ROWS or (self.saved_rows + rows) % netcdf.CHUNK_ROWS == 0
-        return (large and fitting) or time.monotonic() - self._saved >= self._limits.seconds
+        """Whether a segment is due: the collected rows are large, or the last segment is old."""
+        large = self._rows * self._row_bytes >= self._limits.bytes
+        return large or time.monotonic() - self._saved >= self._limits.seconds
 
     def flush(self, checkpoint: Arrays, events: Arrays) -> None:
         """Write the collected rows, possibly just the checkpoint; on return they are saved."""
-        content = self._image(self._collected, checkpoint, events, self._place())
+        content = self._image(
+            self._blocks,
+            checkpoint,
+            events,
+            {"segment": self.count, "first_sample": self.saved_rows, "previous_seal": self._seal},
+        )
         path = self._folder / f"{self.count:08d}.h5"
         with self._writing():
             atomic.write_bytes(path, content)
         self._seal = seal_of(content)
         self.count += 1
-        self.saved_rows += self._collected.rows
-        self._collected = self._nothing(self.saved_rows)
+        self.saved_rows += self._rows
+        self._blocks = []
         self._saved = time.monotonic()
 
-    def _place(self) -> dict[str, Any]:
-        return {"segment": self.count, "first_sample": self.saved_rows, "previous_seal": self._seal}
-
-    def _nothing(self, first: int) -> CollectedRows:
-        return CollectedRows(self._variables, first, self._compressor)
-
     def _image(
-        self, collected: CollectedRows, checkpoint: Arrays, events: Arrays, place: Mapping[str, Any]
+        self, blocks: Sequence[netcdf.Block], checkpoint: Arrays, events: Arrays, place: Mapping[str, Any]
     ) -> memoryview:
         """A whole segment in memory."""
-        buffer, rows = io.BytesIO(), collected.rows
-        attributes = {**self._attributes, **place}
+        buffer, rows = io.BytesIO(), self._rows if blocks else 0
         with netcdf.writing(buffer) as file:
-            created = netcdf.declare(file, self._variables, rows, attributes, compressed=collected.compressed)
-            if rows:
-                collected.write(created)
+            attributes = {**self._attributes, **place}
+            created = netcdf.declare(file, self._variables, rows, attributes, compressed=False)
+            for variable in self._variables if rows else ():
+                parts = netcdf.joined_parts(blocks, variable)
+                for name, values in zip(variable.part_names(), parts, strict=True):
+                    created[name][...] = values.reshape(created[name].shape)
             file.group("checkpoint", checkpoint)
             file.group("events", events)
         return sealed(buffer)
@@ -180,26 +176,30 @@ class SegmentWriter:
         paths = segment_paths(self._folder)
         if len(paths) < self.count:  # rows that nothing fills would read as zeros
             raise RunFolderError(f"{self._folder}: segment {len(paths):08d}.h5 is missing")
-        rows = self.saved_rows + self._collected.rows
+        rows = self.saved_rows + self._rows
         with self._writing(), atomic.replacing(target) as temporary:
             with sink(temporary) as target_file, netcdf.writing(target_file) as file:
                 wanted = [variable for variable in self._variables if variable.name not in unused]
                 created = netcdf.declare(file, wanted, rows, attributes, compressed=True)
-                with chunked(created) as chunks:
-                    for path in paths:
-                        target_file.check()
-                        _copy(path, chunks)
-                    self._collected.add_to(chunks)
+                chunks = {name: ChunkedVariable(variable) for name, variable in created.items()}
+                for path in paths:
+                    target_file.check()
+                    _copy(path, chunks)
+                for block in self._blocks:
+                    for variable in wanted:
+                        for name, values in zip(variable.part_names(), block[variable.name], strict=True):
+                            chunks[name].add(values)
+                for chunk in chunks.values():
+                    chunk.finish()
                 netcdf.add_extras(file, extras)
             content_seal, self.dataset_sha256 = seal(temporary)
         with self._writing():
             if checkpoint is not None:
                 path, last, events = checkpoint
                 place = {"segment": 1, "first_sample": rows, "previous_seal": content_seal}
-                atomic.write_bytes(path, self._image(self._nothing(rows), last, events, place))
+                atomic.write_bytes(path, self._image([], last, events, place))
             conclude()
         remove(self._folder)
-        self._compressor.close()
         return rows
 
 
@@ -262,21 +262,16 @@ def _misfit(path: Path, labels: Mapping[str, Any], number: int, rows: int, run: 
 
 
 def _copy(path: Path, chunks: Mapping[str, ChunkedVariable]) -> None:
-    """Append one segment piece by piece; chunks of a finished dataset being prolonged are copied
-    unchanged.
-    """
+    """Append a segment, or a finished dataset that is being prolonged, which may lack variables of zeros."""
     with netcdf.reading(path) as segment:
-        saved = {name: segment[name] for name in chunks if name in segment}
-        rows = len(saved["time"])
-        for name in (
-            chunks.keys() - saved.keys()
-        ):  # variables left out of a finished dataset that is being prolonged
-            chunks[name].add_zeros(rows)
-        done = {name: chunks[name].add_chunks_of(data) for name, data in saved.items()}
-        for start in range(min(done.values()), rows, _ROWS_AT_ONCE):
-            for name, data in saved.items():
-                piece = slice(max(start, done[name]), start + _ROWS_AT_ONCE)
-                chunks[name].add(data[piece])
+        rows = len(segment["time"])
+        for name, chunk in chunks.items():
+            for first in range(0, rows, _ROWS_AT_ONCE):
+                stop = min(first + _ROWS_AT_ONCE, rows)
+                if name in segment:
+                    chunk.add(segment[name][first:stop])
+                else:
+                    chunk.add_zeros(stop - first)
 
 
 def remove(folder: Path) -> None:

@@ -1,4 +1,4 @@
-"""What HDF5's own calls write is what the netCDF libraries take for their own."""
+"""What h5py writes is what the netCDF libraries take for their own."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 import xarray
 
-from rigidsim.store.netcdf import NetcdfFile, write_rows, writing
+from rigidsim.store.netcdf import NetcdfFile, writing
 
 VALUES = np.arange(30.0).reshape(10, 3)
 
@@ -21,12 +21,12 @@ def fill(file: NetcdfFile) -> None:
     file.attributes({"title": "a text, grüße", "empty": "", "count": 3, "size": 0.1, "many": [1.0, 2.5]})
     file.dimension("time", 10)
     file.texts("axis", "axis", ["x", "y", "z"], {"long_name": "an axis"})
-    write_rows(file.variable("time", ("time",), {"units": "s"}, chunk=(4,), gzip=4), 0, VALUES[:, 0])
+    file.variable("time", ("time",), {"units": "s"}, chunk=(4,), gzip=4)[...] = VALUES[:, 0]
     rates = file.variable("rates", ("time", "axis"), {"units": "rad s-1"}, chunk=(4,), gzip=4)
-    write_rows(rates, 0, VALUES[:7])
-    write_rows(rates, 7, VALUES[7:])
+    rates[:7] = VALUES[:7]
+    rates[7:] = VALUES[7:]
     file.dimension("event", 2)  # without a coordinate of its own
-    write_rows(file.variable("event_rates", ("event", "axis"), {}), 0, VALUES[:2])
+    file.variable("event_rates", ("event", "axis"), {})[...] = VALUES[:2]
     file.dimension("none", 0)
     file.variable("nothing", ("none", "axis"), {"event": "none"})
 

@@ -8,7 +8,6 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import h5py
 import numpy as np
 import pytest
 import xarray
@@ -190,7 +189,7 @@ def test_a_run_in_many_segments_is_the_run_in_one(
     same_bits(one, many)
 
 
-def test_a_dense_run_saves_whole_chunks_and_resumes_from_there(
+def test_a_dense_run_that_was_killed_resumes_from_its_segments(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, free_body: Callable[..., str]
 ) -> None:
     """What waits at a checkpoint is found again; steps and numbers are those of the run in one."""
@@ -211,9 +210,6 @@ def test_a_dense_run_saves_whole_chunks_and_resumes_from_there(
     [folder] = (tmp_path / "two").iterdir()
     chain = read_chain(folder / "segments")
     assert chain.rows > 0
-    assert chain.rows % netcdf.CHUNK_ROWS == 0
-    with h5py.File(chain.paths[-1]) as segment:
-        assert segment["quaternion"].chunks == (netcdf.CHUNK_ROWS, 4)
     two = rigidsim.resume(folder)
     same_bits(one, two)
     assert one.summary["cost"]["steps"] == two.summary["cost"]["steps"]

@@ -15,7 +15,7 @@ from rigidsim.scene.sweeps.sweep import Sweep
 from rigidsim.scene.sweeps.written import nearest_double
 from rigidsim.store import atomic
 from rigidsim.store.atomic import sink
-from rigidsim.store.netcdf import NetcdfFile, write_box, write_rows, writing
+from rigidsim.store.netcdf import NetcdfFile, writing
 from rigidsim.store.seal import seal
 from rigidsim.store.sweeps.gathered import Described, Gathered, TileReader
 from rigidsim.store.sweeps.sources import Sources, plain
@@ -67,8 +67,8 @@ def write_dataset(
                 item = next(item for item in sources.found if plain(item) == described.variable.item)
                 for first, shape, flat in boxes(sweep.shape, math.prod(described.extra)):
                     values = _values(name, described, item, sources, reader, flat)
-                    box = values.reshape(*shape, *described.extra)
-                    write_box(target_variable, (*first, *(0 for _ in described.extra)), box)
+                    place = tuple(slice(i, i + n) for i, n in zip(first, shape, strict=True))
+                    target_variable[place] = values.reshape(*shape, *described.extra)
             _write_reasons(file, found.reasons)
         return seal(temporary)[1]
 
@@ -96,7 +96,7 @@ def _coordinates(file: NetcdfFile, sweep: Sweep) -> str:
             dims = (dim, f"{axis.name}_component")
         if dims != (name,):
             beside.append(name)
-        write_rows(file.variable(name, dims, described), 0, numbers)
+        file.variable(name, dims, described)[...] = numbers
     return " ".join(beside)
 
 
@@ -118,9 +118,8 @@ def _declared(
     if found.times is not None:
         samples = "time"
         file.dimension("time", len(found.times))
-        write_rows(
-            file.variable("time", ("time",), {"units": "s", "long_name": "time of the scene"}), 0, found.times
-        )
+        labels = {"units": "s", "long_name": "time of the scene"}
+        file.variable("time", ("time",), labels)[...] = found.times
     for name, described in sorted(found.variables.items()):
         if name == "time" and found.times is not None:
             continue
@@ -211,5 +210,5 @@ def _write_reasons(file: NetcdfFile, reasons: Mapping[int, str]) -> None:
         "failed_member", ("failed",), {"long_name": "which members didn't end well, the last axis fastest"},
         chunk=None, gzip=None, whole=True,
     )  # fmt: skip
-    write_box(numbers, (0,), np.array(members, dtype=np.int64))
+    numbers[...] = members
     file.texts("failed_reason", "failed", [reasons[m] for m in members], {"long_name": "why"})
