@@ -123,8 +123,9 @@ def judge(scene: Extreme, column: str, precision: str, *, hold: bool = False) ->
     tolerance, rate = max(prepared.effective_tolerance, epsilon), float(prepared.system.rate_bound)
     law = round_off_law(tolerance, progress.steps, rate, duration)
     steps = math.sqrt(max(progress.steps, 1))
-    last_bits = _CLOSED * epsilon if prepared.closed is not None else epsilon * (_EVALUATION + _WALK * steps)
-    bound = last_bits if prepared.closed is not None else FACTOR * law + last_bits
+    closed = prepared.algorithm.form is not None
+    last_bits = _CLOSED * epsilon if closed else epsilon * (_EVALUATION + _WALK * steps)
+    bound = last_bits if closed else FACTOR * law + last_bits
     doubts = [c for c in found if c.code not in (WarningCode.NOT_JOINED, WarningCode.NO_EFFECT)]
     covered = error <= FACTOR * estimate + last_bits
     kind = "SILENT"

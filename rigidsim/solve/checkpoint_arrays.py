@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-import heyoka as hy
 import mpmath
 import numpy as np
 
@@ -46,9 +45,9 @@ def unpack(arrays: Mapping[str, np.ndarray], precision: Precision, name: str) ->
         raise ValueError(f"{name} has parts of shape {parts.shape}")
     if precision.narrow:
         return parts[0].astype(precision.scalar)
-    total = _lifted(parts[0], precision)
+    total = precision.of_doubles(parts[0])
     for part in parts[1:]:
-        total = total + _lifted(part, precision)
+        total = total + precision.of_doubles(part)
     exponents = np.asarray(arrays[f"{name}_exponents"])
     if exponents.shape != total.shape:
         raise ValueError(f"{name} has exponents of shape {exponents.shape}")
@@ -57,13 +56,6 @@ def unpack(arrays: Mapping[str, np.ndarray], precision: Precision, name: str) ->
         for _ in range(-int(exponent) // _STEP):
             total[i] = total[i] * down
     return total
-
-
-def _lifted(part: np.ndarray, precision: Precision) -> np.ndarray:
-    """Float64 numbers in the run's own type; ``astype`` would make multi-precision numbers of 53 bits."""
-    if precision.scalar is not hy.real:
-        return part.astype(precision.scalar)
-    return np.array([hy.real(float(x), precision.bits) for x in part], dtype=hy.real)
 
 
 def _power(precision: Precision, exponent: int) -> Scalar:

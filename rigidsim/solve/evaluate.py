@@ -43,18 +43,9 @@ class _PartnerChart:
         found = [r.first for r in partner.recorded if r.continuity == "wrapped"]
         self._angles = slice(found[0], found[0] + 3) if found else None
         self._outputs = compiled(partner.outputs)
-        self._singular = compiled([partner.singular_factor])
+        self.singular = compiled([partner.singular_factor])
         sizes = [size for r in partner.recorded for size in r.squared_sizes]
-        self._sizes = compiled(sizes) if sizes else None
-
-    def singular_factors(self, states: np.ndarray) -> np.ndarray:
-        """Singular factors of the partner chart, (n,)."""
-        return np.asarray(evaluate_rows(self._singular, states)[0])
-
-    def sizes(self, states: np.ndarray, times: np.ndarray) -> np.ndarray:
-        """Squared sizes of the angles' sines and cosines, (angles that have one, n)."""
-        assert self._sizes is not None
-        return evaluate_rows(self._sizes, states, times=times)
+        self.sizes = compiled(sizes) if sizes else None
 
     def values(
         self,
@@ -131,11 +122,26 @@ class Evaluator:
         """Factors that vanish in the singularity of the chart in use, (n,); None without one."""
         if self._singular is None:
             return None
-        factors = evaluate_rows(self._singular, states)[0]
-        in_partner = chart != 0
-        if in_partner.any():
-            factors[in_partner] = self._partner.singular_factors(states[in_partner])
-        return factors
+        return self._by_chart(self._singular, lambda: self._partner.singular, states, chart)[0]
+
+    def _by_chart(
+        self,
+        own: CompiledFunction,
+        partners: Callable[[], CompiledFunction | None],
+        states: np.ndarray,
+        chart: np.ndarray,
+        times: np.ndarray | None = None,
+    ) -> np.ndarray:
+        """Values (outputs, n) of a function of the states in either chart, as in ``SampleBlock``."""
+        values = evaluate_rows(own, states, times=times)
+        there = chart != 0
+        if there.any():
+            function = partners()
+            assert function is not None
+            values[:, there] = evaluate_rows(
+                function, states[there], times=None if times is None else times[there]
+            )
+        return values
 
     @cached_property
     def _partner(self) -> _PartnerChart:
@@ -218,20 +224,11 @@ class Evaluator:
     def _turned(self, values: np.ndarray, block: SampleBlock) -> np.ndarray:
         """The joined angles with their turns, (n, angles)."""
         sizes = None
-        if self._angles.sizes is not None:
-            sizes = self._sizes(block)
+        if (own := self._angles.sizes) is not None:  # squared, of the angles' sines and cosines
+            sizes = self._by_chart(own, lambda: self._partner.sizes, block.states, block.chart, block.times)
         angles = values[self._angles.columns].T
         found, self.continuity = self._angles.joined(self.continuity, angles, sizes, block)
         return found
-
-    def _sizes(self, block: SampleBlock) -> np.ndarray:
-        """Squared sizes of the angles' sines and cosines, (angles that have one, n)."""
-        assert self._angles.sizes is not None
-        sizes = evaluate_rows(self._angles.sizes, block.states, times=block.times)
-        in_partner = block.chart != 0
-        if in_partner.any():
-            sizes[:, in_partner] = self._partner.sizes(block.states[in_partner], block.times[in_partner])
-        return sizes
 
     def _nearest(self, block: np.ndarray) -> np.ndarray:
         """Give each quaternion the sign nearest to the one before."""

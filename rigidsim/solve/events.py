@@ -232,8 +232,12 @@ def _bits(system: System, expressions: Sequence[hy.expression]) -> list[int]:
     if system.clocked:
         parameters[:, system.parameters - 1 :] = 0.0  # a part of the time far below its last digit
     largest = np.zeros(len(expressions))
+    options = {"pars": np.ascontiguousarray(parameters.T)} if compiled.nparams else {}
     for part in TIMES:
-        values = _evaluated(compiled, states, parameters, start + part * (end - start))
+        if compiled.is_time_dependent:
+            options["time"] = np.full(STATES, start + part * (end - start))
+        with np.errstate(all="ignore"):
+            values = np.asarray(compiled(np.ascontiguousarray(states.T), **options))
         largest = np.fmax(largest, np.where(np.isfinite(values), np.abs(values), 0.0).max(axis=1))
     return [int(bits) for bits in exponents_of(largest)]
 
@@ -242,13 +246,3 @@ def exponents_of(largest: np.ndarray) -> np.ndarray:
     """Binary exponents of the units for given largest values."""
     exponents = np.frexp(largest)[1]
     return np.where(exponents > _WORTH_A_UNIT, exponents, 0)
-
-
-def _evaluated(compiled: Any, states: np.ndarray, parameters: np.ndarray, time: float) -> np.ndarray:
-    """Values of shape (expressions, states)."""
-    inputs = np.ascontiguousarray(states.T)
-    options = {"pars": np.ascontiguousarray(parameters.T)} if compiled.nparams else {}
-    if compiled.is_time_dependent:
-        options["time"] = np.full(len(states), time)
-    with np.errstate(all="ignore"):
-        return np.asarray(compiled(inputs, **options))

@@ -104,6 +104,12 @@ class Precision:
         """A list of mpf as an array of this precision."""
         return np.array([self.number(v) for v in values], dtype=self.scalar)
 
+    def of_doubles(self, values: np.ndarray) -> np.ndarray:
+        """Float64 values (n,); ``astype`` would make multi-precision numbers of 53 bits."""
+        if self.scalar is not hy.real:
+            return values.astype(self.scalar)
+        return np.array([hy.real(float(x), self.bits) for x in values], dtype=hy.real)
+
     def exact(self, value: Scalar) -> mpmath.mpf:
         """A scalar of this precision as an mpf with the same value."""
         total = mpmath.mpf(0)

@@ -30,7 +30,6 @@ from rigidsim.solve.solvers.algorithm import Algorithm, algorithm_of
 
 if TYPE_CHECKING:
     from rigidsim.model.averaged.average import Average
-    from rigidsim.solve.closed_form import ClosedForm
 
 DRIFT_FACTOR = 50.0
 """A sound run keeps relative drifts below this times tolerance times sqrt(steps): rounding errors of the
@@ -74,11 +73,6 @@ class InitialValueProblem:
     def has_steps(self) -> bool:
         """Whether the motion is integrated in steps; a closed form gives the samples without any."""
         return self.algorithm.method.has_steps
-
-    @property
-    def closed(self) -> ClosedForm | None:
-        """The closed form that gives the states; None if none does."""
-        return self.algorithm.form
 
     @property
     def holds_invariants(self) -> bool:

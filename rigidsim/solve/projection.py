@@ -152,9 +152,10 @@ class Projection:
         self._reference = values(self._high.array(wide.initial))
         n, m = len(wide.states), len(projected)
         # views into the compiled functions' input and output
-        self._in, self._out = self._array(np.zeros(n + 2 + 3 * m)), self._array(np.zeros(n + 2 * m + 1))
+        self._in = self._high.of_doubles(np.zeros(n + 2 + 3 * m))
+        self._out = self._high.of_doubles(np.zeros(n + 2 * m + 1))
         self._state, self._clock, self._remembered = self._in[:n], self._in[n : n + 2], self._in[n + 2 :]
-        self._left = self._array(np.zeros(m))
+        self._left = self._high.of_doubles(np.zeros(m))
         self._result = np.zeros(n + 2 * m + 1)
         self._change, self._new_sums = self._result[:n], self._result[n:-1]
 
@@ -228,15 +229,16 @@ class Projection:
             self._remembered[:] = self._residuals_memory
         else:
             self._state[:] = self._widened(state)
-            self._clock[:] = self._array(np.array([elapsed, pace]))
-            self._remembered[:] = self._array(self._residuals_memory)
-        at = {"time": self._array(np.array([now]))[0]} if self._timed else {}
+            self._clock[:] = self._high.of_doubles(np.array([elapsed, pace]))
+            self._remembered[:] = self._high.of_doubles(self._residuals_memory)
+        at = {"time": self._high.of_doubles(np.array([now]))[0]} if self._timed else {}
         self._correction(self._in, outputs=self._out, **at)
         self._result[:] = self._out
         if not self._result[-1] < _LARGEST**2:  # also where it is nan
             times[2] += 1
             return
-        state -= self._change if cheap else self._narrowed(self._change)
+        # float64 so far: at most 250 digits, for which 1e-250 is well in range
+        state -= self._change if cheap else self._low.of_doubles(self._change)
         self._sums[:] = self._new_sums
         self._state[:] = state if cheap else self._widened(state)
         self._residuals(self._state, outputs=self._left)
@@ -266,33 +268,17 @@ class Projection:
 
     # --- arithmetic -------------------------------------------------------------------------------------
 
-    def _array(self, values: np.ndarray) -> np.ndarray:
-        """float64 values in the higher precision."""
-        high = self._high
-        if high.scalar is hy.real:
-            return np.array([hy.real(float(x), high.bits) for x in values])
-        return values.astype(high.scalar)
-
     def _widened(self, state: np.ndarray) -> np.ndarray:
         """A state in the higher precision, exactly."""
         return self._summed(self._low.parts(state))
 
     def _summed(self, values: Sequence[np.ndarray]) -> np.ndarray:
         """The sum of float64 parts, smallest first."""
-        parts = [self._array(part) for part in values]
+        parts = [self._high.of_doubles(part) for part in values]
         total = parts[-1]
         for part in parts[-2::-1]:
             total = total + part
         return total
-
-    def _narrowed(self, change: np.ndarray) -> np.ndarray:
-        """Corrections, float64 so far (at most 250 digits, for which 1e-250 is well in range), in the working
-        precision.
-        """
-        low = self._low
-        if low.scalar is not hy.real:
-            return change.astype(low.scalar)
-        return np.array([hy.real(float(x), low.bits) for x in change])
 
     @property
     def _options(self) -> dict[str, Any]:

@@ -79,6 +79,7 @@ class Stepper:
         destination: time of the last sample, internal units; None if steps may become arbitrarily
             small.
         unresolved: whether several steps were taken at once that have to be taken back and taken one by one.
+        ended: whether the watcher asked to end the call after the latest step.
         until: time beyond which no step may go, to be set from outside: one that would is cut short to end
             there; None for any.
         watcher: sees each step and may end a call early; None without one.
@@ -97,7 +98,7 @@ class Stepper:
         self.smallest = self.largest = 0.0
         self.failure = ""
         self.destination: float | None = None
-        self.unresolved = False
+        self.unresolved = self.ended = False
         self.until: Scalar | None = None
         self.watcher: Watcher | None = None
 
@@ -126,7 +127,7 @@ class Stepper:
             if not self.step():
                 return False
             smallest, largest = min(smallest, self.smallest), max(largest, self.largest)
-            if self.collapsed or self.time == self.until:
+            if self.ended or self.collapsed or self.time == self.until:
                 break
         self.smallest, self.largest = smallest, largest
         return True

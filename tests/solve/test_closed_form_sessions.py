@@ -120,12 +120,12 @@ def test_no_bit_depends_on_which_samples_are_evaluated_together(precision: str) 
     given = precision if precision.isdigit() else f'"{precision}"'
     integrator = f'method = "closed_form"\nprecision = {given}'
     prepared = prepare(rigidsim.parse(config(**flight, integrator=integrator)))
-    assert prepared.closed is not None
+    assert prepared.algorithm.form is not None
     times = prepared.clock.internal(0, 41)
     blocks = [
         np.concatenate(
             [
-                prepared.closed.states(
+                prepared.algorithm.form.states(
                     prepared.system, prepared.precision, times[k : k + rows], prepared.clock.start
                 )
                 for k in range(0, 41, rows)

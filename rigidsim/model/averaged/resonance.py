@@ -80,20 +80,17 @@ class Resonance:
         return f"{self.multiple}:2" if self.multiple % 2 else f"{self.multiple // 2}:1"
 
     @cached_property
-    def coefficients(self) -> tuple[Any, Any, Any]:
+    def coefficients(self) -> tuple[Any, ...]:
         """Hansen coefficients X_0, X_2, X_-2 (mpf)."""
-        e = self.orbit.eccentricity
-        zero, plus, minus = (hansen(self.context, e, self.multiple, m) for m in (0, 2, -2))
-        return zero, plus, minus
+        return self._hansen(self.multiple)
 
     @cached_property
-    def of_wobble(self) -> tuple[Any, Any, Any]:
+    def of_wobble(self) -> tuple[Any, ...]:
         """Hansen coefficients Y_0, Y_2, Y_-2 (mpf)."""
-        e = self.orbit.eccentricity
-        if self.multiple % 2:
-            return self.context.zero, self.context.zero, self.context.zero
-        zero, plus, minus = (hansen(self.context, e, self.multiple // 2, m) for m in (0, 2, -2))
-        return zero, plus, minus
+        return (self.context.zero,) * 3 if self.multiple % 2 else self._hansen(self.multiple // 2)
+
+    def _hansen(self, order: int) -> tuple[Any, ...]:
+        return tuple(hansen(self.context, self.orbit.eccentricity, order, m) for m in (0, 2, -2))
 
     @cached_property
     def second_order(self) -> Vector:

@@ -24,7 +24,7 @@ from rigidsim.model.averaged.orbit_terms import (
 )
 from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.orbits.kepler_states import OrbitStates
-from rigidsim.model.orbits.table_states import ElementStates, TablePlace, element_states
+from rigidsim.model.orbits.table_states import ElementStates, element_states
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.scaling import Rounder
 from rigidsim.model.state_blocks import StateBlock
@@ -40,13 +40,6 @@ class TableTerms:
 
     states: ElementStates
     number: Rounder
-
-    @classmethod
-    def of(
-        cls, table: TabulatedOrbit, place: TablePlace, time_exponent: int, start: Any, number: Rounder
-    ) -> TableTerms:
-        """Carry the orbit's elements: see ``element_states``."""
-        return cls(element_states(table, place, time_exponent, start, number), number)
 
     def _value(self, element: str) -> Symbolic:
         return rounded(self.states.values[element])
@@ -192,7 +185,9 @@ class SourcesSeen(Mechanics):
     def _by_table(self) -> dict[TabulatedOrbit, TableTerms]:
         """For each table, its contribution to an average over orbits."""
         return {
-            table: TableTerms.of(table, place, self.scaling.time, self.scene.start, self.number)
+            table: TableTerms(
+                element_states(table, place, self.scaling.time, self.scene.start, self.number), self.number
+            )
             for table, place in self.tables.items()
         }
 

@@ -13,7 +13,7 @@ Applications, chapter 5), with no integral of the third kind left, and nothing s
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from rigidsim.scene.arithmetic import Matrix, Vector, cross, dot
@@ -21,7 +21,6 @@ from rigidsim.solve.closed_form.arithmetic import Arithmetic
 from rigidsim.solve.closed_form.motion import Motion
 from rigidsim.solve.closed_form.theta import (
     Argument,
-    Lattice,
     Quotient,
     Strand,
     Theta,
@@ -81,10 +80,6 @@ class _Cubic:
     u1: Any
     u2: Any
     u3: Any
-
-    @property
-    def lattice(self) -> Lattice:
-        return self.argument.lattice
 
 
 def heavy_motion(
@@ -153,7 +148,7 @@ def _roots(context: Any, b: Any, c: Any, d: Any) -> list[Any]:
 def _strand(cubic: _Cubic, above: Theta, step: Any, match: tuple[Any, Any], *, at_top: bool) -> Strand:
     """A strand with modulus and rate of phase matched where u = u1, or u = u2 (``at_top``)."""
     modulus, phase_rate = match
-    grid = cubic.lattice
+    grid = cubic.argument.lattice
     context = grid.context
     below = theta(grid, 4 if grid.circular else 2, context.zero)
     if at_top and not grid.periodic:  # u = u2 is reached after infinite time: the quotient goes to a constant
@@ -180,7 +175,7 @@ def _line(
         near, far: sin^2, cos^2 and delta^2 of the amplitude of the zero's distance from the line, and of its
             distance from the edge i K'; the first is needed unless u1 = u2, the second unless u2 = u3.
     """
-    grid = cubic.lattice
+    grid = cubic.argument.lattice
     context = grid.context
     if grid.circular:
         per_length = context.pi / (2 * grid.quarter)
@@ -196,7 +191,7 @@ def _rising(cubic: _Cubic, constant: Any, strength: Any) -> Strand:
     """Strand with abs(f)^2 = (1 + u) / 2, arg(f)' = constant + strength / (2 A (1 + u)): the spinor's
     alpha.
     """
-    context, u1, u2, u3 = cubic.lattice.context, cubic.u1, cubic.u2, cubic.u3
+    context, u1, u2, u3 = cubic.argument.lattice.context, cubic.u1, cubic.u2, cubic.u3
     near = ((1 + u1) / (1 + u2), (u2 - u1) / (1 + u2), (u2 - u1) * (1 + u3) / ((u3 - u1) * (1 + u2)))
     far = ((u3 - u1) / (1 + u3), (1 + u1) / (1 + u3), (1 + u2) / (1 + u3))
     above, step = _line(cubic, (1, 4, 1), -1 if strength < 0 else 1, near, far)
@@ -208,7 +203,7 @@ def _falling(cubic: _Cubic, zero: Any, weight: Any, constant: Any, strength: Any
     """Strand with abs(f)^2 = weight (zero - u), arg(f)' = constant + strength / (2 A (zero - u)), zero in
     [u2, u3].
     """
-    context, u1, u2, u3 = cubic.lattice.context, cubic.u1, cubic.u2, cubic.u3
+    context, u1, u2, u3 = cubic.argument.lattice.context, cubic.u1, cubic.u2, cubic.u3
     zero = min(max(zero, u2), u3)
     gap = u3 - u2
     # on the separatrix zero = u2 = u3: the function decays alike wherever its zero is
@@ -248,14 +243,11 @@ def _placed(context: Any, top: HeavyTop, rates: tuple[Any, Any], level: tuple[An
         spin = context.arg(context.mpc(level[1], level[0]) / (2 * a * context.conj(b)))
     else:
         spin = -context.arg(context.mpc(*rates) / w)
-    return HeavyTop(
-        top.axes,
-        top.argument,
-        top.roots,
-        top.alpha.shifted(spin / 2),
-        top.beta.shifted(-spin / 2),
-        top.across.shifted(-spin),
-        top.axial,
+    return replace(
+        top,
+        alpha=top.alpha.shifted(spin / 2),
+        beta=top.beta.shifted(-spin / 2),
+        across=top.across.shifted(-spin),
     )
 
 

@@ -20,9 +20,8 @@ from rigidsim.solve.compiled import TaylorEngine, interruptible
 from rigidsim.solve.events import BESIDE, EventLog, engine_events, of_order_one
 from rigidsim.solve.precision import Precision, Scalar
 from rigidsim.solve.stepper import Mark
-from rigidsim.solve.switching.resting import Meeting
 from rigidsim.solve.switching.sides import HELD, SLIDES, Continuation, Look, Probe, continued
-from rigidsim.solve.switching.sliding import sliding
+from rigidsim.solve.switching.sliding import Meeting, sliding
 from rigidsim.solve.taylor_stepper import TaylorStepper
 
 Root = tuple[Any, int, int]

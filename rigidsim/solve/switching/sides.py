@@ -26,7 +26,7 @@ SLIDES = 0
 """Mode in place of a side (1 or -1): the motion slides along the surface."""
 HELD = 2
 """Mode in place of a side: the motion keeps to the surface while it slides along surface number m, whose side
-it has (``HELD + m``) or the opposite one (``-HELD - m``); see ``rigidsim.solve.switching.resting``.
+it has (``HELD + m``) or the opposite one (``-HELD - m``); see ``rigidsim.solve.switching.sliding``.
 """
 _ROUNDINGS = 32.0  # units of rounding of an argument's terms, below which it is zero
 _RATE_ROUNDINGS = 1024.0  # the same for its rate, whose terms are products of derivatives

@@ -17,6 +17,7 @@ from rigidsim.model.system import System
 from rigidsim.solve.events import EventLog
 from rigidsim.solve.precision import Precision, Scalar
 from rigidsim.solve.step_bounds import bound_of_sparse_series
+from rigidsim.solve.stepper import Stepper
 from rigidsim.solve.switching.engines import Root
 from rigidsim.solve.switching.moments import between
 from rigidsim.solve.switching.roots import SurfaceRoots
@@ -63,20 +64,10 @@ class SwitchingStepper(SurfaceRoots):
         """Take one step with dense output, not past a surface; False if the state is no longer finite, or the
         motion can't be continued (``failure`` then says why).
         """
-        return self._step(self._longest)[0]
+        return self._step(self._longest)
 
     def skip(self, count: int) -> bool:
-        """See ``Stepper``; taken step by step."""
-        smallest, largest = np.inf, 0.0
-        for _ in range(count):
-            fine, on = self._step(self._longest)
-            if not fine:
-                return False
-            smallest, largest = min(smallest, self.smallest), max(largest, self.largest)
-            if not on or self.collapsed or self.time == self.until:
-                break
-        self.smallest, self.largest = smallest, largest
-        return True
+        return Stepper.skip(self, count)  # step by step
 
     def to(self, time: float) -> bool:
         for _ in range(100_000):
@@ -84,7 +75,7 @@ class SwitchingStepper(SurfaceRoots):
             left = (time - high) - low
             if left <= abs(time) * self._epsilon:
                 return True
-            if not self._step(min(left, self._longest))[0]:
+            if not self._step(min(left, self._longest)):
                 break
         return False
 
@@ -99,11 +90,10 @@ class SwitchingStepper(SurfaceRoots):
         self._agree()
         self._enter()
 
-    def _step(self, longest: Scalar) -> tuple[bool, bool]:
-        """Take a step: whether all went well, and whether the watcher lets the call continue."""
+    def _step(self, longest: Scalar) -> bool:
         if self._unsettled:
             self.failure = self._unsettled
-            return False, False
+            return False
         if self.until is not None:
             high, low = self._integrator.dtime
             longest = min(longest, (self.until - high) - low)
@@ -124,7 +114,7 @@ class SwitchingStepper(SurfaceRoots):
                 begun.state[:] = before
                 outcome, size = begun.step(self.precision.of_double(bound), write_tc=True)
             if outcome == hy.taylor_outcome.err_nf_state:
-                return False, False
+                return False
             natural = abs(float(size))
             root = self._first_root(time, before)
             if root is None:
@@ -140,22 +130,22 @@ class SwitchingStepper(SurfaceRoots):
             begun.dtime = time
             begun.state[:] = before
             if not self._arrive(root, [before], self._fresh):
-                return False, False
+                return False
         else:
             assert root is not None
-            return self._fail(root[1], "it turns back to it again and again"), False
+            return self._fail(root[1], "it turns back to it again and again")
         self._dense = begun
         self.smallest, self.largest = abs(float(size)), natural
         self.steps += 1
         self._judge(time[0], 1)
-        on = True if self.watcher is None else self.watcher(begun)
+        self.ended = self.watcher is not None and not self.watcher(begun)
         self._follow()
         again, self._fresh = self._fresh, False
         if root is not None and not self._arrive(root, [before, np.array(self.state)], again):
-            return False, False
+            return False
         if self._along:
             self._keep_to_surfaces()
-        return True, on
+        return True
 
     def _width(self, time: Scalar) -> Scalar:
         size = _WIDTH * self._epsilon * max(abs(float(time)), 1.0)

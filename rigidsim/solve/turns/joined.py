@@ -99,10 +99,13 @@ class JoinedAngles:
     ) -> None:
         self.variables = angles_to_join(system)
         self.columns = [r.first + i for r in self.variables for i in range(r.count)]
+        ends = np.cumsum([r.count for r in self.variables]).tolist()
+        self._parts = {r.name: slice(end - r.count, end) for r, end in zip(self.variables, ends, strict=True)}
         self._system, self._wrapping = system, wrapping
         self._compiled, self._precision, self._steps = compiled, precision, AngleSteps(self.variables)
         self.dense = not self.variables or not is_sparse(system)
         steady = [] if self.dense else [r for r in self.variables if advances_steadily(system, r)]
+        self._steady_variables = steady
         self._with_poles = [(r, r.poles) for r in self.variables if r.poles is not None]
         self._others = [r for r in self.variables if r not in steady]
         self.sparse = bool(self._others) and not self.dense
@@ -129,12 +132,7 @@ class JoinedAngles:
 
     def part(self, variable: Recorded) -> slice | None:
         """Where a variable's angles are among the joined ones; None if they aren't joined."""
-        place = 0
-        for joined in self.variables:
-            if joined.name == variable.name:
-                return slice(place, place + joined.count)
-            place += joined.count
-        return None
+        return self._parts.get(variable.name)
 
     def joined(
         self, known: Continuity, angles: np.ndarray, sizes: np.ndarray | None, samples: SampleBlock
@@ -263,10 +261,6 @@ class JoinedAngles:
         if self._steady is not None:
             turns[:, steady] = known.turns[steady] + np.cumsum(self._advanced(known, block, steady), axis=0)
         return turns, wrapped_from
-
-    @property
-    def _steady_variables(self) -> list[Recorded]:
-        return [] if self._steady is None else self._steady.variables
 
     def _advanced(self, known: Continuity, block: _DoubleSamples, columns: np.ndarray) -> np.ndarray:
         """Full turns (n, columns) from row to row of angles that advance steadily."""

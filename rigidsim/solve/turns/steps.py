@@ -102,7 +102,7 @@ class SteadyAngles:
     """Angles whose turns between samples follow from their rates."""
 
     def __init__(self, system: System, variables: list[Recorded]) -> None:
-        self.variables = variables
+        self._variables = variables
         self._unit = system.scaling.time
         self._system = system
         self._function: CompiledFunction | None = None
@@ -127,7 +127,7 @@ class SteadyAngles:
         """Rates of the angles, rad per internal unit of time."""
         if self._function is None:
             system = self._system.rounded(precision_of("double").number)
-            names = {r.name for r in self.variables}
+            names = {r.name for r in self._variables}
             found = [r.steady for r in system.recorded if r.name in names]
             rates = [rate for steady in found if steady is not None for rate in steady.rates]
             self._function = hy.cfunc(rates, system.variables, compact_mode=True)
