@@ -34,12 +34,7 @@ _PATIENCE = 0.1  # seconds, in place of the usual patience
 
 @dataclass
 class Assembly:
-    """The parts of an integration.
-
-    Attributes:
-        corrected: what takes the steps of the problem's algorithm, and effects in between; where it has none,
-            the start.
-    """
+    """The parts of an integration; ``corrected`` stands at the start where the algorithm takes no steps."""
 
     prepared: InitialValueProblem
     stride: int
@@ -49,9 +44,7 @@ class Assembly:
     evaluator: Evaluator
 
     def steps(self) -> CorrectedStepper:
-        """What takes steps, by Taylor series where the algorithm has none: for whoever steps whatever the
-        config says, as a pilot does.
-        """
+        """What takes steps, by Taylor series where the algorithm has none, for pilots."""
         if self.prepared.has_steps:
             return self.corrected
         return interruptible(lambda: _stepping(self.prepared, Taylor(), self.wrapping, self.log, self.stride))
@@ -68,11 +61,7 @@ class Assembly:
 
 
 def assemble(prepared: InitialValueProblem, *, stride: int = STRIDE) -> Assembly:
-    """Compile everything that a prepared scene needs to run from its start; Ctrl-C is heeded meanwhile.
-
-    Raises:
-        ConfigError: invariants are to be projected but there are none.
-    """
+    """Compile everything that a prepared scene needs from its start; Ctrl-C is heeded meanwhile."""
     return interruptible(lambda: _assembled(prepared, stride))
 
 
@@ -137,9 +126,7 @@ def sampler(
 
 
 def _following(check: Check, evaluator: Evaluator, clock: SampleClock) -> Check:
-    """The check, extended by counting turns up to where the run is, for a part of a chunk's time each
-    call.
-    """
+    """The check, and turns counted up to where the run is, for a part of a chunk's time each call."""
 
     def checked(progress: Progress) -> Status | None:
         stop = check(progress)
@@ -159,9 +146,7 @@ def _following(check: Check, evaluator: Evaluator, clock: SampleClock) -> Check:
 
 
 def _in_small_blocks(pacing: Pacing, radians: float) -> Pacing:
-    """Pacing with blocks of samples so small that turns between them are counted within a fraction of a
-    second.
-    """
+    """Pacing with blocks so small that turns within one are counted in a fraction of a second."""
     rows = max(1, int(_RADIANS_AT_ONCE / radians))
     return replace(
         pacing,

@@ -53,11 +53,7 @@ def pack_versions(versions: Mapping[str, int]) -> Arrays:
 
 
 def check_versions(arrays: Mapping[str, np.ndarray], versions: Mapping[str, int]) -> None:
-    """Refuse a checkpoint of other parts, or of other versions of them.
-
-    Raises:
-        ValueError: says what differs and what to do.
-    """
+    """Raise a ValueError, with what to do, for a checkpoint of other parts or other versions of them."""
     found = {name: int(n[0]) for name, n in arrays.items() if name.startswith(_VERSION)}
     found = {name.removeprefix(_VERSION): version for name, version in found.items()}
     # a part that an older checkpoint lacks begins anew

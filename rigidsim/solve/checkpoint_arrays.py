@@ -33,11 +33,7 @@ def pack(values: np.ndarray, precision: Precision, name: str) -> Arrays:
 
 
 def unpack(arrays: Mapping[str, np.ndarray], precision: Precision, name: str) -> np.ndarray:
-    """Scalars restored from packed arrays.
-
-    Raises:
-        ValueError: arrays of another shape or precision.
-    """
+    """Scalars restored from packed arrays; raises a ValueError for another shape or precision."""
     if f"{name}_parts" not in arrays:
         return precision.zeros((0,))
     parts = np.asarray(arrays[f"{name}_parts"], dtype=np.float64)
@@ -63,11 +59,7 @@ def _power(precision: Precision, exponent: int) -> Scalar:
 
 
 def numbers(arrays: Mapping[str, np.ndarray], name: str, count: int) -> list[float]:
-    """So many numbers of an array.
-
-    Raises:
-        KeyError, ValueError: it is missing, or has others.
-    """
+    """So many numbers of an array; raises a KeyError if it is missing, a ValueError if it has others."""
     found = np.asarray(arrays[name])
     if found.shape != (count,):
         raise ValueError(f"the checkpoint has {name} of shape {found.shape}, not ({count},)")

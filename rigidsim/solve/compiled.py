@@ -38,12 +38,7 @@ DISK_LIMIT = 256 << 20
 
 
 class CompiledFunction(Protocol):
-    """Function returned by ``heyoka.cfunc``.
-
-    Attributes:
-        llvm_states: the compiled modules (in compact mode one for all), which print what they were compiled
-            for.
-    """
+    """Function returned by ``heyoka.cfunc``; its ``llvm_states`` print what it was compiled for."""
 
     llvm_states: Any
 
@@ -93,11 +88,9 @@ class Kept(Generic[T]):
         self._lock = Lock()
 
     def get(self, description: object, make: Callable[[], T]) -> T:
-        """The object made earlier from this description, or a new one.
-
-        Args:
-            description: everything that the object depends on. It is compared by its serialised bytes, since
-                expressions that count as equal can differ in the sign of a zero.
+        """The object made earlier from this description of everything it depends on, or a new one. It is
+        compared by its serialised bytes, since expressions that count as equal can differ in the sign of a
+        zero.
         """
         key = pickle.dumps(description)
         with self._lock:
@@ -142,9 +135,7 @@ _stores = [CodeStore()]
 
 @contextmanager
 def kept_in(store: CodeStore) -> Iterator[None]:
-    """Use only this store of compiled code inside the block, in all threads: for code compiled otherwise than
-    its description tells.
-    """
+    """Use only this store inside the block, in all threads: for code compiled in another way."""
     _stores.append(store)
     try:
         yield
@@ -164,9 +155,7 @@ def compiled_function(
 
 
 def compiled_engine(equations: Sequence[Any], initial: Any, **options: Any) -> TaylorEngine:
-    """Like ``heyoka.taylor_adaptive`` without events, but cached: the caller gets an engine of its own, as if
-    newly compiled.
-    """
+    """Like ``heyoka.taylor_adaptive`` without events, but cached; each caller gets its own engine."""
     made = _stores[-1].engines.get(
         (list(equations), initial, sorted(options.items())),
         lambda: hy.taylor_adaptive(list(equations), initial, **options),

@@ -111,11 +111,7 @@ class CorrectedStepper:
         return arrays
 
     def unpack(self, arrays: Mapping[str, np.ndarray]) -> StepBoundary:
-        """A boundary restored from them.
-
-        Raises:
-            KeyError, ValueError: they belong to another system or precision.
-        """
+        """A boundary restored from them; raises a KeyError or ValueError for another system or precision."""
         time, state = (unpack(arrays, self.stepper.precision, name) for name in ("time", "state"))
         steps, events, *_ = (int(n) for n in arrays["counts"])
         if time.shape != (2,) or state.shape != self.stepper.state.shape:

@@ -83,11 +83,8 @@ def freedoms_of(system: System, number: Rounder) -> list[Symbolic]:
 
 def lacking_rates(exact: System, integrated: System) -> list[Symbolic]:
     """What integrated equations lack of each derivative, since their coefficients are rounded; empty where
-    they have parameters, which change along the motion: orbits by tables, which are rounded themselves.
-
-    Args:
-        exact: with all digits of its coefficients that the higher precision holds.
-        integrated: with those that the integration has, in the higher precision.
+    they have parameters, which change along the motion: orbits by tables, which are rounded themselves. Both
+    have the digits of the higher precision, ``integrated`` those of the integration in it.
     """
     pairs = zip(exact.equations, integrated.equations, strict=True)
     if hy.get_params([right for _, right in exact.equations]):
@@ -109,10 +106,8 @@ def damping_between(low: int, high: int, context: mpmath.MPContext) -> mpmath.mp
 def least_correction(
     gradients: list[list[Symbolic]], wanted: list[Symbolic], damping: Scalar
 ) -> list[Symbolic]:
-    """Least change of the state that removes r from the residuals, J^T (J J^T + damping)^-1 r.
-
-    Args:
-        gradients: J, one row for each residual, of order one.
+    """Least change of the state that removes r from the residuals, J^T (J J^T + damping)^-1 r; J has one row
+    for each residual, of order one.
     """
     m = len(wanted)
     pairs = [[zip(gradients[a], gradients[b], strict=True) for b in range(m)] for a in range(m)]

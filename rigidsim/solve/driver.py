@@ -14,11 +14,9 @@ from rigidsim.solve.status import Status
 
 
 class Driver:
-    """Has a solver advance, looks after guards and Ctrl-C, and hands over and saves what it finds.
-
-    Args:
-        check: called in each round, at least every tenth of a second or after each single step.
-        most_steps: limit of natural steps, counted from the run's beginning, that is never exceeded.
+    """Has a solver advance, looks after guards and Ctrl-C, and hands over and saves what it finds. The check
+    is called in each round, at least every tenth of a second or after each single step; most steps count from
+    the run's beginning and are never exceeded.
     """
 
     def __init__(

@@ -157,11 +157,7 @@ class Evaluator:
         )
 
     def evaluate(self, block: SampleBlock) -> RecordedParts:
-        """All variables of a block, which must follow the block evaluated before.
-
-        Returns:
-            The recorded variables, and for each invariant its drift, (n, 1), in one part.
-        """
+        """All variables of a block, which must follow the one before, and each invariant's drift, (n, 1)."""
         assert self._outputs is not None
         initial = self.initial if self._parameters else None
         values = evaluate_rows(self._outputs, block.states, initial, block.times)

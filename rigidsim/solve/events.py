@@ -67,11 +67,7 @@ class EventLog:
     muted: bool = False
 
     def note(self, index: int, time: Scalar, state: np.ndarray) -> None:
-        """Record a crossing found by the engine.
-
-        Raises:
-            StoppedError: there are too many.
-        """
+        """Record a crossing found by the engine; raises a StoppedError if there are too many."""
         if self.muted or (self.quiet_until is not None and time <= self.quiet_until):
             return
         if len(self.found) >= MOST_EVENTS:
@@ -90,11 +86,7 @@ class EventLog:
         return [f for f in self.found if f.index == index and float(f.time) <= last]
 
     def back_to(self, count: int) -> None:
-        """Forget all but the first ``count``.
-
-        Raises:
-            ValueError: there are fewer.
-        """
+        """Forget all but the first ``count``; raises a ValueError if there are fewer."""
         if count > len(self.found):
             raise ValueError(f"{len(self.found)} events are known, not {count}")
         del self.found[count:]
@@ -182,11 +174,7 @@ def pack_events(found: Sequence[FoundEvent], precision: Precision) -> Arrays:
 
 
 def unpack_events(arrays: Mapping[str, np.ndarray], precision: Precision, states: int) -> list[FoundEvent]:
-    """Crossings restored from packed arrays.
-
-    Raises:
-        ValueError: the arrays don't belong together.
-    """
+    """Crossings restored from packed arrays; raises a ValueError if these don't belong together."""
     times = unpack(arrays, precision, "time")
     count = len(times)
     values = unpack(arrays, precision, "state").reshape(count, states)
@@ -205,10 +193,8 @@ _WORTH_A_UNIT = 1  # bits above one; a smaller excess loosens nothing
 def of_order_one(
     system: System, expressions: Sequence[hy.expression], meant: Sequence[hy.expression]
 ) -> list[hy.expression]:
-    """Expressions scaled for the engine by powers of two; their zeros are unchanged.
-
-    Args:
-        meant: the same without the small offsets that keep them off a zero.
+    """Expressions scaled for the engine by powers of two; their zeros are unchanged, and ``meant`` are the
+    same without the small offsets that keep them off a zero.
     """
     if not expressions:
         return []

@@ -48,9 +48,7 @@ class LyapunovSpectrum:
 
     @property
     def spread(self) -> float:
-        """Change of the largest exponent over the second half of the run, 1/s: a measure of its
-        convergence.
-        """
+        """Change of the largest exponent over the second half of the run, 1/s: how far it converged."""
         later = self.exponents[len(self.times) // 2 :, 0]
         return float(later.max() - later.min())
 
@@ -63,10 +61,8 @@ class LyapunovSpectrum:
 
 @dataclass
 class Convergence:
-    """Progress of a spectrum: plain float64 arrays with everything needed to resume with the same bits.
-
-    Attributes:
-        state: state of the system and the orthogonalised tangent vectors; empty at the start.
+    """Progress of a spectrum: plain float64 arrays with everything needed to resume with the same bits. The
+    state is the system's with the orthogonalised tangent vectors; empty at the start.
     """
 
     number: int = 0

@@ -186,9 +186,7 @@ def prepare_scene(
 
 
 def _is_worth_holding(system: System) -> bool:
-    """Whether ``hold_invariants = "auto"`` has any effect: not if nothing physical is conserved, nor if steps
-    end on switching surfaces.
-    """
+    """Whether "auto" projects: not if nothing physical is conserved, nor if steps end on surfaces."""
     if not system.formulation.resolves_rotation:  # whose norm is no invariant that its rate would depend on
         return False
     if system.switches:
@@ -225,10 +223,8 @@ def _auto_of_averages(precision: Precision) -> Scalar | None:
 
 
 def _check_tolerance(tolerance: mpmath.mpf, precision: Precision) -> None:
-    """Refuse a tolerance that would cost ever higher orders and gain nothing.
-
-    Raises:
-        ConfigError: a tolerance further below the precision's epsilon than that is below 1.
+    """Refuse a tolerance further below the precision's epsilon than that is below 1: it would cost ever
+    higher orders and gain nothing.
     """
     least = precision.epsilon**2
     if tolerance < least:
@@ -260,11 +256,7 @@ def _refuse_spectrum(system: System) -> None:
 
 
 def _refuse_non_finite_start(system: System, precision: Precision) -> None:
-    """Evaluate the equations once: a load from Python may have no value at the start.
-
-    Raises:
-        ConfigError: names the states whose derivatives aren't finite.
-    """
+    """Evaluate the equations once: a load from Python may have no finite value at the start."""
     outputs = [right for _, right in system.equations]
     sides = {}
     if count := system.parameters:  # on whichever side, and at the start's own time

@@ -143,9 +143,7 @@ class Projection:
             self._then[:] = self.residuals(precision.array(system.initial))
 
     def _prepare(self) -> None:
-        """Compile the evaluation of the initial invariants and set up the rest once; a correction is a call
-        of 7 us.
-        """
+        """Compile the initial invariants and set up the rest once; a correction is a call of 7 us."""
         self._wide = wide = self._system.rounded(self._high.number)
         projected, _ = projected_invariants(wide)
         values = compiled_function([h.expression for h in projected], wide.variables, **self._options)
@@ -165,11 +163,7 @@ class Projection:
         return not self.late or self._times[3] == 1.0
 
     def note(self, state: np.ndarray, time: Scalar, number: int) -> None:
-        """Note a state before projection begins.
-
-        Args:
-            number: from 0 on, below ``LATE // NOTED``.
-        """
+        """Note a state before projection begins, number 0 to ``LATE // NOTED`` - 1."""
         row = self._notes[number]
         row[0], row[1] = float(time), self._chart
         row[2:] = np.concatenate(self._low.parts(state))
@@ -256,9 +250,7 @@ class Projection:
 
     @property
     def corrections(self) -> np.ndarray:
-        """Corrections put back so far, (scalars,), relative to the drifts' scales: the drifts that would have
-        been, to first order.
-        """
+        """Corrections so far, (scalars,), over the drifts' scales: to first order the drifts without them."""
         return self._sums[len(self.names) :].copy()
 
     @property

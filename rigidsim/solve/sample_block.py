@@ -123,11 +123,7 @@ def pack_angles(found: Sequence[AngleState]) -> np.ndarray:
 
 
 def unpack_angles(rows: np.ndarray) -> list[AngleState]:
-    """Angle states restored from such rows.
-
-    Raises:
-        ValueError: rows of another length.
-    """
+    """Angle states restored from such rows; raises a ValueError for rows of another length."""
     if not rows.shape[1]:
         return [AngleState()] * len(rows)
     if rows.shape[1] != 7:

@@ -153,9 +153,7 @@ class SampleBuffer:
         return SampleBlock.joined(blocks), dict(zip(firsts, boundaries, strict=False))
 
     def took(self, work: str, rows: int, seconds: float) -> None:
-        """Adapt how many samples may wait to what each kind of work on them gets done in the time of a
-        chunk.
-        """
+        """Adapt how many samples may wait to what each kind of work gets done in the time of a chunk."""
         if rows < _FEWEST_ROWS:  # they tell little about the cost of a row
             return
         pacing = self._pacing

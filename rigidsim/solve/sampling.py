@@ -132,9 +132,7 @@ class SampleClock:
             yield from ((self._numerator(i), self._divisor) for i in range(first, stop))
 
     def _refuse_coinciding(self, samples: SampleTimes) -> None:
-        """Refuse samples that coincide in this precision; the spacing is resolved worst at the time of
-        largest size.
-        """
+        """Refuse samples that coincide; spacing is resolved worst at the time of largest size."""
         candidates = {0, max(0, self.count - 2)}
         if samples.times is not None:
             candidates = set(range(self.count - 1))

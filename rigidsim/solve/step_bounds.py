@@ -45,12 +45,8 @@ def bound_of_sparse_series(coefficients: np.ndarray) -> float:
 
 
 def bounds_of_sparse_series(sizes: np.ndarray) -> np.ndarray:
-    """The same bounds for many motions side by side, (members,).
-
-    Worked out one by one: numpy's last bits may depend on the place in an array.
-
-    Args:
-        sizes: size of the largest coefficient of each term, (order + 1, members).
+    """The same bounds for many motions side by side, (members,), from the largest coefficient of each term,
+    (order + 1, members); one by one: numpy's last bits may depend on the place in an array.
     """
     return np.array([_bound(sizes[:, member].tolist()) for member in range(sizes.shape[1])])
 

@@ -15,11 +15,8 @@ def stepper_of(
     start: Scalar,
     log: EventLog | None = None,
 ) -> TaylorStepper:
-    """The stepper of a system: a plain one, unless the system switches sides.
-
-    Args:
-        tolerance: None for the precision's epsilon.
-        log: log of events; without one, none are looked for.
+    """The stepper of a system: a plain one, unless the system switches sides; tolerance None stands for the
+    precision's epsilon, and without a log no events are looked for.
     """
     if not system.switches:
         return TaylorStepper(system, precision, tolerance, start, log)

@@ -220,9 +220,7 @@ class TaylorStepper(Stepper):
         return np.array(self._integrator.update_d_output(time))  # heyoka reuses its buffer
 
     def skip(self, count: int) -> bool:
-        """Take at most ``count`` steps without dense output, fewer if the watcher ends the call; False if the
-        state is no longer finite.
-        """
+        """Take at most ``count`` steps, fewer if the watcher ends the call; False if the state is lost."""
         return self._propagate(self._meet(), count, write_tc=self.watcher is not None)[0]
 
     def to(self, time: float) -> bool:

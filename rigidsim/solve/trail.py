@@ -17,10 +17,8 @@ _MOST = {True: 64, False: 16}  # of narrow precisions, whose closed forms take a
 
 @dataclass
 class SampleTrail:
-    """Evenly spaced samples and the last one; the choice doesn't depend on the blocks in which they came.
-
-    Attributes:
-        kept: (index, time, state, chart) of each: internal units.
+    """Evenly spaced samples and the last one, by (index, time, state, chart), internal units; the choice
+    doesn't depend on the blocks in which they came.
     """
 
     version: ClassVar[int] = 1

@@ -49,11 +49,7 @@ than a weak harmonic's part at them.
 
 
 def refuse_scene(scene: Scene, loads: Sequence[Load]) -> None:
-    """Refuse a scene that is of no kind that has averages.
-
-    Raises:
-        ConfigError: no average applies; says why.
-    """
+    """Raise a ConfigError for a scene that is of no kind that has averages."""
     config, level = scene.config, scene.config.model.level
     alone = [load for load in loads if gradient_source_of(load) is None]
     integrator = config.integrator
@@ -259,9 +255,7 @@ def _refuse_passing(scene: Scene, spectrum: BodySpectrum, source: Source) -> Non
 
 
 def _offered(scene: Scene, spectrum: BodySpectrum, source: Source) -> Resonance | None:
-    """Nearest spin-orbit resonance with a source on a Kepler orbit, for a body that turns about its axis of
-    largest moment; None for any other.
-    """
+    """Nearest spin-orbit resonance with a source on a Kepler orbit, for rotation about axis 3; or None."""
     motion = spectrum.motion
     least, middle, most = motion.moments
     axial = least < middle < most and motion.tilt(scene.context) <= AXIAL
@@ -272,9 +266,7 @@ def _offered(scene: Scene, spectrum: BodySpectrum, source: Source) -> Resonance 
 
 
 def _combination(spectrum: BodySpectrum, orders: tuple[int, int, int], body: float) -> str:
-    """A combination of frequencies as text, such as "2 g - 2 l - 3 n"; in a symmetric body g alone turns the
-    tensor.
-    """
+    """A combination of frequencies as text ("2 g - 2 l - 3 n"); g alone turns a symmetric body's tensor."""
     i, j, k = orders
     signed = -k if body > 0 else k
     terms = [(i, "g"), (j, "l"), (signed, "n")]
@@ -283,9 +275,7 @@ def _combination(spectrum: BodySpectrum, orders: tuple[int, int, int], body: flo
 
 
 def _refuse_forced(scene: Scene, spectrum: BodySpectrum, source: Source) -> None:
-    """Refuse a torque that changes too fast, beside the free motion, for the figure axis to follow the
-    momentum.
-    """
+    """Refuse a torque too fast, beside the free motion, for the figure axis to follow the momentum."""
     motion, orbit = spectrum.motion, source.harmonics
     k = np.arange(len(orbit))
     g = spectrum.rates[0]

@@ -100,11 +100,7 @@ class Average:
         return Carried.MEAN if self.short_period else Carried.NEITHER
 
     def initial(self, exponent: int) -> Vector:
-        """Initial states.
-
-        Args:
-            exponent: binary exponent of the internal unit of angular momentum.
-        """
+        """Initial states, a momentum in units of 2^exponent kg m^2/s."""
         if self.driven is not None:
             return [*self.start, *self.driven.states(exponent)]
         if self.resonance is None or self.slow is None:
@@ -113,9 +109,7 @@ class Average:
         return [*self.slow.quaternion, *momentum]
 
     def rate(self, source: Source) -> Any:
-        """Precession constant k = 3 (G M / a^3) excess / L (mpf, 1/s) of a source; see
-        ``rigidsim.model.averaged.orbit_terms``.
-        """
+        """Precession constant k = 3 (G M / a^3) excess / L (mpf, 1/s) of a source; see ``orbit_terms``."""
         return source.strength * self.motion.excess / self.motion.momentum
 
     @property

@@ -177,11 +177,7 @@ class PolhodeCourse:
 def follow(
     torques: DrivingTorques, start: Sequence[float], begin: float, end: float, epsilon: float
 ) -> PolhodeCourse:
-    """Follow the mean torques over the run.
-
-    Raises:
-        NoCourse: no average applies; says from when on, and why.
-    """
+    """Follow the mean torques over the run; NoCourse says from when on no average applies, and why."""
     times, amplitudes, fastest, failure = _followed(torques, np.array(start, dtype=float), begin, end)
     picked = np.unique(np.linspace(0, len(times) - 1, _EXAMINED).astype(int))
     waves = [wave_of(torques, *amplitudes[i]) for i in picked]
@@ -294,9 +290,7 @@ def _examine(torques: DrivingTorques, amplitudes: np.ndarray, wave: Wave, root: 
 
 
 def _turned(times: np.ndarray, waves: Sequence[Wave]) -> tuple[float, float]:
-    """Angles by which resonances and rotations turn the momentum: the sum of the former and the largest of
-    the latter.
-    """
+    """Angles by which resonances (their sum) and rotations (the largest) turn the momentum."""
     scatter = swing = 0.0
     for n, wave in enumerate(waves):
         sizes = np.abs(wave.harmonics)

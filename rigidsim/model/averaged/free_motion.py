@@ -56,9 +56,7 @@ class FreeMotion:
 
     @property
     def excess(self) -> Any:
-        """(3 <m . I m> - tr I) / 2, which takes the place of C - A of an axisymmetric body in principal
-        rotation.
-        """
+        """(3 <m . I m> - tr I) / 2, in place of C - A of an axisymmetric body in principal rotation."""
         mean = dot(self.moments, self.squares)
         return (3 * mean - sum(self.moments[1:], self.moments[0])) / 2
 

@@ -37,9 +37,7 @@ class AveragedMechanics(SourcesSeen):
 
     @property
     def conserves_energy(self) -> bool:
-        """Whether energy is conserved; the question doesn't arise, as the energy of the free rotation is a
-        constant.
-        """
+        """False: the energy of the free rotation is a constant."""
         return False
 
     # --- equations ------------------------------------------------------------------------------------------
@@ -69,9 +67,7 @@ class AveragedMechanics(SourcesSeen):
         return cross(bent, s)
 
     def _secular(self, source: Source) -> list[Symbolic]:
-        """Secular pull -(k/2) (1 - e^2)^(-3/2) (n . s) n plus the second-order term, or the pull of a source
-        at rest.
-        """
+        """Secular pull -(k/2) (1 - e^2)^(-3/2) (n . s) n to second order; the pull of a source at rest."""
         context, s = self.scene.context, self.direction
         if source.table is not None:
             unit = self.scene.context.ldexp(self.scene.context.one, self.scaling.time)
@@ -105,9 +101,7 @@ class AveragedMechanics(SourcesSeen):
         return [g + more * ((x * x - y * y) * n + 2.0 * (z * (x * a - y * b))) for g, n, a, b in towards]
 
     def _pull(self, s: list[Symbolic]) -> list[Symbolic]:
-        """Sum G s of k (a/r)^3 (s . r) r over the sources, per internal unit of time; s' is its cross product
-        with s.
-        """
+        """G s, the sum of k (a/r)^3 (s . r) r, per internal unit of time; s' is its cross product with s."""
         parts = [self._pull_of(source, s) for source in self.of.sources]
         return [hy.sum([part[i] for part in parts]) for i in range(3)]
 

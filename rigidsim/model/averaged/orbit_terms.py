@@ -58,12 +58,7 @@ class Functions(Protocol):
 
 @dataclass(frozen=True)
 class OrbitPlace:
-    """Position of a source on its orbit, as numbers or expressions.
-
-    Attributes:
-        cosine, sine: cosine and sine of the eccentric anomaly.
-        pericentre, across: unit vectors P and T.
-    """
+    """Position on an orbit by the eccentric anomaly and the unit vectors P and T, numbers or expressions."""
 
     cosine: Any
     sine: Any
@@ -73,12 +68,8 @@ class OrbitPlace:
 
 @dataclass(frozen=True)
 class Ellipse:
-    """Shape and mean motion of an orbit, as numbers (mpf) or expressions.
-
-    Attributes:
-        square: e^2.
-        root: sqrt(1 - e^2).
-        circular: whether e is known to be zero.
+    """Shape (e, e^2, sqrt(1 - e^2), whether e is known to be 0) and mean motion; numbers (mpf) or
+    expressions.
     """
 
     eccentricity: Any
@@ -122,11 +113,8 @@ def second_order(eccentricity: float) -> tuple[float, float]:
 def nutation(
     functions: Functions, ellipse: Ellipse, place: OrbitPlace, size: Any, s: Vector, number: Any
 ) -> Vector:
-    """Nutation k (J s) x s.
-
-    Args:
-        size: k / (2 n) (1 - e^2)^(-3/2).
-        number: converts the ellipse's values to factors.
+    """Nutation k (J s) x s for a size k / (2 n) (1 - e^2)^(-3/2); ``number`` makes the ellipse's values
+    factors.
     """
     e, root = ellipse.eccentricity, ellipse.root
     b = e / (1 + root)

@@ -32,10 +32,8 @@ _WEAK = 1e-9  # of the largest moment, and of the largest harmonic of an orbit
 
 
 def passing(scene: Scene, driven: Driven, sources: Sequence[Source]) -> Driven:
-    """The driven motion with the sum of the angles by which passages turn the momentum.
-
-    Raises:
-        ConfigError: names the first resonance that can't be passed over, and when it is met.
+    """The driven motion with the sum of the angles by which passages turn the momentum; raises a ConfigError
+    that names the first resonance that can't be passed over, and when it is met.
     """
     if not sources:
         return driven

@@ -70,12 +70,8 @@ class Polhodes:
 
 
 def mean_square_sine(parameter: Any, root: Callable[[Any], Any], means: int) -> Any:
-    """<sin^2 f> = (K - E) / (k^2 K) by arithmetic-geometric means (Abramowitz & Stegun 17.6), free of their
-    cancellation: 1/2 (1 + sum of 2^n c_n^2 / k^2).
-
-    Args:
-        parameter: k^2: a number, an array or an expression.
-        means: how many means are taken; see ``means_needed``.
+    """<sin^2 f> = (K - E) / (k^2 K) by so many arithmetic-geometric means (Abramowitz & Stegun 17.6), free of
+    their cancellation: 1/2 (1 + sum of 2^n c_n^2 / k^2); k^2 is a number, an array or an expression.
     """
     smaller = root(1.0 - parameter)
     greater = 0.5 * (1.0 + smaller)

@@ -57,11 +57,7 @@ class SlowStart:
 
 @dataclass(frozen=True)
 class Resonance:
-    """A spin-orbit resonance of a body with one of its sources.
-
-    Attributes:
-        multiple: k = 2 p.
-    """
+    """A spin-orbit resonance of a body with one of its sources, of the multiple k = 2 p."""
 
     motion: FreeMotion
     source: Source

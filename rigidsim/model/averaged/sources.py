@@ -139,9 +139,7 @@ class Source:
 
     @property
     def uncertainty(self) -> float:
-        """By how much the mean motion may be another than ``motion``, rad/s: that of a point mass is taken
-        from its osculating orbit.
-        """
+        """Error (rad/s) of the mean motion of a point mass, which is taken from its osculating orbit."""
         return 0.0 if self.osculating is None else self.osculating.perturbed * self.osculating.motion
 
     @property
@@ -176,9 +174,7 @@ class Source:
         return Ellipse.of(context, self.orbit)
 
     def secular_strength(self, context: Any) -> Any:
-        """Secular strength 3 G M / (2 a^3) (1 - e^2)^(-3/2) (mpf, 1/s^2) of an orbit, the largest in a
-        table.
-        """
+        """3 G M / (2 a^3) (1 - e^2)^(-3/2) (mpf, 1/s^2) of an orbit, the largest in a table."""
         if self.table is not None:
             rest = 1 - self.table.largest_eccentricity**2
             size = self.strength * (self.table.semi_major_axis / self.table.smallest_axis) ** 3
@@ -187,9 +183,7 @@ class Source:
         return self.strength * Ellipse.of(context, self.orbit).secular_factor
 
     def normal(self, context: Any, time: Any) -> Vector:
-        """Unit normal of the orbit's plane at a time, space axes; at time zero if the node moves
-        uniformly.
-        """
+        """Unit normal of the orbit's plane, space axes; at time zero if the node moves uniformly."""
         if self.table is not None:
             return self.table.normal(time)
         assert self.orbit is not None
@@ -221,9 +215,7 @@ class Source:
         return OrbitPlace(context.cos(anomaly), context.sin(anomaly), *turned(axes, turn))
 
     def pull(self, context: Any, time: Any) -> np.ndarray | None:
-        """(a/r)^3 r r^T, (3, 3), at a time, the start for a point mass; None if only an ephemeris gives
-        it.
-        """
+        """(a/r)^3 r r^T, (3, 3), at a time (a point mass: at the start); None for an ephemeris."""
         if self.pair is not None:
             length = norm(context, self.pair.place)
             direction = np.array([float(x / length) for x in self.pair.place])

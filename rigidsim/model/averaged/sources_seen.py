@@ -72,9 +72,7 @@ class TableTerms:
 
     @cached_property
     def seen(self) -> OrbitStates:
-        """Orbit states like those of a motion that resolves the orbit; without a direction if the position is
-        unknown.
-        """
+        """Orbit states as where the orbit is resolved; no direction if the position is unknown."""
         at, states = self.place, self.states
         if at is None:
             return OrbitStates(states.block, [], states.normal, hy.expression(1.0))
@@ -85,11 +83,7 @@ class TableTerms:
         return OrbitStates(states.block, direction, states.normal, inverse / self._value(AXIS))
 
     def secular(self, rate: Any, s: list[Symbolic]) -> list[Symbolic]:
-        """Vector whose cross product with s is s', to second order.
-
-        Args:
-            rate: k at the mean axis, per internal unit of time (mpf).
-        """
+        """Vector whose product with s is s', to second order; k (mpf) is that at the mean axis."""
         normal, ellipse = self.states.normal, self.ellipse
         z = dot(normal, s)
         first = as_factor(self.number(-rate)) * (ellipse.secular_factor * self._cubed * z)
@@ -192,9 +186,7 @@ class SourcesSeen(Mechanics):
         }
 
     def table(self, orbit: TabulatedOrbit) -> OrbitStates:
-        """See ``Kinematics``; averaged over the orbit, without a direction unless the mean longitude is
-        carried.
-        """
+        """Averaged over the orbit it has no direction unless the mean longitude is carried."""
         return self._by_table[orbit].seen if self.of.over_orbits else super().table(orbit)
 
     def table_block(self, table: TabulatedOrbit) -> StateBlock:

@@ -59,10 +59,8 @@ class BodySpectrum:
         return np.asarray(found)
 
     def phases(self, matrix: np.ndarray) -> tuple[float, float]:
-        """Phases of precession and wobble, rad, for an attitude.
-
-        Args:
-            matrix: rotation from the principal axes of ``motion`` to a frame with z along the momentum.
+        """Phases (rad) of precession and wobble for a rotation from the principal axes of ``motion`` to a
+        frame with z along the momentum.
         """
         m = matrix[2]
         first, second, _ = (float(x) for x in self.motion.amplitudes)

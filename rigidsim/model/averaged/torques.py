@@ -49,11 +49,7 @@ def reads_rates_alone(load: Load) -> bool:
 
 @dataclass(frozen=True)
 class DrivingTorques:
-    """The torques of a body alone, as functions of its rates.
-
-    Attributes:
-        damping: coefficients d (mpf) of viscous torques about the principal axes.
-    """
+    """The torques of a body alone, as functions of its rates; damping is d (mpf) about principal axes."""
 
     scene: Scene
     scaling: Scaling
@@ -91,9 +87,7 @@ class DrivingTorques:
         return [self.scene.context.ldexp(d / i, unit) for d, i in pairs]
 
     def _along_axes(self, number: Rounder) -> list[Symbolic]:
-        """Torque of the other loads along the principal axes, in the variables ``RATE_STATES``, internal
-        units.
-        """
+        """Torque of the other loads along the principal axes, in ``RATE_STATES``, internal units."""
         terms = self._mechanics(number).torque
         found = []
         for axis in self.polhodes.axes:

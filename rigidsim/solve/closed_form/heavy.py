@@ -188,9 +188,7 @@ def _line(
 
 
 def _rising(cubic: _Cubic, constant: Any, strength: Any) -> Strand:
-    """Strand with abs(f)^2 = (1 + u) / 2, arg(f)' = constant + strength / (2 A (1 + u)): the spinor's
-    alpha.
-    """
+    """Strand with abs(f)^2 = (1 + u) / 2, arg(f)' = constant + strength / (2 A (1 + u)): alpha."""
     context, u1, u2, u3 = cubic.argument.lattice.context, cubic.u1, cubic.u2, cubic.u3
     near = ((1 + u1) / (1 + u2), (u2 - u1) / (1 + u2), (u2 - u1) * (1 + u3) / ((u3 - u1) * (1 + u2)))
     far = ((u3 - u1) / (1 + u3), (1 + u1) / (1 + u3), (1 + u2) / (1 + u3))
@@ -232,9 +230,7 @@ def _joined(context: Any, cubic: _Cubic, alpha: Strand, beta: Strand, across: St
 
 
 def _placed(context: Any, top: HeavyTop, rates: tuple[Any, Any], level: tuple[Any, Any]) -> HeavyTop:
-    """The top turned about its own axis so that it starts with the given transverse rates, or the given
-    direction of the vertical, whichever is larger, as one may vanish.
-    """
+    """The top turned about its axis to these transverse rates or vertical: the larger, as one may vanish."""
     rest = top.argument.start * top.argument.turn_rate / top.argument.speed
     a, b, w = (
         f.slope(top.argument, rest)[0] * context.expj(f.offset) for f in (top.alpha, top.beta, top.across)

@@ -72,9 +72,7 @@ def choose_motion(context: mpmath.MPContext, scene: Scene, scaling: Scaling) -> 
 def _top_frame(
     context: mpmath.MPContext, moments: Vector, axes: Matrix, arm: Vector, tiny: mpmath.mpf
 ) -> tuple[Matrix, mpmath.mpf, mpmath.mpf] | None:
-    """Axes with the third along the arm, and the moments across and along it; None if the body isn't
-    symmetric about the arm.
-    """
+    """Axes with the third along the arm, and moments across and along; None for no such symmetry."""
     length = norm(context, arm)
     third = [x / length for x in arm]
     largest = max(moments)
@@ -159,10 +157,8 @@ class ClosedForm:
         return np.ldexp(np.stack(rates, axis=1), -self.scaling.time), np.stack(quaternion, axis=1)
 
     def exactly(self, seconds: mpmath.mpf, digits: int) -> tuple[Vector, Vector]:
-        """Angular velocity and quaternion at one time, in mpmath.
-
-        Args:
-            digits: number of correct digits, relative to the largest rate.
+        """Angular velocity and quaternion at one time, in mpmath, correct in so many digits of the largest
+        rate.
         """
         elapsed = mpmath.ldexp(seconds, -self.scaling.time)
         arithmetic = Digits(self._context(math.ceil(digits * math.log2(10)), _phase_bits(elapsed)))
@@ -235,11 +231,7 @@ def _phase_bits(elapsed: mpmath.mpf) -> int:
 
 
 def closed_form_of(scene: Scene, *, driven: bool = False) -> ClosedForm:
-    """The closed form of a scene.
-
-    Raises:
-        NoClosedForm: the scene has none.
-    """
+    """The closed form of a scene; raises NoClosedForm if it has none."""
     if driven:
         raise NoClosedForm(WhyNot.PYTHON_LOAD, "a load given from Python has no closed form")
     for load in scene.loads:

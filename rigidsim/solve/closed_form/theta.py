@@ -192,11 +192,7 @@ def _weights(context: Any, kind: int, k: int, shift: Any, *, hyperbolic: bool) -
 
 @dataclass(frozen=True)
 class Argument:
-    """The argument u = speed t + start of elliptic functions of a lattice.
-
-    Attributes:
-        start: value at t = 0, with abs(start) at most 2K.
-    """
+    """The argument u = speed t + start of elliptic functions of a lattice, abs(start) at most 2K."""
 
     lattice: Lattice
     speed: Any
@@ -220,9 +216,7 @@ class Argument:
 
 @dataclass(frozen=True)
 class Quotient:
-    """Quotient ``amplitude * above / below``, the latter real on the line of motion; they share the
-    variable.
-    """
+    """Quotient ``amplitude * above / below`` in one variable; below is real on the line of motion."""
 
     above: Theta
     below: Theta
@@ -244,11 +238,7 @@ class Quotient:
 
 @dataclass(frozen=True)
 class Strand:
-    """A quotient with a growing phase: times ``exp(i (rate t + step n + offset))`` after n half periods.
-
-    Attributes:
-        rate: rate of the phase, rad per unit of time.
-    """
+    """A quotient with a growing phase: times ``exp(i (rate t + step n + offset))`` after n half periods."""
 
     quotient: Quotient
     rate: Any
@@ -286,11 +276,7 @@ def phase_slope(theta: Theta, z: Any) -> Any:
 
 @dataclass(frozen=True)
 class Jacobi:
-    """Jacobi's three functions on a lattice.
-
-    Attributes:
-        cn, sn, dn: within half a period 2K; cn and dn are the real part of theirs, sn the imaginary one.
-    """
+    """Jacobi's functions within half a period 2K: the real parts of cn and dn, the imaginary one of sn."""
 
     cn: Quotient
     sn: Quotient

@@ -176,9 +176,7 @@ class Charts(Effect):
         return a, b, c
 
     def references(self, times: np.ndarray) -> np.ndarray | None:
-        """The requested angles (n, 3), rad, before each of the times within the steps since ``begin``; None
-        in the requested chart.
-        """
+        """Requested angles (n, 3), rad, before each time since ``begin``; None in the requested chart."""
         if not self.chart:
             return None
         passed = np.zeros(len(times), dtype=np.int64)

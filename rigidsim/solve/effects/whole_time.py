@@ -15,9 +15,7 @@ class WholeTime(Effect):
 
     @staticmethod
     def suits(stepper: Stepper) -> bool:
-        """Not where events or switching surfaces are looked for, since a step back could cross one twice; nor
-        where steps are cut short.
-        """
+        """Not with events or surfaces, since a step back could cross one twice, nor with steps cut short."""
         return not (stepper.has_events or stepper.single_steps or stepper.system.stepwise)
 
     def apply(self, stepper: Stepper, stride: int) -> bool:

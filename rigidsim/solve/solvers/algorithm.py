@@ -91,10 +91,8 @@ A = TypeVar("A", bound=type[Algorithm])
 
 
 def solves(method: Method) -> Callable[[A], A]:
-    """Register an algorithm, so that ``[integrator] method`` finds it (a class decorator).
-
-    Raises:
-        ValueError: the method's name is taken.
+    """Register an algorithm, so that ``[integrator] method`` finds it (a class decorator); raises a
+    ValueError if the method's name is taken.
     """
 
     def register(algorithm: A) -> A:
@@ -109,11 +107,7 @@ def solves(method: Method) -> Callable[[A], A]:
 
 
 def algorithm_of(scene: Scene, system: System, *, driven: bool) -> Algorithm:
-    """The algorithm that a scene's ``[integrator] method`` asks for.
-
-    Raises:
-        ConfigError: it can't solve the scene.
-    """
+    """The algorithm that ``[integrator] method`` asks for; a ConfigError if it can't solve the scene."""
     name = scene.config.integrator.method
     kind = ALGORITHMS[name]
     try:

@@ -69,9 +69,7 @@ class SwitchedEngines(TaylorStepper):
 
     @property
     def _held(self) -> dict[int, tuple[int, int]]:
-        """Surfaces kept to at rest: the surface whose side each has, and whether it has that side or the
-        opposite.
-        """
+        """For surfaces kept to at rest: the surface whose side each has (1) or the opposite (-1)."""
         return {
             j: (abs(mode) - HELD, 1 if mode > 0 else -1)
             for j, mode in enumerate(self._modes)
@@ -273,9 +271,7 @@ class SwitchedEngines(TaylorStepper):
         return 2.0 ** (-self.precision.bits - BESIDE) if self._fresh and value == 0 else 0.0
 
     def _at_rest(self, on: list[int], look: Look) -> Continuation | None:
-        """How to continue if swings about the meeting of two surfaces have decayed to rounding; None
-        otherwise.
-        """
+        """How to continue if swings about two surfaces have decayed to rounding; None otherwise."""
         small = [
             i
             for i, mode in enumerate(self._modes)

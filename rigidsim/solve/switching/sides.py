@@ -34,13 +34,7 @@ _RATE_ROUNDINGS = 1024.0  # the same for its rate, whose terms are products of d
 
 @dataclass(frozen=True)
 class Look:
-    """Surfaces and field at a state.
-
-    Attributes:
-        by_time: (surfaces,), their partial derivatives.
-        gradients: (surfaces, states).
-        field: (states,), derivatives of the states.
-    """
+    """Surfaces and field at a state: arguments, their partial derivatives, gradients (surfaces, states)."""
 
     u: np.ndarray
     by_time: np.ndarray
@@ -122,9 +116,7 @@ class Probe:
         return _ROUNDINGS * self._epsilon * look.size(j, states, self.moments[j].rounded_from(look.time))
 
     def swing_noise(self, look: Look, j: int, state: np.ndarray) -> float:
-        """The same for an argument that is a small difference of states of order one, as when swings come to
-        rest and only rounding is left of them.
-        """
+        """The same for a small difference of states of order one, as when swings come to rest."""
         gradient = math.hypot(*(float(x) for x in look.gradients[j]))
         return _ROUNDINGS * self._epsilon * gradient * max(abs(float(x)) for x in state)
 
@@ -135,11 +127,7 @@ class Probe:
 
 @dataclass(frozen=True)
 class Continuation:
-    """How to continue from some surfaces.
-
-    Attributes:
-        modes: for each surface 1, -1 or ``SLIDES``; None if there is no way, or more than one.
-    """
+    """How to continue from surfaces: 1, -1 or ``SLIDES`` for each; None for no way, or more than one."""
 
     modes: Mapping[int, int] | None
     why: str = ""

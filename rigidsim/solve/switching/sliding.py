@@ -37,11 +37,7 @@ MOST_AT_ONCE = 3
 
 @dataclass(frozen=True)
 class Sliding:
-    """The motion along some surfaces.
-
-    Attributes:
-        sides: value in place of each surface's side; the motion leaves the surface when it reaches 1 or -1.
-    """
+    """The motion along some surfaces, which it leaves when the value in place of its side is 1 or -1."""
 
     equations: list[tuple[Symbolic, Symbolic]]
     sides: list[Symbolic]
@@ -50,11 +46,8 @@ class Sliding:
 def sliding(
     system: System, along: Sequence[int], held: Mapping[int, tuple[int, int]] | None = None
 ) -> Sliding:
-    """Equations of a system along the surfaces of these numbers.
-
-    Args:
-        held: surfaces also kept to: the surface whose side each has, and 1 for the same or -1 for the
-            opposite.
+    """Equations of a system along the surfaces of these numbers; ``held`` are others kept to: the surface
+    whose side each has, and 1 for the same or -1 for the opposite.
     """
     fields = {name: right for name, (_, right) in zip(system.states, system.equations, strict=True)}
     if held:
@@ -131,11 +124,7 @@ LookAt = Callable[[Mapping[int, int], np.ndarray, Scalar], Look]
 
 @dataclass(frozen=True)
 class Meeting:
-    """Surfaces that meet at a state.
-
-    Attributes:
-        at: looks at the surfaces on given sides and at states nearby.
-    """
+    """Surfaces that meet at a state; ``at`` looks at them on given sides and at states nearby."""
 
     at: LookAt
     probe: Probe
@@ -212,9 +201,7 @@ class Meeting:
         return _DIFFERENCES * self.epsilon**0.5
 
     def _kept_to(self, others: Sequence[int], field: np.ndarray, pair: tuple[int, int]) -> np.ndarray:
-        """A field given for sides 1 of other surfaces that the motion keeps to, converted to the sides with
-        which it does.
-        """
+        """A field for sides 1 of other surfaces kept to, converted to the sides with which they are."""
         plain = dict.fromkeys((*others, *pair), 1)
         here = self.at(plain, self.state, self.time)
         parts, felt = [], []
@@ -259,9 +246,7 @@ class Meeting:
         return (there[0] - there[1]) / (2 * step)
 
     def _felt(self, j: int, pair: tuple[int, int], fixed: Mapping[int, int]) -> bool:
-        """Whether the side of a surface changes how the motion crosses a pair of others, or the pair changes
-        it.
-        """
+        """Whether a surface's side changes how the motion crosses a pair of others, or the reverse."""
         i, m = pair
         here, there = (self.at({**fixed, i: 1, m: 1, j: side}, self.state, self.time) for side in (1, -1))
         if abs(float(here.rate(m) - there.rate(m))) > self.probe.rate_noise(here, m):

@@ -38,10 +38,8 @@ _WIDTH = 2.0**8  # roundings of a time between two findings of the same crossing
 
 
 class SwitchingStepper(SurfaceRoots):
-    """Stepper of a system with surfaces, or with angles whose turns matter.
-
-    Attributes:
-        begun: the boundary at which the motion begins, on the sides to which it leads.
+    """Stepper of a system with surfaces, or with angles whose turns matter; it has begun on the sides to
+    which the motion leads.
     """
 
     def __init__(
@@ -180,11 +178,7 @@ class SwitchingStepper(SurfaceRoots):
         return _MOST_SWITCHES * min(_SHORTEST, (_ROUNDINGS * self._epsilon) ** 0.5)
 
     def _arrive(self, root: Root, states: list[np.ndarray], again: bool) -> bool:
-        """Continue from a surface; False if that is impossible.
-
-        Args:
-            again: whether the step began on a surface, too.
-        """
+        """Continue from a surface (``again``: as the step began); False if that is impossible."""
         _, j, side = root
         self._fresh = True
         self.switches += 1

@@ -66,11 +66,7 @@ MOST_OF_A_CLOSED_FORM = 1e6
 
 
 def radians_between(samples: SampleTimes, rate: float) -> float:
-    """Largest angle by which a body turns between neighbouring samples, rad.
-
-    Args:
-        rate: bound of each component of the angular velocity, rad/s.
-    """
+    """Largest angle (rad) between neighbouring samples for rates of at most this per component (rad/s)."""
     return math.sqrt(3) * rate * samples.largest_spacing
 
 
@@ -98,12 +94,8 @@ def is_sparse(system: System) -> bool:
 
 
 def doubtful_rows(jumps: np.ndarray, angles: np.ndarray, sequence: str) -> np.ndarray:
-    """Rows where angles change by nearly half a turn between dense samples, near their pole but not within
-    rounding.
-
-    Args:
-        jumps: (n, 3), changes from the row before, to the nearest.
-        angles: (n + 1, 3), the row before the first among them.
+    """Rows where angles (n + 1, 3) change, by jumps (n, 3) to the nearest, by nearly half a turn between
+    dense samples, near their pole but not within rounding.
     """
     middle = angles[:, 1]
     factor = np.abs(np.sin(middle) if is_proper(sequence) else np.cos(middle)) > _POLE
@@ -176,9 +168,7 @@ class TurnCounter:
             self._advance(time)
 
     def turns(self, place: Place) -> np.ndarray | None:
-        """Full turns (angles,) at a later sample, counted from the beginning; None if the motion followed
-        doesn't lead there.
-        """
+        """Full turns (angles,) from the beginning to a sample; None if the motion doesn't lead there."""
         while self._time < place.time and not self._lost:
             self._advance(place.time)
         watched = self._watched

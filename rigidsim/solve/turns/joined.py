@@ -137,10 +137,8 @@ class JoinedAngles:
     def joined(
         self, known: Continuity, angles: np.ndarray, sizes: np.ndarray | None, samples: SampleBlock
     ) -> tuple[np.ndarray, Continuity]:
-        """Angles (n, angles) with their turns, and what the next block is joined to.
-
-        Args:
-            sizes: squared sizes of those that have one, (their number, n).
+        """Angles (n, angles) with their turns, and what the next block is joined to, from squared sizes of
+        those that have one, (their number, n).
         """
         squared = self._all_sizes(sizes, len(angles))
         lost = (squared < self._least) | ~np.isfinite(squared)
@@ -283,9 +281,7 @@ class JoinedAngles:
     def _counted(
         self, known: Continuity, block: _DoubleSamples, columns: np.ndarray
     ) -> tuple[np.ndarray, float]:
-        """Full turns (n, columns) counted along the motion from sample to sample, zero once they are lost,
-        and the time from which they are.
-        """
+        """Full turns (n, columns) counted along the motion, zero once lost, and the time when they are."""
         turns = np.zeros((len(block.times), len(columns)), dtype=np.int64)
         latest, before, wrapped_from = _latest(known), known.turns[columns], known.wrapped_from
         for row, time in enumerate(block.times.tolist()):
@@ -308,11 +304,7 @@ class JoinedAngles:
 
 @dataclass(frozen=True)
 class _DoubleSamples:
-    """Samples in float64, internal units.
-
-    Attributes:
-        angles, sizes: (n, angles), angles without turns, and sizes of their sines and cosines.
-    """
+    """Samples in float64, internal units; angles (n, angles) without turns, sizes of sines and cosines."""
 
     times: np.ndarray
     states: np.ndarray

@@ -29,11 +29,7 @@ _TURN = 2 * np.pi
 
 @dataclass(frozen=True)
 class Place:
-    """A sample from which turns are counted.
-
-    Attributes:
-        angles: float64, the run's angles without turns.
-    """
+    """A sample from which turns are counted, with the run's angles without turns, float64, internal units."""
 
     time: float
     state: np.ndarray
@@ -46,9 +42,7 @@ def nearest(jumps: np.ndarray) -> np.ndarray:
 
 
 def at_poles(sequence: str, middle: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Whether the sum (1) or the difference (-1) of the outer Euler angles is regular at the nearer pole, and
-    the factor that vanishes there.
-    """
+    """Whether the outer angles' sum (1) or difference (-1) is regular at the nearer pole, and its factor."""
     sine, cosine = np.sin(middle), np.cos(middle)
     if is_proper(sequence):
         return np.copysign(1.0, cosine), np.abs(sine)
@@ -111,10 +105,8 @@ class SteadyAngles:
         self._excursion = np.concatenate([[steady.excursion] * count for steady, count in known])
 
     def turns(self, before: Place, here: Place, sizes: np.ndarray) -> np.ndarray | None:
-        """Full turns (angles,) from one sample to a later one; None if an angle is too near its pole.
-
-        Args:
-            sizes: sizes of the angles' sines and cosines at the later sample.
+        """Full turns (angles,) from one sample to a later one, of these sizes of sines and cosines; None if
+        an angle is too near its pole.
         """
         time = here.time - before.time
         left_open = self._uncertainty * math.ldexp(time, self._unit) + self._excursion

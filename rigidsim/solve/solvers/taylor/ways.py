@@ -80,11 +80,7 @@ class Ways:
 
 
 class WayFinder:
-    """Chooses the way for each chunk from the recent steps.
-
-    Attributes:
-        longest: longest recent step, internal units; 0 before the first.
-    """
+    """Chooses the way for each chunk from the recent steps, of which ``longest`` is 0 before the first."""
 
     def __init__(
         self, corrected: CorrectedStepper, stepper: TaylorStepper, clock: SampleClock, pacing: Pacing
@@ -183,9 +179,7 @@ class WayFinder:
         return self._corrected.whole_times and self._stepper.until is None and fits and near
 
     def _grid_steps(self, left: int) -> int:
-        """Whole strides, or all remaining steps and more, since the remainder of a grid would go step by
-        step.
-        """
+        """Whole strides, or all remaining steps and more: a grid's remainder would go step by step."""
         stride = self._corrected.stride
         most = self._most(SampleWay.GRID)
         if 2 * most >= stride:  # the rest of a stride goes step by step
