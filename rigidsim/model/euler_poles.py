@@ -37,11 +37,7 @@ taken by itself, with an error of some 64 roundings.
 
 @dataclass(frozen=True)
 class Poles:
-    """Where the outer Euler angles of a sequence are undefined.
-
-    Attributes:
-        squared_factor: square of the factor that vanishes there, as an expression of the state.
-    """
+    """Where the outer Euler angles of a sequence are undefined: the square of a factor vanishes there."""
 
     sequence: str
     squared_factor: Symbolic

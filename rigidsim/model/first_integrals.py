@@ -31,8 +31,8 @@ class EquatorialTop:
     strength: Any  # M g l, J
 
 
-def equatorial_top(m: Mechanics) -> EquatorialTop | None:
-    """The scene as such a top; None for any other body, or if another load exerts a torque too."""
+def _top(m: Mechanics, ratio: int) -> EquatorialTop | None:
+    """The scene as a top with A = B = ratio C; None for any other body, or if another load turns it, too."""
     context, scene = m.scene.context, m.scene
     axis, arm = m.symmetry_direction, scene.torque_arm
     if m.vertical is None or axis is None or arm is None or scene.gravity is None or m.carriers:
@@ -46,19 +46,20 @@ def equatorial_top(m: Mechanics) -> EquatorialTop | None:
     first = [a / length for a in arm]
     second = cross(axis, first)
     equatorial, axial = (dot(e, apply(scene.body.inertia, e)) for e in (first, axis))
-    return EquatorialTop(
-        [first, second, list(axis)], equatorial, axial, length * norm(context, scene.gravity)
-    )
+    if axial == 0 or abs(equatorial - ratio * axial) > equatorial * tiny:
+        return None
+    frame = [first, second, list(axis)]
+    return EquatorialTop(frame, equatorial, axial, length * norm(context, scene.gravity))
 
 
 def kovalevskaya_top(m: Mechanics) -> EquatorialTop | None:
     """The scene as Kovalevskaya's top, A = B = 2 C; None if it isn't one."""
-    return _with_ratio(m, 2)
+    return _top(m, 2)
 
 
 def goryachev_chaplygin_top(m: Mechanics) -> EquatorialTop | None:
     """The scene as Goryachev and Chaplygin's top, A = B = 4 C and L_z = 0; None if it isn't one."""
-    top = _with_ratio(m, 4)
+    top = _top(m, 4)
     if top is None:
         return None
     context, scene = m.scene.context, m.scene
@@ -67,15 +68,6 @@ def goryachev_chaplygin_top(m: Mechanics) -> EquatorialTop | None:
     size = norm(context, momentum) * norm(context, vertical)
     level = abs(dot(momentum, vertical)) <= size * negligible(context)
     return top if level else None
-
-
-def _with_ratio(m: Mechanics, ratio: int) -> EquatorialTop | None:
-    top = equatorial_top(m)
-    context = m.scene.context
-    if top is None or top.axial == 0:
-        return None
-    close = abs(top.equatorial - ratio * top.axial) <= top.equatorial * negligible(context)
-    return top if close else None
 
 
 def _along(m: Mechanics, axis: Vector, vector: list[Symbolic]) -> Symbolic:

@@ -69,9 +69,7 @@ def _source_matrix(sources: list[tuple[Any, Vector]]) -> Matrix:
 
 
 def keeps(m: Mechanics, axis: Vector, loads: Sequence[Load] | None = None) -> bool:
-    """Whether no torque of these loads (all by default) acts about a unit axis in space, however the body
-    moves.
-    """
+    """Whether no torque of these loads (or any) acts about a unit axis in space, however the body moves."""
     context = m.scene.context
     tiny = negligible(context)
     turning = [load for load in m.turning if loads is None or load in loads]
@@ -102,9 +100,7 @@ def _turns_about(m: Mechanics, load: Load, axis: Vector) -> bool:
 
 
 def field_axis(m: Mechanics) -> Vector | None:
-    """Unit vector along the field to which the linear potentials combine; None if they don't combine to
-    one.
-    """
+    """Unit vector along the one field to which the linear potentials combine; None if they don't."""
     linear = _linear(m, m.turning)
     if not linear:
         return None
@@ -120,9 +116,7 @@ def field_axis(m: Mechanics) -> Vector | None:
 
 
 def source_axis(m: Mechanics) -> Vector | None:
-    """Unit vector towards the fixed sources if they lie on one line, or else along their axis of symmetry;
-    None without either.
-    """
+    """Unit vector towards fixed sources on one line, or else along their axis of symmetry; or None."""
     sources = _sources(m, m.turning)
     if not sources:
         return None
@@ -151,9 +145,7 @@ def _kept(m: Mechanics, axis: Vector | None, *others: Vector | None) -> Vector |
 
 
 def free_axis(m: Mechanics, which: int) -> Vector | None:
-    """Space axis without a torque about it, if some torque acts and the axis has no more specific name; None
-    otherwise.
-    """
+    """Space axis without a torque about it, if some torque acts and no other name is its own; or None."""
     context = m.scene.context
     axis = [context.one if i == which else context.zero for i in range(3)]
     return _kept(m, axis, weight_axis(m), source_axis(m), field_axis(m)) if m.torque else None
@@ -185,25 +177,16 @@ def sources_alone(m: Mechanics) -> bool:
 
 def several_directions(m: Mechanics) -> bool:
     """Whether all torque comes from fixed sources that lie in more than one direction."""
-    if not sources_alone(m):
-        return False
-    first, *others = (d for _, d in _sources(m, m.loads))
-    return not all(parallel(m.scene.context, first, other) for other in others)
-
-
-def adjugate(matrix: Matrix) -> Matrix:
-    """det(A) A^-1 of a symmetric 3x3 matrix, also of a singular one."""
-    a, b, c = matrix
-    return [cross(b, c), cross(c, a), cross(a, b)]
+    directions = [d for _, d in _sources(m, m.loads)] if sources_alone(m) else []
+    return not all(parallel(m.scene.context, directions[0], other) for other in directions[1:])
 
 
 def _squares(m: Mechanics) -> tuple[list[tuple[Any, Vector, Symbolic]], Symbolic]:
-    """For each principal direction d of S (internal units): its value s, d, and d . R adj(I) R^T d; then
-    |L|^2.
-    """
+    """Value s, d, and d . R adj(I) R^T d for each principal direction d of S (internal units); |L|^2."""
     context = m.scene.context
     values, axes = eigen(context, _source_matrix(_sources(m, m.loads)))
-    inertia = adjugate(m.numbers.inertia)
+    a, b, c = m.numbers.inertia
+    inertia = [cross(b, c), cross(c, a), cross(a, b)]  # its adjugate
     rows = []
     for value, axis in zip(values, axes, strict=True):
         s = context.ldexp(value, 2 * m.scaling.time)
@@ -237,15 +220,11 @@ def bogoyavlensky_constant(m: Mechanics) -> Symbolic:
 def largest_brun(m: Mechanics, momentum: Any) -> Any:
     """|L|^2 + tr(S) times the largest product of two moments, SI, for a size of the momentum."""
     moments = sorted(m.scene.body.principal_moments)
-    return momentum**2 + _trace(m) * moments[1] * moments[2]
+    return momentum**2 + source_trace(m) * moments[1] * moments[2]
 
 
-def largest_bogoyavlensky(m: Mechanics, momentum: Any) -> Any:
-    """tr(S) times ``largest_brun``, SI."""
-    return _trace(m) * largest_brun(m, momentum)
-
-
-def _trace(m: Mechanics) -> Any:
+def source_trace(m: Mechanics) -> Any:
+    """tr(S), 1/s^2."""
     s = _source_matrix(_sources(m, m.loads))
     return sum(s[i][i] for i in range(3))
 
@@ -268,8 +247,8 @@ def one_point(m: Mechanics) -> bool:
 
 
 def attracting_line(m: Mechanics) -> Vector | None:
-    """Unit vector of the line through all attracting points about which no load exerts a moment on the body's
-    motion; None without such a line, or if the whole momentum is conserved.
+    """Unit vector of the line through all attracting points about which no load turns the body's motion; None
+    without such a line, or if the whole momentum is conserved.
     """
     points, context = _points(m), m.scene.context
     if not points or one_point(m):

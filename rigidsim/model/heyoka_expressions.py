@@ -46,15 +46,13 @@ def to_heyoka(
     context: Any,
     sides: Mapping[Node, Any] = _NO_SIDES,
 ) -> Any:
-    """Convert an expression to heyoka's variables.
+    """Convert an expression to heyoka's variables; constant parts are worked out in ``context``.
 
     Args:
-        variables: a heyoka expression for every name that the expression uses; ``t`` is heyoka's time
-            unless it is given here, as an expression or as a ``TwoPartTime``.
-        context: arithmetic in which constant parts are worked out.
-        sides: heyoka expressions for the signs of arguments that are switching surfaces; those of others are
-            found wherever the expression is evaluated, which is right for values alone: a series would go on
-            past the jump.
+        variables: a heyoka expression for every name used; ``t`` is heyoka's time unless it is given here, as
+            an expression or as a ``TwoPartTime``.
+        sides: for the signs of arguments that are switching surfaces; those of others are found wherever the
+            expression is evaluated, which is right for values alone: a series would go on past the jump.
 
     Raises:
         ExpressionError: a constant has no finite value, or lies beyond the range of the numbers.

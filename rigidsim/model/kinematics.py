@@ -33,28 +33,15 @@ T = TypeVar("T")
 
 @dataclass(frozen=True)
 class Kinematics:
-    """Expressions of the state, in internal units.
-
-    Attributes:
-        rate_states: the three states of the rates, each in its own unit.
-        attitude: None if no attitude is carried.
-        vertical: unit vector against gravity, body axes; None where no torque needs it.
-        position, velocity: states in their own units; None unless carried.
-        number: rounds an mpf once to the working precision.
-        orbit_tags: for each prescribed orbit, the tag that makes its state names unique.
-        surfaces: switching surfaces, between which expressions are smooth.
-        tables: positions of the states and parameters of tabulated orbits.
-        clocked: whether expressions of the time need it in two numbers (``rigidsim.model.two_part``).
-        body: names the states of the body.
-    """
+    """Expressions of the state, in internal units; ``ModelPlan`` says what the last fields are."""
 
     scene: Scene
     scaling: Scaling
     numbers: ScaledNumbers
-    rate_states: list[Symbolic]
+    rate_states: list[Symbolic]  # the three states of the rates, each in its own unit
     attitude: AttitudeStates | None
-    vertical: list[Symbolic] | None
-    position: list[Symbolic] | None
+    vertical: list[Symbolic] | None  # unit vector against gravity, body axes; None where no torque needs it
+    position: list[Symbolic] | None  # states in their own units
     velocity: list[Symbolic] | None
     number: Rounder
     orbit_tags: Mapping[KeplerOrbit, str] = field(default_factory=dict)
@@ -97,9 +84,7 @@ class Kinematics:
         return self.attitude.matrix
 
     def seen_from(self, point: Vector) -> tuple[list[Symbolic], Symbolic]:
-        """Unit direction in space axes from a fixed point (mpf, m, space axes) to the body in flight, and the
-        inverse distance (1/length).
-        """
+        """Direction (unit, space axes) from a fixed point (mpf, m) to the body in flight; 1 / distance."""
         offset = self.offset_from(point)
         inverse = 1.0 / length(offset)
         return [x * inverse for x in offset], inverse
@@ -129,9 +114,8 @@ class Kinematics:
 
     @cached_property
     def symmetry_direction(self) -> Vector | None:
-        """Unit axis about which the tensor is symmetric, body axes (mpf).
-
-        None for an asymmetric body, and for a sphere on which no load marks an axis.
+        """Unit axis (mpf, body axes) of the tensor's symmetry; None without one, or where a sphere has none
+        marked by a load.
         """
         context, body = self.scene.context, self.scene.body
         moments, axes = body.principal_moments, body.principal_axes
@@ -185,11 +169,7 @@ def in_common_unit(states: list[Symbolic], units: list[Any], number: Rounder) ->
 
 
 def seconds(m: Kinematics, since: Epoch | None = None) -> Symbolic:
-    """The scene's time as an expression, s; heyoka's own is in internal units.
-
-    Args:
-        since: date of time 0, to have the time since J2000 instead.
-    """
+    """The scene's time as an expression, s, or that since J2000, if ``since`` is the date of time 0."""
     context = m.scene.context
     unit = context.ldexp(context.one, m.scaling.time)
     time = hy.time if unit == 1 else m.number(unit) * hy.time

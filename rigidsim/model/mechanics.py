@@ -54,20 +54,13 @@ class Mechanics(Kinematics):
         return None
 
     @property
-    def averaged(self) -> bool:
-        """Whether the motion is averaged over rotations."""
-        return self.turning_rate is not None
-
-    @property
     def kept_by_average(self) -> str | None:
         """Why averaging over rotations keeps the size of the angular momentum; None if it doesn't."""
         return None
 
     @property
     def commensurable_angle(self) -> tuple[Symbolic, Symbolic] | None:
-        """Sine and cosine, times a common size, of the angle that a resonance keeps if rotation and orbit are
-        averaged over; None elsewhere.
-        """
+        """Sine and cosine, times a common size, of the angle that an averaged resonance keeps; else None."""
         return None
 
     def tells(self, name: str) -> bool:
@@ -123,9 +116,7 @@ class Mechanics(Kinematics):
 
     @cached_property
     def inner_torque(self) -> list[Term]:
-        """Terms of the torque that the carriers exert on the body, which no total feels: body axes, internal
-        units of energy.
-        """
+        """Terms of the torque that the carriers exert on the body, which no total feels, as ``torque``."""
         return inner_torque(self.carriers, self)
 
     # --- what the loads do -------------------------------------------------------------------------------
@@ -225,9 +216,7 @@ class Mechanics(Kinematics):
 
     @property
     def marked(self) -> Vector | None:
-        """See ``Kinematics``: points to the centre of mass of a heavy body, or along the dipole of any
-        other.
-        """
+        """To the centre of mass of a heavy body, or along the dipole of any other."""
         pulled = [linear_potential_of(load, self.scene) for load in self.loads]
         return self.numbers.arm or next((found[0] for found in pulled if found is not None), None)
 

@@ -1,6 +1,4 @@
-"""Outputs of a system: variables that are recorded, quantities that are conserved, and drifts that are
-watched.
-"""
+"""Outputs of a system: variables that are recorded, quantities that are conserved, their watched drifts."""
 
 from __future__ import annotations
 
@@ -24,16 +22,8 @@ from rigidsim.scene.registry import OBSERVABLES
 class Recorded:
     """One recorded variable of the dataset.
 
-    Attributes:
-        first, count: position and number of its components in ``System.outputs``.
-        exponents: binary exponents that bring the components to SI.
-        continuity: how samples are joined: "" (as they are), "wrapped" (angles that are states),
-            "unwrap" (angles that are functions of the state), "parity" and "nearest" (quaternion signs).
-        squared_sizes: for angles that are functions of the state, a value that vanishes where each is
-            undefined; none for Euler angles.
-        poles: for Euler angles that are functions of the state, where the outer ones are undefined.
-        steady: how these angles advance between samples, if known.
-        attributes: attributes besides units, long name and frame.
+    Samples are joined as ``continuity`` says: "" (as they are), "wrapped" (angles that are states), "unwrap"
+    (angles that are functions of the state), "parity" and "nearest" (quaternion signs).
     """
 
     name: str
@@ -41,38 +31,30 @@ class Recorded:
     units: str
     long_name: str
     frame: str
-    first: int
+    first: int  # position of its components in ``System.outputs``
     count: int
-    exponents: list[int]
+    exponents: list[int]  # binary, that bring the components to SI
     invariant: bool
     continuity: str = ""
-    squared_sizes: list[Symbolic] = field(default_factory=list)
-    poles: Poles | None = None
-    steady: Steady | None = None
-    attributes: Mapping[str, str] = field(default_factory=dict)
+    squared_sizes: list[Symbolic] = field(default_factory=list)  # vanish where angles are undefined
+    poles: Poles | None = None  # for Euler angles that are functions of the state
+    steady: Steady | None = None  # how these angles advance between samples, if known
+    attributes: Mapping[str, str] = field(default_factory=dict)  # besides units, long name and frame
 
 
 @dataclass(frozen=True)
 class Invariant:
-    """A quantity that the motion conserves, and the drift that is watched.
-
-    Attributes:
-        why: why it is conserved.
-        expressions: its components, in internal units.
-        exponents: binary exponents of the components' units.
-        scale: what drifts are relative to, SI (mpf); ``scale_name`` says what it is.
-        numerical: True for an invariant of the numerical representation alone (a quaternion's norm).
-    """
+    """A quantity that the motion conserves, and the drift that is watched."""
 
     name: str
-    why: str
+    why: str  # it is conserved
     units: str
     long_name: str
-    expressions: list[Symbolic]
-    exponents: list[int]
-    scale: Any
+    expressions: list[Symbolic]  # its components, in internal units
+    exponents: list[int]  # binary, of the components' units
+    scale: Any  # what drifts are relative to, SI (mpf)
     scale_name: str
-    numerical: bool = False
+    numerical: bool = False  # of the numerical representation alone (a quaternion's norm)
 
 
 def recorded_variables(m: Mechanics, record: Sequence[str] | None) -> tuple[list[Recorded], list[Symbolic]]:
@@ -94,24 +76,13 @@ def recorded_variables(m: Mechanics, record: Sequence[str] | None) -> tuple[list
                 raise ConfigError(Problem("[output] record", what))
             continue
         components = observable.expressions(m)
-        recorded.append(
-            Recorded(
-                observable.name,
-                observable.dims,
-                observable.units,
-                observable.long_name,
-                observable.frame,
-                len(outputs),
-                len(components),
-                observable.unit_exponents(m, len(components)),
-                observable.conserved(m) is not None,
-                observable.continuity(m),
-                [] if observable.angles is None else [x.squared_size for x in observable.angles(m)],
-                observable.poles(m),
-                observable.steady(m),
-                observable.attributes(m),
-            )
-        )
+        x, count = observable, len(components)
+        sizes = [] if x.angles is None else [angle.squared_size for angle in x.angles(m)]
+        variable = Recorded(
+            x.name, x.dims, x.units, x.long_name, x.frame, len(outputs), count, x.unit_exponents(m, count),
+            x.conserved(m) is not None, x.continuity(m), sizes, x.poles(m), x.steady(m), x.attributes(m),
+        )  # fmt: skip
+        recorded.append(variable)
         outputs += components
     return recorded, outputs
 
@@ -130,19 +101,9 @@ def find_invariants(m: Mechanics, norms: list[Symbolic]) -> list[Invariant]:
         if why is None:
             continue
         scale, scale_name = observable.drift_scale(m)
-        expressions = observable.expressions(m)
-        found.append(
-            Invariant(
-                observable.name,
-                why,
-                observable.units,
-                observable.long_name,
-                expressions,
-                observable.unit_exponents(m, len(expressions)),
-                scale,
-                scale_name,
-            )
-        )
+        expressions, x = observable.expressions(m), observable
+        exponents = x.unit_exponents(m, len(expressions))
+        found.append(Invariant(x.name, why, x.units, x.long_name, expressions, exponents, scale, scale_name))
     one = m.scene.context.one
     watched: list[tuple[str, str, str, Symbolic]] = [
         (f"orbit_norm_{number}", _UNIT, "norm of a cosine and sine that an orbit is carried by", expression)
@@ -167,8 +128,7 @@ def drift_outputs(invariants: list[Invariant], context: Any, number: Rounder) ->
         inverse = number(context.ldexp(1, invariant.exponents[0]) / invariant.scale)
         differences = [x - hy.par[first + n] for n, x in enumerate(invariant.expressions)]
         first += len(differences)
-        if len(differences) == 1:
-            drifts.append(inverse * differences[0])
-        else:
-            drifts.append(inverse * hy.sqrt(hy.sum([d * d for d in differences])))
+        single = len(differences) == 1
+        size = differences[0] if single else hy.sqrt(hy.sum([d * d for d in differences]))
+        drifts.append(inverse * size)
     return drifts

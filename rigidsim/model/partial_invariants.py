@@ -1,6 +1,4 @@
-"""Invariants of scenes whose loads leave an axis or a direction free of torque; recorded only where they
-hold.
-"""
+"""Invariants of scenes whose loads leave an axis or a direction free of torque, recorded where they hold."""
 
 from __future__ import annotations
 
@@ -68,7 +66,7 @@ def _brun_scale(m: Mechanics) -> tuple[Any, str]:
 
 
 def _bogoyavlensky_scale(m: Mechanics) -> tuple[Any, str]:
-    value = fixed_axes.largest_bogoyavlensky(m, momentum_scale(m)[0])
+    value = fixed_axes.source_trace(m) * fixed_axes.largest_brun(m, momentum_scale(m)[0])
     return value, "sum of 3 G M / R^3 times the scale of Brun's constant"
 
 

@@ -24,33 +24,22 @@ Rounder = Callable[[Any], Any]
 
 @dataclass(frozen=True)
 class Drive:
-    """Estimated effect of loads of unknown size (see ``rigidsim.model.load_estimate``), mpf.
+    """Estimated effect of loads of unknown size (see ``rigidsim.model.load_estimate``), mpf."""
 
-    Attributes:
-        energy: added energy of rotation, J.
-        speed: added speed of the centre of mass, m/s.
-    """
-
-    energy: Any
-    speed: Any
+    energy: Any  # added energy of rotation, J
+    speed: Any  # added speed of the centre of mass, m/s
 
 
 @dataclass(frozen=True)
 class Scaling:
-    """Binary exponents of the internal units, in SI: one internal unit of time is ``2**time`` seconds.
-
-    Attributes:
-        time, inertia, length, speed: exponents.
-        rates: exponents of the three body rates relative to ``1 / (unit of time)``.
-        drive: the estimate used for loads of unknown size, or None.
-    """
+    """Binary exponents of the internal units, in SI: one internal unit of time is ``2**time`` seconds."""
 
     time: int
     inertia: int
-    rates: tuple[int, int, int]
+    rates: tuple[int, int, int]  # relative to 1 / (unit of time)
     length: int = 0
     speed: int = 0
-    drive: Drive | None = None
+    drive: Drive | None = None  # the estimate used for loads of unknown size
 
     @property
     def momentum(self) -> int:
@@ -81,9 +70,6 @@ def largest_rates(scene: Scene, drive: Drive | None = None) -> list[Any]:
     For a free body in principal axes both 2 E I_max - L^2 and L^2 - 2 E I_min are sums of squares with
     positive weights, so each bounds two rates and the smaller bound is sharp (Landau & Lifshitz, section 37).
     Otherwise |w_i| <= sqrt(2 E_kin,max (I^-1)_ii).
-
-    Args:
-        drive: estimate for loads whose size the scene doesn't know.
     """
     context, body, w = scene.context, scene.body, scene.angular_velocity
     inertia, inverse = body.inertia, scene.inverse_inertia
@@ -117,9 +103,7 @@ def largest_rates(scene: Scene, drive: Drive | None = None) -> list[Any]:
 
 
 def symmetry_axis(scene: Scene) -> int | None:
-    """Body axis about which a diagonal tensor is symmetric and on which the centre of mass lies; None if no
-    such axis.
-    """
+    """Body axis of symmetry of a diagonal tensor on which the centre of mass lies; None without one."""
     inertia, center = scene.body.inertia, scene.body.center_of_mass
     for axis in range(3):
         j, k = (axis + 1) % 3, (axis + 2) % 3
@@ -199,15 +183,6 @@ def _flight_scales(scene: Scene, drive: Drive | None) -> tuple[Any, Any]:
     return norm(context, scene.position) + swiftest * horizon, swiftest
 
 
-def _point_mass_rates(scene: Scene) -> list[Any]:
-    """Fastest angular rate of each pair of point masses, rad/s."""
-    masses = scene.bodies
-    if masses is None:
-        return []
-    count = range(len(masses.names))
-    return [masses.encounter(scene.context, i, j)[1] for i in count for j in count if i < j]
-
-
 def _point_mass_scales(scene: Scene) -> tuple[Any, Any]:
     """Largest distance from the origin (m) and speed (m/s) of point masses and body at the start."""
     context, masses = scene.context, scene.bodies
@@ -233,7 +208,9 @@ def choose_scaling(scene: Scene, drive: Drive | None = None) -> Scaling:
         if axial is not None and all(body.inertia[i][j] == 0 for i in range(3) for j in range(3) if i != j):
             swing_moment = body.inertia[(axial + 1) % 3][(axial + 1) % 3]
         fastest = context.maximum([fastest, context.sqrt(potential / swing_moment)])
-    fastest = context.maximum([fastest, source_rate(scene), *_point_mass_rates(scene)])
+    masses, count = scene.bodies, range(0 if scene.bodies is None else len(scene.bodies.names))
+    met = [masses.encounter(context, i, j)[1] for i in count for j in count if i < j] if masses else []
+    fastest = context.maximum([fastest, source_rate(scene), *met])
     time = -exponent(context, fastest)
     if fastest == 0:  # at rest for good: any unit will do, the horizon is the natural one
         time = exponent(context, scene.end - scene.start)
@@ -241,21 +218,14 @@ def choose_scaling(scene: Scene, drive: Drive | None = None) -> Scaling:
     for bound in bounds:
         relative = exponent(context, bound) + time if bound != 0 else 0
         rates.append(relative if abs(relative) >= _WORTH_A_UNIT else 0)
-    length = speed = 0
+    flight: tuple[Any, Any] = 0, 0
     if scene.bodies is not None:
-        farthest, swiftest = _point_mass_scales(scene)
-        length, speed = exponent(context, farthest), exponent(context, swiftest)
+        flight = _point_mass_scales(scene)
     elif scene.position is not None and scene.velocity is not None:
-        farthest, swiftest = _flight_scales(scene, drive)
-        length, speed = exponent(context, farthest), exponent(context, swiftest)
-    return Scaling(
-        time=time,
-        inertia=exponent(context, max(body.principal_moments)),
-        rates=(rates[0], rates[1], rates[2]),
-        length=length,
-        speed=speed,
-        drive=drive,
-    )
+        flight = _flight_scales(scene, drive)
+    length, speed = (exponent(context, size) for size in flight)
+    inertia = exponent(context, max(body.principal_moments))
+    return Scaling(time, inertia, (rates[0], rates[1], rates[2]), length, speed, drive)
 
 
 # --- the scene's constants ----------------------------------------------------------------------------------
@@ -263,20 +233,13 @@ def choose_scaling(scene: Scene, drive: Drive | None = None) -> Scaling:
 
 @dataclass(frozen=True)
 class ScaledNumbers:
-    """The scene's constants in internal units (see ``Scaling``), as mpf.
-
-    Attributes:
-        inertia, inverse_inertia: 3x3.
-        rate_units: the unit of each of the three body rates.
-        arm: M com |g|, body axes: the potential energy is ``arm . vertical``; None without a torque.
-        up: unit vector against gravity, space axes; None without gravity.
-    """
+    """The scene's constants in internal units (see ``Scaling``), as mpf."""
 
     inertia: Matrix
     inverse_inertia: Matrix
     rate_units: Vector
-    arm: Vector | None
-    up: Vector | None
+    arm: Vector | None  # M com |g|, body axes: potential energy is arm . vertical; None without a torque
+    up: Vector | None  # unit vector against gravity, space axes; None without gravity
 
     def vertical_of(self, matrix: SymbolicMatrix, number: Rounder) -> list[Symbolic]:
         """Unit vector against gravity in body axes, R^T up."""
@@ -287,20 +250,16 @@ class ScaledNumbers:
 
 def scaled_numbers(scene: Scene, scaling: Scaling) -> ScaledNumbers:
     """Bring the scene's constants to internal units; powers of two only, so nothing is rounded."""
-    context = scene.context
-    one = context.one
-    up = arm = None
+    context, up, arm = scene.context, None, None
+    strength = context.zero if scene.gravity is None else norm(context, scene.gravity)
     if scene.gravity is not None and any(g != 0 for g in scene.gravity):
-        strength = norm(context, scene.gravity)
         up = [-g / strength for g in scene.gravity]
     if scene.torque_arm is not None:
-        assert scene.gravity is not None
-        strength = norm(context, scene.gravity)
         arm = [context.ldexp(a * strength, -scaling.energy) for a in scene.torque_arm]
     return ScaledNumbers(
         [[context.ldexp(x, -scaling.inertia) for x in row] for row in scene.body.inertia],
         [[context.ldexp(x, scaling.inertia) for x in row] for row in scene.inverse_inertia],
-        [context.ldexp(one, e) for e in scaling.rates],
+        [context.ldexp(context.one, e) for e in scaling.rates],
         arm,
         up,
     )

@@ -17,13 +17,9 @@ from rigidsim.scene.arithmetic import Matrix, negligible
 
 @dataclass(frozen=True)
 class RotatingBody:
-    """A body that turns: everything that is named after it, or follows from its inertia and rates.
+    """A body that turns: everything that is named after it, or follows from its inertia and rates."""
 
-    Attributes:
-        prefix: begins the names of its states, which tells several bodies apart; empty for the scene's.
-    """
-
-    prefix: str = ""
+    prefix: str = ""  # begins the names of its states, which tells several bodies apart
 
     @property
     def rates(self) -> list[str]:
@@ -75,23 +71,14 @@ BODY = RotatingBody()
 
 @dataclass(frozen=True)
 class StateBlock:
-    """A group of states that belong together.
-
-    Attributes:
-        names: names of the states.
-        derivatives: right-hand sides, in the same order.
-        initial: initial values (mpf), internal units.
-        norms: expressions that stay 1 by construction.
-        exponents: binary exponents that bring the states to SI; empty for pure numbers.
-        why: why they are carried.
-    """
+    """A group of states that belong together, with their right-hand sides and initial values."""
 
     names: Sequence[str]
     derivatives: Sequence[Symbolic]
-    initial: Sequence[Any]
-    norms: Sequence[Symbolic] = field(default_factory=list)
-    exponents: Sequence[int] = ()
-    why: str = ""
+    initial: Sequence[Any]  # mpf, internal units
+    norms: Sequence[Symbolic] = field(default_factory=list)  # expressions that stay 1 by construction
+    exponents: Sequence[int] = ()  # binary, that bring the states to SI; empty for pure numbers
+    why: str = ""  # they are carried
 
     @property
     def variables(self) -> list[Symbolic]:
@@ -106,17 +93,11 @@ class StateBlock:
 
 @dataclass(frozen=True)
 class OrbitalFrame:
-    """Quantities of the orbital frame, for an attitude carried relative to a circular orbit.
+    """Quantities of the orbital frame, for an attitude carried relative to a circular orbit; body axes."""
 
-    Attributes:
-        direction: unit vector towards the attracting body, body axes.
-        normal: unit normal of the orbit, body axes.
-        states: states of the orbit itself, from which the attitude in space follows.
-    """
-
-    direction: list[Symbolic]
-    normal: list[Symbolic]
-    states: StateBlock
+    direction: list[Symbolic]  # unit vector towards the attracting body
+    normal: list[Symbolic]  # unit normal of the orbit
+    states: StateBlock  # of the orbit itself, from which the attitude in space follows
 
 
 @dataclass(frozen=True)
@@ -124,9 +105,7 @@ class AttitudeStates:
     """The part of a system of equations that carries the attitude.
 
     Attributes:
-        names: names of the states.
-        derivatives: right-hand sides, in the same order.
-        initial: initial values (mpf).
+        names, derivatives, initial: see ``StateBlock``.
         matrix: R, body to space, as expressions of the states.
         quaternion: [w, x, y, z] as expressions; see ``quaternion_sign``.
         quaternion_sign: how it is made continuous: "state" (it is one), "wrapping" (it changes sign with

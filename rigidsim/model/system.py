@@ -10,31 +10,27 @@ from typing import Any
 import heyoka as hy
 
 from rigidsim.model.assembly import assemble_states
-from rigidsim.model.formulations.formulation import Formulation, ModelPlan, Requirements
+from rigidsim.model.formulations.formulation import Formulation, ModelPlan
 from rigidsim.model.heyoka_expressions import carries_sign, plain_angles, state_names, to_heyoka
 from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.orbits.table_states import Pieces
 from rigidsim.model.outputs import Invariant, Recorded, drift_outputs, find_invariants, recorded_variables
 from rigidsim.model.rotations import Symbolic
-from rigidsim.model.scaling import Rounder, Scaling
+from rigidsim.model.scaling import Rounder
 from rigidsim.model.state_blocks import StateBlock, joined
 from rigidsim.scene.expressions.tree import ATTITUDE_NAMES, names_used
-from rigidsim.scene.scene import Scene
 
-_LARGEST_EXPONENT = 1000
-"""Largest binary exponent of a recorded variable in SI: float64 ends at 2^1024, and sizes are known only
-roughly.
-"""
+_LARGEST_EXPONENT = 1000  # of a recorded variable in SI: float64 ends at 2^1024, and sizes are known roughly
 _DIRECTIONS = {"any": 0, "up": 1, "down": -1}
 
 
 @dataclass(frozen=True)
 class Crossing:
-    """An event as an expression of the states; ``direction`` is -1, 0 (any) or 1."""
+    """An event as an expression of the states."""
 
     name: str
     expression: Symbolic
-    direction: int
+    direction: int  # -1, 0 (any) or 1
     stop: bool
 
 
@@ -44,10 +40,11 @@ class System:
     Each part is worked out once, when it is first needed.
 
     Attributes:
-        plan: decisions made before anything was rounded.
+        plan: decisions made before anything was rounded; what follows are parts of it.
         number: rounds an mpf once to the working precision's scalar.
         formulation: of the rotation: the plan's, or its partner (``chart``).
         sequence: sequence of the Euler angles that are states, or that are recorded.
+        clocked: whether the second number of the time is the last parameter.
     """
 
     def __init__(
@@ -58,12 +55,12 @@ class System:
         chart: Formulation | None = None,
         coefficients: Rounder | None = None,
     ) -> None:
-        self.plan = plan
-        self.number = number
+        self.plan, self.number = plan, number
         self.formulation = chart or plan.formulation
         self.sequence = self.formulation.sequence or plan.scene.config.integrator.euler_sequence
-        self._chart = chart
-        self._coefficients = coefficients
+        self.scene, self.scaling, self.requirements = plan.scene, plan.scaling, plan.requirements
+        self.wide, self.clocked = plan.wide, plan.clocked
+        self._chart, self._coefficients = chart, coefficients
 
     # --- the same motion, rounded otherwise -----------------------------------------------------------------
 
@@ -84,36 +81,13 @@ class System:
     def partner(self) -> System | None:
         """The same system in the chart that a run changes to near the singularity; None without a chart.
 
-        Its states are the same but for the angles. Its recorded Euler angles are those of this system's
-        sequence, on the branch given by the parameter after the invariants' (see
-        ``rigidsim.model.formulations.euler_angles``).
+        Its recorded Euler angles are those of this system's sequence, on the branch given by the parameter
+        after the invariants' (see ``rigidsim.model.formulations.euler_angles``).
         """
         partner = self.formulation.partner
         if partner is None:
             return None
         return System(self.plan, self.number, chart=partner, coefficients=self._coefficients)
-
-    # --- what was decided -----------------------------------------------------------------------------------
-
-    @property
-    def scene(self) -> Scene:
-        """The scene, including loads given from Python."""
-        return self.plan.scene
-
-    @property
-    def scaling(self) -> Scaling:
-        """Internal units."""
-        return self.plan.scaling
-
-    @property
-    def requirements(self) -> Requirements:
-        """Which states are carried, and why."""
-        return self.plan.requirements
-
-    @property
-    def wide(self) -> bool:
-        """Whether the equations are too long to be compiled unrolled."""
-        return self.plan.wide
 
     @cached_property
     def rate_bound(self) -> Any:
@@ -170,7 +144,11 @@ class System:
     @property
     def reasons(self) -> list[tuple[str, str]]:
         """(states, why) for each block, and for the chart that a run may change to."""
-        found = [(_label(block), block.why) for block in self.blocks]
+        found = []
+        for block in self.blocks:
+            many = len(block.names) > 6
+            shown = f"{block.names[0]} ... {block.names[-1]}" if many else " ".join(block.names)
+            found.append((shown, block.why))
         if self.partner is not None:
             angles = " ".join(self.mechanics.carried(self.mechanics.attitude).names)
             regular = self.partner.sequence
@@ -233,9 +211,7 @@ class System:
 
     @cached_property
     def crossings(self) -> list[Crossing]:
-        """Events to be located along the motion; their times are single numbers, and so is the time that they
-        read.
-        """
+        """Events to be located along the motion; the time that they read is a single number."""
         m, found = self.mechanics, []
         for event in self.scene.events:
             names = state_names(m, event.reads, clocked=False)
@@ -243,13 +219,11 @@ class System:
             found.append(Crossing(event.name, expression, _DIRECTIONS[event.direction], event.stop))
         return found
 
-    # --- what changes at given times ------------------------------------------------------------------------
+    # --- what changes at given times, or is switched --------------------------------------------------------
 
     @cached_property
     def pieces(self) -> Pieces | None:
-        """Tabulated parameters and states that are reset at given times, where steps must end; None without
-        tables.
-        """
+        """What is reset at given times, where steps must end; None without tables."""
         if not self.plan.tables:
             return None
         return Pieces(self.plan.tables, self.scaling.time, self.scene.start, self.number)
@@ -259,13 +233,9 @@ class System:
         """Whether it needs a stepper rather than the bare engine, because something happens between steps."""
         return self.switches or self.pieces is not None
 
-    # --- what it switches on --------------------------------------------------------------------------------
-
     @cached_property
     def surfaces(self) -> list[Symbolic]:
-        """Arguments whose zeros are switching surfaces; the parameter of the same number holds the side, +1
-        or -1.
-        """
+        """Arguments that vanish on switching surfaces; the parameter of the same number is the side, +-1."""
         m, found = self.mechanics, [surface.expression for surface in self.plan.surfaces.found]
         return [
             to_heyoka(x, state_names(m, names_used(x)), m.number, m.scene.context, m.sides) for x in found
@@ -273,9 +243,7 @@ class System:
 
     @cached_property
     def turning(self) -> list[Symbolic]:
-        """Euler angles whose full turns are parameters after the sides; the angles here are without those
-        turns.
-        """
+        """Euler angles, less the full turns that are parameters after the sides."""
         names = self.plan.surfaces.turning
         angles = dict(zip(ATTITUDE_NAMES[4:], plain_angles(self.mechanics), strict=True)) if names else {}
         return [angles[name] for name in names]
@@ -285,11 +253,6 @@ class System:
         """The quaternion, without its sign, if that sign is the last parameter; empty otherwise."""
         m = self.mechanics
         return list(m.carried(m.attitude).quaternion) if carries_sign(m) else []
-
-    @property
-    def clocked(self) -> bool:
-        """Whether the second number of the time is the last parameter."""
-        return self.plan.clocked
 
     @property
     def parameters(self) -> int:
@@ -319,8 +282,3 @@ def build_system(plan: ModelPlan, number: Rounder) -> System:
             if abs(exponent) > _LARGEST_EXPONENT:
                 raise OverflowError(f"{variable.name} would be about 2^{exponent} {variable.units}")
     return system
-
-
-def _label(block: StateBlock) -> str:
-    names = list(block.names)
-    return f"{names[0]} ... {names[-1]}" if len(names) > 6 else " ".join(names)

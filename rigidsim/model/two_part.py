@@ -31,16 +31,11 @@ _MOST_PARTS = 64  # doubles in a number of any precision that is in use
 
 @dataclass(frozen=True)
 class TwoPart:
-    """A constant that is split into two parts wherever it multiplies an expression.
-
-    Attributes:
-        high, low: the parts.
-        single: the nearest scalar, for sums, whose own rounding varies from time to time anyway.
-    """
+    """A constant that is split into two parts wherever it multiplies an expression."""
 
     high: Any
     low: Any
-    single: Any
+    single: Any  # the nearest scalar, for sums, whose own rounding varies from time to time anyway
 
     def __mul__(self, other: Any) -> Any:
         if not isinstance(other, hy.expression):
@@ -65,9 +60,7 @@ class TwoPart:
 
 
 def as_factor(constant: Any) -> Any:
-    """A constant that is only ever used as a factor: in two parts, or an expression (0 and 1 vanish from
-    products).
-    """
+    """A constant only used as a factor: in two parts, or an expression (0 and 1 vanish from products)."""
     return constant if isinstance(constant, TwoPart) else hy.expression(constant)
 
 
@@ -81,10 +74,7 @@ def in_two_parts(
 ) -> Callable[[Any], Any]:
     """``number`` extended to two-part coefficients; a constant that it holds exactly stays a plain scalar.
 
-    Args:
-        exact: converts a scalar to the mpf of the same value.
-        bits: of the working precision.
-        context: arithmetic with more than twice its digits.
+    ``exact`` is from a scalar to its mpf; the context has more than twice the digits of ``bits``.
     """
 
     def split(value: Any) -> Any:
@@ -103,15 +93,10 @@ def in_two_parts(
 
 @dataclass(frozen=True)
 class TwoPartTime:
-    """The scene's time in two numbers.
+    """The scene's time in two numbers."""
 
-    Attributes:
-        unit: internal unit of time, s (mpf).
-        low: the parameter that holds what the engine's time leaves out, internal units.
-    """
-
-    unit: Any
-    low: Any
+    unit: Any  # internal unit of time, s (mpf)
+    low: Any  # the parameter that holds what the engine's time leaves out, internal units
 
     def expression(self, line: LineInTime, number: Callable[[Any], Any], context: Any) -> Any:
         """A line as an expression of the engine's time."""

@@ -36,9 +36,7 @@ _LEVI_CIVITA = {
 
 
 class Unsuited(ValueError):
-    """Raised if a formulation that is asked for doesn't apply to a scene; the message goes on from
-    ``given "name", but``.
-    """
+    """A formulation doesn't apply to a scene; the message goes on from ``given "name", but``."""
 
 
 class Rounding(Enum):
@@ -51,49 +49,30 @@ class Rounding(Enum):
 
 @dataclass(frozen=True)
 class Requirements:
-    """Which states a scene requires.
-
-    Attributes:
-        attitude: whether an attitude is carried.
-        vertical: whether the vertical is carried as three states of its own (Euler-Poisson equations).
-        flight: whether position and velocity are carried.
-        record: names asked for, or None for everything that the scene has.
-        why: reasons for what is carried: "rates", "attitude", "vertical", "flight".
-        left_out: (what, why) for groups that are not carried.
-    """
+    """Which states a scene requires."""
 
     attitude: bool
-    vertical: bool
+    vertical: bool  # as three states of its own (Euler-Poisson equations)
     flight: bool
-    record: list[str] | None
-    why: Mapping[str, str]
-    left_out: Sequence[tuple[str, str]] = ()
+    record: list[str] | None  # names asked for, or None for everything that the scene has
+    why: Mapping[str, str]  # what is carried: "rates", "attitude", "vertical", "flight"
+    left_out: Sequence[tuple[str, str]] = ()  # (what, why) for groups that are not carried
 
 
 @dataclass(frozen=True)
 class ModelPlan:
-    """The modelling decisions from which a system of equations follows in any precision.
+    """The modelling decisions from which a system of equations follows in any precision."""
 
-    Attributes:
-        scene: the scene, including loads given from Python.
-        loads: all that act, with the uniform fields combined into one.
-        formulation: of the rotation.
-        orbit_tags: for each prescribed orbit, the tag that makes its state names unique.
-        surfaces: switching surfaces on which the equations change.
-        tables: positions of the states and parameters of tabulated orbits.
-        clocked: whether expressions of the time need it in two numbers (``rigidsim.model.two_part``).
-    """
-
-    scene: Scene
-    loads: Sequence[Load]
-    formulation: Formulation
+    scene: Scene  # including loads given from Python
+    loads: Sequence[Load]  # all that act, with the uniform fields combined into one
+    formulation: Formulation  # of the rotation
     requirements: Requirements
     scaling: Scaling
     numbers: ScaledNumbers
-    orbit_tags: Mapping[KeplerOrbit, str]
-    surfaces: Surfaces
-    tables: Mapping[TabulatedOrbit, TablePlace] = field(default_factory=dict)
-    clocked: bool = False
+    orbit_tags: Mapping[KeplerOrbit, str]  # that make the state names of prescribed orbits unique
+    surfaces: Surfaces  # on which the equations change
+    tables: Mapping[TabulatedOrbit, TablePlace] = field(default_factory=dict)  # their states and parameters
+    clocked: bool = False  # whether the time takes two numbers (``rigidsim.model.two_part``)
 
     @property
     def wide(self) -> bool:
@@ -221,9 +200,6 @@ def _rate_equations(m: Mechanics, torque: list[Term]) -> list[Symbolic]:
 
     Written as quadratic forms in the rates, so that principal and arbitrary body axes are one case: in
     principal axes the coefficients that vanish are left out (Landau & Lifshitz, Mechanics, eq. 36.4-5).
-
-    Args:
-        torque: terms of all loads and carriers, body axes, internal units.
     """
     context, numbers, states = m.scene.context, m.numbers, m.rate_states
     zero = context.zero

@@ -123,13 +123,11 @@ def total_momentum_scale(m: Mechanics) -> tuple[Any, str]:
 
 
 def _torque_free(m: Mechanics) -> str | None:
-    return None if m.torque or m.averaged else "no torque acts"
+    return None if m.torque or m.turning_rate is not None else "no torque acts"
 
 
 def _momentum_kept(m: Mechanics) -> str | None:
-    if m.averaged:
-        return m.kept_by_average
-    return _torque_free(m)
+    return _torque_free(m) if m.turning_rate is None else m.kept_by_average
 
 
 def _conservative(m: Mechanics) -> str | None:

@@ -29,10 +29,6 @@ def _without(_: Mechanics) -> None:
     return None
 
 
-def _nothing(_: Mechanics) -> Mapping[str, str]:
-    return {}
-
-
 def always(_: Mechanics) -> bool:
     """Record wherever a scene has the quantity, unless the config names what to record."""
     return True
@@ -45,11 +41,9 @@ def only_when_named(_: Mechanics) -> bool:
 
 @dataclass(frozen=True)
 class Angle:
-    """atan2(across, along), an angle that may turn around; it is undefined where both vanish.
+    """atan2(across, along), an angle that may turn around: sine and cosine times a common size, of order 1.
 
-    Attributes:
-        across, along: sine and cosine times a common size, of order 1 where the angle is well
-            defined; NaN is recorded if it is below ``rigidsim.model.euler_poles.UNDEFINED`` rounding errors.
+    Where that is below ``rigidsim.model.euler_poles.UNDEFINED`` rounding errors, NaN is recorded.
     """
 
     across: Symbolic
@@ -70,16 +64,12 @@ class Angle:
 class Steady:
     """How angles advance between samples, if that tells their full turns without following the motion.
 
-    Attributes:
-        rates: rate of each angle as an expression of the state, rad per internal unit of time.
-        uncertainty: by how much the rates may change between samples, rad/s.
-        excursion: additional deviation of the angles, rad. Both count for an angle whose sine and cosine
-            have size 1, and are divided by a smaller one.
+    The last two count for an angle whose sine and cosine have size 1, and are divided by a smaller one.
     """
 
-    rates: list[Symbolic]
-    uncertainty: float
-    excursion: float
+    rates: list[Symbolic]  # of each angle, rad per internal unit of time
+    uncertainty: float  # by how much the rates may change between samples, rad/s
+    excursion: float  # additional deviation of the angles, rad
 
 
 @dataclass(frozen=True)
@@ -121,7 +111,7 @@ class Observable:
     angles: Callable[[Mechanics], list[Angle]] | None = None
     poles: Callable[[Mechanics], Poles | None] = _without
     steady: Callable[[Mechanics], Steady | None] = _without
-    attributes: Callable[[Mechanics], Mapping[str, str]] = _nothing
+    attributes: Callable[[Mechanics], Mapping[str, str]] = lambda _: {}
     absent: Callable[[Mechanics], str | None] = _without
 
     def available(self, m: Mechanics) -> bool:
