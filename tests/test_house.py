@@ -32,7 +32,7 @@ def test_no_module_is_longer_than_the_page_says() -> None:
 
 
 def test_hardly_any_module_asks_which_solver_it_is() -> None:
-    """They ask ``rigidsim.scene.methods`` what a method can do; what is left are names promised to users."""
+    """They ask ``rigidsim.scene.choices`` what a method can do; what is left are names promised to users."""
     assert len(SOLVER.named_in(MODULES)) <= 8
     found = SOLVER.asked_in(
         {"a.py": 'if m in ("taylor", "b"): c', "b.py": "d.closed", "c.py": 'e = "taylor"'}

@@ -29,8 +29,8 @@ from rigidsim.accuracy.setting import (
 from rigidsim.accuracy.trial import Told
 from rigidsim.errors import ConfigError, Problem
 from rigidsim.model.load import Load
+from rigidsim.scene.choices import attitude_variables, variables_named
 from rigidsim.scene.config import Experiment
-from rigidsim.scene.formulations import attitude_variables, variables_named
 from rigidsim.scene.integrator_table import LARGEST_DIGITS
 from rigidsim.scene.readable_time import span_text
 

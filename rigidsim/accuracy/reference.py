@@ -19,7 +19,7 @@ import numpy as np
 from rigidsim.accuracy.motion import KnownMotion
 from rigidsim.accuracy.setting import Setting, epsilon
 from rigidsim.scene.arithmetic import working_bits
-from rigidsim.scene.formulations import DEFAULT_FORMULATION, variables_named
+from rigidsim.scene.choices import DEFAULT_FORMULATION, variables_named
 
 INCOMPARABLE = 0.5
 """Difference (rad) past which all digits are gone."""

@@ -11,9 +11,8 @@ from types import MappingProxyType
 
 from rigidsim.errors import ConfigError, Problem
 from rigidsim.scene.arithmetic import working_bits
+from rigidsim.scene.choices import DEFAULT_FORMULATION, DEFAULT_METHOD, METHODS, attitude_variables
 from rigidsim.scene.config import Experiment
-from rigidsim.scene.formulations import DEFAULT_FORMULATION, attitude_variables
-from rigidsim.scene.methods import DEFAULT_METHOD, METHODS
 from rigidsim.scene.scene import build_scene
 from rigidsim.solve.problem import auto_tolerance
 

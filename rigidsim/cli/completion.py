@@ -11,8 +11,8 @@ from pydantic import BaseModel
 
 from rigidsim.scene.bodies.presets import PRESETS
 from rigidsim.scene.bodies.shapes import SHAPES
+from rigidsim.scene.choices import METHODS
 from rigidsim.scene.fields import EULER_SEQUENCES
-from rigidsim.scene.methods import METHODS
 from rigidsim.scene.schema import Config
 from rigidsim.workflows.templates import described
 

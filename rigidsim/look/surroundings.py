@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rigidsim.scene.known_bodies import KNOWN, known_body
+from rigidsim.scene.bodies.presets import KNOWN, known_body
 
 if TYPE_CHECKING:
     import xarray

@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
-from rigidsim.scene.known_bodies import known_body
+from rigidsim.scene.bodies.presets import known_body
 from rigidsim.scene.orbits import KeplerOrbit
 from rigidsim.scene.readable_time import number_text, span_text
 

@@ -30,8 +30,8 @@ from rigidsim.model.needs import NEEDS
 from rigidsim.model.orbits.table_states import Carried, TablePlace, places_of
 from rigidsim.model.refusals import refuse_odd_loads, refuse_second_orbits
 from rigidsim.model.scaling import Scaling, amplitude_of, choose_scaling, scaled_numbers
+from rigidsim.scene.choices import AUTO, variables_named
 from rigidsim.scene.expressions.tree import ATTITUDE_NAMES, FLIGHT_NAMES
-from rigidsim.scene.formulations import AUTO, variables_named
 from rigidsim.scene.orbit_tables.pieces import TabulatedOrbit
 from rigidsim.scene.orbits import KeplerOrbit
 from rigidsim.scene.registry import OBSERVABLES

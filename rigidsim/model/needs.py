@@ -12,7 +12,7 @@ from rigidsim.model.frames import first_source, flies_about_source, flies_in_pla
 from rigidsim.model.load import loads_of
 from rigidsim.model.mechanics import Mechanics
 from rigidsim.scene.arithmetic import negligible
-from rigidsim.scene.formulations import variables_named
+from rigidsim.scene.choices import variables_named
 from rigidsim.scene.scene import Scene
 
 

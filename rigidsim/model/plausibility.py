@@ -14,8 +14,8 @@ from fractions import Fraction
 from rigidsim.model.load_words import ASTRONOMICAL_UNIT, length_text, span_words
 from rigidsim.scene import attitude
 from rigidsim.scene.arithmetic import Vector, apply, dot, hansen, norm
+from rigidsim.scene.bodies.presets import KNOWN, KnownBody, known_body
 from rigidsim.scene.exact import ExactNumber
-from rigidsim.scene.known_bodies import KNOWN, KnownBody, known_body
 from rigidsim.scene.orbits import PACES, KeplerOrbit, Orbit
 from rigidsim.scene.point_masses import GRAVITATIONAL_CONSTANT
 from rigidsim.scene.readable_time import span_text

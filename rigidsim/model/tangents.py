@@ -22,7 +22,7 @@ from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.observables.observable import Observable, only_when_named
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.state_blocks import StateBlock, joined
-from rigidsim.scene.methods import DEFAULT_METHOD
+from rigidsim.scene.choices import DEFAULT_METHOD
 from rigidsim.scene.registry import register_observable
 
 GROWTH = "tangent_growth"

@@ -16,11 +16,10 @@ from rigidsim.errors import ConfigError, Problem
 from rigidsim.scene import validation_messages as messages
 from rigidsim.scene.bodies.table import POINT_OR_NAME
 from rigidsim.scene.frame import PLANE_OR_NORMAL
-from rigidsim.scene.overrides import FLAG, apply_overrides, written
 from rigidsim.scene.python_values import assignments_of, toml_text
 from rigidsim.scene.registry import LOAD_KINDS
 from rigidsim.scene.schema import Config, config_model
-from rigidsim.scene.toml_text import long_integers, parse_toml
+from rigidsim.scene.toml_text import FLAG, apply_overrides, long_integers, parse_toml, written
 
 Overrides = Sequence[str] | Mapping[str, Any]
 """Values to replace: ``KEY=VALUE`` texts, or dotted keys with Python values."""

@@ -6,6 +6,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, StrictBool, StrictInt, WithJsonSchema, field_validator
 
+from rigidsim.scene.choices import AUTO, DEFAULT_METHOD, FORMULATIONS, METHODS
 from rigidsim.scene.exact import ExactNumber, parse_number
 from rigidsim.scene.fields import (
     ConfigTable,
@@ -16,8 +17,6 @@ from rigidsim.scene.fields import (
     number_schema,
     refuse,
 )
-from rigidsim.scene.formulations import AUTO, FORMULATIONS
-from rigidsim.scene.methods import DEFAULT_METHOD, METHODS
 from rigidsim.scene.validation_messages import shown
 
 # A number is carried and stored as a sum of float64 parts, which end at 2^-1074: 250 digits (833 bits) leave

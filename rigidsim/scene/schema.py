@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 from functools import lru_cache
-from typing import Annotated, Any, Union
+from typing import Annotated, Any, Literal, Union
 
 from pydantic import (
     Field,
@@ -22,6 +22,7 @@ from pydantic import (
 )
 
 from rigidsim.scene.bodies.table import Body
+from rigidsim.scene.choices import REDUCED
 from rigidsim.scene.events import EventTable
 from rigidsim.scene.expressions.tree import ATTITUDE_NAMES, FLIGHT_NAMES, RATE_NAMES, RESERVED
 from rigidsim.scene.fields import (
@@ -43,7 +44,6 @@ from rigidsim.scene.fields import (
 )
 from rigidsim.scene.frame import Frame
 from rigidsim.scene.integrator_table import Integrator
-from rigidsim.scene.model_table import Model
 from rigidsim.scene.point_masses import PointMassBody
 from rigidsim.scene.registry import LOAD_KINDS, OBSERVABLES, LoadFields
 from rigidsim.scene.sample_times import Time
@@ -76,6 +76,25 @@ class Initial(ConfigTable):
     """position of the centre of mass, in space axes; with it or velocity the body flies freely"""
     velocity: Triple[Speed] | None = Field(None, examples=[[0, "7.5 km/s", 0]])
     """velocity of the centre of mass, in space axes"""
+
+
+class Model(ConfigTable):
+    """``[model]``: every rotation, or the motion averaged over it, or over the sources' orbits as well."""
+
+    level: Literal["full", "spin_averaged", "orbit_averaged", "auto"] = "full"
+    """full resolves every rotation; spin_averaged follows the direction of the angular momentum, and its size
+    and energy under torques that do work, averaged over the body's free rotation; orbit_averaged averages
+    over the sources' orbits as well; auto is the cheapest level that keeps [integrator] accuracy_axis
+    """
+    short_period: StrictBool = False
+    """add back, to first order, what averaging removed: the nutation with the orbital periods, and the offset
+    of figure and spin axes from the angular momentum
+    """
+
+    @property
+    def reduced(self) -> bool:
+        """Whether the model averages anything."""
+        return self.level in REDUCED
 
 
 class Output(ConfigTable):

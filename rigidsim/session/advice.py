@@ -11,7 +11,7 @@ from rigidsim.accuracy.models.modelling import measure_modelling
 from rigidsim.accuracy.models.side_by_side import Unmeasured
 from rigidsim.errors import ConfigError
 from rigidsim.model.capabilities import gradient_source_of
-from rigidsim.scene.model_table import FULL, REDUCED
+from rigidsim.scene.choices import FULL, REDUCED
 from rigidsim.session.diagnostics import Diagnostics
 from rigidsim.session.session import AdviceLimits
 from rigidsim.solve.problem import prepare

@@ -17,10 +17,9 @@ from rigidsim.model.load import Load, own_loads
 from rigidsim.model.model_plan import plan_model
 from rigidsim.model.projected_invariants import conserves, projected_invariants
 from rigidsim.model.system import System, build_system
+from rigidsim.scene.choices import AUTO, FORMULATIONS
 from rigidsim.scene.config import Experiment
-from rigidsim.scene.formulations import FORMULATIONS
 from rigidsim.scene.initial_values import check_start
-from rigidsim.scene.model_table import AUTO
 from rigidsim.scene.scene import Scene, build_scene
 from rigidsim.solve.compiled import compiled_function
 from rigidsim.solve.precision import Precision, Scalar, precision_of

@@ -20,7 +20,7 @@ from pydantic import (
 )
 
 from rigidsim.errors import RunFolderError
-from rigidsim.scene.methods import DEFAULT_METHOD
+from rigidsim.scene.choices import DEFAULT_METHOD
 from rigidsim.store.summary_parts import (
     Accuracy,
     Advice,

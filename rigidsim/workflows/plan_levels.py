@@ -14,8 +14,8 @@ from rigidsim.accuracy.models.side_by_side import Unmeasured
 from rigidsim.accuracy.motion import Pilot, run_pilot
 from rigidsim.errors import ConfigError
 from rigidsim.model.load import Load
+from rigidsim.scene.choices import FULL
 from rigidsim.scene.config import Experiment
-from rigidsim.scene.model_table import FULL
 from rigidsim.solve.assembly import assemble
 from rigidsim.solve.corrected_stepper import CorrectedStepper
 from rigidsim.solve.problem import InitialValueProblem, prepare

@@ -12,9 +12,9 @@ import numpy as np
 from rigidsim.errors import FORCE, RunFolderError, either
 from rigidsim.model.load import Load
 from rigidsim.scene.config import Experiment, Overrides, has_earlier_settings, parse, parse_earlier
-from rigidsim.scene.overrides import assignments
 from rigidsim.scene.python_values import assignments_of
 from rigidsim.scene.scene import build_scene
+from rigidsim.scene.toml_text import assignments
 from rigidsim.session.dataset import root_attributes as attributes_now
 from rigidsim.session.execution import execute, with_timeline
 from rigidsim.session.guards import Observer

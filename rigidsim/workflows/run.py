@@ -12,7 +12,7 @@ from rigidsim.accuracy.models.level import choose_level
 from rigidsim.accuracy.setting import Setting, leaves_choice, wanted
 from rigidsim.errors import ConfigError
 from rigidsim.model.load import Load
-from rigidsim.scene.model_table import AUTO, FULL
+from rigidsim.scene.choices import AUTO, FULL
 from rigidsim.session.dataset import refuse_taken_names
 from rigidsim.session.execution import execute
 from rigidsim.session.guards import Observer

@@ -18,8 +18,8 @@ import numpy as np
 from rigidsim.accuracy.bench.dataset import TOLD, BestSetting, advice, dataset_of
 from rigidsim.accuracy.bench.measure import measure
 from rigidsim.errors import RunFolderError
+from rigidsim.scene.choices import FULL
 from rigidsim.scene.config import Experiment
-from rigidsim.scene.model_table import FULL
 from rigidsim.store import atomic
 from rigidsim.workflows.plan_levels import compared_levels
 

@@ -14,7 +14,7 @@ import typer
 import rigidsim
 from rigidsim.cli import completion
 from rigidsim.cli.app import app
-from rigidsim.scene.methods import METHODS
+from rigidsim.scene.choices import METHODS
 
 Config = Callable[..., str]
 Command = Callable[..., Any]

@@ -28,7 +28,7 @@ from rigidsim.model.rotations import Symbolic, quaternion_matrix
 from rigidsim.model.scaling import Rounder
 from rigidsim.model.state_blocks import AttitudeStates
 from rigidsim.model.system import System
-from rigidsim.scene.formulations import Variables
+from rigidsim.scene.choices import Variables
 from rigidsim.solve.effects.effect import Effect, register_effect
 from rigidsim.solve.precision import Precision
 from rigidsim.solve.stepper import Stepper

@@ -19,7 +19,7 @@ from support import angle_between, config, loaded, run_text, same_bits
 
 import rigidsim
 from rigidsim.model.system import System
-from rigidsim.scene.methods import Method
+from rigidsim.scene.choices import Method
 from rigidsim.scene.scene import Scene
 from rigidsim.solve.compiled import compiled_function
 from rigidsim.solve.events import EventLog

@@ -12,7 +12,7 @@ import numpy as np
 from rigidsim.accuracy.bench.measure import Measurement, RowStatus
 from rigidsim.accuracy.bench.plan import DEFAULT
 from rigidsim.accuracy.setting import Setting, precision_title, precision_titled
-from rigidsim.scene.methods import METHODS
+from rigidsim.scene.choices import METHODS
 
 if TYPE_CHECKING:
     import xarray

@@ -26,8 +26,8 @@ from rigidsim.accuracy.reference import (
 from rigidsim.accuracy.setting import Setting
 from rigidsim.accuracy.trial import trial_scene
 from rigidsim.errors import RigidsimError
+from rigidsim.scene.choices import FORMULATIONS
 from rigidsim.scene.config import Experiment
-from rigidsim.scene.formulations import FORMULATIONS
 from rigidsim.scene.scene import build_scene
 from rigidsim.solve.assembly import assemble
 from rigidsim.solve.problem import prepare_scene

@@ -20,8 +20,7 @@ from rigidsim.accuracy.models.side_by_side import Unmeasured
 from rigidsim.accuracy.trial import compactly
 from rigidsim.errors import ConfigError
 from rigidsim.model.averaged.average import DIRECTION, Average
-from rigidsim.scene.methods import DEFAULT_METHOD
-from rigidsim.scene.model_table import ORBIT_AVERAGED
+from rigidsim.scene.choices import DEFAULT_METHOD, ORBIT_AVERAGED
 from rigidsim.solve.problem import InitialValueProblem, prepare_scene
 from rigidsim.solve.shadow.carriers import BatchCarrier, StepperCarrier
 from rigidsim.solve.shadow.ensemble import PERTURBED, EnsembleCarrier

@@ -11,8 +11,8 @@ from rigidsim.accuracy.models.modelling import measure_modelling
 from rigidsim.accuracy.models.side_by_side import Unmeasured
 from rigidsim.errors import ConfigError, Problem
 from rigidsim.model.load import Load
+from rigidsim.scene.choices import AUTO, FULL, ORBIT_AVERAGED, SPIN_AVERAGED
 from rigidsim.scene.config import Experiment
-from rigidsim.scene.model_table import AUTO, FULL, ORBIT_AVERAGED, SPIN_AVERAGED
 from rigidsim.solve.problem import prepare
 
 CHEAPEST_FIRST = (ORBIT_AVERAGED, SPIN_AVERAGED)

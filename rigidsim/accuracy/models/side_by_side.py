@@ -17,8 +17,8 @@ from rigidsim.model.averaged.free_motion import FreeMotion
 from rigidsim.model.averaged.resonance import SlowStart
 from rigidsim.scene import attitude
 from rigidsim.scene.arithmetic import apply, cross, dot, norm
+from rigidsim.scene.choices import FULL
 from rigidsim.scene.exact import fraction_of
-from rigidsim.scene.model_table import FULL
 from rigidsim.scene.sample_times import SampleTimes
 from rigidsim.scene.scene import Scene
 from rigidsim.solve.assembly import assemble, sampler

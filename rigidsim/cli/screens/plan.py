@@ -11,7 +11,7 @@ from rich.console import Console
 
 from rigidsim.cli.screens.page import Page, Styled
 from rigidsim.cli.screens.summary import from_step, print_understood
-from rigidsim.scene.methods import method_named
+from rigidsim.scene.choices import method_named
 from rigidsim.scene.readable_time import span_text
 from rigidsim.workflows.plan import RunPlan
 from rigidsim.workflows.plan_levels import LevelCost

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from rigidsim.look.figures.style import STYLE
-from rigidsim.scene.methods import method_named
+from rigidsim.scene.choices import method_named
 from rigidsim.scene.readable_time import span_text
 
 if TYPE_CHECKING:

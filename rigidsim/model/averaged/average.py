@@ -35,7 +35,7 @@ from rigidsim.model.orbits.table_states import Carried
 from rigidsim.model.scaling import Scaling
 from rigidsim.scene import attitude
 from rigidsim.scene.arithmetic import Vector, apply, cross, dot, negligible, norm, working_bits
-from rigidsim.scene.model_table import ORBIT_AVERAGED
+from rigidsim.scene.choices import ORBIT_AVERAGED
 from rigidsim.scene.scene import Scene
 
 _ROUNDS = 4  # iterations; each gains a factor of the nutation's size

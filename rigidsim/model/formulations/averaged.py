@@ -21,7 +21,7 @@ from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.scaling import Rounder, choose_scaling
 from rigidsim.model.state_blocks import AttitudeStates, StateBlock
-from rigidsim.scene.formulations import Variables
+from rigidsim.scene.choices import Variables
 from rigidsim.scene.scene import Scene
 
 _OF_FIGURE = ("figure_axis",)

@@ -25,7 +25,7 @@ from rigidsim.model.scaling import Rounder, Scaling
 from rigidsim.model.state_blocks import AttitudeStates, StateBlock
 from rigidsim.scene import attitude as numeric
 from rigidsim.scene.arithmetic import apply, dot, multiply, negligible
-from rigidsim.scene.formulations import FORMULATIONS
+from rigidsim.scene.choices import FORMULATIONS
 from rigidsim.scene.rotations import is_proper
 from rigidsim.scene.scene import Scene
 

@@ -27,7 +27,7 @@ from rigidsim.model.state_blocks import AttitudeStates
 from rigidsim.scene import attitude
 from rigidsim.scene.arithmetic import dot
 from rigidsim.scene.attitude import AXES, parity
-from rigidsim.scene.formulations import FORMULATIONS
+from rigidsim.scene.choices import FORMULATIONS
 from rigidsim.scene.rotations import is_proper
 from rigidsim.scene.scene import Scene
 

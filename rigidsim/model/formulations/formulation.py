@@ -23,7 +23,7 @@ from rigidsim.model.rotations import Symbolic
 from rigidsim.model.scaling import Rounder, ScaledNumbers, Scaling, largest_rates
 from rigidsim.model.state_blocks import BODY, AttitudeStates, StateBlock
 from rigidsim.scene.arithmetic import dot, negligible
-from rigidsim.scene.formulations import DEFAULT_FORMULATION, FORMULATIONS, Variables
+from rigidsim.scene.choices import DEFAULT_FORMULATION, FORMULATIONS, Variables
 from rigidsim.scene.orbit_tables.pieces import TabulatedOrbit
 from rigidsim.scene.orbits import KeplerOrbit
 from rigidsim.scene.scene import Scene

@@ -27,7 +27,7 @@ from rigidsim.model.scaling import Rounder
 from rigidsim.model.state_blocks import AttitudeStates, OrbitalFrame, StateBlock
 from rigidsim.model.two_part import as_factor
 from rigidsim.scene import attitude
-from rigidsim.scene.formulations import DEFAULT_FORMULATION, FORMULATIONS
+from rigidsim.scene.choices import DEFAULT_FORMULATION, FORMULATIONS
 from rigidsim.scene.orbits import KeplerOrbit
 from rigidsim.scene.scene import Scene
 

@@ -29,7 +29,7 @@ from rigidsim.model.state_blocks import AttitudeStates, StateBlock
 from rigidsim.model.two_part import as_factor
 from rigidsim.scene import attitude
 from rigidsim.scene.arithmetic import Vector, apply, cross, dot, negligible, norm
-from rigidsim.scene.formulations import FORMULATIONS
+from rigidsim.scene.choices import FORMULATIONS
 from rigidsim.scene.scene import Scene
 
 ANGLE, SPIN = "angle", "spin"

@@ -13,7 +13,7 @@ from rigidsim.model.load import Load
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.scaling import Rounder
 from rigidsim.model.state_blocks import BODY, AttitudeStates
-from rigidsim.scene.formulations import DEFAULT_FORMULATION, FORMULATIONS
+from rigidsim.scene.choices import DEFAULT_FORMULATION, FORMULATIONS
 from rigidsim.scene.scene import Scene
 
 

@@ -9,7 +9,7 @@ from rigidsim.model.scaling import Rounder
 from rigidsim.model.state_blocks import BODY, StateBlock
 from rigidsim.scene.arithmetic import apply, cross, transpose
 from rigidsim.scene.attitude import rotation_matrix
-from rigidsim.scene.formulations import FORMULATIONS
+from rigidsim.scene.choices import FORMULATIONS
 
 
 @formulates(FORMULATIONS["rates"])

@@ -12,7 +12,7 @@ from rigidsim.model.rotations import Symbolic
 from rigidsim.model.scaling import Rounder
 from rigidsim.model.state_blocks import AttitudeStates
 from rigidsim.scene.attitude import rotation_matrix
-from rigidsim.scene.formulations import FORMULATIONS
+from rigidsim.scene.choices import FORMULATIONS
 
 
 @formulates(FORMULATIONS["rotation_matrix"])

@@ -25,9 +25,8 @@ from rigidsim.scene.epochs import J2000, Epoch
 from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.fields import GravitationalParameter, Metre, Triple
 from rigidsim.scene.frame import ECLIPTIC
-from rigidsim.scene.orbit_tables.orbit import resolve_tabulated_orbit
 from rigidsim.scene.orbit_tables.pieces import TabulatedOrbit
-from rigidsim.scene.orbits import KeplerOrbit, Orbit, attracting_body, resolve_orbit
+from rigidsim.scene.orbits import KeplerOrbit, Orbit, attracting_body, resolve_orbit, resolve_tabulated_orbit
 from rigidsim.scene.registry import LoadFields, Surroundings, register_load
 from rigidsim.scene.scene import Scene
 from rigidsim.store.summary_parts import Caution

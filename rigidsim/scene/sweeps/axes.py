@@ -8,9 +8,9 @@ from dataclasses import dataclass
 
 from rigidsim.errors import Problem
 from rigidsim.scene.exact import ExactNumber
-from rigidsim.scene.overrides import key_steps
 from rigidsim.scene.registry import OBSERVABLES
 from rigidsim.scene.sweeps.written import AxisValues
+from rigidsim.scene.toml_text import key_steps
 from rigidsim.scene.validation_messages import shown
 
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,60}")

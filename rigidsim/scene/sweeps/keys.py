@@ -7,8 +7,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from functools import lru_cache
 from typing import Any
 
-from rigidsim.scene.overrides import apply_overrides, key_steps
 from rigidsim.scene.schema import config_model
+from rigidsim.scene.toml_text import apply_overrides, key_steps
 from rigidsim.scene.validation_messages import nearest
 
 

@@ -11,16 +11,15 @@ import tomlkit
 from tomlkit.exceptions import TOMLKitError
 
 from rigidsim.errors import ConfigError, MemberError, Problem, either
+from rigidsim.scene.choices import AUTO, FULL
 from rigidsim.scene.config import Experiment, parse, validated
-from rigidsim.scene.model_table import AUTO, FULL
-from rigidsim.scene.overrides import apply_overrides, key_steps
 from rigidsim.scene.python_values import toml_text
 from rigidsim.scene.sweep_table import INDICATORS, SweepTable
 from rigidsim.scene.sweeps.axes import Axis, axis_name, clashes
 from rigidsim.scene.sweeps.keys import refuse_unsettable, unit_and_length
 from rigidsim.scene.sweeps.values import axis_values
 from rigidsim.scene.sweeps.written import nearest_double
-from rigidsim.scene.toml_text import parse_toml
+from rigidsim.scene.toml_text import apply_overrides, key_steps, parse_toml
 
 MOST_MEMBERS = 100_000_000
 _ASKED = either("is asked for with rigidsim run --sweep KEY=SPEC", "changes={'sweep': {...}} adds one")

@@ -13,11 +13,9 @@ import numpy as np
 
 from rigidsim.errors import ConfigError
 from rigidsim.model.scaling import Drive
+from rigidsim.scene.choices import DEFAULT_METHOD, FULL, variables_named
 from rigidsim.scene.config import Experiment
-from rigidsim.scene.formulations import variables_named
-from rigidsim.scene.methods import DEFAULT_METHOD
-from rigidsim.scene.model_table import FULL
-from rigidsim.scene.overrides import key_steps
+from rigidsim.scene.toml_text import key_steps
 from rigidsim.scene.tracing.numbers import Traced, Untraceable
 from rigidsim.solve.batch.members import Members
 from rigidsim.solve.batch.replay import Replay

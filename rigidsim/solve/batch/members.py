@@ -10,8 +10,8 @@ import numpy as np
 
 from rigidsim.scene.config import Experiment
 from rigidsim.scene.exact import ExactNumber
-from rigidsim.scene.overrides import key_steps
 from rigidsim.scene.sweeps.sweep import Sweep
+from rigidsim.scene.toml_text import key_steps
 from rigidsim.solve.batch.replay import SharedReals, real_of
 from rigidsim.solve.batch.tracing import TRACED_TABLES
 

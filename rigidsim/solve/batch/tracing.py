@@ -17,8 +17,8 @@ from rigidsim.scene.arithmetic import context_for
 from rigidsim.scene.config import Experiment
 from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.initial_values import check_start
-from rigidsim.scene.overrides import key_steps
 from rigidsim.scene.scene import Scene, build_scene
+from rigidsim.scene.toml_text import key_steps
 from rigidsim.scene.tracing.context import TracingContext
 from rigidsim.scene.tracing.exact import swept_number
 from rigidsim.scene.tracing.numbers import Graph, Traced, Untraceable

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, ClassVar, TypeVar
 
 from rigidsim.errors import ConfigError, Problem
 from rigidsim.model.system import System
-from rigidsim.scene.methods import METHODS, Method
+from rigidsim.scene.choices import METHODS, Method
 from rigidsim.scene.scene import Scene
 from rigidsim.solve.corrected_stepper import CorrectedStepper
 from rigidsim.solve.effects.effect import registered_effects

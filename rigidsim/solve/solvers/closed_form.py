@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rigidsim.model.system import System
-from rigidsim.scene.methods import METHODS
+from rigidsim.scene.choices import METHODS
 from rigidsim.scene.scene import Scene
 from rigidsim.solve.corrected_stepper import CorrectedStepper, StepBoundary
 from rigidsim.solve.events import EventLog

@@ -11,9 +11,8 @@ from pathlib import Path
 from typing import Any
 
 from rigidsim.errors import FORCE, OUT, ConfigError, Problem, RunFolderError
-from rigidsim.scene.overrides import apply_overrides
 from rigidsim.scene.sweeps.sweep import Sweep
-from rigidsim.scene.toml_text import parse_toml
+from rigidsim.scene.toml_text import apply_overrides, parse_toml
 from rigidsim.scene.validation_messages import shown
 from rigidsim.store.sweeps.dataset import write_dataset
 from rigidsim.store.sweeps.folder import SweepFolder

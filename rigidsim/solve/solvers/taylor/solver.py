@@ -7,7 +7,7 @@ from collections.abc import Callable
 from typing import ClassVar, TypeAlias
 
 from rigidsim.model.system import System
-from rigidsim.scene.methods import DEFAULT_METHOD, METHODS
+from rigidsim.scene.choices import DEFAULT_METHOD, METHODS
 from rigidsim.solve.corrected_stepper import CorrectedStepper, StepBoundary
 from rigidsim.solve.events import EventLog
 from rigidsim.solve.precision import Precision, Scalar

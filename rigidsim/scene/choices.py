@@ -1,7 +1,7 @@
-"""Formulations of the rotation that a config can name in ``[integrator] formulation``, and what each can do.
+"""Methods, formulations and models that a config can name, and what each can do.
 
-Whoever has to treat formulations differently asks for an ability here, or in ``Formulation``
-(``rigidsim.model.formulations``), which tells their states and equations: never for a name.
+Whoever has to treat them differently asks for an ability here, or in ``rigidsim.solve.solvers`` and
+``rigidsim.model.formulations``, which tell how they solve a scene: never for a name.
 """
 
 from __future__ import annotations
@@ -9,6 +9,49 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 AUTO = "auto"
+FULL, SPIN_AVERAGED, ORBIT_AVERAGED = "full", "spin_averaged", "orbit_averaged"
+REDUCED = (SPIN_AVERAGED, ORBIT_AVERAGED)
+"""Levels that carry only the momentum's direction; later ones average more."""
+
+
+@dataclass(frozen=True)
+class Method:
+    """A method by which a motion is found.
+
+    Attributes:
+        name: as in configs, summaries and datasets.
+        title: name in sentences and tables.
+        told: what it is, for the description of the key.
+        has_steps: whether it integrates any equations step by step. One without steps gives the states at
+            any time from a solution that is known, and has no tolerance.
+    """
+
+    name: str
+    title: str
+    told: str
+    has_steps: bool = True
+
+
+DEFAULT_METHOD = "taylor"
+METHODS: dict[str, Method] = {
+    method.name: method
+    for method in (
+        Method(DEFAULT_METHOD, "Taylor series", "Taylor series step by step"),
+        Method(
+            "closed_form",
+            "closed form",
+            "for a free body or a heavy symmetric top, theta functions at a cost independent of the time",
+            has_steps=False,
+        ),
+    )
+}
+
+
+def method_named(name: str) -> Method:
+    """The method of a summary or dataset; one of a later version is taken to have steps."""
+    return METHODS.get(name) or Method(name, name.replace("_", " "), "")
+
+
 DEFAULT_FORMULATION = "quaternion"
 """Regular everywhere: in it settings are tried, and questions about a motion itself are asked."""
 
