@@ -32,7 +32,7 @@ from rigidsim.model.load import Load
 from rigidsim.scene.choices import attitude_variables, variables_named
 from rigidsim.scene.config import Experiment
 from rigidsim.scene.integrator_table import LARGEST_DIGITS
-from rigidsim.scene.readable_time import span_text
+from rigidsim.scene.readable import span_text
 
 _DIGITS: dict[str | int, range] = {"single": range(4, 8), "double": range(4, 16), "extended": range(13, 19)}
 """Tolerances of each precision, as negative powers of ten; looser ones are no cheaper than the one before."""

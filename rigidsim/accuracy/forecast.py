@@ -17,7 +17,7 @@ from rigidsim.accuracy.setting import Setting, epsilon
 from rigidsim.accuracy.trial import Told, Trial, Trials
 from rigidsim.model.load import Load
 from rigidsim.scene.config import Experiment
-from rigidsim.scene.readable_time import span_text
+from rigidsim.scene.readable import span_text
 from rigidsim.scene.scene import build_scene
 
 _BASE_TOLERANCE = 1e-8  # of the trial that all other tolerances are first forecast from

@@ -11,7 +11,7 @@ import mpmath
 import numpy as np
 
 from rigidsim.errors import RigidsimError
-from rigidsim.scene.readable_units import ANGLE_UNITS, AngleUnit
+from rigidsim.scene.readable import ANGLE_UNITS, AngleUnit
 
 # Sums of doubles end at 2^-1074 and stay below 2^1025: 1,400 digits hold each exactly.
 _EXACT = Context(prec=1400, Emax=10**6, Emin=-(10**6))

@@ -18,7 +18,7 @@ import xarray
 
 from rigidsim.formats.digits import converted
 from rigidsim.formats.tables import BLOCK_NUMBERS, Table, TableColumn, columns_of
-from rigidsim.scene.readable_units import AngleUnit
+from rigidsim.scene.readable import AngleUnit
 from rigidsim.store.sweeps.dataset import boxes
 
 MEMBER = "member"

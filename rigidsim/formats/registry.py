@@ -13,7 +13,7 @@ from rigidsim.errors import RigidsimError
 from rigidsim.formats import FORMATS
 from rigidsim.formats.naming import Naming
 from rigidsim.formats.tables import Table
-from rigidsim.scene.readable_units import AngleUnit
+from rigidsim.scene.readable import AngleUnit
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,7 @@ import numpy as np
 import xarray
 
 from rigidsim.formats.digits import RADIAN, converted
-from rigidsim.scene.readable_units import AngleUnit
+from rigidsim.scene.readable import AngleUnit
 from rigidsim.store.netcdf import CHUNK_ROWS
 from rigidsim.store.variables import LABELS, parts_in
 

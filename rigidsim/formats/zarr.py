@@ -12,7 +12,7 @@ from rigidsim.formats.digits import RADIAN, converted
 from rigidsim.formats.member_tables import MemberTable
 from rigidsim.formats.registry import Format, TableSource
 from rigidsim.formats.tables import Table
-from rigidsim.scene.readable_units import AngleUnit
+from rigidsim.scene.readable import AngleUnit
 from rigidsim.store.netcdf import CHUNK_ROWS
 from rigidsim.store.sweeps.dataset import chunk_shape
 from rigidsim.store.variables import parts_in

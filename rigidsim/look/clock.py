@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rigidsim.scene.readable_time import DAY, YEAR
+from rigidsim.scene.readable import DAY, YEAR
 
 _LARGEST = 2.0**62  # int64 with room for differences and for the viewer's own sentinels
 _LARGEST_NANOSECONDS = 9.2e18  # 291.5 years, just below 2**63 ns

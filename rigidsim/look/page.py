@@ -9,7 +9,7 @@ import numpy as np
 
 from rigidsim.look.plots import pretty_unit
 from rigidsim.look.roles import drifts, in_words, is_averaged, read_config, title_of
-from rigidsim.scene.readable_time import TimeWords
+from rigidsim.scene.readable import TimeWords
 
 if TYPE_CHECKING:
     import xarray

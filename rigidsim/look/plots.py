@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigidsim.look.roles import drift_of, in_words, is_averaged, put_back_of
-from rigidsim.scene.readable_units import angle_unit, si_scale
+from rigidsim.scene.readable import angle_unit, si_scale
 
 if TYPE_CHECKING:
     import xarray

@@ -8,7 +8,7 @@ from typing import Any
 
 from rigidsim.scene.bodies.presets import known_body
 from rigidsim.scene.orbits import KeplerOrbit
-from rigidsim.scene.readable_time import number_text, span_text
+from rigidsim.scene.readable import number_text, span_text
 
 _DIGITS = 4
 _KILOMETRES = 1e4  # m, from where on km read better

@@ -18,7 +18,7 @@ from rigidsim.scene.bodies.presets import KNOWN, KnownBody, known_body
 from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.orbits import PACES, KeplerOrbit, Orbit
 from rigidsim.scene.point_masses import GRAVITATIONAL_CONSTANT
-from rigidsim.scene.readable_time import span_text
+from rigidsim.scene.readable import span_text
 from rigidsim.scene.scene import Scene
 from rigidsim.store.summary_parts import Caution, WarningCode
 

@@ -14,8 +14,7 @@ from pydantic import ValidationError
 
 from rigidsim.errors import ConfigError, Problem
 from rigidsim.scene import validation_messages as messages
-from rigidsim.scene.bodies.table import POINT_OR_NAME
-from rigidsim.scene.frame import PLANE_OR_NORMAL
+from rigidsim.scene.fields import NAME_OR_VECTOR
 from rigidsim.scene.python_values import assignments_of, toml_text
 from rigidsim.scene.registry import LOAD_KINDS
 from rigidsim.scene.schema import Config, config_model
@@ -145,7 +144,7 @@ def validated(table: dict[str, Any], source: str) -> Config:
         config = model.model_validate(table)
     except ValidationError as error:
         named = {problem.where for problem in problems}
-        found = messages.config_error(model, error, {*POINT_OR_NAME, *PLANE_OR_NORMAL, *LOAD_KINDS}).problems
+        found = messages.config_error(model, error, {*NAME_OR_VECTOR, *LOAD_KINDS}).problems
         problems += [problem for problem in found if problem.where not in named]
     if problems:
         raise ConfigError(problems, source)

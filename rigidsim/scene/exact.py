@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 import re
 from dataclasses import dataclass, field
-from decimal import Decimal, InvalidOperation
+from decimal import MAX_EMAX, MIN_EMIN, Context, Decimal, Inexact, InvalidOperation
 from fractions import Fraction
 from functools import cache
 from typing import Any
@@ -208,30 +208,26 @@ def in_its_unit(value: Any) -> tuple[ExactNumber, str]:
     return parse_number(match["number"], "1"), match["unit"].strip()
 
 
+def exact_decimal(value: Fraction) -> Decimal | None:
+    """The same number as a decimal without zeros at its end; None for a fraction that isn't one."""
+    digits = value.numerator.bit_length() + value.denominator.bit_length() + 1
+    context = Context(prec=digits, Emin=MIN_EMIN, Emax=MAX_EMAX, traps=[Inexact])
+    try:
+        return context.divide(Decimal(value.numerator), Decimal(value.denominator)).normalize(context)
+    except Inexact:
+        return None
+
+
 def decimal_text(value: Fraction) -> str:
     """A number as TOML text: a decimal if it has at most some hundred digits, otherwise ``p/q``, which needs
     quotes.
     """
-    rest, powers = value.denominator, {2: 0, 5: 0}
-    for prime in powers:
-        while rest % prime == 0 and powers[prime] <= _LONGEST_DECIMAL:
-            rest //= prime
-            powers[prime] += 1
-    places = max(powers.values())
-    if rest != 1 or places > _LONGEST_DECIMAL:
+    number = exact_decimal(value)
+    exponent = 0 if number is None else int(number.as_tuple().exponent)
+    if number is None or -exponent > _LONGEST_DECIMAL:
         return f"{value.numerator}/{value.denominator}"
-    whole = value.numerator * 10**places // value.denominator
-    sign, digits = "-" if whole < 0 else "", str(abs(whole))
-    if not places and len(digits) <= _PLAIN_DIGITS:
-        return sign + digits
-    significant = digits.rstrip("0") or "0"
-    exponent = len(digits) - len(significant) - places
-    point = len(significant) + exponent  # digits before the point
-    if -4 <= point - 1 <= _PLAIN_DIGITS and exponent < 0:
-        whole_part = significant[:point] if point > 0 else "0"
-        return f"{sign}{whole_part}.{'0' * max(0, -point)}{significant[max(0, point) :]}"
-    rest_digits = f".{significant[1:]}" if len(significant) > 1 else ""
-    return f"{sign}{significant[0]}{rest_digits}e{point - 1}"
+    short = -4 <= number.adjusted() <= _PLAIN_DIGITS if exponent < 0 else number.adjusted() < _PLAIN_DIGITS
+    return f"{number:f}" if short else f"{number:e}".replace("e+", "e")
 
 
 def with_unit(number: ExactNumber, unit: str, text: str) -> Quantity:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from itertools import product
 from typing import Annotated, Any, TypeVar
@@ -13,6 +13,7 @@ from pydantic import (
     BaseModel,
     BeforeValidator,
     ConfigDict,
+    Discriminator,
     Field,
     PlainValidator,
     StrictStr,
@@ -41,6 +42,38 @@ class ConfigTable(BaseModel):
         arbitrary_types_allowed=True,
         defer_build=True,
         use_attribute_docstrings=True,
+    )
+
+
+def numbers_in(value: object, path: tuple[str | int, ...] = ()) -> Iterator[tuple[Any, list[ExactNumber]]]:
+    """Numbers in a table with their places: single ones, and arrays of them."""
+    if isinstance(value, ExactNumber):
+        yield path, [value]
+    elif isinstance(value, BaseModel):
+        for name, entry in value:
+            yield from numbers_in(entry, (*path, name))
+    elif isinstance(value, list):
+        if value and all(isinstance(entry, ExactNumber) for entry in value):
+            yield path, value
+            return
+        for number, entry in enumerate(value):
+            yield from numbers_in(entry, (*path, number))
+
+
+NAME_OR_VECTOR = ("as a name", "as a vector")
+"""Tags of the alternatives of a key that takes either."""
+
+
+def name_or_vector(allowed: str) -> Discriminator:
+    """What tells such alternatives apart, and anything else as not ``allowed``."""
+
+    def kind(value: Any) -> str | None:
+        if isinstance(value, str):
+            return NAME_OR_VECTOR[0]
+        return NAME_OR_VECTOR[1] if isinstance(value, list) else None
+
+    return Discriminator(
+        kind, custom_error_type="kind_of_value", custom_error_message=f"{allowed} is allowed"
     )
 
 

@@ -6,13 +6,13 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Annotated, Any, Literal
 
-from pydantic import Discriminator, Tag
+from pydantic import Tag
 
 from rigidsim.errors import ConfigError, Problem
 from rigidsim.scene.arithmetic import Vector, cross, dot, negligible, norm
 from rigidsim.scene.bodies.body import RigidBody
 from rigidsim.scene.exact import ExactNumber
-from rigidsim.scene.fields import ConfigTable, Dimensionless, Triple
+from rigidsim.scene.fields import NAME_OR_VECTOR, ConfigTable, Dimensionless, Triple, name_or_vector
 
 ORBIT = "orbit"
 SPACE = "space"
@@ -25,14 +25,6 @@ OBLIQUITY = ExactNumber(Fraction(84381406, 1000 * 3600 * 180), pi_power=1)
 """Angle (rad) from the equator to the ecliptic of J2000, 84381.406 arcsec: IAU 2006 (resolution B1, the P03
 precession of Capitaine et al. 2003, A&A 412, 567).
 """
-PLANE_OR_NORMAL = ("as a name", "as a normal")
-"""Names of the alternatives of ``[frame] reference``."""
-
-
-def _kind_of_plane(value: Any) -> str | None:
-    if isinstance(value, str):
-        return PLANE_OR_NORMAL[0]
-    return PLANE_OR_NORMAL[1] if isinstance(value, list) else None
 
 
 class Frame(ConfigTable):
@@ -41,13 +33,11 @@ class Frame(ConfigTable):
     axes: SpaceAxes | None = None
     """name of the space axes; with an ephemeris they are ecliptic J2000"""
     reference: Annotated[
-        Annotated[Literal["space", "orbit"], Tag(PLANE_OR_NORMAL[0])]
-        | Annotated[Triple[Dimensionless], Tag(PLANE_OR_NORMAL[1])],
-        Discriminator(
-            _kind_of_plane,
-            custom_error_type="kind_of_value",
-            custom_error_message='"space" (the plane XY), "orbit" (the source\'s own, moving plane) or a '
-            "normal [x, y, z] in space axes is allowed",
+        Annotated[Literal["space", "orbit"], Tag(NAME_OR_VECTOR[0])]
+        | Annotated[Triple[Dimensionless], Tag(NAME_OR_VECTOR[1])],
+        name_or_vector(
+            '"space" (the plane XY), "orbit" (the source\'s own, moving plane) or a normal [x, y, z] in space '
+            "axes"
         ),
     ] = "space"
     """reference plane of obliquity and longitudes: space (XY), orbit (the moving plane of the source's

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Any, TypeVar
@@ -13,14 +13,42 @@ from rigidsim.scene.arithmetic import Matrix, Vector, apply, context_for, dot, t
 from rigidsim.scene.bodies.body import RigidBody, build_body, inverse_inertia
 from rigidsim.scene.config import Experiment
 from rigidsim.scene.epochs import Epoch
-from rigidsim.scene.events import Event, resolve_events
-from rigidsim.scene.expressions.tree import Expression
+from rigidsim.scene.exact import ExactNumber
+from rigidsim.scene.expressions.parser import parse_expression
+from rigidsim.scene.expressions.tree import (
+    ATTITUDE_NAMES,
+    FLIGHT_NAMES,
+    RATE_NAMES,
+    Expression,
+    ExpressionError,
+    names_used,
+)
 from rigidsim.scene.frame import Figure, figure_of, reference_normal
 from rigidsim.scene.point_masses import PointMasses, resolve_point_masses
 from rigidsim.scene.registry import LOAD_KINDS, SceneLoad, Surroundings
 from rigidsim.scene.sample_times import SampleTimes, sample_times
 
 T = TypeVar("T")
+
+
+@dataclass(frozen=True)
+class Event:
+    """One event of a scene.
+
+    Attributes:
+        direction: direction of the crossing: "any", "up" or "down".
+        stop: whether the run ends there.
+    """
+
+    name: str
+    expression: Expression
+    direction: str
+    stop: bool
+
+    @property
+    def reads(self) -> frozenset[str]:
+        """Names that the expression uses."""
+        return names_used(self.expression)
 
 
 @dataclass(frozen=True)
@@ -127,7 +155,8 @@ def build_scene(experiment: Experiment, context: Any = None) -> Scene:
             config.bodies, table.host, table.coupling, body.mass, context, free_flight=free_flight
         )
         resolved = _resolve_loads(config, body, context, masses, free_flight=free_flight, span=(start, end))
-        gravity = _gravity(resolved, context)
+        fields = [load.uniform_field for load in resolved if load.uniform_field is not None]
+        gravity = [sum(x, context.zero) for x in zip(*fields, strict=True)] if fields else None
         for number, load in enumerate(resolved):
             load.check(number, position)
         if gravity is not None and body.mass is None:
@@ -147,7 +176,7 @@ def build_scene(experiment: Experiment, context: Any = None) -> Scene:
             velocity=velocity,
             gravity=gravity,
             loads=tuple(load for load in resolved if load.acts() and load.uniform_field is None),
-            events=resolve_events(config.events, config.parameters, free_flight=position is not None),
+            events=_resolve_events(config.events, config.parameters, free_flight=position is not None),
             start=start,
             end=end,
             samples=samples,
@@ -223,13 +252,6 @@ def _resolve_loads(
     return found
 
 
-def _gravity(resolved: list[SceneLoad], context: Any) -> Vector | None:
-    fields = [load.uniform_field for load in resolved if load.uniform_field is not None]
-    if not fields:
-        return None
-    return [sum(components, context.zero) for components in zip(*fields, strict=True)]
-
-
 def _translation(config: schema.Config, body: RigidBody, context: Any) -> tuple[Vector | None, Vector | None]:
     table = config.initial
     if table.position is None and table.velocity is None:
@@ -254,3 +276,23 @@ def _check_limits(limits: schema.Limits) -> None:
         value = getattr(limits, key)
         if value is not None and value.sign <= 0:
             raise _fail("limits", key, f"given {float(value):g}; a positive number is allowed")
+
+
+def _resolve_events(
+    tables: Sequence[schema.EventTable], parameters: Mapping[str, ExactNumber], *, free_flight: bool
+) -> tuple[Event, ...]:
+    """Read the expressions of ``[[events]]``."""
+    names = ("t", *RATE_NAMES, *ATTITUDE_NAMES, *(FLIGHT_NAMES if free_flight else ()))
+    found = []
+    for number, table in enumerate(tables):
+        where = f"[[events]] number {number + 1} expression"
+        try:
+            expression = parse_expression(table.expression, names, parameters=parameters, jumps=False)
+        except ExpressionError as error:
+            raise ConfigError(Problem(where, str(error))) from None
+        if not names_used(expression):
+            raise ConfigError(
+                Problem(where, f'given "{table.expression}", which never changes; use {", ".join(names)}')
+            )
+        found.append(Event(table.name, expression, table.direction, table.action == "stop"))
+    return tuple(found)

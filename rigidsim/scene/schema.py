@@ -23,7 +23,6 @@ from pydantic import (
 
 from rigidsim.scene.bodies.table import Body
 from rigidsim.scene.choices import REDUCED
-from rigidsim.scene.events import EventTable
 from rigidsim.scene.expressions.tree import ATTITUDE_NAMES, FLIGHT_NAMES, RATE_NAMES, RESERVED
 from rigidsim.scene.fields import (
     Angle,
@@ -39,6 +38,7 @@ from rigidsim.scene.fields import (
     Second,
     Speed,
     Triple,
+    VariableName,
     named,
     refuse,
 )
@@ -133,6 +133,21 @@ class Output(ConfigTable):
         if self.tip is not None and self.record is not None and "tip" not in self.record:
             raise refuse('a tip is given, but record has no "tip"; name it there, or leave tip out')
         return self
+
+
+class EventTable(ConfigTable):
+    """``[[events]]``: where an expression of time and the state crosses zero."""
+
+    name: VariableName = Field(examples=["flip"])
+    """prefix of the dataset's variables: NAME_time, NAME_quaternion, ..."""
+    expression: StrictStr = Field(examples=["wy", "theta - pi/2"])
+    """expression of t, the states (wx wy wz, qw qx qy qz, phi theta psi, x y z, vx vy vz) and [parameters],
+    in SI; the event is its crossing of zero
+    """
+    direction: Literal["any", "up", "down"] = "any"
+    """direction of the crossing"""
+    action: Literal["record", "stop"] = "record"
+    """record the event, or stop the run at it"""
 
 
 class Limits(ConfigTable):

@@ -157,8 +157,12 @@ def _kinds(
     generator = random.Random(1)
     drawn = [[generator.choice((1, -1)) for _ in arguments] for _ in states]
     agreement = negligible(context)
+
+    def inner_first(item: tuple[Node, Surface]) -> int:
+        return sum(1 for _ in nodes(item[1].expression))
+
     with context.workprec(context.prec + GUARD_BITS):
-        for node, surface in sorted(arguments.items(), key=lambda item: _size(item[1].expression)):
+        for node, surface in sorted(arguments.items(), key=inner_first):
             parts = [on_sides(surface.expression, found, sides) for sides in drawn]
             values = [_value(part, state, context) for part, state in zip(parts, states, strict=True)]
             for index, others in enumerate(known):
@@ -170,11 +174,6 @@ def _kinds(
                 found[node] = len(known), 1
                 known.append(values)
     return found
-
-
-def _size(expression: Expression) -> int:
-    """Number of nodes: what is within an argument has fewer."""
-    return sum(1 for _ in nodes(expression))
 
 
 def _value(expression: Expression, state: Mapping[str, Any], context: Any) -> Any | None:

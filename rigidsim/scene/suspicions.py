@@ -3,21 +3,18 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
-
-from pydantic import BaseModel
+from collections.abc import Sequence
 
 from rigidsim.errors import Problem
-from rigidsim.scene.events import Event
 from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.expressions.tree import Constant, Expression, Name, Operation, operations
-from rigidsim.scene.scene import Scene
+from rigidsim.scene.fields import numbers_in
+from rigidsim.scene.scene import Event, Scene
 from rigidsim.scene.schema import Config
 from rigidsim.scene.units import time_unit
 from rigidsim.scene.validation_messages import key_path
 
 _TURN = 2 * math.pi
-Path = tuple[str | int, ...]
 
 
 def suspicious_angles(config: Config) -> list[Problem]:
@@ -27,7 +24,7 @@ def suspicious_angles(config: Config) -> list[Problem]:
     A multiple of pi is meant in radians, and a value with a unit is unambiguous.
     """
     found = []
-    for path, numbers in _numbers((), config):
+    for path, numbers in numbers_in(config):
         bare = [x for x in numbers if x.assumed == "rad" and not x.pi_power]
         half = [numbers[1]] if path[-1] == "euler_angles" else numbers if path[-1] == "inclination" else []
         beyond = [
@@ -120,18 +117,3 @@ def unreachable_events(events: Sequence[Event]) -> list[Problem]:
             )
             found.append(Problem(where, what))
     return found
-
-
-def _numbers(path: Path, value: object) -> Iterator[tuple[Path, list[ExactNumber]]]:
-    """Numbers in a config with their places: single ones, and arrays of them."""
-    if isinstance(value, ExactNumber):
-        yield path, [value]
-    elif isinstance(value, BaseModel):
-        for name in type(value).model_fields:
-            yield from _numbers((*path, name), getattr(value, name))
-    elif isinstance(value, list):
-        if value and all(isinstance(entry, ExactNumber) for entry in value):
-            yield path, value
-            return
-        for number, entry in enumerate(value):
-            yield from _numbers((*path, number), entry)

@@ -10,7 +10,7 @@ from rigidsim.accuracy.estimates.course import UNCERTAIN
 from rigidsim.accuracy.estimates.estimate import Estimate, estimate_errors
 from rigidsim.accuracy.models.modelling import ModellingError, measure_modelling
 from rigidsim.accuracy.models.side_by_side import Unmeasured
-from rigidsim.scene.readable_time import TimeWords, span_text
+from rigidsim.scene.readable import TimeWords, span_text
 from rigidsim.session.statistics import SampleStatistics
 from rigidsim.session.understood import time_words
 from rigidsim.solve.corrected_stepper import CorrectedStepper

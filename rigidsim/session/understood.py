@@ -7,7 +7,7 @@ from typing import Any
 from rigidsim.model.load import Load
 from rigidsim.scene import attitude
 from rigidsim.scene.arithmetic import Vector, working_bits
-from rigidsim.scene.readable_time import TimeWords
+from rigidsim.scene.readable import TimeWords
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.schema import Config
 from rigidsim.scene.suspicions import (

@@ -48,7 +48,7 @@ def export(
             go to long tables beside it: ``NAME.time.csv``, ``NAME.flip_occurrence.csv``, ``NAME.line.csv``.
         force: replace existing files.
         naming: epoch, axes and names that the run's config leaves open, for aem and oem; empty for sweeps.
-        angle_unit: unit of angles, one of ``rigidsim.scene.readable_units.ANGLE_UNITS``; rad by
+        angle_unit: unit of angles, one of ``rigidsim.scene.readable.ANGLE_UNITS``; rad by
             default. For csv, parquet and zarr.
         block_numbers: numbers of a sweep held in memory at once; no digit depends on it.
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from rigidsim.cli.screens.verdicts import advice_line, next_lines
+from rigidsim.cli.screens.words import advice_line, next_lines
 from rigidsim.store.summary_parts import Advice, AdviceCode
 
 LONG = "end = 12000\nsamples = 101"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from rigidsim.scene.epochs import parse_epoch
-from rigidsim.scene.readable_time import DAY, YEAR, instant_text, span_text
+from rigidsim.scene.readable import DAY, YEAR, instant_text, span_text
 
 FLYBY = parse_epoch("2029-04-13T21:46:00 TDB")
 

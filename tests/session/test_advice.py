@@ -8,7 +8,7 @@ import pytest
 from support import config
 
 import rigidsim
-from rigidsim.cli.screens.verdicts import verdict_line
+from rigidsim.cli.screens.words import verdict_line
 from rigidsim.session.verdict import LEAST, Soundness, verdict_on
 from rigidsim.store.summary_parts import AdviceCode, WarningCode
 

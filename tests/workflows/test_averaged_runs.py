@@ -220,7 +220,7 @@ def test_tradeoff_has_models_beside_settings() -> None:
 @pytest.mark.slow
 def test_a_long_run_that_records_axes_is_told_of_the_cheaper_model(full: rigidsim.Run) -> None:
     """What is promised is kept: the model advised is as near, at that part of the steps."""
-    from rigidsim.cli.screens.verdicts import advice_line
+    from rigidsim.cli.screens.words import advice_line
 
     assert full.summary["cost"]["steps"] < AdviceLimits().steps
     assert run_text(text("full"), estimate=True).summary["advice"] == []

@@ -9,10 +9,9 @@ import rigidsim.workflows.check as validation
 import rigidsim.workflows.plan as planning
 import rigidsim.workflows.tradeoff as measuring
 from rigidsim.cli.screens.page import print_json
-from rigidsim.cli.screens.plan import print_plan
+from rigidsim.cli.screens.plan import print_plan, print_tradeoff
 from rigidsim.cli.screens.summary import print_checked
 from rigidsim.cli.screens.sweeps import print_sweep_plan
-from rigidsim.cli.screens.tradeoff import print_tradeoff
 from rigidsim.scene.editor_schema import editor_schema
 from rigidsim.scene.sweeps.sweep import Sweep
 from rigidsim.workflows.read import load

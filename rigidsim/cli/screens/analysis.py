@@ -12,7 +12,7 @@ from rich.table import Table
 from rich.text import Text
 
 from rigidsim.cli.screens.page import Page
-from rigidsim.scene.readable_time import YEAR, span_text, unit_for
+from rigidsim.scene.readable import YEAR, span_text, unit_for
 
 if TYPE_CHECKING:
     from rigidsim.analysis.result import Analysis, SignalAnalysis, SpectralLine

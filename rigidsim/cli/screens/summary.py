@@ -10,11 +10,10 @@ from typing import TYPE_CHECKING, Any
 from rich.console import Console
 
 from rigidsim.cli.screens.page import Page, Styled
-from rigidsim.cli.screens.understood import understood
-from rigidsim.cli.screens.verdicts import advice_line, next_lines, verdict_line
+from rigidsim.cli.screens.words import advice_line, next_lines, understood, verdict_line
 from rigidsim.errors import ConfigError
 from rigidsim.scene.choices import method_named, variables_named
-from rigidsim.scene.readable_time import YEAR, TimeWords, span_text
+from rigidsim.scene.readable import YEAR, TimeWords, span_text
 from rigidsim.store.summary import Brief, Span, Start, Summary, UnderstoodBody
 from rigidsim.store.summary_parts import ENGINE, Accuracy, InvariantDrift, Modelling, TableErrors
 

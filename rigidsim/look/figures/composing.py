@@ -16,7 +16,7 @@ from rigidsim.look.figures.style import GREY, INK, STYLE, blank
 from rigidsim.look.page import largest_drift
 from rigidsim.look.roles import drifts, is_averaged, read_config
 from rigidsim.look.thinning import thin
-from rigidsim.scene.readable_time import unit_for
+from rigidsim.scene.readable import unit_for
 
 if TYPE_CHECKING:
     import xarray

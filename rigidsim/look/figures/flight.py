@@ -12,7 +12,7 @@ from rigidsim.look.figures import eye as eyes
 from rigidsim.look.figures.panel import panel, recorded
 from rigidsim.look.figures.scales import si_scale
 from rigidsim.look.figures.style import INK, Z, curve, square, titled
-from rigidsim.scene.readable_time import span_text
+from rigidsim.scene.readable import span_text
 
 if TYPE_CHECKING:
     import xarray

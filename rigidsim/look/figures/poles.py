@@ -24,7 +24,7 @@ from rigidsim.look.figures.style import (
     titled,
     trace,
 )
-from rigidsim.scene.readable_time import span_text
+from rigidsim.scene.readable import span_text
 
 if TYPE_CHECKING:
     import xarray

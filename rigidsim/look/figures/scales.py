@@ -10,8 +10,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigidsim.scene.epochs import J2000
-from rigidsim.scene.readable_time import YEAR, TimeUnit, epoch_of, julian_year, unit_of
-from rigidsim.scene.readable_units import ANGLE_UNITS, angle_unit, largest, si_scale
+from rigidsim.scene.readable import (
+    ANGLE_UNITS,
+    YEAR,
+    TimeUnit,
+    angle_unit,
+    epoch_of,
+    julian_year,
+    largest,
+    si_scale,
+    unit_of,
+)
 
 if TYPE_CHECKING:
     import xarray

@@ -11,7 +11,7 @@ import numpy as np
 from matplotlib import rc_context
 
 from rigidsim.look.figures.style import STYLE, ShownFigure
-from rigidsim.scene.readable_time import DAY, YEAR, TimeUnit, unit_for
+from rigidsim.scene.readable import DAY, YEAR, TimeUnit, unit_for
 
 if TYPE_CHECKING:
     import xarray

@@ -13,7 +13,7 @@ from rigidsim.look.figures.fits import secular
 from rigidsim.look.figures.panel import panel, recorded
 from rigidsim.look.figures.scales import TimeAxis, angle_scale, angle_text, number, si_scale, time_axis_of
 from rigidsim.look.figures.style import BLUE, GREY, ORANGE, PALETTE, VIOLET, X, Y, Z, curve, key
-from rigidsim.scene.readable_time import DAY, named_unit, span_text, unit_for
+from rigidsim.scene.readable import DAY, named_unit, span_text, unit_for
 
 if TYPE_CHECKING:
     import xarray

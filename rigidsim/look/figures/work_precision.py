@@ -13,7 +13,7 @@ from matplotlib.lines import Line2D
 
 from rigidsim.look.figures.style import STYLE
 from rigidsim.scene.choices import method_named
-from rigidsim.scene.readable_time import span_text
+from rigidsim.scene.readable import span_text
 
 if TYPE_CHECKING:
     import xarray

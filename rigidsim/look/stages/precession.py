@@ -33,8 +33,7 @@ from rigidsim.look.stages.parts import (
     trail,
 )
 from rigidsim.look.symbols import graticule
-from rigidsim.scene.readable_time import span_text
-from rigidsim.scene.readable_units import angle_unit
+from rigidsim.scene.readable import angle_unit, span_text
 
 if TYPE_CHECKING:
     import xarray

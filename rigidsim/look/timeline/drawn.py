@@ -19,7 +19,7 @@ from rigidsim.look.stages.registry import build_picture
 from rigidsim.look.states import States, charts_of, sections_of, states_of
 from rigidsim.look.thinning import thinned_indices
 from rigidsim.look.timeline import drawing, plotting
-from rigidsim.scene.readable_time import TimeWords
+from rigidsim.scene.readable import TimeWords
 
 if TYPE_CHECKING:
     import xarray

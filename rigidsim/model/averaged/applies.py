@@ -24,7 +24,7 @@ from rigidsim.model.capabilities import gradient_source_of
 from rigidsim.model.carriers import carried_beside
 from rigidsim.model.load import Load
 from rigidsim.scene.choices import ORBIT_AVERAGED
-from rigidsim.scene.readable_time import span_text
+from rigidsim.scene.readable import span_text
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.surfaces import surfaces_of
 

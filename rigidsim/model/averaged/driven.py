@@ -22,7 +22,7 @@ from rigidsim.model.load import Load
 from rigidsim.model.scaling import Scaling, scaled_numbers
 from rigidsim.scene import attitude
 from rigidsim.scene.arithmetic import Vector, apply, dot, norm
-from rigidsim.scene.readable_time import span_text
+from rigidsim.scene.readable import span_text
 from rigidsim.scene.scene import Scene
 
 EPSILON = 2.0**-60

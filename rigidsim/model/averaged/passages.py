@@ -24,7 +24,7 @@ from rigidsim.model.averaged.course import SWING
 from rigidsim.model.averaged.driven import Driven
 from rigidsim.model.averaged.sources import Source
 from rigidsim.model.averaged.spectrum import BodySpectrum, body_spectrum
-from rigidsim.scene.readable_time import span_text
+from rigidsim.scene.readable import span_text
 from rigidsim.scene.scene import Scene
 
 _PLACES = 48  # along the course

@@ -12,7 +12,7 @@ from rigidsim.model.load import Load, Term
 from rigidsim.model.load_words import span_words
 from rigidsim.scene.arithmetic import Vector, cross, negligible, norm
 from rigidsim.scene.fields import Damping, Triple
-from rigidsim.scene.readable_time import number_text
+from rigidsim.scene.readable import number_text
 from rigidsim.scene.registry import LoadFields, Surroundings, register_load
 from rigidsim.scene.scene import Scene
 

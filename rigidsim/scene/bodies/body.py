@@ -6,7 +6,6 @@ another. Positions in the result are body axes, metres, from the reference point
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Any
@@ -26,7 +25,8 @@ from rigidsim.scene.bodies.pieces import (
     refuse_dimensions,
 )
 from rigidsim.scene.bodies.presets import PRESETS
-from rigidsim.scene.exact import ExactNumber, parse_number
+from rigidsim.scene.exact import ExactNumber, exact_decimal, parse_number
+from rigidsim.scene.fields import numbers_in
 from rigidsim.scene.tracing.numbers import plain
 
 SOURCES = ("principal_moments", "inertia_tensor", "points", "shape", "parts", "preset")
@@ -214,7 +214,7 @@ def momentum(body: RigidBody, angular_velocity: Vector) -> Vector:
 
 def rounding_of(table: BaseModel) -> Fraction:
     """Relative rounding of the coarsest number of a table that looks rounded; 0 if none does."""
-    return max((_rounding(number) for number in _numbers(table)), default=Fraction(0))
+    return max((_rounding(x) for _, numbers in numbers_in(table) for x in numbers), default=Fraction(0))
 
 
 def merged(
@@ -243,34 +243,9 @@ def merged(
     )
 
 
-def _numbers(part: Any) -> Iterator[ExactNumber]:
-    if isinstance(part, ExactNumber):
-        yield part
-    elif isinstance(part, BaseModel):
-        for _, value in part:
-            yield from _numbers(value)
-    elif isinstance(part, list | tuple):
-        for value in part:
-            yield from _numbers(value)
-
-
 def _rounding(number: ExactNumber) -> Fraction:
-    digits = 0 if number.swept else _digits(number.rational)
+    written = None if number.swept else exact_decimal(number.rational)
+    digits = len(written.as_tuple().digits) if written else 0  # a fraction that is no decimal is exact
     if digits in _DIGITS_OF_DOUBLES:
         return _DOUBLE
     return Fraction(1, 10 ** (digits - 1)) if digits >= _DIGITS_OF_DOUBLES.stop else Fraction(0)
-
-
-def _digits(value: Fraction) -> int:
-    """Significant digits of a decimal; 0 for a fraction that isn't one, which is exact."""
-    twos = fives = 0
-    rest = value.denominator
-    while rest % 2 == 0:
-        rest, twos = rest // 2, twos + 1
-    while rest % 5 == 0:
-        rest, fives = rest // 5, fives + 1
-    if rest != 1 or value == 0:
-        return 0
-    places = max(twos, fives)
-    whole = abs(value.numerator) * 2 ** (places - twos) * 5 ** (places - fives)
-    return len(str(whole).rstrip("0"))

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from pydantic import Discriminator, Field, StrictStr, Tag, WithJsonSchema, create_model
+from pydantic import Field, StrictStr, Tag, WithJsonSchema, create_model
 
 from rigidsim.scene.bodies.presets import PRESETS
 from rigidsim.scene.bodies.shapes import DIMENSIONS, SHAPES
 from rigidsim.scene.exact import ZERO
 from rigidsim.scene.fields import (
+    NAME_OR_VECTOR,
     Angle,
     ConfigTable,
     Dimensionless,
@@ -20,6 +21,7 @@ from rigidsim.scene.fields import (
     Moment,
     OneOf,
     Triple,
+    name_or_vector,
 )
 
 _SIZES = {
@@ -33,14 +35,6 @@ _SIZES = {
     "major_radius": "from the centre to the middle of the tube",
     "minor_radius": "of the tube",
 }
-POINT_OR_NAME = ("as a name", "as a point")
-"""Names of the alternatives of ``[body] reference``."""
-
-
-def _kind_of_reference(value: Any) -> str | None:
-    if isinstance(value, str):
-        return POINT_OR_NAME[0]
-    return POINT_OR_NAME[1] if isinstance(value, list) else None
 
 
 class PointMass(ConfigTable):
@@ -101,16 +95,11 @@ _LANDMARKS = {name for shape in SHAPES.values() for name in shape.landmarks}
 Reference = Annotated[
     Annotated[
         StrictStr,
-        Tag(POINT_OR_NAME[0]),
+        Tag(NAME_OR_VECTOR[0]),
         WithJsonSchema({"type": "string", "enum": ["center_of_mass", *sorted(_LANDMARKS)]}),
     ]
-    | Annotated[Triple[Metre], Tag(POINT_OR_NAME[1])],
-    Discriminator(
-        _kind_of_reference,
-        custom_error_type="kind_of_value",
-        custom_error_message='"center_of_mass", a landmark of the shape such as "corner", or a point '
-        "[x, y, z] is allowed",
-    ),
+    | Annotated[Triple[Metre], Tag(NAME_OR_VECTOR[1])],
+    name_or_vector('"center_of_mass", a landmark of the shape such as "corner", or a point [x, y, z]'),
 ]
 
 

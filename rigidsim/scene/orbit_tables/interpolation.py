@@ -75,7 +75,7 @@ class Interpolation:
         """Weights of the values at offsets from a row in its first and second derivative."""
         if offsets not in self._weights:
             here = next(i for i, x in enumerate(offsets) if x == 0)
-            products = [_product([x - y for y in offsets if y != x]) for x in offsets]
+            products = [math.prod([x - y for y in offsets if y != x]) for x in offsets]
             one = [
                 products[here] / (p * (offsets[here] - x)) if i != here else x
                 for i, (x, p) in enumerate(zip(offsets, products, strict=True))
@@ -88,13 +88,6 @@ class Interpolation:
             two[here] = -sum(w for i, w in enumerate(two) if i != here)
             self._weights[offsets] = np.array(one), np.array(two)
         return self._weights[offsets]
-
-
-def _product(factors: Sequence[Any]) -> Any:
-    found = factors[0]
-    for factor in factors[1:]:
-        found = found * factor
-    return found
 
 
 def left_out(times: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
