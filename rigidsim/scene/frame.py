@@ -36,8 +36,8 @@ class Frame(ConfigTable):
         Annotated[Literal["space", "orbit"], Tag(NAME_OR_VECTOR[0])]
         | Annotated[Triple[Dimensionless], Tag(NAME_OR_VECTOR[1])],
         name_or_vector(
-            '"space" (the plane XY), "orbit" (the source\'s own, moving plane) or a normal [x, y, z] in space '
-            "axes"
+            '"space" (the plane XY), "orbit" (the source\'s own, moving plane) or a normal [x, y, z] in '
+            "space axes"
         ),
     ] = "space"
     """reference plane of obliquity and longitudes: space (XY), orbit (the moving plane of the source's
