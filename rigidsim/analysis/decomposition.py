@@ -17,19 +17,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from rigidsim.analysis import refinement
 from rigidsim.analysis.exponentials import Reals, Sum
-from rigidsim.analysis.refinement import (
-    CLOSEST,
-    SignalSamples,
-    apart,
-    at_nyquist,
-    error_growth,
-    folded,
-    mirrored,
-    refined,
-    remainder,
-    settled,
-)  # fmt: skip
+from rigidsim.analysis.refinement import CLOSEST, SignalSamples, apart, mirrored, refined, remainder
 from rigidsim.analysis.secular import hidden_rate
 from rigidsim.analysis.windows import Spectrum, hann, peak, positions, spectrum
 
@@ -87,7 +77,7 @@ def decompose(
     assert search is not None
     total = search.total
     final = order or _final_order(total, samples.real)
-    total = settled(double, total, final)
+    total = refinement.settled(double, total, final)
     while (weaker := _merged(total, samples.real, search.limit)) is not None:
         search.close.append(float(total.frequencies[weaker]))
         kept = [n for n in range(len(total.frequencies)) if n != weaker]
@@ -96,7 +86,7 @@ def decompose(
             frequencies=tuple(total.frequencies[n] for n in kept),
             amplitudes=tuple(total.amplitudes[n] for n in kept),
         )
-        total = settled(double, total, final)
+        total = refinement.settled(double, total, final)
     if samples.bits > 53:
         total = refined(samples, total, final)
     return _judged(samples, total, final, search)
@@ -214,7 +204,7 @@ class _Search:
             frequencies=(*self.total.frequencies, context.mpf(frequency)),
             amplitudes=(*self.total.amplitudes, context.mpc(amplitude)),
         )
-        self.total = folded(refined(self.samples, self.total, self.order, steps=_STEPS))
+        self.total = refinement.folded(refined(self.samples, self.total, self.order, steps=_STEPS))
 
 
 def _judged(samples: SignalSamples, total: Sum, order: int, search: _Search) -> Decomposition:
@@ -232,9 +222,9 @@ def _judged(samples: SignalSamples, total: Sum, order: int, search: _Search) -> 
         return math.sqrt(float(np.mean(near**2))) if len(near) else float(found.sizes.max())
 
     # neighbours that are hard to tell apart make errors grow
-    growth = error_growth(mirrored(total, samples.real), order)
+    growth = refinement.error_growth(mirrored(total, samples.real), order)
     powers, lines = len(total.polynomial), len(total.frequencies) * (2 if samples.real else 1)
-    held = at_nyquist(total, samples.real)
+    held = refinement.at_nyquist(total, samples.real)
     frequency_errors, amplitude_errors = [], []
     for n, (frequency, amplitude) in enumerate(zip(total.frequencies, total.amplitudes, strict=True)):
         level = beside(float(frequency)) * growth[powers + n]

@@ -8,22 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigidsim.look import signals
-from rigidsim.look.figures import fits, timelines
+from rigidsim.look.figures import fits, style, timelines
 from rigidsim.look.figures.panel import panel, recorded
 from rigidsim.look.figures.scales import angle_scale, angle_text, si_scale
-from rigidsim.look.figures.style import (
-    BLUE,
-    GREY,
-    INK,
-    ORANGE,
-    VIOLET,
-    curve,
-    key,
-    note,
-    square,
-    titled,
-    trace,
-)
+from rigidsim.look.figures.style import BLUE, INK, ORANGE, VIOLET, curve, key, square
 from rigidsim.scene.readable import span_text
 
 if TYPE_CHECKING:
@@ -39,7 +27,7 @@ _FAR = 0.5  # rad from its mean motion, up to which a pole's path is as on a pla
 def path_about(axes: Axes, path: Array, across: str, up: str, *, center: bool = True) -> None:
     """Draw a path (rows, 2) with equal scales, its labels, and a cross at the origin as its center."""
     x, y = path.T
-    trace(axes, x, y)
+    style.trace(axes, x, y)
     if center:
         axes.plot(0, 0, "+", color=INK, ms=10, mew=1.3)
         x, y = np.append(x, 0), np.append(y, 0)
@@ -69,9 +57,9 @@ def polar_motion(axes: Axes, dataset: xarray.Dataset, plane: Array) -> None:
     period = span_text(_TURN / abs(rate), 5)
     way = "counterclockwise" if rate > 0 else "clockwise"
     if least > 0.55 * most:
-        note(axes, 0.5, 0.62, f"{period}\n{way}", fontsize=11.5, fontweight="bold")
-        note(axes, 0.5, 0.40, f"radius {size}", color=GREY)
-        titled(axes, title)
+        style.note(axes, 0.5, 0.62, f"{period}\n{way}", fontsize=11.5, fontweight="bold")
+        style.note(axes, 0.5, 0.40, f"radius {size}", color=style.GREY)
+        style.titled(axes, title)
     else:
         key(axes, f"{title}: once round in {period}, {way}")
 
@@ -120,7 +108,7 @@ def pole_path(axes: Axes, dataset: xarray.Dataset, found: tuple[dict[str, Array]
     for name, path in shown.items():
         x, y = (path / scale).T
         if name == "figure" or len(shown) == 1:
-            trace(axes, x, y)
+            style.trace(axes, x, y)
         else:
             color = timelines.AXIS_COLORS[name]
             curve(axes, x, y, in_plane=True, color=color, lw=0.7, alpha=0.6, zorder=1, label=f"{name} axis")
@@ -171,7 +159,7 @@ def nutation(axes: Axes, dataset: xarray.Dataset, plane: Array) -> None:
     title = "Nutation: the pole about its mean motion"
     ellipse = fits.leading_ellipse(signals.seconds(dataset), plane)
     if ellipse is None:
-        titled(axes, title)
+        style.titled(axes, title)
         return
     long, short = (angle_text(size, 3) for size in ellipse.semi_axes)
     label = f"{span_text(_TURN / ellipse.rate, 3)}: semi-axes {long}, {short}"

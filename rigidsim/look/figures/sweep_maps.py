@@ -16,20 +16,9 @@ from matplotlib import rc_context
 from matplotlib.colors import LogNorm
 from numpy.typing import NDArray
 
+from rigidsim.look.figures import sweep_axes
 from rigidsim.look.figures.style import GREY, MOST_VECTOR_POINTS, PALE, PALETTE, STYLE, blank, key, titled
-from rigidsim.look.figures.sweep_axes import (
-    along,
-    axes_of,
-    directions,
-    edges_of,
-    geometric,
-    label_of,
-    named,
-    number_ticks,
-    spans_decades,
-    title_of,
-    value_text,
-)
+from rigidsim.look.figures.sweep_axes import along, label_of, named, title_of, value_text
 
 if TYPE_CHECKING:
     import xarray
@@ -57,7 +46,7 @@ _FILLED = 2.0  # area of a sphere's dots over that of its map
 
 def drawable(dataset: xarray.Dataset) -> list[str]:
     """Names that a sweep's figure can show, the default first."""
-    axes = axes_of(dataset)
+    axes = sweep_axes.axes_of(dataset)
     found = [
         str(name)
         for name, variable in dataset.data_vars.items()
@@ -112,7 +101,7 @@ def sweep_figure(dataset: xarray.Dataset, what: str | None = None) -> Figure:
         axes, cut, said = _cut(dataset, variable)
         if bracket:
             cut, said = _component(dataset, cut, axes, int(index.removesuffix("]")), said)
-        on_sphere = directions(dataset, axes[0]) if len(axes) == 1 else None
+        on_sphere = sweep_axes.directions(dataset, axes[0]) if len(axes) == 1 else None
         longest = max(axes, key=lambda dim: cut.sizes[dim])
         lines = len(axes) == 1 or min(cut.sizes[dim] for dim in axes) <= _FEW < cut.sizes[longest]
         if (not lines or len(axes) > 1 or on_sphere is not None) and set(map(str, cut.dims)) != set(axes):
@@ -124,7 +113,7 @@ def sweep_figure(dataset: xarray.Dataset, what: str | None = None) -> Figure:
 
 def _cut(dataset: xarray.Dataset, variable: xarray.DataArray) -> tuple[list[str], xarray.DataArray, str]:
     """At most two axes of more than one value, the longest; others are cut at their first value."""
-    axes = axes_of(dataset)
+    axes = sweep_axes.axes_of(dataset)
     longest = sorted(axes, key=lambda dim: -dataset.sizes[dim])[:2]
     kept = [dim for dim in axes if dim in longest and dataset.sizes[dim] > 1] or axes[:1]
     said = []
@@ -174,11 +163,11 @@ def _lines(dataset: xarray.Dataset, cut: xarray.DataArray, axis: str, said: str)
     if values.shape[1] > _MOST_LINES:
         title += f" (the first {_MOST_LINES} of {values.shape[1]})"
     key(axes, title)
-    number_ticks(axes.xaxis, dataset, axis, along_x=True)
+    sweep_axes.number_ticks(axes.xaxis, dataset, axis, along_x=True)
     axes.set(xlabel=label, ylabel=named(cut))
-    if geometric(place):
+    if sweep_axes.geometric(place):
         axes.set_xscale("log")
-    if spans_decades(values):
+    if sweep_axes.spans_decades(values):
         axes.set_yscale("log")
     axes.yaxis.set_offset_position("right")  # the key is on the left
     return figure
@@ -200,8 +189,8 @@ def _map(dataset: xarray.Dataset, cut: xarray.DataArray, dims: list[str], said: 
     (x, x_label, _), (y, y_label, _) = (along(dataset, dim) for dim in dims)
     values = np.asarray(cut.transpose(*dims).values, dtype=np.float64)
     values, x, y = values[np.argsort(x)][:, np.argsort(y)], np.sort(x), np.sort(y)
-    logs = [geometric(place) for place in (x, y)]
-    edges = [edges_of(place, log) for place, log in zip((x, y), logs, strict=True)]
+    logs = [sweep_axes.geometric(place) for place in (x, y)]
+    edges = [sweep_axes.edges_of(place, log) for place, log in zip((x, y), logs, strict=True)]
     axes.set_facecolor(PALE)
     scale, extend = _colours(values)
     mesh = axes.pcolormesh(*edges, values.T, cmap="viridis", rasterized=True, **scale)
@@ -210,7 +199,7 @@ def _map(dataset: xarray.Dataset, cut: xarray.DataArray, dims: list[str], said: 
         if log:
             setting("log")
     for axis, dim in zip((axes.xaxis, axes.yaxis), dims, strict=True):
-        number_ticks(axis, dataset, dim, along_x=axis is axes.xaxis)
+        sweep_axes.number_ticks(axis, dataset, dim, along_x=axis is axes.xaxis)
     axes.set(xlabel=x_label, ylabel=y_label)
     titled(axes, title_of(cut, said) + ("" if np.isfinite(values).all() else " (grey: no value)"))
     _colour_bar(axes, mesh, cut, extend=extend)
@@ -226,7 +215,7 @@ def _colours(values: Array) -> tuple[dict[str, Any], str]:
     if not len(finite):
         return {"vmin": 0.0, "vmax": 1.0}, "neither"
     ends = [0.5, 99.5] if len(finite) >= _MANY else [0, 100]
-    decades = spans_decades(values)
+    decades = sweep_axes.spans_decades(values)
     low, high = np.percentile(finite[finite > 0] if decades else finite, ends)
     if not decades and (high - low < 0.5 * np.ptp(finite) or low == high):  # few different values
         low, high = finite.min(), finite.max()
@@ -270,7 +259,7 @@ def _sphere(dataset: xarray.Dataset, cut: xarray.DataArray, vectors: Array, said
 
 def _points(dataset: xarray.Dataset, variable: xarray.DataArray) -> Figure:
     """A section's points of all members: one component against the other, or the axis of the members."""
-    members = [dim for dim in variable.dims if dim in axes_of(dataset)]
+    members = [dim for dim in variable.dims if dim in sweep_axes.axes_of(dataset)]
     occurrence = next(str(dim) for dim in variable.dims if str(dim).endswith(_SECTION))
     rest = [str(dim) for dim in variable.dims if dim not in members and dim != occurrence]
     table = np.asarray(variable.transpose(*members, occurrence, *rest).values, dtype=np.float64)

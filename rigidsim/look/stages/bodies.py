@@ -13,23 +13,8 @@ from rigidsim.look import signals, surroundings
 from rigidsim.look.roles import read_config
 from rigidsim.look.signals import values
 from rigidsim.look.solids import Mesh, body_meshes, point_positions, rotation_matrix
-from rigidsim.look.stages.parts import (
-    ARROW_REACH,
-    AXIS_REACH,
-    MOMENTUM,
-    POLHODE,
-    SOURCE,
-    TRACK,
-    VELOCITY,
-    Array,
-    Arrow,
-    Camera,
-    Stage,
-    Trail,
-    longest,
-    trail,
-    viewer_quaternion,
-)
+from rigidsim.look.stages import parts
+from rigidsim.look.stages.parts import Array, Arrow, Camera, Stage, Trail, trail
 
 if TYPE_CHECKING:
     import xarray
@@ -93,8 +78,8 @@ class Subject:
             unit=self.reach,
             meshes=self.meshes,
             points=self.points,
-            axis_length=AXIS_REACH,
-            quaternion=None if self.quaternion is None else viewer_quaternion(self.quaternion),
+            axis_length=parts.AXIS_REACH,
+            quaternion=None if self.quaternion is None else parts.viewer_quaternion(self.quaternion),
             arrows=arrows,
             trails=trails,
         )
@@ -107,9 +92,9 @@ class Subject:
             unit=unit,
             meshes=[mesh.scaled(size) for mesh in self.meshes],
             points=self.points * size,
-            quaternion=None if self.quaternion is None else viewer_quaternion(self.quaternion),
+            quaternion=None if self.quaternion is None else parts.viewer_quaternion(self.quaternion),
             translation=path,
-            trails=[trail("track", TRACK, path, words=words)],
+            trails=[trail("track", parts.TRACK, path, words=words)],
         )
 
     @property
@@ -135,28 +120,30 @@ def vectors_of(
     notes: list[str] = []
     attitude = subject.attitude
     momentum = column(dataset, "angular_momentum", 3)
-    if momentum is not None and attitude is not None and longest(momentum) > 0:
-        factor = ARROW_REACH / longest(momentum)
+    if momentum is not None and attitude is not None and parts.longest(momentum) > 0:
+        factor = parts.ARROW_REACH / parts.longest(momentum)
         words = "angular momentum L"
         arrows.append(
-            Arrow("angular_momentum", "L", MOMENTUM, momentum * factor, False, words, label_at=1.09)
+            Arrow("angular_momentum", "L", parts.MOMENTUM, momentum * factor, False, words, label_at=1.09)
         )
         notes.append(f"{words} (yellow), space axes: 1 unit = {1 / factor:.6g} kg m²/s")
     rates = column(dataset, "angular_velocity", 3)
-    if rates is not None and longest(rates) > 0:
-        factor = ARROW_REACH / longest(rates)
+    if rates is not None and parts.longest(rates) > 0:
+        factor = parts.ARROW_REACH / parts.longest(rates)
         in_body = rates * factor
         tip = in_body if attitude is None else np.einsum("tij,tj->ti", attitude, in_body)
         words, at = "angular velocity ω", 0.93 if arrows else 1.07
-        arrows.append(Arrow("angular_velocity", "ω", VELOCITY, tip, attitude is None, words, label_at=at))
+        arrows.append(
+            Arrow("angular_velocity", "ω", parts.VELOCITY, tip, attitude is None, words, label_at=at)
+        )
         notes.append(f"{words} (cyan): 1 unit = {1 / factor:.6g} rad/s")
         if paths:
             words = "polhode: ω's path in the body"
-            trails.append(trail("polhode", POLHODE, in_body, in_body=True, words=words))
+            trails.append(trail("polhode", parts.POLHODE, in_body, in_body=True, words=words))
             notes.append("polhode (pink): the path of the tip of ω in body axes, carried by the body")
         if paths and attitude is not None:
             words = "herpolhode: ω's path in space"
-            trails.append(trail("herpolhode", VELOCITY, tip, with_centre=True, words=words))
+            trails.append(trail("herpolhode", parts.VELOCITY, tip, with_centre=True, words=words))
             notes.append("herpolhode (cyan): the path of the tip of ω in space axes")
     if trails:
         notes.append("trails: bright for the time just passed, dark for the whole run")
@@ -169,7 +156,7 @@ def source_arrows(dataset: xarray.Dataset, subject: Subject, length: float) -> l
     for key, globe, name, path in [*_masses(dataset), *_sources(dataset, subject)]:
         way = length * path / np.linalg.norm(path, axis=1, keepdims=True)
         called = surroundings.called(globe, name)
-        color = globe.color if globe else SOURCE
+        color = globe.color if globe else parts.SOURCE
         arrows.append(Arrow(key, f"to {called}", color, way, False, f"direction of {called}"))
     return arrows
 
@@ -232,11 +219,11 @@ def camera(stage: Stage, *, narrow: bool = False, subject: Subject | None = None
             return stage.camera
         back = stage.camera.target + 1.08 * (stage.camera.position - stage.camera.target)
         return Camera(back, stage.camera.target, stage.camera.up)
-    target, radius = np.zeros(3), 1.12 * ARROW_REACH if stage.arrows else 1.3
+    target, radius = np.zeros(3), 1.12 * parts.ARROW_REACH if stage.arrows else 1.3
     if stage.translation is not None:
         low, high = np.nanmin(stage.translation, axis=0), np.nanmax(stage.translation, axis=0)
         target = (low + high) / 2
-        margin = ARROW_REACH if stage.arrows else 0.16
+        margin = parts.ARROW_REACH if stage.arrows else 0.16
         radius = float(np.linalg.norm(high - low)) / 2 + margin
     elevation, azimuth = USUAL_VIEW
     if stage.translation is not None and not stage.arrows:
@@ -303,7 +290,7 @@ def with_track(subject: Subject, body: Stage, notes: list[str]) -> list[Stage]:
     unit = reach if near else max(float(np.nanmax(np.abs(position - center))), reach)
     translation = (position - center) / unit
     if near:
-        track = trail("track", TRACK, translation, words="track of the centre of mass")
+        track = trail("track", parts.TRACK, translation, words="track of the centre of mass")
         return [replace(body, translation=translation, trails=[*body.trails, track])]
     enlarged = TRACK_BODY * unit / reach
     notes.append(

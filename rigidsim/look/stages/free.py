@@ -12,32 +12,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rigidsim.look import signals
+from rigidsim.look.stages import parts
 from rigidsim.look.stages.bodies import Subject, column, vectors_of
-from rigidsim.look.stages.parts import (
-    ARROW_REACH,
-    BODY,
-    FAINT,
-    FIGURE,
-    MOMENTUM,
-    PALE,
-    POLHODE,
-    SPACE,
-    VELOCITY,
-    Array,
-    Arrow,
-    Camera,
-    Line,
-    Picture,
-    Shell,
-    Spot,
-    Stage,
-    Vector,
-    circle,
-    grid,
-    longest,
-    quaternion_of,
-    trail,
-)
+from rigidsim.look.stages.parts import BODY, Array, Arrow, Camera, Line, Picture, Shell, Spot, Stage, Vector
 
 if TYPE_CHECKING:
     import xarray
@@ -66,7 +43,7 @@ def picture(dataset: xarray.Dataset, subject: Subject) -> Picture | None:
     followed = signals.principal_axes(dataset)[k] * (1 if along[k] >= 0 else -1)
     tip = np.einsum("tij,j->ti", subject.attitude, 1.15 * followed)
     words = f"trace of the body's {_axis_name(followed)} axis"
-    trace = trail("axis_trace", FIGURE, tip, with_centre=True, words=words)
+    trace = parts.trail("axis_trace", parts.FIGURE, tip, with_centre=True, words=words)
     if trace.line:  # of samples too far apart it would be a cloud
         stage.trails.append(trace)
     momentum = signals.steady_momentum(dataset)
@@ -81,7 +58,7 @@ def picture(dataset: xarray.Dataset, subject: Subject) -> Picture | None:
 
 def _shell(dataset: xarray.Dataset, radii: Array) -> Shell:
     # principal axes are rows: the rotation from these to body axes is the transpose
-    turn = quaternion_of(signals.principal_axes(dataset).T[None])[0]
+    turn = parts.quaternion_of(signals.principal_axes(dataset).T[None])[0]
     return Shell("energy_ellipsoid", radii, ENERGY, BODY, turn[[1, 2, 3, 0]])
 
 
@@ -96,7 +73,7 @@ def _poinsot(dataset: xarray.Dataset, along: Array, radii: Array, rates: Array, 
     """The ellipsoid with these semi-axes on the plane across the momentum's direction."""
     scale = 1.0 / float(radii.max())
     velocity = next(arrow for arrow in body.arrows if arrow.name == "angular_velocity")
-    tip = velocity.vectors * (longest(rates) / ARROW_REACH * scale)
+    tip = velocity.vectors * (parts.longest(rates) / parts.ARROW_REACH * scale)
     heights = tip @ along
     reach = float(np.sqrt(max(np.nanmax((tip**2).sum(axis=1) - heights**2), 0.0)))
     size = 1.2 * max(reach, 0.8)
@@ -114,17 +91,23 @@ def _poinsot(dataset: xarray.Dataset, along: Array, radii: Array, rates: Array, 
         unit=1.0,
         quaternion=body.quaternion,
         turns_with=body.root,
-        arrows=[Arrow("angular_velocity", "", VELOCITY, tip, False, "angular velocity ω", radius=0.014)],
+        arrows=[
+            Arrow("angular_velocity", "", parts.VELOCITY, tip, False, "angular velocity ω", radius=0.014)
+        ],
         trails=[
-            trail("polhode", POLHODE, rates * scale, in_body=True, words=on_ellipsoid),
-            trail("herpolhode", (90, 225, 160), tip, words=on_plane),
+            parts.trail("polhode", parts.POLHODE, rates * scale, in_body=True, words=on_ellipsoid),
+            parts.trail("herpolhode", (90, 225, 160), tip, words=on_plane),
         ],
         lines=[
-            Line("plane/rim", FAINT, circle(size, along, floor), SPACE, 1.6),
-            *grid("plane", floor, first, second, size, 4, 0.45, round_=True),
+            Line("plane/rim", parts.FAINT, parts.circle(size, along, floor), parts.SPACE, 1.6),
+            *parts.grid("plane", floor, first, second, size, 4, 0.45, round_=True),
         ],
-        vectors=[Vector("momentum", "L", MOMENTUM, start, 1.2 * floor, SPACE, "angular momentum L", 0.012)],
-        spots=[Spot("plane/label", "invariable plane", PALE, floor - 0.98 * size * second)],
+        vectors=[
+            Vector(
+                "momentum", "L", parts.MOMENTUM, start, 1.2 * floor, parts.SPACE, "angular momentum L", 0.012
+            )
+        ],
+        spots=[Spot("plane/label", "invariable plane", parts.PALE, floor - 0.98 * size * second)],
         shells=[_shell(dataset, radii * scale)],
         camera=Camera(center + eye, center, -along),
     )

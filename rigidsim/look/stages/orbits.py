@@ -9,26 +9,9 @@ import numpy as np
 
 from rigidsim.look import signals, surroundings
 from rigidsim.look.solids import rotation_matrix
+from rigidsim.look.stages import parts
 from rigidsim.look.stages.bodies import FIELD, Subject, column, direction_of, plane_view, vectors_of
-from rigidsim.look.stages.parts import (
-    FAINT,
-    FIGURE,
-    PALE,
-    SOURCE,
-    SPACE,
-    Array,
-    Arrow,
-    Camera,
-    Line,
-    Picture,
-    Solid,
-    Spot,
-    Stage,
-    Vector,
-    quaternion_of,
-    trail,
-    viewer_quaternion,
-)
+from rigidsim.look.stages.parts import SPACE, Array, Arrow, Camera, Line, Picture, Solid, Spot, Stage, Vector
 from rigidsim.look.surroundings import GREY, Globe, called
 from rigidsim.look.symbols import globe, graticule
 
@@ -53,7 +36,7 @@ def free_orbit(dataset: xarray.Dataset, subject: Subject) -> Picture | None:
     arrows, trails, notes = vectors_of(dataset, subject, paths=False)
     name = called(planet, "attracting point")
     down = -position / np.linalg.norm(position, axis=1, keepdims=True)
-    arrows.append(Arrow("nadir", f"to {name}", SOURCE, 1.35 * down, False, f"direction of {name}"))
+    arrows.append(Arrow("nadir", f"to {name}", parts.SOURCE, 1.35 * down, False, f"direction of {name}"))
     close = subject.stage(arrows, trails, "Body, seen in space axes")
     stages = [close, _orbit(subject, position, planet, notes)]
     leading = ("libration", "angular_velocity")
@@ -78,7 +61,7 @@ def satellite(dataset: xarray.Dataset, subject: Subject) -> Picture | None:
         angles = column(dataset, "roll_pitch_yaw", 3)
         if angles is None or not np.isfinite(angles).all():
             return None
-        quaternion = quaternion_of(local @ _turned(angles))
+        quaternion = parts.quaternion_of(local @ _turned(angles))
     planet = surroundings.globe_of(listed[0])
     known = replace(subject, quaternion=quaternion, attitude=rotation_matrix(quaternion))
     notes = ["in the local frame the planet's surface is drawn near the body, and not to scale"]
@@ -134,7 +117,7 @@ def _orbit(subject: Subject, position: Array, planet: Globe | None, notes: list[
     return replace(
         subject.enlarged(ORBIT_BODY, title, unit, places, "orbit"),
         solids=[Solid("planet", globe(np.full(3, radius), planet.color if planet is not None else GREY))],
-        spots=[Spot("planet", name, PALE, np.array([0.0, 0.0, radius + 0.06]))],
+        spots=[Spot("planet", name, parts.PALE, np.array([0.0, 0.0, radius + 0.06]))],
         lines=[Line(f"graticule/{k}", (20, 24, 30), ring, SPACE, 0.7, 0.5) for k, ring in enumerate(rings)],
         camera=Camera(1.3 / np.sin(FIELD / 2) * direction, np.zeros(3), np.array([0.0, 0.0, 1.0])),
     )
@@ -152,12 +135,12 @@ def _in_local_frame(dataset: xarray.Dataset, subject: Subject, local: Array, pla
     # in space, as all moving parts are; the view looks from the local frame
     tip = 1.3 * np.einsum("tij,tj->ti", relative, np.broadcast_to(axis, (len(relative), 3)))
     words = "trace of the body axis that points down"
-    trails = [trail("local/axis_trace", FIGURE, tip, words=words, head=True)]
+    trails = [parts.trail("local/axis_trace", parts.FIGURE, tip, words=words, head=True)]
     center = np.array([0.0, 0.0, _BELOW + _HORIZON])
     surface = globe(np.full(3, _HORIZON), planet.color if planet is not None else GREY)
     name = f"to {called(planet, 'source')}"
     vectors = [
-        ("nadir", name, SOURCE, (0, 0, 1.75), f"nadir: {name}"),
+        ("nadir", name, parts.SOURCE, (0, 0, 1.75), f"nadir: {name}"),
         ("forward", "forward", FORWARD, (1.75, 0, 0), "along the orbit"),
         ("normal", "normal", NORMAL, (0, -1.6, 0), "the orbit's normal"),
     ]
@@ -168,14 +151,14 @@ def _in_local_frame(dataset: xarray.Dataset, subject: Subject, local: Array, pla
         subject.stage([], trails, "Body in the local frame"),
         solids=[Solid("horizon", surface.moved(np.eye(3), center), "local")],
         lines=[
-            Line(f"horizon/{k}", FAINT, line + center, "local", 0.6, 0.35)
+            Line(f"horizon/{k}", parts.FAINT, line + center, "local", 0.6, 0.35)
             for k, line in enumerate(graticule(np.full(3, _HORIZON), 15.0))
         ],
         vectors=[
             Vector(key, label, color, np.zeros(3), np.array(way), "local", words)
             for key, label, color, way, words in vectors
         ],
-        frames={"local": viewer_quaternion(quaternion_of(local))},
+        frames={"local": parts.viewer_quaternion(parts.quaternion_of(local))},
         looked_from="local",
         camera=Camera(target + eye, target, np.array([0.0, 0.0, -1.0])),
     )

@@ -11,25 +11,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rigidsim.look import signals, surroundings
-from rigidsim.look.stages import precession
+from rigidsim.look.stages import parts, precession
 from rigidsim.look.stages.bodies import Subject, column, source_arrows
-from rigidsim.look.stages.parts import (
-    BODY,
-    FIGURE,
-    PALE,
-    POLHODE,
-    VELOCITY,
-    Array,
-    Arrow,
-    Color,
-    Line,
-    Picture,
-    Plane,
-    Stage,
-    Vector,
-    circle,
-    trail,
-)
+from rigidsim.look.stages.parts import BODY, Array, Arrow, Color, Line, Picture, Plane, Stage, Vector, trail
 from rigidsim.look.symbols import earth, globe, graticule
 
 if TYPE_CHECKING:
@@ -66,8 +50,8 @@ def picture(dataset: xarray.Dataset, subject: Subject) -> Picture | None:
     rings = enumerate(graticule(half))
     stage.lines.extend(Line(f"graticule/{k}", (20, 24, 30), line, BODY, 0.8, 0.55) for k, line in rings)
     if turns or subject.attitude is None:  # the prime meridian stands out, so that the rotation shows
-        stage.lines.append(Line("prime_meridian", PALE, graticule(half, 180.0, 1.006)[0], BODY, 1.6))
-    stage.lines.append(Line("equator", EQUATOR, circle(1.01, figure), BODY, 1.8, 1.0, "equator"))
+        stage.lines.append(Line("prime_meridian", parts.PALE, graticule(half, 180.0, 1.006)[0], BODY, 1.6))
+    stage.lines.append(Line("equator", EQUATOR, parts.circle(1.01, figure), BODY, 1.8, 1.0, "equator"))
     notes = ["continents: Natural Earth; the body's x axis is at longitude zero"] if name == "earth" else []
     planes = _pole_planes(dataset)
     called = {"": "a planet", "earth": "the Earth", "moon": "the Moon"}.get(name, name.capitalize())
@@ -76,7 +60,9 @@ def picture(dataset: xarray.Dataset, subject: Subject) -> Picture | None:
         stage = replace(stage, camera=precession.eye_of_pole(0.3, 1.75))
         return Picture(f"rotation of {called}", [stage], planes, _LEADING, notes)
     pole = subject.attitude @ figure
-    arrow = Arrow("figure_axis", "figure axis", FIGURE, precession.POLE_REACH * pole, False, "figure axis")
+    arrow = Arrow(
+        "figure_axis", "figure axis", parts.FIGURE, precession.POLE_REACH * pole, False, "figure axis"
+    )
     stage.arrows.append(arrow)
     precession.reference_plane(stage)
     precession.circle_of_precession(dataset, stage, pole, "figure", notes)
@@ -121,7 +107,7 @@ def _in_its_own_axes(dataset: xarray.Dataset, stage: Stage, figure: Array, notes
     """Draw figure axis and spin axis, their angle enlarged until it is visible."""
     notes.append("no attitude was recorded: the body is shown in its own axes and doesn't turn")
     stage.vectors.append(
-        Vector("figure_axis", "figure axis", FIGURE, figure, 0.55 * figure, BODY, "figure axis", 0.014)
+        Vector("figure_axis", "figure axis", parts.FIGURE, figure, 0.55 * figure, BODY, "figure axis", 0.014)
     )
     rates = column(dataset, "angular_velocity", 3)
     if rates is None:
@@ -138,8 +124,10 @@ def _in_its_own_axes(dataset: xarray.Dataset, stage: Stage, figure: Array, notes
     shown = 1.4 * figure + 1.4 * factor * apart
     times = f"{factor:,.0f} times"
     words = "spin axis" if factor == 1.0 else f"spin axis, {times} farther from the figure axis"
-    stage.arrows.append(Arrow("spin_axis", "spin axis", VELOCITY, shown, True, words))
-    stage.trails.append(trail("polar_motion", POLHODE, shown, in_body=True, words="path of the spin axis"))
+    stage.arrows.append(Arrow("spin_axis", "spin axis", parts.VELOCITY, shown, True, words))
+    stage.trails.append(
+        trail("polar_motion", parts.POLHODE, shown, in_body=True, words="path of the spin axis")
+    )
     notes.append(f"the angle between spin axis and figure axis is drawn {times} too large")
 
 
@@ -148,5 +136,7 @@ def _pole_planes(dataset: xarray.Dataset) -> list[Plane]:
     planes = precession.nutation_planes(dataset, "figure")
     motion = signals.polar_motion(dataset)
     if motion is not None and np.nanmax(np.abs(motion)) > 0:
-        planes.append(precession.plane_of("polar_motion_path", "Polar motion", POLHODE, motion, ("m1", "m2")))
+        planes.append(
+            precession.plane_of("polar_motion_path", "Polar motion", parts.POLHODE, motion, ("m1", "m2"))
+        )
     return planes

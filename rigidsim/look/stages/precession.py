@@ -13,25 +13,9 @@ import numpy as np
 
 from rigidsim.look import signals, surroundings
 from rigidsim.look.roles import is_averaged, read_config
+from rigidsim.look.stages import parts
 from rigidsim.look.stages.bodies import Subject, direction_of, eye_at, source_arrows
-from rigidsim.look.stages.parts import (
-    FAINT,
-    FIGURE,
-    MOMENTUM,
-    SPACE,
-    Array,
-    Arrow,
-    Camera,
-    Color,
-    Line,
-    Picture,
-    Plane,
-    Spot,
-    Stage,
-    circle,
-    quaternion_of,
-    trail,
-)
+from rigidsim.look.stages.parts import SPACE, Array, Arrow, Camera, Color, Line, Picture, Plane, Spot, Stage
 from rigidsim.look.symbols import graticule
 from rigidsim.scene.readable import angle_unit, span_text
 
@@ -72,13 +56,13 @@ def picture(dataset: xarray.Dataset, subject: Subject) -> Picture | None:
     else:
         stage = replace(stage, meshes=[], points=np.empty((0, 3)))
         rings = enumerate(graticule(np.full(3, 0.6), lift=1.0))
-        stage.lines.extend(Line(f"directions/{k}", FAINT, line, SPACE, 0.7, 0.4) for k, line in rings)
+        stage.lines.extend(Line(f"directions/{k}", parts.FAINT, line, SPACE, 0.7, 0.4) for k, line in rings)
         notes.append("the body isn't drawn: of its attitude only the momentum's direction is known")
     for name, axis in axes.items():
-        color = FIGURE if name == "figure" else MOMENTUM
+        color = parts.FIGURE if name == "figure" else parts.MOMENTUM
         shown, words = POLE_REACH * axis, f"{name} axis"
         stage.arrows.append(Arrow(f"{name}_axis", words, color, shown, False, words))
-        path = trail(f"{name}_path", color, shown, words=f"path of the {words}")
+        path = parts.trail(f"{name}_path", color, shown, words=f"path of the {words}")
         # of samples too far apart it would be a cloud; on the circle of precession it wouldn't be seen
         if path.line and np.ptp(axis[:, 2]) > _APART:
             stage.trails.append(path)
@@ -137,7 +121,7 @@ def pointed(dataset: xarray.Dataset, subject: Subject, figure: Array, *, plane: 
     in_body = np.stack([*signals.across(figure), figure], axis=1)
     in_space = np.stack([node, np.cross(pole, node), pole], axis=2)
     attitude = in_space @ in_body.T
-    return replace(subject, attitude=attitude, quaternion=quaternion_of(attitude))
+    return replace(subject, attitude=attitude, quaternion=parts.quaternion_of(attitude))
 
 
 def standing_note(dataset: xarray.Dataset, what: str) -> str:
@@ -167,13 +151,13 @@ def followed_sources(dataset: xarray.Dataset, subject: Subject, notes: list[str]
 def reference_plane(stage: Stage) -> None:
     """Put the XY plane of space with its normal on a stage."""
     up = np.array([0.0, 0.0, 1.0])
-    rim = Line("ecliptic/rim", ECLIPTIC, circle(1.75, up), SPACE, 1.8, 0.9, "plane of reference")
-    stage.lines.extend([rim, Line("ecliptic/inner", ECLIPTIC, circle(1.3, up), SPACE, 0.8, 0.35)])
+    rim = Line("ecliptic/rim", ECLIPTIC, parts.circle(1.75, up), SPACE, 1.8, 0.9, "plane of reference")
+    stage.lines.extend([rim, Line("ecliptic/inner", ECLIPTIC, parts.circle(1.3, up), SPACE, 0.8, 0.35)])
     for k in range(6):
         ends = np.outer([-1.75, 1.75], direction_of(0.0, np.pi * k / 6))
         stage.lines.append(Line(f"ecliptic/spoke{k}", ECLIPTIC, ends, SPACE, 0.7, 0.22))
-    stage.lines.append(Line("normal", FAINT, np.array([[0, 0, -1.5], [0, 0, 1.75]]), SPACE, 1.0))
-    stage.spots.append(Spot("normal", "normal", FAINT, np.array([0.0, 0.0, 1.78])))
+    stage.lines.append(Line("normal", parts.FAINT, np.array([[0, 0, -1.5], [0, 0, 1.75]]), SPACE, 1.0))
+    stage.spots.append(Spot("normal", "normal", parts.FAINT, np.array([0.0, 0.0, 1.78])))
 
 
 def circle_of_precession(
@@ -186,7 +170,7 @@ def circle_of_precession(
     if not 1e-3 < tilt < np.pi - 1e-3:
         return
     up, high = np.array([0.0, 0.0, 1.0]), np.array([0, 0, POLE_REACH * np.cos(tilt)])
-    ring = circle(POLE_REACH * np.sin(tilt), up, high)
+    ring = parts.circle(POLE_REACH * np.sin(tilt), up, high)
     words = "precession of the pole" if axis == "figure" else f"precession of the {axis}"
     found = signals.orientation(dataset, axis)
     seconds = signals.seconds(dataset)
@@ -215,7 +199,7 @@ def nutation_planes(dataset: xarray.Dataset, axis: str) -> list[Plane]:
     if not np.abs(path).max() > 0:
         return []
     title = "Nutation of the pole" if axis == "figure" else f"Nutation of the {axis}"
-    return [plane_of("nutation_path", title, FIGURE, path, ("longitude", "obliquity"))]
+    return [plane_of("nutation_path", title, parts.FIGURE, path, ("longitude", "obliquity"))]
 
 
 def plane_of(key: str, title: str, color: Color, path: Array, names: tuple[str, str]) -> Plane:

@@ -9,24 +9,9 @@ import numpy as np
 
 from rigidsim.look import signals, surroundings
 from rigidsim.look.solids import Mesh
+from rigidsim.look.stages import parts
 from rigidsim.look.stages.bodies import FIELD, Subject, vectors_of
-from rigidsim.look.stages.parts import (
-    BODY,
-    FAINT,
-    FIGURE,
-    PALE,
-    PULL,
-    SPACE,
-    Array,
-    Camera,
-    Line,
-    Picture,
-    Plane,
-    Spot,
-    Vector,
-    circle,
-    trail,
-)
+from rigidsim.look.stages.parts import BODY, SPACE, Array, Camera, Line, Picture, Plane, Spot, Vector, trail
 from rigidsim.look.symbols import spinning_top
 
 if TYPE_CHECKING:
@@ -62,7 +47,7 @@ def picture(dataset: xarray.Dataset, subject: Subject) -> Picture | None:
     assert attitude is not None
     arrows = [replace(a, vectors=a.vectors * (1.25 if a.name == "angular_momentum" else 1.1)) for a in arrows]
     tip = TRACE * attitude @ axis
-    trails = [trail("tip", FIGURE, tip, words="trace of the axis", head=True)]
+    trails = [trail("tip", parts.FIGURE, tip, words="trace of the axis", head=True)]
     lowest = min(float(np.nanmin(tip @ up)), float((subject.meshes[0].vertices @ axis).min()))
     # A top that dips below its pivot stands on a post, not on a floor that it would pass through.
     post = not (lowest > -0.02 and float(np.nanmin(tip @ up)) > 0.25)
@@ -70,16 +55,16 @@ def picture(dataset: xarray.Dataset, subject: Subject) -> Picture | None:
     across = _across(up)
     lines = [
         *_ground(up, ground),
-        Line("vertical", FAINT, np.stack([ground, 1.5 * up]), width=1.0, words="vertical"),
+        Line("vertical", parts.FAINT, np.stack([ground, 1.5 * up]), width=1.0, words="vertical"),
     ]
     # on a post the label is below, where it is clear of the body's own
-    spots = [Spot("pivot", "pivot", PALE, 0.55 * ground if post else center, size=0.0 if post else 5.0)]
+    spots = [Spot("pivot", "pivot", parts.PALE, 0.55 * ground if post else center, size=0.0 if post else 5.0)]
     if post:
-        lines.append(Line("ground/post", PALE, np.stack([ground, center]), width=4.0))
+        lines.append(Line("ground/post", parts.PALE, np.stack([ground, center]), width=4.0))
     if symbol is None:
         com = arm / subject.reach
-        lines.append(Line("arm", PALE, np.stack([center, com]), BODY, 2.5))
-        spots.append(Spot("center_of_mass", "centre of mass", PULL, com, BODY, 6.0))
+        lines.append(Line("arm", parts.PALE, np.stack([center, com]), BODY, 2.5))
+        spots.append(Spot("center_of_mass", "centre of mass", parts.PULL, com, BODY, 6.0))
     place, words = 1.25 * across[0] + 0.9 * up, "gravity"
     elevation = np.deg2rad(20.0)
     direction = np.cos(elevation) * (0.55 * across[0] - 0.83 * across[1]) + np.sin(elevation) * up
@@ -88,7 +73,7 @@ def picture(dataset: xarray.Dataset, subject: Subject) -> Picture | None:
         subject.stage(arrows, trails, "Top on its pivot"),
         lines=lines,
         spots=spots,
-        vectors=[Vector("gravity", words, PULL, place, -0.55 * up, SPACE, words, 0.02)],
+        vectors=[Vector("gravity", words, parts.PULL, place, -0.55 * up, SPACE, words, 0.02)],
         camera=Camera(target + radius / np.sin(FIELD / 2) * direction, target, up),
     )
     leading = ("tilt", "precession_angle", "nutation_angle", "euler_angles")
@@ -136,13 +121,15 @@ def _across(axis: Array) -> tuple[Array, Array]:
 
 def _ground(up: Array, at: Array) -> list[Line]:
     first, second = _across(up)
-    lines = [Line("ground/rim", FAINT, circle(1.6, up, at), SPACE, 1.2, 0.8)]
+    lines = [Line("ground/rim", parts.FAINT, parts.circle(1.6, up, at), SPACE, 1.2, 0.8)]
     for radius in (0.4, 0.8, 1.2):
-        lines.append(Line(f"ground/ring{radius:g}", FAINT, circle(radius, up, at), SPACE, 0.7, 0.4))
+        lines.append(
+            Line(f"ground/ring{radius:g}", parts.FAINT, parts.circle(radius, up, at), SPACE, 0.7, 0.4)
+        )
     for k, way in enumerate((first, second, first + second, first - second)):
         way = way / np.linalg.norm(way)
         points = np.stack([at - 1.6 * way, at + 1.6 * way])
-        lines.append(Line(f"ground/spoke{k}", FAINT, points, SPACE, 0.7, 0.4))
+        lines.append(Line(f"ground/spoke{k}", parts.FAINT, points, SPACE, 0.7, 0.4))
     return lines
 
 
@@ -152,4 +139,4 @@ def _from_above(tip: Array, up: Array, across: tuple[Array, Array]) -> Plane:
     rings = tuple((float(np.sin(np.deg2rad(t))), f"{t}°") for t in (10, 30, 60, 90))
     largest = float(np.nanmax(np.linalg.norm(plane, axis=1)))
     shown = tuple(ring for ring in rings if ring[0] <= 1.3 * largest) or rings[:1]
-    return Plane("tip_from_above", "Axis from above", FIGURE, plane, rings=shown, names=("X", "Y"))
+    return Plane("tip_from_above", "Axis from above", parts.FIGURE, plane, rings=shown, names=("X", "Y"))

@@ -14,16 +14,9 @@ from rigidsim.look.clock import Clock
 from rigidsim.look.plots import Plot
 from rigidsim.look.stages.bodies import Subject, camera
 from rigidsim.look.stages.parts import Color, Plane, Stage
+from rigidsim.look.timeline import plotting
 from rigidsim.look.timeline.drawing import OLDER, fades, trail_path, trail_stride
 from rigidsim.look.timeline.drawn import DrawnRun
-from rigidsim.look.timeline.plotting import (
-    LEGEND_LINE,
-    legend_lines,
-    legend_of,
-    plane_path,
-    plane_reach,
-    plot_path,
-)
 
 SCREEN_SECONDS = 60.0  # the longest that playing a whole run may take
 TURN_SECONDS = 3.0  # per turn of the body, when the run has few enough turns for it
@@ -43,7 +36,7 @@ def build_blueprint(run: DrawnRun, *, following: bool = False) -> rrb.Blueprint:
     beside = [tabs([plane_view(plane) for plane in planes])] if planes else []
     shares = [3.0] * len(spaces) + [1.6] * len(beside)
     scene = spaces[0] if len(shares) == 1 else rrb.Horizontal(*spaces, *beside, column_shares=shares)
-    left = left_side(scene, legend_of(stages), {page.lower(): page for page in run.pages})
+    left = left_side(scene, plotting.legend_of(stages), {page.lower(): page for page in run.pages})
     views = {
         place: [plot_view(plot) for plot in run.plots if plot.place == place]
         for place in ("leading", "drift", "more")
@@ -85,7 +78,7 @@ def build_comparison(
     views += [plot_view(plot) for plot in common.values() if plot.place == "drift"]
     left = left_side(
         scene,
-        legend_of(runs[0].picture.stages),
+        plotting.legend_of(runs[0].picture.stages),
         {page.lower(): name for name, run in named for page in run.pages},
     )
     return page_of(left, views, time_panel(clock, max(run.turns for run in runs), following=False))
@@ -110,13 +103,13 @@ def left_side(
     scene: rrb.View | rrb.Container, legend: Sequence[tuple[str, Color]], pages: Mapping[str, str]
 ) -> rrb.Container:
     """The scene above its legend and the text pages, by their entities."""
-    height = 30.0 + 24.0 * legend_lines(legend)
+    height = 30.0 + 24.0 * plotting.legend_lines(legend)
     key = rrb.Spatial2DView(
         origin="/legend",
         name="What is shown",
         background=_DARK,
         visual_bounds=rrb.VisualBounds2D(
-            x_range=(0.0, 30.0), y_range=(0.0, LEGEND_LINE * legend_lines(legend))
+            x_range=(0.0, 30.0), y_range=(0.0, plotting.LEGEND_LINE * plotting.legend_lines(legend))
         ),
     )
     texts: list[rrb.View] = [
@@ -190,9 +183,9 @@ def _window(clock: Clock, rows: int) -> list[rr.VisibleTimeRange]:
 
 def plane_view(plane: Plane) -> rrb.Spatial2DView:
     """A view of one plane figure."""
-    size = 1.35 * plane_reach(plane)
+    size = 1.35 * plotting.plane_reach(plane)
     return rrb.Spatial2DView(
-        origin=plane_path(plane),
+        origin=plotting.plane_path(plane),
         name=plane.title,
         background=_DARK,
         visual_bounds=rrb.VisualBounds2D(x_range=(-size, size), y_range=(-size, size)),
@@ -206,8 +199,8 @@ def plot_view(plot: Plot) -> rrb.TimeSeriesView:
     return rrb.TimeSeriesView(
         origin="/plots",
         contents=[
-            *(plot_path(plot, series.name) for series in plot.series),
-            *(plot_path(plot, level.key) for level in plot.levels),
+            *(plotting.plot_path(plot, series.name) for series in plot.series),
+            *(plotting.plot_path(plot, level.key) for level in plot.levels),
         ],
         name=plot.title,
         plot_legend=rrb.PlotLegend(visible=True, corner=corner),
