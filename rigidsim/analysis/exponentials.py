@@ -25,12 +25,7 @@ _ROWS = 64  # of blocks that are worked on at once, in a precision beyond double
 
 
 def exponentials(frequencies: Sequence[Any], numbers: NDArray[np.int64]) -> Complexes:
-    """exp(i pi f n), (numbers, frequencies), right to rounding for any numbers below 2^40.
-
-    Args:
-        frequencies: mpf, half turns per number.
-        numbers: integers.
-    """
+    """exp(i pi f n), (numbers, frequencies), right to rounding for any numbers below 2^40; f are mpf."""
     result = np.empty((len(numbers), len(frequencies)), dtype=np.complex128)
     for k, frequency in enumerate(frequencies):
         # in units of 2^-64 turns, as unsigned integers that wrap around by themselves

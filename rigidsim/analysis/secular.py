@@ -26,11 +26,8 @@ _LONGEST = 3.0  # half lengths that a slow part may take to change by e, where t
 
 
 def hidden_rate(total: Sum, left: Complexes, noise: float) -> float:
-    """What a slow part may have added to the rate of a real signal, per half length; 0 if nothing is left.
-
-    Args:
-        left: remainder, (n,).
-        noise: standard deviation of its mean, as if it were white.
+    """What a slow part may have added to the rate of a real signal, per half length; 0 if nothing of it is
+    left in the remainder (n,), whose mean has the standard deviation ``noise``, as if it were white.
     """
     c, s = _polynomial(left.real, noise, 3)
     if not np.any(np.abs(c[2:]) > _SURE * s[2:]):

@@ -7,6 +7,7 @@ that is p + 1 bins wide on either side.
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -100,7 +101,8 @@ class Spectrum:
 def spectrum(values: Complexes, order: int, *, real: bool) -> Spectrum:
     """Spectrum with two points per bin; of a real signal the positive half, with amplitudes of exp(i w t)."""
     count = len(values)
-    size = _smooth(2 * count)
+    # the next number without prime factors above 5, which transforms fast
+    size = next(n for n in itertools.count(2 * count) if pow(30, 64, n) == 0)
     weights = hann(count, order) / count
     if real:
         found = np.fft.rfft(values.real * weights, size)
@@ -109,20 +111,6 @@ def spectrum(values: Complexes, order: int, *, real: bool) -> Spectrum:
         found = np.fft.fftshift(np.fft.fft(values * weights, size))
         frequencies = (np.arange(size) - size // 2) / size
     return Spectrum(frequencies, np.abs(found), found, count)
-
-
-def _smooth(least: int) -> int:
-    """The next number without prime factors above 5, which transforms fast."""
-    best = 1 << (least - 1).bit_length()
-    fives = 1
-    while fives < best:
-        threes = fives
-        while threes < best:
-            size = threes << max((-(-least // threes) - 1).bit_length(), 0)
-            best = min(best, size) if size >= least else best
-            threes *= 3
-        fives *= 5
-    return best
 
 
 def peak(found: Spectrum, at: int) -> float:

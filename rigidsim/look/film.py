@@ -33,16 +33,12 @@ class NoGraphics(RuntimeError):
 def render(
     path: Path, target: Path, *, seconds: float = SECONDS, told: Callable[[int, int], None] | None = None
 ) -> Path:
-    """Draw a recording as a PNG picture, or a GIF or MP4 film of the whole run.
+    """Draw a recording (``.rrd``) as a PNG picture, or a GIF or MP4 film of the whole run, as the suffix of
+    `target` says, which it returns.
 
     Args:
-        path: a ``.rrd`` file.
-        target: the file, whose suffix decides what is drawn.
         seconds: duration of a film.
         told: called with the number of frames drawn so far, and the total.
-
-    Returns:
-        `target`.
 
     Raises:
         ValueError: another suffix.
@@ -117,10 +113,6 @@ def _encoder() -> Any:
 
 class HeadlessViewer:
     """The viewer without a screen, with a recording open in it and its time at rest; a context manager.
-
-    Args:
-        path: a `.rrd` file.
-        size: width and height of the window in points; a picture may have more pixels.
 
     Attributes:
         client: client of rerun, for what isn't offered here.

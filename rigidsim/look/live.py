@@ -25,11 +25,7 @@ def follow(
 
     Args:
         read: returns the dataset saved so far (None before there is one), and whether the run goes on.
-        web: in the browser, served on 127.0.0.1 only, until Ctrl-C.
-        poll: interval between polls, s.
-
-    Returns:
-        The viewer's exit code; 130 after Ctrl-C.
+        web, and what is returned: as for ``viewer.open_viewer``.
 
     Raises:
         NoDisplay, FileNotFoundError: as for ``viewer.open_viewer``.

@@ -28,13 +28,7 @@ _SOUTHERN_ICE, _NORTHERN_ICE = -60.0, (72.0, 80.0)  # degrees of latitude: land 
 
 
 def spinning_top(radius: float, height: float, whole: float) -> Mesh:
-    """A top that stands on its tip at the origin, with its disk at some height and a stem above it.
-
-    Args:
-        radius: radius of the disk.
-        height: height of the disk.
-        whole: height of the stem's end.
-    """
+    """A top that stands on its tip at the origin, with a disk at some height, and a stem up to `whole`."""
     stem, rim = 0.09 * radius, 0.13 * radius
     pieces = (
         StraightPiece((0.0, 0.0), (0.30 * radius, height - 3.2 * rim)),

@@ -28,11 +28,8 @@ def thinned_indices(count: int, rows: int) -> NDArray[np.int64]:
 def thin(dataset: xarray.Dataset, rows: int, at_once: int = ROWS_AT_ONCE) -> xarray.Dataset:
     """The rows of `thinned_indices`, in memory; residuals are left out.
 
-    Only variables that have a time dimension, and of those only the rows asked for, are read:
-    memory goes with `rows`, not with the length of the run.
-
-    Args:
-        at_once: rows of the file that one read spans.
+    Only variables that have a time dimension, and of those only the rows asked for, are read, from `at_once`
+    rows of the file at a time: memory goes with `rows`, not with the length of the run.
 
     Raises:
         ValueError: no `time` dimension or coordinate, or see `thinned_indices`.

@@ -29,13 +29,9 @@ _DOTS = 160  # per inch
 
 @dataclass(frozen=True)
 class Kind:
-    """A figure that can be asked for; ``FIGURES`` has in a line what it shows.
-
-    Attributes:
-        needs: what a run must have for it, in words.
-        curves: panels over time.
-        planes: square panels. It can be drawn of a run that has something for one of these, or without them
-            for one of the curves.
+    """A figure that can be asked for (``FIGURES`` has in a line what it shows): what a run must have for it,
+    in words, its panels over time and its square ones. It can be drawn of a run that has something for one of
+    the latter, or without them for one of the former.
     """
 
     needs: str
@@ -82,10 +78,9 @@ def available(dataset: xarray.Dataset) -> list[str]:
 
 
 def figure(dataset: xarray.Dataset, what: str = OVERVIEW) -> Figure:
-    """A figure of a run.
+    """A figure of a run, possibly lazy, of any length: at most 20,000 rows are drawn.
 
     Args:
-        dataset: dataset of a run, possibly lazy, of any length; at most 20,000 rows are drawn.
         what: a name of `FIGURES`.
 
     Raises:
@@ -122,16 +117,10 @@ def check_name(what: str) -> None:
 def save_figure(
     dataset: xarray.Dataset, path: str | Path, what: str = OVERVIEW, *, file_format: str | None = None
 ) -> Path:
-    """Draw a figure of a run to a file.
+    """Draw a figure of a run to a file (see `figure`), which is whole when this returns its path.
 
     Args:
-        dataset: dataset of a run, possibly lazy; at most 20,000 rows of each variable are drawn.
-        path: the file; it is whole when this returns.
-        what: see `figure`.
         file_format: see `figure_format`; by default given by the suffix of `path`.
-
-    Returns:
-        `path`.
 
     Raises:
         ValueError: another suffix, or as for `figure`.

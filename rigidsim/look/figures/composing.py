@@ -90,12 +90,8 @@ def compose(
     *,
     facts: bool = False,
 ) -> Figure:
-    """A page of those panels for which the dataset has data.
-
-    Args:
-        curves: panels over a common time axis, below one another.
-        planes: square panels, below one another beside curves, otherwise side by side.
-        facts: whether to put a table of what was run and what was conserved below the planes.
+    """A page of those panels for which the dataset has data: curves over a common time axis, planes beside
+    them or side by side, and below these a table of what was run and what was conserved, if wanted.
     """
     shown = shown_rows(dataset)
     curves = [panel for panel in curves if panel.shows(shown.rows)]

@@ -53,15 +53,8 @@ def eye_at(toward: Array) -> Eye:
 def draw_ellipsoid(
     axes: Axes, eye: Eye, radii: Array, color: str, *, outside: Array | None = None, alpha: float = 1.0
 ) -> Array:
-    """Draw the visible part of an ellipsoid about the origin.
-
-    Args:
-        radii: semi-axes (3,).
-        outside: semi-axes of another ellipsoid; only parts outside it are drawn.
-        alpha: opacity.
-
-    Returns:
-        The covered points of the picture, (n, 2).
+    """Draw the visible part of an ellipsoid with semi-axes (3,) about the origin, or what of it lies outside
+    another; returns the covered points of the picture, (n, 2).
     """
     u, v = np.meshgrid(np.linspace(0, 2 * np.pi, _AROUND + 1), np.linspace(0, np.pi, _ALONG + 1))
     points = np.stack([np.cos(u) * np.sin(v), np.sin(u) * np.sin(v), np.cos(v)], axis=-1) * radii

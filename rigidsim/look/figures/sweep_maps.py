@@ -80,7 +80,6 @@ def sweep_figure(dataset: xarray.Dataset, what: str | None = None) -> Figure:
     """A sweep's page: one variable over its axes.
 
     Args:
-        dataset: dataset of a sweep, lazy or not.
         what: name of the variable, with ``[INDEX]`` for one component; by default the first indicator, else
             the first time of an event, else the first quantity that was kept.
 

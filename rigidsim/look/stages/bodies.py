@@ -208,11 +208,8 @@ def direction_of(elevation: float, azimuth: float) -> Array:
 
 
 def camera(stage: Stage, *, narrow: bool = False, subject: Subject | None = None) -> Camera:
-    """The stage's own camera, or one from which the leading arrow lies across the picture.
-
-    Args:
-        narrow: the view is about as wide as high, so the eye stands further back.
-        subject: the body; a plate is seen so that its face shows most of the time.
+    """The stage's own camera, or one from which the leading arrow lies across the picture; further back in a
+    narrow view, about as wide as high. A plate is seen so that its face shows most of the time.
     """
     if stage.camera is not None:
         if not narrow:

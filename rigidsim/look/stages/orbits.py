@@ -71,12 +71,8 @@ def satellite(dataset: xarray.Dataset, subject: Subject) -> Picture | None:
 
 
 def local_frame(position: Array, normal: Array) -> Array:
-    """Rotations (rows, 3, 3) from the local frame to space: x forward, y against the orbit's normal, z to the
-    attracting body.
-
-    Args:
-        position: (rows, 3) from the attracting body.
-        normal: (3,) or (rows, 3), the orbit's normal; need not be exactly across the position.
+    """Rotations (rows, 3, 3) from the local frame to space: x forward, y against the orbit's normal, which
+    need not be exactly across the position, z to the attracting body, from which positions (rows, 3) are.
     """
     down = -position / np.linalg.norm(position, axis=1, keepdims=True)
     forward = np.cross(np.broadcast_to(normal, position.shape), -down)

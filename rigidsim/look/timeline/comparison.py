@@ -33,15 +33,8 @@ _FLOOR = 1e-18  # rad: below what a difference of attitudes in double precision 
 
 
 def write_comparison(named: Sequence[tuple[str, xarray.Dataset]], path: Path, *, rows: int = ROWS) -> int:
-    """Write two to ``MOST`` datasets with their names as one recording on one clock, side by side.
-
-    Args:
-        named: names on the screen, and datasets.
-        path: the file; it is whole when this returns.
-        rows: largest number of rows of each.
-
-    Returns:
-        The number of rows written.
+    """Write two to ``MOST`` datasets, at most so many rows of each, with their names on the screen as one
+    recording on one clock, side by side; it is whole when this returns the number of rows written.
 
     Raises:
         ValueError: another number of datasets, or as for ``timeline.write_timeline``.
@@ -155,9 +148,7 @@ def angle_between(one: NDArray[np.float64], other: NDArray[np.float64]) -> NDArr
 def _at(
     times: NDArray[np.float64], theirs: NDArray[np.float64], quaternion: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Unit quaternions at given times: recorded at samples, interpolated on the arc between two, nan
-    elsewhere.
-    """
+    """Unit quaternions at given times: as sampled, on the arc between two samples, nan elsewhere."""
     unit = quaternion / np.linalg.norm(quaternion, axis=1, keepdims=True)
     after = np.clip(np.searchsorted(theirs, times), 0, len(theirs) - 1)
     exact = theirs[after] == times

@@ -27,14 +27,8 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class DrawnRun:
-    """Everything drawn of one dataset.
-
-    Attributes:
-        steps: (rows,), which rows of the dataset these are.
-        pages: markdown by name.
-        words: wording of its times.
-        strides: of arrows and trails, by the stage's root and their entity.
-        turns: turns of the body during the run, from its mean rate; 0 if the rate isn't known.
+    """Everything drawn of one dataset: of its rows `steps`, with pages of markdown by name, the turns of the
+    body (0 if its rate isn't known), and strides of arrows and trails by the stage's root and their entity.
     """
 
     picture: Picture
@@ -58,11 +52,7 @@ class DrawnRun:
         steps: NDArray[np.int64],
         clock: Clock | None = None,
     ) -> DrawnRun:
-        """The drawing of a dataset from its rows in memory.
-
-        Args:
-            steps: which rows of the dataset these are.
-            clock: clock of their times; None for the one that suits them.
+        """The drawing of a dataset from those of its rows that are in memory, on the clock that suits them.
 
         Raises:
             ValueError: a time that isn't finite, or an unreadable ``drawing``.

@@ -10,7 +10,7 @@ import rerun as rr
 from numpy.typing import NDArray
 
 from rigidsim.look.plots import Plot
-from rigidsim.look.stages.parts import Arrow, Color, Line, Plane, Stage, Trail, Vector
+from rigidsim.look.stages.parts import Arrow, Color, Line, Plane, Stage, Trail, Vector, joined
 from rigidsim.look.states import States
 
 PIXELS = 500  # about the width of a plot
@@ -112,7 +112,7 @@ def draw_planes(recording: rr.RecordingStream, planes: Sequence[Plane]) -> None:
         finite = points[np.isfinite(points).all(axis=1)]
         whole = finite[:: max(len(finite) // 4000, 1)]
         dim: Color = tuple(round(0.5 * x) for x in plane.color)  # type: ignore[assignment]
-        if len(whole) > 1 and plane.moves and _dense(whole):
+        if len(whole) > 1 and plane.moves and joined(whole):
             log("whole", _faint([whole], color=dim, width=0.9, order=1.0))
         else:
             color = dim if plane.moves else plane.color
@@ -160,12 +160,6 @@ def plane_reach(plane: Plane) -> float:
 def flipped(points: NDArray[np.float64]) -> NDArray[np.float64]:
     """Plane points for the viewer, whose second axis points down."""
     return points * np.array([1.0, -1.0])
-
-
-def _dense(points: NDArray[np.float64]) -> bool:
-    chords = np.linalg.norm(np.diff(points, axis=0), axis=1)
-    radius = float(np.linalg.norm(points - points.mean(axis=0), axis=1).max())
-    return float(np.percentile(chords, 95)) <= 0.35 * max(radius, 1e-300)
 
 
 def legend_of(stages: Sequence[Stage]) -> list[tuple[str, Color]]:
