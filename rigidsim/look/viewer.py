@@ -1,4 +1,4 @@
-"""Opening a timeline in the viewer of rerun-sdk."""
+"""The viewer of rerun-sdk: a timeline opened in it, or a running run followed as it goes on."""
 
 from __future__ import annotations
 
@@ -9,16 +9,21 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from importlib.util import find_spec
 from pathlib import Path
+from typing import TYPE_CHECKING
 from urllib.parse import quote
+
+if TYPE_CHECKING:
+    import xarray
 
 LOOPBACK = "127.0.0.1"  # rerun's own default would listen on every interface
 WEB_PORT, DATA_PORT = 9090, 9876
 """Ports of 127.0.0.1 on which the browser page and its recording are served: rerun's own."""
 INTERRUPTED = 130
+_POLL_SECONDS, _ANSWER_SECONDS, _CLOSING_SECONDS = 1.0, 20.0, 3.0
 QUIET = {"CI": "1"}  # the one variable that keeps the viewer from sending usage statistics (0.41)
 
 
@@ -48,22 +53,51 @@ def open_viewer(path: Path, *, web: bool = False) -> int:
     """
     with _running([str(existing(path))], DATA_PORT, ["--port", "auto"], web=web) as process:
         try:
-            return ended(process)
+            return _ended(process)
         except KeyboardInterrupt:
             return INTERRUPTED
 
 
-@contextmanager
-def empty_viewer(*, web: bool = False) -> Iterator[tuple[subprocess.Popen[bytes], int]]:
-    """A viewer that waits for recordings, and the port of 127.0.0.1 on which it takes them; it is ended with
-    the context.
+def follow(read: Callable[[], tuple[xarray.Dataset | None, bool]], *, web: bool = False) -> int:
+    """Open the viewer on a run that goes on, and keep it up to date until the run or the viewer ends.
+
+    Args:
+        read: returns the dataset saved so far (None before there is one), and whether the run goes on.
+        web, and what is returned: as for ``open_viewer``.
 
     Raises:
-        FileNotFoundError, NoDisplay: as for ``open_viewer``.
+        NoDisplay, FileNotFoundError: as for ``open_viewer``.
+        RuntimeError: the viewer ended before it listened.
     """
     port = free_port()
     with _running([], port, ["--port", str(port), "--expect-data-soon"], web=web) as process:
-        yield process, port
+        # Ctrl-C ends the viewer, too: what was on its way there would be complained of, and `process` tells
+        # enough. rerun looks at this when it is loaded
+        os.environ.setdefault("RUST_LOG", "off")
+        from rigidsim.look.timeline.writing import live_recording
+
+        try:
+            _wait_for(process, port)
+            with live_recording(f"rerun+http://{LOOPBACK}:{port}/proxy") as recording:
+                going_on = True
+                while going_on and process.poll() is None:
+                    dataset, going_on = read()
+                    if dataset is not None:
+                        with dataset:
+                            recording.update(dataset)
+                    until = time.monotonic() + (_POLL_SECONDS if going_on else 0.0)
+                    while process.poll() is None and time.monotonic() < until:
+                        time.sleep(0.1)
+            return _ended(process)
+        except KeyboardInterrupt:
+            return INTERRUPTED
+        except RuntimeError:
+            # sent while the viewer was being closed
+            try:
+                return _ended(process, _CLOSING_SECONDS)
+            except subprocess.TimeoutExpired:
+                pass
+            raise
 
 
 @contextmanager
@@ -88,7 +122,10 @@ def _running(
         process = subprocess.Popen(command, env={**environment, "TMPDIR": scratch})
         try:
             if web:
-                print(web_words(port), flush=True)
+                # dark, as the page's colours are made for
+                source = quote(f"rerun+http://{LOOPBACK}:{port}/proxy", safe="")
+                page = f"http://{LOOPBACK}:{WEB_PORT}?theme=dark&url={source}"
+                print(f"open {page} in a browser on this machine; Ctrl-C ends it", flush=True)
             yield process
         finally:
             process.terminate()
@@ -100,30 +137,15 @@ def has_display() -> bool:
     return sys.platform != "linux" or bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
 
 
-def ended(process: subprocess.Popen[bytes], timeout: float | None = None) -> int:
-    """Wait for a viewer; returns its exit code, 130 if Ctrl-C reached it first.
-
-    Raises:
-        TimeoutExpired: of subprocess, after so many seconds.
-    """
+def _ended(process: subprocess.Popen[bytes], timeout: float | None = None) -> int:
+    """The exit code of a viewer once it has ended, 130 if Ctrl-C reached it first."""
     code = process.wait(timeout)
     return INTERRUPTED if code == -signal.SIGINT else code
 
 
-def web_words(port: int) -> str:
-    """The page's address, dark as its colours are made for, and how to end it; its recording is on a port."""
-    source = quote(f"rerun+http://{LOOPBACK}:{port}/proxy", safe="")
-    page = f"http://{LOOPBACK}:{WEB_PORT}?theme=dark&url={source}"
-    return f"open {page} in a browser on this machine; Ctrl-C ends it"
-
-
-def wait_for(process: subprocess.Popen[bytes], port: int, seconds: float) -> None:
-    """Wait until a viewer takes recordings.
-
-    Raises:
-        RuntimeError: the viewer ended, or isn't ready within so many seconds.
-    """
-    until = time.monotonic() + seconds
+def _wait_for(process: subprocess.Popen[bytes], port: int) -> None:
+    """Wait until a viewer takes recordings."""
+    until = time.monotonic() + _ANSWER_SECONDS
     while time.monotonic() < until:
         if process.poll() is not None:
             raise RuntimeError(f"the viewer ended with exit code {process.returncode}")
@@ -131,7 +153,7 @@ def wait_for(process: subprocess.Popen[bytes], port: int, seconds: float) -> Non
             if probe.connect_ex((LOOPBACK, port)) == 0:
                 return
         time.sleep(0.1)
-    raise RuntimeError(f"the viewer didn't answer within {seconds:g} s")
+    raise RuntimeError(f"the viewer didn't answer within {_ANSWER_SECONDS:g} s")
 
 
 def viewer_binary() -> Path:

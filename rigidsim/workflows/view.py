@@ -10,7 +10,7 @@ from pathlib import Path
 import xarray
 
 from rigidsim.errors import RigidsimError, RunFolderError
-from rigidsim.look import film, live, viewer
+from rigidsim.look import film, viewer
 from rigidsim.scene.sweeps.sweep import Sweep
 from rigidsim.store import atomic
 from rigidsim.store.run import Run, SavedRun, open_run
@@ -64,7 +64,7 @@ def show(named: Sequence[tuple[str, Run]], *, web: bool = False) -> int:
     first = named[0][1]
     try:
         if len(named) == 1 and isinstance(first, SavedRun) and first.folder.at_work:
-            return live.follow(lambda: _so_far(first), web=web)
+            return viewer.follow(lambda: _so_far(first), web=web)
         with _recording_of(named) as timeline:
             return viewer.open_viewer(timeline, web=web)
     except (FileNotFoundError, RuntimeError) as error:
@@ -103,7 +103,7 @@ def _recording_of(named: Sequence[tuple[str, Run]]) -> Iterator[Path]:
         with named[0][1].recording() as timeline:
             yield timeline
         return
-    from rigidsim.look.timeline.comparison import write_comparison  # which loads rerun, see look.live
+    from rigidsim.look.timeline.comparison import write_comparison  # which loads rerun, see look.viewer
 
     with tempfile.TemporaryDirectory(prefix="rigidsim-view-") as scratch, ExitStack() as opened:
         datasets = [(name, opened.enter_context(run.dataset)) for name, run in named]

@@ -22,7 +22,7 @@ from rigidsim.look.thinning import thin, thinned_indices
 from rigidsim.look.timeline import write_timeline
 from rigidsim.look.timeline.blueprint import build_blueprint
 from rigidsim.look.timeline.drawn import DrawnRun
-from rigidsim.look.timeline.recording import recording_to
+from rigidsim.look.timeline.writing import recording_to
 
 pytestmark = [
     pytest.mark.slow,
@@ -92,15 +92,14 @@ def _write_empty(dataset: rigidsim.Run, path: Path) -> None:
     """The same stage without body, arrows and trails."""
     shown = thin(dataset, ROWS)
     drawn = DrawnRun.of(dataset, shown, thinned_indices(dataset.sizes["time"], ROWS))
-    with recording_to(path, "empty", len(drawn.seconds)) as recording:
-        recording.start(build_blueprint(drawn))
+    with recording_to(path, "empty", len(drawn.seconds), build_blueprint(drawn)) as recording:
         stages = [
             replace(stage, meshes=[], points=np.zeros((0, 3)), arrows=[], trails=[], axis_length=0.0)
             for stage in drawn.picture.stages
         ]
         bare = replace(drawn, picture=replace(drawn.picture, stages=stages))
-        bare.draw_static(recording.stream)
-        bare.draw_rows(recording.stream, slice(0, len(drawn.seconds)))
+        bare.draw_static(recording)
+        bare.draw_rows(recording, slice(0, len(drawn.seconds)))
 
 
 def test_the_viewer_turns_the_body_as_the_dataset_says(tmp_path: Path) -> None:

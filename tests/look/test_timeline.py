@@ -14,7 +14,7 @@ pytest.importorskip("rerun")
 import rigidsim
 from rigidsim.look.thinning import thin
 from rigidsim.look.timeline import write_timeline
-from rigidsim.look.timeline.recording import CHUNK
+from rigidsim.look.timeline.writing import CHUNK
 from rigidsim.store.variables import parts_in
 
 Build = Callable[..., xarray.Dataset]

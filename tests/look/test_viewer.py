@@ -94,7 +94,7 @@ def test_no_driver_is_said_plainly(
 
 def test_importing_the_package_loads_neither_rerun_nor_matplotlib() -> None:
     code = (
-        "import sys; from rigidsim.look import figure_names, film, live, viewer; "
+        "import sys; from rigidsim.look import figure_names, film, viewer; "
         "print(sorted({'rerun', 'matplotlib', 'xarray', 'pyarrow'} & set(sys.modules)))"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
@@ -165,5 +165,5 @@ def test_without_a_display_it_is_said_what_to_do(
     said = r"--web serves .* --png, --gif or --mp4 FILE"
     with pytest.raises(viewer.NoDisplay, match=said):
         viewer.open_viewer(tmp_path / "t.rrd")
-    with pytest.raises(viewer.NoDisplay, match=said), viewer.empty_viewer():
-        pass
+    with pytest.raises(viewer.NoDisplay, match=said):
+        viewer.follow(lambda: (None, False))

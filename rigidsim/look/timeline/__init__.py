@@ -4,12 +4,11 @@ Importing this package loads rerun, so import it only where a timeline is writte
 
 | module | holds |
 | --- | --- |
-| `writing` | `write_timeline`: dataset to `timeline.rrd`; `LiveRecording`: of a run that goes on |
+| `writing` | `write_timeline`: dataset to `timeline.rrd`; `LiveRecording`: of a run that goes on; the file |
 | `comparison` | `write_comparison`: several runs side by side |
 | `drawn` | everything that is drawn of one run |
 | `drawing`, `plotting` | stages, and plots, planes, legend and clock, as rerun entities |
 | `blueprint` | the page that the viewer opens with, for one run and for several |
-| `recording` | a recording of rerun written to a file |
 """
 
 from rigidsim.look.timeline.writing import write_timeline

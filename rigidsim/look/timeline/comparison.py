@@ -19,7 +19,7 @@ from rigidsim.look.signals import values
 from rigidsim.look.thinning import thin, thinned_indices
 from rigidsim.look.timeline.blueprint import build_comparison
 from rigidsim.look.timeline.drawn import DrawnRun
-from rigidsim.look.timeline.recording import chunks, recording_to
+from rigidsim.look.timeline.writing import chunks, recording_to
 
 if TYPE_CHECKING:
     import xarray
@@ -53,15 +53,15 @@ def write_comparison(named: Sequence[tuple[str, xarray.Dataset]], path: Path, *,
     apart = attitude_differences([(name, table) for name, _, table in shown])
     titles = [legible(name) for name, _ in named]
     blueprint = build_comparison(list(zip(titles, drawn, strict=True)), clock, apart)
-    with recording_to(path, " and ".join(name for name, _ in named), sum(map(len, seconds))) as recording:
-        recording.start(blueprint)
+    count, name = sum(map(len, seconds)), " and ".join(name for name, _ in named)
+    with recording_to(path, name, count, blueprint) as recording:
         for run in drawn:
-            run.draw_static(recording.stream, legend=run is drawn[0])
+            run.draw_static(recording, legend=run is drawn[0])
             for part in chunks(0, len(run.seconds)):
-                run.draw_rows(recording.stream, part)
+                run.draw_rows(recording, part)
         if apart is not None:
-            drawn[0].draw_plots(recording.stream, [apart])
-    return sum(map(len, seconds))
+            drawn[0].draw_plots(recording, [apart])
+    return count
 
 
 def _part(clock: Clock, seconds: NDArray[np.float64]) -> Clock:

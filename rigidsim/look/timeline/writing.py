@@ -1,7 +1,9 @@
-"""Writing a run's timeline, whole or as the run goes on."""
+"""Writing a run's timeline, whole or as the run goes on: with strict errors, and never on a full disk."""
 
 from __future__ import annotations
 
+import errno
+import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -9,18 +11,22 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import rerun as rr
+import rerun.blueprint as rrb
+from rerun.error_utils import set_strict_mode, strict_mode
 
 from rigidsim.look.page import legible
 from rigidsim.look.roles import title_of
 from rigidsim.look.thinning import thin, thinned_indices
 from rigidsim.look.timeline.blueprint import build_blueprint
 from rigidsim.look.timeline.drawn import DrawnRun
-from rigidsim.look.timeline.recording import check_room, chunks, recording_to, strict
 
 if TYPE_CHECKING:
     import xarray
 
 LIVE_ROWS = 100_000
+CHUNK = 4096  # rows per chunk: larger ones make the viewer slow, smaller ones heavy
+_ROW_BYTES = 600  # at most: some twenty variables
+_FIRST_BYTES = 1024 * _ROW_BYTES  # bodies, layout, page
 
 
 def write_timeline(dataset: xarray.Dataset, path: Path, *, rows: int = 100_000) -> int:
@@ -45,13 +51,58 @@ def write_timeline(dataset: xarray.Dataset, path: Path, *, rows: int = 100_000) 
     shown = thin(dataset, rows)
     count = shown.sizes["time"]
     run = DrawnRun.of(dataset, shown, thinned_indices(dataset.sizes["time"], rows))
-    with recording_to(path, title_of(dataset), count) as recording:
-        recording.start(build_blueprint(run))
-        run.draw_static(recording.stream)
+    with recording_to(path, title_of(dataset), count, build_blueprint(run)) as recording:
+        run.draw_static(recording)
         for part in chunks(0, count):
             check_room(path, count - part.start)
-            run.draw_rows(recording.stream, part)
+            run.draw_rows(recording, part)
     return count
+
+
+def chunks(first: int, count: int) -> Iterator[slice]:
+    """The rows from the first to the last, ``CHUNK`` at a time."""
+    return (slice(start, min(start + CHUNK, count)) for start in range(first, count, CHUNK))
+
+
+@contextmanager
+def recording_to(path: Path, name: str, rows: int, blueprint: rrb.Blueprint) -> Iterator[rr.RecordingStream]:
+    """A recording of at most so many rows, with its layout, whose file is whole when the block ends.
+
+    Raises:
+        RuntimeError: the environment variable RERUN switches recording off.
+        OSError: there is no room for it.
+    """
+    check_room(path, rows)
+    with strict():
+        # The context manager finishes the file: without it there is no footer.
+        with rr.RecordingStream("rigidsim") as stream:
+            if not rr.is_enabled(stream):
+                raise RuntimeError("RERUN is set to off in the environment: unset it")
+            stream.save(path, default_blueprint=blueprint)
+            stream.send_recording_name(legible(name))
+            yield stream
+
+
+@contextmanager
+def strict() -> Iterator[None]:
+    """Turn errors of the rerun API into exceptions inside the block.
+
+    Otherwise wrong lengths, shapes and times are dropped with a warning.
+    """
+    before = strict_mode()
+    set_strict_mode(True)
+    try:
+        yield
+    finally:
+        set_strict_mode(before)
+
+
+def check_room(path: Path, rows: int) -> None:
+    """Refuse if there is too little room, before rerun finds the disk full and may wait for ever."""
+    room, needed = shutil.disk_usage(path.parent).free, _FIRST_BYTES + _ROW_BYTES * rows
+    if room < needed:
+        missing = f"it may need {needed / 1e6:.1f} MB, and {room / 1e6:.1f} MB are free"
+        raise OSError(errno.ENOSPC, missing, str(path))
 
 
 class LiveRecording:
