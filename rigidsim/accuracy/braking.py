@@ -22,7 +22,7 @@ from rigidsim.model.averaged.torques import reads_rates_alone
 from rigidsim.model.capabilities import gradient_source_of
 from rigidsim.solve.precision import precision_of
 from rigidsim.solve.problem import InitialValueProblem, double_twin
-from rigidsim.solve.steppers import stepper_of
+from rigidsim.solve.switching.stepper import stepper_of
 from rigidsim.solve.taylor_stepper import TaylorStepper
 
 _MOMENTS = 6

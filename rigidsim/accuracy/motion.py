@@ -16,7 +16,7 @@ from rigidsim.solve.error_growth import Growth, measure_growth
 from rigidsim.solve.problem import double_twin, prepare_scene
 from rigidsim.solve.sampling import SampleClock
 from rigidsim.solve.stepper import Stepper
-from rigidsim.solve.steppers import stepper_of
+from rigidsim.solve.switching.stepper import stepper_of
 
 PILOT_STEPS = 20_000
 """Pilot steps in double precision at its epsilon: some tens of milliseconds."""

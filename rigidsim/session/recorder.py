@@ -13,8 +13,8 @@ from rigidsim.errors import RunFolderError
 from rigidsim.session.dataset import dates_of, drift_name, put_back_name
 from rigidsim.session.statistics import SampleStatistics
 from rigidsim.solve.assembly import Assembly
-from rigidsim.solve.checkpoint import Position, SavedPart, check_versions, pack_versions
-from rigidsim.solve.checkpoint_arrays import Arrays, numbers
+from rigidsim.solve.checkpoint import Arrays, SavedPart, check_versions, numbers, pack_versions
+from rigidsim.solve.corrected_stepper import Position
 from rigidsim.solve.evaluate import Evaluator, RecordedParts
 from rigidsim.solve.events import pack_events, unpack_events
 from rigidsim.solve.problem import InitialValueProblem

@@ -10,7 +10,7 @@ from typing import ClassVar
 import numpy as np
 
 from rigidsim.session.guards import Observer
-from rigidsim.solve.checkpoint_arrays import Arrays, numbers
+from rigidsim.solve.checkpoint import Arrays, numbers
 from rigidsim.solve.sampler import Pacing, Progress
 from rigidsim.store.segments import SegmentLimits
 from rigidsim.store.summary_parts import ENGINE, Caution

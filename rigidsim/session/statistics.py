@@ -9,7 +9,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from rigidsim.solve.checkpoint_arrays import Arrays, numbers
+from rigidsim.solve.checkpoint import Arrays, numbers
 
 
 @dataclass(frozen=True)

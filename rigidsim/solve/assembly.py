@@ -5,9 +5,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
-from rigidsim.solve.checkpoint import Position
 from rigidsim.solve.compiled import interruptible
-from rigidsim.solve.corrected_stepper import STRIDE, CorrectedStepper
+from rigidsim.solve.corrected_stepper import STRIDE, CorrectedStepper, Position
 from rigidsim.solve.driver import Driver
 from rigidsim.solve.effects.angle_wrapping import AngleWrapping
 from rigidsim.solve.effects.charts import Charts

@@ -16,7 +16,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from rigidsim.solve.checkpoint_arrays import Arrays, pack, unpack
+from rigidsim.solve.checkpoint import Arrays, pack, unpack
 from rigidsim.solve.effects.effect import Effect
 from rigidsim.solve.effects.whole_time import WholeTime
 from rigidsim.solve.precision import Scalar
@@ -37,6 +37,19 @@ class StepBoundary:
 
     mark: Mark
     memories: tuple[Any, ...]
+
+
+@dataclass(frozen=True)
+class Position:
+    """Position from which a run continues with the same bits.
+
+    Attributes:
+        boundary: a step boundary past all samples before ``next_sample``.
+        next_sample: index of the first sample that isn't handed over.
+    """
+
+    boundary: StepBoundary
+    next_sample: int
 
 
 _NEAR = 3

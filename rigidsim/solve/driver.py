@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import time
 
-from rigidsim.solve.checkpoint import Position
-from rigidsim.solve.corrected_stepper import StepBoundary
-from rigidsim.solve.sample_buffer import SampleBuffer
-from rigidsim.solve.sampler import MEASURED, Check, Pacing, Progress, SampleReceiver
+from rigidsim.solve.corrected_stepper import Position, StepBoundary
+from rigidsim.solve.sampler import MEASURED, Check, Pacing, Progress, SampleBuffer, SampleReceiver
 from rigidsim.solve.sampling import SampleClock
 from rigidsim.solve.solvers.solver import Solver
 from rigidsim.solve.status import Status

@@ -14,7 +14,7 @@ import numpy as np
 
 from rigidsim.model.system import System
 from rigidsim.solve.precision import Precision
-from rigidsim.solve.steppers import stepper_of
+from rigidsim.solve.switching.stepper import stepper_of
 
 PILOT_STEPS = 2000
 _CHUNK = 4  # steps between comparisons

@@ -14,7 +14,7 @@ import numpy as np
 
 from rigidsim.model.outputs import Recorded
 from rigidsim.model.system import System
-from rigidsim.solve.checkpoint_arrays import Arrays
+from rigidsim.solve.checkpoint import Arrays
 from rigidsim.solve.compiled import CompiledFunction, compiled_function, evaluate_rows, interruptible
 from rigidsim.solve.effects.angle_wrapping import AngleWrapping
 from rigidsim.solve.effects.charts import Lift

@@ -17,7 +17,7 @@ import numpy as np
 
 from rigidsim.errors import StoppedError
 from rigidsim.model.system import System
-from rigidsim.solve.checkpoint_arrays import Arrays, pack, unpack
+from rigidsim.solve.checkpoint import Arrays, pack, unpack
 from rigidsim.solve.compiled import TaylorEngine, compiled_function
 from rigidsim.solve.precision import Precision, Scalar
 from rigidsim.solve.sample_block import AngleState, SampleBlock, pack_angles, unpack_angles

@@ -1,14 +1,19 @@
-"""What goes between a driver and its run: progress, checks, the receiver of samples, and how much at once."""
+"""What goes between a driver and its run: progress, checks, how much at once, and the buffer of samples."""
 
 from __future__ import annotations
 
+import time
+from bisect import bisect_left
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Protocol
 
-from rigidsim.solve.checkpoint import Position
-from rigidsim.solve.corrected_stepper import StepBoundary
+import numpy as np
+
+from rigidsim.solve.corrected_stepper import Position, StepBoundary
+from rigidsim.solve.precision import Scalar
 from rigidsim.solve.sample_block import SampleBlock
+from rigidsim.solve.sampling import SampleClock
 from rigidsim.solve.status import Status
 
 
@@ -92,3 +97,157 @@ class Pacing:
 
 MEASURED = Pacing()
 """The defaults, which cost least where they were measured."""
+
+
+_FEWEST_ROWS = 8  # that may wait: some tens of milliseconds at 250 digits
+_GROWTH = 4  # largest growth of the waiting rows from one hand-over to the next
+
+
+class SampleBuffer:
+    """Collects samples and hands them over in blocks of bounded size and, as far as is known, duration."""
+
+    def __init__(self, clock: SampleClock, receiver: SampleReceiver, pacing: Pacing, first: int = 0) -> None:
+        self._clock = clock
+        self._receiver = receiver
+        self._pacing = pacing
+        self.handed = self.count = first
+        self._blocks: list[SampleBlock] = []
+        self._boundaries: list[StepBoundary] = []
+        self._most = _FEWEST_ROWS
+        self._affordable: dict[str, int] = {}
+        self._handed_at = time.perf_counter()
+        self._upcoming: tuple[int, Scalar] | None = None
+        self._found = 0  # found before the last limit: the next call expects about as many
+
+    @property
+    def complete(self) -> bool:
+        """Whether all samples have been found."""
+        return self.count >= self._clock.count
+
+    @property
+    def room(self) -> int:
+        """Number of samples that may still be found before the waiting ones are handed over."""
+        return self._most - (self.count - self.handed)
+
+    @property
+    def full(self) -> bool:
+        """Whether the waiting samples must be handed over before more are found."""
+        return self.room <= 0
+
+    @property
+    def upcoming(self) -> Scalar:
+        """Time of the next sample."""
+        if self._upcoming is None or self._upcoming[0] != self.count:
+            self._upcoming = self.count, self._clock.at(self.count)
+        return self._upcoming[1]
+
+    def until(self, limit: Scalar, most: int) -> np.ndarray:
+        """Times of the next samples at or before ``limit``, at most ``most``."""
+        position = first = self.count
+        rows = min(self._found + 1, self._pacing.rows_at_once)
+        stop = min(self._clock.count, position + max(most, 0))
+        pieces = [self._clock.internal(0, 0)]
+        while position < stop:
+            times = self._clock.internal(position, min(position + rows, stop))
+            inside = int(np.count_nonzero(times <= limit))
+            pieces.append(times[:inside])
+            position += inside
+            if inside < len(times):
+                break
+            rows = min(_GROWTH * rows, self._pacing.rows_at_once)
+        self._found = position - first
+        return np.concatenate(pieces)
+
+    def take(self, block: SampleBlock, boundary: StepBoundary) -> None:
+        """Take the next samples, with a step boundary before them."""
+        if len(block):
+            self._blocks.append(block)
+            self._boundaries.append(boundary)
+            self.count += len(block)
+
+    def back_to(self, count: int) -> None:
+        """Forget all samples found since there were ``count``."""
+        while self._blocks and self._blocks[-1].first >= count:
+            self._blocks.pop()
+            self._boundaries.pop()
+        self.count = max(count, self.handed)
+
+    @property
+    def boundary(self) -> StepBoundary | None:
+        """A step boundary before the first waiting sample; None if none waits."""
+        return self._boundaries[0] if self._boundaries else None
+
+    @property
+    def whole(self) -> bool:
+        """Whether as many have been handed over as the receiver saves at the least cost."""
+        return self.handed % self._receiver.rows_together == 0
+
+    def hand_over(self, *, patiently: bool = False) -> tuple[int, StepBoundary] | None:
+        """Hand what is collected to the receiver.
+
+        Args:
+            patiently: only if it is much or old; if much, just the samples that make it ``whole``.
+
+        Returns:
+            If the receiver wants no sample past one of them: its index and a boundary before it; the
+            others are dropped.
+
+        Raises:
+            KeyboardInterrupt: from the receiver; samples that it didn't take keep waiting.
+        """
+        waiting, rows = self.count - self.handed, self._pacing.rows_at_once
+        waited = time.perf_counter() - self._handed_at
+        old = waited >= self._pacing.patience
+        if not waiting or (patiently and waiting < min(rows, self._most) and not old):
+            return None
+        stop = self.count - self.count % self._receiver.rows_together
+        if old or not patiently or stop <= self.handed:
+            stop = self.count
+        started = self._handed_at = time.perf_counter()
+        whole, boundaries = self._waiting_until(stop)
+        handed = len(whole)
+        for start in range(0, handed, rows):
+            block = whole.rows(start, start + rows)
+            try:
+                self._receiver.take(block)
+            except KeyboardInterrupt:  # while something that it needs was compiled: it took none of these
+                self._blocks.insert(0, whole.rows(start, handed))
+                self._boundaries.insert(0, _before(block.first, boundaries))
+                raise
+            self.handed += len(block)
+            last = self._receiver.last_wanted
+            if last is not None:
+                self._blocks, self._boundaries = [], []
+                self.count = self.handed = last + 1
+                return last, _before(last, boundaries)
+        self.took("hand over", handed, time.perf_counter() - started)
+        return None
+
+    def _waiting_until(self, stop: int) -> tuple[SampleBlock, dict[int, StepBoundary]]:
+        """Take out the waiting samples before ``stop``, and for each piece in which they were found a
+        boundary before it, by the piece's first sample.
+        """
+        firsts = [block.first for block in self._blocks]
+        pieces = bisect_left(firsts, stop)
+        blocks, boundaries = self._blocks[:pieces], self._boundaries[:pieces]
+        self._blocks, self._boundaries = self._blocks[pieces:], self._boundaries[pieces:]
+        cut = stop - blocks[-1].first
+        if cut < len(blocks[-1]):
+            self._blocks.insert(0, blocks[-1].rows(cut, len(blocks[-1])))
+            self._boundaries.insert(0, boundaries[-1])
+            blocks[-1] = blocks[-1].rows(0, cut)
+        return SampleBlock.joined(blocks), dict(zip(firsts, boundaries, strict=False))
+
+    def took(self, work: str, rows: int, seconds: float) -> None:
+        """Adapt how many samples may wait to what each kind of work gets done in the time of a chunk."""
+        if rows < _FEWEST_ROWS:  # they tell little about the cost of a row
+            return
+        pacing = self._pacing
+        self._affordable[work] = int(rows * pacing.chunk_seconds / max(seconds, 1e-9))
+        affordable = max(min(self._affordable.values()), _FEWEST_ROWS)
+        self._most = min(affordable, _GROWTH * self._most, pacing.rows_waiting)
+
+
+def _before(sample: int, boundaries: dict[int, StepBoundary]) -> StepBoundary:
+    """The boundary before the piece in which a sample was found."""
+    return boundaries[max(first for first in boundaries if first <= sample)]

@@ -8,7 +8,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from rigidsim.solve.checkpoint_arrays import Arrays, pack, unpack
+from rigidsim.solve.checkpoint import Arrays, pack, unpack
 from rigidsim.solve.precision import Precision, Scalar
 from rigidsim.solve.sample_block import SampleBlock
 

@@ -19,7 +19,7 @@ from rigidsim.solve.compiled import TaylorEngine
 from rigidsim.solve.precision import precision_of
 from rigidsim.solve.requirements import propagation
 from rigidsim.solve.shadow.ensemble import HOPELESS_STEPS, PERTURBED, EnsembleCarrier
-from rigidsim.solve.steppers import stepper_of
+from rigidsim.solve.switching.stepper import stepper_of
 from rigidsim.solve.taylor_stepper import TaylorStepper
 
 _DOUBLE_ORDER = 20

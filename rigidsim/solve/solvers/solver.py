@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from rigidsim.solve.corrected_stepper import StepBoundary
 from rigidsim.solve.precision import Scalar
-from rigidsim.solve.sample_buffer import SampleBuffer
-from rigidsim.solve.sampler import Progress
+from rigidsim.solve.sampler import Progress, SampleBuffer
 from rigidsim.solve.sampling import SampleClock
 from rigidsim.solve.status import Status
 from rigidsim.solve.stepper import OwnErrors

@@ -11,8 +11,7 @@ import numpy as np
 
 from rigidsim.solve.corrected_stepper import CorrectedStepper, StepBoundary
 from rigidsim.solve.precision import Scalar
-from rigidsim.solve.sample_buffer import SampleBuffer
-from rigidsim.solve.sampler import Pacing, Progress
+from rigidsim.solve.sampler import Pacing, Progress, SampleBuffer
 from rigidsim.solve.sampling import SampleClock
 from rigidsim.solve.solvers.solver import Solver
 from rigidsim.solve.status import Status

@@ -23,6 +23,7 @@ from rigidsim.solve.switching.moments import between
 from rigidsim.solve.switching.roots import SurfaceRoots
 from rigidsim.solve.switching.sides import HELD, SLIDES, Continuation, Fields, Look
 from rigidsim.solve.switching.sliding import MOST_AT_ONCE
+from rigidsim.solve.taylor_stepper import TaylorStepper
 
 _ATTEMPTS = 32  # attempts at one step
 _MOST_SWITCHES = 256
@@ -305,3 +306,18 @@ class SwitchingStepper(SurfaceRoots):
         surface = self.system.plan.surfaces.found[j]
         self.failure = f'at the kink or jump of "{surface.text}" ({surface.where}) {why}; {what_to_do}'
         return False
+
+
+def stepper_of(
+    system: System,
+    precision: Precision,
+    tolerance: Scalar | None,
+    start: Scalar,
+    log: EventLog | None = None,
+) -> TaylorStepper:
+    """The stepper of a system: a plain one, unless the system switches sides; tolerance None stands for the
+    precision's epsilon, and without a log no events are looked for.
+    """
+    if not system.switches:
+        return TaylorStepper(system, precision, tolerance, start, log)
+    return SwitchingStepper(system, precision, tolerance, start, log)

@@ -40,7 +40,7 @@ from rigidsim.scene.scene import SampleTimes
 from rigidsim.solve.compiled import CompiledFunction, compiled_engine, compiled_function, interruptible
 from rigidsim.solve.precision import precision_of
 from rigidsim.solve.sample_block import SampleBlock
-from rigidsim.solve.steppers import stepper_of
+from rigidsim.solve.switching.stepper import stepper_of
 from rigidsim.solve.taylor_stepper import TaylorStepper
 from rigidsim.solve.turns.steps import AngleSteps, Place
 

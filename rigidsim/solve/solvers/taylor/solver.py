@@ -11,14 +11,13 @@ from rigidsim.scene.choices import DEFAULT_METHOD, METHODS
 from rigidsim.solve.corrected_stepper import CorrectedStepper, StepBoundary
 from rigidsim.solve.events import EventLog
 from rigidsim.solve.precision import Precision, Scalar
-from rigidsim.solve.sample_buffer import SampleBuffer
-from rigidsim.solve.sampler import Pacing, Progress
+from rigidsim.solve.sampler import Pacing, Progress, SampleBuffer
 from rigidsim.solve.sampling import SampleClock
 from rigidsim.solve.solvers.algorithm import Algorithm, solves
 from rigidsim.solve.solvers.solver import Solver
 from rigidsim.solve.solvers.stepwise import Reach, StepwiseSolver
 from rigidsim.solve.solvers.taylor.ways import SampleWay, WayFinder
-from rigidsim.solve.steppers import stepper_of
+from rigidsim.solve.switching.stepper import stepper_of
 from rigidsim.solve.taylor_stepper import TaylorStepper
 
 
