@@ -41,15 +41,10 @@ class StepBoundary:
 
 @dataclass(frozen=True)
 class Position:
-    """Position from which a run continues with the same bits.
+    """Position from which a run continues with the same bits."""
 
-    Attributes:
-        boundary: a step boundary past all samples before ``next_sample``.
-        next_sample: index of the first sample that isn't handed over.
-    """
-
-    boundary: StepBoundary
-    next_sample: int
+    boundary: StepBoundary  # a step boundary past all samples before ``next_sample``
+    next_sample: int  # index of the first sample that isn't handed over
 
 
 _NEAR = 3

@@ -42,13 +42,12 @@ class Growth:
     Attributes:
         factor: largest growth of an offset in rates and attitude, over the linear growth |w| t / sqrt 3 of
             a stable motion; 1 where it is no larger than a few times that.
-        rate: rate of exponential growth beyond each comparison's window, 1/s; zero for linear growth.
         saturated: whether ``factor`` is a lower bound only, since an offset became as large as the motion.
     """
 
     factor: float
     seconds: float
-    rate: float
+    rate: float  # rate of exponential growth beyond each comparison's window, 1/s; zero for linear growth
     window: float
     saturated: bool = False
     passing_rate: float = 0.0

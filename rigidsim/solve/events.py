@@ -40,31 +40,24 @@ class FoundEvent:
 
     Attributes:
         time, state: internal units, in the run's precision; the state is of shape (states,).
-        angles: what the angle states stood for at the beginning of the step that contains it.
     """
 
     index: int
     time: Scalar
     state: np.ndarray
-    angles: AngleState
+    angles: AngleState  # what the angle states stood for at the beginning of the step that contains it
 
 
 @dataclass
 class EventLog:
-    """All crossings so far, in order of time.
-
-    Attributes:
-        stop: time of the first crossing that ends the run, or None.
-        quiet_until: time up to which crossings are already known; None if there are none.
-        muted: whether a step is being repeated whose crossings are already known.
-    """
+    """All crossings so far, in order of time."""
 
     stops: list[bool] = field(default_factory=list)
     angles: Callable[[], AngleState] = AngleState
     found: list[FoundEvent] = field(default_factory=list)
-    stop: Scalar | None = None
-    quiet_until: Scalar | None = None
-    muted: bool = False
+    stop: Scalar | None = None  # time of the first crossing that ends the run, or None
+    quiet_until: Scalar | None = None  # time up to which crossings are already known; None if there are none
+    muted: bool = False  # whether a step is being repeated whose crossings are already known
 
     def note(self, index: int, time: Scalar, state: np.ndarray) -> None:
         """Record a crossing found by the engine; raises a StoppedError if there are too many."""

@@ -26,18 +26,12 @@ import numpy as np
 class Indicators(NamedTuple):
     """Indicators of some motions, each (members,); those of a motion whose growth was lost refer to the time
     before.
-
-    Attributes:
-        megno: mean of Y over time.
-        fli: largest growth.
-        largest_exponent: 1/s.
-        until: time up to which they are known, seconds since the start.
     """
 
-    megno: np.ndarray
-    fli: np.ndarray
-    largest_exponent: np.ndarray
-    until: np.ndarray
+    megno: np.ndarray  # mean of Y over time
+    fli: np.ndarray  # largest growth
+    largest_exponent: np.ndarray  # 1/s
+    until: np.ndarray  # time up to which they are known, seconds since the start
 
 
 def indicators(times: np.ndarray, growth: np.ndarray) -> Indicators:

@@ -30,15 +30,10 @@ _MOST_ROWS = 1000  # rows of the convergence that are kept
 
 @dataclass(frozen=True)
 class LyapunovSpectrum:
-    """Lyapunov exponents as they converge.
+    """Lyapunov exponents as they converge."""
 
-    Attributes:
-        times: times since the run's start, s, shape (rows,).
-        exponents: 1/s, largest first, shape (rows, states of the motion).
-    """
-
-    times: np.ndarray
-    exponents: np.ndarray
+    times: np.ndarray  # times since the run's start, s, shape (rows,)
+    exponents: np.ndarray  # 1/s, largest first, shape (rows, states of the motion)
     states: tuple[str, ...] = ()
 
     @property

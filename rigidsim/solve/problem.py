@@ -51,22 +51,17 @@ _BITS_OF_AVERAGES = 53, 10
 
 @dataclass(frozen=True)
 class InitialValueProblem:
-    """A scene with its equations, ready to be integrated.
-
-    Attributes:
-        tolerance: scalar of the precision, or None for its epsilon; "auto" becomes one of these.
-        holds_late: whether invariants are projected only after a number of steps.
-    """
+    """A scene with its equations, ready to be integrated."""
 
     experiment: Experiment
     scene: Scene
     precision: Precision
     system: System
     clock: SampleClock
-    tolerance: Scalar | None
+    tolerance: Scalar | None  # scalar of the precision, or None for its epsilon; "auto" becomes one of these
     algorithm: Algorithm
     python_loads: tuple[Load, ...] = ()
-    holds_late: bool = False
+    holds_late: bool = False  # whether invariants are projected only after a number of steps
 
     @property
     def has_steps(self) -> bool:

@@ -16,13 +16,12 @@ class AngleState(NamedTuple):
     """Which Euler angles the angle states stand for; all fields are empty or 0 without angle states.
 
     Attributes:
-        turns: full turns of the angle states.
         chart: 0 for angles of the requested sequence, 1 for those of its partner
             (``rigidsim.solve.effects.charts``).
         reference: in the partner chart, the requested angles at the latest natural step, rad; else zeros.
     """
 
-    turns: tuple[int, ...] = ()
+    turns: tuple[int, ...] = ()  # full turns of the angle states
     chart: int = 0
     reference: tuple[float, ...] = ()
 

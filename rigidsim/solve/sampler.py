@@ -22,25 +22,20 @@ class Progress:
     """Progress of a run; its one mutable record.
 
     Attributes:
-        next_sample: index of the first sample that isn't handed over yet.
-        time: time that the integration has reached, s.
         smallest_step, largest_step: extremes of the natural steps so far, internal units.
-        redone_steps: steps taken back because they went past a sample.
-        last_good: last step boundary with a finite state, for a run that broke down.
-        detail: why it broke down, if more is known.
     """
 
     samples: int
-    next_sample: int = 0
+    next_sample: int = 0  # index of the first sample that isn't handed over yet
     steps: int = 0
-    time: float = 0.0
+    time: float = 0.0  # time that the integration has reached, s
     smallest_step: float = float("inf")
     largest_step: float = 0.0
-    redone_steps: int = 0
+    redone_steps: int = 0  # steps taken back because they went past a sample
     status: Status = Status.RUNNING
     integration_seconds: float = 0.0
-    last_good: StepBoundary | None = None
-    detail: str = ""
+    last_good: StepBoundary | None = None  # last step boundary with a finite state, for a run that broke down
+    detail: str = ""  # why it broke down, if more is known
 
     @property
     def fraction(self) -> float:
@@ -81,18 +76,15 @@ class Pacing:
 
     Attributes:
         chunk_seconds: time between checks of guards and Ctrl-C; well below the half second that a user waits.
-        patience: seconds until samples of a slow run are handed over.
-        rows_at_once: samples in a block that is evaluated; more are no faster, and take memory.
         rows_waiting: samples in memory before they are evaluated, however fast they come; no more than are
             evaluated in the time of a chunk.
-        solver: numbers by which the solver chooses its ways; None for those that were measured.
     """
 
     chunk_seconds: float = 0.05
-    patience: float = 2.0
-    rows_at_once: int = 8192
+    patience: float = 2.0  # seconds until samples of a slow run are handed over
+    rows_at_once: int = 8192  # samples in a block that is evaluated; more are no faster, and take memory
     rows_waiting: int = 32768
-    solver: Any = None
+    solver: Any = None  # numbers by which the solver chooses its ways; None for those that were measured
 
 
 MEASURED = Pacing()

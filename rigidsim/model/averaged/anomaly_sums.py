@@ -41,17 +41,12 @@ class AnomalySums:
     """Sums over the orbits after which a motion in resonance repeats: one, or two for odd multiples.
 
     Units: mean motion and largest moment are 1.
-
-    Attributes:
-        moments: (3,), the largest, 1, last.
-        strength: 3 G M / (a^3 n^2).
-        multiple: k = 2 p.
     """
 
-    moments: np.ndarray
-    strength: float
+    moments: np.ndarray  # (3,), the largest, 1, last
+    strength: float  # 3 G M / (a^3 n^2)
     eccentricity: float
-    multiple: int
+    multiple: int  # k = 2 p
     points: int
 
     @classmethod

@@ -67,8 +67,6 @@ class Average:
     """An averaged motion; numbers are mpf, SI.
 
     Attributes:
-        start: initial direction of the momentum, unit vector, space axes.
-        swing: angle (rad) by which the terms removed by averaging over the rotation swing the momentum.
         figure: +1 or -1 if the figure axis is the circled one or its opposite and stays near the momentum,
             0 elsewhere.
         driven: what torques of the body alone do; None without such torques. Then ``motion`` and ``energy``
@@ -79,9 +77,9 @@ class Average:
     short_period: bool
     motion: FreeMotion
     sources: Sequence[Source]
-    start: Vector
+    start: Vector  # initial direction of the momentum, unit vector, space axes
     energy: Any
-    swing: float
+    swing: float  # angle (rad) by which the terms removed by averaging over the rotation swing the momentum
     figure: int
     resonance: Resonance | None = None
     slow: SlowStart | None = None

@@ -63,21 +63,18 @@ class Wave:
     """What a torque does within a rotation, at one place of the course; internal units.
 
     Attributes:
-        periodic: P and Q less their mean course, over ``_GRID`` amplitudes, (2, n).
-        parameter: k^2.
         wobble, precession: rates l (signed) and g, rad per unit of time.
         harmonics: Fourier coefficients over the amplitude of the torque across the momentum, turned back by
             the mean precession, over L times the rate of the amplitude: rad.
-        phase: of the precession less its mean course, at the amplitudes.
     """
 
-    periodic: np.ndarray
-    parameter: float
+    periodic: np.ndarray  # P and Q less their mean course, over ``_GRID`` amplitudes, (2, n)
+    parameter: float  # k^2
     wobble: float
     precession: float
     harmonics: np.ndarray
     orders: np.ndarray
-    phase: np.ndarray
+    phase: np.ndarray  # of the precession less its mean course, at the amplitudes
 
     @property
     def ratio(self) -> np.ndarray:
@@ -141,10 +138,6 @@ class PolhodeCourse:
     """P and Q along the run; internal units.
 
     Attributes:
-        parameter: largest k^2.
-        fastest: largest rate at which torques change P, Q or the momentum, relative to their sizes.
-        scatter: sum of the angles (rad) by which passing resonances turn the momentum.
-        swing: largest angle (rad) by which the torques swing the momentum within a rotation.
         swings: largest changes of the momentum's size and of the energy within a wobble, relative to them.
     """
 
@@ -152,10 +145,10 @@ class PolhodeCourse:
     times: np.ndarray
     amplitudes: np.ndarray
     nodes: int
-    parameter: float
-    fastest: float
-    scatter: float
-    swing: float
+    parameter: float  # largest k^2
+    fastest: float  # largest rate at which torques change P, Q or the momentum, relative to their sizes
+    scatter: float  # sum of the angles (rad) by which passing resonances turn the momentum
+    swing: float  # largest angle (rad) by which the torques swing the momentum within a rotation
     swings: tuple[float, float]
 
     @cached_property

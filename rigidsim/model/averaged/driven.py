@@ -31,13 +31,7 @@ EPSILON = 2.0**-60
 
 @dataclass(frozen=True)
 class Driven:
-    """What torques of the body alone do to an averaged motion; numbers are mpf, SI.
-
-    Attributes:
-        amplitude: f at the start, rad.
-        direction: periodic part of the momentum's direction at the start.
-        passed: sum of the angles (rad) by which resonances with gradients turn the momentum.
-    """
+    """What torques of the body alone do to an averaged motion; numbers are mpf, SI."""
 
     titles: Sequence[str]
     polhodes: Polhodes
@@ -45,10 +39,10 @@ class Driven:
     course: PolhodeCourse
     axial: Any
     transverse: Any
-    amplitude: float
+    amplitude: float  # f at the start, rad
     epsilon: float
-    direction: np.ndarray
-    passed: float = 0.0
+    direction: np.ndarray  # periodic part of the momentum's direction at the start
+    passed: float = 0.0  # sum of the angles (rad) by which resonances with gradients turn the momentum
 
     @property
     def scatter(self) -> float:

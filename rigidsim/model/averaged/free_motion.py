@@ -33,19 +33,15 @@ class FreeMotion:
     """A free rotation; numbers are mpf, SI.
 
     Attributes:
-        axes: the axes of these moments: unit, right-handed, body axes, with L . third positive.
-        parameter: k^2; 0 for a symmetric body, and for a rotation about a principal axis.
-        squares: means of the squared components of m along the axes.
-        amplitudes: |M1|, |M2|, |M3|.
         precession_rate, wobble_rate: g and l, rad/s; l is 0 if the tensor doesn't depend on its angle.
     """
 
     momentum: Any
     moments: Vector
-    axes: Matrix
-    parameter: Any
-    squares: Vector
-    amplitudes: Vector
+    axes: Matrix  # the axes of these moments: unit, right-handed, body axes, with L . third positive
+    parameter: Any  # k^2; 0 for a symmetric body, and for a rotation about a principal axis
+    squares: Vector  # means of the squared components of m along the axes
+    amplitudes: Vector  # |M1|, |M2|, |M3|
     precession_rate: Any
     wobble_rate: Any
 

@@ -46,12 +46,11 @@ class SlowStart:
     """Initial state of a resonant average; mpf.
 
     Attributes:
-        quaternion: attitude of the axes a, b, c, to space axes.
         momentum: angular momentum along them beyond that of exactly p turns to a revolution about c,
             kg m^2/s.
     """
 
-    quaternion: Vector
+    quaternion: Vector  # attitude of the axes a, b, c, to space axes
     momentum: Vector
 
 

@@ -36,21 +36,13 @@ _SERIES = {"sun": (365.25636, 0.0167), "moon": (27.32166, 0.0549)}
 
 @dataclass(frozen=True)
 class Osculating:
-    """Motion of a point mass as seen from the body, from the osculating orbit of the start.
+    """Motion of a point mass as seen from the body, from the osculating orbit of the start."""
 
-    Attributes:
-        motion: mean motion, rad/s; 0 if it isn't bound to the body.
-        eccentricity: 0 if it isn't.
-        perturbed: accelerations of the relative motion by the other masses over the mutual one.
-        nearest: (a/r)^3 at the closest approach.
-        passing_rate: angular rate there, rad/s.
-    """
-
-    motion: float
-    eccentricity: float
-    perturbed: float
-    nearest: float
-    passing_rate: float
+    motion: float  # mean motion, rad/s; 0 if it isn't bound to the body
+    eccentricity: float  # 0 if it isn't
+    perturbed: float  # accelerations of the relative motion by the other masses over the mutual one
+    nearest: float  # (a/r)^3 at the closest approach
+    passing_rate: float  # angular rate there, rad/s
 
     @classmethod
     def of(cls, context: Any, pair: PointMassPair) -> Osculating:
@@ -67,16 +59,11 @@ class Osculating:
 
 @dataclass(frozen=True)
 class Source:
-    """The source of one gravity gradient.
+    """The source of one gravity gradient."""
 
-    Attributes:
-        number: position of its ``[[loads]]`` table, from 1.
-        strength: 3 G M / a^3 (mpf, 1/s^2), a being ``GradientSource.distance``.
-    """
-
-    number: int
+    number: int  # position of its ``[[loads]]`` table, from 1
     of: GradientSource
-    strength: Any
+    strength: Any  # 3 G M / a^3 (mpf, 1/s^2), a being ``GradientSource.distance``
     osculating: Osculating | None = None
 
     @property

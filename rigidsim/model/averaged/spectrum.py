@@ -28,15 +28,13 @@ class BodySpectrum:
     """Harmonics of the inertia tensor of a freely turning body.
 
     Attributes:
-        rates: g and l, rad/s.
         harmonics: (3, points) complex, c_ij in kg m^2 by order i and by j as in ``numpy.fft.fftfreq``.
-        turns: (points, 3, 3), T's rotation from the principal axes at equal steps of the wobble.
     """
 
     motion: FreeMotion
-    rates: tuple[float, float]
+    rates: tuple[float, float]  # g and l, rad/s
     harmonics: np.ndarray
-    turns: np.ndarray
+    turns: np.ndarray  # (points, 3, 3), T's rotation from the principal axes at equal steps of the wobble
 
     @cached_property
     def orders(self) -> tuple[np.ndarray, np.ndarray]:

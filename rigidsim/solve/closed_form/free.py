@@ -40,17 +40,14 @@ class SymmetricFree(Motion):
     """Free motion with two equal moments (a sphere, a rod), or of any body that turns about a principal axis.
 
     Attributes:
-        transverse: rate across axis 3.
-        axial: w3.
-        sum_rate: s'.
         spin_rate, spin: rate and initial value of the transverse rate's angle: w2 + i w1 ~ exp(i angle).
     """
 
     tilt_cosine: Any
     tilt_sine: Any
-    transverse: Any
-    axial: Any
-    sum_rate: Any
+    transverse: Any  # rate across axis 3
+    axial: Any  # w3
+    sum_rate: Any  # s'
     spin_rate: Any
     spin: Any
 
@@ -76,22 +73,18 @@ class AsymmetricFree(Motion):
     """Free motion with three different moments: w = (W1 cn, W2 sn, W3 dn)(u), L circling axis 3.
 
     Attributes:
-        amplitudes: W1, W2, W3.
-        leans: amplitudes of L1 / 2L, L2 / 2L and L3 / L.
-        phase: theta function whose phase is that of alpha; it has a variable of its own.
         rate, step: mean rate of s/2 and its change per half period, as in ``Strand``.
-        moments: I1, I2, I3; I2 lies between the others.
     """
 
     argument: Argument
-    amplitudes: tuple[Any, Any, Any]
-    leans: tuple[Any, Any, Any]
+    amplitudes: tuple[Any, Any, Any]  # W1, W2, W3
+    leans: tuple[Any, Any, Any]  # amplitudes of L1 / 2L, L2 / 2L and L3 / L
     functions: Jacobi
-    phase: Theta
+    phase: Theta  # theta function whose phase is that of alpha; it has a variable of its own
     rate: Any
     step: Any
     momentum: Any
-    moments: tuple[Any, Any, Any]
+    moments: tuple[Any, Any, Any]  # I1, I2, I3; I2 lies between the others
 
     title = "free asymmetric body: Jacobi elliptic functions"
 

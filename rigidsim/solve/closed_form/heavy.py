@@ -36,17 +36,14 @@ class HeavyTop(Motion):
     """A top that nutates, precesses regularly, swings as a pendulum, or any mixture.
 
     Attributes:
-        argument: argument of the elliptic functions; half a period 2K is one nutation.
-        roots: u1 <= u2 <= 1 <= u3 of the cubic.
         alpha, beta: spinor of the attitude (axis 3 along the top's axis, space Z against gravity).
-        across: w1 + i w2.
     """
 
-    argument: Argument
-    roots: tuple[Any, Any, Any]
+    argument: Argument  # argument of the elliptic functions; half a period 2K is one nutation
+    roots: tuple[Any, Any, Any]  # u1 <= u2 <= 1 <= u3 of the cubic
     alpha: Strand
     beta: Strand
-    across: Strand
+    across: Strand  # w1 + i w2
     axial: Any
 
     title = "heavy symmetric top: Jacobi elliptic functions"

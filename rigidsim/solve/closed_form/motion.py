@@ -29,15 +29,10 @@ class NoClosedForm(ValueError):
 
 @dataclass(frozen=True)
 class Motion:
-    """A rotation in closed form, in the units of time and inertia of the numbers that it was made from.
+    """A rotation in closed form, in the units of time and inertia of the numbers that it was made from."""
 
-    Attributes:
-        axes: rows are the axes of the frame in which the motion is written (right-handed, body axes).
-        title: name of the motion, for plans and summaries.
-    """
-
-    axes: Matrix
-    title: ClassVar[str] = "rotation"
+    axes: Matrix  # rows are the axes of the frame in which the motion is written (right-handed, body axes)
+    title: ClassVar[str] = "rotation"  # name of the motion, for plans and summaries
 
     def at(self, arithmetic: Arithmetic, time: Any) -> tuple[list[Any], list[Any]]:
         """Rates along ``axes`` and a quaternion from ``axes`` to a frame fixed in space, at times after the

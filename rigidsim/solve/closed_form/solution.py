@@ -98,14 +98,13 @@ class ClosedForm:
     """Closed-form solution of a scene, forwards or backwards from its start.
 
     Attributes:
-        motion: rotation of the body about its reference point, internal units of time.
         before, after: quaternions from the motion's fixed frame to space, and from the body axes to the
             motion's own.
     """
 
     method: ClassVar[str] = "closed_form"
     scene: Scene
-    motion: Motion
+    motion: Motion  # rotation of the body about its reference point, internal units of time
     scaling: Scaling
     before: Vector
     after: Vector

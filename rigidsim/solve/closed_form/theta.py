@@ -26,15 +26,13 @@ class Lattice:
 
     Attributes:
         m, complement: parameter and 1 - m, each with all its digits.
-        quarter: K; infinite on the separatrix (m = 1).
-        other: K', the quarter period of ``complement``; infinite for m = 0.
     """
 
     context: Any
     m: Any
     complement: Any
-    quarter: Any
-    other: Any
+    quarter: Any  # K; infinite on the separatrix (m = 1)
+    other: Any  # K', the quarter period of ``complement``; infinite for m = 0
 
     @property
     def circular(self) -> bool:
@@ -79,23 +77,16 @@ class Theta:
     part of the argument; or cosh and sinh of a variable along the imaginary axis, with the shift as a
     constant real part. The factor 2 nome^(1/4) of theta_1 and theta_2 is left out, and so is a factor of i
     in the trigonometric theta_1.
-
-    Attributes:
-        per_turn: the variable z over the number of turns x / 2K, or over x itself on the separatrix.
-        orders: k_n.
-        weights: a_n, b_n; without the power of the nome where hyperbolic.
-        logs: logarithm of that power.
-        sizes: binary logarithm of a bound of each term.
     """
 
     context: Any
     kind: int
     hyperbolic: bool
-    per_turn: Any
-    orders: tuple[int, ...]
-    weights: tuple[tuple[Any, Any], ...]
-    logs: tuple[Any, ...]
-    sizes: tuple[float, ...]
+    per_turn: Any  # the variable z over the number of turns x / 2K, or over x itself on the separatrix
+    orders: tuple[int, ...]  # k_n
+    weights: tuple[tuple[Any, Any], ...]  # a_n, b_n; without the power of the nome where hyperbolic
+    logs: tuple[Any, ...]  # logarithm of that power
+    sizes: tuple[float, ...]  # binary logarithm of a bound of each term
 
     def terms(self, bits: int) -> int:
         """Number of terms above 2^-bits."""
