@@ -239,17 +239,17 @@ def _refuse_passing(scene: Scene, spectrum: BodySpectrum, source: Source) -> Non
     The torque of a source that passes at the angular rate w has a continuous spectrum that falls like
     exp(-nu / w), since its singularities in complex time are within 1 / w of the real axis.
     """
-    if source.osculating is None or source.motion > 0:
+    if source.passing_rate is None or source.motion > 0:
         return
     sizes = np.abs(spectrum.harmonics)
     seen = spectrum.oscillating & (sizes > _WEAK * max(float(x) for x in spectrum.motion.moments))
     rates = np.append(np.abs(spectrum.frequencies[seen]), abs(spectrum.rates[0]))
-    most = PASSING * source.osculating.passing_rate
+    most = PASSING * source.passing_rate
     if rates.min() < most:
         raise _refused(
             scene.config.model.level,
             f"the point mass of [[loads]] {source.name} isn't bound to the body and passes it, by their "
-            f"motion at the start, at {source.osculating.passing_rate:.3g} rad/s, which the body's slowest "
+            f"motion at the start, at {source.passing_rate:.3g} rad/s, which the body's slowest "
             f"frequency, {rates.min():.3g} rad/s, has to exceed by a factor of {PASSING:.0f}",
         )
 

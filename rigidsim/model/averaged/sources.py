@@ -35,36 +35,45 @@ _SERIES = {"sun": (365.25636, 0.0167), "moon": (27.32166, 0.0549)}
 
 
 @dataclass(frozen=True)
-class Osculating:
-    """Motion of a point mass as seen from the body, from the osculating orbit of the start."""
-
-    motion: float  # mean motion, rad/s; 0 if it isn't bound to the body
-    eccentricity: float  # 0 if it isn't
-    perturbed: float  # accelerations of the relative motion by the other masses over the mutual one
-    nearest: float  # (a/r)^3 at the closest approach
-    passing_rate: float  # angular rate there, rad/s
-
-    @classmethod
-    def of(cls, context: Any, pair: PointMassPair) -> Osculating:
-        """That of a pair at the start."""
-        least, rate = pair.encounter(context)
-        perturbed = pair.perturbation(context)
-        if (axis := pair.semi_major_axis(context)) is None:
-            return cls(0.0, 0.0, perturbed, 1.0, float(rate))
-        # what the others do to axis and eccentricity is of the size of their share in the acceleration
-        closer = float(least / axis) * max(1 - 2 * perturbed, 0.5)
-        e = min(pair.eccentricity(context) + 2 * perturbed, _ALMOST_PARABOLIC)
-        return cls(pair.mean_motion(context), e, perturbed, closer**-3, float(rate))
-
-
-@dataclass(frozen=True)
 class Source:
-    """The source of one gravity gradient."""
+    """The source of one gravity gradient; a point mass is judged by its osculating orbit of the start."""
 
     number: int  # position of its ``[[loads]]`` table, from 1
     of: GradientSource
     strength: Any  # 3 G M / a^3 (mpf, 1/s^2), a being ``GradientSource.distance``
-    osculating: Osculating | None = None
+    motion: float = 0.0  # mean motion, rad/s; 0 at rest, or for a point mass that isn't bound to the body
+    eccentricity: float = 0.0  # of its orbit, the largest in a table
+    nearest: float = 1.0  # (a/r)^3 at the closest approach
+    slow_rate: float = 0.0  # bound of the rate of node and periapsis together, rad/s; for a mass an estimate
+    uncertainty: float = 0.0  # of a point mass's mean motion, rad/s
+    passing_rate: float | None = None  # of a point mass: angular rate at the closest approach, rad/s
+
+    @classmethod
+    def at_start(cls, context: Any, number: int, source: GradientSource) -> Source:
+        """The source as it moves at the start."""
+        given = number, source, 3 * source.gravitational_parameter / source.distance(context) ** 3
+        if (pair := source.pair) is not None:
+            least, rate = pair.encounter(context)
+            if (axis := pair.semi_major_axis(context)) is None:
+                return cls(*given, passing_rate=float(rate))
+            # what the others do to axis and eccentricity is of the size of their share in the acceleration
+            perturbed, motion = pair.perturbation(context), pair.mean_motion(context)
+            closer = float(least / axis) * max(1 - 2 * perturbed, 0.5)
+            e = min(pair.eccentricity(context) + 2 * perturbed, _ALMOST_PARABOLIC)
+            doubt = perturbed * motion
+            return cls(*given, motion, e, closer**-3, doubt, doubt, float(rate))
+        if source.ephemeris is not None:
+            days, e = _SERIES[source.ephemeris]
+            return cls(*given, 2 * math.pi / (days * _DAY), e, (1 - e) ** -3)
+        if (table := source.table) is not None:
+            slow = float(table.normal_drift + table.shape_drift)
+            nearest = float(table.semi_major_axis / table.pericentre) ** 3
+            return cls(*given, float(table.mean_motion), float(table.largest_eccentricity), nearest, slow)
+        if (orbit := source.orbit) is None:
+            return cls(*given)
+        e = float(orbit.eccentricity)
+        slow = abs(float(orbit.node_rate)) + abs(float(orbit.periapsis_rate))
+        return cls(*given, abs(float(orbit.mean_motion)), e, (1 - e) ** -3, slow)
 
     @property
     def orbit(self) -> KeplerOrbit | None:
@@ -92,56 +101,9 @@ class Source:
         return self.orbit is not None or self.table is not None
 
     @property
-    def motion(self) -> float:
-        """Mean motion, rad/s; 0 for a source at rest, or a point mass that passes by."""
-        if self.osculating is not None:
-            return self.osculating.motion
-        if self.of.ephemeris is not None:
-            return 2 * math.pi / (_SERIES[self.of.ephemeris][0] * _DAY)
-        if self.table is not None:
-            return float(self.table.mean_motion)
-        return 0.0 if self.orbit is None else abs(float(self.orbit.mean_motion))
-
-    @property
-    def eccentricity(self) -> float:
-        """Eccentricity of the source's orbit, the largest in a table; 0 for a source at rest."""
-        if self.osculating is not None:
-            return self.osculating.eccentricity
-        if self.of.ephemeris is not None:
-            return _SERIES[self.of.ephemeris][1]
-        if self.table is not None:
-            return float(self.table.largest_eccentricity)
-        return 0.0 if self.orbit is None else float(self.orbit.eccentricity)
-
-    @property
-    def slow_rate(self) -> float:
-        """Bound of the rate of node and periapsis together, rad/s; an estimate for a point mass."""
-        if self.osculating is not None:
-            return self.uncertainty
-        if self.table is not None:
-            return float(self.table.normal_drift + self.table.shape_drift)
-        if self.orbit is None:
-            return 0.0
-        return abs(float(self.orbit.node_rate)) + abs(float(self.orbit.periapsis_rate))
-
-    @property
-    def uncertainty(self) -> float:
-        """Error (rad/s) of the mean motion of a point mass, which is taken from its osculating orbit."""
-        return 0.0 if self.osculating is None else self.osculating.perturbed * self.osculating.motion
-
-    @property
     def harmonics(self) -> np.ndarray:
         """Sizes of the harmonics of (a/r)^3 r r^T in the mean motion, the mean first."""
         return np.ones(1) if self.motion == 0 else orbit_harmonics(self.eccentricity)
-
-    @property
-    def nearest(self) -> float:
-        """(a/r)^3 at the closest approach."""
-        if self.osculating is not None:
-            return self.osculating.nearest
-        if self.table is not None:
-            return float(self.table.semi_major_axis / self.table.pericentre) ** 3
-        return float((1 - self.eccentricity) ** -3)
 
     def strength_at(self, context: Any, time: Any) -> Any:
         """3 G M / a^3 (mpf, 1/s^2) at a time."""
@@ -225,14 +187,8 @@ class Source:
 
 def sources_of(scene: Scene, loads: Sequence[Load]) -> list[Source]:
     """Sources of all gravity gradients of a scene, with their strengths."""
-    context, found = scene.context, []
-    for number, load in enumerate(loads, start=1):
-        source = gradient_source_of(load)
-        if source is not None:
-            strength = 3 * source.gravitational_parameter / source.distance(context) ** 3
-            seen = None if source.pair is None else Osculating.of(context, source.pair)
-            found.append(Source(number, source, strength, seen))
-    return found
+    found = [(number, gradient_source_of(load)) for number, load in enumerate(loads, start=1)]
+    return [Source.at_start(scene.context, n, source) for n, source in found if source is not None]
 
 
 def unit(context: Any, vector: Vector) -> Vector:
