@@ -42,14 +42,13 @@ class Growth:
     Attributes:
         factor: largest growth of an offset in rates and attitude, over the linear growth |w| t / sqrt 3 of
             a stable motion; 1 where it is no larger than a few times that.
-        saturated: whether ``factor`` is a lower bound only, since an offset became as large as the motion.
     """
 
     factor: float
     seconds: float
     rate: float  # rate of exponential growth beyond each comparison's window, 1/s; zero for linear growth
     window: float
-    saturated: bool = False
+    saturated: bool = False  # ``factor`` is a lower bound: an offset became as large as the motion
     passing_rate: float = 0.0
 
     def at(self, seconds: float) -> float:

@@ -36,14 +36,10 @@ DIRECTIONS = {
 
 @dataclass(frozen=True)
 class FoundEvent:
-    """One crossing of an event.
-
-    Attributes:
-        time, state: internal units, in the run's precision; the state is of shape (states,).
-    """
+    """One crossing of an event."""
 
     index: int
-    time: Scalar
+    time: Scalar  # and state (states,): internal units, in the run's precision
     state: np.ndarray
     angles: AngleState  # what the angle states stood for at the beginning of the step that contains it
 

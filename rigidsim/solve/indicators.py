@@ -46,10 +46,9 @@ def indicators(times: np.ndarray, growth: np.ndarray) -> Indicators:
     """
     since = times - times[:1] if times.ndim == 2 else (times - times[0])[:, None]
     finite = np.isfinite(growth)
-    whole = bool(finite.all())  # as growth mostly is: nothing has to be left out
-    known = finite[:, :1] if whole else np.logical_and.accumulate(finite, axis=0)
-    g = growth if whole else np.where(known, growth, 0.0)
-    step = np.diff(since, axis=0) if whole else np.where(known[1:], np.diff(since, axis=0), 0.0)
+    known = np.logical_and.accumulate(finite, axis=0)
+    g = np.where(known, growth, 0.0)
+    step = np.where(known[1:], np.diff(since, axis=0), 0.0)
     area = np.zeros_like(g)
     np.cumsum(step * (g[1:] + g[:-1]) / 2, axis=0, out=area[1:])
     with np.errstate(invalid="ignore", divide="ignore"):

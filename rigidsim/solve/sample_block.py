@@ -13,17 +13,11 @@ Angles = tuple[float, float, float]
 
 
 class AngleState(NamedTuple):
-    """Which Euler angles the angle states stand for; all fields are empty or 0 without angle states.
-
-    Attributes:
-        chart: 0 for angles of the requested sequence, 1 for those of its partner
-            (``rigidsim.solve.effects.charts``).
-        reference: in the partner chart, the requested angles at the latest natural step, rad; else zeros.
-    """
+    """Which Euler angles the angle states stand for; all fields are empty or 0 without angle states."""
 
     turns: tuple[int, ...] = ()  # full turns of the angle states
-    chart: int = 0
-    reference: tuple[float, ...] = ()
+    chart: int = 0  # 1 for angles of the partner (``rigidsim.solve.effects.charts``)
+    reference: tuple[float, ...] = ()  # requested angles at the latest step, rad, in the partner chart
 
 
 _NOTHING = np.zeros(0)
@@ -70,9 +64,6 @@ class SampleBlock:
             reference: one row for each sample; None if it doesn't change either.
         """
         n = len(times)
-        if not angles.turns and reference is None and not len(put_back):  # columns of no width
-            none = np.empty((n, 0))
-            return cls(first, times, states, none.astype(np.int64), np.zeros(n, np.int64), none, none)
         turns = np.array([angles.turns], dtype=np.int64)
         if reference is None:
             reference = np.array([angles.reference], dtype=np.float64).repeat(n, axis=0)

@@ -19,17 +19,13 @@ from rigidsim.solve.status import Status
 
 @dataclass
 class Progress:
-    """Progress of a run; its one mutable record.
-
-    Attributes:
-        smallest_step, largest_step: extremes of the natural steps so far, internal units.
-    """
+    """Progress of a run; its one mutable record."""
 
     samples: int
     next_sample: int = 0  # index of the first sample that isn't handed over yet
     steps: int = 0
     time: float = 0.0  # time that the integration has reached, s
-    smallest_step: float = float("inf")
+    smallest_step: float = float("inf")  # extremes of the natural steps so far, internal units
     largest_step: float = 0.0
     redone_steps: int = 0  # steps taken back because they went past a sample
     status: Status = Status.RUNNING
@@ -72,18 +68,12 @@ class SampleReceiver(Protocol):
 
 @dataclass(frozen=True)
 class Pacing:
-    """Amounts; no bit depends on them. A user waits for Ctrl-C no longer than for a chunk and its hand-over.
+    """Amounts; no bit depends on them. Ctrl-C is heeded after no more than a chunk and its hand-over."""
 
-    Attributes:
-        chunk_seconds: time between checks of guards and Ctrl-C; well below the half second that a user waits.
-        rows_waiting: samples in memory before they are evaluated, however fast they come; no more than are
-            evaluated in the time of a chunk.
-    """
-
-    chunk_seconds: float = 0.05
+    chunk_seconds: float = 0.05  # between checks of guards and Ctrl-C; well below what a user waits
     patience: float = 2.0  # seconds until samples of a slow run are handed over
     rows_at_once: int = 8192  # samples in a block that is evaluated; more are no faster, and take memory
-    rows_waiting: int = 32768
+    rows_waiting: int = 32768  # in memory before they are evaluated, as many as in the time of a chunk
     solver: Any = None  # numbers by which the solver chooses its ways; None for those that were measured
 
 

@@ -67,8 +67,6 @@ class Average:
     """An averaged motion; numbers are mpf, SI.
 
     Attributes:
-        figure: +1 or -1 if the figure axis is the circled one or its opposite and stays near the momentum,
-            0 elsewhere.
         driven: what torques of the body alone do; None without such torques. Then ``motion`` and ``energy``
             are those of the start.
     """
@@ -80,7 +78,7 @@ class Average:
     start: Vector  # initial direction of the momentum, unit vector, space axes
     energy: Any
     swing: float  # angle (rad) by which the terms removed by averaging over the rotation swing the momentum
-    figure: int
+    figure: int  # +1 or -1 if the figure axis or its opposite is circled and stays near the momentum, else 0
     resonance: Resonance | None = None
     slow: SlowStart | None = None
     driven: Driven | None = None

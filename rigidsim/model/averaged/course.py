@@ -63,14 +63,13 @@ class Wave:
     """What a torque does within a rotation, at one place of the course; internal units.
 
     Attributes:
-        wobble, precession: rates l (signed) and g, rad per unit of time.
         harmonics: Fourier coefficients over the amplitude of the torque across the momentum, turned back by
             the mean precession, over L times the rate of the amplitude: rad.
     """
 
     periodic: np.ndarray  # P and Q less their mean course, over ``_GRID`` amplitudes, (2, n)
     parameter: float  # k^2
-    wobble: float
+    wobble: float  # l (signed), rad per unit of time; precession is g
     precession: float
     harmonics: np.ndarray
     orders: np.ndarray
@@ -135,11 +134,7 @@ def wave_of(torques: DrivingTorques, axial: float, transverse: float) -> Wave:
 
 @dataclass(frozen=True)
 class PolhodeCourse:
-    """P and Q along the run; internal units.
-
-    Attributes:
-        swings: largest changes of the momentum's size and of the energy within a wobble, relative to them.
-    """
+    """P and Q along the run; internal units."""
 
     torques: DrivingTorques
     times: np.ndarray
@@ -149,7 +144,7 @@ class PolhodeCourse:
     fastest: float  # largest rate at which torques change P, Q or the momentum, relative to their sizes
     scatter: float  # sum of the angles (rad) by which passing resonances turn the momentum
     swing: float  # largest angle (rad) by which the torques swing the momentum within a rotation
-    swings: tuple[float, float]
+    swings: tuple[float, float]  # largest relative changes of momentum and energy within a wobble
 
     @cached_property
     def least(self) -> float:

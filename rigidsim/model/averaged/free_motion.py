@@ -30,11 +30,7 @@ class Separatrix(Exception):
 
 @dataclass(frozen=True)
 class FreeMotion:
-    """A free rotation; numbers are mpf, SI.
-
-    Attributes:
-        precession_rate, wobble_rate: g and l, rad/s; l is 0 if the tensor doesn't depend on its angle.
-    """
+    """A free rotation; numbers are mpf, SI."""
 
     momentum: Any
     moments: Vector
@@ -42,7 +38,7 @@ class FreeMotion:
     parameter: Any  # k^2; 0 for a symmetric body, and for a rotation about a principal axis
     squares: Vector  # means of the squared components of m along the axes
     amplitudes: Vector  # |M1|, |M2|, |M3|
-    precession_rate: Any
+    precession_rate: Any  # g and l, rad/s; l is 0 if the tensor doesn't depend on its angle
     wobble_rate: Any
 
     @property

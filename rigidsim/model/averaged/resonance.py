@@ -43,15 +43,10 @@ _ROUNDS = 4  # iterations of the start; each gains a factor of the nutation's si
 
 @dataclass(frozen=True)
 class SlowStart:
-    """Initial state of a resonant average; mpf.
-
-    Attributes:
-        momentum: angular momentum along them beyond that of exactly p turns to a revolution about c,
-            kg m^2/s.
-    """
+    """Initial state of a resonant average; mpf."""
 
     quaternion: Vector  # attitude of the axes a, b, c, to space axes
-    momentum: Vector
+    momentum: Vector  # along them beyond that of exactly p turns to a revolution about c, kg m^2/s
 
 
 @dataclass(frozen=True)

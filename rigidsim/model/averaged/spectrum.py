@@ -25,15 +25,11 @@ _LEAST = 1e-12  # of the largest harmonic
 
 @dataclass(frozen=True)
 class BodySpectrum:
-    """Harmonics of the inertia tensor of a freely turning body.
-
-    Attributes:
-        harmonics: (3, points) complex, c_ij in kg m^2 by order i and by j as in ``numpy.fft.fftfreq``.
-    """
+    """Harmonics of the inertia tensor of a freely turning body."""
 
     motion: FreeMotion
     rates: tuple[float, float]  # g and l, rad/s
-    harmonics: np.ndarray
+    harmonics: np.ndarray  # (3, points) complex, c_ij in kg m^2 by i and by j as in ``fftfreq``
     turns: np.ndarray  # (points, 3, 3), T's rotation from the principal axes at equal steps of the wobble
 
     @cached_property

@@ -37,18 +37,14 @@ from rigidsim.solve.closed_form.theta import (
 
 @dataclass(frozen=True)
 class SymmetricFree(Motion):
-    """Free motion with two equal moments (a sphere, a rod), or of any body that turns about a principal axis.
-
-    Attributes:
-        spin_rate, spin: rate and initial value of the transverse rate's angle: w2 + i w1 ~ exp(i angle).
-    """
+    """Free motion with two equal moments (a sphere, a rod), or of any body about a principal axis."""
 
     tilt_cosine: Any
     tilt_sine: Any
     transverse: Any  # rate across axis 3
     axial: Any  # w3
     sum_rate: Any  # s'
-    spin_rate: Any
+    spin_rate: Any  # and initial value of the transverse rate's angle: w2 + i w1 ~ exp(i angle)
     spin: Any
 
     title = "free body with two equal moments, or in rotation about a principal axis: circular functions"
@@ -70,18 +66,14 @@ class SymmetricFree(Motion):
 
 @dataclass(frozen=True)
 class AsymmetricFree(Motion):
-    """Free motion with three different moments: w = (W1 cn, W2 sn, W3 dn)(u), L circling axis 3.
-
-    Attributes:
-        rate, step: mean rate of s/2 and its change per half period, as in ``Strand``.
-    """
+    """Free motion with three different moments: w = (W1 cn, W2 sn, W3 dn)(u), L circling axis 3."""
 
     argument: Argument
     amplitudes: tuple[Any, Any, Any]  # W1, W2, W3
     leans: tuple[Any, Any, Any]  # amplitudes of L1 / 2L, L2 / 2L and L3 / L
     functions: Jacobi
     phase: Theta  # theta function whose phase is that of alpha; it has a variable of its own
-    rate: Any
+    rate: Any  # mean rate of s/2 and its change per half period, as in ``Strand``
     step: Any
     momentum: Any
     moments: tuple[Any, Any, Any]  # I1, I2, I3; I2 lies between the others

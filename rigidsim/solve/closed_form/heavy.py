@@ -33,15 +33,11 @@ from rigidsim.solve.closed_form.theta import (
 
 @dataclass(frozen=True)
 class HeavyTop(Motion):
-    """A top that nutates, precesses regularly, swings as a pendulum, or any mixture.
-
-    Attributes:
-        alpha, beta: spinor of the attitude (axis 3 along the top's axis, space Z against gravity).
-    """
+    """A top that nutates, precesses regularly, swings as a pendulum, or any mixture."""
 
     argument: Argument  # argument of the elliptic functions; half a period 2K is one nutation
     roots: tuple[Any, Any, Any]  # u1 <= u2 <= 1 <= u3 of the cubic
-    alpha: Strand
+    alpha: Strand  # and beta: spinor of the attitude (axis 3 along the top's axis, space Z against gravity)
     beta: Strand
     across: Strand  # w1 + i w2
     axial: Any

@@ -95,18 +95,13 @@ _GUARD_BITS = 40  # guard bits of an evaluation beyond double, for its own round
 
 @dataclass(frozen=True)
 class ClosedForm:
-    """Closed-form solution of a scene, forwards or backwards from its start.
-
-    Attributes:
-        before, after: quaternions from the motion's fixed frame to space, and from the body axes to the
-            motion's own.
-    """
+    """Closed-form solution of a scene, forwards or backwards from its start."""
 
     method: ClassVar[str] = "closed_form"
     scene: Scene
     motion: Motion  # rotation of the body about its reference point, internal units of time
     scaling: Scaling
-    before: Vector
+    before: Vector  # quaternions from the motion's fixed frame to space, and body axes to its own
     after: Vector
 
     @property

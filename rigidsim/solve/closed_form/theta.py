@@ -22,14 +22,10 @@ from rigidsim.solve.closed_form.arithmetic import Arithmetic, Pair
 
 @dataclass(frozen=True)
 class Lattice:
-    """The two quarter periods of a parameter m.
-
-    Attributes:
-        m, complement: parameter and 1 - m, each with all its digits.
-    """
+    """The two quarter periods of a parameter m."""
 
     context: Any
-    m: Any
+    m: Any  # and 1 - m, each with all its digits
     complement: Any
     quarter: Any  # K; infinite on the separatrix (m = 1)
     other: Any  # K', the quarter period of ``complement``; infinite for m = 0

@@ -29,17 +29,14 @@ class Continuity:
 
     Attributes:
         turns: full turns added to the joined angles, (angles,).
-        last_angles, last_quaternion: latest sample's values, float64, the angles before those turns; None
-            before the first block.
-        last_time, last_state: the latest sample's, float64, internal units, if turns are counted from it.
         wrapped_from: time (internal units) of the first sample with unknown turns: from there on, angles
             are recorded within one turn; nan if all are known, and -inf for states that aren't samples.
     """
 
     turns: np.ndarray = field(default_factory=lambda: np.zeros(3, dtype=np.int64))
-    last_angles: np.ndarray | None = None
+    last_angles: np.ndarray | None = None  # of the latest sample, float64, before those turns; None before it
     last_quaternion: np.ndarray | None = None
-    last_time: float = math.nan
+    last_time: float = math.nan  # of the latest sample, internal units, if turns are counted from it
     last_state: np.ndarray | None = None
     wrapped_from: float = math.nan
 

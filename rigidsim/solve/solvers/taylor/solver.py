@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
-from typing import ClassVar, TypeAlias
 
 from rigidsim.model.system import System
 from rigidsim.scene.choices import DEFAULT_METHOD, METHODS
@@ -41,7 +39,13 @@ class TaylorSolver(StepwiseSolver):
             self.ways.look_ahead(boundary)
         started, before = time.perf_counter(), self.stepper.steps
         way, count = self.ways.choose(self.buffer.count, self.buffer.upcoming)
-        finite = self._WAYS[way](self, self.allowed(count, most), boundary)
+        take = {
+            SampleWay.SKIP: self._skip,
+            SampleWay.GRID: self._grid,
+            SampleWay.BLOCK: self._block,
+            SampleWay.STEP: self._step,
+        }[way]
+        finite = take(self.allowed(count, most), boundary)
         self.ways.measured(way, self.stepper.steps - before, time.perf_counter() - started)
         return finite
 
@@ -102,14 +106,6 @@ class TaylorSolver(StepwiseSolver):
     def _step(self, count: int, boundary: StepBoundary) -> bool:
         """Take single steps, until the next sample is worth a skip."""
         return self.step_by_step(count, boundary, self.ways.numbers.skip_from)
-
-    _Take: TypeAlias = "Callable[[TaylorSolver, int, StepBoundary], bool]"
-    _WAYS: ClassVar[dict[SampleWay, _Take]] = {
-        SampleWay.SKIP: _skip,
-        SampleWay.GRID: _grid,
-        SampleWay.BLOCK: _block,
-        SampleWay.STEP: _step,
-    }
 
 
 @solves(METHODS[DEFAULT_METHOD])

@@ -46,30 +46,18 @@ class SampleWay(Enum):
 
 @dataclass(frozen=True)
 class Ways:
-    """Parameters of the choice; the defaults cost least where they were measured.
+    """Parameters of the choice; the defaults cost least where they were measured."""
 
-    Attributes:
-        grid_rows: most samples in a stride, which can't be shortened, for it to be taken as a grid; bounds
-            the memory, about 8 MB in double precision.
-        grid_strides: strides per sample up to which grids (20 us each) cost less than skips (85 us).
-        block_spacing: steps per sample up to which blocks (1 ms each, and 0.8 us a step) cost less than
-            skipping to each.
-        skip_margin: share of the steps to the next sample, if all are as long as the longest recent one, that
-            are skipped at once.
-        even_margin: share of the steps to the next sample, if they are as long as those of the latest skip on
-            average, that are skipped at once if that is no more than the latest skip.
-    """
-
-    grid_rows: int = 65536
-    grid_strides: float = 4.0
+    grid_rows: int = 65536  # most samples in a stride, which can't be cut short: 8 MB in double precision
+    grid_strides: float = 4.0  # per sample, up to which grids (20 us each) cost less than skips (85 us)
     least_grid_steps: int = 8  # fewer are cheaper one by one
     block_steps: int = 4096  # most steps in a block
-    block_spacing: float = 64.0
+    block_spacing: float = 64.0  # steps per sample up to which blocks (1 ms each, 0.8 us a step) beat skips
     least_block_steps: int = 64  # fewer are cheaper one by one
     look_ahead: int = 16  # samples over which their spacing is measured
     skip_from: float = 12.0  # steps to a sample from which skipping costs less than single steps
-    skip_margin: float = 0.9
-    even_margin: float = 0.97
+    skip_margin: float = 0.9  # of the steps to the next sample, if as long as the longest recent one, skipped
+    even_margin: float = 0.97  # the same by the latest skip's mean length, if that is no more than that skip
     fading: float = 0.98  # factor per chunk by which the longest recent step fades
 
 
