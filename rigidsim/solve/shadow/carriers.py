@@ -43,9 +43,9 @@ integrator takes 18 and 48 us for four lanes; on a quieter machine 6.6 and 15, w
 and 83 ms to compile and 1.5 and 2.3 us a step. At 1e-6 half of that. Of these times 6 to 19 ms are no code
 generation: a batch that was compiled before takes so long to make.
 """
-_UNEVEN, _FEW_STEPS = 2.5, 8
-"""Ratio of longest to shortest step up to which steps count as alike, and a number of steps so small that it
-doesn't matter.
+_UNEVEN, _FEW_STEPS, _FEW_OF_ALL = 2.5, 8, 2048
+"""Ratio of longest to shortest step up to which steps count as alike; and a number of steps so small that it
+doesn't matter, or such a part of all.
 """
 _EIGHTY_BITS = int(np.finfo(np.longdouble).nmant) == 63
 _LEAST_TOLERANCE, _LEAST_WIDE_TOLERANCE = 1e-11, 1e-15
@@ -89,8 +89,8 @@ class _SingleMotion:
 
     tolerance: float
 
-    def __init__(self) -> None:
-        self._most_even = HOPELESS_STEPS
+    def __init__(self, steps: float = 0.0) -> None:
+        self._most_even, self._few = HOPELESS_STEPS, max(_FEW_STEPS, round(steps / _FEW_OF_ALL))
 
     def advance(
         self, which: np.ndarray, states: np.ndarray, begin: np.ndarray, end: np.ndarray, steps: np.ndarray
@@ -113,8 +113,8 @@ class _SingleMotion:
         tried = min(self._most_even, most)
         while True:
             _, shortest, longest, steps, *_ = go(tried)
-            if longest <= _UNEVEN * shortest or steps <= _FEW_STEPS:
-                self._most_even = 2 * max(tried, _FEW_STEPS)
+            if longest <= _UNEVEN * shortest or steps <= self._few:
+                self._most_even = 2 * max(tried, self._few)
                 return int(steps)
             tried = steps // 2
 
@@ -126,7 +126,7 @@ class BatchCarrier(_SingleMotion):
     """
 
     def __init__(self, system: System, steps: float, tolerance: float = TOLERANCE) -> None:
-        super().__init__()
+        super().__init__(steps)
         self._system, self.tolerance = system, tolerance
         self._level = self._level_for(steps, tolerance)
         self._carried = [i for i, n in enumerate(system.states) if not (n == WORK or n.startswith(TANGENT))]

@@ -127,7 +127,7 @@ class ShadowEnsemble:
         *,
         rounded: np.ndarray | None = None,
         series: Callable[[np.ndarray, float], np.ndarray] | None = None,
-        stretches: int = 16,
+        stretches: int = 12,
     ) -> None:
         self.carrier, self._measures, self._errors = carrier, measures, perturbations
         self._epsilon, self._series, self._stretches = epsilon, series, stretches
@@ -142,13 +142,14 @@ class ShadowEnsemble:
         self.time, self._steps = starts.begin.copy(), np.zeros(motions)
         self._ahead, self._cut = np.zeros(motions), np.zeros(motions)
         self._over = np.zeros(motions)
-        self._round = 0
+        self._random = np.random.default_rng(0)
         self.spread = Spread(motions)
         self._pace(starts.steps)
         self._stride = self._most.copy()
-        normal = np.random.default_rng(0).standard_normal((len(starts.states), 1, PERTURBED))
-        sizes = np.where(rounded, self._largest, 0.0)[:, :, None]
-        self._add(np.arange(motions), self._errors.first * sizes * normal)
+        normal = self._random.standard_normal((len(starts.states), 1, PERTURBED))
+        sizes, every = np.where(rounded, self._largest, 0.0)[:, :, None], np.arange(motions)
+        self._add(every, self._errors.first * sizes * normal)
+        self._far = self._distances(every, self._apart(every))  # of the farthest
 
     def _pace(self, steps: np.ndarray) -> None:
         """Set the longest stretches of so many further steps (motions,)."""
@@ -166,7 +167,6 @@ class ShadowEnsemble:
         other, begin = copy.copy(self), np.array([start])
         units, read = self._starts.rate_units, self._starts.parameters
         starts = Starts(state[:, None], begin, np.array([end]), np.array([steps]), units, read)
-        other._stretches = min(other._stretches, 12)
         other._begin(starts, starts.states != 0)
         return other
 
@@ -194,11 +194,11 @@ class ShadowEnsemble:
             lost: spread of the attitude (or the rates) past which nothing more can be learnt.
         """
         ends = np.minimum(self._starts.end, until)
-        while True:
-            going = np.flatnonzero(self.spread.whole & (self.time < ends) & (self._over < lost))
-            if not len(going) or not go_on():
-                return self.spread
-            with np.errstate(all="ignore"):
+        with np.errstate(all="ignore"):
+            while True:
+                going = np.flatnonzero(self.spread.whole & (self.time < ends) & (self._over < lost))
+                if not len(going) or not go_on():
+                    return self.spread
                 self._go(going, ends[going])
 
     def all_lost(self, lost: float) -> bool:
@@ -209,13 +209,13 @@ class ShadowEnsemble:
 
     def _go(self, going: np.ndarray, until: np.ndarray) -> None:
         """Follow some motions through one stretch, as long as growth allows."""
-        self._round += 1
+        # the same number of draws in each round, for whichever motions
         rows = 2 + len(self._states) * (2 if self._errors.shared else 1)
-        normal = np.random.default_rng(self._round).standard_normal((rows, PERTURBED))
-        before, begin, stride = self._states[:, going], self.time[going], self._stride[going]
-        if not self._steps.any():  # what moves is rounded; until that is known, little is left out
-            stride = np.full(len(going), float(_SHORTEST))
-        expected = np.clip(self._expected[going] - self._steps[going], 1, stride)
+        normal = self._random.standard_normal((rows, PERTURBED))
+        before, begin, steps = self._states[:, going], self.time[going], self._steps[going]
+        # what moves is rounded; until that is known, little is left out
+        stride = np.where(steps > 0, self._stride[going], float(_SHORTEST))
+        expected = np.minimum(np.maximum(self._expected[going] - steps, 1), stride)
         # a rounded time is another time, for loads that depend on it: another one at each step, whereas the
         # perturbed motions' lasts for the stretch
         late = np.abs(begin + self._errors.ahead)
@@ -225,21 +225,21 @@ class ShadowEnsemble:
         found, taken, reached = self.carrier.advance(
             going, before, begin[:, None] + shifts, until[:, None] + shifts, stride
         )
-        followed = np.isfinite(found).all(axis=(0, 2)) & (self._steps[going] <= self._last_steps[going])
         grown = self._distances(going, found[:, :, 1:] - found[:, :, :1])
-        small = grown < _SATURATED
-        self.spread.whole[going[~followed]] = False
-        self._repeat(going[followed & ~small])
-        well = followed & small
-        if not well.any():
-            return
+        followed = np.isfinite(found).all(axis=(0, 2)) & (steps <= self._last_steps[going])
+        well = followed & (grown < _SATURATED)
         if not well.all():
+            self.spread.whole[going[~followed]] = False
+            self._repeat(going[followed & ~well])
+            if not well.any():
+                return
             going, before, found = going[well], before[:, well], found[:, well]
             taken, reached, grown, until = taken[well], reached[well], grown[well], until[well]
-        growth = grown / np.maximum(self._distances(going, before[:, :, 1:] - before[:, :, :1]), 1e-300)
-        stride = self._stride[going]
-        shorter = np.where(growth > _WILD, np.maximum(stride / 2, _SHORTEST), stride)
-        self._stride[going] = np.where(growth < _CALM, np.minimum(2 * stride, self._most[going]), shorter)
+            stride = stride[well]
+        growth = grown / np.maximum(self._far[going], 1e-300)
+        asked = self._stride[going]
+        shorter = np.where(growth > _WILD, np.maximum(asked / 2, _SHORTEST), asked)
+        self._stride[going] = np.where(growth < _CALM, np.minimum(2 * asked, self._most[going]), shorter)
         self._steps[going] += taken
         self.time[going] = reached
         sizes = np.maximum(np.abs(before[:, :, 0]), np.abs(found[:, :, 0]))
@@ -250,9 +250,15 @@ class ShadowEnsemble:
         if angles := self._measures.angles:  # which grow, and step control with them
             found[angles] -= self._measures.turn * np.rint(found[angles, :, :1] / self._measures.turn)
         self._states[:, going] = found
-        self._perturb(going, sizes, taken, growth, reached < until, normal[1:])
-        self._draw_in(going)
-        self._note(going)
+        even = taken >= stride  # one that ended early will be followed by another short one
+        likely = np.where(even, self._stride[going], np.minimum(2 * taken, self._stride[going]))
+        self._perturb(going, sizes, taken, growth, np.where(reached < until, likely, 0.0), normal[1:])
+        apart = self._apart(going)
+        far = self._far[going] = self._distances(going, apart)
+        if (far > _LARGEST).any():
+            self._move(going, np.where(far > _LARGEST, _DRAWN_IN / np.maximum(far, _LARGEST), 1.0))
+            apart = self._apart(going)
+        self._note(going, apart)
 
     def _repeat(self, which: np.ndarray) -> None:
         """Set up stretches that have to be repeated: shorter, or from nearer."""
@@ -267,23 +273,23 @@ class ShadowEnsemble:
         sizes: np.ndarray,
         taken: np.ndarray,
         growth: np.ndarray,
-        going: np.ndarray,
+        likely: np.ndarray,
         normal: np.ndarray,
     ) -> None:
         """Add errors of half of the steps taken, and of half of those ahead.
 
         Args:
             sizes: of what moves, (states, motions).
-            going: (motions,) whether there are any ahead.
+            likely: steps of the next stretch, (motions,).
             normal: random numbers (1 + states, perturbed), and as many more for shared errors.
         """
         errors, states = self._errors, len(sizes)
         left = np.maximum(self._expected[which] - self._steps[which], 1)
-        ahead = np.where(going, np.minimum(self._stride[which], left) / 2, 0.0)
+        ahead = np.minimum(likely, left) / 2
         steps = np.maximum(taken - self._ahead[which], 0.0) + ahead
         self._ahead[which] = ahead
         # of errors made all along a stretch of exponential growth g a part 1 / ln g grows as much (variances)
-        root = np.sqrt(steps / np.clip(np.log(growth), 1.0, math.log(_WILD)))[:, None]
+        root = np.sqrt(steps / np.minimum(np.maximum(np.log(growth), 1.0), math.log(_WILD)))[:, None]
         added = errors.own * (root.T * sizes)[:, :, None] * normal[1 : 1 + states, None]
         if errors.shared:
             size = errors.shared * root[:, 0] * sizes[self._measures.felt].max(axis=0, initial=0.0)
@@ -303,14 +309,10 @@ class ShadowEnsemble:
         felt = self._measures.felt[:, None, None]
         self._states[:, which, 1:] += np.where(felt, self._factor[which][:, None] * added, 0.0)
 
-    def _draw_in(self, which: np.ndarray) -> None:
-        """Move perturbed motions that are too far nearer, in the same directions."""
-        far = self._distances(which, self._apart(which))
-        if (far > _LARGEST).any():
-            self._move(which, np.where(far > _LARGEST, _DRAWN_IN / np.maximum(far, _LARGEST), 1.0))
-
     def _move(self, which: np.ndarray, factor: np.ndarray) -> None:
+        """Bring perturbed motions nearer, in the same directions."""
         self._factor[which] *= factor
+        self._far[which] *= factor
         self._states[:, which, 1:] = self._states[:, which, :1] + factor[:, None] * self._apart(which)
 
     def _apart(self, which: np.ndarray) -> np.ndarray:
@@ -322,7 +324,8 @@ class ShadowEnsemble:
         """
         scaled = apart * self._inverse[:, which, None]
         squares = self._measures.groups @ (scaled * scaled).reshape(len(apart), -1)
-        return np.asarray(np.sqrt(squares.reshape(-1, *apart.shape[1:]).max(axis=(0, 2))))
+        largest: np.ndarray = np.sqrt(squares.reshape(-1, *apart.shape[1:]).max(axis=(0, 2)))
+        return largest
 
     def _weigh(self) -> None:
         """Update the inverse sizes (states, motions) of the groups that states belong to; 0 for groups that
@@ -332,8 +335,8 @@ class ShadowEnsemble:
         sizes = groups.T @ (groups[:, :, None] * self._largest).max(axis=1)
         self._inverse = np.where(sizes > 0, 1 / np.maximum(sizes, 1e-150), 0.0)
 
-    def _note(self, which: np.ndarray) -> None:
-        states, apart, unit = self._states[:, which, 0], self._apart(which), self._factor[which]
+    def _note(self, which: np.ndarray, apart: np.ndarray) -> None:
+        states, unit = self._states[:, which, 0], self._factor[which]
         found = self._measures.differences(states, apart, self._starts, which, unit)
         cut, steps = self._cut[which], self._steps[which]
         self.spread.note(which, time=self.time[which], steps=steps, cut=cut, **found)

@@ -96,7 +96,7 @@ class Measures:
             unit: what differences are told in, (motions,).
         """
         places, found = self.places, {}
-        wrong = np.sqrt((apart**2).mean(axis=2)) / unit
+        wrong = np.sqrt(np.add.reduce(apart * apart, axis=2) / apart.shape[2]) / unit
         if rates := places["rates"]:
             units = starts.rate_units[:, which]
             size, off = (np.sqrt(((units * x[rates]) ** 2).sum(axis=0)) for x in (states, wrong))
