@@ -22,12 +22,18 @@ from rigidsim.accuracy.comparison import (
 )
 from rigidsim.accuracy.motion import KnownMotion, motion_of
 from rigidsim.accuracy.reference import (
+    AS_BAD,
     INCOMPARABLE,
-    POLICY,
+    PEER_SAFETY,
+    PICKED_SAFETY,
+    SAFETY,
+    TIMES,
+    WIDE_TIMES,
     Reference,
     ReferenceKind,
     own_error,
     references,
+    scatter_of,
 )
 from rigidsim.accuracy.setting import Setting, setting_of
 from rigidsim.accuracy.trial import Told, Trial, Trials, try_setting
@@ -61,9 +67,8 @@ class Certificate:
 
     def as_dict(self) -> dict[str, float | str | int]:
         """Values for the summary."""
-        place = {} if self.place is None else {"certified_position": self.place}
         return {
-            **place,
+            **({} if self.place is None else {"certified_position": self.place}),
             "certified": self.error,
             "difference_at_end": self.end,
             "how": self.how,
@@ -114,7 +119,7 @@ class _Compared:
         self.setting = setting_of(trials.experiment)
         self._trials, self._motion = trials, motion
         self._count = dataset.sizes["time"]
-        self._rows = {most: rows_to_compare(dataset, most) for most in (POLICY.times, POLICY.wide_times)}
+        self._rows = {most: rows_to_compare(dataset, most) for most in (TIMES, WIDE_TIMES)}
         everything = np.unique(np.concatenate(list(self._rows.values())))
         self._place = {row: n for n, row in enumerate(everything)}
         self._times = exact_times(dataset, everything)
@@ -136,10 +141,10 @@ class _Compared:
 
     def against(self, reference: Reference) -> Certificate | None:
         """The certificate that a reference gives; None if it is impossible."""
-        rows = self._rows[POLICY.wide_times if reference.kind is ReferenceKind.CLOSED_FORM else POLICY.times]
-        safety = POLICY.safety if len(rows) == self._count else POLICY.picked_safety
+        rows = self._rows[WIDE_TIMES if reference.kind is ReferenceKind.CLOSED_FORM else TIMES]
+        safety = SAFETY if len(rows) == self._count else PICKED_SAFETY
         if reference.kind is ReferenceKind.PEER:
-            safety = POLICY.peer_safety
+            safety = PEER_SAFETY
         places = [self._place[row] for row in rows]
         times = [self._times[place] for place in places]
         better = self._trials.whole(reference.setting, times)
@@ -173,10 +178,10 @@ class _Compared:
         if reference.kind is ReferenceKind.CLOSED_FORM:
             return safety * apart
         own = reference.setting
-        share = own.level * POLICY.scatter_of(own, self._motion.steps) / self.setting.level
+        share = own.level * scatter_of(own, self._motion.steps) / self.setting.level
         if own.bits <= self.setting.bits:
-            share = POLICY.as_bad
-        return (safety + min(POLICY.as_bad, share)) * apart
+            share = AS_BAD
+        return (safety + min(AS_BAD, share)) * apart
 
 
 def verdict(

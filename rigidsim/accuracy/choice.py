@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 from rigidsim.accuracy.forecast import Forecasts
 from rigidsim.accuracy.motion import KnownMotion
 from rigidsim.accuracy.setting import (
-    MEASURED,
+    STEP_SECONDS,
     Setting,
     asked_of_attitude,
     cost,
@@ -39,36 +39,20 @@ _DIGITS: dict[str | int, range] = {"single": range(4, 8), "double": range(4, 16)
 _LADDER: tuple[str | int, ...] = ("double", "extended", "quadruple", 50, 75, 100, 150, 200, LARGEST_DIGITS)
 
 
-@dataclass(frozen=True)
-class ChoiceMargins:
-    """Margins between the forecast and the requested accuracy.
+_SAFETY, _HOPE, _HOPE_LONG, _PROGRESS = 3.0, 0.6, 3.0, 0.2
+"""Ratio of the accuracy to the largest acceptable forecast; ratios of forecast to accuracy up to which a
+setting is tried if the next precision costs ten times as much, of a short run, and of a long one, which
+mostly does better than its beginning forecasts; ratio to a failed setting's forecast that the next one must
+promise.
 
-    With the defaults 199 of 200 random runs kept what they were asked for, and 96 of 100 cost at most twice
-    the cheapest setting of a full search (``experiments/accuracy_certificates.py``).
-
-    Attributes:
-        safety: ratio of the accuracy to the largest acceptable forecast.
-        hope, hope_long: ratio of forecast to accuracy up to which a setting is tried if the next precision
-            costs ten times as much; for a long run, which mostly does better than its beginning forecasts.
-        progress: ratio to a failed setting's forecast that the next one must promise.
-    """
-
-    safety: float = 3.0
-    hope: float = 0.6
-    hope_long: float = 3.0
-    progress: float = 0.2
-
-
-MARGINS = ChoiceMargins()
+With these 199 of 200 random runs kept what they were asked for, and 96 of 100 cost at most twice the cheapest
+setting of a full search (``experiments/accuracy_certificates.py``).
+"""
 
 
 @dataclass(frozen=True)
 class Choice:
-    """A chosen setting and its forecast.
-
-    Attributes:
-        forecast: forecast attitude error at the end, rad.
-    """
+    """A chosen setting and the attitude error that is forecast for its end, rad."""
 
     setting: Setting
     forecast: float
@@ -133,11 +117,11 @@ def choose(
         return cost(setting, motion.steps, forecasts.samples)
 
     candidates = sorted(_candidates(experiment, motion), key=counted)
-    most = accuracy / MARGINS.safety
-    hope = accuracy * (MARGINS.hope_long if forecasts.part < 1 else MARGINS.hope)
+    most = accuracy / _SAFETY
+    hope = accuracy * (_HOPE_LONG if forecasts.part < 1 else _HOPE)
     if beyond is not None:
         hope = 0.0
-        most = min(most, MARGINS.progress * forecasts.error(beyond))
+        most = min(most, _PROGRESS * forecasts.error(beyond))
         spent = counted(beyond)
         candidates = [s for s in candidates if counted(s) > spent]
     while True:
@@ -202,7 +186,7 @@ def _unreachable(forecasts: Forecasts, best: Setting | None, accuracy: float) ->
     if best is None:
         return f"given {accuracy:.3g} rad, but the other keys of [integrator] leave no setting to choose from"
     motion = forecasts.motion
-    seconds = cost(best, motion.steps, forecasts.samples) * MEASURED.seconds
+    seconds = cost(best, motion.steps, forecasts.samples) * STEP_SECONDS
     reached = forecasts.error(best)
     what = f"would be right to about {reached:.2g} rad" if reached < 1 else "would keep no digit"
     text = (

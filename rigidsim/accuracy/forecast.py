@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from rigidsim.accuracy.comparison import angles_between, spread_times
 from rigidsim.accuracy.motion import PILOT_STEPS, motion_of
@@ -24,54 +24,26 @@ _BASE_TOLERANCE = 1e-8  # of the trial that all other tolerances are first forec
 _LARGEST_EXPONENT = 600.0  # keeps products within doubles
 
 
-@dataclass(frozen=True)
-class Extrapolation:
-    """Extrapolation from trials to a run's end.
-
-    With the defaults 96 of 100 choices cost at most twice the cheapest setting of a full search, and 199 of
-    200 were kept (``experiments/accuracy_certificates.py``).
-
-    Attributes:
-        steps: largest number of natural steps of a trial.
-        times, closed_times: times compared; fewer for a closed form, whose samples may take milliseconds.
-        saturated: error (rad) past which errors are no longer small, and don't scale.
-        closed_floor: least error of a closed form, in roundings.
-        exponential: power of time past which growth counts as exponential.
-        power: largest power of time of any other growth.
-        series, projected, rounding: least powers for errors of series, and of rounding with projected
-            invariants and without.
-        clearly: ratio of accuracy to round-off law from which rounding needn't be measured.
-    """
-
-    steps: int = PILOT_STEPS
-    times: int = 200
-    closed_times: int = 17
-    saturated: float = 0.05
-    closed_floor: float = 8.0
-    exponential: float = 5.0
-    power: float = 2.0
-    series: float = 1.2
-    projected: float = 1.0
-    rounding: float = 1.5
-    clearly: float = 20.0
-
-    def at_end(self, early: float, late: float, part: float, setting: Setting) -> float:
-        """Error at a run's end, rad.
-
-        Args:
-            early, late: largest errors over the first quarter of a trial, and over all of it.
-        """
-        early = max(early, late * 1e-300)
-        power = math.log(late / early) / math.log(4)
-        if power > self.exponential:
-            left = (1 / part - 1) / 0.75 * math.log(late / early)
-            return late * math.exp(min(left, _LARGEST_EXPONENT))
-        rounding = self.projected if setting.hold_invariants else self.rounding
-        law = self.series if setting.tolerance is not None else rounding
-        return late * (1 / part) ** max(law, min(power, self.power))
+# With these 96 of 100 choices cost at most twice the cheapest setting of a full search, and 199 of 200 were
+# kept (``experiments/accuracy_certificates.py``).
+_TIMES, _CLOSED_TIMES = 200, 17  # compared; fewer of a closed form, whose samples may take milliseconds
+_SATURATED = 0.05  # rad: past which errors are no longer small, and don't scale
+_CLOSED_FLOOR = 8.0  # least error of a closed form, in roundings
+_CLEARLY = 20.0  # ratio of accuracy to round-off law from which rounding needn't be measured
+_EXPONENTIAL, _POWER = 5.0, 2.0  # powers of time: past which growth is exponential; largest of any other
+_SERIES, _PROJECTED, _ROUNDING = 1.2, 1.0, 1.5
+"""Least powers of time for errors of series, and of rounding with projected invariants and without."""
 
 
-LAW = Extrapolation()
+def _at_end(early: float, late: float, part: float, setting: Setting) -> float:
+    """Error at a run's end, rad, from the largest over the first quarter of a trial and over all of it."""
+    early = max(early, late * 1e-300)
+    power = math.log(late / early) / math.log(4)
+    if power > _EXPONENTIAL:
+        left = (1 / part - 1) / 0.75 * math.log(late / early)
+        return late * math.exp(min(left, _LARGEST_EXPONENT))
+    law = _SERIES if setting.tolerance is not None else _PROJECTED if setting.hold_invariants else _ROUNDING
+    return late * (1 / part) ** max(law, min(power, _POWER))
 
 
 class Forecasts:
@@ -87,10 +59,10 @@ class Forecasts:
         """Examine a motion's beginning."""
         self._experiment, self._accuracy = experiment, accuracy
         self._trials = Trials(experiment, loads, told)
-        self.motion = motion_of(experiment, loads=loads, pilot_steps=LAW.steps)
+        self.motion = motion_of(experiment, loads=loads, pilot_steps=PILOT_STEPS)
         self.samples = build_scene(experiment).samples.count
-        self.part = min(1.0, LAW.steps / self.motion.steps)
-        self._times = spread_times(experiment, LAW.times, self.part)
+        self.part = min(1.0, PILOT_STEPS / self.motion.steps)
+        self._times = spread_times(experiment, _TIMES, self.part)
         self._measured: dict[Setting, float] = {}
         self._references: dict[Setting, Trial | None] = {}
 
@@ -126,10 +98,10 @@ class Forecasts:
     def _closed_error(self, setting: Setting) -> float:
         """Error of a closed form, compared over the whole run since it costs the same at any horizon."""
         if setting not in self._measured:
-            floor = LAW.closed_floor * epsilon(setting.precision)
+            floor = _CLOSED_FLOOR * epsilon(setting.precision)
             self._measured[setting] = math.inf
             if floor <= self._accuracy:
-                times = spread_times(self._experiment, LAW.closed_times)
+                times = spread_times(self._experiment, _CLOSED_TIMES)
                 better = exact_beyond(setting.precision, setting.method).setting
                 one, other = (self._trials.whole(s, times) for s in (setting, better))
                 if one is not None and other is not None:
@@ -139,7 +111,7 @@ class Forecasts:
 
     def _obvious(self, setting: Setting) -> bool:
         """Whether rounding is clearly negligible."""
-        return self.motion.rounding(setting.precision) * LAW.clearly <= self._accuracy
+        return self.motion.rounding(setting.precision) * _CLEARLY <= self._accuracy
 
     def _rounding(self, setting: Setting) -> float:
         if self._obvious(setting):
@@ -173,12 +145,12 @@ class Forecasts:
             return math.inf
         errors = angles_between(trial.attitudes, reference.attitudes)
         late = float(errors.max())
-        if late > LAW.saturated:  # no longer small: only the law tells how large it would be
+        if late > _SATURATED:  # no longer small: only the law tells how large it would be
             return max(late, self.motion.error(setting.level))
         late = max(late, epsilon(setting.precision))
         if self.part >= 1.0:
             return late
-        return LAW.at_end(float(errors[: len(errors) // 4].max()), late, self.part, setting)
+        return _at_end(float(errors[: len(errors) // 4].max()), late, self.part, setting)
 
     def _reference(self, setting: Setting) -> Trial | None:
         """The trial against which a setting's trial is compared: in double precision if rounding is

@@ -25,7 +25,9 @@ _FEWEST_STEPS = 16  # for the law of rounding, which is one of many steps
 
 @dataclass(frozen=True)
 class Pilot:
-    """A motion's first steps, as a pilot."""
+    """A motion's first steps: those taken, their mean length (internal time), those that the whole motion
+    will take, and the CPU time of each.
+    """
 
     taken: int
     step: float

@@ -34,52 +34,27 @@ _SAME_VARIABLES = 10.0
 """Ratio of the common error of solutions in the same variables to their distance."""
 
 
-@dataclass(frozen=True)
-class Policy:
-    """Policy for references: how far they go, and which margins are kept.
+# With these no certificate of 200 random scenes was exceeded by the true error, and 199 of these runs were
+# certified as they asked (``experiments/accuracy_certificates.py``).
+TIMES, WIDE_TIMES = 4096, 129
+"""Largest number of times compared; the latter for a closed form, which takes milliseconds per sample."""
+_EXTENDED_STEPS, _WIDE_STEPS = 1e5, 1e5
+"""Steps past which extended precision (a second) isn't the first choice, quadruple (a minute) isn't used."""
+SAFETY, PICKED_SAFETY, PEER_SAFETY = 1.25, 2.0, 5.0
+"""Factors on the largest difference: if all samples were compared; if only the fastest of each stretch, since
+errors along the motion are largest where it is fastest; if the reference is no better than the run.
+"""
+AS_BAD = 3.0
+"""Error of a reference no better than the run, over the difference."""
+_CLEARLY = 0.01  # error of a reference with many digits, over the accuracy or the run's errors per step
+_MUCH_BETTER = 1e-2  # ratio of errors per step to the run's below which a reference's own hardly matter
 
-    With the defaults no certificate of 200 random scenes was exceeded by the true error, and 199 of these
-    runs were certified as they asked (``experiments/accuracy_certificates.py``).
 
-    Attributes:
-        times, wide_times: largest number of times compared; the latter for a closed form, which takes
-            milliseconds per sample.
-        extended_steps: steps past which extended precision (a second) isn't the first choice.
-        wide_steps: steps past which quadruple precision (a minute) isn't used.
-        safety, picked_safety: factors on the largest difference if all samples were compared, and if only the
-            fastest of each stretch, since errors along the motion are largest where it is fastest.
-        peer_safety: the factor if the reference is no better than the run, but independent of it.
-        clearly: error of a reference with many digits, over the accuracy or the run's errors per step.
-        scatter: ratio of two settings' errors over the ratio of their errors per step.
-        scatter_of_series: the same per square root of the steps, if truncation errors add up while rounding
-            errors walk at random.
-        much_better: ratio of errors per step to the run's below which a reference's own error hardly matters.
-        as_bad: error of a reference no better than the run, over the difference.
+def scatter_of(setting: Setting, steps: float) -> float:
+    """Ratio of two settings' errors over that of their errors per step, after so many steps: more per square
+    root of these if truncation errors add up while rounding errors walk at random.
     """
-
-    times: int = 4096
-    wide_times: int = 129
-    extended_steps: float = 1e5
-    wide_steps: float = 1e5
-    safety: float = 1.25
-    picked_safety: float = 2.0
-    peer_safety: float = 5.0
-    clearly: float = 0.01
-    scatter: float = 100.0
-    scatter_of_series: float = 10.0
-    much_better: float = 1e-2
-    as_bad: float = 3.0
-
-    def scatter_of(self, setting: Setting, steps: float) -> float:
-        """Scatter of a setting's errors over so many steps."""
-        return self.scatter if setting.tolerance is None else self.scatter_with_series(steps)
-
-    def scatter_with_series(self, steps: float) -> float:
-        """The same for any setting whose tolerance is above its epsilon."""
-        return self.scatter + self.scatter_of_series * math.sqrt(steps)
-
-
-POLICY = Policy()
+    return 100.0 if setting.tolerance is None else 100.0 + 10.0 * math.sqrt(steps)
 
 
 class ReferenceKind(Enum):
@@ -118,14 +93,14 @@ def references(setting: Setting, motion: KnownMotion, accuracy: float) -> list[R
     """
     loose = setting.has_steps and setting.tolerance is not None
     stepped: list[str | int] = []
-    if setting.bits <= 53 and loose and motion.steps > POLICY.extended_steps:
+    if setting.bits <= 53 and loose and motion.steps > _EXTENDED_STEPS:
         stepped.append("double")
-    if setting.bits <= 53 and (motion.steps <= POLICY.extended_steps or not motion.exact):
+    if setting.bits <= 53 and (motion.steps <= _EXTENDED_STEPS or not motion.exact):
         stepped.append("extended")
     costly: list[Reference] = []
     if motion.exact and setting.has_steps:
         costly.append(exact_beyond(setting.precision, motion.exact))
-    elif motion.steps <= POLICY.wide_steps:
+    elif motion.steps <= _WIDE_STEPS:
         stepped += ["quadruple"] * (setting.bits <= 64)
         stepped.append(digits_beyond(setting.precision))
     elif motion.exact:  # too long for steps: the closed form must check itself, with many more digits
@@ -160,7 +135,7 @@ def stepped_reference(
     """An integration at a precision's epsilon. Invariants are projected where that is right: with more digits
     than 64 bits rounding doesn't matter, nor does it over a short way in double precision.
     """
-    projected = working_bits(precision) <= 64 and (precision != "double" or steps > POLICY.extended_steps)
+    projected = working_bits(precision) <= 64 and (precision != "double" or steps > _EXTENDED_STEPS)
     return Setting(precision, formulation=formulation, hold_invariants=projected and motion.holds)
 
 
@@ -168,9 +143,9 @@ def _only_as_good(reference: Setting, setting: Setting, motion: KnownMotion, acc
     """A multi-precision reference with no more accuracy than needed."""
     if reference.bits <= 64:
         return reference
-    tolerance = POLICY.clearly * accuracy / max(1.0, motion.error(1.0))
-    tolerance /= POLICY.scatter_with_series(motion.steps)
-    tolerance = min(tolerance, POLICY.clearly * setting.level)
+    tolerance = _CLEARLY * accuracy / max(1.0, motion.error(1.0))
+    tolerance /= scatter_of(replace(reference, tolerance=1.0), motion.steps)
+    tolerance = min(tolerance, _CLEARLY * setting.level)
     return replace(reference, tolerance=tolerance) if tolerance > epsilon(reference.precision) else reference
 
 
@@ -243,17 +218,17 @@ def own_error(
     if reference.kind is ReferenceKind.CLOSED_FORM:
         return 0.0  # dozens of digits more than the run
     own = reference.setting
-    level = own.level * POLICY.scatter_of(own, motion.steps)
+    level = own.level * scatter_of(own, motion.steps)
     estimate = math.inf
     if setting.has_steps:
-        estimate = difference * min(POLICY.as_bad, level / setting.level)
+        estimate = difference * min(AS_BAD, level / setting.level)
         if own.bits <= setting.bits:  # rounded coefficients and initial values are the same in both
             return max(estimate, motion.rounding(own.precision))
-        if level <= POLICY.much_better * setting.level:
+        if level <= _MUCH_BETTER * setting.level:
             return estimate
     for precision in ("double", "extended"):
         probe = Setting(precision)
-        if own.level > POLICY.much_better * probe.level:
+        if own.level > _MUCH_BETTER * probe.level:
             break
         found = distance(probe)
         if found < INCOMPARABLE:

@@ -5,9 +5,8 @@ as a count, so that no clock decides what is chosen; and the accuracy that a con
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping
-from dataclasses import dataclass, field
-from types import MappingProxyType
+from collections.abc import Collection
+from dataclasses import dataclass
 
 from rigidsim.errors import ConfigError, Problem
 from rigidsim.scene.arithmetic import working_bits
@@ -106,38 +105,18 @@ def setting_of(experiment: Experiment) -> Setting:
     )
 
 
-_STEPS: Mapping[str | int, float] = MappingProxyType(
-    {"single": 1.25, "double": 1.0, "extended": 9.0, "quadruple": 135.0}
-)
+STEP_SECONDS = 1e-6
+"""Duration of a step of a free body in double precision, on one core; for messages only."""
+_STEPS: dict[str | int, float] = {"single": 1.25, "double": 1.0, "extended": 9.0, "quadruple": 135.0}
+"""Cost of a step over the square of its Taylor order, relative to double precision at its epsilon.
 
-
-@dataclass(frozen=True)
-class UnitCosts:
-    """Costs in steps of double precision at its epsilon.
-
-    The defaults were measured by ``experiments/accuracy_certificates.py --calibrate``, which says where they
-    are off by more than 1.3.
-
-    Attributes:
-        steps: cost of a step over the square of its Taylor order, relative to double precision.
-        digits_step: the same at 50 digits, proportional to the digits beyond.
-        projected: cost factor of a step after which invariants are projected.
-        closed_start, closed_sample: cost of a closed form's first sample, and of each one, to 53 bits.
-        wide_closed_sample, digits_closed_sample: cost of each to 64 or 113 bits, and to 50 digits.
-        seconds: duration of the unit for a free body on one core; for messages only.
-    """
-
-    steps: Mapping[str | int, float] = field(default_factory=lambda: _STEPS)
-    digits_step: float = 155.0
-    projected: float = 1.05
-    closed_start: float = 800.0
-    closed_sample: float = 0.4
-    wide_closed_sample: float = 1400.0
-    digits_closed_sample: float = 1900.0
-    seconds: float = 1e-6
-
-
-MEASURED = UnitCosts()
+These were measured by ``experiments/accuracy_certificates.py --calibrate``, which says where they are off by
+more than 1.3.
+"""
+_DIGITS_STEP = 155.0  # the same at 50 digits, proportional to the digits beyond
+_PROJECTED = 1.05  # factor on a step after which invariants are projected
+_CLOSED_START, _CLOSED_SAMPLE = 800.0, 0.4  # of a closed form to 53 bits, first and further samples
+_WIDE_CLOSED_SAMPLE, _DIGITS_CLOSED_SAMPLE = 1400.0, 1900.0  # to 64 or 113 bits, and to 50 digits
 
 
 def cost(setting: Setting, steps: float, samples: int) -> float:
@@ -148,12 +127,12 @@ def cost(setting: Setting, steps: float, samples: int) -> float:
     digits = max(1.0, setting.precision / 50) if isinstance(setting.precision, int) else None
     if not setting.has_steps:
         if setting.bits <= 53:
-            return MEASURED.closed_start + samples * MEASURED.closed_sample
+            return _CLOSED_START + samples * _CLOSED_SAMPLE
         if digits is not None:
-            return samples * MEASURED.digits_closed_sample * digits
-        return samples * MEASURED.wide_closed_sample
-    step = MEASURED.steps[setting.precision] if digits is None else MEASURED.digits_step * digits
-    projected = MEASURED.projected if setting.hold_invariants else 1.0
+            return samples * _DIGITS_CLOSED_SAMPLE * digits
+        return samples * _WIDE_CLOSED_SAMPLE
+    step = _STEPS[setting.precision] if digits is None else _DIGITS_STEP * digits
+    projected = _PROJECTED if setting.hold_invariants else 1.0
     return steps * step * (setting.taylor_order / 20) ** 2 * projected
 
 

@@ -42,7 +42,9 @@ def dataset_of(measured: Measurement) -> xarray.Dataset:
     from rigidsim.store.provenance import versions
 
     rows, plan = measured.rows, measured.plan
-    names = sorted({name for row in rows for name in row.drifts})
+    tried = [row.trial for row in rows]
+    drifted = [{} if trial is None else trial.drifts for trial in tried]
+    names = sorted({name for drifts in drifted for name in drifts})
     span = plan.end - plan.start
     error = np.full((len(rows), len(plan.times)), np.nan)
     own = np.full(len(rows), np.nan)
@@ -58,6 +60,9 @@ def dataset_of(measured: Measurement) -> xarray.Dataset:
 
     def numbers(values: Sequence[float]) -> np.ndarray:
         return np.where(known, np.array(values, dtype=np.float64), np.nan)
+
+    def counts(name: str) -> np.ndarray:
+        return numbers([math.nan if trial is None else getattr(trial, name) for trial in tried])
 
     def words(values: Sequence[object]) -> np.ndarray:
         return np.array([str(value) for value in values], dtype=object)
@@ -82,14 +87,14 @@ def dataset_of(measured: Measurement) -> xarray.Dataset:
             "cpu_seconds": variable(
                 numbers([measured.cpu_seconds(r) for r in rows]), "s", "CPU time of the measured part"
             ),
-            "steps": variable(numbers([r.steps for r in rows]), "1", "natural Taylor steps"),
-            "taylor_order": variable(numbers([r.order for r in rows]), "1", "order of the Taylor series"),
-            "work": variable(numbers([r.work for r in rows]), "1", "steps x order^2 x states"),
+            "steps": variable(counts("steps"), "1", "natural Taylor steps"),
+            "taylor_order": variable(counts("order"), "1", "order of the Taylor series"),
+            "work": variable(counts("work"), "1", "steps x order^2 x states"),
             "measured_time": variable(
                 numbers([row.part * span for row in rows]), "s", "how much of the motion was measured"
             ),
             "drift": variable(
-                np.array([[row.drifts.get(name, np.nan) for name in names] for row in rows]).reshape(
+                np.array([[drifts.get(name, np.nan) for name in names] for drifts in drifted]).reshape(
                     len(rows), len(names)
                 ),
                 "1",
@@ -199,29 +204,21 @@ def advice(dataset: xarray.Dataset) -> list[BestSetting]:
     for position, (exponent, n, less) in enumerate(found):
         if position and found[position - 1][1] == n:
             continue
-        last = exponent
-        for later, other, _ in found[position:]:
-            if other != n:
-                break
-            last = later
-        result.append(_advice_of(dataset, n, exponent, last, less, float(error[n])))
+        last = min(later for later, other, _ in found if other == n)
+        one = dataset.isel(setting=n)
+        result.append(
+            BestSetting(
+                at_most=10.0**exponent,
+                more_than=10.0 ** (last - 1),
+                title=str(one["setting"].item()),
+                error=float(error[n]),
+                cost=float(one["cpu_ratio"]),
+                seconds=float(one["measured_time"]),
+                less=less,
+                keys=_keys(one),
+            )
+        )
     return result
-
-
-def _advice_of(
-    dataset: xarray.Dataset, n: int, first: int, last: int, less: bool, error: float
-) -> BestSetting:
-    one = dataset.isel(setting=n)
-    return BestSetting(
-        at_most=10.0**first,
-        more_than=10.0 ** (last - 1),
-        title=str(one["setting"].item()),
-        error=error,
-        cost=float(one["cpu_ratio"]),
-        seconds=float(one["measured_time"]),
-        less=less,
-        keys=_keys(one),
-    )
 
 
 def _keys(one: xarray.Dataset) -> tuple[str, ...]:

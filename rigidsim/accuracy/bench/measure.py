@@ -33,31 +33,14 @@ from rigidsim.accuracy.bench.plan import (
 from rigidsim.accuracy.bench.worker import Task, ask
 from rigidsim.accuracy.comparison import angles_between
 from rigidsim.accuracy.setting import Setting
+from rigidsim.accuracy.trial import Trial
 from rigidsim.errors import RigidsimError
 from rigidsim.scene.config import Experiment
 
 _LEAST_BUDGET = 5.0
-
-
-@dataclass(frozen=True)
-class Timing:
-    """How a time budget is spent.
-
-    Attributes:
-        grace: extra seconds for what a measurement can't do without, on a busy machine.
-        exploring: part of the budget by which attitudes must be there.
-        single: part of the budget that one setting may take.
-        passes: CPU seconds of passes for each setting in each process: their median is then known to a
-            few per cent.
-    """
-
-    grace: float = 120.0
-    exploring: float = 0.65
-    single: float = 0.4
-    passes: float = 0.03
-
-
-TIMING = Timing()
+_GRACE = 120.0  # extra seconds for what a measurement can't do without, on a busy machine
+_EXPLORING, _SINGLE = 0.65, 0.4  # parts of the budget, for all attitudes and for those of one setting
+_PASSES = 0.03  # CPU seconds of passes per setting and process: their median is then known to a few per cent
 
 
 class RowStatus(StrEnum):
@@ -71,13 +54,10 @@ class RowStatus(StrEnum):
 
 @dataclass
 class Row:
-    """Results for one setting.
+    """Results for one setting, measured over a part of the horizon, or the problem why not, for the user.
 
     Attributes:
-        part: part of the horizon over which it was measured.
-        status: outcome of the measurement.
-        problem: why it was not measured, for the user.
-        attitudes: float64 parts (samples, 4).
+        trial: attitudes, drifts and counts; None if there are none.
         unit_seconds: CPU seconds per step (closed form: per sample), for each process.
         default_seconds: those of the default setting, in the same processes.
     """
@@ -86,13 +66,19 @@ class Row:
     part: float = 1.0
     status: RowStatus = RowStatus.LEFT_OUT
     problem: str = ""
-    attitudes: list[np.ndarray] = field(default_factory=list)
-    drifts: dict[str, float] = field(default_factory=dict)
-    steps: int = 0
-    order: int = 0
-    work: float = 0.0
+    trial: Trial | None = None
     unit_seconds: list[float] = field(default_factory=list)
     default_seconds: list[float] = field(default_factory=list)
+
+    @property
+    def attitudes(self) -> list[np.ndarray]:
+        """Float64 parts (samples, 4)."""
+        return [] if self.trial is None else self.trial.attitudes
+
+    @property
+    def steps(self) -> int:
+        """Natural steps taken."""
+        return 0 if self.trial is None else self.trial.steps
 
     @property
     def measured(self) -> bool:
@@ -112,15 +98,11 @@ class Measurement:
     processes: int
     seconds: float
 
-    def reference_of(self, row: Row) -> ReferenceSolution:
-        """The reference against which a setting is held."""
-        if row.setting.precision == "quadruple" and self.wide_reference is not None:
-            return self.wide_reference
-        return self.reference
-
     def errors(self, row: Row) -> tuple[np.ndarray, np.ndarray]:
         """Attitude errors (samples,) of a measured setting, and the reference's own, rad."""
-        reference = self.reference_of(row)
+        reference = self.reference
+        if row.setting.precision == "quadruple" and self.wide_reference is not None:
+            reference = self.wide_reference
         count = min(len(row.attitudes[0]), len(reference.attitudes[0]))
         mine = [part[:count] for part in row.attitudes]
         theirs = [part[:count] for part in reference.attitudes]
@@ -179,8 +161,8 @@ def measure(
     if settings is None:
         settings = every_setting(plan.exact, full=full)
     rows = [Row(s) for s in dict.fromkeys([DEFAULT, *settings])]
-    explored = begun + TIMING.exploring * budget
-    references = ReferenceThread(experiment, plan, explored, TIMING.grace, wanted=reference == "best")
+    explored = begun + _EXPLORING * budget
+    references = ReferenceThread(experiment, plan, explored, _GRACE, wanted=reference == "best")
     references.start()
     told(f"attitudes of {len(rows)} settings")
     _explore(experiment, plan, rows, budget, explored)
@@ -201,21 +183,17 @@ def _explore(experiment: Experiment, plan: Plan, rows: list[Row], budget: float,
     for row in rows:
         wide = row.setting.precision == "quadruple" and row.setting.has_steps
         row.part = plan.short if wide else plan.part
-        tasks.append(attitude_task(plan, row.setting, TIMING.single * budget, wide=wide))
+        tasks.append(attitude_task(plan, row.setting, _SINGLE * budget, wide=wide))
         row.problem = f"left out: the budget of {budget:g} s was used up before its turn"
     # without the default there is no comparison: on a busy machine it may be late
-    first_by = time.monotonic() + TIMING.grace
+    first_by = time.monotonic() + _GRACE
     for answer in ask(experiment, tasks, deadline=deadline, first_by=first_by):
         row = rows[answer.index]
         row.status = RowStatus.MEASURED if row.part >= plan.part else RowStatus.SHORT
-        row.problem = ""
-        if answer.problem is not None:
-            row.status, row.problem = RowStatus.FAILED, answer.problem
-        if answer.values:
-            row.attitudes = answer.values["attitudes"]
-            row.drifts = answer.values["drifts"]
-            row.steps, row.order = answer.values["steps"], answer.values["order"]
-            row.work = answer.values["work"]
+        row.problem = answer.problem or ""
+        if row.problem:
+            row.status = RowStatus.FAILED
+        row.trial = answer.trial
     if not rows[0].measured:
         raise RigidsimError(
             f"tradeoff: the default setting ({DEFAULT.title}), which costs are relative to, could not be "
@@ -243,13 +221,13 @@ def _time(
         random.Random(repeat).shuffle(order)
         middle = len(order) // 2
         turns = [rows[0], *order[:middle], rows[0], *order[middle:], rows[0]]
-        tasks = [Task(row.setting, "speed", plan.times, TIMING.passes, max(1, row.steps)) for row in turns]
+        tasks = [Task(row.setting, "speed", plan.times, _PASSES, max(1, row.steps)) for row in turns]
         seconds: dict[int, float] = {}
         limit = deadline if repeat else max(deadline, time.monotonic() + 30.0)
-        first_by = 0.0 if repeat else time.monotonic() + TIMING.grace
+        first_by = 0.0 if repeat else time.monotonic() + _GRACE
         for answer in ask(experiment, tasks, deadline=limit, first_by=first_by):
             if answer.problem is None:
-                seconds[answer.index] = answer.values["seconds"]
+                seconds[answer.index] = answer.seconds
         defaults = [seconds[n] for n, row in enumerate(turns) if row is rows[0] and n in seconds]
         if not defaults:
             break

@@ -44,35 +44,12 @@ _WARMING = 32  # steps whose cost isn't measured
 _FEW_TOLERANCES = (1e-6, 1e-10)  # of the other formulations in double precision
 
 
-@dataclass(frozen=True)
-class Budgeting:
-    """How a time budget is divided.
-
-    Costs are in steps of the default setting, measured and rounded up.
-
-    Attributes:
-        pilot_steps: steps of the pilot that measures the pace of the default setting.
-        all_share, all_cost: share of the budget and cost of all settings together.
-        reference_share, reference_cost: the same for the reference in quadruple precision.
-        quadruple_share, quadruple_cost: the same for all quadruple settings.
-        digits_share, digits_cost: the same for the reference of these.
-        samples, short_samples: number of attitudes compared, over the whole part and over the short one.
-    """
-
-    pilot_steps: int = 4000
-    all_share: float = 0.3
-    all_cost: float = 350.0
-    reference_share: float = 0.3
-    reference_cost: float = 1300.0
-    quadruple_share: float = 0.1
-    quadruple_cost: float = 2600.0
-    digits_share: float = 0.2
-    digits_cost: float = 12000.0
-    samples: int = 32
-    short_samples: int = 6
-
-
-BUDGETING = Budgeting()
+_PILOT_STEPS = 4000  # measure the pace of the default setting
+_ALL, _REFERENCE, _QUADRUPLE, _DIGITS = (0.3, 350.0), (0.3, 1300.0), (0.1, 2600.0), (0.2, 12000.0)
+"""Shares of the budget, and costs in steps of the default setting, measured and rounded up: of all settings
+together, of their reference in quadruple precision, of all quadruple settings, and of the reference of these.
+"""
+_SAMPLES, _SHORT_SAMPLES = 32, 6  # attitudes compared, over the whole part and over the short one
 
 
 @dataclass(frozen=True)
@@ -142,20 +119,17 @@ def make_plan(experiment: Experiment, budget: float) -> Plan:
     start, end = float(scene.start), float(scene.samples.last)
     prepared = prepare_scene(experiment, trial_scene(experiment, DEFAULT))
     corrected = assemble(prepared).steps()
-    pilot = run_pilot(
-        corrected.stepper, prepared.clock, corrected.skip, steps=BUDGETING.pilot_steps, warming=_WARMING
-    )
+    pilot = run_pilot(corrected.stepper, prepared.clock, corrected.skip, steps=_PILOT_STEPS, warming=_WARMING)
     whole = pilot.whole * pilot.seconds_per_step
     exact, why = exact_method(scene)
-    part = min(1.0, BUDGETING.all_share * budget / (whole * BUDGETING.all_cost))
-    short = BUDGETING.quadruple_share * budget / (whole * BUDGETING.quadruple_cost)
-    if not exact:
-        part = min(part, BUDGETING.reference_share * budget / (whole * BUDGETING.reference_cost))
-        short = min(short, BUDGETING.digits_share * budget / (whole * BUDGETING.digits_cost))
-    short = min(part, short)
-    short_times = grid(start, end, short, BUDGETING.short_samples) if short < part else ()
+    part, reference, quadruple, digits = (
+        share * budget / (whole * cost) for share, cost in (_ALL, _REFERENCE, _QUADRUPLE, _DIGITS)
+    )
+    part = min(1.0, part if exact else min(part, reference))
+    short = min(part, quadruple if exact else min(quadruple, digits))
+    short_times = grid(start, end, short, _SHORT_SAMPLES) if short < part else ()
     # the start is a sample, so that the motion begins there
-    times = tuple(sorted({start, *short_times, *grid(start, end, part, BUDGETING.samples)}))
+    times = tuple(sorted({start, *short_times, *grid(start, end, part, _SAMPLES)}))
     limit = short_times[-1] if short_times else times[-1]
     return Plan(
         start=start,
@@ -235,8 +209,8 @@ class ReferenceThread(threading.Thread):
         try:
             first_by = time.monotonic() + self._grace
             for answer in ask(self._experiment, self._tasks, deadline=self._deadline, first_by=first_by):
-                if answer.problem is None:
-                    self._found[self._tasks[answer.index].setting] = answer.values["attitudes"]
+                if answer.problem is None and answer.trial is not None:
+                    self._found[self._tasks[answer.index].setting] = answer.trial.attitudes
         except BaseException as error:  # reported in the main thread
             self._failure = error
 

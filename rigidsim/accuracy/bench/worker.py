@@ -10,6 +10,7 @@ are repeated until they can be told from noise. Recording costs the same in ever
 
 from __future__ import annotations
 
+import math
 import pickle
 import queue
 import statistics
@@ -19,14 +20,14 @@ import tempfile
 import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, replace
+from typing import Literal
 
 import mpmath
 import numpy as np
 
 from rigidsim.accuracy.setting import Setting
-from rigidsim.accuracy.trial import trial_scene, try_setting
+from rigidsim.accuracy.trial import Trial, trial_scene, try_setting
 from rigidsim.errors import ConfigError, RigidsimError
 from rigidsim.scene.config import Experiment, parse
 from rigidsim.solve.assembly import assemble
@@ -39,23 +40,18 @@ _SHORTEST_PASS = 4e-3  # CPU seconds: the clock's own resolution is a microsecon
 _LONGEST_WARMING = 2000  # steps
 _CLOSED_ROWS = {True: 2000, False: 4}  # of a pass in double, and in mpmath
 
-Measured = tuple[dict[str, Any], str | None]
-"""What was measured; why not, or not to the end, in words."""
-
 
 @dataclass(frozen=True)
 class Task:
-    """What to do with one setting.
+    """What to do with one setting: integrate it over some times (s), or measure its speed.
 
     Attributes:
-        kind: "attitudes" (integrate and answer with attitudes and drifts) or "speed".
-        times: sample times, s.
         patience: CPU seconds that an integration may take, or that repeated passes should take.
         steps: steps of the whole motion, if known, since passes don't go past its end.
     """
 
     setting: Setting
-    kind: str
+    kind: Literal["attitudes", "speed"]
     times: tuple[float, ...]
     patience: float
     steps: int = 1_000_000
@@ -63,19 +59,20 @@ class Task:
 
 @dataclass(frozen=True)
 class Answer:
-    """Result of one task: its index, what was measured, and why not, or not to the end; None if all went
+    """Result of one task: its trial or seconds per unit, and why not, or not to the end; None if all went
     well.
     """
 
-    index: int
-    values: dict[str, Any]
+    trial: Trial | None = None
+    seconds: float = math.nan
     problem: str | None = None
+    index: int = 0
 
 
 # --- in the process that measures ------------------------------------------------------------------------
 
 
-def _attitudes(experiment: Experiment, task: Task) -> Measured:
+def _attitudes(experiment: Experiment, task: Task) -> Answer:
     """Integrate over the task's times."""
     started = time.process_time()
 
@@ -83,14 +80,13 @@ def _attitudes(experiment: Experiment, task: Task) -> Measured:
         return Status.WALL_TIME if time.process_time() - started > task.patience else None
 
     trial = try_setting(experiment, task.setting, [mpmath.mpf(t) for t in task.times], go_on=go_on)
-    names = ("attitudes", "drifts", "steps", "order", "work")
-    found = {name: getattr(trial, name) for name in names}
+    problem = None if trial.status is Status.FINISHED else trial.status.message
     if trial.status is Status.WALL_TIME:
-        return found, f"took longer than {task.patience:.3g} s, its part of the budget"
-    return found, None if trial.status is Status.FINISHED else trial.status.message
+        problem = f"took longer than {task.patience:.3g} s, its part of the budget"
+    return Answer(trial, problem=problem)
 
 
-def _speed(experiment: Experiment, task: Task) -> Measured:
+def _speed(experiment: Experiment, task: Task) -> Answer:
     """CPU seconds per natural step, or per sample of a closed form: the median of several passes."""
     scene = trial_scene(experiment, task.setting, [mpmath.mpf(t) for t in task.times])
     prepared = prepare_scene(experiment, scene, tolerance=task.setting.tolerance)
@@ -102,7 +98,7 @@ def _speed(experiment: Experiment, task: Task) -> Measured:
         def one_pass(_: int) -> None:
             closed.states(system, precision, rows, begin)
 
-        return {"seconds": _per_unit(one_pass, len(rows), len(rows), task.patience)}, None
+        return Answer(seconds=_per_unit(one_pass, len(rows), len(rows), task.patience))
     corrected = assemble(prepared).steps()
     start = corrected.boundary()
 
@@ -111,7 +107,7 @@ def _speed(experiment: Experiment, task: Task) -> Measured:
         corrected.skip(count)
 
     steps(min(task.steps, _LONGEST_WARMING))  # charts are compiled when first needed
-    return {"seconds": _per_unit(steps, min(32, task.steps), task.steps, task.patience)}, None
+    return Answer(seconds=_per_unit(steps, min(32, task.steps), task.steps, task.patience))
 
 
 def _per_unit(one_pass: Callable[[int], None], count: int, most: int, patience: float) -> float:
@@ -139,11 +135,11 @@ def _work() -> None:
         try:
             found = measure(experiment, task)
         except ConfigError as error:
-            found = {}, "; ".join(map(str, error.problems))
+            found = Answer(problem="; ".join(map(str, error.problems)))
         except RigidsimError as error:
-            found = {}, str(error)
+            found = Answer(problem=str(error))
         except (OverflowError, ZeroDivisionError, ValueError) as error:
-            found = {}, f"{type(error).__name__}: {error}"
+            found = Answer(problem=f"{type(error).__name__}: {error}")
         pickle.dump(found, sys.stdout.buffer)
         sys.stdout.buffer.flush()
 
@@ -172,14 +168,14 @@ def ask(
                 found = child.answers.get(timeout=max(0.0, until - time.monotonic()))
                 if found is None:
                     break
-                yield Answer(following, *found)
+                yield replace(found, index=following)
                 following += 1
         except queue.Empty:
             return
         finally:
             words = child.end()
         if following < len(tasks):
-            yield Answer(following, {}, f"the process that measured it ended with {words}")
+            yield Answer(problem=f"the process that measured it ended with {words}", index=following)
             following += 1
 
 
@@ -192,7 +188,7 @@ class _Child:
             [sys.executable, "-m", "rigidsim.accuracy.bench.worker"],
             stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=self._errors,
         )  # fmt: skip
-        self.answers: queue.Queue[Measured | None] = queue.Queue()
+        self.answers: queue.Queue[Answer | None] = queue.Queue()
         self._reader = threading.Thread(target=self._read, daemon=True)
         self._reader.start()
         assert self._process.stdin is not None

@@ -63,22 +63,22 @@ def choose_level(
     asked = _asked(experiment)
     considered: list[Considered] = []
     for level in CHEAPEST_FIRST:
-        if level in without:
-            considered.append(Considered(level, None, "its measured error was larger than asked for"))
-            continue
         other = experiment.having([f'model.level="{level}"'])
+        why_not = "its measured error was larger than asked for" if level in without else ""
         try:
-            found = measure_modelling(prepare(other, loads=loads))
+            found = None if why_not else measure_modelling(prepare(other, loads=loads))
         except ConfigError as error:
-            considered.append(Considered(level, None, "; ".join(p.what for p in error.problems)))
-            continue
+            found, why_not = None, "; ".join(p.what for p in error.problems)
         except Unmeasured as why:
-            considered.append(Considered(level, None, str(why)))
+            found, why_not = None, str(why)
+        if found is None:
+            considered.append(Considered(level, None, why_not))
             continue
-        if found.worst <= asked:
-            considered.append(Considered(level, found.worst, "", found.cpu_seconds_of_run))
+        kept = found.worst <= asked
+        why_not = "" if kept else "more than asked for"
+        considered.append(Considered(level, found.worst, why_not, found.cpu_seconds_of_run))
+        if kept:
             return LevelChoice(other, level, considered)
-        considered.append(Considered(level, found.worst, "more than asked for", found.cpu_seconds_of_run))
     considered.append(Considered(FULL, 0.0, ""))
     return LevelChoice(fully(experiment), FULL, considered)
 

@@ -110,7 +110,21 @@ def measure_modelling(
         until = end if whole else at + length
         windows.append(side_by_side(prepared, average, at, until, direction, go_on))
     if whole:
-        return _of_whole(average, windows[0], time.process_time() - started)
+        (window,) = windows
+        return ModellingError(
+            average.level,
+            min(_SPARE_OF_WHOLE * window.recorded, math.pi),
+            None
+            if window.recorded_figure is None
+            else min(_SPARE_OF_WHOLE * window.recorded_figure, math.pi),
+            math.hypot(*window.growth),
+            window.recorded,
+            True,
+            "every rotation was resolved beside the run to its end",
+            time.process_time() - started,
+            windows,
+            {name: _SPARE_OF_WHOLE * change.largest for name, change in window.changes.items()},
+        )
     motions = [motion_at(average, states, exponent) for _, states, _ in places]
     steady = average.resonance is not None or not average.sources
     carried = None if steady else carrying(prepared, average, go_on)
@@ -168,23 +182,6 @@ def _places(
     return found
 
 
-def _of_whole(average: Average, window: Window, spent: float) -> ModellingError:
-    how = "every rotation was resolved beside the run to its end"
-    figure = window.recorded_figure
-    return ModellingError(
-        average.level,
-        min(_SPARE_OF_WHOLE * window.recorded, math.pi),
-        None if figure is None else min(_SPARE_OF_WHOLE * figure, math.pi),
-        math.hypot(*window.growth),
-        window.recorded,
-        True,
-        how,
-        spent,
-        [window],
-        {name: _SPARE_OF_WHOLE * change.largest for name, change in window.changes.items()},
-    )
-
-
 def _extrapolated(
     prepared: InitialValueProblem,
     average: Average,
@@ -202,7 +199,12 @@ def _extrapolated(
     changes, faster = _changed(average, windows, span), 0.0
     if average.driven is not None and average.sources:
         # lasting errors of size and energy change the rate of precession; what oscillates doesn't
-        kept = [_lasting(windows, name, span / 2) + average.driven.passed for name in (SIZE, SHAPE)]
+        kept = [
+            max(abs(window.changes[name].mean) for window in windows)
+            + _grown(windows, name, span / 2)
+            + average.driven.passed
+            for name in (SIZE, SHAPE)
+        ]
         detuned = max(average.driven.detuned(motion, kept[0], kept[1]) for motion in motions)
         faster = average.strength * detuned
     if carried is None:
@@ -257,8 +259,3 @@ def _grown(windows: Sequence[Window], name: str, seconds: float) -> float:
     rates = np.array([change.growth for change in seen])
     rate = abs(rates.mean()) + (rates.max() - rates.min()) / 2 + max(change.doubt for change in seen)
     return float(rate) * seconds
-
-
-def _lasting(windows: Sequence[Window], name: str, seconds: float) -> float:
-    """The same, with the mean error within the windows."""
-    return max(abs(window.changes[name].mean) for window in windows) + _grown(windows, name, seconds)

@@ -50,7 +50,9 @@ class Unmeasured(Exception):
 
 @dataclass(frozen=True)
 class Change:
-    """Difference of a changing quantity between both models, relative to its value."""
+    """Difference of a changing quantity between both models, relative to its value: the largest, the mean,
+    its growth (1/s), and how far that differs between the window's parts.
+    """
 
     largest: float
     mean: float
@@ -98,12 +100,6 @@ def motion_at(average: Average, states: Sequence[Any], exponent: int) -> FreeMot
     return average.driven.motion(axial, transverse)
 
 
-def _sample_count(motion: FreeMotion, seconds: float) -> int:
-    """Number of samples at which both models are compared."""
-    rotations = seconds * max(rotation_rates(motion)) / _TURN
-    return int(min(max(_FEWEST_SAMPLES, _SAMPLES_PER_ROTATION * rotations), _MOST_SAMPLES))
-
-
 def side_by_side(
     prepared: InitialValueProblem,
     average: Average,
@@ -118,36 +114,38 @@ def side_by_side(
         Unmeasured: one of them is refused, or doesn't reach the end.
     """
     exponent = prepared.system.scaling.momentum
-    count = _sample_count(motion_at(average, states, exponent), end - begin)
+    rotations = (end - begin) * max(rotation_rates(motion_at(average, states, exponent))) / _TURN
+    count = int(min(max(_FEWEST_SAMPLES, _SAMPLES_PER_ROTATION * rotations), _MOST_SAMPLES))
     scene = _starting(prepared.scene, average, begin, end, states, exponent, count)
     if begin != float(prepared.scene.start):
         scene = with_bodies(scene, prepared, states)
     # whether what averaging removed can be added back
     back = average.resonance is None and average.driven is None
     names = ["momentum_axis"] + (["figure_axis"] if average.figure else [])
-    changing = [] if average.driven is None else [SIZE]
-    energies = [] if average.driven is None else [_OF_ROTATION, ENERGY]
-    steps, true = _followed(prepared, scene, None, False, names + changing + energies[:1], go_on)
-    wanted = names + changing + energies[1:]
-    reduced = plain = _followed(prepared, scene, average, back, wanted, go_on)
+    driven = average.driven is not None
+    steps, true = _followed(prepared, scene, None, False, names + [SIZE, _OF_ROTATION] * driven, go_on)
+    reduced_steps, reduced = _followed(prepared, scene, average, back, names + [SIZE, ENERGY] * driven, go_on)
+    plain = reduced
     if back and not average.short_period:
-        plain = _followed(prepared, scene, average, False, names, go_on)
+        _, plain = _followed(prepared, scene, average, False, names, go_on)
     times = np.linspace(0.0, end - begin, count)
-    apart = true["momentum_axis"] - reduced[1]["momentum_axis"]
-    basis = _basis(plain[1]["momentum_axis"])
-    growth, doubt = _growth(times, apart @ basis.T)
+    apart = true["momentum_axis"] - reduced["momentum_axis"]
+    growth, doubt = _growth(times, apart @ _basis(plain["momentum_axis"]).T)
+
+    def distances(model: Mapping[str, np.ndarray]) -> tuple[float, float | None]:
+        momentum, *figure = (float(np.linalg.norm(true[x] - model[x], axis=1).max()) for x in names)
+        return momentum, figure[0] if figure else None
+
     return Window(
         begin,
         end,
         steps,
-        _largest(apart),
-        _largest(true["figure_axis"] - reduced[1]["figure_axis"]) if average.figure else None,
-        _largest(true["momentum_axis"] - plain[1]["momentum_axis"]),
-        _largest(true["figure_axis"] - plain[1]["figure_axis"]) if average.figure else None,
+        *distances(reduced),
+        *distances(plain),
         (float(growth[0]), float(growth[1])),
         doubt,
-        reduced[0],
-        _changes(times, true, reduced[1]) if average.driven is not None else {},
+        reduced_steps,
+        _changes(times, true, reduced) if driven else {},
     )
 
 
@@ -232,11 +230,7 @@ def _followed(
     names: list[str],
     go_on: Callable[[], bool],
 ) -> tuple[int, dict[str, np.ndarray]]:
-    """Steps, and the variables asked for at all samples.
-
-    Raises:
-        Unmeasured: the motion is refused, or doesn't reach the end.
-    """
+    """Steps, and the variables asked for at all samples. Raises ``Unmeasured``."""
     config = scene.config
     level = FULL if average is None else average.level
     model = config.model.model_copy(update={"level": level, "short_period": short_period})
@@ -293,7 +287,3 @@ def _slope(times: np.ndarray, values: np.ndarray) -> np.ndarray:
     weights = np.sin(np.pi * (times - times[0]) / (times[-1] - times[0])) ** 2
     x = x - (weights @ x) / weights.sum()
     return np.asarray((weights * x) @ values / ((weights * x) @ x))
-
-
-def _largest(vectors: np.ndarray) -> float:
-    return float(np.linalg.norm(vectors, axis=1).max())
