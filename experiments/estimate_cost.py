@@ -30,7 +30,7 @@ import numpy as np
 
 import rigidsim
 from rigidsim.session.diagnostics import Diagnostics
-from rigidsim.session.statistics import SampleStatistics
+from rigidsim.session.recorder import SampleStatistics
 from rigidsim.solve.assembly import assemble, sampler
 from rigidsim.solve.problem import prepare
 from rigidsim.solve.sample_block import SampleBlock

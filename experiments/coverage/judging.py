@@ -15,7 +15,7 @@ from experiments.coverage import moments
 from experiments.coverage.families import SAMPLES, CoverageScene
 from rigidsim.errors import ConfigError
 from rigidsim.session.diagnostics import Diagnostics
-from rigidsim.session.statistics import SampleStatistics
+from rigidsim.session.recorder import SampleStatistics
 from rigidsim.solve.assembly import Assembly, assemble, sampler
 from rigidsim.solve.problem import InitialValueProblem, prepare
 from rigidsim.solve.sample_block import SampleBlock

@@ -19,7 +19,7 @@ from experiments.extremes.scenes import Extreme
 from rigidsim.accuracy.error_law import round_off_law
 from rigidsim.errors import ConfigError
 from rigidsim.session.diagnostics import Diagnostics
-from rigidsim.session.statistics import SampleStatistics
+from rigidsim.session.recorder import SampleStatistics
 from rigidsim.solve.assembly import assemble, sampler
 from rigidsim.solve.closed_form import ClosedForm, NoClosedForm, closed_form_of
 from rigidsim.solve.problem import InitialValueProblem, prepare

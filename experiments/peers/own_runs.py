@@ -13,7 +13,7 @@ from collections.abc import Callable
 import rigidsim
 from experiments.peers import Answer
 from experiments.peers.scenes import Scene
-from rigidsim.session.guards import Observer
+from rigidsim.session.session import Observer
 from rigidsim.solve.assembly import assemble, sampler
 from rigidsim.solve.problem import InitialValueProblem
 from rigidsim.solve.problem import prepare as prepared_from

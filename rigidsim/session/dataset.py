@@ -14,7 +14,6 @@ import numpy as np
 from rigidsim.errors import ConfigError, Problem
 from rigidsim.model.outputs import Invariant
 from rigidsim.session.dates import Dates
-from rigidsim.session.session import Effort
 from rigidsim.solve.assembly import Assembly
 from rigidsim.solve.evaluate import Evaluator, RecordedParts
 from rigidsim.solve.events import EventLog, samples_at
@@ -268,9 +267,7 @@ def _surroundings(prepared: InitialValueProblem) -> list[dict[str, Any]]:
     return [one for one in shown if one is not None]
 
 
-def of_complete(
-    attributes: RootAttributes, summary: Summary, effort: Effort, angles_wrapped_from: float = math.nan
-) -> RootAttributes:
+def of_complete(attributes: RootAttributes, summary: Summary, angles_wrapped_from: float) -> RootAttributes:
     """Attributes of the dataset of a run that ended."""
     put_back = {name: row.put_back for name, row in summary.invariants.items()}
     tables = {name: found.as_dict() for name, found in summary.tables.items()}
@@ -279,8 +276,8 @@ def of_complete(
         status_message=summary.message,
         warnings="\n".join(summary.warnings),
         steps=summary.cost.steps,
-        wall_seconds=effort.wall,
-        cpu_seconds=effort.cpu,
+        wall_seconds=summary.cost.wall_seconds,
+        cpu_seconds=summary.cost.cpu_seconds,
         finished_at=provenance.now(),
         put_back=json.dumps(put_back) if summary.held else None,
         attitude_error=summary.accuracy.estimated_attitude_error,

@@ -115,21 +115,10 @@ class Dates:
         """Julian dates in two doubles and times (s) of the requested samples of one block."""
         origin = block * _BLOCK
         index = np.arange(max(first - origin, 0), min(stop - origin, _BLOCK), dtype=np.float64)
-        days, seconds = self._begins(block)
+        begin = self.samples.begin + origin * self.samples.step
+        days, seconds = _parts(self.epoch.julian_date() + begin / DAY), _parts(begin)
         high, low = _line(days, self._steps[0], index)
         return high, low, np.add(*_line(seconds, self._steps[1], index))
-
-    def _begins(self, block: int) -> tuple[Parts, Parts]:
-        """Julian date and time (s) of the first sample of a block."""
-        if block not in self._known:
-            begin = self.samples.begin + block * _BLOCK * self.samples.step
-            self._known.clear()  # blocks are asked for one after the other
-            self._known[block] = _parts(self.epoch.julian_date() + begin / DAY), _parts(begin)
-        return self._known[block]
-
-    @cached_property
-    def _known(self) -> dict[int, tuple[Parts, Parts]]:
-        return {}
 
     @cached_property
     def _steps(self) -> tuple[Parts, Parts]:

@@ -11,13 +11,10 @@ from pathlib import Path
 from rigidsim.errors import VIEW, StoppedWritingError
 from rigidsim.scene.schema import Output
 from rigidsim.session import dataset, lyapunov
-from rigidsim.session.advice import cheaper_model
-from rigidsim.session.diagnostics import Diagnostics
+from rigidsim.session.diagnostics import Diagnostics, cheaper_model
 from rigidsim.session.ending import chart_changes, closing_words, time_reached
-from rigidsim.session.guards import Guards, Interruption, Observer
-from rigidsim.session.recorder import Checkpoints, Recorder
-from rigidsim.session.session import RunCost, Session
-from rigidsim.session.statistics import SampleStatistics
+from rigidsim.session.recorder import Checkpoints, Recorder, SampleStatistics
+from rigidsim.session.session import Guards, Interruption, Observer, RunCost, Session
 from rigidsim.session.summary import cost_so_far, summarise
 from rigidsim.solve.assembly import assemble, sampler
 from rigidsim.solve.lyapunov import LyapunovSpectrum
@@ -198,7 +195,7 @@ class _ActiveRun:
     def ended(self, summary: Summary) -> RootAttributes:
         """Attributes of the dataset."""
         wrapped_from = self.recorder.statistics.angles_wrapped_from
-        return dataset.of_complete(self.attributes, summary, self.session.effort, wrapped_from)
+        return dataset.of_complete(self.attributes, summary, wrapped_from)
 
 
 def _completed(

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from rigidsim.errors import RESUME, RunFolderError, StoppedWritingError, once_mended
 from rigidsim.session.dataset import LYAPUNOV_NAMES
-from rigidsim.session.guards import Interruption
+from rigidsim.session.session import Interruption
 from rigidsim.solve.lyapunov import Convergence, LyapunovSpectrum, lyapunov_spectrum
 from rigidsim.solve.problem import InitialValueProblem, double_twin
 from rigidsim.store import atomic, netcdf

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import Enum
+from itertools import accumulate
 
 import numpy as np
 
@@ -37,8 +39,7 @@ class Outcome(Enum):
 ENDED_WELL = (Status.FINISHED.value, Status.EVENT.value)
 OUTCOMES = (
     *(s.value for s in (Status.FINISHED, Status.EVENT, Status.WALL_TIME, Status.MAX_STEPS, Status.MAX_DRIFT)),
-    *(s.value for s in (Status.NON_FINITE, Status.COLLAPSED, Status.UNRESOLVED)),
-    *(o.value for o in Outcome),
+    *(s.value for s in (Status.NON_FINITE, Status.COLLAPSED, Status.UNRESOLVED, *Outcome)),
 )
 """All outcomes of members; a dataset stores the index in this list, which may only grow."""
 WARNINGS = tuple(code.value for code in WarningCode)
@@ -68,13 +69,10 @@ class MemberResults:
         """Several groups of members joined in order."""
         counts = [len(part.kept["status"].values) for part in parts]
         reasons: dict[int, str] = {}
-        first = 0
-        engines: dict[str, int] = {}
-        for part, count in zip(parts, counts, strict=True):
+        engines: Counter[str] = Counter()
+        for part, first in zip(parts, accumulate(counts, initial=0), strict=False):
             reasons |= {first + place: why for place, why in part.reasons.items()}
-            first += count
-            for engine, number in part.engines.items():
-                engines[engine] = engines.get(engine, 0) + number
+            engines.update(part.engines)
         why = next((part.why_alone for part in parts if part.why_alone), "")
         spent = sum(part.estimating for part in parts)
         return cls(joined([part.kept for part in parts], counts), reasons, engines, why, spent)

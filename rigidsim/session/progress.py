@@ -14,7 +14,7 @@ from rich.console import Console
 from rich.progress import BarColumn, TaskID, TextColumn
 from rich.progress import Progress as Bar
 
-from rigidsim.session.guards import Observer
+from rigidsim.session.session import Observer
 from rigidsim.session.understood import time_words
 from rigidsim.solve.problem import InitialValueProblem
 from rigidsim.solve.sampler import Progress

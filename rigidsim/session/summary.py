@@ -8,9 +8,8 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from rigidsim.model.capabilities import table_of
-from rigidsim.session.advice import advice_on
 from rigidsim.session.dataset import unused_variables
-from rigidsim.session.diagnostics import Diagnostics
+from rigidsim.session.diagnostics import Diagnostics, advice_on
 from rigidsim.session.session import Effort, Phases
 from rigidsim.session.understood import body_of, cautions_of, span_of, start_of, told_loads
 from rigidsim.solve.lyapunov import LyapunovSpectrum

@@ -162,11 +162,9 @@ class _Joined(BackendArray):
         return indexing.explicit_indexing_adapter(key, self.shape, basic, self._read)
 
     def _read(self, key: tuple[Any, ...]) -> np.ndarray:
-        wanted, rest = key[0], key[1:]
-        if not isinstance(wanted, slice):
-            row = range(self.shape[0])[wanted]
-            return np.asarray(self._rows(range(row, row + 1), rest)[0])
-        rows = range(*wanted.indices(self.shape[0]))
+        rows, rest = range(self.shape[0])[key[0]], key[1:]
+        if not isinstance(rows, range):
+            return np.asarray(self._rows(range(rows, rows + 1), rest)[0])
         return self._rows(rows, rest) if rows.step > 0 else self._rows(rows[::-1], rest)[::-1]
 
     def _rows(self, rows: range, rest: tuple[Any, ...]) -> np.ndarray:

@@ -17,9 +17,8 @@ from rigidsim.scene.scene import build_scene
 from rigidsim.scene.toml_text import assignments
 from rigidsim.session.dataset import root_attributes as attributes_now
 from rigidsim.session.execution import execute, with_timeline
-from rigidsim.session.guards import Observer
 from rigidsim.session.progress import watched
-from rigidsim.session.session import Session, Tuning
+from rigidsim.session.session import Observer, Session, Tuning
 from rigidsim.solve.assembly import assemble
 from rigidsim.solve.problem import InitialValueProblem, prepare
 from rigidsim.solve.status import Status

@@ -15,9 +15,8 @@ from rigidsim.model.load import Load
 from rigidsim.scene.choices import AUTO, FULL
 from rigidsim.session.dataset import refuse_taken_names
 from rigidsim.session.execution import execute
-from rigidsim.session.guards import Observer
 from rigidsim.session.progress import watched
-from rigidsim.session.session import Session, Tuning
+from rigidsim.session.session import Observer, Session, Tuning
 from rigidsim.session.storage import refuse_too_large, refuse_too_large_for_memory
 from rigidsim.solve.problem import InitialValueProblem, prepare
 from rigidsim.store.folder import RunFolder

@@ -13,7 +13,7 @@ import xarray
 from pydantic import BaseModel
 
 from rigidsim.errors import RESUME, RunFolderError
-from rigidsim.session.guards import Observer
+from rigidsim.session.session import Observer
 from rigidsim.solve.status import Status
 from rigidsim.store import provenance
 from rigidsim.store.attributes import Use, read_attributes

@@ -12,7 +12,7 @@ from rich.console import Console
 
 import rigidsim
 from rigidsim.cli.screens import summary as report
-from rigidsim.session.guards import Observer
+from rigidsim.session.session import Observer
 
 FREE = """name = "free"
 [body]

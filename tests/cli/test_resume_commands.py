@@ -83,7 +83,7 @@ def test_a_process_that_was_ended_is_resumed(number: int, config: Config, start:
 def test_sigterm_while_the_equations_are_compiled(config: Config, start: Start) -> None:
     """Before anything is integrated it ends like Ctrl-C, too, and can be resumed."""
     prelude = (
-        "import os, signal, rigidsim.session.guards as g\n"
+        "import os, signal, rigidsim.session.session as g\n"
         "g.Observer.started = lambda *_: os.kill(os.getpid(), signal.SIGTERM)\n"
         "import rigidsim.session.progress as p\n"
         "for c in vars(p).values():\n"

@@ -8,8 +8,7 @@ import time
 from pathlib import Path
 
 import rigidsim
-from rigidsim.session.guards import Observer
-from rigidsim.session.session import Tuning
+from rigidsim.session.session import Observer, Tuning
 from rigidsim.solve.sampler import Pacing, Progress
 from rigidsim.store.segments import SegmentLimits
 

@@ -13,8 +13,7 @@ import pytest
 from support import cases, config, same_bits
 
 import rigidsim
-from rigidsim.session.guards import Observer
-from rigidsim.session.session import Tuning
+from rigidsim.session.session import Observer, Tuning
 from rigidsim.solve.compiled import CodeStore, kept_in
 from rigidsim.solve.problem import prepare
 from rigidsim.solve.sampler import Pacing, Progress

@@ -12,7 +12,7 @@ from support import EAGER, IMPATIENT, cases, config, loaded, same_bits
 
 import rigidsim
 from rigidsim import ConfigError, RunFolderError
-from rigidsim.session.guards import Observer
+from rigidsim.session.session import Observer
 from rigidsim.solve import driver
 from rigidsim.store import atomic, provenance
 
