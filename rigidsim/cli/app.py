@@ -40,13 +40,7 @@ def main() -> None:
 
 
 def _command(module: str, more: str = "") -> Callable[[Callable[..., None]], Callable[..., None]]:
-    """Make a function's arguments and docstring a command.
-
-    Args:
-        module: module of ``rigidsim.cli.commands`` whose function of the same name does the work, and returns
-            the exit code, or None for 0.
-        more: end of its help.
-    """
+    """Make arguments and docstring those of a command, done by a module of ``rigidsim.cli.commands``."""
 
     def declared(function: Callable[..., None]) -> Callable[..., None]:
         name = function.__name__

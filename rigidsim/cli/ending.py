@@ -11,11 +11,7 @@ from rigidsim.errors import RigidsimError
 
 
 def exit_code(command: Callable[[], int]) -> int:
-    """Run a command that returns its exit code; an error meant for the user is printed and has a code, too.
-
-    Args:
-        command: called once, in this thread.
-    """
+    """Run a command that returns its exit code; an error meant for the user is printed and has one, too."""
     # SIGTERM ends like Ctrl-C, and so does SIGINT where a script's background job starts with it ignored:
     # later on the run itself heeds both, and one that comes before that mustn't be lost
     ending = (signal.SIGINT, signal.SIGTERM)

@@ -36,9 +36,7 @@ def working_bits(precision: str | int) -> int:
 
 
 class _Context(mpmath.MPContext):
-    """An mpmath context that inherits its special functions; each new plain context would wrap all of them
-    again.
-    """
+    """An mpmath context that inherits its special functions, which each plain one would wrap again."""
 
     @classmethod
     def _wrap_specfun(cls, *_: Any) -> None:

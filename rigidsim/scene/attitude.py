@@ -84,10 +84,7 @@ def quaternion_from_euler(context: Any, angles: Vector, sequence: str) -> Vector
 
 
 def euler_from_matrix(context: Any, r: Matrix, sequence: str) -> Vector:
-    """Intrinsic Euler angles of R; the middle one in [0, pi] (proper) or [-pi/2, pi/2].
-
-    In the singularity, where only a sum or difference of the outer angles is defined, the last is zero.
-    """
+    """Intrinsic Euler angles of R; see ``Rotations.euler_from_matrix``."""
     return _within(context).euler_from_matrix(sequence, r)
 
 

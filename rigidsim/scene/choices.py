@@ -101,9 +101,7 @@ FORMULATIONS: dict[str, Variables] = {
 
 
 def variables_named(name: str) -> Variables:
-    """The variables of a config, summary or dataset: quaternions stand for "auto", and those of a later
-    version, or of an averaged motion, tell an attitude.
-    """
+    """Those of a config, summary or dataset; unknown ones (averaged, of a later version) tell an attitude."""
     return FORMULATIONS.get(DEFAULT_FORMULATION if name == AUTO else name) or Variables(name, general=False)
 
 

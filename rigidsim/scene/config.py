@@ -193,9 +193,7 @@ def _with_tables(experiment: Experiment, folder: Path) -> Experiment:
 
 
 def _table_sections(config: Config, folder: Path) -> str:
-    """TOML text, to be appended to the config, with the tables that loads name and the config doesn't
-    contain.
-    """
+    """TOML text, to be appended to the config, of tables that loads name and the config doesn't contain."""
     found: dict[str, str] = {}
     for where, name in _named(config):
         if name not in found and name not in config.tables:

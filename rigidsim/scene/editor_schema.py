@@ -105,9 +105,7 @@ def _kinds(node: dict[str, Any]) -> list[dict[str, Any]]:
 
 
 def as_written(value: Any) -> Any:
-    """A default in TOML's terms: an exact number, which pydantic would take apart, as a user would
-    write it.
-    """
+    """A default as a user would write it; pydantic would take an exact number apart."""
     if isinstance(value, list):
         return [as_written(item) for item in value]
     if not (isinstance(value, Mapping) and "rational" in value):

@@ -32,13 +32,7 @@ _FIRST_OFFSET = 10  # TAI - UTC on 1972-01-01, before which seconds of UTC had o
 
 @dataclass(frozen=True)
 class Epoch:
-    """An instant in a time scale.
-
-    Attributes:
-        scale: one of ``SCALES``.
-        day: proleptic Gregorian ordinal, as in ``datetime.date``.
-        ticks: time of day in 1e-14 s; 86,400 s or more within a leap second.
-    """
+    """An instant: ordinal of its day, and ticks of 1e-14 s in it (of a leap second from 86,400 s on)."""
 
     scale: str
     day: int
@@ -56,9 +50,7 @@ class Epoch:
         return f"{date.fromordinal(self.day)}T{clock}{'.' if digits else ''}{digits}"
 
     def after(self, seconds: Decimal) -> Epoch:
-        """The instant some seconds later, to 1e-14 s, in the same scale; ``ValueError`` beyond the years 1 to
-        9999, or where UTC isn't known.
-        """
+        """The instant some seconds later, to 1e-14 s; ``ValueError`` past years 1 to 9999 or known UTC."""
         ticks = int(_WIDE.scaleb(seconds, DIGITS).to_integral_value(context=_WIDE))
         uniform = self._uniform() + ticks
         if self.scale != "UTC":
@@ -113,9 +105,7 @@ J2000 = Epoch("TDB", date(2000, 1, 1).toordinal(), 43200 * _SECOND)
 
 
 def parse_epoch(text: str) -> Epoch:
-    """Read an instant as written in a config: ``2029-04-13T21:46:00 TDB``, or ``J2000``; ``ValueError`` says
-    what is allowed.
-    """
+    """Read an instant such as ``2029-04-13T21:46:00 TDB`` or ``J2000``; ``ValueError`` for anything else."""
     if text.strip() == "J2000":
         return J2000
     match = _FORM.fullmatch(text.strip())
@@ -153,9 +143,7 @@ def _unknown() -> str:
 
 @lru_cache(maxsize=1)
 def leap_seconds() -> tuple[list[int], list[int], int]:
-    """Days (ordinals) from which TAI - UTC has a new value, the values in seconds, and the day until which
-    they are known.
-    """
+    """Days (ordinals) from which TAI - UTC changes, its values in s, and the day until which they hold."""
     text = (files("tzdata") / "zoneinfo" / "leapseconds").read_text(encoding="ascii")
     days, offsets = [date(1972, 1, 1).toordinal()], [_FIRST_OFFSET]
     for words in (line.split() for line in text.splitlines() if line.startswith("Leap")):

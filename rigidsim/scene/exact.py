@@ -84,9 +84,7 @@ class ExactNumber:
 
 @cache
 def _for_doubles() -> Any:
-    """Context in which numbers are rounded to doubles, made once: making one takes longer than reading a
-    config.
-    """
+    """Context in which numbers are rounded to doubles; making one takes longer than reading a config."""
     import mpmath
 
     context = mpmath.MPContext()
@@ -190,17 +188,13 @@ def _from_text(text: str, unit: str) -> ExactNumber:
 
 
 def parse_quantity(value: Any) -> ExactNumber:
-    """Read a TOML value as a number in SI: a ``Quantity`` if it has a unit, of whatever dimension; see
-    ``parse_number``.
-    """
+    """Read a number in SI, see ``parse_number``: a ``Quantity``, of whatever dimension, if it has a unit."""
     number, unit = in_its_unit(value)
     return with_unit(number, unit, value) if unit else number
 
 
 def in_its_unit(value: Any) -> tuple[ExactNumber, str]:
-    """Read a TOML value as a number (see ``parse_number``) and the unit written after it, which isn't looked
-    at; empty if there is none.
-    """
+    """Read a number, see ``parse_number``, and the unit after it, which isn't looked at (empty if none)."""
     short = isinstance(value, str) and len(value) <= _LONGEST_TEXT
     match = _NUMBER_AND_UNIT.fullmatch(value) if short else None
     if match is None or match["unit"] is None:
@@ -219,9 +213,7 @@ def exact_decimal(value: Fraction) -> Decimal | None:
 
 
 def decimal_text(value: Fraction) -> str:
-    """A number as TOML text: a decimal if it has at most some hundred digits, otherwise ``p/q``, which needs
-    quotes.
-    """
+    """A number as TOML text: a decimal of at most some hundred digits, otherwise ``p/q``, to be quoted."""
     number = exact_decimal(value)
     exponent = 0 if number is None else int(number.as_tuple().exponent)
     if number is None or -exponent > _LONGEST_DECIMAL:

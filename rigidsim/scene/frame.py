@@ -51,13 +51,7 @@ class Frame(ConfigTable):
 
 @dataclass(frozen=True)
 class Figure:
-    """Figure axis of a body and two axes of its equator; right-handed unit vectors, body axes (mpf).
-
-    Attributes:
-        first: direction from which angles within the equator count (the prime meridian).
-        pole: the figure axis.
-        described: description of the axis, for readers.
-    """
+    """Figure axis and two axes of its equator, the first of which angles count from; body axes (mpf)."""
 
     first: Vector
     second: Vector
@@ -98,9 +92,7 @@ def figure_of(table: Frame, body: RigidBody, context: Any) -> Figure:
 
 
 def unique_axis(body: RigidBody, context: Any, *, largest: bool) -> Vector | None:
-    """Unit principal axis of the largest or smallest moment, body axes (mpf), its largest component positive;
-    None if it isn't unique.
-    """
+    """Unit principal axis of the largest or smallest moment, largest component positive; None if many are."""
     moments = body.principal_moments
     low, middle, high = sorted(range(3), key=lambda i: moments[i])
     apart = moments[high] - moments[middle] if largest else moments[middle] - moments[low]

@@ -75,9 +75,7 @@ def _check_branch(scene: Scene) -> list[Problem]:
 
 
 def _check_singular(scene: Scene, values: dict[str, Any]) -> list[Problem]:
-    """Refuse loads that read Euler angles if these are singular at the start, where they have no
-    derivatives.
-    """
+    """Refuse loads that read Euler angles where these are singular at the start and have no derivatives."""
     formulas = [formula for load in scene.loads for formula in load.formulas()]
     reading = [(where, names_used(e) & set(ATTITUDE_NAMES[4:])) for where, e in formulas]
     if not any(names for _, names in reading):

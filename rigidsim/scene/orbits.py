@@ -242,9 +242,7 @@ _NO_CONSTANTS = ("table", "node_rate", "periapsis_rate")
 
 
 def resolve_tabulated_orbit(fields: Orbit, strength: Any | None, around: Surroundings) -> TabulatedOrbit:
-    """Work out the orbit of a table; ``strength`` is the gravitational parameter of Kepler's third law, if
-    known.
-    """
+    """Work out a table's orbit; ``strength`` is the gravitational parameter of Kepler's law, if known."""
     name = fields.table
     assert name is not None
     given = [

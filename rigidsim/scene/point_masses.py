@@ -88,9 +88,7 @@ class PointMasses:
     full: bool
 
     def constant(self, context: Any, mass: Any | None) -> Any:
-        """The constant G that gives masses in kg: chosen so that the host has its own mass (kg), if that is
-        known and reacts.
-        """
+        """G for masses in kg: by the host's own mass (kg), if that is known and reacts."""
         if self.full and self.host is not None and mass is not None:
             return self.strengths[self.host] / mass
         return context.mpf(GRAVITATIONAL_CONSTANT)
@@ -136,9 +134,7 @@ def resolve_point_masses(
     *,
     free_flight: bool,
 ) -> PointMasses | None:
-    """Work out the initial states of ``[[bodies]]``; None if there are none. ``mass`` (kg) is the rigid
-    body's, which has a position of its own in ``free_flight``.
-    """
+    """Initial states of ``[[bodies]]``; None without any. ``mass`` (kg) is the rigid body's."""
     if not tables:
         for key, given in (("host", host), ("coupling", coupling)):
             if given is not None:
@@ -230,9 +226,7 @@ def _place(
 
 
 def _of_elements(number: int, orbit: StartingOrbit, strength: Any, context: Any) -> tuple[Vector, Vector]:
-    """Relative position and velocity from osculating elements (Murray & Dermott 1999, sections 2.4 and
-    2.8).
-    """
+    """Relative position and velocity (Murray & Dermott 1999, sections 2.4 and 2.8)."""
     a, e = ellipse_of(orbit, context, lambda key, text: _fault(number, f"orbit.{key}", text))
     anomaly = eccentric_anomaly(context, orbit.mean_anomaly.at(context), e)
     c, s, root = context.cos(anomaly), context.sin(anomaly), context.sqrt(1 - e * e)

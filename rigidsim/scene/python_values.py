@@ -35,9 +35,7 @@ def toml_text(tables: Mapping[str, Any]) -> str:
 
 
 def assignments_of(changes: Mapping[str, Any]) -> list[str]:
-    """Values to replace as ``KEY=VALUE`` texts; a dictionary as a value changes those keys in its table that
-    it has, None removes a key.
-    """
+    """Values to replace as ``KEY=VALUE``; a dictionary changes its keys of a table, None removes a key."""
     found = []
     for key, value in changes.items():
         if isinstance(value, Mapping):

@@ -60,11 +60,7 @@ def rotation_matrix(q: Sequence[Scalar]) -> Matrix:
 
 
 def shepperd(r: Matrix) -> tuple[Vector, dict[tuple[int, int], Scalar]]:
-    """4 q_n^2 and, for m < n, 4 q_m q_n of the quaternion q of R.
-
-    Shepperd 1978, J. Guidance and Control 1, 223: divided by the root of the largest square, no digits are
-    lost.
-    """
+    """4 q_n^2 and, for m < n, 4 q_m q_n of R's quaternion (Shepperd 1978, J. Guidance and Control 1, 223)."""
     trace = r[0][0] + r[1][1] + r[2][2]
     squares = [1.0 + trace] + [1.0 - trace + 2.0 * r[n][n] for n in range(3)]
     pairs: dict[tuple[int, int], Scalar] = {}
@@ -76,9 +72,7 @@ def shepperd(r: Matrix) -> tuple[Vector, dict[tuple[int, int], Scalar]]:
 
 
 def outer_angles(sequence: str, r: Matrix) -> tuple[Pair, Pair]:
-    """Sine and cosine of the first and of the last Euler angle of R, times the factor that vanishes in the
-    singularity.
-    """
+    """Sine and cosine of first and last Euler angle of R, times the factor that vanishes where singular."""
     i, j, k = map(AXES.index, sequence)
     m, e = 3 - i - j, parity(i, j)
     if i == k:
@@ -99,9 +93,7 @@ def shared_turn(sequence: str, r: Matrix, side: Scalar) -> Pair:
 
 
 def pole_side(sequence: str, r: Matrix) -> Scalar:
-    """Element of R that is +1 in the singularity where the sum of the outer angles is defined, and -1 where
-    their difference is.
-    """
+    """Element of R: +1 where only the sum of the outer angles is defined, -1 where their difference is."""
     i, _, k = map(AXES.index, sequence)
     return r[i][k]
 

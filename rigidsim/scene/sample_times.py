@@ -42,15 +42,7 @@ class Time(ConfigTable):
 
 @dataclass(frozen=True)
 class SampleTimes:
-    """Sample times in seconds, exactly as written: ``begin + i * step``, or a list.
-
-    Attributes:
-        begin: start of the motion.
-        step: spacing of a grid; zero for a list.
-        times: the list, or None.
-        count: number of samples.
-        context: the scene's context.
-    """
+    """Exact sample times, s: ``begin + i * step``, or a list (with step zero) of times from ``begin`` on."""
 
     begin: Fraction
     step: Fraction

@@ -33,12 +33,7 @@ T = TypeVar("T")
 
 @dataclass(frozen=True)
 class Event:
-    """One event of a scene.
-
-    Attributes:
-        direction: direction of the crossing: "any", "up" or "down".
-        stop: whether the run ends there.
-    """
+    """One event of a scene: its direction is any, up or down; with ``stop`` the run ends there."""
 
     name: str
     expression: Expression
@@ -98,9 +93,7 @@ class Scene:
 
     @property
     def free_flight(self) -> bool:
-        """Whether the body moves with six degrees of freedom, rather than about a fixed point or in free
-        rotation.
-        """
+        """Whether the body moves with six degrees of freedom."""
         return self.position is not None
 
     @property

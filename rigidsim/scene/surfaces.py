@@ -35,12 +35,7 @@ _OUTER = ("phi", "psi")  # of the Euler angles, those that turn without end
 
 @dataclass(frozen=True)
 class Surface:
-    """A switching surface, where ``expression`` is zero.
-
-    Attributes:
-        text: the function with the kink or jump, as written.
-        where: its place in the config.
-    """
+    """Where ``expression`` is zero: the function with the kink or jump as written, and its place."""
 
     expression: Expression
     text: str

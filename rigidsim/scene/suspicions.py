@@ -80,9 +80,7 @@ def _constant_arguments(expression: Expression) -> list[tuple[str, ExactNumber]]
 
 
 def suspicious_end(config: Config) -> list[Problem]:
-    """A bare number, in seconds, as the end of a run whose times are shown in a unit longer than that: meant
-    in that unit?
-    """
+    """A bare number, in seconds, as end of a run whose times are shown in a longer unit: meant in that?"""
     end, unit = config.time.end, config.time.unit
     if end is None or unit is None or end.assumed != "s" or end.pi_power:
         return []
@@ -100,9 +98,7 @@ def suspicious_end(config: Config) -> list[Problem]:
 
 
 def unreachable_events(events: Sequence[Event]) -> list[Problem]:
-    """Events that can't happen because the middle Euler angle, from 0 to pi or -pi/2 to pi/2, is compared
-    with a number beyond that range: meant in degrees?
-    """
+    """Events that compare the middle Euler angle with what it never is: meant in degrees?"""
     found = []
     for number, event in enumerate(events):
         root = event.expression.root

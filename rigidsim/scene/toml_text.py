@@ -108,9 +108,7 @@ def apply_overrides(table: dict[str, Any], overrides: Sequence[str], what: str =
 
 
 def written(text: str, overrides: Sequence[str], meant: dict[str, Any], source: str, what: str = FLAG) -> str:
-    """A config's text with values replaced in place, in the digits given, so that it has the tables
-    ``meant``; comments and order stay.
-    """
+    """A text with values replaced in place, in the digits given, so that its tables are ``meant``."""
     try:
         document = tomlkit.parse(text)
         for assignment in overrides:
@@ -147,9 +145,7 @@ def _written_value(text: str) -> Any:
 
 
 def assignments(text: str, keys: Sequence[str]) -> list[str]:
-    """``KEY=VALUE`` texts, in the config's own digits, for those of the given keys (``table.key``) that it
-    has.
-    """
+    """``KEY=VALUE`` in the config's own digits for those of the keys (``table.key``) that it has."""
     document = tomlkit.parse(text)
     found = []
     for key in keys:

@@ -163,9 +163,7 @@ def happens_at_a_moment(scene: Scene) -> bool:
 
 
 def acts_at_moments_alone(scene: Scene) -> bool:
-    """Whether loads depend on time by nothing but its distance from moments, which no rounding of the time
-    itself disturbs.
-    """
+    """Whether loads depend on time by distances from moments alone, which no rounding of time disturbs."""
     for load in scene.loads:
         formulas = list(load.formulas())
         lines = [line for _, expression in formulas for line in lines_in(expression, scene.context)]

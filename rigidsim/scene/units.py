@@ -176,9 +176,7 @@ def known_units() -> str:
 
 
 def conversion(text: str, expected: str) -> tuple[Fraction, int]:
-    """Exact factor from a unit to the SI unit ``expected``, as ``rational * pi**power``; ``UnitError`` if it
-    has another dimension.
-    """
+    """Factor (rational, power of pi) to the SI unit ``expected``; ``UnitError`` for another dimension."""
     factor, pi_power, dimensions = _to_si(text)
     if expected == "rad/s" and _HERTZ.search(text):
         raise UnitError(f'"{text}" may count turns or radians; write "turn/s" (or "rpm", "deg/s") or "rad/s"')
@@ -191,9 +189,7 @@ def conversion(text: str, expected: str) -> tuple[Fraction, int]:
 
 
 def time_unit(name: str) -> Fraction:
-    """Length in seconds of a named unit of time, such as ``day``, ``yr`` or ``kyr``; ``UnitError`` for
-    others.
-    """
+    """Length in seconds of a unit of time, such as ``day`` or ``kyr``; ``UnitError`` for others."""
     if not re.fullmatch(r"[^\W\d]+", name):
         raise UnitError(f'"{name[:40]}" is not the name of a unit of time')
     factor, pi_power = conversion(name, "s")

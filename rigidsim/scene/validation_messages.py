@@ -173,9 +173,7 @@ def _of_the_user(location: tuple[str | int, ...], alternatives: Collection[str])
 def config_error(
     model: type[BaseModel], error: ValidationError, alternatives: Collection[str]
 ) -> ConfigError:
-    """All problems that the validator found, one per key, in the words of ``Problem``; names of unions'
-    ``alternatives`` aren't part of the user's key.
-    """
+    """All problems found, one per key; names of unions' ``alternatives`` aren't part of the user's key."""
     problems: dict[str, Problem] = {}
     for item in islice(error.errors(include_url=False), _MOST_PROBLEMS):
         # the alternatives of a union each report; their names are no part of the user's key

@@ -125,11 +125,7 @@ def _with_unit(value: float, units: str) -> str:
 
 
 def _lines(signal: SignalAnalysis, angle: bool, digits: int, *, narrow: bool) -> Table:
-    """Table of a signal's lines.
-
-    Args:
-        narrow: leave out the errors of frequencies, which their digits imply, to make room for the names.
-    """
+    """Table of a signal's lines; ``narrow`` without the errors of frequencies, which their digits imply."""
     table = Table(box=SIMPLE_HEAD, pad_edge=False, show_edge=False)
     largest = float(signal.lines[0].amplitude)
     unit, symbol = angle_unit(largest) if angle else (1.0, signal.units)

@@ -25,11 +25,7 @@ _NUMBERS = ("largest drift", "final", "bound", "initial", "put back")
 
 
 class Page:
-    """Prints on a console.
-
-    Args:
-        out: by default one on stdout, wide enough for whole words where it is piped.
-    """
+    """Prints on a console, by default on stdout, wide enough for whole words where it is piped."""
 
     def __init__(self, out: Console | None = None) -> None:
         terminal = sys.stdout is not None and sys.stdout.isatty()  # it may be closed
@@ -69,11 +65,7 @@ class Page:
 
 
 def print_json(value: Any, *, indent: int | None = None) -> None:
-    """Print a result as strict JSON: null for nan and infinities, [real, imaginary] for complex ones.
-
-    Raises:
-        TypeError: something in it has no place in JSON.
-    """
+    """Print a result as strict JSON: null for nan and infinities, [real, imaginary] for complex ones."""
     print(json.dumps(_plain(value), indent=indent, allow_nan=False), flush=True)
 
 

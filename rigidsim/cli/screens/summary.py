@@ -42,11 +42,7 @@ def _drift(value: float | None) -> str:
 
 
 def print_summary(summary: Brief, folder: str, out: Console | None = None, *, loads: bool = False) -> None:
-    """Print the table at the end of ``run`` and of ``info``.
-
-    Args:
-        loads: whether it says what acts on the body.
-    """
+    """Print the table at the end of ``run`` and ``info``, with ``loads`` what acts on the body, too."""
     on = Page(out)
     color = "green" if summary.status == "finished" else "yellow"
     on.say((summary.name, "bold"), "  ", (summary.status, f"bold {color}"))

@@ -67,9 +67,7 @@ class RigidBody:
 
 
 def build_body(table: body_table.Body, context: Any, sequence: str = "zxz") -> RigidBody:
-    """Work out the body that ``[body]`` describes; parts that name no ``sequence`` of Euler angles have this
-    one.
-    """
+    """Work out the body of ``[body]``; ``sequence`` is of Euler angles for parts that name none."""
     given = [name for name in SOURCES if getattr(table, name) is not None]
     if len(given) != 1:
         found = " and ".join(given) if given else "no source of inertia"
@@ -200,9 +198,7 @@ def _equivalent_cuboid(
 
 
 def inverse_inertia(context: Any, body: RigidBody) -> Matrix:
-    """Inverse of the tensor; an axis without inertia (a rod's) gets no angular acceleration
-    (pseudo-inverse).
-    """
+    """Pseudo-inverse of the tensor: about an axis without inertia (a rod's) nothing is accelerated."""
     inverse = [context.zero if m == 0 else 1 / m for m in body.principal_moments]
     return multiply(multiply(transpose(body.principal_axes), diagonal(inverse)), body.principal_axes)
 
@@ -220,9 +216,7 @@ def rounding_of(table: BaseModel) -> Fraction:
 def merged(
     context: Any, inertia: Matrix, moments: Vector, axes: Matrix, rounding: Fraction
 ) -> tuple[Matrix, Vector, Matrix]:
-    """A tensor, its principal moments and axes (rows), with moments made equal that differ by the relative
-    ``rounding`` of the numbers that they are made of.
-    """
+    """A tensor with its moments and axes (rows); moments equal to a relative ``rounding`` are made equal."""
     tiny = _ROUNDINGS * context.mpf(rounding.numerator) / rounding.denominator * max(moments)
     low, middle, high = sorted(range(3), key=lambda i: moments[i])
     if moments[high] - moments[low] <= tiny:

@@ -48,9 +48,7 @@ def pieces_of(table: body_table.Body, source: str, context: Any, sequence: str) 
 
 
 def reference_point(table: body_table.Body, source: str, center: Vector, context: Any) -> Vector:
-    """Reference point in the coordinates in which the body is described (a shape's origin is its centre of
-    mass).
-    """
+    """Reference point in the coordinates in which the body is described."""
     if table.reference is None or table.reference == "center_of_mass":
         return center
     if isinstance(table.reference, str):
@@ -72,9 +70,7 @@ def reference_point(table: body_table.Body, source: str, center: Vector, context
 
 
 def parallel_axis(inertia: Matrix, mass: Any, arm: Vector) -> Matrix:
-    """Tensor (kg m^2) about a point from that about the centre of mass, an ``arm`` (m) away (Steiner's
-    theorem).
-    """
+    """Tensor (kg m^2) about a point an ``arm`` (m) from the centre of mass (Steiner's theorem)."""
     square = dot(arm, arm)
     return [
         [inertia[i][j] + mass * ((square if i == j else 0) - arm[i] * arm[j]) for j in range(3)]

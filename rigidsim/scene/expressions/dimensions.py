@@ -58,9 +58,7 @@ class Measure:
         return Measure(_sorted({base: p * exponent.rational for base, p in self.powers}), self.written)
 
     def with_other(self, other: Measure) -> Measure:
-        """Dimension of a sum, or of anything else that takes values of one dimension; ``DimensionError`` if
-        they differ and a unit is written in either.
-        """
+        """Dimension of a sum or comparison; ``DimensionError`` if they differ and either has a unit."""
         written = self.written or other.written
         if self.powers is None or other.powers is None or self.powers == other.powers:
             return Measure(other.powers if self.powers is None else self.powers, written)

@@ -77,12 +77,7 @@ _CHECKING = context_for("quadruple")
 
 @dataclass(frozen=True)
 class _Parsed:
-    """A parsed expression.
-
-    Attributes:
-        measure: its dimension, as far as known.
-        bare: whether it is a number with a unit, without parentheses.
-    """
+    """A parsed expression; ``bare`` is a number with a unit without parentheses around it."""
 
     node: Node
     measure: Measure = ANY

@@ -34,11 +34,7 @@ FLIGHT_NAMES = ("x", "y", "z", "vx", "vy", "vz")
 
 
 class ExpressionError(ValueError):
-    """An expression that can't be read or has no value; the text shows the place.
-
-    Attributes:
-        column: column of the place, from 1; None if the error has no place in the text.
-    """
+    """An expression that can't be read or has no value; the text shows the place, if it has one."""
 
     def __init__(self, what: str, text: str = "", position: int | None = None) -> None:
         self.column = None if position is None else position + 1
@@ -67,9 +63,7 @@ class Name:
 
 @dataclass(frozen=True)
 class Operation:
-    """An operation: sum or product (of two or more operands), quotient, power, negative, or a smooth function
-    or ``sign``.
-    """
+    """Sum or product (of two or more operands), quotient, power, negative, a smooth function or ``sign``."""
 
     operator: str
     operands: tuple[Node, ...]
@@ -147,9 +141,7 @@ def _chain(operator: str, node: Node) -> tuple[Node, ...]:
 
 
 def fold(expression: Expression, combine: Callable[[Node, list[Any]], Any]) -> Any:
-    """Fold the tree: ``combine(node, results of its operands)`` from the leaves to the root, without
-    recursion.
-    """
+    """Fold the tree without recursion: ``combine(node, results of its operands)`` from leaves to root."""
     results: list[Any] = []
     waiting: list[tuple[Node, bool]] = [(expression.root, False)]
     while waiting:
@@ -184,9 +176,7 @@ def names_used(expression: Expression) -> frozenset[str]:
 
 
 def constant_value(expression: Expression, context: Any) -> Any:
-    """The value (mpf) of an expression without names; None if it contains a name. ``ExpressionError`` as of
-    ``evaluate``.
-    """
+    """The value (mpf) of an expression without names, see ``evaluate``; None if it contains a name."""
     return evaluate(expression, dict.fromkeys(names_used(expression)), context)
 
 
@@ -209,9 +199,7 @@ def evaluate(expression: Expression, values: Mapping[str, Any], context: Any) ->
 
 
 def operate(expression: Expression, node: Operation, operands: list[Any], context: Any) -> Any:
-    """Apply one operation to mpf operands; ``ExpressionError`` if the value isn't finite, or exceeds
-    2**20000.
-    """
+    """Apply one operation to mpf operands; ``ExpressionError`` if it isn't finite, or exceeds 2**20000."""
     operator, first, last = node.operator, operands[0], operands[-1]
     refused, why = _REFUSED.get(operator, (None, ""))
     if refused and refused(first, last):

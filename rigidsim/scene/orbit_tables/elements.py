@@ -49,13 +49,7 @@ class TableError(ValueError):
 
 @dataclass(frozen=True)
 class ElementTable:
-    """The numbers of a table.
-
-    Attributes:
-        times: ascending, s (mpf).
-        columns: the other columns by name, SI (mpf), one value for each time.
-        context: mpmath context of the numbers.
-    """
+    """Numbers of a table (mpf, SI): ascending times, and for each a value of the other columns."""
 
     times: Sequence[Any]
     columns: Mapping[str, Sequence[Any]]

@@ -29,12 +29,7 @@ ORDER = 6
 
 
 class Interpolation:
-    """Interpolation between rows of numbers of any kind (floats, or mpf in an array of objects).
-
-    Args:
-        times: at least four, ascending.
-        values: (times, columns).
-    """
+    """Interpolation between rows (times, columns) of floats, or of mpf in an array of objects."""
 
     def __init__(self, times: Sequence[Any], values: np.ndarray) -> None:
         self.times = times

@@ -177,9 +177,7 @@ class TabulatedOrbit:
         return eccentric_anomaly(context, longitude - periapsis, e) + periapsis
 
     def starting_longitude(self, time: Any) -> Any:
-        """The mean longitude at a time; if no column gives it, from the anomaly at the scene's time zero and
-        the mean motion for the axis at this time.
-        """
+        """The mean longitude at a time; without a column from that at time zero and the mean motion now."""
         elements = self.at(time)
         if LONGITUDE in elements:
             return elements[LONGITUDE]
@@ -255,9 +253,7 @@ class TabulatedOrbit:
 
     @cached_property
     def shape_drift(self) -> Any:
-        """Bound of the rate at which the periapsis turns where the orbit is most eccentric, rad/s: twice that
-        between neighbouring rows.
-        """
+        """Bound of the rate of the periapsis (rad/s), twice that between rows at the largest eccentricity."""
         e = self.largest_eccentricity
         return 2 * self._fastest(EXCENTRIC) / e if e > 0 else self.context.zero
 
@@ -274,9 +270,7 @@ class TabulatedOrbit:
 
     @property
     def longitude_exponent(self) -> int:
-        """Binary exponent of the unit of the mean longitude (rad), chosen so that it passes less than one
-        unit over the whole table.
-        """
+        """Binary exponent of a unit (rad) of which the mean longitude passes less than one over the table."""
         span = self.table.times[-1] - self.table.times[0]
         return int(self.context.mag(self.motion(self.smallest_axis) * span)) + 1
 
