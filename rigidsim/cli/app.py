@@ -74,7 +74,7 @@ def _program(
     """High-precision experiments on rotating rigid bodies: one TOML file is one experiment."""
 
 
-@_command("new")
+@_command("configs")
 def new(scene: options.SceneArgument = None, name: options.NameArgument = None) -> None:
     """Write a commented config to start from; alone, list the scenes there are.
 

@@ -22,8 +22,7 @@ from rigidsim.model.kinematics import Kinematics
 from rigidsim.model.rotations import Symbolic, constant
 from rigidsim.scene import attitude
 from rigidsim.scene.arithmetic import working_epsilon
-from rigidsim.scene.attitude import AXES, parity
-from rigidsim.scene.rotations import is_proper, outer_angles, pole_side, shared_turn
+from rigidsim.scene.rotations import AXES, is_proper, outer_angles, parity, pole_side, shared_turn
 from rigidsim.scene.scene import Scene
 
 UNDEFINED = 16.0

@@ -25,14 +25,15 @@ from rigidsim.model.rotations import Symbolic, euler_from_matrix, quaternion_fro
 from rigidsim.model.scaling import Rounder
 from rigidsim.model.two_part import TwoPartTime, rounded
 from rigidsim.scene.expressions import tree as expressions
-from rigidsim.scene.expressions.lines import LineInTime, line_of
 from rigidsim.scene.expressions.tree import (
     ATTITUDE_NAMES,
     FLIGHT_NAMES,
     RATE_NAMES,
     Expression,
+    LineInTime,
     Name,
     Node,
+    line_of,
 )
 
 _NO_SIDES: Mapping[Node, Any] = {}

@@ -24,7 +24,7 @@ from typing import Any
 import heyoka as hy
 
 from rigidsim.scene.arithmetic import negligible
-from rigidsim.scene.expressions.lines import LineInTime
+from rigidsim.scene.expressions.tree import LineInTime
 
 _MOST_PARTS = 64  # doubles in a number of any precision that is in use
 

@@ -123,11 +123,8 @@ def diagonal(entries: Vector) -> Matrix:
 
 
 def eigen(context: Any, matrix: Matrix) -> tuple[Vector, Matrix]:
-    """Principal values and axes of a symmetric 3x3 matrix.
-
-    Returns:
-        The values and, as rows, the right-handed unit axes. A diagonal matrix keeps its order and axes;
-        otherwise the values ascend and the first two axes have a positive largest component.
+    """Principal values and (as rows) right-handed unit axes of a symmetric 3x3 matrix. A diagonal one keeps
+    its order and axes; otherwise values ascend, and the first two axes have a positive largest component.
     """
     if all(matrix[i][j] == 0 for i in range(3) for j in range(3) if i != j):
         one = context.one
@@ -171,12 +168,7 @@ def hansen(context: Any, eccentricity: Any, multiple: int, order: int) -> Any:
 
     over a turn of the eccentric anomaly E (Hansen 1855; Plummer 1918, section 44); X_{2p}^{-3,2} is H(p, e)
     of Goldreich & Peale 1966. The integrand is periodic and analytic: the trapezoidal rule converges
-    geometrically.
-
-    Args:
-        eccentricity: 0 to below 1 (mpf).
-        multiple: k.
-        order: m.
+    geometrically. The ``eccentricity`` is from 0 to below 1, ``multiple`` is k, ``order`` is m.
     """
     if eccentricity == 0:
         return context.one if multiple == order else context.zero

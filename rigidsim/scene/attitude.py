@@ -12,19 +12,7 @@ from typing import Any
 from rigidsim.errors import ConfigError
 from rigidsim.scene import rotations
 from rigidsim.scene.arithmetic import GUARD_BITS, Matrix, Vector, negligible, norm
-from rigidsim.scene.rotations import AXES, Rotations, parity, shepperd
-
-__all__ = [
-    "AXES",
-    "euler_from_matrix",
-    "given_attitude",
-    "parity",
-    "product",
-    "quaternion_from_euler",
-    "quaternion_from_matrix",
-    "rotation_matrix",
-    "unit_quaternion",
-]
+from rigidsim.scene.rotations import Rotations, shepperd
 
 
 def _within(context: Any) -> Rotations:

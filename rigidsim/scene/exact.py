@@ -44,11 +44,7 @@ _STEP = re.compile(
 
 @dataclass(frozen=True)
 class ExactNumber:
-    """``rational * pi**pi_power``, in SI units (angles in radians).
-
-    Attributes:
-        assumed: the unit assumed if none was written; empty otherwise.
-    """
+    """``rational * pi**pi_power``, in SI (angles in rad); ``assumed`` is its unit if none was written."""
 
     rational: Fraction
     pi_power: int = 0

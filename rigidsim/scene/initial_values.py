@@ -52,10 +52,8 @@ def check_start(scene: Scene) -> None:
 
 
 def _check_branch(scene: Scene) -> list[Problem]:
-    """Refuse expressions that read Euler angles if the start is given by the other triple.
-
-    Every attitude has two triples of Euler angles; expressions use the one whose middle angle is in its
-    range, which other formulations find as well.
+    """Refuse expressions that read Euler angles if the start is given by the other of an attitude's two
+    triples: they use the one whose middle angle is in its range, as found in every formulation.
     """
     read = frozenset().union(*(names_used(e) for _, e in scene.formulas())) & set(ATTITUDE_NAMES[4:])
     if scene.euler_angles is None or not read:

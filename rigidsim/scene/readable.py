@@ -113,6 +113,14 @@ def instant_text(epoch: Epoch, seconds: float, span: float) -> str:
     return f"year {number_text(julian_year(epoch) + seconds / YEAR, 9)} {uniform.scale}"
 
 
+def bytes_text(count: float) -> str:
+    """A number of bytes in a unit that suits it."""
+    for unit, factor in (("EB", 1e18), ("PB", 1e15), ("TB", 1e12), ("GB", 1e9), ("MB", 1e6), ("kB", 1e3)):
+        if count >= factor:
+            return f"{count / factor:.3g} {unit}"
+    return f"{count:.0f} B"
+
+
 @dataclass(frozen=True)
 class TimeWords:
     """Wording of the times of one run: their unit, the date of time 0 if known, and the run's length, s."""
@@ -162,12 +170,8 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class AngleUnit:
-    """A unit of angle.
-
-    Attributes:
-        name: as ``--angle-unit`` takes it, and as it appears in column names.
-        symbol: as written after a number.
-        per_turn: how many make a full turn; None for the radian, which doesn't divide one.
+    """A unit of angle: its name in ``--angle-unit`` and names of columns, its symbol after a number, and how
+    many make a full turn; None for the radian, which doesn't divide one.
     """
 
     name: str

@@ -44,10 +44,9 @@ class Surface:
 
 @dataclass(frozen=True)
 class Surfaces:
-    """All surfaces of a scene.
+    """All surfaces of a scene, in the order of the config.
 
     Attributes:
-        found: the surfaces in the order of the config.
         places: for each argument of a sign, the index of its surface, and the sign (1 or -1) of their ratio.
         turning: Euler angles whose full turns matter to some expression.
         signed: whether the sign of the quaternion matters to some expression.

@@ -19,15 +19,16 @@ from fractions import Fraction
 from typing import Any
 
 from rigidsim.scene.exact import ExactNumber
-from rigidsim.scene.expressions.lines import LineInTime, lines_in
 from rigidsim.scene.expressions.tree import (
     Constant,
     Expression,
     ExpressionError,
+    LineInTime,
     Node,
     Operation,
     evaluate,
     fold,
+    lines_in,
     names_used,
     operation,
     operations,

@@ -8,8 +8,14 @@ from typing import Any
 import numpy as np
 
 from rigidsim.model.capabilities import Rooted, having
-from rigidsim.scene.expressions.lines import lines_in
-from rigidsim.scene.expressions.tree import Expression, ExpressionError, evaluate, names_used, operations
+from rigidsim.scene.expressions.tree import (
+    Expression,
+    ExpressionError,
+    evaluate,
+    lines_in,
+    names_used,
+    operations,
+)
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.transitions import narrow_parts
 from rigidsim.session.diagnostics import NEAR_SINGULAR

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from rigidsim.errors import RunFolderError
+from rigidsim.scene.readable import bytes_text
 from rigidsim.session.dataset import dataset_variables
 from rigidsim.solve.problem import InitialValueProblem
 
@@ -37,8 +38,8 @@ class Storage:
         if self.needed <= self.free:
             return None
         return (
-            f"takes about {_size(self.needed)} of space until it is complete ({_size(self.segments)} of "
-            f"segments, {_size(self.dataset)} of dataset.h5), and {_size(self.free)} are free there; take "
+            f"takes about {bytes_text(self.needed)} of space until it is complete ({bytes_text(self.segments)} of "
+            f"segments, {bytes_text(self.dataset)} of dataset.h5), and {bytes_text(self.free)} are free there; take "
             "fewer [time] samples, record less ([output] record), choose a folder on another disk, or, where "
             'a part of it will do, say in [limits] when it may stop, such as wall_time = "1 h"'
         )
@@ -81,13 +82,6 @@ def refuse_too_large_for_memory(prepared: InitialValueProblem) -> None:
     there = float(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES"))
     if needed > there:
         raise RunFolderError(
-            f"{prepared.scene.name}: takes about {_size(needed)} of memory, and the machine has "
-            f"{_size(there)}; give a folder as out, take fewer samples, or record less ([output] record)"
+            f"{prepared.scene.name}: takes about {bytes_text(needed)} of memory, and the machine has "
+            f"{bytes_text(there)}; give a folder as out, take fewer samples, or record less ([output] record)"
         )
-
-
-def _size(count: float) -> str:
-    for unit, factor in (("EB", 1e18), ("PB", 1e15), ("TB", 1e12), ("GB", 1e9), ("MB", 1e6)):
-        if count >= factor:
-            return f"{count / factor:.3g} {unit}"
-    return f"{count / 1e3:.3g} kB"

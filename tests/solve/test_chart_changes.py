@@ -12,8 +12,8 @@ import pytest
 from support import angle_between, cases, law, run_text, same_bits, wide
 
 from rigidsim import resume
-from rigidsim.scene.attitude import AXES
 from rigidsim.scene.fields import EULER_SEQUENCES
+from rigidsim.scene.rotations import AXES
 from rigidsim.session.session import Tuning
 from rigidsim.solve.sampler import Pacing
 from rigidsim.solve.solvers.taylor.ways import Ways

@@ -1,4 +1,4 @@
-"""Commands that look at a config: ``check``, ``plan``, ``tradeoff``, ``schema``."""
+"""Commands on configs: ``new``, ``check``, ``plan``, ``tradeoff``, ``schema``."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from pathlib import Path
 import rigidsim.workflows.check as validation
 import rigidsim.workflows.plan as planning
 import rigidsim.workflows.tradeoff as measuring
-from rigidsim.cli.screens.page import print_json
+from rigidsim.cli.screens.page import Page, print_json
 from rigidsim.cli.screens.plan import print_plan, print_tradeoff
 from rigidsim.cli.screens.summary import print_checked
 from rigidsim.cli.screens.sweeps import print_sweep_plan
@@ -16,6 +16,18 @@ from rigidsim.scene.editor_schema import editor_schema
 from rigidsim.scene.sweeps.sweep import Sweep
 from rigidsim.workflows.read import load
 from rigidsim.workflows.sweeps.plan import plan_sweep
+from rigidsim.workflows.templates import described, write_new
+
+
+def new(scene: str | None, name: str | None) -> None:
+    """Write a template, or list them."""
+    if scene is None:
+        on = Page()
+        on.table(["scene", "what it is"], described().items())
+        on.say("rigidsim new SCENE [NAME] writes NAME.toml")
+        return
+    path = write_new(scene, name)
+    print(f"{path}: edit it, then: rigidsim check {path}; rigidsim run {path}")
 
 
 def check(configs: list[Path], overrides: list[str] | None, as_json: bool) -> int:

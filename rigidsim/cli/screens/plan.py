@@ -13,7 +13,7 @@ from rich.console import Console
 from rigidsim.cli.screens.page import Page, Styled
 from rigidsim.cli.screens.summary import from_step, print_understood
 from rigidsim.scene.choices import method_named
-from rigidsim.scene.readable import span_text
+from rigidsim.scene.readable import bytes_text, span_text
 from rigidsim.workflows.plan import RunPlan
 from rigidsim.workflows.plan_levels import LevelCost
 
@@ -53,8 +53,8 @@ def print_plan(plan: RunPlan, out: Console | None = None) -> None:
         "forecast",
         f"{predicted.steps:.3g} steps of about {span_text(pilot.step)}{first} "
         f"(pilot of {pilot.steps:.0f}), {span_text(predicted.total_seconds)}, "
-        f"{_size(predicted.memory_bytes)} of memory, dataset {_size(predicted.dataset_bytes)}, "
-        f"timeline {_size(predicted.timeline_bytes)}",
+        f"{bytes_text(predicted.memory_bytes)} of memory, dataset {bytes_text(predicted.dataset_bytes)}, "
+        f"timeline {bytes_text(predicted.timeline_bytes)}",
     )
     if predicted.pace is None:
         on.line(
@@ -117,14 +117,6 @@ def _print_equations(shared: Sequence[str], equations: Sequence[str], on: Page) 
 def _shortened(line: str) -> str:
     """A line with its numbers to six significant digits."""
     return _NUMBER.sub(lambda found: f"{float(found[0]):.{_DIGITS}g}", line)
-
-
-def _size(count: float) -> str:
-    """Bytes in a readable unit."""
-    for unit, factor in (("TB", 1e12), ("GB", 1e9), ("MB", 1e6), ("kB", 1e3)):
-        if count >= factor:
-            return f"{count / factor:.3g} {unit}"
-    return f"{count:.0f} B"
 
 
 def print_tradeoff(result: dict[str, Any]) -> None:

@@ -7,13 +7,11 @@ import shlex
 from collections.abc import Iterator, Sequence
 
 from rigidsim.scene.readable import (
-    TimeUnit,
     epoch_of,
     instant_text,
-    named_unit,
     number_text,
     span_text,
-    unit_for,
+    unit_of,
 )
 from rigidsim.session.verdict import Soundness, verdict_on
 from rigidsim.solve.status import Status
@@ -75,7 +73,7 @@ def start_text(start: Start) -> str:
 
 def time_text(time: Span) -> str:
     """Start and end in the config's unit or one that suits the span, and the number of samples."""
-    unit = _unit(time)
+    unit = unit_of({"time_unit": time.unit}, max(abs(time.start_s), abs(time.end_s)))
     ends = [
         f"{number_text(seconds / unit.seconds, _DIGITS)}{'' if seconds == 0 else ' ' + unit.symbol}"
         for seconds in (time.start_s, time.end_s)
@@ -88,13 +86,6 @@ def time_text(time: Span) -> str:
     span = time.end_s - time.start_s
     dates = [instant_text(epoch, seconds, span) for seconds in (time.start_s, time.end_s)]
     return f"{text}\n{dates[0]} to {dates[1]}"
-
-
-def _unit(time: Span) -> TimeUnit:
-    try:
-        return named_unit(time.unit) if time.unit else unit_for(max(abs(time.start_s), abs(time.end_s)))
-    except ValueError:  # of a summary that was tampered with
-        return unit_for(time.end_s)
 
 
 def _number(value: float) -> str:

@@ -99,7 +99,7 @@ def _initial_momenta(scene: Scene, scaling: Scaling, angles: list[Any]) -> list[
     turned = numeric.rotation_matrix([context.one] + [context.zero] * 3)
     projections = []
     for angle, axis in zip(angles, sequence, strict=True):
-        index = numeric.AXES.index(axis)
+        index = "xyz".index(axis)
         direction = [row[index] for row in turned]
         projections.append(context.ldexp(dot(direction, momentum), -scaling.momentum))
         quaternion = numeric.quaternion_from_euler(context, [angle, context.zero, context.zero], axis * 3)

@@ -26,9 +26,8 @@ from rigidsim.model.scaling import Rounder
 from rigidsim.model.state_blocks import AttitudeStates
 from rigidsim.scene import attitude
 from rigidsim.scene.arithmetic import dot
-from rigidsim.scene.attitude import AXES, parity
 from rigidsim.scene.choices import FORMULATIONS
-from rigidsim.scene.rotations import is_proper
+from rigidsim.scene.rotations import AXES, is_proper, parity
 from rigidsim.scene.scene import Scene
 
 ANGLES = ["phi", "theta", "psi"]

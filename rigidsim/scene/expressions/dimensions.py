@@ -29,11 +29,8 @@ class DimensionError(ValueError):
 
 @dataclass(frozen=True)
 class Measure:
-    """Knowledge of a value's dimension.
-
-    Attributes:
-        powers: powers of base units, sorted; empty for a number or an angle; None if any is possible.
-        written: whether a unit was written in the value.
+    """What is known of a dimension: powers of base units (empty for a number or an angle, None if any is
+    possible), and whether a unit was written in the value.
     """
 
     powers: units.Powers | None

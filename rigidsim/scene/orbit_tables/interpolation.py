@@ -101,12 +101,8 @@ def left_out(times: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndar
 
 @dataclass(frozen=True)
 class InterpolationError:
-    """Interpolation errors when every other row is left out and interpolated from the others.
-
-    Attributes:
-        direction: largest error of the source's direction, rad.
-        distance: largest relative error of the distance.
-        expected: factor by which both shrink with all rows present, if the rows follow smooth functions.
+    """Largest errors of the source's direction (rad) and, relative, of its distance when every other row is
+    left out; with all rows both shrink by a factor, ``expected`` where they follow smooth functions.
     """
 
     direction: float

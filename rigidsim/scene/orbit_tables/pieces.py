@@ -37,13 +37,8 @@ _LARGEST_TILT = 0.9999  # of sin(i/2): 178.4 deg
 
 
 class TabulatedOrbit:
-    """An orbit with elements over time; numbers are mpf of the scene's precision, SI.
-
-    Attributes:
-        key: everything the orbit is made from; orbits with equal keys are the same.
-        name: name of the table.
-        table: its numbers.
-        motion: function from the semi-major axis (m) to the mean motion (rad/s).
+    """An orbit with elements over time; numbers are mpf of the scene's precision, SI. Orbits with equal keys,
+    everything they are made from, are the same; ``motion`` goes from the semi-major axis to the mean motion.
     """
 
     def __init__(

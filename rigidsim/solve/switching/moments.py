@@ -11,9 +11,15 @@ from typing import Any
 
 from rigidsim.model.system import System
 from rigidsim.model.two_part import exactly, in_two_numbers
-from rigidsim.scene.expressions.lines import as_line, lines_in
 from rigidsim.scene.expressions.piecewise import on_sides
-from rigidsim.scene.expressions.tree import Expression, ExpressionError, evaluate, names_used
+from rigidsim.scene.expressions.tree import (
+    Expression,
+    ExpressionError,
+    as_line,
+    evaluate,
+    lines_in,
+    names_used,
+)
 from rigidsim.solve.precision import Precision, Scalar
 
 _WIDER, _MOST_WIDER = 2.0**2, 14  # from one rounding of a time on, around which its zero is looked for

@@ -16,8 +16,7 @@ import numpy as np
 
 from rigidsim.model.outputs import Recorded
 from rigidsim.model.system import System
-from rigidsim.scene.attitude import AXES, parity
-from rigidsim.scene.rotations import is_proper
+from rigidsim.scene.rotations import AXES, is_proper, parity
 from rigidsim.solve.compiled import CompiledFunction
 from rigidsim.solve.precision import precision_of
 
