@@ -37,9 +37,11 @@ class Storage:
         """Message if there is too little room; None if there is enough."""
         if self.needed <= self.free:
             return None
+        sizes = (self.needed, self.segments, self.dataset, self.free)
+        needed, segments, dataset, free = map(bytes_text, sizes)
         return (
-            f"takes about {bytes_text(self.needed)} of space until it is complete ({bytes_text(self.segments)} of "
-            f"segments, {bytes_text(self.dataset)} of dataset.h5), and {bytes_text(self.free)} are free there; take "
+            f"takes about {needed} of space until it is complete ({segments} of "
+            f"segments, {dataset} of dataset.h5), and {free} are free there; take "
             "fewer [time] samples, record less ([output] record), choose a folder on another disk, or, where "
             'a part of it will do, say in [limits] when it may stop, such as wall_time = "1 h"'
         )
