@@ -17,7 +17,6 @@ import heyoka as hy
 
 from rigidsim.model.kinematics import Kinematics, seconds
 from rigidsim.model.load import Term
-from rigidsim.model.orbits.kepler_states import OrbitStates
 from rigidsim.model.orbits.point_mass_states import PointMassPair
 from rigidsim.model.rotations import Symbolic, transpose
 from rigidsim.scene.arithmetic import Vector, cross, norm, unit_vectors
@@ -38,8 +37,7 @@ class SourcePosition:
     inverse_distance: Symbolic  # mean distance over distance
 
 
-MEAN_DISTANCE = {"sun": 149597870700, "moon": 384400000}
-"""Metres; the mean distance that ``SourcePosition.inverse_distance`` is relative to."""
+MEAN_DISTANCE = {"sun": 149597870700, "moon": 384400000}  # m
 
 
 def source_position(body: str, seconds: Symbolic) -> SourcePosition:
@@ -69,9 +67,7 @@ def gradient_terms(
     """Torque 3 strength factor c x (I c) for a unit direction c in body axes (MacCullagh): the constant
     strength (mpf) becomes one coefficient with the moments, the factor is an expression.
     """
-    inertia = m.numbers.inertia
-    units = unit_vectors(m.scene.context)
-    columns = transpose(inertia)
+    units, columns = unit_vectors(m.scene.context), transpose(m.numbers.inertia)
     terms: list[Term] = []
     for a in range(3):
         for j in range(a, 3):
@@ -87,7 +83,7 @@ def gradient_terms(
 
 @dataclass(frozen=True)
 class GradientSource:
-    """Position of a distant attracting body; exactly one of five ways says where it is."""
+    """A distant attracting body; exactly one of five ways says where it is."""
 
     gravitational_parameter: Any  # m^3/s^2 (mpf)
     orbit: KeplerOrbit | None = None
@@ -119,13 +115,9 @@ class GradientSource:
         if self.position is not None:
             length = norm(context, self.position)
             return m.fixed([x / length for x in self.position]), None
-        place: OrbitStates | SourcePosition
-        if self.orbit is not None:
-            place = m.orbit(self.orbit)
-        elif self.table is not None:
-            place = m.table(self.table)
-        else:
-            assert self.ephemeris is not None
-            place = source_position(self.ephemeris, seconds(m, since=self.epoch))
+        if self.ephemeris is not None:
+            series = source_position(self.ephemeris, seconds(m, since=self.epoch))
+            return series.direction, series.inverse_distance
+        place = m.orbit(self.orbit) if self.orbit is not None else m.table(m.carried(self.table))
         circular = self.orbit is not None and self.orbit.circular
         return place.direction, None if circular else place.inverse_distance

@@ -27,13 +27,11 @@ from rigidsim.model.load import Load, loads_of
 from rigidsim.model.load_estimate import estimate_drive
 from rigidsim.model.loads.uniform_gravity import UniformGravity
 from rigidsim.model.needs import NEEDS
-from rigidsim.model.orbits.table_states import Carried, TablePlace, places_of
+from rigidsim.model.orbits.table_states import places_of
 from rigidsim.model.refusals import refuse_odd_loads, refuse_second_orbits
 from rigidsim.model.scaling import Scaling, amplitude_of, choose_scaling, scaled_numbers
 from rigidsim.scene.choices import AUTO, variables_named
 from rigidsim.scene.expressions.tree import ATTITUDE_NAMES, FLIGHT_NAMES
-from rigidsim.scene.orbit_tables.pieces import TabulatedOrbit
-from rigidsim.scene.orbits import KeplerOrbit
 from rigidsim.scene.registry import OBSERVABLES
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.surfaces import surfaces_of
@@ -74,35 +72,22 @@ def plan_model(
         scaling = choose_scaling(scene, estimate_drive(scene, unknown, requirements))
     if not formulation.carries_rates:
         scaling = replace(scaling, rates=(0, 0, 0))
-    surfaces, tables = surfaces_of(scene), _tables(scene, formulation.longitude)
+    tabulated = [(str(number), table_of(load)) for number, load in enumerate(loads_of(scene), start=1)]
+    tables = places_of([(tag, x) for tag, x in tabulated if x is not None], formulation.longitude)
+    surfaces = surfaces_of(scene)
     if tables and surfaces.found and formulation.resolves_rotation:
         what = (
             f'given beside {surfaces.found[0].where}, whose "{surfaces.found[0].text}" has a kink or jump: '
             "steps can't end at both; make the change smooth with tanh, or give the orbit by elements"
         )
         raise ConfigError(Problem("[[loads]] orbit.table", what))
+    orbits = [(orbit_of(load), str(number)) for number, load in enumerate(loads_of(scene), start=1)]
+    tags = {orbit: tag for orbit, tag in reversed(orbits) if orbit is not None}  # the first load's tag
+    clocked = formulation.resolves_rotation and not tables and happens_at_a_moment(scene)
+    numbers = scaled_numbers(scene, scaling)
     return ModelPlan(
-        scene,
-        loads,
-        formulation,
-        requirements,
-        scaling,
-        scaled_numbers(scene, scaling),
-        _orbit_tags(scene),
-        surfaces,
-        tables,
-        formulation.resolves_rotation and not tables and happens_at_a_moment(scene),
+        scene, loads, formulation, requirements, scaling, numbers, tags, surfaces, tables, clocked
     )
-
-
-def _tables(scene: Scene, longitude: Carried) -> dict[TabulatedOrbit, TablePlace]:
-    tables = [(str(number), table_of(load)) for number, load in enumerate(loads_of(scene), start=1)]
-    return places_of([(tag, table) for tag, table in tables if table is not None], longitude)
-
-
-def _orbit_tags(scene: Scene) -> dict[KeplerOrbit, str]:
-    found = [(orbit_of(load), str(number)) for number, load in enumerate(loads_of(scene), start=1)]
-    return {orbit: tag for orbit, tag in reversed(found) if orbit is not None}  # the first load's tag
 
 
 # --- which states -------------------------------------------------------------------------------------------

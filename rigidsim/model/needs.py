@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 from rigidsim.model import fixed_axes
 from rigidsim.model.capabilities import Attracting, Damping, corotating_orbit_of
@@ -11,17 +12,9 @@ from rigidsim.model.first_integrals import goryachev_chaplygin_top, kovalevskaya
 from rigidsim.model.frames import first_source, flies_about_source, flies_in_plane, rotating_orbit
 from rigidsim.model.load import loads_of
 from rigidsim.model.mechanics import Mechanics
-from rigidsim.scene.arithmetic import negligible
+from rigidsim.scene.arithmetic import Vector, negligible
 from rigidsim.scene.choices import variables_named
 from rigidsim.scene.scene import Scene
-
-
-def _no_states(_: Scene) -> str | None:
-    return None
-
-
-def _never_missing(scene: Scene, formulation: str) -> str | None:
-    return None
 
 
 def _unless(possible: Callable[[Scene], object], why: str) -> Callable[[Scene, str], str | None]:
@@ -34,18 +27,13 @@ def _flight_of_a_free_body(scene: Scene) -> str | None:
 
 @dataclass(frozen=True)
 class Need:
-    """One thing that observables may need.
-
-    Attributes:
-        met: whether the mechanics of a scene meets it.
-        states: states that must be carried for it: "attitude", "flight" or None.
-        missing: why a scene in this formulation can't have it, told before anything is built; None where that
-            is seen only later.
+    """One thing that observables may need: whether it is met, the states that must be carried for it
+    ("attitude", "flight" or None), and why a scene in a formulation can't have it, if that is seen at once.
     """
 
     met: Callable[[Mechanics], bool]
-    states: Callable[[Scene], str | None] = _no_states
-    missing: Callable[[Scene, str], str | None] = _never_missing
+    states: Callable[[Scene], str | None] = lambda _: None
+    missing: Callable[[Scene, str], str | None] = lambda scene, formulation: None
 
 
 def work_is_needed(m: Mechanics) -> bool:
@@ -88,21 +76,13 @@ _NO_SOURCE = _unless(
 )
 
 
-def _source_states(scene: Scene) -> str | None:
-    return "flight" if flies_about_source(scene) else None
-
-
 def _sourced(m: Mechanics) -> bool:
     load = first_source(m.loads) if m.attitude is not None else None
     return load is not None and (not isinstance(load, Attracting) or m.velocity is not None)
 
 
-def _free_axis(which: int) -> Need:
-    return Need(lambda m: m.attitude is not None and fixed_axes.free_axis(m, which) is not None)
-
-
-def _plane_states(scene: Scene) -> str | None:
-    return "flight" if flies_in_plane(scene, loads_of(scene)) else None
+def _with_axis(found: Callable[[Mechanics], Vector | None]) -> Need:
+    return Need(lambda m: m.attitude is not None and found(m) is not None)
 
 
 def _isotropic_damping(m: Mechanics) -> bool:
@@ -131,12 +111,18 @@ NEEDS: dict[str, Need] = {
     "jacobi": Need(lambda m: m.attitude is not None and rotating_orbit(m) is not None),
     "kovalevskaya": Need(lambda m: kovalevskaya_top(m) is not None),
     "goryachev_chaplygin": Need(lambda m: goryachev_chaplygin_top(m) is not None),
-    "source_axis": Need(lambda m: m.attitude is not None and fixed_axes.kept_source_axis(m) is not None),
-    "field_axis": Need(lambda m: m.attitude is not None and fixed_axes.kept_field_axis(m) is not None),
-    **{f"free_axis_{name}": _free_axis(i) for i, name in enumerate("xyz")},
+    "source_axis": _with_axis(fixed_axes.kept_source_axis),
+    "field_axis": _with_axis(fixed_axes.kept_field_axis),
+    **{
+        f"free_axis_{name}": _with_axis(partial(fixed_axes.free_axis, which=i))
+        for i, name in enumerate("xyz")
+    },
     "isotropic_damping": Need(lambda m: m.attitude is not None and _isotropic_damping(m)),
-    "plane": Need(lambda m: not flies_in_plane(m.scene, m.loads) or m.velocity is not None, _plane_states),
-    "source": Need(_sourced, _source_states, _NO_SOURCE),
+    "plane": Need(
+        lambda m: not flies_in_plane(m.scene, m.loads) or m.velocity is not None,
+        lambda scene: "flight" if flies_in_plane(scene, loads_of(scene)) else None,
+    ),
+    "source": Need(_sourced, lambda scene: "flight" if flies_about_source(scene) else None, _NO_SOURCE),
     "place": Need(lambda m: not m.scene.free_flight or m.velocity is not None, _flight_of_a_free_body),
     "sources": Need(lambda m: m.attitude is not None and fixed_axes.sources_alone(m)),
     "several_sources": Need(lambda m: m.attitude is not None and fixed_axes.several_directions(m)),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import heyoka as hy
@@ -37,10 +38,6 @@ def _total_momentum_along(m: Mechanics) -> list[Symbolic]:
 
 def _along(axis: Callable[[Mechanics], Vector | None]) -> Callable[[Mechanics], list[Symbolic]]:
     return lambda m: [fixed_axes.along(m, m.carried(axis(m)))]
-
-
-def _free_axis(which: int) -> Callable[[Mechanics], Vector | None]:
-    return lambda m: fixed_axes.free_axis(m, which)
 
 
 def _across_its_beginning(m: Mechanics) -> list[Symbolic]:
@@ -85,8 +82,8 @@ BUILT_IN: tuple[Observable, ...] = (
         Observable(
             f"angular_momentum_{'xyz'[i]}", (), "kg m2 s-1",
             f"angular momentum along the space axis {'XYZ'[i]}",
-            _along(_free_axis(i)), same_unit(MOMENTUM, 1), "space axes", (f"free_axis_{'xyz'[i]}",),
-            lambda m: "no load has a torque about this axis", momentum_scale,
+            _along(partial(fixed_axes.free_axis, which=i)), same_unit(MOMENTUM, 1), "space axes",
+            (f"free_axis_{'xyz'[i]}",), lambda m: "no load has a torque about this axis", momentum_scale,
         )
         for i in range(3)
     ),

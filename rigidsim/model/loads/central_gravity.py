@@ -117,9 +117,7 @@ class CentralGravity(PointAttraction):
         return offset, distance, norm(context, scene.velocity) ** 2 / 2 - self.strength / distance
 
     def nearest_approach(self, scene: Scene) -> Any:
-        """Pericentre distance, m: at least a thousandth of the initial distance, since a scale must not
-        vanish for a plunging orbit.
-        """
+        """Pericentre distance, m, but a thousandth of the first one at least: a scale must not vanish."""
         return closest(scene.context, self._start(scene)[0], scene.velocity or [], self.strength)[0]
 
     def amplitude(self, scene: Scene) -> Any:

@@ -21,11 +21,10 @@ from rigidsim.model.plausibility import about_distance, about_orbit, about_spin,
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.two_part import as_factor
 from rigidsim.scene.arithmetic import Vector, across, norm, parallel
-from rigidsim.scene.epochs import J2000, Epoch
+from rigidsim.scene.epochs import J2000
 from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.fields import GravitationalParameter, Metre, Triple
 from rigidsim.scene.frame import ECLIPTIC
-from rigidsim.scene.orbit_tables.pieces import TabulatedOrbit
 from rigidsim.scene.orbits import KeplerOrbit, Orbit, attracting_body, resolve_orbit, resolve_tabulated_orbit
 from rigidsim.scene.registry import LoadFields, Surroundings, register_load
 from rigidsim.scene.scene import Scene
@@ -56,21 +55,14 @@ class GravityGradientFields(LoadFields):
 
 @register_load
 @dataclass(frozen=True)
-class GravityGradient(Load):
-    """Torque (3 G M / R^3) c x (I c) of a distant body in direction c (MacCullagh).
+class GravityGradient(GradientSource, Load):
+    """Torque (3 G M / R^3) c x (I c) of a distant body in direction c (MacCullagh), which is its own source.
 
-    Exactly one of ``orbit``, ``table``, ``position`` (space axes, m) and ``ephemeris`` says where it is; for
-    an ephemeris the space axes are the mean ecliptic and equinox of J2000, and time counts from the scene's
-    epoch, by default J2000.
+    For an ephemeris the space axes are the mean ecliptic and equinox of J2000, and time counts from the
+    scene's epoch, by default J2000.
     """
 
-    gravitational_parameter: Any
-    orbit: KeplerOrbit | None = None
-    position: Vector | None = None
-    ephemeris: str | None = None
     axes: str | None = None
-    epoch: Epoch | None = None
-    table: TabulatedOrbit | None = None
     Fields = GravityGradientFields
     title = "gravity_gradient"
     described = "a gravity-gradient load"
@@ -121,9 +113,7 @@ class GravityGradient(Load):
 
     @property
     def gradient_source(self) -> GradientSource:
-        return GradientSource(
-            self.gravitational_parameter, self.orbit, self.table, self.position, self.ephemeris, self.epoch
-        )
+        return self
 
     @property
     def conservative(self) -> bool:  # type: ignore[override]
@@ -156,14 +146,12 @@ class GravityGradient(Load):
     def source_direction(self, m: Kinematics) -> list[Symbolic]:
         if m.attitude is not None and m.attitude.orbital is not None:
             return m.attitude.orbital.direction
-        return m.seen(self.gradient_source.seen(m)[0])
+        return m.seen(self.seen(m)[0])
 
     def strength(self, m: Kinematics) -> tuple[Any, Symbolic | None]:
-        """G M / R^3 in internal units: the value at a constant distance (mpf), and the factor by which it
-        varies.
-        """
-        context, (_, inverse) = m.scene.context, self.gradient_source.seen(m)
-        distance = self.gradient_source.distance(context)
+        """G M / R^3 in internal units: at a constant distance (mpf), and the factor by which it varies."""
+        context, (_, inverse) = m.scene.context, self.seen(m)
+        distance = self.distance(context)
         value = context.ldexp(self.gravitational_parameter / distance**3, 2 * m.scaling.time)
         return value, None if inverse is None else inverse**3
 
@@ -201,7 +189,7 @@ class GravityGradient(Load):
 
     def amplitude(self, scene: Scene) -> Any:
         path = self.orbit or self.table
-        distance = self.gradient_source.distance(scene.context) if path is None else path.pericentre
+        distance = self.distance(scene.context) if path is None else path.pericentre
         return tidal_range(scene, self.gravitational_parameter, distance)
 
     def fastest_rate(self, scene: Scene) -> Any:
@@ -214,12 +202,12 @@ class GravityGradient(Load):
         if self.orbit is not None:
             where = orbit_text(self.orbit, strength)
         elif self.table is not None:
-            where = f"{reach_text(strength, self.gradient_source.distance(context))} on average, on an orbit "
+            where = f"{reach_text(strength, self.distance(context))} on average, on an orbit "
             where += self.table.described
         elif self.position is not None:
             where = f"at rest, {reach_text(strength, norm(context, self.position))}"
         else:
-            where = f"from its series, about {reach_text(strength, self.gradient_source.distance(context))}"
+            where = f"from its series, about {reach_text(strength, self.distance(context))}"
         largest = value_text(self.amplitude(scene), "N m")
         return f"gravity gradient of {source_text(strength)}, {where}; torque up to {largest}"
 

@@ -1,6 +1,4 @@
-"""Magnetic dipole: a moment of the body in a uniform field, or in the field of a dipole about which the body
-moves, on a prescribed orbit or as it flies.
-"""
+"""Magnetic dipole: a moment of the body in a uniform field, or in that of a dipole about which it moves."""
 
 from __future__ import annotations
 
@@ -70,20 +68,14 @@ class MagneticDipoleFields(LoadFields):
 class MagneticDipole(Load):
     """Torque m x B, potential -m . B (Jackson, Classical Electrodynamics, sections 5.6 and 5.7).
 
-    The field of a centred dipole M is B = (mu_0 / 4 pi r^3) (3 (M . c) c - M) in direction c.
-
-    Attributes:
-        moment: m, body axes, A m^2 (mpf).
-        source: the field itself (T), or M (A m^2) of a dipole; space axes.
-        orbit: orbit of the source seen from the body (which only reverses c); shared with other loads.
-        place: position of the dipole about which the body flies, space axes, m; empty where it is the point
-            that attracts the body. None if it doesn't fly about one.
+    The field of a centred dipole M is B = (mu_0 / 4 pi r^3) (3 (M . c) c - M) in direction c. The ``place``
+    of the dipole about which the body flies (space axes, m) is empty where it is the point that attracts it.
     """
 
-    moment: Vector
-    source: Vector
-    orbit: KeplerOrbit | None = None
-    place: Vector | None = None
+    moment: Vector  # m, body axes, A m^2 (mpf)
+    source: Vector  # the field itself (T), or M (A m^2) of a dipole; space axes
+    orbit: KeplerOrbit | None = None  # of the source seen from the body (which only reverses c)
+    place: Vector | None = None  # None if it doesn't fly about a dipole
     Fields = MagneticDipoleFields
     title = "magnetic_dipole"
     described = "a magnetic dipole"
@@ -252,18 +244,14 @@ def _refuse_contradictions(fields: MagneticDipoleFields, around: Surroundings) -
             why = "has a position of its own, where the field is taken: remove orbit and "
             why += "gravitational_parameter, and keep source_moment"
         raise around.fault("orbit", f"given for a body that {why}")
-    if around.free_flight:
-        if (fields.field is None) == (fields.source_moment is None):
-            given = "neither field nor" if fields.field is None else "both field and"
-            what = f"given {given} source_moment; exactly one of them is needed for a body with a position"
-            raise around.fault("field", what)
-    else:
-        if (fields.field is None) == (fields.orbit is None):
-            given = "neither field nor" if fields.field is None else "both field and"
-            raise around.fault("field", f"given {given} orbit; exactly one of them is needed")
-        if (fields.source_moment is None) != (fields.orbit is None):
-            what = "missing; it is needed with orbit" if fields.orbit else "given without orbit; remove it"
-            raise around.fault("source_moment", what)
+    other = fields.source_moment if around.free_flight else fields.orbit
+    if (fields.field is None) == (other is None):
+        given = "neither field nor" if fields.field is None else "both field and"
+        name, why = ("source_moment", " for a body with a position") if around.free_flight else ("orbit", "")
+        raise around.fault("field", f"given {given} {name}; exactly one of them is needed{why}")
+    if not around.free_flight and (fields.source_moment is None) != (fields.orbit is None):
+        what = "missing; it is needed with orbit" if fields.orbit else "given without orbit; remove it"
+        raise around.fault("source_moment", what)
     if fields.position is not None and not (around.free_flight and fields.source_moment is not None):
         what = "given; allowed with source_moment, for a body with [initial] position and velocity"
         raise around.fault("position", what)

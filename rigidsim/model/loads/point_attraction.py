@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, ClassVar
 
 from rigidsim.errors import ConfigError, Problem
 from rigidsim.model.gradient import GradientSource, gradient_terms, tidal_range
@@ -114,6 +114,8 @@ class MovingSource(PointAttraction):
 
     masses: PointMasses  # all of them
     number: int  # index of the one that attracts
+    as_points: ClassVar[bool] = False  # whether it attracts the body as a point, too
+    felt: ClassVar[str]  # by the masses under full coupling
 
     @property
     def described(self) -> str:  # type: ignore[override]
@@ -135,11 +137,6 @@ class MovingSource(PointAttraction):
         return self.masses.strengths[self.number]
 
     @property
-    def name(self) -> str:
-        """Name of the mass."""
-        return self.masses.names[self.number]
-
-    @property
     def plane(self) -> OrbitPlane:
         return _OsculatingPlane(self)
 
@@ -155,8 +152,7 @@ class MovingSource(PointAttraction):
 
     def motion(self, m: Kinematics) -> list[Symbolic]:
         """Velocity of the body as seen from the mass, space axes, units of speed."""
-        states = m.carried(m.point_masses)
-        host = self.masses.host
+        states, host = m.carried(m.point_masses), self.masses.host
         own = m.carried(m.velocity) if host is None else states.velocities[host]
         return [x - a for x, a in zip(own, states.velocities[self.number], strict=True)]
 
@@ -166,8 +162,8 @@ class MovingSource(PointAttraction):
         return [x * inverse for x in place], inverse
 
     def acceleration(self, m: Kinematics) -> list[Symbolic]:
-        """Acceleration of the body by its shape, space axes."""
-        return _less(self.pull(m, as_point=False))
+        """Acceleration of the body, space axes: by its shape, and as a point if ``as_points``."""
+        return [-x - y for x, y in zip(*self.pull(m, as_point=self.as_points), strict=True)]
 
     def reaction(self, m: Kinematics) -> list[tuple[int, Any, list[Symbolic]]]:
         if not self.masses.full:
@@ -193,11 +189,10 @@ class MovingSource(PointAttraction):
 
     def start(self, scene: Scene) -> tuple[Vector, Vector]:
         """Position and velocity of the body as seen from the mass, m and m/s (mpf)."""
-        masses, n = self.masses, self.number
-        if masses.host is None:
-            own = scene.position or [], scene.velocity or []
-        else:
-            own = masses.positions[masses.host], masses.velocities[masses.host]
+        masses, n, host = self.masses, self.number, self.masses.host
+        own = scene.position or [], scene.velocity or []
+        if host is not None:
+            own = masses.positions[host], masses.velocities[host]
         there = masses.positions[n], masses.velocities[n]
         place, moving = ([x - a for x, a in zip(*pair, strict=True)] for pair in zip(own, there, strict=True))
         return place, moving
@@ -211,9 +206,9 @@ class MovingSource(PointAttraction):
     def told(self, scene: Scene) -> str:
         distance, largest = norm(scene.context, self.start(scene)[0]), self.amplitude(scene)
         return (
-            f'{self.title.replace("_", " ")} of the moving point mass "{self.name}", '
+            f'{self.title.replace("_", " ")} of the moving point mass "{self.masses.names[self.number]}", '
             f"{source_text(self.strength)}, {reach_text(self.strength, distance)} at the start; "
-            f"torque up to {value_text(largest, 'N m')}"
+            f"torque up to {value_text(largest, 'N m')}" + (self.felt if self.masses.full else "")
         )
 
     def cautions(self, fields: Any, where: str, scene: Scene) -> Iterator[Caution]:
@@ -230,6 +225,7 @@ class MovingGradient(MovingSource):
     """The torque of a point mass on a body that is a point mass itself, or flies without its force."""
 
     title = "gravity_gradient"
+    felt = "; the bodies feel its shape"
 
     @property
     def gradient_source(self) -> GradientSource | None:
@@ -244,14 +240,13 @@ class MovingGradient(MovingSource):
             what += '"central_gravity", whose force the bodies feel'
             raise ConfigError(Problem(f"[[loads]] number {number + 1} kind", what))
 
-    def told(self, scene: Scene) -> str:
-        return super().told(scene) + ("; the bodies feel its shape" if self.masses.full else "")
-
 
 class MovingAttractor(MovingSource):
     """The torque and force of a point mass on a body with a position of its own."""
 
     title = "central_gravity"
+    as_points = True
+    felt = "; the bodies feel the forces of this one"
 
     def check(self, number: int, position: Vector | None) -> None:
         if self.masses.host is not None:
@@ -259,26 +254,15 @@ class MovingAttractor(MovingSource):
             what += 'each other anyway; give "gravity_gradient"'
             raise ConfigError(Problem(f"[[loads]] number {number + 1} kind", what))
 
-    def acceleration(self, m: Kinematics) -> list[Symbolic]:
-        """Acceleration of the body, by its shape and as a point."""
-        return _less(self.pull(m, as_point=True))
-
     def force(self, m: Kinematics) -> list[Term]:
         return list(zip(unit_vectors(m.scene.context), self.acceleration(m), strict=True))
 
     def potential(self, m: Kinematics) -> Symbolic | None:
         return -self.second_degree(m) - self.as_point(m)
 
-    def told(self, scene: Scene) -> str:
-        return super().told(scene) + ("; the bodies feel the forces of this one" if self.masses.full else "")
-
     def cautions(self, fields: Any, where: str, scene: Scene) -> Iterator[Caution]:
         yield from super().cautions(fields, where, scene)
         yield from about_start(scene, attracting(*self._given(scene)), *self.start(scene))
-
-
-def _less(pull: tuple[list[Symbolic], list[Symbolic]]) -> list[Symbolic]:
-    return [-x - y for x, y in zip(*pull, strict=True)]
 
 
 @dataclass(frozen=True)

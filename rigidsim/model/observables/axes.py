@@ -33,24 +33,9 @@ from rigidsim.scene.frame import ECLIPTIC, OBLIQUITY
 AXIS = ("axis",)
 
 
-def figure_axis(m: Mechanics) -> list[Symbolic]:
-    """Unit vector along the figure axis, space axes."""
-    return unit(m.figure_space)
-
-
-def spin_axis(m: Mechanics) -> list[Symbolic]:
-    """Unit vector w / |w| along the angular velocity, space axes."""
-    return unit(m.spin_space)
-
-
-def momentum_axis(m: Mechanics) -> list[Symbolic]:
-    """Unit vector L / |L| along the angular momentum, space axes."""
-    return unit(m.momentum_space)
-
-
 def three_axes(m: Mechanics) -> list[list[Symbolic]]:
-    """Unit vectors in the order of the labels of the dimension ``axis``."""
-    return [figure_axis(m), spin_axis(m), momentum_axis(m)]
+    """Unit vectors in the order of the labels of the dimension ``axis``, space axes."""
+    return [unit(m.figure_space), unit(m.spin_space), unit(m.momentum_space)]
 
 
 def _on_plane(m: Mechanics) -> list[list[Symbolic]]:
@@ -60,19 +45,13 @@ def _on_plane(m: Mechanics) -> list[list[Symbolic]]:
 
 
 def _on_sky(m: Mechanics) -> list[list[Symbolic]]:
-    """Components of each axis along equatorial axes, which differ from the space axes if these are the
-    ecliptic's.
-    """
+    """Components of each axis along equatorial axes: the space axes, unless these are the ecliptic's."""
     axes, context = three_axes(m), m.scene.context
     if m.scene.axes != ECLIPTIC:
         return axes
     angle = OBLIQUITY.at(context)
     c, s = m.fixed([context.cos(angle), context.sin(angle)])
     return [[x, c * y - s * z, s * y + c * z] for x, y, z in axes]
-
-
-def _elevation(x: Symbolic, y: Symbolic, z: Symbolic) -> Symbolic:
-    return hy.atan2(z, hy.sqrt(x * x + y * y))
 
 
 def _sky(convention: str) -> Callable[[Mechanics], Mapping[str, str]]:
@@ -88,16 +67,17 @@ _AT_REST = "unit vector; NaN where the body is at rest"
 
 register_all(
     Observable(
-        "figure_axis", SPACE, "1", "direction of the figure axis", figure_axis,
+        "figure_axis", SPACE, "1", "direction of the figure axis", lambda m: unit(m.figure_space),
         frame="space axes", needs=("attitude",), by_default=is_planet,
         attributes=told("unit vector", figure=True),
     ),
     Observable(
-        "spin_axis", SPACE, "1", "direction of the angular velocity", spin_axis,
+        "spin_axis", SPACE, "1", "direction of the angular velocity", lambda m: unit(m.spin_space),
         frame="space axes", needs=("attitude",), by_default=only_when_named, attributes=told(_AT_REST),
     ),
     Observable(
-        "momentum_axis", SPACE, "1", "direction of the angular momentum", momentum_axis,
+        "momentum_axis", SPACE, "1", "direction of the angular momentum",
+        lambda m: unit(m.momentum_space),
         frame="space axes", needs=("attitude",), by_default=only_when_named,
         attributes=told(_AT_REST),
     ),
@@ -109,7 +89,7 @@ register_all(
     ),
     Observable(
         "declination", AXIS, "rad", "declination of the figure, spin and momentum axes",
-        lambda m: [_elevation(*axis) for axis in _on_sky(m)],
+        lambda m: [hy.atan2(z, hy.sqrt(x * x + y * y)) for x, y, z in _on_sky(m)],
         frame="space axes", needs=("attitude",), by_default=only_when_named,
         attributes=_sky("positive north of the equator"),
     ),

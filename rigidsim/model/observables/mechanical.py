@@ -22,7 +22,7 @@ from rigidsim.model.observables.observable import (
     register_all,
     same_unit,
 )
-from rigidsim.model.rotations import Symbolic
+from rigidsim.model.rotations import Symbolic, along
 from rigidsim.model.scaling import loads_amplitude, potential_amplitude, source_rate
 from rigidsim.scene.arithmetic import Vector, apply, cross, dot, norm
 
@@ -176,23 +176,14 @@ def _axial(m: Mechanics) -> str | None:
     return why + (", and no torque acts" if not m.torque else "")
 
 
-def _pulled(m: Mechanics) -> bool:
-    return any(x != 0 for vector, _ in m.force for x in vector)
-
-
 def _linear(m: Mechanics) -> str | None:
-    return "no force acts" if m.velocity is not None and not _pulled(m) else None
+    pulled = any(x != 0 for vector, _ in m.force for x in vector)
+    return "no force acts" if m.velocity is not None and not pulled else None
 
 
 def _along_symmetry_axis(m: Mechanics) -> list[Symbolic]:
-    assert m.symmetry_direction is not None
-    pairs = zip(m.symmetry_direction, m.momentum_body, strict=True)
+    pairs = zip(m.carried(m.symmetry_direction), m.momentum_body, strict=True)
     return [hy.sum([m.number(e) * x for e, x in pairs if e != 0])]
-
-
-def _along_vertical(m: Mechanics) -> list[Symbolic]:
-    assert m.vertical is not None
-    return [hy.sum([v * x for v, x in zip(m.vertical, m.momentum_body, strict=True)])]
 
 
 def _euler(m: Mechanics) -> list[Symbolic]:
@@ -264,8 +255,8 @@ register_all(
     ),
     Observable(
         "angular_momentum_vertical", (), "kg m2 s-1", "angular momentum along the vertical",
-        _along_vertical, same_unit(MOMENTUM, 1), "space axes", ("vertical",),
-        _vertical_only, momentum_scale,
+        lambda m: [along(m.carried(m.vertical), m.momentum_body)], same_unit(MOMENTUM, 1), "space axes",
+        ("vertical",), _vertical_only, momentum_scale,
     ),
     Observable(
         "angular_momentum_axial", (), "kg m2 s-1", "angular momentum along the symmetry axis",

@@ -20,23 +20,9 @@ import heyoka as hy
 
 from rigidsim.model.frames import local_frame, moves_slowly_in_orbit
 from rigidsim.model.mechanics import Mechanics
-from rigidsim.model.observables.observable import (
-    BODY,
-    Angle,
-    Observable,
-    continuous_angles,
-    register_all,
-)
-from rigidsim.model.rotations import Symbolic, along
+from rigidsim.model.observables.observable import BODY, Angle, Observable, continuous_angles, register_all
+from rigidsim.model.rotations import along
 from rigidsim.scene.frame import unique_axis
-
-ROLL_PITCH_YAW = ("roll_pitch_yaw_component",)
-LIBRATION = ("libration_angle",)
-
-
-def nadir(m: Mechanics) -> list[Symbolic]:
-    """Unit vector towards the source, body axes."""
-    return local_frame(m).down
 
 
 def roll_pitch_yaw(m: Mechanics) -> list[Angle]:
@@ -69,7 +55,7 @@ _NEEDS = ("attitude", "source")
 
 register_all(
     continuous_angles(
-        "roll_pitch_yaw", ROLL_PITCH_YAW, "roll, pitch and yaw", roll_pitch_yaw,
+        "roll_pitch_yaw", ("roll_pitch_yaw_component",), "roll, pitch and yaw", roll_pitch_yaw,
         frame="local frame to body axes", needs=_NEEDS, by_default=moves_slowly_in_orbit,
         attributes=_told(
             "3-2-1 (yaw about z, pitch about y, roll about x) from the local frame (z to the source, y "
@@ -78,7 +64,7 @@ register_all(
         ),
     ),
     continuous_angles(
-        "libration", LIBRATION, "libration of the axis of smallest moment", libration,
+        "libration", ("libration_angle",), "libration of the axis of smallest moment", libration,
         frame="local frame", needs=_NEEDS, absent=_no_long_axis,
         attributes=_told(
             "angles of the axis of smallest moment from the direction to the source: in the orbit's plane, "
@@ -86,8 +72,8 @@ register_all(
         ),
     ),
     Observable(
-        "nadir", BODY, "1", "direction to the source", nadir, frame="body axes", needs=_NEEDS,
-        by_default=moves_slowly_in_orbit, attributes=_told("unit vector"),
+        "nadir", BODY, "1", "direction to the source", lambda m: local_frame(m).down,
+        frame="body axes", needs=_NEEDS, by_default=moves_slowly_in_orbit, attributes=_told("unit vector"),
     ),
 )  # fmt: skip
 

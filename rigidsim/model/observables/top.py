@@ -16,7 +16,6 @@ import heyoka as hy
 
 from rigidsim.model.frames import fixed_plane
 from rigidsim.model.mechanics import Mechanics
-from rigidsim.model.observables.axes import figure_axis
 from rigidsim.model.observables.observable import (
     SPACE,
     Angle,
@@ -26,7 +25,7 @@ from rigidsim.model.observables.observable import (
     same_unit,
     told,
 )
-from rigidsim.model.rotations import Symbolic, along, apply
+from rigidsim.model.rotations import Symbolic, along, apply, unit
 from rigidsim.scene.arithmetic import Vector
 
 
@@ -43,21 +42,15 @@ def tilt(m: Mechanics) -> list[Symbolic]:
     return [hy.atan2(hy.sqrt(e * e + f * f), p)]
 
 
-def spin_angle(m: Mechanics) -> list[Angle]:
-    """Rotation angle of the body about its figure axis, from the line of nodes."""
-    e, f, _ = _vertical(m)
-    return [Angle(e, f)]
-
-
 def precession_angle(m: Mechanics) -> list[Angle]:
     """Precession angle of the figure axis about the vertical: line of nodes from the horizontal X."""
     plane = fixed_plane(m, m.carried(m.numbers.up), "horizontal plane")
-    u, v, _ = plane.components(figure_axis(m))
+    u, v, _ = plane.components(unit(m.figure_space))
     return [Angle(u, -v)]
 
 
 def tip_point(m: Mechanics) -> Vector | None:
-    """Body-fixed point whose path is recorded, from the reference point (mpf, m): ``[output] tip``, or the
+    """Body-fixed point whose path is recorded (mpf, m, from the reference point): ``[output] tip``, or the
     centre of mass of a body that turns about another point; None without either.
     """
     given = m.scene.config.output.tip
@@ -91,10 +84,6 @@ def _is_top(m: Mechanics) -> bool:
     return m.numbers.arm is not None
 
 
-def _traced(m: Mechanics) -> bool:
-    return _is_top(m) or m.scene.config.output.tip is not None
-
-
 def _tip_told(m: Mechanics) -> dict[str, str]:
     point = tip_point(m)
     told = "" if point is None else ", ".join(m.scene.context.nstr(x, 17) for x in point)
@@ -117,7 +106,8 @@ register_all(
         ),
     ),
     continuous_angles(
-        "spin_angle", (), "rotation about the figure axis", spin_angle,
+        "spin_angle", (), "rotation about the figure axis",
+        lambda m: [Angle(*_vertical(m)[:2])],
         needs=("attitude", "vertical"), by_default=_is_top,
         attributes=told(
             "of the body from the line of nodes; turns counted; NaN where the figure axis is vertical",
@@ -126,6 +116,7 @@ register_all(
     ),
     Observable(
         "tip", SPACE, "m", "path of a point of the body", tip, same_unit(_tip_exponent, 3), "space axes",
-        ("attitude", "place"), by_default=_traced, attributes=_tip_told, absent=_no_tip,
+        ("attitude", "place"), by_default=lambda m: _is_top(m) or m.scene.config.output.tip is not None,
+        attributes=_tip_told, absent=_no_tip,
     ),
 )  # fmt: skip

@@ -37,8 +37,8 @@ from rigidsim.scene.orbit_tables.pieces import AXIS, LONGITUDE, TabulatedOrbit
 
 _POWERS = 5  # of the polynomials; as many parameters for each element
 _LEAST = -5
-"""Binary exponent, in bits of the working precision, below which parameters are set to zero: elements are of
-order one, so that anything smaller is a remnant of a zero and could underflow single precision.
+"""Exponent, in bits of the working precision, of what is set to zero: elements are of order one, so that
+anything smaller is a remnant of a zero and could underflow single precision.
 """
 
 
@@ -63,13 +63,9 @@ class TablePlace:
         neither = self.longitude is Carried.NEITHER
         return [x for x in orbit.moving if not (neither and x == LONGITUDE)]
 
-    def parameter_count(self, orbit: TabulatedOrbit) -> int:
-        """Number of parameters that an orbit takes."""
-        return 1 + _POWERS * len(self.elements(orbit))
-
 
 def places_of(
-    orbits: Sequence[tuple[str, TabulatedOrbit]], longitude: Carried = Carried.ECCENTRIC
+    orbits: Sequence[tuple[str, TabulatedOrbit]], longitude: Carried
 ) -> dict[TabulatedOrbit, TablePlace]:
     """Places of the given orbits, with their tags; an orbit that occurs twice gets one place."""
     found: dict[TabulatedOrbit, TablePlace] = {}
@@ -77,7 +73,7 @@ def places_of(
     for tag, orbit in orbits:
         if orbit not in found:
             found[orbit] = TablePlace(tag, first, longitude)
-            first += found[orbit].parameter_count(orbit)
+            first += 1 + _POWERS * len(found[orbit].elements(orbit))
     return found
 
 
