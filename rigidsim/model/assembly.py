@@ -22,14 +22,7 @@ from rigidsim.scene.orbits import KeplerOrbit
 def assemble_states(
     plan: ModelPlan, formulation: Formulation, number: Rounder
 ) -> tuple[Mechanics, list[StateBlock]]:
-    """The mechanical quantities of a scene, and the blocks of its states in the order of the system.
-
-    Args:
-        formulation: the plan's, or its partner.
-
-    Raises:
-        ConfigError: a load that can't be written in the formulation's states.
-    """
+    """The mechanical quantities of a scene, and its blocks of states in the order of the system."""
     assembled = formulation.assembled(plan, number)
     if assembled is not None:
         return assembled

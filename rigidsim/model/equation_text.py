@@ -35,14 +35,8 @@ class Call:
 
 
 def equation_texts(equations: Sequence[tuple[Any, Any]], **options: Any) -> tuple[list[str], list[str]]:
-    """The equations, and the parts that they share.
-
-    Args:
-        equations: heyoka variables with their derivatives.
-        options: for compiled functions in the precision of the run.
-
-    Returns:
-        ``u1 = ...`` for each shared part, of earlier ones, and ``wx' = ...`` for each equation.
+    """``u1 = ...`` for each shared part, of earlier ones, and ``wx' = ...`` for each equation, as compiled
+    with ``options`` in the precision of the run.
     """
     names = [str(variable) for variable, _ in equations]
     function = hy.cfunc(
@@ -81,10 +75,7 @@ def _written(names: list[str], steps: list[Node]) -> tuple[list[str], list[str]]
 
 
 def _parsed(text: str) -> Node:
-    """
-    Raises:
-        SyntaxError, ValueError: not a whole expression.
-    """
+    """``SyntaxError`` or ``ValueError`` if it isn't a whole expression."""
     composite = _COMPOSITE.fullmatch(text)
     if composite is None:
         return _tree(text)
@@ -133,9 +124,7 @@ def _leaves(node: Node) -> list[str]:
 
 
 def _simple(node: Node) -> Node:
-    """The same with sums and products in one piece each; factors that are powers of two taken together, which
-    is exact.
-    """
+    """The same with sums and products in one piece each, and powers of two taken together, which is exact."""
     if not isinstance(node, Call):
         return node
     arguments = tuple(map(_simple, node.arguments))

@@ -43,11 +43,8 @@ class Poles:
 
 
 def angles_of_matrix(m: Kinematics, *, differentiable: bool = False) -> list[Symbolic]:
-    """Euler angles of the scene's sequence within one turn, rad.
-
-    Args:
-        differentiable: whether branches that aren't selected must have finite derivatives. The middle angle,
-            which has a kink in the pole, is then constant there.
+    """Euler angles of the scene's sequence within one turn, rad; where branches that aren't selected must
+    have finite derivatives, the middle one, which has a kink in the pole, is constant there.
     """
     sequence, r, context = m.scene.config.integrator.euler_sequence, m.matrix, m.scene.context
     half, whole = (hy.expression(m.number(x)) for x in (context.pi, 2 * context.pi))

@@ -180,9 +180,7 @@ def local_frame(m: Mechanics) -> LocalFrame:
 
 
 def moves_slowly_in_orbit(m: Mechanics) -> bool:
-    """Whether the scene is about the body's attitude in its orbit: a prescribed one or free flight, and at
-    most two turns per revolution at the start.
-    """
+    """Whether the body starts with at most two turns per revolution, on a prescribed orbit or in flight."""
     plane = plane_of(first_source(m.loads))
     rate = None if plane is None else plane.rate(m.scene)
     return rate is not None and bool(norm(m.scene.context, m.scene.angular_velocity) <= _SLOW * rate)

@@ -94,8 +94,8 @@ class GradientSource:
     pair: PointMassPair | None = None  # the point mass that it is, and the one that the body is
 
     def distance(self, context: Any) -> Any:
-        """Semi-major axis (that of the start for a point mass, or else the least distance of one that isn't
-        bound), distance of a source at rest, or mean distance of the series, m (mpf).
+        """Semi-major axis (for a point mass that of the start, or the least distance of one that isn't
+        bound), or distance of a source at rest, or mean distance of the series, m (mpf).
         """
         if self.orbit is not None:
             return self.orbit.semi_major_axis

@@ -166,16 +166,10 @@ def carries_sign(m: Kinematics) -> bool:
 
 def state_names(m: Kinematics, names: Collection[str], *, clocked: bool = True) -> dict[str, Any]:
     """Expressions in SI units for the names that a user's expression reads; a ``TwoPartTime`` where the time
-    takes two numbers.
+    takes two numbers, and ``clocked``.
 
     Parameters ``par[..]`` stand for what the state alone doesn't tell: after the sides of the surfaces, the
     full turns of angles, then the sign of the quaternion, then the second number of the time.
-
-    Args:
-        clocked: False to have the time as one number in any case.
-
-    Raises:
-        KeyError: a name that the scene doesn't carry.
     """
     context, scaling = m.scene.context, m.scaling
 

@@ -170,8 +170,8 @@ class _Samples:
         self._uniform = np.searchsorted(self._times, uniform)
 
     def _compiled(self, expressions: Sequence[Symbolic]) -> Callable[[np.ndarray, np.ndarray], np.ndarray]:
-        """Function of times (t,) and states (names, s) that returns values (expressions, t, s), with 0 for
-        values that are not finite.
+        """Function of times (t,) and states (names, s) to values (expressions, t, s), 0 if they aren't
+        finite.
         """
         function = hy.cfunc(list(expressions), list(hy.make_vars(*self._names)), compact_mode=True)
 
@@ -202,9 +202,7 @@ class _Samples:
         return _Sampled(values, most, float(size.max()) / fastest if fastest > 0 else np.inf)
 
     def impulse(self, values: np.ndarray) -> np.ndarray:
-        """Running integral over time of a vector's mean over the states, shape (3, times); zero if it is only
-        noise.
-        """
+        """Running integral of a vector's mean over the states, shape (3, times); zero if it is only noise."""
         means, size = values.mean(axis=2), np.sqrt((values**2).sum(axis=0).mean(axis=1))
         steps = np.diff(self._times)
         sums = np.cumsum((means[:, 1:] + means[:, :-1]) / 2 * steps, axis=1)
@@ -215,9 +213,7 @@ class _Samples:
         return total if np.linalg.norm(total, axis=0).max() > noise else np.zeros_like(total)
 
     def _pulses(self, narrow: list[Symbolic], times: np.ndarray) -> list[np.ndarray]:
-        """Times on a logarithmic grid around the zeros of arguments, found by Newton's method from the other
-        times.
-        """
+        """Times on a logarithmic grid around the zeros of arguments, which Newton's method finds."""
         found = []
         for u in narrow:
             argument, at = self._compiled([u, _by_time(u)]), times

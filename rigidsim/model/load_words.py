@@ -46,9 +46,7 @@ def source_text(strength: Any) -> str:
 
 
 def reach_text(strength: Any, *distances: Any) -> str:
-    """Distance, or least and largest distance (m), from the centre of a body of a gravitational parameter,
-    and the altitude if it is a known one.
-    """
+    """Distance, or least and largest distance (m), from a body's centre, and the altitude of a known one."""
     lengths = [float(x) for x in distances]
     if lengths[-1] - lengths[0] < _EVEN * lengths[-1]:
         lengths = lengths[:1]
@@ -62,9 +60,7 @@ def reach_text(strength: Any, *distances: Any) -> str:
 
 
 def orbit_text(orbit: KeplerOrbit, strength: Any) -> str:
-    """An orbit's size, altitude, periods and inclination, about a body of a gravitational parameter
-    (m^3/s^2).
-    """
+    """An orbit's size, altitude, periods and inclination, about a body of a G M (m^3/s^2)."""
     mean, e = float(orbit.semi_major_axis), float(orbit.eccentricity)
     shape = "circular" if orbit.circular else "eccentric"
     reach = reach_text(strength, *([mean] if orbit.circular else [mean * (1 - e), mean * (1 + e)]))

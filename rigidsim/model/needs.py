@@ -37,9 +37,7 @@ class Need:
 
 
 def work_is_needed(m: Mechanics) -> bool:
-    """Whether the energy balance is checked by integrating power: where energy isn't conserved and no Jacobi
-    constant of a single load takes its place.
-    """
+    """Whether the loads' power is integrated: energy isn't conserved, and there is no Jacobi constant."""
     has_jacobi = m.attitude is not None and len(m.loads) == 1 and corotating_orbit_of(m.loads[0]) is not None
     return _has_energy(m) and not m.conserves_energy and not has_jacobi and m.power is not None
 
@@ -86,9 +84,7 @@ def _with_axis(found: Callable[[Mechanics], Vector | None]) -> Need:
 
 
 def _isotropic_damping(m: Mechanics) -> bool:
-    """Whether the body turns and every load that exerts a torque is a damping, with coefficients that add up
-    to a multiple of the inertia tensor.
-    """
+    """Whether the body turns, under dampings alone that add up to a multiple of the inertia tensor."""
     found = [load.damping() if isinstance(load, Damping) else None for load in m.turning]
     at_rest = all(w == 0 for w in m.scene.angular_velocity)
     if m.carriers or not found or any(c is None for c in found) or at_rest:

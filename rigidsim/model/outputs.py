@@ -58,11 +58,7 @@ class Invariant:
 
 
 def recorded_variables(m: Mechanics, record: Sequence[str] | None) -> tuple[list[Recorded], list[Symbolic]]:
-    """The variables of the dataset, and the expressions of all their components.
-
-    Raises:
-        ConfigError: a requested variable doesn't exist in this scene.
-    """
+    """The variables of the dataset, and all their components; what a scene lacks is refused."""
     recorded: list[Recorded] = []
     outputs: list[Symbolic] = []
     for observable in OBSERVABLES.values():

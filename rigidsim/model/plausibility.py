@@ -54,9 +54,7 @@ def implied_strength(orbit: KeplerOrbit) -> float:
 
 
 def about_strength(given: ExactNumber, distance: float, where: str) -> Iterator[Caution]:
-    """A gravitational parameter without a unit that is a known body's in km^3/s^2; the distance (m) tells
-    that from one of a scene without units.
-    """
+    """A known body's G M in km^3/s^2 without a unit, which the distance (m) makes plausible."""
     body = _in_kilometres(float(given), distance) if given.assumed else None
     if body is not None:
         known = f"{body.owner} is {body.gravitational_parameter / _CUBIC_KILOMETRE:.6g} km^3/s^2"
@@ -69,9 +67,7 @@ def attracting(given: ExactNumber, distance: float) -> KnownBody | None:
 
 
 def _meant_body(given: ExactNumber) -> KnownBody | None:
-    """The known body whose gravitational parameter is given, as far as the number's own digits tell: ``4e14``
-    is the Earth's, 4.001736482e14 isn't.
-    """
+    """The known body that a number means, as far as its digits tell: 4e14 the Earth, 4.001736482e14 none."""
     value = float(given)
     body = known_body(value)
     if body is None:

@@ -28,14 +28,7 @@ _NOISE = 1e-9  # of the largest component: far above rounding, far below any loa
 
 
 def refuse_odd_loads(scene: Scene, requirements: Requirements, loads: Sequence[Load]) -> None:
-    """Refuse a load that differs between q and -q, by evaluating torques and forces at random states.
-
-    Args:
-        loads: those given by expressions or from Python.
-
-    Raises:
-        ConfigError: a load is odd; names it, what was found, and what to write instead.
-    """
+    """Refuse a load, given by expressions or from Python, that differs between q and -q at random states."""
     for load in loads:
         if "attitude" not in load.reads or not requirements.attitude:
             continue
@@ -63,12 +56,7 @@ def refuse_odd_loads(scene: Scene, requirements: Requirements, loads: Sequence[L
 
 
 def refuse_second_orbits(scene: Scene, loads: Sequence[Load]) -> None:
-    """Refuse the gravity gradient of a source whose place the scene integrates already: it would follow an
-    orbit of its own, and act twice.
-
-    Raises:
-        ConfigError: a gradient has the gravitational parameter of a carried source; says what to give.
-    """
+    """Refuse the gradient of a source whose place is integrated already: it would act twice."""
     where, bodies = "[[loads]] gravity_gradient", scene.bodies
     pulling = [load for load in loads if "flight" in load.reads]
     attractors = [x for load in pulling if (x := getattr(load, "gravitational_parameter", None)) is not None]

@@ -58,9 +58,7 @@ quaternion_from_euler = _HEYOKA.quaternion_from_euler
 def quaternion_from_matrix(r: SymbolicMatrix, *, differentiable: bool = False) -> list[Symbolic]:
     """Quaternion of R up to sign; the component with the largest square is selected at evaluation.
 
-    Args:
-        differentiable: whether to keep branches that aren't selected finite: heyoka's derivative of a
-            selection multiplies them by zero.
+    If ``differentiable``, other branches stay finite: heyoka's derivative multiplies them by zero.
     """
     squares, pairs = rotations.shepperd(r)
     if differentiable:  # the largest is at least 1

@@ -143,10 +143,7 @@ class BoundsFlight(Protocol):
 
     def flight_bounds(self, scene: Scene, fed: Any) -> tuple[Any, Any] | None:
         """Largest distance from the origin (m) and speed (m/s) of a body that flies under this load alone;
-        None if it doesn't bound the flight.
-
-        Args:
-            fed: speed that loads of unknown size are estimated to add, m/s.
+        None if it doesn't bound the flight. Loads of unknown size add ``fed`` (m/s) to the speed.
         """
 
 

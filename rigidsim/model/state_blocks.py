@@ -102,41 +102,27 @@ class OrbitalFrame:
 
 @dataclass(frozen=True)
 class AttitudeStates:
-    """The part of a system of equations that carries the attitude.
+    """The part of a system of equations that carries the attitude; the first three as in ``StateBlock``.
 
-    Attributes:
-        names, derivatives, initial: see ``StateBlock``.
-        matrix: R, body to space, as expressions of the states.
-        quaternion: [w, x, y, z] as expressions; see ``quaternion_sign``.
-        quaternion_sign: how it is made continuous: "state" (it is one), "wrapping" (it changes sign with
-            each full turn of an angle) or "nearest" (the sign nearest to the sample before).
-        angles: indices in ``names`` of states that are angles and grow without bound.
-        defect: name, long name and expression of what should stay constant by construction, or None.
-        singular_factor: expression that vanishes where the states are singular, or None.
-        sequence: sequence of Euler angles, if that is what the states are.
-        orbital: the orbital frame, if the states are the attitude relative to it; else None.
-        angle_unit: binary exponent of the unit in which such angles are carried, rad.
-        chord: angle (rad) between attitudes whose states are at a small distance of 1, if it is the same
-            everywhere; else None.
-        momenta: names of further states of the rotation that are in the place of the body rates.
-        observables: those recorded by default because the states tell them directly.
+    The quaternion is made continuous as ``quaternion_sign`` says: "state" (it is one), "wrapping" (it changes
+    sign with each full turn of an angle) or "nearest" (the sign nearest to the sample before).
     """
 
     names: list[str]
     derivatives: list[Symbolic]
     initial: list[Any]
-    matrix: SymbolicMatrix
-    quaternion: list[Symbolic]
+    matrix: SymbolicMatrix  # R, body to space, as expressions of the states
+    quaternion: list[Symbolic]  # [w, x, y, z] as expressions
     quaternion_sign: str
-    angles: tuple[int, ...] = ()
-    defect: tuple[str, str, Symbolic] | None = None
-    singular_factor: Symbolic | None = None
-    sequence: str = ""
-    orbital: OrbitalFrame | None = None
-    angle_unit: int = 0
-    chord: float | None = None
-    momenta: tuple[str, ...] = ()
-    observables: tuple[str, ...] = ()
+    angles: tuple[int, ...] = ()  # indices in ``names`` of states that are angles and grow without bound
+    defect: tuple[str, str, Symbolic] | None = None  # name, long name and value of what stays by construction
+    singular_factor: Symbolic | None = None  # vanishes where the states are singular
+    sequence: str = ""  # of Euler angles, if that is what the states are
+    orbital: OrbitalFrame | None = None  # if the states are the attitude relative to it
+    angle_unit: int = 0  # binary exponent of the unit in which such angles are carried, rad
+    chord: float | None = None  # rad between attitudes at a small distance of 1, if the same everywhere
+    momenta: tuple[str, ...] = ()  # further states of the rotation in the place of the body rates
+    observables: tuple[str, ...] = ()  # recorded by default because the states tell them directly
 
     @property
     def variables(self) -> list[Symbolic]:

@@ -39,11 +39,7 @@ _CLOCK = "t_of_pace"  # stands in for the time, by which heyoka doesn't differen
 
 
 def pace_block(m: Mechanics, before: StateBlock) -> list[StateBlock]:
-    """The state that keeps steps from passing over a pulse or a switch; none if nothing has either.
-
-    Args:
-        before: all other states.
-    """
+    """The state that keeps steps from passing over a pulse or a switch in ``before``; none without."""
     watched = _arguments(m)
     rooted = [(load.title, v) for load in m.loads if isinstance(load, Rooted) for v in load.roots(m)]
     if not (watched or rooted):
@@ -73,10 +69,7 @@ def _arguments(m: Mechanics) -> list[tuple[str, Symbolic]]:
 
 
 def _along_the_motion(u: Symbolic, derivatives: Mapping[str, Symbolic]) -> Symbolic:
-    """Time derivative of an expression of time and the states, internal units.
-
-    Any other variable in it is a swept number, which doesn't change along a motion.
-    """
+    """Time derivative of an expression, internal units; any swept number in it is constant along a motion."""
     by_time, by_state = slopes(u)
     terms = [slope * derivatives[name] for name, slope in by_state.items() if name in derivatives]
     return hy.sum([*terms, *by_time]) if terms or by_time else hy.expression(0.0)

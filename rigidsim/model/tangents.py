@@ -44,9 +44,7 @@ def own_names(m: Mechanics) -> list[str]:
 
 
 def moving_names(own: Iterable[str], reads: Mapping[str, set[str]]) -> set[str]:
-    """States whose offsets are offsets of the motion: the body's own, and those coupled to it both ways (such
-    as a load with a memory), by the names in the derivative of each state.
-    """
+    """States whose offsets are the motion's: the body's own, and those coupled to it both ways."""
     own = set(own)
     acting = _reached(own, reads)
     read_by = {name: {other for other in reads if name in reads[other]} for name in reads}
@@ -95,9 +93,7 @@ def tangent_block(m: Mechanics, before: Sequence[StateBlock]) -> StateBlock:
 def _varied(
     states: Sequence[Symbolic], rights: Sequence[Symbolic], along: Sequence[Symbolic]
 ) -> list[Symbolic]:
-    """Rates of a tangent vector of x' = f(x): the derivatives of f (``rights``) along it; whatever else f
-    contains counts as constant.
-    """
+    """Rates of a tangent vector of x' = f(x): derivatives of f (``rights``) along it; others are constant."""
     others = sorted({name for right in rights for name in hy.get_variables(right)} - set(map(str, states)))
     constants = {hy.make_vars(name): hy.par[n] for n, name in enumerate(others)}
     rights = hy.subs(list(rights), constants) if constants else list(rights)
@@ -110,12 +106,11 @@ def _varied(
 
 
 def _of_a_turn(m: Mechanics, names: Sequence[str], rights: Sequence[Symbolic]) -> list[Symbolic] | None:
-    """Rates of the tangent vector of a planar motion whose torque depends on its angle only through vectors
-    of space seen from the body; None for any other motion.
+    """Rates of the tangent vector of a planar motion whose torque sees its angle in vectors of space alone,
+    or None.
 
-    Seen from a body that turns about its axis k, such a vector c has dc/d(angle) = -k x c: its components are
-    its own derivatives. Written with them, the derivative of a gravity gradient's torque takes four products
-    of series instead of nine.
+    Seen from a body that turns about its axis k, such a vector c has dc/d(angle) = -k x c: written with its
+    own components, the derivative of a gradient's torque takes four products of series instead of nine.
     """
     about = _axis_of_turn(m) if list(names) == [ANGLE, SPIN] else None
     if about is None or m.attitude is None:

@@ -52,14 +52,7 @@ class Averaged(Formulation):
 
     @classmethod
     def along(cls, scene: Scene, loads: Sequence[Load], along: Average | None) -> Averaged:
-        """The average of a scene.
-
-        Args:
-            along: the average, already chosen, of a motion that this scene is a part of.
-
-        Raises:
-            ConfigError: the scene can't be averaged, or what is recorded needs every rotation.
-        """
+        """The average of a scene, or the one already chosen of a motion that the scene is a part of."""
         average = average_of(scene, loads, replace(choose_scaling(scene), rates=(0, 0, 0)), along)
         _refuse_untold(average, scene.config.output.record)
         refuse_without_plane(scene, loads)
@@ -147,11 +140,7 @@ def _amplitudes(m: DrivenMechanics) -> StateBlock:
 
 
 def _refuse_untold(average: Average, record: Sequence[str] | None) -> None:
-    """Refuse observables that an averaged motion can't provide.
-
-    Raises:
-        ConfigError: names a recorded variable that needs every rotation resolved.
-    """
+    """Refuse observables that need every rotation resolved."""
     for name in record or ():
         if name in _OF_FIGURE and not average.figure:
             why = "the body tumbles, so that its figure axis points nowhere on average; record momentum_axis "

@@ -108,11 +108,7 @@ def _initial_momenta(scene: Scene, scaling: Scaling, angles: list[Any]) -> list[
 
 
 def _hamilton_equations(m: Mechanics) -> list[Symbolic]:
-    """Right-hand sides for the three angles, then the three momenta.
-
-    Raises:
-        ConfigError: a load without a potential.
-    """
+    """Right-hand sides of the three angles and momenta; refused for a load without a potential."""
     if beside := carried_beside(m.loads):
         what = f'given "canonical", but {beside}; choose another formulation'
         raise ConfigError(Problem("[integrator] formulation", what))

@@ -35,12 +35,7 @@ ANGLES = ["phi", "theta", "psi"]
 
 @formulates(FORMULATIONS["euler_angles"])
 class EulerAngles(Formulation):
-    """The angles of one sequence.
-
-    Args:
-        sequence: sequence of the angles that are states.
-        partner: the same motion in the partner sequence; None if this is the partner.
-    """
+    """The angles of one sequence, with the same motion in the partner sequence, unless this is that one."""
 
     rounding = Rounding.ANGLES
 

@@ -88,11 +88,8 @@ class OrbitalQuaternion(Formulation):
 def _in_space(
     plane: list[Any], half: list[Symbolic], relative: SymbolicMatrix, p: list[Symbolic], number: Rounder
 ) -> tuple[SymbolicMatrix, list[Symbolic]]:
-    """R and the quaternion in space, for those relative to the orbital frame.
-
-    Args:
-        plane: quaternion of the orbit's plane.
-        half: cosine and sine of half the angle that the frame has turned by.
+    """R and the quaternion in space, for those relative to the orbital frame, from the quaternion of the
+    orbit's plane, and cosine and sine of half the angle that the frame has turned by.
     """
     c, s = half
     w, x, y, z = p

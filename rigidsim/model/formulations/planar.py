@@ -41,14 +41,9 @@ control is relative), however often the body has turned.
 
 @formulates(FORMULATIONS["planar"])
 class Planar(Formulation):
-    """The angle and its rate.
+    """The angle (initially ``angle``, mpf) about a principal axis (unit, body axes), and its rate.
 
-    Args:
-        axis: principal axis that the body turns about, unit, body axes (mpf).
-        origin: quaternion from which the angle counts: the smallest rotation that takes the axis to its
-            direction in space.
-        angle: initial angle, rad (mpf).
-        why: what speaks for it where it wasn't asked for.
+    It counts from ``origin``, the smallest rotation that takes the axis to its direction in space.
     """
 
     carries_rates = False
@@ -125,11 +120,7 @@ class Planar(Formulation):
 
 
 def _plane_of(scene: Scene, loads: Sequence[Load]) -> tuple[Vector, Vector, Any]:
-    """Axis, origin and angle of a motion that stays in a plane.
-
-    Raises:
-        Unsuited: the motion isn't known to stay in a plane; says why.
-    """
+    """Axis, origin and angle of a motion that stays in a plane; ``Unsuited`` where that isn't known."""
     if scene.free_flight:
         raise Unsuited("the body has a position and flies")
     if beside := carried_beside(loads):

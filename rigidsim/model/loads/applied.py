@@ -176,8 +176,8 @@ class Applied(Load):
         return self.arm, [value.at(scene.context) for value in found]
 
     def turns_about(self, m: Kinematics, axis: Vector) -> bool:
-        """Whether it may have a torque about the axis, as far as components in space axes tell: a torque has
-        none if it has no component along the axis, a force if it has no other.
+        """As far as components in space axes tell: a torque has none about the axis without a component along
+        it, a force without any other.
         """
         if self.frame != "space":
             return True

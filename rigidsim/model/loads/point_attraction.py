@@ -59,12 +59,10 @@ class PointAttraction(Load):
         return m.scene.context.ldexp(self.strength, extra - length_power * m.scaling.length)
 
     def pull(self, m: Kinematics, *, as_point: bool) -> tuple[list[Symbolic], list[Symbolic]]:
-        """Minus the body's acceleration, as a sum of parts along the direction and along R I c:
+        """Minus the body's acceleration, with or without that as a point, in parts along the direction and R
+        I c:
 
-        (G M / r^2 + (3 G M / 2 m r^4) (tr I - 5 c . I c)) R c  and  (3 G M / m r^4) R I c.
-
-        Args:
-            as_point: whether the first part includes the attraction of the body as a point.
+        (G M / r^2 + (3 G M / 2 m r^4) (tr I - 5 c . I c)) R c and (3 G M / m r^4) R I c.
         """
         space, inverse = self.seen(m)
         body, scaling = apply(transpose(m.matrix), space), m.scaling
@@ -127,9 +125,7 @@ class MovingSource(PointAttraction):
 
     @property
     def wide(self) -> bool:
-        """Whether there are three or more masses: their equations take ten seconds to compile unrolled, one
-        otherwise.
-        """
+        """Whether there are three or more masses, whose equations take ten seconds to compile unrolled."""
         return len(self.masses.names) > _UNROLLED
 
     @property

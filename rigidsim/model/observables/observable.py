@@ -136,12 +136,8 @@ def continuous_angles(
     by_default: Callable[[Mechanics], bool] = only_when_named,
     **more: Any,
 ) -> Observable:
-    """An observable of angles, in rad, whose full turns are counted along the motion, however far apart the
-    samples are.
-
-    Args:
-        angles: one for each component.
-        more: ``frame``, ``needs``, ``steady``, ``attributes`` and ``absent`` of ``Observable``.
+    """An observable of angles (one per component), in rad, whose full turns are counted along the motion,
+    however far apart the samples are; ``more`` as for ``Observable``.
     """
     values = lambda m: [angle.value for angle in angles(m)]  # noqa: E731
     return Observable(

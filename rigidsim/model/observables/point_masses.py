@@ -36,9 +36,7 @@ def _kilograms(m: Mechanics) -> Vector:
 
 
 def _moving(m: Mechanics) -> list[tuple[Any, list[Symbolic], list[Symbolic], Vector, Vector]]:
-    """Mass, position and velocity (as expressions, and at the start) of everything that moves, including the
-    body if it flies and the masses feel it.
-    """
+    """Mass, position, velocity (now and at the start) of all that moves, with a body that they feel."""
     states, masses = m.carried(m.point_masses), _masses(m)
     states_, starts = (states.positions, states.velocities), (masses.positions, masses.velocities)
     found = list(zip(_kilograms(m), *states_, *starts, strict=True))

@@ -74,9 +74,7 @@ def _rotation_angle(m: Mechanics) -> list[Angle]:
     north, upright = _senses(m)
 
     def seen(vector: list[Symbolic], sign: int = 1) -> list[Symbolic]:
-        """Components along X', Y', n, or along X', -Y', -n for sign -1, so that the momentum's last one is
-        positive.
-        """
+        """Components along X', Y', n, or X', -Y', -n for sign -1, so that the momentum's last is positive."""
         x, y, z = plane.components(vector)
         signs = (sign, sign * north, sign * north)
         return [a if s > 0 else -a for a, s in zip((x, y, z), signs, strict=True)]
@@ -91,9 +89,7 @@ def _rotation_angle(m: Mechanics) -> list[Angle]:
 
 
 def _rotation_sum(m: Mechanics) -> str:
-    """The rotation angle as a sum of Andoyer's: seen from the side on which the momentum is, h and l count
-    backwards if that isn't the normal's, or the figure axis'.
-    """
+    """The rotation angle as a sum of Andoyer's: h and l count backwards on the momentum's other side."""
     north, upright = _senses(m)
     if north > 0 and upright > 0:
         return "h + g + l"
@@ -155,9 +151,7 @@ def _polar_motion(m: Mechanics) -> list[Symbolic]:
 
 
 def _no_polar_motion(m: Mechanics) -> str | None:
-    """Why there is no polar motion: the spin starts outside the cone about the figure axis where it is
-    recorded.
-    """
+    """Why there is no polar motion: the spin starts outside the cone where it is recorded."""
     context, figure = m.scene.context, m.scene.figure
     aligned = abs(dot(m.scene.angular_velocity, figure.pole))
     across = norm(context, [dot(m.scene.angular_velocity, e) for e in (figure.first, figure.second)])

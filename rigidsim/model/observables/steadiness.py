@@ -43,9 +43,7 @@ _FAST = 10
 
 
 def _turns_about_its_figure(m: Mechanics) -> bool:
-    """Whether the body starts turning nearly about its figure axis (that of largest moment, or of
-    symmetry).
-    """
+    """Whether the body starts turning nearly about its figure axis, a principal one."""
     scene, context = m.scene, m.scene.context
     spin, pole = scene.angular_velocity, scene.figure.pole
     if all(w == 0 for w in spin):
@@ -63,9 +61,7 @@ def _moves(load: Load) -> bool:
 
 
 def is_planet(m: Mechanics) -> bool:
-    """Whether the scene is a fast spin that precesses under the gravity gradient of an orbiting or ephemeris
-    body.
-    """
+    """Whether a fast spin precesses under gravity gradients of orbiting or ephemeris bodies."""
     if m.attitude is None or not m.turning:
         return False
     distant = [x for x in m.turning if _moves(x)]

@@ -55,9 +55,7 @@ class PointMassStates:
         return [b - a for a, b in zip(self.positions[i], self.positions[j], strict=True)]
 
     def react(self, pulls: list[tuple[int, Any, list[Symbolic]]]) -> None:
-        """Add accelerations besides the mutual attraction of the points: of some masses (by index), as a
-        number (mpf) times expressions in units of speed over time.
-        """
+        """Add accelerations of masses (by index): numbers (mpf) times expressions, in speed over time."""
         self._pulls = pulls
 
     def _accelerations(self) -> list[list[Symbolic]]:
@@ -157,9 +155,7 @@ class PointMassPair:
         return self.masses.encounter(context, self.host, self.number)
 
     def perturbation(self, context: Any) -> float:
-        """Sum of the accelerations by which the other masses change the relative motion, each with its own
-        sign left out, over the mutual attraction.
-        """
+        """Sum of the sizes of what other masses change the relative motion by, over the mutual attraction."""
         distance, total = norm(context, self.place), 0.0
         for other, strength in enumerate(self.masses.strengths):
             if other in (self.host, self.number):
