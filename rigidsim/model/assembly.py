@@ -9,8 +9,8 @@ import heyoka as hy
 from rigidsim.model.capabilities import Reacting, having, orbit_of, table_of
 from rigidsim.model.formulations.formulation import Formulation, ModelPlan
 from rigidsim.model.mechanics import Mechanics
-from rigidsim.model.needs import work_is_needed
 from rigidsim.model.observables.mechanical import WORK
+from rigidsim.model.observables.observable import work_is_needed
 from rigidsim.model.scaling import Rounder
 from rigidsim.model.state_blocks import BODY, StateBlock, joined
 from rigidsim.model.step_limiter import pace_block

@@ -1,4 +1,4 @@
-"""Observables: one entry from a name to its expressions, and how its samples are joined.
+"""Observables: one entry from a name to its expressions, how its samples are joined, and what it needs.
 
 A new observable is one ``Observable`` in a list of this package. A new invariant is an observable whose
 ``conserved`` says when and why it holds. Angles that may turn around are ``continuous_angles``. Each then
@@ -9,16 +9,147 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import heyoka as hy
 
+from rigidsim.model import fixed_axes
+from rigidsim.model.capabilities import Attracting, Damping, corotating_orbit_of
 from rigidsim.model.euler_poles import Poles
-from rigidsim.model.frames import reference_plane
+from rigidsim.model.first_integrals import goryachev_chaplygin_top, kovalevskaya_top
+from rigidsim.model.frames import (
+    first_source,
+    flies_about_source,
+    flies_in_plane,
+    reference_plane,
+    rotating_orbit,
+)
+from rigidsim.model.load import loads_of
 from rigidsim.model.mechanics import Mechanics
-from rigidsim.model.needs import NEEDS
 from rigidsim.model.rotations import Symbolic
+from rigidsim.scene.arithmetic import Vector, negligible
+from rigidsim.scene.choices import variables_named
 from rigidsim.scene.registry import register_observable
+from rigidsim.scene.scene import Scene
+
+
+def _unless(possible: Callable[[Scene], object], why: str) -> Callable[[Scene, str], str | None]:
+    return lambda scene, _: None if possible(scene) else why
+
+
+def _flight_of_a_free_body(scene: Scene) -> str | None:
+    return "flight" if scene.free_flight else None
+
+
+@dataclass(frozen=True)
+class Need:
+    """One thing that observables may need: whether it is met, the states that must be carried for it
+    ("attitude", "flight" or None), and why a scene in a formulation can't have it, if that is seen at once.
+    """
+
+    met: Callable[[Mechanics], bool]
+    states: Callable[[Scene], str | None] = lambda _: None
+    missing: Callable[[Scene, str], str | None] = lambda scene, formulation: None
+
+
+def work_is_needed(m: Mechanics) -> bool:
+    """Whether the loads' power is integrated: energy isn't conserved, and there is no Jacobi constant."""
+    has_jacobi = m.attitude is not None and len(m.loads) == 1 and corotating_orbit_of(m.loads[0]) is not None
+    return _has_energy(m) and not m.conserves_energy and not has_jacobi and m.power is not None
+
+
+def _has_energy(m: Mechanics) -> bool:
+    return m.velocity is not None or not m.scene.free_flight
+
+
+def _no_attitude(scene: Scene, formulation: str) -> str | None:
+    if variables_named(formulation).keeps_attitude:
+        return None
+    return f'needs the attitude; choose another formulation than "{formulation}", such as "auto"'
+
+
+_NO_POSITION = _unless(
+    lambda scene: scene.free_flight,
+    "the scene has no position; give [initial] position or velocity, or leave it out",
+)
+_NO_POTENTIAL = _unless(
+    lambda scene: scene.loads or scene.torque_arm is not None or (scene.free_flight and scene.gravity),
+    "no load of the scene has a potential that varies; leave it out",
+)
+_NO_VERTICAL = _unless(
+    lambda scene: scene.torque_arm is not None,
+    "the scene has no load that marks a vertical; record angular_momentum instead",
+)
+_NO_POINT_MASSES = _unless(
+    lambda scene: scene.bodies is not None, "there are no [[bodies]]; add them, or leave it out"
+)
+_NO_SOURCE = _unless(
+    lambda scene: first_source(loads_of(scene)) is not None,
+    "no load has a source whose direction it would count from (gravity_gradient, central_gravity, or "
+    "magnetic_dipole with an orbit); leave it out",
+)
+
+
+def _sourced(m: Mechanics) -> bool:
+    load = first_source(m.loads) if m.attitude is not None else None
+    return load is not None and (not isinstance(load, Attracting) or m.velocity is not None)
+
+
+def _with_axis(found: Callable[[Mechanics], Vector | None]) -> Need:
+    return Need(lambda m: m.attitude is not None and found(m) is not None)
+
+
+def _isotropic_damping(m: Mechanics) -> bool:
+    """Whether the body turns, under dampings alone that add up to a multiple of the inertia tensor."""
+    found = [load.damping() if isinstance(load, Damping) else None for load in m.turning]
+    at_rest = all(w == 0 for w in m.scene.angular_velocity)
+    if m.carriers or not found or any(c is None for c in found) or at_rest:
+        return False
+    total = [sum((c[i] for c in found if c is not None), m.scene.context.zero) for i in range(3)]
+    inertia, k = m.scene.body.inertia, max(range(3), key=lambda i: m.scene.body.inertia[i][i])
+    wanted = [[total[k] / inertia[k][k] * x for x in row] for row in inertia]
+    differences = [(total[i] if i == j else 0) - wanted[i][j] for i in range(3) for j in range(3)]
+    return all(abs(d) <= total[k] * negligible(m.scene.context) for d in differences)
+
+
+NEEDS: dict[str, Need] = {
+    "attitude": Need(lambda m: m.attitude is not None, lambda _: "attitude", _no_attitude),
+    "flight": Need(lambda m: m.velocity is not None, lambda _: "flight", _NO_POSITION),
+    "vertical": Need(lambda m: m.vertical is not None and m.numbers.arm is not None, missing=_NO_VERTICAL),
+    "potential": Need(lambda m: m.potential_energy is not None, _flight_of_a_free_body, _NO_POTENTIAL),
+    "energy": Need(_has_energy, _flight_of_a_free_body),
+    "symmetry": Need(lambda m: m.symmetry_direction is not None),
+    "work": Need(work_is_needed),
+    "jacobi": Need(lambda m: m.attitude is not None and rotating_orbit(m) is not None),
+    "kovalevskaya": Need(lambda m: kovalevskaya_top(m) is not None),
+    "goryachev_chaplygin": Need(lambda m: goryachev_chaplygin_top(m) is not None),
+    "source_axis": _with_axis(fixed_axes.kept_source_axis),
+    "field_axis": _with_axis(fixed_axes.kept_field_axis),
+    **{
+        f"free_axis_{name}": _with_axis(partial(fixed_axes.free_axis, which=i))
+        for i, name in enumerate("xyz")
+    },
+    "isotropic_damping": Need(lambda m: m.attitude is not None and _isotropic_damping(m)),
+    "plane": Need(
+        lambda m: not flies_in_plane(m.scene, m.loads) or m.velocity is not None,
+        lambda scene: "flight" if flies_in_plane(scene, loads_of(scene)) else None,
+    ),
+    "source": Need(_sourced, lambda scene: "flight" if flies_about_source(scene) else None, _NO_SOURCE),
+    "place": Need(lambda m: not m.scene.free_flight or m.velocity is not None, _flight_of_a_free_body),
+    "sources": Need(lambda m: m.attitude is not None and fixed_axes.sources_alone(m)),
+    "several_sources": Need(lambda m: m.attitude is not None and fixed_axes.several_directions(m)),
+    "attracting_line": Need(
+        lambda m: (
+            m.velocity is not None and m.attitude is not None and fixed_axes.attracting_line(m) is not None
+        )
+    ),
+    "point_masses": Need(lambda m: m.scene.bodies is not None, missing=_NO_POINT_MASSES),
+    "free_fall": Need(lambda m: m.velocity is not None and fixed_axes.falls_freely(m)),
+    "attractor": Need(lambda m: m.velocity is not None and any(isinstance(x, Attracting) for x in m.loads)),
+}
+"""All needs, by the names that ``Observable.needs`` uses."""
+
 
 Dims = tuple[str, ...]
 BODY: Dims = ("body_axis",)
@@ -84,7 +215,7 @@ class Observable:
         frame: "body axes", "space axes" or "".
         expressions: components as expressions of the state, in internal units (see ``Kinematics``).
         exponents: binary exponents of the components' internal units; None where they are in SI or have none.
-        needs: what the scene must have; names in ``rigidsim.model.needs.NEEDS``.
+        needs: what the scene must have; names in ``rigidsim.model.observables.observable.NEEDS``.
         conserved: why it is an invariant of this scene, or None where it isn't.
         drift_scale: scale of its drift in SI (mpf), and the name of that scale.
         by_default: whether it is recorded if the config names nothing.
