@@ -39,14 +39,10 @@ class Decomposition:
 
     Attributes:
         sum: polynomial, and lines (of a real signal those of positive frequency: twice their real part).
-        order: order of the window.
         frequency_errors, amplitude_errors, polynomial_errors: one standard deviation each, from the remainder
             next to the line: turns per sample, and the signal's unit.
-        left: rms of the remainder.
-        level: median size of the windowed remainder's spectrum: lines below it aren't seen.
-        close: frequencies (turns per sample) at which something is left that is too close to a line, or to
-            the secular part, to be told apart.
-        exhausted: whether lines above the floor may be left since as many were found as asked for.
+        left, level: rms of the remainder; median size of its windowed spectrum, below which lines aren't
+        seen. close, exhausted: as of ``result.SignalAnalysis``, in turns per sample.
     """
 
     sum: Sum

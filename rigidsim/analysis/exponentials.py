@@ -75,14 +75,8 @@ class Grid:
 
 @dataclass(frozen=True)
 class Sum:
-    """A polynomial and a sum of exponentials.
-
-    Attributes:
-        context: mpmath context of the numbers.
-        count: number of samples.
-        polynomial: coefficients (mpc) of powers of 2 n / count, n counted from the middle.
-        frequencies: mpf, turns per sample.
-        amplitudes: amplitudes (mpc) at the middle.
+    """A polynomial (coefficients, mpc, of powers of 2 n / count, n counted from the middle of so many
+    samples), and exponentials of frequencies (mpf, turns per sample) with amplitudes (mpc) at the middle.
     """
 
     context: Any
@@ -115,11 +109,8 @@ class Sum:
         )
 
     def left_of(self, parts: Sequence[tuple[Reals, Reals]], bits: int) -> Complexes:
-        """A signal less this sum, in double precision.
-
-        Args:
-            parts: real and imaginary parts of the signal, (n,); its value is the sum over the list.
-            bits: bits of the signal's precision; beyond 53 the difference is taken in as many, rounded once.
+        """A signal, real and imaginary parts (n,) summed over the list, less this sum, in double precision;
+        with more bits than 53 the difference is taken in as many, and rounded once.
         """
         if bits <= 53:
             real, imaginary = parts[0]

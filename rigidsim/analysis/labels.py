@@ -131,32 +131,13 @@ def label(
     allowed: Reals = _SIGMAS * np.sqrt(error**2 + (vectors**2) @ errors**2) + _ROUNDING * np.max(
         np.abs(vectors * values), axis=1
     )
-    candidates = _Candidates(vectors, observed, turns, true, nyquist)
-    found = candidates.named(frequency, allowed, known, real=real)
-    if not found.multipliers and blend:
-        found = candidates.named(frequency, np.maximum(allowed, blend), known, real=real, blended=True)
-    return found
 
-
-@dataclass(frozen=True)
-class _Candidates:
-    """All combinations, the frequency at which each is observed, and the turns per sample lost by folding."""
-
-    vectors: NDArray[np.int64]
-    observed: Reals
-    turns: Reals
-    true: Reals
-    nyquist: float
-
-    def named(
-        self, frequency: float, allowed: Reals, known: Sequence[Known], *, real: bool, blended: bool = False
-    ) -> Label:
+    def simplest(allowed: Reals, *, blended: bool) -> Label:
         """The simplest combination that fits; others of nearly the same simplicity make it doubtful."""
-        vectors, turns = self.vectors, self.turns
-        fits = np.abs(self.observed - frequency) <= allowed
+        fits = np.abs(observed - frequency) <= allowed
         if real:
             # the mirror image has the opposite combination, which is in the list too
-            fits &= (turns != 0) | (self.true >= 0)
+            fits &= (turns != 0) | (true >= 0)
         found = np.flatnonzero(fits)
         if not len(found):
             return Label()
@@ -166,8 +147,11 @@ class _Candidates:
         best = found[0]
         if blended:  # a blend lies next to the strongest of its lines
             simple = found[cost <= cost[0] + _RIVALS]
-            best = simple[np.argmin(np.abs(self.observed[simple] - frequency))]
-        if self._by_chance(frequency, float(allowed[best]), int(cost[0])) > _CHANCE:
+            best = simple[np.argmin(np.abs(observed[simple] - frequency))]
+        # as many equally simple combinations fit by chance, given their density here
+        width: float = max(200 * float(allowed[best]), nyquist / 500)
+        near = (np.abs(observed - frequency) <= width) & (np.abs(vectors).sum(axis=1) <= cost[0])
+        if max(int(np.count_nonzero(near)) - 1, 0) * float(allowed[best]) / width > _CHANCE:
             return Label()
         rivals = [
             n
@@ -182,12 +166,10 @@ class _Candidates:
         multipliers = tuple(vectors[best].tolist())
         return Label(multipliers, named(multipliers, known), folds, others)
 
-    def _by_chance(self, frequency: float, allowed: float, cost: int) -> float:
-        """Expected number of equally simple combinations that fit by chance, given their density here."""
-        width: float = max(200 * allowed, self.nyquist / 500)
-        near = np.abs(self.observed - frequency) <= width
-        near &= np.abs(self.vectors).sum(axis=1) <= cost
-        return max(int(np.count_nonzero(near)) - 1, 0) * allowed / width
+    found = simplest(allowed, blended=False)
+    if not found.multipliers and blend:
+        found = simplest(np.maximum(allowed, blend), blended=True)
+    return found
 
 
 def reversed_label(name: Label, known: Sequence[Known]) -> Label:
@@ -203,8 +185,7 @@ def _same(one: NDArray[np.int64], other: NDArray[np.int64], real: bool) -> bool:
 def settled(known: Sequence[Known], lines: Mapping[str, Sequence[tuple[Any, float, float]]]) -> list[Known]:
     """Roughly known frequencies, replaced by the strongest line near them, or left out.
 
-    Args:
-        lines: for each signal's lines, frequency (rad/s), its error, and amplitude.
+    Of each signal's lines are given frequency (rad/s), its error, and amplitude.
     """
     found = []
     for one in known:

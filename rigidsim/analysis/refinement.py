@@ -20,14 +20,10 @@ CLOSEST = 0.6  # bins between lines below which Newton's method can't tell them 
 
 @dataclass(frozen=True)
 class SignalSamples:
-    """Equidistant samples of a signal.
+    """Equidistant samples of a signal: real and imaginary parts (n,), summed over the list.
 
-    Attributes:
-        parts: real and imaginary parts, (n,) float64; the value is the sum over the list.
-        real: whether the signal is real by definition.
-        bits: bits of the precision; the mpmath context has more.
-        late: by how much of a spacing samples are later than equidistant ones, (n,): times are rounded, in a
-            pattern that would show up as lines.
+    The mpmath context has more than the precision's bits. By so much of a spacing samples are late, (n,):
+    times are rounded, in a pattern that would show up as lines.
     """
 
     parts: tuple[tuple[Reals, Reals], ...]

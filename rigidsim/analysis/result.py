@@ -6,6 +6,7 @@ import json
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from operator import attrgetter
 from typing import TYPE_CHECKING, Any
 
 import mpmath
@@ -239,72 +240,65 @@ def _number(value: Any) -> Any:
 def _dataset(analysis: Analysis) -> xarray.Dataset:
     signals, known = analysis.signals, analysis.known
     longest = max((len(s.lines) for s in signals), default=0)
-    shape = (len(signals), longest)
-    parts = 1 if all(s.bits <= 53 for s in signals) else 3
-    dims = ("signal", "line")
     data: dict[str, tuple[Any, ...]] = {}
 
+    def put(name: str, dims: tuple[str, ...], values: Any, dtype: Any = np.float64, **told: str) -> None:
+        data[name] = (dims, np.array(values, dtype=dtype), told)
+
     def table(
-        name: str, units: str, long_name: str, of: Any = None, dtype: Any = np.float64, fill: Any = np.nan
+        name: str, units: str, words: str, of: Any, dtype: Any = np.float64, fill: Any = np.nan
     ) -> None:
-        values = np.full(shape, fill, dtype=dtype)
-        for row, signal in enumerate(signals):
-            values[row, : len(signal.lines)] = [
-                getattr(line, name) if of is None else of(line) for line in signal.lines
-            ]
-        data[name] = (dims, values, {"units": units, "long_name": long_name})
+        of = attrgetter(of) if isinstance(of, str) else of
+        rows = [[of(line) for line in s.lines] + [fill] * (longest - len(s.lines)) for s in signals]
+        values = np.array(rows, dtype=dtype).reshape(len(signals), longest)
+        put(name, ("signal", "line"), values, dtype, units=units, long_name=words)
+
+    def along(name: str, units: str, words: str, of: Any, dtype: Any = np.float64) -> None:
+        of = attrgetter(of) if isinstance(of, str) else of
+        put(name, ("signal",), [of(s) for s in signals], dtype, units=units, long_name=words)
 
     def remainder(value: Any, part: int) -> float:
         return float(value) if part == 0 else remainder(value - float(value), part - 1)
 
-    for part in range(parts):
+    def real(value: Any) -> float:
+        return np.nan if value is None else float(value.real)
+
+    for part in range(1 if all(s.bits <= 53 for s in signals) else 3):
         name = part_name("frequency", part)
         table(name, "rad s-1", "angular frequency", lambda x, p=part: remainder(x.frequency, p))
         if part:
             data[name][2]["residual_of"] = "frequency"
-    table("frequency_error", "rad s-1", "one standard deviation of the frequency")
-    table("observed_frequency", "rad s-1", "frequency before it was unfolded", lambda x: x.observed)
-    table("amplitude", "", "amplitude, in the signal's unit")
-    table("amplitude_error", "", "one standard deviation of the amplitude")
-    table("phase", "rad", "phase at time zero")
-    table("phase_error", "rad", "one standard deviation of the phase at mid-span")
-    table("mismatch", "rad s-1", "frequency less that of its label")
-    table("label", "", "combination of known frequencies", lambda x: x.label.text, object, "")
-    table("unfolded", "1", "1 where the frequency lies beyond Nyquist's", None, np.int8, 0)
-    table("ambiguous", "1", "1 where several combinations fit", None, np.int8, 0)
-    multipliers = np.zeros((*shape, len(known)), dtype=np.int64)
+    table("frequency_error", "rad s-1", "one standard deviation of the frequency", "frequency_error")
+    table("observed_frequency", "rad s-1", "frequency before it was unfolded", "observed")
+    table("amplitude", "", "amplitude, in the signal's unit", "amplitude")
+    table("amplitude_error", "", "one standard deviation of the amplitude", "amplitude_error")
+    table("phase", "rad", "phase at time zero", "phase")
+    table("phase_error", "rad", "one standard deviation of the phase at mid-span", "phase_error")
+    table("mismatch", "rad s-1", "frequency less that of its label", "mismatch")
+    table("label", "", "combination of known frequencies", "label.text", object, "")
+    table("unfolded", "1", "1 where the frequency lies beyond Nyquist's", "unfolded", np.int8, 0)
+    table("ambiguous", "1", "1 where several combinations fit", "ambiguous", np.int8, 0)
+    multipliers = np.zeros((len(signals), longest, len(known)), dtype=np.int64)
+    curves = np.full((2, len(signals), max((len(s.spectrum[0]) for s in signals), default=0)), np.nan)
     for row, signal in enumerate(signals):
         for column, line in enumerate(signal.lines):
-            if line.label.multipliers:
-                multipliers[row, column] = line.label.multipliers
-    data["multipliers"] = ((*dims, "known"), multipliers, {"units": "1", "long_name": "of known frequencies"})
-    data["known_frequency"] = (
-        ("known",), np.array([float(k.value) for k in known]),
-        {"units": "rad s-1", "long_name": "what labels are made of"},
-    )  # fmt: skip
-    data["known_source"] = (("known",), np.array([k.source for k in known], dtype=object), {"units": ""})
-
-    def along(name: str, values: list[Any], units: str, long_name: str, dtype: Any = np.float64) -> None:
-        data[name] = (("signal",), np.array(values, dtype=dtype), {"units": units, "long_name": long_name})
-
-    values = [np.nan if s.value is None else float(s.value.real) for s in signals]
-    rates = [np.nan if s.rate is None else float(s.rate.real) for s in signals]
-    errors = [s.rate_error for s in signals]
-    along("signal_units", [s.units for s in signals], "", "unit of the signal", object)
-    along("real", [int(s.real) for s in signals], "1", "1 of a real signal", np.int8)
-    along("secular_value", values, "", "secular part at mid-span")
-    along("secular_rate", rates, "", "rate of the secular part, per s")
-    along("secular_rate_error", errors, "", "one standard deviation of the rate, per s")
-    along("left", [s.left for s in signals], "", "rms of what is left without lines and secular part")
-    along("noise_level", [s.level for s in signals], "", "amplitude below which lines aren't seen")
-    along("window_order", [s.order for s in signals], "1", "order of the Hann window", np.int64)
-    size = max((len(s.spectrum[0]) for s in signals), default=0)
-    curves = np.full((2, len(signals), size), np.nan)
-    for row, signal in enumerate(signals):
+            multipliers[row, column] = line.label.multipliers or 0
         for which in (0, 1):
             curves[which, row, : len(signal.spectrum[which])] = signal.spectrum[which]
-    data["spectrum_frequency"] = (("signal", "spectrum"), curves[0], {"units": "rad s-1"})
-    data["spectrum_amplitude"] = (("signal", "spectrum"), curves[1], {"long_name": "windowed amplitude"})
+    dims, words = ("signal", "line", "known"), "what labels are made of"
+    put("multipliers", dims, multipliers, np.int64, units="1", long_name="of known frequencies")
+    put("known_frequency", ("known",), [float(k.value) for k in known], units="rad s-1", long_name=words)
+    put("known_source", ("known",), [k.source for k in known], object, units="")
+    along("signal_units", "", "unit of the signal", "units", object)
+    along("real", "1", "1 of a real signal", "real", np.int8)
+    along("secular_value", "", "secular part at mid-span", lambda s: real(s.value))
+    along("secular_rate", "", "rate of the secular part, per s", lambda s: real(s.rate))
+    along("secular_rate_error", "", "one standard deviation of the rate, per s", "rate_error")
+    along("left", "", "rms of what is left without lines and secular part", "left")
+    along("noise_level", "", "amplitude below which lines aren't seen", "level")
+    along("window_order", "1", "order of the Hann window", "order", np.int64)
+    put("spectrum_frequency", ("signal", "spectrum"), curves[0], units="rad s-1")
+    put("spectrum_amplitude", ("signal", "spectrum"), curves[1], long_name="windowed amplitude")
     attributes = {
         "title": analysis.title,
         "source": "rigidsim analyse",

@@ -44,13 +44,8 @@ FIRST = (
 
 @dataclass(frozen=True)
 class EquidistantTimes:
-    """Equidistant times of samples.
-
-    Attributes:
-        start, spacing: mpf, s.
-        count: number of samples.
-        bits: bits of the times' precision.
-        late: what their rounding adds to equidistant times, in spacings, (n,); None beyond double precision.
+    """Equidistant times of samples, in mpf, s; their rounding makes them late by so many spacings, (n,),
+    which is None beyond double precision.
     """
 
     start: Any
@@ -146,14 +141,8 @@ def bits_of(dataset: xarray.Dataset, parts: int) -> int:
 
 @dataclass(frozen=True)
 class Signal:
-    """A sampled real or complex function of time.
-
-    Attributes:
-        name: variable and components: ``polar_motion.m1+i.m2``, ``obliquity.figure``.
-        variable: variable it is made of.
-        units: units of its values.
-        real: whether it is real.
-        degree: degree of the secular polynomial; -1 for none.
+    """A sampled real or complex function of time, named by its variable and components, such as
+    ``polar_motion.m1+i.m2``, with the degree of its secular polynomial (-1: none).
     """
 
     name: str
@@ -217,13 +206,9 @@ def signals_of(dataset: xarray.Dataset, chosen: Sequence[str] = ()) -> list[Sign
                 )
             found += [s for s in matching if s not in found]
         return found
-    by_default = [s for s in offered if s.variable in FIRST and _of_figure(s)]
+    by_default = [s for s in offered if s.variable in FIRST and not s.name.endswith((".spin", ".momentum"))]
     rates = [s for s in offered if s.variable == "angular_velocity"]
     return sorted(by_default, key=lambda s: FIRST.index(s.variable)) or rates or offered
-
-
-def _of_figure(signal: Signal) -> bool:
-    return "." not in signal.name or signal.name.split(".")[1] not in ("spin", "momentum")
 
 
 def _variables(dataset: xarray.Dataset) -> list[str]:

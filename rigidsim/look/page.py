@@ -26,9 +26,13 @@ def summary_page(dataset: xarray.Dataset, thinned: xarray.Dataset) -> str:
     status = ended.replace("_", " ")
     if ended not in ("", "finished") and attributes.get("status_message"):
         status = str(attributes["status_message"])
+    start, end = (float(thinned["time"].values[i]) for i in (0, -1))
+    words = TimeWords.of(attributes, start, end)
+    total = dataset.sizes["time"]
+    complete = total == thinned.sizes["time"]
     facts = [
-        ("span", _span(dataset, thinned)),
-        ("samples", _samples(dataset, thinned)),
+        ("span", f"{words.moment(start)} to {words.moment(end)}"),
+        ("samples", f"{total:,}" if complete else f"{total:,}, shown {thinned.sizes['time']:,}"),
         ("steps", attributes.get("steps")),
         ("precision", attributes.get("precision") or integrator.get("precision")),
         (
@@ -46,7 +50,6 @@ def summary_page(dataset: xarray.Dataset, thinned: xarray.Dataset) -> str:
     lines = [heading, "", *_table(tuple(name for name, _ in facts), [tuple(str(v) for _, v in facts)])]
     invariants = _invariants(thinned)
     if invariants:
-        complete = dataset.sizes["time"] == thinned.sizes["time"]
         drift = "largest drift" if complete else "largest drift of the rows shown"
         # across, not down: a page that must be scrolled isn't read
         names, initial, largest = zip(*invariants, strict=True)
@@ -102,26 +105,6 @@ def _invariants(thinned: xarray.Dataset) -> list[tuple[str, ...]]:
     return rows
 
 
-def _span(dataset: xarray.Dataset, thinned: xarray.Dataset) -> str:
-    start, end = (float(thinned["time"].values[i]) for i in (0, -1))
-    words = TimeWords.of(dataset.attrs, start, end)
-    return f"{words.moment(start)} to {words.moment(end)}"
-
-
-def _samples(dataset: xarray.Dataset, thinned: xarray.Dataset) -> str:
-    total, shown = dataset.sizes["time"], thinned.sizes["time"]
-    return f"{total:,}" if total == shown else f"{total:,}, shown {shown:,}"
-
-
-def _cell(value: object) -> str:
-    return str(value).replace("|", "\\|").replace("\n", " ")
-
-
 def _table(head: tuple[str, ...], rows: list[tuple[str, ...]]) -> list[str]:
-    rule = "| " + " | ".join("---" for _ in head) + " |"
-    return [
-        "| " + " | ".join(head) + " |",
-        rule,
-        *("| " + " | ".join(_cell(cell) for cell in row) + " |" for row in rows),
-        "",
-    ]
+    told = [[cell.replace("|", "\\|").replace("\n", " ") for cell in row] for row in rows]
+    return [*(f"| {' | '.join(cells)} |" for cells in (head, ["---"] * len(head), *told)), ""]

@@ -77,6 +77,19 @@ def norms(vectors: Array) -> Array:
     return np.asarray(np.sqrt(np.einsum("ij,ij->i", vectors, vectors)))
 
 
+def joined(values: Array, reach: float = 0.4) -> bool:
+    """Whether neighbours of samples (rows,) or (rows, n) lie within `reach` radii of the whole.
+
+    By default these are some sixteen a turn. Where a quantity swings faster than it was sampled, lines would
+    draw a pattern that isn't there.
+    """
+    table = finite_rows(values.reshape(len(values), -1))
+    if len(table) < 3:
+        return True
+    radius = float(norms(table - table.mean(axis=0)).max())
+    return float(np.percentile(norms(np.diff(table, axis=0)), 95)) <= reach * radius or radius == 0.0
+
+
 def axis_names(dataset: xarray.Dataset) -> list[str]:
     """Names of the principal axes: those of body axes, or 1, 2, 3 if they aren't body axes."""
     axes = principal_axes(dataset)

@@ -96,10 +96,8 @@ def source_path(one: dict[str, Any], seconds: Array) -> Array | None:
 
 
 def kepler_path(orbit: dict[str, float], seconds: Array) -> Array:
-    """Positions (rows, 3), m, on an orbit of classical elements whose node and periapsis move uniformly.
-
-    Args:
-        orbit: elements at time zero (m, rad), their rates and the mean motion (rad/s).
+    """Positions (rows, 3), m, on an orbit of classical elements at time zero (m, rad), whose node and
+    periapsis move uniformly (rad/s).
     """
     e, axis = orbit["eccentricity"], orbit["semi_major_axis"]
     mean = np.remainder(orbit["mean_anomaly"] + orbit["mean_motion"] * seconds + np.pi, 2 * np.pi) - np.pi

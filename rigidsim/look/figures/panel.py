@@ -18,12 +18,8 @@ Draw = Callable[["Axes", "xarray.Dataset", Any], None]
 
 @dataclass(frozen=True)
 class Panel:
-    """A panel.
-
-    Attributes:
-        find: what it draws of a dataset in memory; None if the dataset has nothing for it.
-        draw_found: draws that on axes, with title, labels and units.
-        begins: for a panel over time, whether to show only the start if the whole would be a solid band.
+    """A panel: `find` gives what it draws of a dataset in memory, or None; `draw_found` draws that on axes,
+    with title, labels and units. One that `begins` shows only the start if the whole would be a solid band.
     """
 
     find: Find

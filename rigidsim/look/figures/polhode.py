@@ -19,7 +19,7 @@ from rigidsim.look.figures import eye as eyes
 from rigidsim.look.figures.panel import panel
 from rigidsim.look.figures.poles import path_about
 from rigidsim.look.figures.scales import number, si_scale
-from rigidsim.look.figures.style import GREY, PINK, Z, joined, key, titled
+from rigidsim.look.figures.style import GREY, PINK, Z, key, titled
 from rigidsim.look.solids import rotation_matrix
 from rigidsim.look.thinning import thinned_indices
 
@@ -131,7 +131,7 @@ def _view(points: Array, radii: Array, moments: Array) -> eyes.Eye:
 
 
 def _path(axes: Axes, view: eyes.Eye, points: Array, front: NDArray[np.bool_], **style: object) -> None:
-    if joined(points):
+    if signals.joined(points):
         eyes.line(axes, view, points, ~front, color=PINK, lw=1.1, alpha=0.35)
         eyes.line(axes, view, points, front, color=PINK, lw=1.9, zorder=5)
     else:
@@ -205,7 +205,7 @@ def poinsot(axes: Axes, dataset: xarray.Dataset, found: tuple[Array, Array, Arra
     disc = np.column_stack([size * np.cos(angle), size * np.sin(angle), np.full(181, depth)])
     axes.fill(*view.flat(disc).T, color="#e9edf2", zorder=0)
     entries = [Line2D([], [], color=PINK, lw=1.9, label="polhode")]
-    if joined(ring):
+    if signals.joined(ring):
         ring = ring[thinned_indices(len(ring), 6000)]
         eyes.line(axes, view, ring, color=Z, lw=0.9, zorder=0.5, label="herpolhode")
         entries.append(axes.get_lines()[-1])

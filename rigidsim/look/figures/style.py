@@ -19,6 +19,7 @@ from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from rigidsim.look.roles import read_config, title_of
+from rigidsim.look.signals import joined
 
 if TYPE_CHECKING:
     import xarray
@@ -33,10 +34,7 @@ START = "#0d0887"
 PALETTE = (BLUE, ORANGE, VIOLET, Y, X, TEAL, "#8c6d46", GREY)
 
 MOST_VECTOR_POINTS = 6000  # of a curve in an SVG; longer ones become pixels there
-IN_PLANE, OVER_TIME = 0.4, 0.8
-"""Distance between neighbours, in radii of the whole, up to which samples are joined by lines: some sixteen
-and eight samples a turn.
-"""
+_OVER_TIME = 0.8  # radii of the whole between neighbours that are joined: some eight samples a turn
 _KEY_ROW = 12.4  # height of a row of a key, points
 _KEY_LETTER, _TITLE_LETTER = 4.9, 6.1  # mean widths of a letter, points
 _LATER = "lighter: later"
@@ -143,29 +141,13 @@ def _room(axes: Axes) -> float:
     return float(axes.get_position().width * axes.figure.bbox.width / axes.figure.dpi * 72.0 * 1.1)
 
 
-def joined(values: Array, reach: float = IN_PLANE) -> bool:
-    """Whether neighbours of samples (rows,) or (rows, n) lie within `reach` radii of the whole.
-
-    Where a quantity swings faster than it was sampled, lines would draw a pattern that isn't there.
-    """
-    if len(values) < 3:
-        return True
-    table = values.reshape(len(values), -1)
-    table = table[np.isfinite(table).all(axis=1)]
-    if len(table) < 3:
-        return True
-    chords = np.linalg.norm(np.diff(table, axis=0), axis=1)
-    radius = float(np.linalg.norm(table - table.mean(axis=0), axis=1).max())
-    return float(np.percentile(chords, 95)) <= reach * radius or radius == 0.0
-
-
 def curve(axes: Axes, x: Array, y: Array, *, in_plane: bool = False, **style: Any) -> None:
     """Draw a curve over time, or in a plane; if the samples aren't dense enough, its samples as points.
 
     Long ones are drawn as pixels in an SVG, which otherwise would weigh megabytes.
     """
     style.setdefault("rasterized", len(x) > MOST_VECTOR_POINTS)
-    whole = joined(np.stack([x, y], axis=1)) if in_plane else joined(y, OVER_TIME)
+    whole = joined(np.stack([x, y], axis=1)) if in_plane else joined(y, _OVER_TIME)
     if not whole:
         size = float(np.clip(9000 / max(len(x), 1), 2.0, 4.0))
         style |= {"linestyle": "none", "marker": ".", "markersize": size, "markeredgewidth": 0.0}

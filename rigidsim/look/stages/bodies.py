@@ -31,14 +31,9 @@ _FLAT = 0.12  # of the other extents, below which a body is a plate
 
 @dataclass(frozen=True)
 class Subject:
-    """The body of a dataset, ready to be put on a stage.
-
-    Attributes:
-        reach: metres, the unit of `meshes` and `points`.
-        attitude: (rows, 3, 3) body to space, or None.
-        quaternion: (rows, 4) w x y z as recorded, or None.
-        position: (rows, 3), m, or None.
-        solids: solids in the attribute ``drawing``.
+    """The body of a dataset, ready to be put on a stage: meshes and points in units of its reach (metres),
+    quaternions (rows, 4) w x y z as recorded, attitudes (rows, 3, 3) to space and positions (rows, 3), m, as
+    far as known, and the solids in the attribute ``drawing``.
     """
 
     reach: float

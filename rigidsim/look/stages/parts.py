@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from rigidsim.look.signals import across
+from rigidsim.look.signals import across, finite_rows, joined, norms
 from rigidsim.look.solids import Mesh
 from rigidsim.look.thinning import thinned_indices
 
@@ -26,8 +26,8 @@ own.
 
 ARROW_REACH = 1.6  # length of the longest arrow, in units of the body's reach
 AXIS_REACH = 1.15  # of the body axes
-_CHORDS = 8000  # of a path that are looked at, to know how dense it is
 CURVE_POINTS = 4000  # of a whole polhode or track
+NEAR = 0.35  # radii of a path between neighbours that are joined
 
 MOMENTUM: Color = (255, 196, 40)
 VELOCITY: Color = (90, 215, 235)
@@ -60,10 +60,7 @@ class Arrow:
 @dataclass(frozen=True)
 class Trail:
     """A moving point along time: (rows, 3) in stage units; `whole` (points, 3) is its thinned path.
-
-    Attributes:
-        line, whole_line: whether neighbours are close enough to be joined.
-        head: whether the point itself is marked.
+    Neighbours are joined if they are close enough; with `head` the point itself is marked.
     """
 
     name: str
@@ -188,13 +185,8 @@ class Stage:
 
 @dataclass(frozen=True)
 class Plane:
-    """A plane figure: a path (rows, 2) with its moving point, or points that stand for themselves.
-
-    Attributes:
-        title: title with the unit.
-        moves: whether the rows go along time.
-        rings: radii of circles about the origin, with their labels.
-        names: names of the two axes.
+    """A plane figure: a path (rows, 2) whose point moves along time, or points that stand for themselves;
+    with labelled rings about the origin, and names of both axes. The title has the unit.
     """
 
     key: str
@@ -208,14 +200,8 @@ class Plane:
 
 @dataclass(frozen=True)
 class Picture:
-    """Everything drawn of a dataset besides its plots.
-
-    Attributes:
-        kind: kind of scene, in words.
-        stages: the first is the body's.
-        planes: plane figures beside it.
-        leading: variables whose plots come first.
-        notes: notes on scales, for the summary page.
+    """Everything drawn of a dataset besides its plots: the kind of scene in words, the body's stage first,
+    plane figures beside it, the variables whose plots come first, and notes on scales for a page.
     """
 
     kind: str
@@ -236,33 +222,15 @@ def trail(
     head: bool = False,
 ) -> Trail:
     """A trail of a moving point (rows, 3)."""
-    whole = points[thinned_indices(len(points), CURVE_POINTS)]
-    whole = whole[np.isfinite(whole).all(axis=1)]
-    line, whole_line = joined(points), joined(whole)
+    whole = finite_rows(points[thinned_indices(len(points), CURVE_POINTS)])
+    line, whole_line = joined(points, NEAR), joined(whole, NEAR)
     return Trail(name, color, points, line, whole, whole_line, in_body, with_centre, words, head)
-
-
-def joined(points: Array) -> bool:
-    """Whether samples are dense enough that joining them doesn't cut across the curve."""
-    first = np.arange(0, len(points) - 1, max(len(points) // _CHORDS, 1))
-    between = points[first + 1] - points[first]
-    chords = np.sqrt(np.einsum("ij,ij->i", between, between))
-    chords = chords[np.isfinite(chords)]
-    if not len(chords):
-        return True
-    points = points[first]
-    points = points[np.isfinite(points).all(axis=1)]
-    radius = longest(points - points.mean(axis=0))
-    return float(np.percentile(chords, 95)) <= 0.35 * max(radius, 1e-6)
 
 
 def longest(vectors: Array) -> float:
     """The largest norm of vectors (rows, 3); 0 if none is finite."""
-    largest = float(np.sqrt(np.einsum("ij,ij->i", vectors, vectors).max()))
-    if np.isfinite(largest):
-        return largest
-    norms = np.linalg.norm(vectors, axis=1)
-    return float(np.nanmax(norms)) if np.isfinite(norms).any() else 0.0
+    found = norms(vectors)
+    return float(found[np.isfinite(found)].max(initial=0.0))
 
 
 def viewer_quaternion(quaternion: Array) -> NDArray[np.float32]:

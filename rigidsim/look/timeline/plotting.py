@@ -10,7 +10,8 @@ import rerun as rr
 from numpy.typing import NDArray
 
 from rigidsim.look.plots import Plot
-from rigidsim.look.stages.parts import Arrow, Color, Line, Plane, Stage, Trail, Vector, joined
+from rigidsim.look.signals import joined
+from rigidsim.look.stages.parts import NEAR, Arrow, Color, Line, Plane, Stage, Trail, Vector
 from rigidsim.look.states import States
 
 PIXELS = 500  # about the width of a plot
@@ -112,7 +113,7 @@ def draw_planes(recording: rr.RecordingStream, planes: Sequence[Plane]) -> None:
         finite = points[np.isfinite(points).all(axis=1)]
         whole = finite[:: max(len(finite) // 4000, 1)]
         dim: Color = tuple(round(0.5 * x) for x in plane.color)  # type: ignore[assignment]
-        if len(whole) > 1 and plane.moves and joined(whole):
+        if len(whole) > 1 and plane.moves and joined(whole, NEAR):
             log("whole", _faint([whole], color=dim, width=0.9, order=1.0))
         else:
             color = dim if plane.moves else plane.color

@@ -106,11 +106,7 @@ def check_room(path: Path, rows: int) -> None:
 
 
 class LiveRecording:
-    """A recording that grows with a run, on a stream that is connected to a viewer or a file.
-
-    Attributes:
-        rows: number of rows sent so far.
-    """
+    """A recording that grows with a run, by `rows` so far, on a stream to a viewer or a file."""
 
     def __init__(self, stream: rr.RecordingStream) -> None:
         self._stream = stream
