@@ -66,7 +66,7 @@ def refuse_scene(scene: Scene, loads: Sequence[Load]) -> None:
             against = "a body whose moments are all the same turns steadily, and nothing averages its torques"
     elif alone and level == ORBIT_AVERAGED:
         against = f"{alone[0].title} is no gravity gradient, and is averaged over the rotation alone"
-        raise _refused(level, against, 'choose "spin_averaged"')
+        raise refused(level, against, 'choose "spin_averaged"')
     elif strange := [load.title for load in alone if not reads_rates_alone(load)]:
         against = f"{strange[0]} is neither the gravity gradient of a source with elements, a place or an "
         against += "ephemeris, nor of one of [[bodies]], nor a function of the rates in body axes"
@@ -90,19 +90,19 @@ def refuse_scene(scene: Scene, loads: Sequence[Load]) -> None:
         against = "[output] lyapunov is of the full motion: set it to false"
     elif scene.bodies is not None and scene.bodies.full:
         against = 'coupling = "full" makes the bodies feel every rotation of this one'
-        raise _refused(level, against, 'set [body] coupling to "one_way", or choose level = "full"')
+        raise refused(level, against, 'set [body] coupling to "one_way", or choose level = "full"')
     elif level == ORBIT_AVERAGED:
         sources = [gradient_source_of(load) for load in loads]
         if beside := [source.pair.name for source in sources if source is not None and source.pair]:
             against = f'the orbit of the point mass "{beside[0]}" is integrated, so that there is no '
             against += "ellipse to average over"
             remedy = 'choose "spin_averaged", or write the elements of the orbit into a table '
-            raise _refused(level, against, remedy + '(orbit = {table = "elements.csv"})')
+            raise refused(level, against, remedy + '(orbit = {table = "elements.csv"})')
         if any(source is not None and source.ephemeris for source in sources):
             against = "the source of an ephemeris has no elements to average over"
-            raise _refused(level, against, 'choose "spin_averaged", or give it an orbit with a node_rate')
+            raise refused(level, against, 'choose "spin_averaged", or give it an orbit with a node_rate')
     if against:
-        raise _refused(level, against)
+        raise refused(level, against)
     if alone and config.model.short_period:
         what = (
             f"given true, but what {alone[0].title} does within a rotation isn't added back; set it to false"
@@ -132,7 +132,7 @@ def refuse_frequencies(
     if len(kept) > 1:
         what = f"the body keeps pace with [[loads]] number {kept[0].source.number} ({kept[0].name}) and "
         what += f"number {kept[1].source.number} ({kept[1].name}) at once"
-        raise _refused(scene.config.model.level, what)
+        raise refused(scene.config.model.level, what)
     for source, resonance in zip(sources, found, strict=True):
         if resonance is None:
             _refuse_forced(scene, spectrum, source)
@@ -160,7 +160,7 @@ def told_of_resonances(sources: Sequence[Source]) -> str:
 
 def separatrix_refused(level: str) -> ConfigError:
     """The error for a body that turns about its intermediate axis."""
-    return _refused(
+    return refused(
         level,
         "the body turns about its intermediate axis, where its wobble takes forever and nothing averages",
     )
@@ -222,7 +222,7 @@ def _refuse_resonance(
         if not rate[worst] < slow[worst]:
             worst = np.unravel_index(int(np.argmax(swing)), rate.shape)
         at = int(i[worst[0]]), int(j[worst[0]]), int(k[worst[1]])
-        raise _refused(
+        raise refused(
             scene.config.model.level,
             f"{_combination(spectrum, at, float(body[worst[0]]))} of the body's precession g and wobble l "
             f"and of the mean motion n of [[loads]] {source.name} is only "
@@ -246,7 +246,7 @@ def _refuse_passing(scene: Scene, spectrum: BodySpectrum, source: Source) -> Non
     rates = np.append(np.abs(spectrum.frequencies[seen]), abs(spectrum.rates[0]))
     most = PASSING * source.passing_rate
     if rates.min() < most:
-        raise _refused(
+        raise refused(
             scene.config.model.level,
             f"the point mass of [[loads]] {source.name} isn't bound to the body and passes it, by their "
             f"motion at the start, at {source.passing_rate:.3g} rad/s, which the body's slowest "
@@ -284,7 +284,7 @@ def _refuse_forced(scene: Scene, spectrum: BodySpectrum, source: Source) -> None
     forced[orbit < _WEAK * orbit.max()] = 0.0
     most = int(np.argmax(forced))
     if forced[most] > SWING:
-        raise _refused(
+        raise refused(
             scene.config.model.level,
             f"the torque of [[loads]] {source.name} bends the rotation by {forced[most]:.2g} rad, "
             f"since the body precesses freely at {g:.3g} rad/s and the source goes round at "
@@ -299,7 +299,7 @@ def _refuse_slow_orbit(scene: Scene, spectrum: BodySpectrum, source: Source) -> 
     rate = float(abs(source.secular_strength(context) * motion.excess / motion.momentum))
     if rate > SWING * source.motion or source.slow_rate > SWING * source.motion:
         what = "the momentum precesses" if rate >= source.slow_rate else "node and periapsis move"
-        raise _refused(
+        raise refused(
             scene.config.model.level,
             f"{what} by {max(rate, source.slow_rate) / source.motion:.2g} rad for each radian that the "
             f"source of [[loads]] number {source.number} goes round; up to {SWING} is allowed",
@@ -311,6 +311,7 @@ def _period(rate: float) -> str:
     return span_text(2 * np.pi / rate) if rate > 0 else "forever"
 
 
-def _refused(level: str, against: str, remedy: str = 'choose level = "full"') -> ConfigError:
+def refused(level: str, against: str, remedy: str = 'choose level = "full"') -> ConfigError:
+    """The error for an average that doesn't apply."""
     joined = f", or {remedy}" if _ASKS.search(against) else f"; {remedy}"
     return ConfigError(Problem("[model] level", f'given "{level}", but {against}{joined}'))

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from rigidsim.errors import ConfigError, Problem
+from rigidsim.model.averaged.applies import refused
 from rigidsim.model.averaged.course import PARAMETER, SWING, NoCourse, PolhodeCourse, Wave, follow, wave_of
 from rigidsim.model.averaged.free_motion import FreeMotion, free_motion
 from rigidsim.model.averaged.polhode import Polhodes, mean_square_sine, means_needed
@@ -156,9 +157,8 @@ def _refuse_what_changes(scene: Scene, torques: DrivingTorques) -> None:
     elif torques.depends_on_time:
         against = "a torque depends on time"
     if against is not None:
-        what = f'given "{scene.config.model.level}", but {against}, and only torques that are functions of '
-        what += 'the rates about the body axes are averaged; choose level = "full"'
-        raise ConfigError(Problem("[model] level", what))
+        against += ", and only torques that are functions of the rates about the body axes are averaged"
+        raise refused(scene.config.model.level, against)
 
 
 def _at(values: np.ndarray, angle: float) -> np.ndarray:

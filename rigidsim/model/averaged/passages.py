@@ -19,7 +19,7 @@ from dataclasses import replace
 import numpy as np
 
 from rigidsim.errors import ConfigError, Problem
-from rigidsim.model.averaged.applies import refuse_frequencies
+from rigidsim.model.averaged.applies import refuse_frequencies, refused
 from rigidsim.model.averaged.course import SWING
 from rigidsim.model.averaged.driven import Driven
 from rigidsim.model.averaged.sources import Source
@@ -60,11 +60,8 @@ def passing(scene: Scene, driven: Driven, sources: Sequence[Source]) -> Driven:
             total += kick
             if captured or total > SWING:
                 how = "may be captured in" if captured else f"is turned by {total:.2g} rad by passing"
-                what = (
-                    f'given "{scene.config.model.level}", but the rotation {how} a resonance with [[loads]] '
-                )
-                what += f'number {source.number}; choose level = "full"{when}'
-                raise ConfigError(Problem("[model] level", what))
+                against = f"the rotation {how} a resonance with [[loads]] number {source.number}"
+                raise refused(scene.config.model.level, against, f'choose level = "full"{when}')
     return replace(driven, passed=total)
 
 

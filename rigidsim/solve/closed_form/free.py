@@ -20,7 +20,7 @@ from typing import Any
 
 from rigidsim.scene.arithmetic import Matrix, Vector, dot
 from rigidsim.solve.closed_form.arithmetic import Arithmetic
-from rigidsim.solve.closed_form.motion import Motion, NoClosedForm, WhyNot, right_handed
+from rigidsim.solve.closed_form.motion import Motion, NoClosedForm, right_handed
 from rigidsim.solve.closed_form.theta import (
     Argument,
     Jacobi,
@@ -153,7 +153,6 @@ def free_motion(context: Any, moments: Vector, axes: Matrix, rates: Vector, tiny
         return _symmetric(context, moments, axes, components, alike.index(True))
     if min(moments) == 0:
         raise NoClosedForm(
-            WhyNot.BODY,
             "a body without inertia about one axis, whose other two moments differ, has no closed form",
         )
     return _asymmetric(context, moments, axes, components, tiny)

@@ -3,28 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from enum import Enum
 from typing import Any, ClassVar
 
 from rigidsim.scene.arithmetic import Matrix, cross, dot
 from rigidsim.solve.closed_form.arithmetic import Arithmetic
 
 
-class WhyNot(Enum):
-    """Kinds of reasons why a scene has no closed form."""
-
-    PYTHON_LOAD = "a load given from Python"
-    LOAD = "a load of the config"
-    BODY = "a free body without inertia about one axis, whose other two moments differ"
-    TOP = "a heavy top that isn't symmetric about the line to its centre of mass"
-
-
 class NoClosedForm(ValueError):
     """Raised if a scene has no closed form here; the message says why, as the rest of a sentence."""
-
-    def __init__(self, why: WhyNot, words: str) -> None:
-        super().__init__(words)
-        self.why = why
 
 
 @dataclass(frozen=True)

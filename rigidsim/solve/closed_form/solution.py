@@ -21,7 +21,7 @@ from rigidsim.scene.scene import Scene
 from rigidsim.solve.closed_form.arithmetic import Arithmetic, Digits, Doubles, two_sum
 from rigidsim.solve.closed_form.free import free_motion, spinning
 from rigidsim.solve.closed_form.heavy import heavy_motion, perpendicular_axes
-from rigidsim.solve.closed_form.motion import Motion, NoClosedForm, WhyNot
+from rigidsim.solve.closed_form.motion import Motion, NoClosedForm
 from rigidsim.solve.precision import Precision, Scalar
 
 
@@ -54,7 +54,6 @@ def choose_motion(context: mpmath.MPContext, scene: Scene, scaling: Scaling) -> 
     frame = _top_frame(context, moments, axes, arm, tiny)
     if frame is None:
         raise NoClosedForm(
-            WhyNot.TOP,
             "a heavy top without two equal moments, or with its centre of mass off its symmetry axis, has no "
             "closed form here",
         )
@@ -227,9 +226,9 @@ def _phase_bits(elapsed: mpmath.mpf) -> int:
 def closed_form_of(scene: Scene, *, driven: bool = False) -> ClosedForm:
     """The closed form of a scene; raises NoClosedForm if it has none."""
     if driven:
-        raise NoClosedForm(WhyNot.PYTHON_LOAD, "a load given from Python has no closed form")
+        raise NoClosedForm("a load given from Python has no closed form")
     for load in scene.loads:
-        raise NoClosedForm(WhyNot.LOAD, f"{load.described} has no closed form here")
+        raise NoClosedForm(f"{load.described} has no closed form here")
     context = mpmath.MPContext()
     # double roots (regular precession) keep half the digits
     context.prec = 3 * scene.context.prec

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, ClassVar, TypeVar
+from typing import ClassVar, TypeVar
 
 from rigidsim.errors import ConfigError, Problem
 from rigidsim.model.system import System
 from rigidsim.scene.choices import METHODS, Method
 from rigidsim.scene.scene import Scene
+from rigidsim.solve.closed_form import ClosedForm
 from rigidsim.solve.corrected_stepper import CorrectedStepper
 from rigidsim.solve.effects.effect import registered_effects
 from rigidsim.solve.events import EventLog
@@ -17,9 +18,6 @@ from rigidsim.solve.sampler import Pacing
 from rigidsim.solve.solvers.solver import Solver
 from rigidsim.solve.solvers.stepwise import StepwiseSolver
 from rigidsim.solve.stepper import Stepper
-
-if TYPE_CHECKING:
-    from rigidsim.solve.closed_form import ClosedForm
 
 
 class Unsuitable(ValueError):

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from rigidsim.model.system import System
 from rigidsim.scene.choices import METHODS
 from rigidsim.scene.scene import Scene
+from rigidsim.solve.closed_form import ClosedForm, NoClosedForm, closed_form_of
 from rigidsim.solve.corrected_stepper import CorrectedStepper, StepBoundary
 from rigidsim.solve.events import EventLog
 from rigidsim.solve.precision import Precision, Scalar
@@ -18,10 +18,6 @@ from rigidsim.solve.solvers.algorithm import Algorithm, Unsuitable, solves
 from rigidsim.solve.solvers.solver import Solver
 from rigidsim.solve.status import Status
 from rigidsim.solve.stepper import Mark, Stepper
-
-if TYPE_CHECKING:
-    from rigidsim.solve.closed_form import ClosedForm
-
 
 _WIDE_ROWS = 64  # at once beyond double precision, where one takes about a millisecond
 
@@ -81,8 +77,6 @@ class InClosedForm(Algorithm):
 
     @classmethod
     def of(cls, scene: Scene, system: System, *, driven: bool) -> InClosedForm:
-        from rigidsim.solve.closed_form import NoClosedForm, closed_form_of
-
         integrator = scene.config.integrator
         try:
             form = closed_form_of(scene, driven=driven)
