@@ -1,6 +1,6 @@
 """The course of an averaged motion under torques of the body alone, followed ahead in double precision.
 
-The mean torques change P and Q (see ``polhode``) whatever the momentum's direction, so that their course is
+The mean torques change P and Q (see ``free_motion``) whatever the momentum's direction; their course is
 known before the run: over which polhodes torques have to be averaged, and whether each average applies.
 It doesn't near the separatrix, where the wobble takes as long as the change of its size; nor where torques
 change the motion much within one rotation. Where an even harmonic of the wobble keeps pace with the

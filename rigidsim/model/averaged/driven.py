@@ -16,8 +16,13 @@ import numpy as np
 from rigidsim.errors import ConfigError, Problem
 from rigidsim.model.averaged.applies import refused
 from rigidsim.model.averaged.course import PARAMETER, SWING, NoCourse, PolhodeCourse, Wave, follow, wave_of
-from rigidsim.model.averaged.free_motion import FreeMotion, free_motion
-from rigidsim.model.averaged.polhode import Polhodes, mean_square_sine, means_needed
+from rigidsim.model.averaged.free_motion import (
+    FreeMotion,
+    Polhodes,
+    free_motion,
+    mean_square_sine,
+    means_needed,
+)
 from rigidsim.model.averaged.torques import DrivingTorques
 from rigidsim.model.load import Load
 from rigidsim.model.scaling import Scaling, scaled_numbers

@@ -1,6 +1,6 @@
 """Mechanics of an averaged motion under torques of the body alone, which change its energy and momentum.
 
-Besides the momentum's direction the amplitudes P and Q of ``polhode`` are states. Gravity gradients turn the
+Besides the momentum's direction the amplitudes P and Q of ``free_motion`` are states. Gradients turn the
 direction as before, with the mean tensor of the present polhode.
 """
 

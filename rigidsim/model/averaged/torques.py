@@ -1,7 +1,7 @@
 """Torques of the body alone, averaged over its free motion: dampings, and functions of the rates.
 
 Such a torque has a mean along the momentum and one that does work, which change the amplitudes P and Q of
-``polhode``; across the momentum it goes round with the precession and has no mean. A viscous torque takes
+``free_motion``; across the momentum it goes round with the precession and has no mean. A viscous torque takes
 closed means, of whose matrix the products about two axes vanish:
 
     Q' = -Q (d1 / I1 (1 - S) + d2 / I2 S),   P' = -P (d3 / I3 (1 - k^2 S) + k^2 d2 / I2 S),   S = <sin^2 f>
@@ -19,7 +19,7 @@ from typing import Any
 import heyoka as hy
 import numpy as np
 
-from rigidsim.model.averaged.polhode import Polhodes, mean_square_sine, means_needed, nodes_needed
+from rigidsim.model.averaged.free_motion import Polhodes, mean_square_sine, means_needed, nodes_needed
 from rigidsim.model.capabilities import Damping, Reacting, has_source, orbit_of, table_of
 from rigidsim.model.carriers import Carrier
 from rigidsim.model.load import Load

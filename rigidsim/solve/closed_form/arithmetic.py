@@ -1,4 +1,4 @@
-"""The two arithmetics in which closed forms are evaluated: float64 arrays, and mpmath at any precision.
+"""Closed-form rotations, and the arithmetics that evaluate them: float64 arrays, and mpmath at any precision.
 
 Formulas are written once, against ``Arithmetic``. What differs is how a phase is reduced: in double, rate
 and time are pairs hi + lo, so that turns are counted to some 30 digits and nothing is lost at 1e8 radians.
@@ -6,9 +6,12 @@ and time are pairs hi + lo, so that turns are counted to some 30 digits and noth
 
 from __future__ import annotations
 
-from typing import Any, Protocol
+from dataclasses import dataclass
+from typing import Any, ClassVar, Protocol
 
 import numpy as np
+
+from rigidsim.scene.arithmetic import Matrix, cross, dot
 
 Pair = tuple[Any, Any]
 """Real and imaginary part, or high and low part, of a number."""
@@ -152,3 +155,28 @@ def _split(a: Any) -> Pair:
 def _pair(value: Any) -> Pair:
     high = float(value)
     return high, float(value - high)
+
+
+class NoClosedForm(ValueError):
+    """Raised if a scene has no closed form here; the message says why, as the rest of a sentence."""
+
+
+@dataclass(frozen=True)
+class Motion:
+    """A rotation in closed form, in the units of time and inertia of the numbers that it was made from."""
+
+    axes: Matrix  # rows are the axes of the frame in which the motion is written (right-handed, body axes)
+    title: ClassVar[str] = "rotation"  # name of the motion, for plans and summaries
+
+    def at(self, arithmetic: Arithmetic, time: Any) -> tuple[list[Any], list[Any]]:
+        """Rates along ``axes`` and a quaternion from ``axes`` to a frame fixed in space, at times after the
+        start (see ``Arithmetic`` for their type).
+        """
+        raise NotImplementedError
+
+
+def right_handed(axes: Matrix, flip: int = 1) -> Matrix:
+    """The axes, with number ``flip`` reversed if they are left-handed."""
+    if dot(cross(axes[0], axes[1]), axes[2]) > 0:
+        return axes
+    return [[-x for x in axis] if i == flip else axis for i, axis in enumerate(axes)]

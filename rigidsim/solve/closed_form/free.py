@@ -19,8 +19,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from rigidsim.scene.arithmetic import Matrix, Vector, dot
-from rigidsim.solve.closed_form.arithmetic import Arithmetic
-from rigidsim.solve.closed_form.motion import Motion, NoClosedForm, right_handed
+from rigidsim.solve.closed_form.arithmetic import Arithmetic, Motion, NoClosedForm, right_handed
 from rigidsim.solve.closed_form.theta import (
     Argument,
     Jacobi,

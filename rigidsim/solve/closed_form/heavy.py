@@ -17,8 +17,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from rigidsim.scene.arithmetic import Matrix, Vector, cross, dot
-from rigidsim.solve.closed_form.arithmetic import Arithmetic
-from rigidsim.solve.closed_form.motion import Motion
+from rigidsim.solve.closed_form.arithmetic import Arithmetic, Motion
 from rigidsim.solve.closed_form.theta import (
     Argument,
     Quotient,

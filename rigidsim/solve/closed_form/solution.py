@@ -18,10 +18,9 @@ from rigidsim.model.system import System
 from rigidsim.scene import attitude
 from rigidsim.scene.arithmetic import Matrix, Vector, cross, dot, negligible, norm
 from rigidsim.scene.scene import Scene
-from rigidsim.solve.closed_form.arithmetic import Arithmetic, Digits, Doubles, two_sum
+from rigidsim.solve.closed_form.arithmetic import Arithmetic, Digits, Doubles, Motion, NoClosedForm, two_sum
 from rigidsim.solve.closed_form.free import free_motion, spinning
 from rigidsim.solve.closed_form.heavy import heavy_motion, perpendicular_axes
-from rigidsim.solve.closed_form.motion import Motion, NoClosedForm
 from rigidsim.solve.precision import Precision, Scalar
 
 
