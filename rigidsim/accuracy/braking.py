@@ -40,10 +40,8 @@ def is_braked(prepared: InitialValueProblem) -> bool:
 
 
 def mean_pace(prepared: InitialValueProblem) -> float | None:
-    """Mean number of steps per second over the whole run, relative to that at its start.
-
-    Returns:
-        None if the course of its average isn't known until the end.
+    """Mean number of steps per second over the whole run, relative to that at its start; None if the course
+    of its average isn't known until the end.
     """
     moments, system = prepared.scene.body.principal_moments, prepared.system
     stepwise = bool(system.plan.surfaces.found) or system.stepwise

@@ -46,12 +46,8 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Certificate:
-    """Result of a certification.
-
-    Attributes:
-        error: bound of the attitude error at the times compared, the end among them, rad.
-        end: the difference found at the end itself, rad.
-        place: bound of the position error at the same times, m; None if no accuracy of it was asked for.
+    """Result of a certification: bound of the attitude error (rad) at the times compared, the difference
+    found at the end, and a bound of the position error (m); None if no accuracy of it was asked for.
     """
 
     error: float
@@ -191,11 +187,8 @@ def verdict(
     *,
     key: str = "accuracy",
 ) -> str | None:
-    """Warning for a summary if the requested accuracies (rad, and m of the path) weren't certified; None if
-    they were.
-
-    Args:
-        key: key of ``[integrator]`` that asked for the accuracy of the attitude.
+    """Warning if the requested accuracies (rad, by a key of ``[integrator]``, and m of the path) weren't
+    certified.
     """
     remedy = f"could be certified ({certificate.how}); choose a higher precision or a nearer end"
     if accuracy is not None and certificate.error > accuracy:

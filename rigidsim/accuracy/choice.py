@@ -102,13 +102,8 @@ def choose(
     told: Told | None = None,
     key: str = "accuracy",
 ) -> Choice:
-    """The cheapest setting whose forecast keeps an accuracy, within what the config leaves open.
-
-    Args:
-        accuracy: attitude accuracy at the end, rad.
-
-    Raises:
-        ConfigError: no setting does.
+    """The cheapest setting whose forecast keeps an attitude accuracy (rad, at the end), within what the
+    config leaves open. Raises ``ConfigError`` if none does.
     """
     forecasts = Forecasts(experiment, accuracy, loads, told)
     motion = forecasts.motion

@@ -46,12 +46,9 @@ def run_pilot(
     largest_chunk: int = 64,
     warming: int = 0,
 ) -> Pilot:
-    """Take the first steps of a motion.
-
-    Args:
-        skip: takes a number of steps, with anything done between them; the stepper's own by default.
-        steps: largest number of steps, give or take a chunk; none after the last sample.
-        chunk: steps taken at once, at first; doubled each time up to ``largest_chunk``.
+    """Take the first steps of a motion, chunk by chunk, each twice as long up to the largest; ``steps`` are
+    the most, give or take a chunk, and none come after the last sample. ``skip`` takes steps with what is
+    done between.
     """
     skip = skip or stepper.skip
     begin, end = float(clock.start), float(clock.at(clock.count - 1))
@@ -75,11 +72,7 @@ def run_pilot(
 
 @dataclass(frozen=True)
 class KnownMotion:
-    """What is known of a motion before its long run.
-
-    Attributes:
-        rate: bound of the angular velocity, rad/s.
-    """
+    """What is known of a motion before its long run; ``rate`` is the bound of its angular velocity, rad/s."""
 
     steps: float
     rate: float

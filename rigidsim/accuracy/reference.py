@@ -86,11 +86,7 @@ class Reference:
 
 
 def references(setting: Setting, motion: KnownMotion, accuracy: float) -> list[Reference]:
-    """References for a whole run, from cheap to costly.
-
-    Args:
-        accuracy: requested accuracy, rad, which decides how good those with many digits must be.
-    """
+    """References for a whole run, from cheap to costly, as good as an accuracy (rad) needs."""
     loose = setting.has_steps and setting.tolerance is not None
     stepped: list[str | int] = []
     if setting.bits <= 53 and loose and motion.steps > _EXTENDED_STEPS:
@@ -208,12 +204,9 @@ def own_error(
     motion: KnownMotion,
     distance: Callable[[Setting], float],
 ) -> float:
-    """Bound of a reference's own error, rad.
-
-    A pilot may not have seen how strongly the motion amplifies errors; differences have.
-
-    Args:
-        distance: largest distance of the reference from another setting's solution; inf if there is none.
+    """Bound of a reference's own error, rad. A pilot may not have seen how strongly the motion amplifies
+    errors; differences have, as the reference's largest distance from another setting's solution (inf without
+    one).
     """
     if reference.kind is ReferenceKind.CLOSED_FORM:
         return 0.0  # dozens of digits more than the run

@@ -18,11 +18,8 @@ from rigidsim.solve.problem import auto_tolerance
 
 @dataclass(frozen=True)
 class Setting:
-    """A way to integrate.
-
-    Attributes:
-        hold_invariants: whether invariants are projected from the start; otherwise not at all in trials, and
-            late in runs, as "auto" does.
+    """A way to integrate. ``hold_invariants`` projects them from the start; otherwise they aren't at all in
+    trials, and late in runs, as "auto" does.
     """
 
     precision: str | int = "double"

@@ -31,14 +31,9 @@ Told = Callable[[str, float], None]
 
 @dataclass
 class Trial:
-    """Result of a trial.
-
-    Attributes:
-        attitudes: float64 parts of the quaternions, each (samples, 4).
-        places: float64 parts of the positions, m, each (samples, 3); empty if the body has none.
-        cpu_seconds: CPU time of the integration alone.
-        work: steps times Taylor order squared times states: a count that doesn't jitter.
-        histories: relative drift (samples,) of each invariant.
+    """Result of a trial: attitudes and places (m; none without a position) as float64 parts (samples, 4 or
+    3), and the relative drift (samples,) of each invariant. ``work``, steps times order squared times states,
+    doesn't jitter.
     """
 
     setting: Setting
@@ -81,13 +76,8 @@ def trial_scene(
     repeating: bool = False,
 ) -> Scene:
     """The scene of an experiment under another setting, recording its attitude, and its path where an
-    accuracy of that is asked for.
-
-    Args:
-        repeating: whether invariants are held as the experiment holds them, late by default.
-
-    Raises:
-        ConfigError: the scene can't be integrated with this setting.
+    accuracy of that is asked for; ``repeating`` holds invariants as the experiment does. Raises
+    ``ConfigError``.
     """
     config = experiment.config
     integrator = config.integrator.model_copy(

@@ -165,11 +165,8 @@ def on_front(dataset: xarray.Dataset) -> np.ndarray:
 
 @dataclass(frozen=True)
 class BestSetting:
-    """For an attitude error of at most ``at_most`` and more than ``more_than``: the cheapest setting.
-
-    Attributes:
-        error: its largest attitude error, rad.
-        less: whether that is less than for the other settings, so that costs don't compare.
+    """For an attitude error of at most ``at_most`` and more than ``more_than``: the cheapest setting, its
+    largest error (rad), and whether it was measured over less than the others, so that costs don't compare.
     """
 
     at_most: float

@@ -54,12 +54,8 @@ class RowStatus(StrEnum):
 
 @dataclass
 class Row:
-    """Results for one setting, measured over a part of the horizon, or the problem why not, for the user.
-
-    Attributes:
-        trial: attitudes, drifts and counts; None if there are none.
-        unit_seconds: CPU seconds per step (closed form: per sample), for each process.
-        default_seconds: those of the default setting, in the same processes.
+    """Results for one setting, over a part of the horizon: its trial, the problem if there is none, and for
+    each process the CPU seconds per step (closed form: per sample), its own and the default setting's.
     """
 
     setting: Setting

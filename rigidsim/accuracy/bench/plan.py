@@ -54,11 +54,8 @@ _SAMPLES, _SHORT_SAMPLES = 32, 6  # attitudes compared, over the whole part and 
 
 @dataclass(frozen=True)
 class Plan:
-    """How much of the motion is measured.
-
-    Attributes:
-        times: seconds, ascending; the first ``short_count`` reach to the end of ``short``.
-        exact, why: method that gives the motion without steps; empty if there is none, and why.
+    """How much of the motion is measured: ascending times (s), of which the first ``short_count`` reach to
+    the end of ``short``; and the method that gives the motion without steps, or why there is none.
     """
 
     start: float
@@ -110,11 +107,7 @@ def every_setting(exact: str = "", *, full: bool = False) -> list[Setting]:
 
 
 def make_plan(experiment: Experiment, budget: float) -> Plan:
-    """Make a plan from a short pilot of the default setting.
-
-    Raises:
-        ConfigError: the config can't be run.
-    """
+    """Make a plan from a short pilot of the default setting. Raises ``ConfigError``."""
     scene = build_scene(experiment)
     start, end = float(scene.start), float(scene.samples.last)
     prepared = prepare_scene(experiment, trial_scene(experiment, DEFAULT))
@@ -162,11 +155,8 @@ Solutions = Mapping[Setting, list[np.ndarray]]
 
 @dataclass(frozen=True)
 class ReferenceSolution:
-    """Attitudes against which others are held.
-
-    Attributes:
-        attitudes: float64 parts (samples, 4).
-        error: (samples,) estimate of their own error, rad.
+    """Attitudes, float64 parts (samples, 4), against which others are held, and their own error (samples,),
+    rad.
     """
 
     setting: Setting
@@ -176,9 +166,7 @@ class ReferenceSolution:
 
 
 def attitude_task(plan: Plan, setting: Setting, patience: float, *, wide: bool) -> Task:
-    """Task that computes a setting's attitudes over the plan's times, or over the short part of them if it is
-    ``wide``.
-    """
+    """Task that computes a setting's attitudes over the plan's times, the short part of them if ``wide``."""
     times = plan.times[: plan.short_count] if wide else plan.times
     return Task(setting, "attitudes", times, patience)
 
@@ -215,13 +203,8 @@ class ReferenceThread(threading.Thread):
             self._failure = error
 
     def found(self, measured: Solutions) -> tuple[ReferenceSolution, ReferenceSolution | None]:
-        """The reference, and a separate one for quadruple precision if needed.
-
-        Args:
-            measured: solutions over the same times, the best of which serves if there is nothing better.
-
-        Raises:
-            RigidsimError: there is no reference.
+        """The reference, and a separate one for quadruple precision if needed; of what was measured over the
+        same times the best serves if there is nothing better. Raises ``RigidsimError`` if there is none.
         """
         if self._failure is not None:
             raise self._failure

@@ -43,11 +43,8 @@ _CLOSED_ROWS = {True: 2000, False: 4}  # of a pass in double, and in mpmath
 
 @dataclass(frozen=True)
 class Task:
-    """What to do with one setting: integrate it over some times (s), or measure its speed.
-
-    Attributes:
-        patience: CPU seconds that an integration may take, or that repeated passes should take.
-        steps: steps of the whole motion, if known, since passes don't go past its end.
+    """What to do with one setting: integrate it over some times (s), which may take ``patience`` CPU seconds,
+    or measure its speed, for so long and over no more than the whole motion's steps.
     """
 
     setting: Setting
@@ -59,9 +56,7 @@ class Task:
 
 @dataclass(frozen=True)
 class Answer:
-    """Result of one task: its trial or seconds per unit, and why not, or not to the end; None if all went
-    well.
-    """
+    """Result of one task: its trial or seconds per unit, and why not, or not to the end, if so."""
 
     trial: Trial | None = None
     seconds: float = math.nan
@@ -152,12 +147,9 @@ def ask(
 ) -> Iterator[Answer]:
     """Answers to tasks as they come, in order, from a fresh process.
 
-    A task on which the process dies is answered with that, and a new process goes on with the rest. When time
-    is up the process is stopped, and the tasks that are left have no answer.
-
-    Args:
-        deadline: on ``time.monotonic``'s clock.
-        first_by: that of the first answer, which may be later.
+    A task on which the process dies is answered with that, and a new process goes on with the rest. At the
+    deadline (``time.monotonic``), that of the first answer at least ``first_by``, the process is stopped, and
+    the tasks that are left have no answer.
     """
     following = 0
     while following < len(tasks):

@@ -37,11 +37,10 @@ UNCERTAIN = 1e-2
 
 @dataclass(frozen=True)
 class Course:
-    """A run whose errors are to be followed.
-
-    Attributes:
-        stepper: the run's stepper; it, or copies of its engine, are used if good enough.
-        nearest: smallest singular factor of the run's chart; 1 for charts that are changed.
+    """A run whose errors are to be followed, in internal units: the stepper, or copies of its engine, carry
+    the ensemble if good enough; ``nearest`` is the smallest singular factor of its chart, 1 for charts that
+    are changed; ``uneven`` its longest step over its shortest; ``lost`` the errors in epsilons past which
+    nothing is learnt.
     """
 
     prepared: InitialValueProblem
@@ -128,11 +127,7 @@ def exponential_growth(
     times: np.ndarray, errors: np.ndarray, exponent: int, stable: float, least: float
 ) -> tuple[float, float | None]:
     """Rate of exponential growth, 1/s, and when digits are gone, seconds after the start; 0 and None if
-    growth isn't exponential.
-
-    Args:
-        times: times since the start, internal units, whose binary exponent is ``exponent``.
-        errors: rad, or relative.
+    growth isn't exponential. Times are internal, of a binary exponent; errors in rad, or relative.
     """
     largest = np.maximum.accumulate(errors)
     gone = int(np.searchsorted(largest, UNCERTAIN))

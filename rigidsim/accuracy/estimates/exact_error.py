@@ -19,11 +19,8 @@ _VECTORS = {"rates": ("wx", "wy", "wz"), "position": ("x", "y", "z"), "velocity"
 
 @dataclass(frozen=True)
 class ExactError:
-    """Largest errors at some samples, the last among them.
-
-    Attributes:
-        attitude: rad; None if none is carried.
-        position, velocity: m and m/s; None if the body has no position.
+    """Largest errors at some samples, the last among them: rad (None without an attitude), relative, m and
+    m/s (None without a position).
     """
 
     attitude: float | None

@@ -45,11 +45,8 @@ _MORE_STEPS = 4
 
 @dataclass(frozen=True)
 class MemberErrors:
-    """Largest errors of members until their last samples, (members,); nan for those that have none.
-
-    Attributes:
-        attitude: rad, at most pi; None without an attitude.
-        position, velocity: m and m/s; None if the body has no position.
+    """Largest errors of members until their last samples, (members,), in the units of ``Estimate``; nan for
+    those that have none.
     """
 
     attitude: np.ndarray | None

@@ -38,22 +38,17 @@ _STANDS = 1e-13  # rad: a path that is shorter has no direction
 
 @dataclass(frozen=True)
 class Carrying:
-    """Tangent maps of an averaged motion's direction.
-
-    Attributes:
-        maps: (stretches, 2, 2) from its beginning to its end, in components along the path and across it.
+    """Tangent maps (stretches, 2, 2) of an averaged motion's direction, in components along the path and
+    across it.
     """
 
     seconds: float
     maps: np.ndarray
 
     def grown(self, along: float, across: float) -> float:
-        """Largest error (rad) until the end, of a motion that errs by given rates all the time.
-
-        What is made at different times adds up whatever its sign, which need not stay the same.
-
-        Args:
-            along, across: errors made along the path and across it, rad/s.
+        """Largest error (rad) until the end, of a motion that errs by given rates (rad/s) along the path and
+        across it all the time: what is made at different times adds up whatever its sign, which need not stay
+        the same.
         """
         largest = 0.0
         for error in self.errors(along, across):
@@ -153,11 +148,7 @@ def _carrier(problem: InitialValueProblem) -> EnsembleCarrier:
 
 
 def _to(carrier: EnsembleCarrier, states: np.ndarray, begin: float, end: float) -> np.ndarray:
-    """States (states, 1 + perturbed) at a later time.
-
-    Raises:
-        Unmeasured: one of them doesn't get there.
-    """
+    """States (states, 1 + perturbed) at a later time. Raises ``Unmeasured``."""
     only, every = np.zeros(1, dtype=int), np.ones((1, states.shape[1]))
     while begin < end:
         moved, _, reached = carrier.advance(

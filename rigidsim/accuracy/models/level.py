@@ -20,11 +20,8 @@ CHEAPEST_FIRST = (ORBIT_AVERAGED, SPIN_AVERAGED)
 
 @dataclass(frozen=True)
 class Considered:
-    """A model level that was considered.
-
-    Attributes:
-        error: forecast of its modelling error from the beginning of the span, rad; None if there is none.
-        seconds: CPU time, s, of measuring that error after a run; None if it can't be measured.
+    """A model level that was considered: its modelling error, rad, forecast from the beginning of the span,
+    and the CPU time, s, of measuring that after a run; None if there is none.
     """
 
     level: str
@@ -46,16 +43,10 @@ def choose_level(
     experiment: Experiment, *, loads: Sequence[Load] = (), without: Sequence[str] = ()
 ) -> LevelChoice | None:
     """Choose the model for the requested accuracy of axes, each level measured over the beginning of the
-    span.
+    span; None if the level is given. Raises ``ConfigError`` if no accuracy is asked for.
 
     Recording something that no average provides, such as a quaternion, leaves the full model, whose attitude
     is then held to the same accuracy.
-
-    Returns:
-        None if the level is given.
-
-    Raises:
-        ConfigError: no accuracy is asked for.
     """
     config = experiment.config
     if config.model.level != AUTO:
@@ -84,11 +75,7 @@ def choose_level(
 
 
 def fully(experiment: Experiment) -> Experiment:
-    """An experiment with its open level set to the full model; others unchanged.
-
-    Raises:
-        ConfigError: no accuracy is asked for.
-    """
+    """An experiment with its open level set to the full model; others unchanged. Raises ``ConfigError``."""
     if experiment.config.model.level != AUTO:
         return experiment
     _asked(experiment)

@@ -85,13 +85,8 @@ class ModellingError:
 def measure_modelling(
     prepared: InitialValueProblem, trail: SampleTrail | None = None, go_on: Callable[[], bool] = lambda: True
 ) -> ModellingError:
-    """Measure the modelling error of a run.
-
-    Args:
-        trail: some of the run's samples; without them, there is only a window at the beginning.
-
-    Raises:
-        Unmeasured: ``go_on`` ended it, or one of the models can't be followed.
+    """Measure the modelling error of a run, from some of its samples; without them over its beginning alone.
+    Raises ``Unmeasured`` if ``go_on`` ended it, or one of the models can't be followed.
     """
     average = prepared.system.formulation.average
     assert average is not None

@@ -108,10 +108,8 @@ def side_by_side(
     states: Sequence[Any],
     go_on: Callable[[], bool],
 ) -> Window:
-    """Run both models side by side.
-
-    Raises:
-        Unmeasured: one of them is refused, or doesn't reach the end.
+    """Run both models side by side. Raises ``Unmeasured`` if one of them is refused, or doesn't reach the
+    end.
     """
     exponent = prepared.system.scaling.momentum
     rotations = (end - begin) * max(rotation_rates(motion_at(average, states, exponent))) / _TURN

@@ -179,13 +179,9 @@ class BatchCarrier(_SingleMotion):
 
 
 class OwnCarrier(_SingleMotion):
-    """One after the other, by a copy of a run's integrator in double precision: nothing has to be compiled.
-
-    Args:
-        then: tolerance where many more steps are to be taken; None for states that bear no loose one.
-
-    Attributes:
-        until: steps up to which it costs less than compiled code.
+    """One after the other, by a copy of a run's integrator in double precision: nothing has to be compiled,
+    and up to ``until`` steps it costs less. ``then`` is the tolerance for many more steps, None if states
+    bear no loose one.
     """
 
     def __init__(self, system: System, integrator: TaylorEngine, then: float | None = TOLERANCE) -> None:
@@ -226,12 +222,8 @@ class OwnCarrier(_SingleMotion):
 
 
 class StepperCarrier(_SingleMotion):
-    """One after the other, by a stepper that ends its steps on switching surfaces or at given times.
-
-    Args:
-        start, end: times, internal units.
-        steps: steps of the motion between these.
-        stepper: the system's stepper in double precision, borrowed; compiled if None.
+    """One after the other, by a stepper that ends its steps on switching surfaces or at given times: the
+    system's own in double precision, borrowed, or one compiled for so many steps between two times.
     """
 
     def __init__(

@@ -159,10 +159,8 @@ class ShadowEnsemble:
         self._last_steps = self._steps + 4 * steps + HOPELESS_STEPS
 
     def elsewhere(self, state: np.ndarray, start: float, end: float, steps: float) -> ShadowEnsemble:
-        """The ensemble of another part of the motion, which begins in another state (states,); carried alike.
-
-        Args:
-            steps: steps that the part is expected to take.
+        """The ensemble of another part of the motion, which begins in another state (states,);
+        carried alike.
         """
         other, begin = copy.copy(self), np.array([start])
         units, read = self._starts.rate_units, self._starts.parameters
@@ -276,12 +274,8 @@ class ShadowEnsemble:
         likely: np.ndarray,
         normal: np.ndarray,
     ) -> None:
-        """Add errors of half of the steps taken, and of half of those ahead.
-
-        Args:
-            sizes: of what moves, (states, motions).
-            likely: steps of the next stretch, (motions,).
-            normal: random numbers (1 + states, perturbed), and as many more for shared errors.
+        """Add errors of half of the steps taken, and of half of those likely in the next stretch, (motions,),
+        to what moves; of random numbers (1 + states, perturbed), and as many more for shared errors.
         """
         errors, states = self._errors, len(sizes)
         left = np.maximum(self._expected[which] - self._steps[which], 1)
