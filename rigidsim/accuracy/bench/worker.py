@@ -121,7 +121,7 @@ def _per_unit(one_pass: Callable[[int], None], count: int, most: int, patience: 
             return statistics.median(passes)
 
 
-def _work() -> None:
+def work() -> None:
     """Do the tasks given on stdin, answering on stdout."""
     text, source, tasks = pickle.load(sys.stdin.buffer)
     experiment = parse(text, source=source)
@@ -177,7 +177,7 @@ class _Child:
     def __init__(self, experiment: Experiment, tasks: Sequence[Task]) -> None:
         self._errors = tempfile.TemporaryFile()  # noqa: SIM115  (closed at the end)
         self._process = subprocess.Popen(
-            [sys.executable, "-m", "rigidsim.accuracy.bench.worker"],
+            [sys.executable, "-c", "from rigidsim.accuracy.bench import worker; worker.work()"],
             stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=self._errors,
         )  # fmt: skip
         self.answers: queue.Queue[Answer | None] = queue.Queue()
@@ -208,7 +208,3 @@ class _Child:
         lines = self._errors.read().decode(errors="replace").splitlines()
         self._errors.close()
         return f"code {code} ({lines[-1].strip()})" if lines else f"code {code}"
-
-
-if __name__ == "__main__":
-    _work()
