@@ -18,13 +18,14 @@ from rigidsim.scene.config import Experiment
 from rigidsim.scene.toml_text import key_steps
 from rigidsim.scene.tracing.numbers import Traced, Untraceable
 from rigidsim.solve.batch.members import Members
-from rigidsim.solve.batch.replay import Replay
+from rigidsim.solve.batch.replay import Held, Replay
 from rigidsim.solve.batch.tracing import TRACED_TABLES, TracedSystem, trace
 from rigidsim.solve.effects.effect import registered_effects
 from rigidsim.solve.precision import precision_of
 from rigidsim.solve.problem import prepare
 
 _AT_ONCE = 2048  # members whose numbers are worked out together
+_MOST_HELD = 8  # families of which numbers of whole axes are held, some megabytes each
 
 
 class Alone(Enum):
@@ -95,10 +96,15 @@ def _reason_of_system(traced: TracedSystem) -> Alone | None:
 
 @dataclass
 class Family:
-    """Members that share the equations of a traced system, and their kind (see ``Members``)."""
+    """Members that share the equations of a traced system, and their kind (see ``Members``).
+
+    Attributes:
+        held: what follows from values of single axes, worked out once; None where it takes too much memory.
+    """
 
     traced: TracedSystem
     kind: int
+    held: Held | None = None
 
 
 @dataclass(frozen=True)
@@ -222,7 +228,8 @@ class Families:
             return error
         except Untraceable:
             return Alone.UNTRACEABLE
-        return _reason_of_system(traced) or Family(traced, int(self._members.kinds[member]))
+        held: Held | None = {} if len(self.known) < _MOST_HELD else None
+        return _reason_of_system(traced) or Family(traced, int(self._members.kinds[member]), held)
 
     def _taken(self, family: Family, waiting: np.ndarray, result: Sorted) -> np.ndarray:
         """Put the waiting members of a family into the result; returns those that are left."""
@@ -230,7 +237,8 @@ class Families:
         if not len(candidates):
             return waiting
         graph = family.traced.graph
-        replay = Replay(graph, self._members.columns(candidates), len(candidates))
+        columns = self._members.columns(candidates, whole=family.held is not None)
+        replay = Replay(graph, columns, len(candidates), family.held)
         agree = np.flatnonzero(replay.agreeing(list(graph.guards)))
         taken = candidates[agree]
         if not len(taken):

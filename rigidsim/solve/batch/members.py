@@ -12,10 +12,12 @@ from rigidsim.scene.config import Experiment
 from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.sweeps.sweep import Sweep
 from rigidsim.scene.toml_text import key_steps
-from rigidsim.solve.batch.replay import SharedReals, real_of
+from rigidsim.solve.batch.replay import Index, SharedReals, real_of
 from rigidsim.solve.batch.tracing import TRACED_TABLES
 
 _HELD = 1 << 16  # values of axes that are held, each worked out once for all members that share it
+_WHOLE = 1 << 11
+"""Values up to which an axis of a product is worked out as a whole, once for all members."""
 
 
 class AxisNumbers:
@@ -24,6 +26,7 @@ class AxisNumbers:
     def __init__(self, sweep: Sweep) -> None:
         self.sweep = sweep
         self._words: dict[int, dict[str, int]] = {}
+        self._whole: dict[int, list[np.ndarray]] = {}
         self._reals = lru_cache(_HELD)(self._reals_of)
 
     def traced(self, place: int) -> bool:
@@ -34,11 +37,25 @@ class AxisNumbers:
     def _reals_of(self, place: int, index: int) -> list[hy.real]:
         return [real_of(number) for number in self.sweep.axes[place].exact(index)]
 
-    def columns(self, place: int, which: np.ndarray) -> list[SharedReals]:
-        """The numbers that members have, a column for each key; ``which``: index of each one's value."""
-        needed, index = np.unique(which, return_inverse=True)
-        values = [self._reals(place, i) for i in needed.tolist()]
-        return [SharedReals(np.array(column), index) for column in zip(*values, strict=True)]
+    def columns(self, place: int, which: np.ndarray, *, whole: bool) -> list[SharedReals]:
+        """The numbers that members have, a column for each key.
+
+        Args:
+            which: index of each one's value.
+            whole: all values of the axis are worked out, if it isn't too long.
+        """
+        count = self.sweep.axes[place].values.count
+        if whole and self.sweep.product and count <= _WHOLE:
+            if place not in self._whole:
+                self._whole[place] = self._columns(place, range(count))
+            index, columns = Index(which, place), self._whole[place]
+        else:
+            needed, inverse = np.unique(which, return_inverse=True)
+            index, columns = Index(inverse), self._columns(place, needed.tolist())
+        return [SharedReals(column, index) for column in columns]
+
+    def _columns(self, place: int, needed: Sequence[int]) -> list[np.ndarray]:
+        return [np.array(column) for column in zip(*(self._reals(place, i) for i in needed), strict=True)]
 
     def codes(self, place: int, which: np.ndarray) -> np.ndarray:
         """Codes below the axis's length, equal for members whose axis values have the same text."""
@@ -88,9 +105,9 @@ class Members:
         """A member's exact numbers for ``keys``, SI."""
         return [x for place, which in self._traced for x in self.sweep.axes[place].exact(int(which[member]))]
 
-    def columns(self, members: np.ndarray) -> list[SharedReals]:
-        """The numbers of some members for each key, in the scene's arithmetic."""
+    def columns(self, members: np.ndarray, *, whole: bool) -> list[SharedReals]:
+        """The numbers of some members for each key (see ``AxisNumbers``)."""
         found: list[SharedReals] = []
         for place, which in self._traced:
-            found += self._axes.columns(place, which[members])
+            found += self._axes.columns(place, which[members], whole=whole)
         return found

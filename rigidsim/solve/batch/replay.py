@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import heyoka as hy
@@ -27,13 +28,32 @@ _FAILURES = (ZeroDivisionError, ValueError, OverflowError, TypeError)
 Reals = Any  # an array of hy.real, or one hy.real
 
 
-class SharedReals(NamedTuple):
-    """Numbers of members: the values that there are, and which of them each member has, (members,); None
-    where all have one.
+@dataclass(frozen=True, eq=False)
+class Index:
+    """Which of some values each member has, (members,).
+
+    ``axis`` is the place of the axis if these are all of its values: what follows from them alone is the same
+    for other members, too.
     """
 
-    values: Reals
-    which: np.ndarray | None = None
+    which: np.ndarray
+    axis: int | None = None
+
+
+class SharedReals(NamedTuple):
+    """Numbers of members: the values that there are, and which each member has; None where all have one."""
+
+    values: Any
+    index: Index | None = None
+
+    def of_each(self, count: int) -> np.ndarray:
+        """The numbers of so many members."""
+        each = self.values if self.index is None else self.values[self.index.which]
+        return np.broadcast_to(each, count)
+
+
+Held = dict[Any, tuple[Any, int | None]]
+"""What follows from the values of one axis alone, with its place; None for constants."""
 
 
 def real_of(number: ExactNumber) -> hy.real:
@@ -72,49 +92,66 @@ class Replay:
 
     Args:
         columns: for each column of the graph the members' swept numbers; those of one axis share their index.
+        held: what was found for a whole axis, for any members of the same sweep.
     """
 
-    def __init__(self, graph: Graph, columns: Sequence[SharedReals], count: int) -> None:
+    def __init__(self, graph: Graph, columns: Sequence[SharedReals], count: int, held: Held | None) -> None:
         self._graph, self._columns, self._count = graph, columns, count
-        self._numbers: dict[int, SharedReals] = {}
-        self._each = np.arange(count)
+        self._held: Held = {} if held is None else held
+        self._found: dict[Any, SharedReals] = {}
+        self._each = Index(np.arange(count))
+        self._axes = {c.index.axis: c.index for c in columns if c.index and c.index.axis is not None}
 
     def agreeing(self, guards: Sequence[Guard]) -> np.ndarray:
         """Mask of the members that make all decisions as the representative does, (members,)."""
         found = np.ones(self._count, dtype=bool)
         for guard in guards:
-            (left, right), index = self._together(guard.left, guard.right)
-            decided = left < right if guard.kind == "<" else left == right
-            agree = (decided == guard.outcome) & np.isfinite(left) & np.isfinite(right)
-            found &= agree if index is None else agree[index]
+            found &= self._once(guard, self._agreeing, guard).of_each(self._count)
             if not found.any():
                 break
         return found
 
     def doubles(self, node: int) -> np.ndarray:
         """A number rounded once, (members,); nan if it is outside a double's range."""
-        values, index = self.number(node)
-        exact = np.atleast_1d(values)
-        with np.errstate(all="ignore"):
-            found = exact.astype(np.float64) + 0.0  # zero without a sign
-        found[(np.abs(found) < np.finfo(float).tiny) & (exact != hy.real(0.0, _BITS))] = np.nan
-        found[np.isinf(found)] = np.nan
-        return np.full(self._count, found[0]) if index is None else found[index]
+        return self._once(("double", node), self._rounded, node).of_each(self._count)
 
     def number(self, node: int) -> SharedReals:
         """A number of the graph."""
-        if node not in self._numbers:
-            with np.errstate(all="ignore"):
-                self._numbers[node] = self._worked_out(*self._graph.nodes[node])
-        return self._numbers[node]
+        return self._once(node, self._worked_out, *self._graph.nodes[node])
 
-    def _together(self, *nodes: int) -> tuple[list[Reals], np.ndarray | None]:
+    def _once(self, key: Any, work: Callable[..., SharedReals], *given: Any) -> SharedReals:
+        if key not in self._found:
+            if key in self._held:
+                values, axis = self._held[key]
+                self._found[key] = SharedReals(values, None if axis is None else self._axes[axis])
+            else:
+                with np.errstate(all="ignore"):
+                    values, index = self._found[key] = work(*given)
+                if index is None or index.axis is not None:
+                    self._held[key] = values, index and index.axis
+        return self._found[key]
+
+    def _agreeing(self, guard: Guard) -> SharedReals:
+        (left, right), index = self._together(guard.left, guard.right)
+        decided = left < right if guard.kind == "<" else left == right
+        return SharedReals((decided == guard.outcome) & np.isfinite(left) & np.isfinite(right), index)
+
+    def _rounded(self, node: int) -> SharedReals:
+        values, index = self.number(node)
+        exact = np.atleast_1d(values)
+        found = exact.astype(np.float64) + 0.0  # zero without a sign
+        found[(np.abs(found) < np.finfo(float).tiny) & (exact != hy.real(0.0, _BITS))] = np.nan
+        found[np.isinf(found)] = np.nan
+        return SharedReals(found, index)
+
+    def _together(self, *nodes: int) -> tuple[list[Reals], Index | None]:
         """Values of nodes by a common index."""
         found = [self.number(node) for node in nodes]
-        indices = {id(index): index for _, index in found if index is not None}
+        indices = {index for _, index in found if index is not None}
         if len(indices) <= 1:
-            return [values for values, _ in found], next(iter(indices.values()), None)
-        return [values if index is None else values[index] for values, index in found], self._each
+            return [values for values, _ in found], next(iter(indices), None)
+        each = [values if index is None else values[index.which] for values, index in found]
+        return each, self._each
 
     def _worked_out(self, operation: str, arguments: tuple[Any, ...]) -> SharedReals:
         if operation == "constant":

@@ -37,7 +37,8 @@ def check_sweep(sweep: Sweep, *, every: bool = True, each: Each = map) -> Initia
     """Refuse a sweep with a member that can't be run; returns the first that can, prepared.
 
     Args:
-        every: check each member's numbers even if there are more than ``_ALL``: a minute per million members.
+        every: check each member's numbers even if there are more than ``_ALL``: a second per million
+            members of a product, most of a minute where each has values of its own.
         each: like ``map``; may have others look at shares of the members meanwhile.
 
     Raises:

@@ -1,6 +1,7 @@
 """Families: whoever shares a system has exactly the numbers of its own build; others are told apart."""
 
 import re
+from collections.abc import Sequence
 
 import heyoka as hy
 import pytest
@@ -10,7 +11,7 @@ from support import config
 
 from rigidsim import ConfigError, parse
 from rigidsim.scene.sweeps.sweep import Sweep
-from rigidsim.solve.batch.family import Alone, Families, batchable
+from rigidsim.solve.batch.family import Alone, Families, Family, batchable
 from rigidsim.solve.batch.members import Members
 from rigidsim.solve.problem import prepare
 
@@ -56,9 +57,10 @@ def swept(text: str, axes: dict[str, str], mode: str = "zip") -> Sweep:
     return Sweep.of(parse(f'{text}\n[sweep]\nmode = "{mode}"\nseed = 7\n' + "\n".join(lines)))
 
 
-def assert_own_numbers(sweep: Sweep, most: int = 64) -> Families:
-    """Each member's equations and start, bit for bit those of its own build."""
+def assert_own_numbers(sweep: Sweep, most: int = 64, known: Sequence[Family] = ()) -> Families:
+    """Each member's equations and start, bit for bit those of its own build, though families are known."""
     families = Families(Members(sweep))
+    families.known = list(known)
     found = families.sort()
     assert not found.alone
     assert not found.refused
@@ -118,6 +120,14 @@ def test_members_have_the_numbers_of_their_own_builds(
     families = assert_own_numbers(sweep)
     assert len(families.known) <= 6
     assert any(family.traced.parameters.nodes for family in families.known)
+
+
+def test_members_met_later_have_the_numbers_of_their_own_builds() -> None:
+    axes = {"initial.angular_velocity[0]": "values = [0.25, 0.5, 0.7]", "body.mass": "values = [1, 2, 3]"}
+    sweep = swept(FREE, axes, mode="product")
+    before = Families(Members(sweep, [4, 1]))
+    before.sort()
+    assert_own_numbers(sweep, known=before.known)
 
 
 @given(
@@ -204,5 +214,5 @@ def test_numbers_of_many_members_are_those_of_each_in_every_bit_of_the_scenes_ar
         graph = family.traced.graph  # whose values are those of the first member, worked out by mpmath
         for node, value in enumerate(graph.values):
             values, index = numbers.replay.number(node)
-            found = values if index is None else values[index[0]]
+            found = values if index is None else values[index.which[0]]
             assert graph.context.mpf(str(found)) == value, graph.nodes[node]
