@@ -44,11 +44,11 @@ class SharedReals(NamedTuple):
     """Numbers of members: the values that there are, and which each member has; None where all have one."""
 
     values: Any
-    index: Index | None = None
+    shared: Index | None = None
 
     def of_each(self, count: int) -> np.ndarray:
         """The numbers of so many members."""
-        each = self.values if self.index is None else self.values[self.index.which]
+        each = self.values if self.shared is None else self.values[self.shared.which]
         return np.broadcast_to(each, count)
 
 
@@ -100,7 +100,7 @@ class Replay:
         self._held: Held = {} if held is None else held
         self._found: dict[Any, SharedReals] = {}
         self._each = Index(np.arange(count))
-        self._axes = {c.index.axis: c.index for c in columns if c.index and c.index.axis is not None}
+        self._axes = {c.shared.axis: c.shared for c in columns if c.shared and c.shared.axis is not None}
 
     def agreeing(self, guards: Sequence[Guard]) -> np.ndarray:
         """Mask of the members that make all decisions as the representative does, (members,)."""
@@ -128,7 +128,7 @@ class Replay:
                 with np.errstate(all="ignore"):
                     values, index = self._found[key] = work(*given)
                 if index is None or index.axis is not None:
-                    self._held[key] = values, index and index.axis
+                    self._held[key] = values, None if index is None else index.axis
         return self._found[key]
 
     def _agreeing(self, guard: Guard) -> SharedReals:
