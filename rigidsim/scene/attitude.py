@@ -30,10 +30,7 @@ def _within(context: Any) -> Rotations:
 
 
 def _beside(value: Any, terms: Sequence[Any]) -> Any:
-    """The value, or zero if it is just the rounding of the terms it was made of.
-
-    Numbers without guard bits (floats, arrays) have no digits to spare and are left as they are.
-    """
+    """The value, or zero if it is the rounding of its terms; floats and arrays, without guard bits, stay."""
     context = getattr(getattr(value, "graph", value), "context", None)  # a traced number's is its graph's
     if context is None or context.prec < GUARD_BITS:
         return value

@@ -210,9 +210,7 @@ def tabulated_orbit(
     constants: tuple[tuple[str, ExactNumber], ...],
     strength: tuple[Any, ...] | None,
 ) -> TabulatedOrbit:
-    """A tabulated orbit, made once however often a scene is built, from the text of a table, the elements
-    that it lacks, and the parts of an mpf: the gravitational parameter of Kepler's third law, if known.
-    """
+    """A table's orbit, made once: of its text, the elements it lacks, and an mpf's parts for Kepler's law."""
     table = read_table(text, bits)
     context = table.context
     given = dict(constants)

@@ -52,10 +52,7 @@ _BOUNDED: Mapping[str, float] = {
 
 
 def narrow_parts(expression: Expression) -> list[Expression]:
-    """Arguments of flat functions, denominators, and bases of negative or high powers, each once.
-
-    Constants are left out, and anything that can't leave ``WIDE``, such as a sine.
-    """
+    """Arguments of flat functions, denominators, bases of negative or high powers, if they leave ``WIDE``."""
     found: dict[Node, None] = {}
     for node in operations(expression):
         part: Node | None = None
@@ -76,10 +73,7 @@ def narrow_parts(expression: Expression) -> list[Expression]:
 
 
 def root_parts(expression: Expression) -> list[Expression]:
-    """Radicands that may touch zero, each once: there the root has a kink, though no power shows it.
-
-    Sums of squares and a positive number, or anything else positive by its form, are left out.
-    """
+    """Radicands that may touch zero, where the root has a kink; not those that are positive by their form."""
     found: dict[Node, None] = {}
     for node in operations(expression):
         part: Node | None = None

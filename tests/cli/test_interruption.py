@@ -16,7 +16,7 @@ import xarray
 from support import OFTEN, cases, same_bits
 
 import rigidsim
-from rigidsim.cli.ending import exit_code
+from rigidsim.cli.app import exit_code
 
 pytestmark = pytest.mark.optimised  # as the processes that these are held against
 

@@ -182,11 +182,7 @@ def constant_value(expression: Expression, context: Any) -> Any:
 
 
 def evaluate(expression: Expression, values: Mapping[str, Any], context: Any) -> Any:
-    """The value (mpf of the context) for given values of the names.
-
-    Raises:
-        ExpressionError: there is no finite value; the text names the part at fault.
-    """
+    """The value (mpf) for values of the names; ``ExpressionError`` names a part without a finite one."""
 
     def combine(node: Node, operands: list[Any]) -> Any:
         if isinstance(node, Constant):

@@ -86,9 +86,7 @@ class Interpolation:
 
 
 def left_out(times: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Numbers of every other row, and the values (rows, columns) that interpolation gives there when these
-    are left out of float64 ``times`` (n,) and ``values`` (n, columns).
-    """
+    """Every other row's number, and values (rows, columns) interpolated there from the others, in float64."""
     kept = Interpolation(list(times[::2]), values[::2])
     rows = np.arange(1, 2 * kept.pieces, 2)
     found = []
