@@ -230,7 +230,7 @@ class Config(ConfigTable):
 
 
 def config_model() -> type[Config]:
-    """The schema with every kind of load; ``RuntimeError`` if none was registered (``rigidsim.model.loads``)."""
+    """The schema with every kind of load; ``RuntimeError`` if ``rigidsim.model.loads`` registered none."""
     if not LOAD_KINDS:
         raise RuntimeError("no kinds of loads are registered; import rigidsim.model.loads first")
     kinds = [LOAD_KINDS[name].Fields for name in sorted(LOAD_KINDS)]
