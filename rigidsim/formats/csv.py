@@ -8,7 +8,6 @@ reads it as float64 (which rounds numbers beyond double to the nearest one); ``d
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
 from decimal import Decimal
 from pathlib import Path
 
@@ -39,15 +38,16 @@ def write_csv(table: Table, path: Path, source: TableSource) -> None:
         head.insert(2, f"numbers have {source.bits} bits; dtype=str keeps the digits that float64 can't hold")
     names = [column.name for column in columns]
     if dates is not None:
-        head.append(f"time 0 is {dates.epoch}; dates are {dates.epoch.scale}, to 1e-{DIGITS} s")
-        names.insert(1, f"{dates.times.variable.removesuffix('time')}date")
+        epoch, dated = dates
+        head.append(f"time 0 is {epoch}; dates are {epoch.scale}, to 1e-{DIGITS} s")
+        names.insert(1, f"{dated.variable.removesuffix('time')}date")
     with path.open("w", encoding="utf-8", newline="\n") as file:
         file.write("\n# ".join(head) + "\n")
         file.write(",".join(names) + "\n")
         for block in table.blocks(columns):
             shown = [_shown(c, parts, source) for c, parts in zip(columns, block, strict=True)]
             if dates is not None:
-                shown.insert(1, [dates.text(time) for time in shown[columns.index(dates.times)]])
+                shown.insert(1, [_date(epoch, time) for time in shown[columns.index(dated)]])
             file.writelines(",".join(row) + "\n" for row in zip(*shown, strict=True))
 
 
@@ -58,32 +58,24 @@ def _shown(column: TableColumn, parts: list[np.ndarray], source: TableSource) ->
     return texts(parts, column.bits(source.bits))
 
 
-@dataclass(frozen=True)
-class _DateColumns:
-    """Dates of a table's rows."""
-
-    epoch: Epoch
-    times: TableColumn
-
-    def text(self, seconds: str) -> str:
-        """Date of a time of the scene given in s."""
-        return self.epoch.after(Decimal(seconds)).calendar()
-
-
-def _dates(table: Table, source: TableSource) -> _DateColumns | None:
-    """Date columns if the date of time 0 is known and the calendar covers all rows; else None."""
+def _dates(table: Table, source: TableSource) -> tuple[Epoch, TableColumn] | None:
+    """Date of time 0 and the column of times, if known and the calendar covers all rows; else None."""
     if not table.dated:
         return None
     times = next((c for c in table.columns if re.fullmatch(r"(.*_)?time", c.variable)), None)
     if times is None or not table.rows or not (source.naming.epoch or source.attributes.get("epoch")):
         return None
-    found = _DateColumns(named_epoch(source.naming, source.attributes), times)
+    epoch = named_epoch(source.naming, source.attributes)
     try:
         for row in (0, -1):
-            found.text(repr(float(table.dataset[times.variable][row])))
+            _date(epoch, repr(float(table.dataset[times.variable][row])))
     except (ValueError, ArithmeticError):
         return None
-    return found
+    return epoch, times
+
+
+def _date(epoch: Epoch, seconds: str) -> str:
+    return epoch.after(Decimal(seconds)).calendar()
 
 
 def _plain(text: str) -> str:

@@ -65,7 +65,7 @@ class MemberTable(Table):
     def blocks(
         self, columns: Sequence[TableColumn] | None = None, rows: int = 0
     ) -> Iterator[list[list[np.ndarray]]]:
-        """See ``Table.blocks``; the number of columns decides how many rows a block has."""
+        """As of ``Table``; the number of columns decides how many rows a block has."""
         wanted = self.columns if columns is None else columns
         numbers = sum(len(column.parts) for column in self.columns)
         for first, shape, flat in boxes(self.shape, self.each * numbers, self.block_numbers):

@@ -41,13 +41,10 @@ class Naming:
 
 @dataclass(frozen=True)
 class Labels:
-    """Epoch and axes that a message names.
+    """Epoch and axes that a message names, with remarks for its comments.
 
-    Attributes:
-        frame: axes of the message: the scene's, if the standard knows them.
-        turn: cosine and sine of the angle about X from the message's axes to the scene's, and of half of it;
-            None if they are the same.
-        notes: remarks for the message's comments.
+    ``turn``: cosine and sine of the angle about X from the message's axes to the scene's, and of half of it;
+    None if the standard knows the scene's.
     """
 
     epoch: Epoch

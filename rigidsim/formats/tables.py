@@ -29,8 +29,6 @@ class TableColumn:
     """One component of a variable.
 
     Attributes:
-        variable: variable that it is a component of, such as ``angular_velocity``.
-        index: index of the component, besides the row.
         parts: names of the variables whose sum, smallest first, is the exact value; the nearest double first.
         angle_unit: unit of its angles, with which the column's name ends; None if unchanged.
     """
@@ -99,11 +97,6 @@ class Table:
         return int(self.dataset.sizes[self.dim])
 
     @property
-    def is_main(self) -> bool:
-        """Whether it is the table that carries the run's name."""
-        return self.dim == self.main
-
-    @property
     def extent(self) -> str:
         """Description of its rows, for the comment at a file's top."""
         return f"{self.rows} rows along {self.dim}"
@@ -125,15 +118,10 @@ class Table:
 
     def _values(self, column: TableColumn, read: Mapping[str, np.ndarray]) -> list[np.ndarray]:
         """Parts of one column."""
-        parts = [_column(read[part], column.index) for part in column.parts]
+        key: Any = (slice(None), *column.index)
+        parts = [np.asarray(read[part][key]) for part in column.parts]
         unit = column.angle_unit
         return parts if unit is None else converted(parts, unit, column.bits(self.bits))
-
-
-def _column(values: np.ndarray, index: tuple[int, ...]) -> np.ndarray:
-    """One component along the first dimension."""
-    key: Any = (slice(None), *index)
-    return np.asarray(values[key])
 
 
 def tables_of(dataset: xarray.Dataset, angle_unit: AngleUnit | None = None, bits: int = 53) -> list[Table]:

@@ -36,13 +36,8 @@ _STEPS_TO_SINGULARITY = math.e**2  # a Taylor step is e^-2 of the way to it (Jor
 
 @dataclass(frozen=True)
 class Diagnostics:
-    """Evidence on a run's errors from its steps, its samples and the motion itself.
-
-    Attributes:
-        estimate: estimated errors at the end; None if not requested, or the run hasn't ended.
-        modelling: error of a reduced model; None for the full model, and if not measured.
-        unmeasured: why it isn't measured of a run that ended; None if it is.
-        cheaper: an averaged model that would have sufficed; None if there is none, or none was sought.
+    """Evidence on a run's errors from its steps, its samples and the motion itself: the estimate at its end,
+    the error of a reduced model, or why it isn't known, and an averaged model that would have sufficed.
     """
 
     prepared: InitialValueProblem

@@ -35,11 +35,7 @@ from rigidsim.store.variables import Extra
 def execute(
     session: Session, prepared: InitialValueProblem, folder: RunFolder | None, chain: Chain | None = None
 ) -> Run:
-    """Integrate to the end, or to whatever ends it, and complete the files.
-
-    Args:
-        folder: the run's folder; None for a run in memory.
-        chain: segments to resume from, with the arrays of the last one's checkpoint.
+    """Integrate to the end, or to whatever ends it, and complete the files, if there is a folder.
 
     Raises:
         RunFolderError: the folder can't be written, or the checkpoint belongs to another system.

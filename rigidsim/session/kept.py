@@ -21,9 +21,7 @@ ALWAYS = "always"
 
 @dataclass(frozen=True)
 class KeptVariable:
-    """One variable for the members of a tile, (members, ...), and the item of ``[sweep] keep`` that it
-    belongs to.
-    """
+    """One variable for the members of a tile, (members, ...), and its item of ``[sweep] keep``."""
 
     dims: tuple[str, ...]
     values: np.ndarray
@@ -49,9 +47,7 @@ Kept = dict[str, KeptVariable]
 
 @dataclass(frozen=True)
 class MemberSeries:
-    """The samples of some members: parts of (members, samples, components); missing samples at the end are
-    nan.
-    """
+    """Samples of some members: parts of (members, samples, components); missing ones at the end are nan."""
 
     variable: Variable
     parts: Sequence[np.ndarray]
@@ -73,11 +69,8 @@ def kept_of_series(
     keep: Collection[str],
     hidden: Collection[str] = (),
 ) -> Kept:
-    """What is asked for of recorded variables; drifts are always kept.
-
-    Args:
-        times: (samples,), or (members, samples) if each has its own, s.
-        lengths: samples that each member has, (members,).
+    """What is asked for of recorded variables; drifts are always kept. Times in s are (samples,), or
+    (members, samples) if each has its own; ``lengths``: samples that each member has.
     """
     found: Kept = {}
     for one in series:
@@ -152,7 +145,7 @@ def _extremes(one: MemberSeries, times: np.ndarray) -> Kept:
         extreme = np.take_along_axis(values, rows[:, None, :], axis=1)[:, 0]
         when = times[rows] if times.ndim == 1 else np.take_along_axis(times, rows, axis=1)
         when = np.where(np.isnan(extreme), np.nan, when)
-        words = {"min": "smallest", "max": "largest"}[what]
+        words = "smallest" if what == "min" else "largest"
         long_name = f"{words} {variable.attributes.get('long_name', variable.name)} at a sample"
         common = {k: v for k, v in variable.attributes.items() if k in ("frame", "euler_sequence", "angle")}
         found[f"{variable.name}_{what}"] = kept(

@@ -26,7 +26,6 @@ from rigidsim.store.netcdf import joined_parts
 from rigidsim.store.run import MemoryRun
 from rigidsim.store.summary import Summary
 from rigidsim.store.summary_parts import Modelling, WarningCode
-from rigidsim.store.variables import Variable
 
 
 class Outcome(Enum):
@@ -43,19 +42,15 @@ OUTCOMES = (
 )
 """All outcomes of members; a dataset stores the index in this list, which may only grow."""
 WARNINGS = tuple(code.value for code in WarningCode)
+_DATES = ("year", "julian_date", "date")
 _ESTIMATING = ("estimate", "modelling")
 """Phases of a run that find its errors."""
 
 
 @dataclass(frozen=True)
 class MemberResults:
-    """Results of some members.
-
-    Attributes:
-        kept: kept variables by name, each (members, ...).
-        engines: engines that ran members, with the number of members each.
-        why_alone: code of the reason why members were run one by one; empty if none was.
-        estimating: CPU seconds spent on error estimates.
+    """Results of some members: kept variables, (members, ...) each; members by engine; the code of the reason
+    why some were run one by one, empty if none was; and CPU seconds spent on error estimates.
     """
 
     kept: Kept
@@ -210,7 +205,7 @@ def _kept_of_run(result: MemoryRun, keep: Sequence[str], hidden: Collection[str]
     for variable in result.variables:
         if variable.name == "time":
             times = np.reshape(joined_parts(result.blocks, variable)[0], -1)
-        if variable.name == "time" or "units" not in variable.attributes or _is_date(variable):
+        if variable.name == "time" or "units" not in variable.attributes or variable.name in _DATES:
             continue
         parts = [
             part.reshape(1, -1, max(1, int(np.prod(variable.shape))))
@@ -218,10 +213,6 @@ def _kept_of_run(result: MemoryRun, keep: Sequence[str], hidden: Collection[str]
         ]
         series.append(MemberSeries(variable, parts))
     return kept_of_series(series, times, np.array([len(times)]), keep, hidden)
-
-
-def _is_date(variable: Variable) -> bool:
-    return variable.name in ("year", "julian_date", "date")
 
 
 def _events_of_run(result: MemoryRun, keep: Sequence[str], most_events: int, events: Sequence[str]) -> Kept:
@@ -233,7 +224,7 @@ def _events_of_run(result: MemoryRun, keep: Sequence[str], most_events: int, eve
         points = {
             what: (variable, [extras[f"{name}_{what}"].values])
             for what, variable in recorded.items()
-            if f"{name}_{what}" in extras and not _is_date(variable)
+            if f"{name}_{what}" in extras and variable.name not in _DATES
         }
         found |= kept_events(name, [times], most_events, points, keep)
     return found

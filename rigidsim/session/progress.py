@@ -67,7 +67,6 @@ class _Watching(Observer):
         return None
 
     def started(self, prepared: InitialValueProblem, folder: Path | None) -> None:
-        """See ``Observer``."""
         self._begin = self._clock()
         self._name = prepared.scene.name
         self._start = float(prepared.scene.start)
@@ -76,7 +75,6 @@ class _Watching(Observer):
         self._before = 0, 0.0
 
     def resumed(self, progress: Progress) -> None:
-        """See ``Observer``."""
         self._before = progress.steps, self._fraction(progress)
 
     def _fraction(self, progress: Progress) -> float:
@@ -99,35 +97,29 @@ class LineObserver(_Watching):
         self._tried, self._verb = "", "trying"
 
     def started(self, prepared: InitialValueProblem, folder: Path | None) -> None:
-        """See ``Observer``."""
         super().started(prepared, folder)
         self._latest = self._begin
         self._say("integrating in memory" if folder is None else f"integrating into {folder}")
 
     def progressed(self, progress: Progress) -> None:
-        """See ``Observer``."""
         if self._due():
             rate, to_go = self._pace(progress)
             reached = f"{100 * self._fraction(progress):.1f} %, t = {self._words.short(progress.time)}"
             self._say(f"{reached}, {rate} steps/s, {to_go}")
 
     def phase(self, name: str) -> None:
-        """See ``Observer``."""
         if name in _PHASES:
             self._say(_PHASES[name])
         self._tried, self._verb = "", "comparing with" if name == "certify" else "trying"
 
     def nothing_left(self, why: str) -> None:
-        """See ``Observer``."""
         print(_NOTHING_LEFT.format(why), file=sys.stderr, flush=True)
 
     def choosing(self, name: str) -> None:
-        """See ``Observer``."""
         self._name = name
         self._say("choosing settings by short trials")
 
     def trying(self, title: str, fraction: float) -> None:
-        """See ``Observer``."""
         if title != self._tried:
             self._tried, self._latest = title, self._clock()
             self._say(f"{self._verb} {title}")
@@ -170,12 +162,10 @@ class TerminalObserver(_Watching):
         self._bar.stop()
 
     def started(self, prepared: InitialValueProblem, folder: Path | None) -> None:
-        """See ``Observer``."""
         super().started(prepared, folder)
         self._draw(_shortened(self._name), 1.0)
 
     def progressed(self, progress: Progress) -> None:
-        """See ``Observer``."""
         if self._task is None:
             return
         fraction = self._fraction(progress)
@@ -186,20 +176,16 @@ class TerminalObserver(_Watching):
         self._bar.update(self._task, completed=fraction, said=said)
 
     def phase(self, name: str) -> None:
-        """See ``Observer``."""
         if name in _PHASES:
             self._draw(_PHASES[name])
 
     def nothing_left(self, why: str) -> None:
-        """See ``Observer``."""
         self._bar.console.print(_NOTHING_LEFT.format(why), highlight=False, markup=False)
 
     def choosing(self, name: str) -> None:
-        """See ``Observer``."""
         self._draw(f"{_shortened(name)}: choosing")
 
     def trying(self, title: str, fraction: float) -> None:
-        """See ``Observer``."""
         if self._task is not None:
             said = f"{100 * fraction:5.1f} %  {title}"
             self._bar.update(self._task, total=1.0, completed=fraction, said=said)

@@ -45,13 +45,9 @@ class Undefined:
 
 @dataclass
 class SampleStatistics:
-    """Statistics of the samples taken so far, in all sessions.
+    """Statistics of the samples taken so far, in all sessions; times in s.
 
-    Attributes:
-        singularity_time: time of that sample, s.
-        angles_wrapped_from: time of the first sample whose angles are within one turn, since their turns
-            aren't known, seconds; nan where all are.
-        undefined: NaN samples by recorded variable that has any.
+    From ``angles_wrapped_from`` on angles are within one turn, since turns aren't known; nan if all are.
     """
 
     invariants: Sequence[str] = ()
@@ -95,7 +91,6 @@ class SampleStatistics:
             self.singularity_time = float(times[nearest])
 
     def pack(self) -> Arrays:
-        """See ``SavedPart``."""
         arrays = {
             "watched": np.array([self._values(self.largest), self._values(self.final)]),
             "put_back": np.array(self._values(self.put_back)),
@@ -107,7 +102,7 @@ class SampleStatistics:
         return arrays
 
     def restore(self, arrays: Mapping[str, np.ndarray]) -> None:
-        """See ``SavedPart``; older checkpoints hold no undefined samples."""
+        # older checkpoints hold no undefined samples
         largest, final = np.reshape(arrays.get("watched", ()), (2, len(self.invariants)))
         self.largest, self.final = self._by_name(largest), self._by_name(final)
         self.put_back = self._by_name(arrays.get("put_back", ()))

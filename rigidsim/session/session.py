@@ -126,15 +126,12 @@ class Guards:
 
 @dataclass(frozen=True)
 class AdviceLimits:
-    """When a run that resolved every rotation is compared with averaged models.
-
-    Attributes:
-        steps: least steps of such a run: the windows in which both are followed have 2e4 to 2e5 of them.
-        apart: largest distance of axes, rad, at which a model is advised; two seconds of arc.
+    """From how many steps on a run that resolved every rotation is compared with averaged models, and up to
+    which distance of axes, rad, one is advised.
     """
 
-    steps: int = 1_000_000
-    apart: float = 1e-5
+    steps: int = 1_000_000  # the windows in which both are followed have 2e4 to 2e5 of them
+    apart: float = 1e-5  # two seconds of arc
 
 
 @dataclass(frozen=True)
@@ -181,7 +178,6 @@ class RunCost:
     version: ClassVar[int] = 1
 
     def pack(self) -> Arrays:
-        """See ``SavedPart``."""
         effort, progress = self.effort, self.progress
         return {
             "steps_seen": np.array([progress.smallest_step, progress.largest_step]),
@@ -190,7 +186,6 @@ class RunCost:
         }
 
     def restore(self, arrays: Mapping[str, np.ndarray]) -> None:
-        """See ``SavedPart``."""
         effort, progress = self.effort, self.progress
         progress.smallest_step, progress.largest_step = numbers(arrays, "steps_seen", 2)
         effort.wall_seconds, effort.cpu_seconds, progress.integration_seconds = numbers(arrays, "effort", 3)
@@ -199,12 +194,7 @@ class RunCost:
 
 
 class Phases:
-    """Seconds by phase of one session, in the order in which the phases ended.
-
-    Attributes:
-        wall, cpu: seconds of each; the CPU's are those of all threads of this process. The engine's own stand
-            among the former.
-    """
+    """Wall and CPU seconds (of all threads) by phase of one session, in the order in which they ended."""
 
     def __init__(self) -> None:
         self.wall: dict[str, float] = {}

@@ -44,12 +44,8 @@ def summarise(
     attributes: RootAttributes,
     **ended: Any,
 ) -> Summary:
-    """The summary without the digests of files that are still to be written.
-
-    Args:
-        remarks: on how the session began; they precede the warnings.
-        initial: components of the invariants.
-        ended: fields that tell how the run ended, and what it cost.
+    """The summary without the digests of files that are still to be written. Remarks on how the session began
+    precede the warnings; ``initial``: components of the invariants; ``ended``: how it ended, and its cost.
     """
     prepared, progress = found.prepared, found.progress
     scene, system = prepared.scene, prepared.system

@@ -33,18 +33,13 @@ class FileOf:
 
 @dataclass(frozen=True)
 class WorkFolder:
-    """Common base of the folders of runs and sweeps.
-
-    Attributes:
-        kept: what remains when writing stops, for messages.
-        resumed: what the command that resumes does with the rest, for messages.
-        seen_by: the lock (of ``fcntl``) by which it is seen whether a process is at work: a shared one
-            disturbs nobody else who looks, an exclusive one sees those that share the work too.
-    """
+    """Common base of the folders of runs and sweeps."""
 
     path: Path
-    kept: ClassVar[str]
-    resumed: ClassVar[str]
+    kept: ClassVar[str]  # what remains when writing stops, for messages
+    resumed: ClassVar[str]  # what the command that resumes does with the rest, for messages
+    # the lock by which it is seen whether a process is at work: a shared one disturbs nobody else who looks,
+    # an exclusive one sees those that share the work too
     seen_by: ClassVar[int]
 
     config = FileOf("config.toml")

@@ -170,9 +170,7 @@ class SavedRun(Run):
             refuse_damaged(self.folder.dataset, claimed)
 
     def opened(self, *, indexed: bool = True) -> xarray.Dataset:
-        """The dataset as in ``dataset``; without ``indexed``, sample times aren't loaded and can't be
-        selected by.
-        """
+        """As ``dataset``; without ``indexed``, sample times aren't loaded and can't be selected by."""
         from rigidsim.store.reader import open_dataset
 
         if self.folder.dataset.exists():

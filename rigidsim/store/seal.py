@@ -98,10 +98,8 @@ def check_whole(path: Path) -> tuple[str, str]:
 
 
 def refuse_damaged(path: Path, expected: str | None) -> None:
-    """Check a run's complete dataset against its seal; those of the first schema version have none.
-
-    Args:
-        expected: SHA-256 of the file, if the summary beside it gives one.
+    """Check a run's complete dataset against its seal (those of the first schema version have none), and
+    against the SHA-256 that the summary beside it gives, if any.
     """
     try:
         unsealed = read_seal(path) is None

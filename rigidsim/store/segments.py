@@ -34,11 +34,8 @@ Arrays = Mapping[str, np.ndarray]
 
 @dataclass(frozen=True)
 class SegmentLimits:
-    """When a segment is due.
-
-    Attributes:
-        bytes: size of the collected rows; as much again is in memory while a segment is assembled.
-        seconds: time since the latest one, which is what a crash can cost. A segment takes some 20 ms.
+    """When a segment is due: by the size of the collected rows (as much again is in memory while it is
+    assembled), or by the time since the latest one, which is what a crash can cost. One takes some 20 ms.
     """
 
     bytes: int = 16_000_000
@@ -47,12 +44,8 @@ class SegmentLimits:
 
 @dataclass(frozen=True)
 class Chain:
-    """The segments of a run that belong together.
-
-    Attributes:
-        run: the run's identity; empty without segments.
-        damage: what is wrong with the first segment that doesn't belong, or None.
-        spoiled: that segment and all after it.
+    """The segments of a run that belong together; what is wrong with the first that doesn't, if any, and
+    which are spoiled: that one and all after it. The run's identity is empty without segments.
     """
 
     paths: list[Path] = field(default_factory=list)
@@ -64,12 +57,7 @@ class Chain:
 
 
 class SegmentWriter:
-    """Collects blocks and writes them as segments.
-
-    Args:
-        folder: ``segments/`` of a run folder; created.
-        attributes: root attributes that make a segment readable on its own; ``run_id`` among them.
-    """
+    """Collects blocks and writes them as segments in a folder ``segments/``, which is created."""
 
     def __init__(
         self,
@@ -111,12 +99,8 @@ class SegmentWriter:
 
     def flush(self, checkpoint: Arrays, events: Arrays) -> None:
         """Write the collected rows, possibly just the checkpoint; on return they are saved."""
-        content = self._image(
-            self._blocks,
-            checkpoint,
-            events,
-            {"segment": self.count, "first_sample": self.saved_rows, "previous_seal": self._seal},
-        )
+        place = {"segment": self.count, "first_sample": self.saved_rows, "previous_seal": self._seal}
+        content = self._image(self._blocks, checkpoint, events, place)
         path = self._folder / f"{self.count:08d}.h5"
         with self._writing():
             atomic.write_bytes(path, content)

@@ -132,7 +132,9 @@ def _bits_of_members(dataset: xarray.Dataset) -> int:
 
 def _beside(target: Path, table: Table) -> Path:
     """File of a table; that of samples, or of members, is the target itself."""
-    return target if table.is_main else target.with_name(f"{target.stem}.{table.dim}{target.suffix}")
+    return (
+        target if table.dim == table.main else target.with_name(f"{target.stem}.{table.dim}{target.suffix}")
+    )
 
 
 def _refuse_existing(path: Path, found: Format, force: bool) -> None:

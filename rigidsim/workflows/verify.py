@@ -47,14 +47,8 @@ class Difference:
 
 @dataclass(frozen=True)
 class Verdict:
-    """Result of a verification.
-
-    Attributes:
-        identical: every number of every variable agrees in every bit, the files are whole, and the summary's
-            claims hold.
-        difference: the first difference, or None.
-        differing: names of all variables that differ.
-        environment: versions and machine features that changed since, which can explain it.
+    """Result of a verification: identical if every number of every variable agrees in every bit, the files
+    are whole, and the summary's claims hold; ``environment``: what changed since, which may explain the rest.
     """
 
     path: str
