@@ -56,10 +56,7 @@ def _flight_block(m: Mechanics, plan: ModelPlan) -> StateBlock:
     """x' = v and v' = force over mass, in the units of position and speed."""
     context, scaling = m.scene.context, m.scaling
     ratio = m.number(context.ldexp(context.one, scaling.speed + scaling.time - scaling.length))
-    accelerations = []
-    for i in range(3):
-        terms = [m.number(vector[i]) * expression for vector, expression in m.force if vector[i] != 0]
-        accelerations.append(hy.sum(terms) if terms else hy.expression(0.0))
+    accelerations = [hy.sum([m.number(v[i]) * x for v, x in m.force if v[i] != 0]) for i in range(3)]
     initial = [context.ldexp(x, -scaling.length) for x in m.carried(m.scene.position)]
     initial += [context.ldexp(v, -scaling.speed) for v in m.carried(m.scene.velocity)]
     return StateBlock(
@@ -74,14 +71,11 @@ def _flight_block(m: Mechanics, plan: ModelPlan) -> StateBlock:
 def _load_blocks(m: Mechanics) -> list[StateBlock]:
     """Orbits, each once for all loads on it, and any other states that loads bring."""
     blocks: list[StateBlock] = []
-    placed: dict[KeplerOrbit, list[str]] = {}
-    carried: set[TabulatedOrbit] = set()
+    carried: set[KeplerOrbit | TabulatedOrbit] = set()
     for load in m.loads:
-        if (orbit := orbit_of(load)) is not None:
-            placed.setdefault(orbit, []).append(load.title)
-    for load in m.loads:
-        if (orbit := orbit_of(load)) is not None and orbit in placed:
-            titles = ", ".join(dict.fromkeys(placed.pop(orbit)))
+        if (orbit := orbit_of(load)) is not None and orbit not in carried:
+            carried.add(orbit)
+            titles = ", ".join(dict.fromkeys(x.title for x in m.loads if orbit_of(x) == orbit))
             block = m.orbit_block(orbit)
             blocks.append(replace(block, why=block.why or f"{titles}: where its source is"))
         if (table := table_of(load)) is not None and table not in carried:

@@ -14,6 +14,7 @@ heyoka's own treatment of expressions, and what is done about it here:
 
 from __future__ import annotations
 
+import operator
 from collections.abc import Collection, Mapping
 from typing import Any
 
@@ -102,7 +103,11 @@ def to_heyoka(
             if context.isint(exponent):
                 return whole_power(operands[0], int(exponent))
             return operands[0] ** literal(node, exponent)
-        return _symbolic(node.operator, [literal(node, operand) for operand in operands])
+        operands, named = [literal(node, operand) for operand in operands], node.operator
+        if named in ("sum", "product"):
+            return hy.sum(operands) if named == "sum" else hy.prod(operands)
+        own: dict[str, Any] = {"negative": operator.neg, "quotient": operator.truediv}
+        return (own.get(named) or getattr(hy, named))(*operands)
 
     return literal(expression.root, expressions.fold(expression, combine))
 
@@ -129,18 +134,6 @@ def whole_power(base: Any, exponent: int) -> Any:
         if exponent:
             square = square**2.0
     return hy.prod(factors) if factors else hy.expression(1.0)
-
-
-def _symbolic(operator: str, operands: list[Any]) -> Any:
-    if operator == "sum":
-        return hy.sum(operands)
-    if operator == "product":
-        return hy.prod(operands)
-    if operator == "negative":
-        return -operands[0]
-    if operator == "quotient":
-        return operands[0] / operands[1]
-    return getattr(hy, operator)(*operands)
 
 
 # --- what names stand for -----------------------------------------------------------------------------------

@@ -187,8 +187,7 @@ def quadratic_form(m: Kinematics, direction: list[Symbolic]) -> Symbolic:
 
 def inertia_times(m: Kinematics, direction: list[Symbolic]) -> list[Symbolic]:
     """I c for a direction c in body axes, internal units of inertia."""
-    rows = []
-    for row in m.numbers.inertia:
-        terms = [m.number(x) * d for x, d in zip(row, direction, strict=True) if x != 0]
-        rows.append(hy.sum(terms) if terms else hy.expression(0.0))
-    return rows
+    inertia = m.numbers.inertia
+    return [
+        hy.sum([m.number(x) * d for x, d in zip(row, direction, strict=True) if x != 0]) for row in inertia
+    ]

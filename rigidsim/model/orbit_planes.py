@@ -9,7 +9,7 @@ Q = sin(pi_A) cos(Pi_A) from Capitaine, Wallace & Chapront 2003 (A&A 412, 567: t
 from __future__ import annotations
 
 from abc import abstractmethod
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Any
 
@@ -32,17 +32,11 @@ _ECLIPTIC_DRIFT = 1e-12  # rad/s; 0.47 arcsec a year are 7e-14
 
 
 class OrbitPlane:
-    """Plane of a load's source; all vectors returned are in space axes.
+    """Plane of a load's source; all vectors returned are in space axes."""
 
-    Attributes:
-        described: the plane's description when angles are measured from it.
-        called: name of its normal in a local frame; empty if the source doesn't stay in the plane.
-        flown: whether it is the plane of the body's own flight.
-    """
-
-    described: str
-    called: str = ""
-    flown: bool = False
+    described: str  # where angles are measured from it
+    called: str = ""  # its normal in a local frame; empty if the source doesn't stay in the plane
+    flown: bool = False  # whether it is the plane of the body's own flight
 
     @abstractmethod
     def normal(self, m: Kinematics) -> list[Symbolic]:
@@ -80,21 +74,17 @@ class KeplerPlane(OrbitPlane):
         return m.orbit(self.orbit).normal
 
     def at_start(self, scene: Scene) -> Vector:
-        return self._at(scene.context, self.orbit.ascending_node + self.orbit.node_rate * scene.start)
+        turned = self.orbit.node_rate * scene.start
+        return replace(self.orbit, ascending_node=self.orbit.ascending_node + turned).normal(scene.context)
 
     def fixed(self, scene: Scene) -> Vector | None:
-        moves = self.orbit.node_rate != 0
-        return None if moves else self._at(scene.context, self.orbit.ascending_node)
+        return None if self.orbit.node_rate != 0 else self.orbit.normal(scene.context)
 
     def drift(self, scene: Scene) -> Any:
         return abs(self.orbit.node_rate)
 
     def rate(self, scene: Scene) -> Any:
         return abs(self.orbit.mean_motion)
-
-    def _at(self, context: Any, node: Any) -> Vector:
-        sine, cosine = context.sin(self.orbit.inclination), context.cos(self.orbit.inclination)
-        return [sine * context.sin(node), -sine * context.cos(node), cosine]
 
 
 @dataclass(frozen=True)

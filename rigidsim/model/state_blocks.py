@@ -15,50 +15,26 @@ from rigidsim.model.scaling import Rounder
 from rigidsim.scene.arithmetic import Matrix, negligible
 
 
-@dataclass(frozen=True)
 class RotatingBody:
-    """A body that turns: everything that is named after it, or follows from its inertia and rates."""
+    """A body that turns: everything that is named after it, or follows from its inertia and rates.
 
-    prefix: str = ""  # begins the names of its states, which tells several bodies apart
+    The names of its states begin with a prefix, which tells several bodies apart.
+    """
 
-    @property
-    def rates(self) -> list[str]:
-        """States of the angular velocity, body axes."""
-        return self._named("wx", "wy", "wz")
-
-    @property
-    def vertical(self) -> list[str]:
-        """States of the unit vector against gravity, body axes."""
-        return self._named("gx", "gy", "gz")
-
-    @property
-    def quaternion(self) -> list[str]:
-        """States of the attitude as a quaternion, scalar part first."""
-        return self._named("qw", "qx", "qy", "qz")
-
-    @property
-    def position(self) -> list[str]:
-        """States of the position of the centre of mass, space axes."""
-        return self._named("x", "y", "z")
-
-    @property
-    def velocity(self) -> list[str]:
-        """States of its velocity."""
-        return self._named("vx", "vy", "vz")
-
-    def _named(self, *names: str) -> list[str]:
-        return [self.prefix + name for name in names]
+    def __init__(self, prefix: str = "") -> None:
+        self.rates = [prefix + name for name in ("wx", "wy", "wz")]  # angular velocity, body axes
+        self.vertical = [prefix + name for name in ("gx", "gy", "gz")]  # upwards, body axes
+        self.quaternion = [prefix + name for name in ("qw", "qx", "qy", "qz")]  # scalar part first
+        self.position = [prefix + name for name in "xyz"]  # of the centre of mass, space axes
+        self.velocity = [prefix + name for name in ("vx", "vy", "vz")]
 
     def momentum(
         self, inertia: Matrix, rates: list[Symbolic], number: Rounder, context: Any
     ) -> list[Symbolic]:
         """Angular momentum I w, body axes, internal units; moments that are only rounding are left out."""
         least = context.maximum([abs(x) for row in inertia for x in row]) * negligible(context)
-        rows = []
-        for row in inertia:
-            terms = [number(x) * w for x, w in zip(row, rates, strict=True) if abs(x) > least]
-            rows.append(hy.sum(terms) if terms else hy.expression(0.0))
-        return rows
+        products = [[(x, w) for x, w in zip(row, rates, strict=True) if abs(x) > least] for row in inertia]
+        return [hy.sum([number(x) * w for x, w in row]) for row in products]
 
     def energy(self, rates: list[Symbolic], momentum: list[Symbolic]) -> Symbolic:
         """Kinetic energy of rotation w . I w / 2."""

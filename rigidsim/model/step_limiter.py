@@ -72,7 +72,7 @@ def _along_the_motion(u: Symbolic, derivatives: Mapping[str, Symbolic]) -> Symbo
     """Time derivative of an expression, internal units; any swept number in it is constant along a motion."""
     by_time, by_state = slopes(u)
     terms = [slope * derivatives[name] for name, slope in by_state.items() if name in derivatives]
-    return hy.sum([*terms, *by_time]) if terms or by_time else hy.expression(0.0)
+    return hy.sum([*terms, *by_time])
 
 
 def slopes(u: Symbolic) -> tuple[list[Symbolic], dict[str, Symbolic]]:

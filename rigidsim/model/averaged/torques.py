@@ -93,7 +93,7 @@ class DrivingTorques:
         for axis in self.polhodes.axes:
             shares = [(dot(axis, vector), expression) for vector, expression in terms]
             parts = [as_factor(number(share)) * expression for share, expression in shares if share != 0]
-            found.append(hy.sum(parts) if parts else hy.expression(0.0))
+            found.append(hy.sum(parts))
         return found
 
     def _mechanics(self, number: Rounder) -> Mechanics:
@@ -194,7 +194,7 @@ class DrivingTorques:
             more = self._summed(axial, transverse, number, nodes)
             p.append(more[0])
             q.append(more[1])
-        return [hy.sum(p) if p else hy.expression(0.0), hy.sum(q) if q else hy.expression(0.0)]
+        return [hy.sum(p), hy.sum(q)]
 
     def parameter(self, axial: Symbolic, transverse: Symbolic, number: Rounder) -> Symbolic:
         """k^2."""

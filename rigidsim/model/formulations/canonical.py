@@ -56,10 +56,8 @@ class Canonical(Formulation):
         body = [hy.sum([k * p for k, p in zip(column, momenta, strict=True)]) for column in columns]
         inverse = plan.numbers.inverse_inertia
         tiny = max(abs(x) for row in inverse for x in row) * negligible(plan.scene.context)
-        rates = []
-        for row in inverse:
-            terms = [number(x) * m for x, m in zip(row, body, strict=True) if abs(x) > tiny]
-            rates.append(hy.sum(terms) if terms else hy.expression(0.0))
+        products = [[(x, m) for x, m in zip(row, body, strict=True) if abs(x) > tiny] for row in inverse]
+        rates = [rotations.hy.sum([number(x) * m for x, m in row]) for row in products]
         return rates, replace(euler_states(plan.scene, rates, self.sequence), momenta=MOMENTA)
 
     def blocks(self, m: Mechanics, plan: ModelPlan) -> list[StateBlock]:

@@ -225,7 +225,7 @@ def _rate_equations(m: Mechanics, torque: list[Term]) -> list[Symbolic]:
             size = largest_inverse * context.maximum(abs(x) for x in vector) / units[i]
             if abs(coefficient) > tiny * size:
                 terms.append(m.number(coefficient) * expression)
-        result.append(hy.sum(terms) if terms else hy.expression(0.0))
+        result.append(hy.sum(terms))
     return result
 
 

@@ -116,7 +116,7 @@ class Planar(Formulation):
             along = dot(axis, vector)
             if abs(along) > negligible(context) * norm(context, vector):
                 terms.append(m.number(along / moment) * expression)
-        return hy.sum(terms) if terms else hy.expression(0.0)
+        return hy.sum(terms)
 
 
 def _plane_of(scene: Scene, loads: Sequence[Load]) -> tuple[Vector, Vector, Any]:

@@ -71,7 +71,7 @@ class PointMassStates:
         for n, factor, pull in self._pulls:
             for a, x in enumerate(pull):
                 terms[n][a].append(x if factor == 1 else self._number(factor) * x)
-        return [[hy.sum(found) if found else hy.expression(0.0) for found in three] for three in terms]
+        return [list(map(hy.sum, three)) for three in terms]
 
     def block(self) -> StateBlock:
         """One block with the states of all masses."""
