@@ -30,15 +30,13 @@ def summary_page(dataset: xarray.Dataset, thinned: xarray.Dataset) -> str:
     words = TimeWords.of(attributes, start, end)
     total = dataset.sizes["time"]
     complete = total == thinned.sizes["time"]
+    kind = "model" if is_averaged(attributes) else "formulation"
     facts = [
         ("span", f"{words.moment(start)} to {words.moment(end)}"),
         ("samples", f"{total:,}" if complete else f"{total:,}, shown {thinned.sizes['time']:,}"),
         ("steps", attributes.get("steps")),
         ("precision", attributes.get("precision") or integrator.get("precision")),
-        (
-            "model" if is_averaged(attributes) else "formulation",
-            attributes.get("formulation") or integrator.get("formulation"),
-        ),
+        (kind, attributes.get("formulation") or integrator.get("formulation")),
         ("status", status),
     ]
     if "attitude_error" in attributes:

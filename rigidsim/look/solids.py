@@ -15,15 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigidsim.scene import rotations
-from rigidsim.scene.bodies.shapes import (
-    SHAPES,
-    THINNESS,
-    Arc,
-    Box,
-    Ellipsoid,
-    Revolved,
-    StraightPiece,
-)
+from rigidsim.scene.bodies import shapes
+from rigidsim.scene.bodies.shapes import Arc, StraightPiece
 
 Array = NDArray[np.float64]
 
@@ -87,10 +80,10 @@ def solid_mesh(solid: str, dimensions: Mapping[str, Any]) -> Mesh:
         ValueError: an unknown solid, a dimension that is missing, negative, too large or not finite, or a
             solid without any extent.
     """
-    if solid not in SHAPES:
-        known = ", ".join(sorted([*SHAPES, POINT]))
+    if solid not in shapes.SHAPES:
+        known = ", ".join(sorted([*shapes.SHAPES, POINT]))
         raise ValueError(f"drawing: unknown solid {solid!r}; known are {known}")
-    shape = SHAPES[solid]
+    shape = shapes.SHAPES[solid]
     given: dict[str, Array] = {}
     for key, length in shape.dimensions.items():
         if key not in dimensions:
@@ -111,14 +104,14 @@ def solid_mesh(solid: str, dimensions: Mapping[str, Any]) -> Mesh:
             raise ValueError(f"drawing: {solid} {sizes}")
     # Ideal rods and plates have no thickness; a picture of them needs some.
     outline = shape.outline(
-        {key: np.maximum(value, THINNESS * largest).tolist() for key, value in given.items()}
+        {key: np.maximum(value, shapes.THINNESS * largest).tolist() for key, value in given.items()}
     )
     match outline:
-        case Box(x, y, z):
+        case shapes.Box(x, y, z):
             return _box(x, y, z)
-        case Ellipsoid(x, y, z):
+        case shapes.Ellipsoid(x, y, z):
             return ball(x, y, z)
-        case Revolved(pieces):
+        case shapes.Revolved(pieces):
             return revolved(pieces)
 
 

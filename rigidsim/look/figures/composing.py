@@ -126,9 +126,7 @@ def _two_columns(
     )
     if curves:
         grid = outer[0].subgridspec(len(curves), 1)
-        drawn = [
-            _curve_panel(figure.add_subplot(grid[row]), panel, shown) for row, panel in enumerate(curves)
-        ]
+        drawn = [_curve_panel(figure.add_subplot(grid[k]), panel, shown) for k, panel in enumerate(curves)]
         for row, (axes, data, begins) in enumerate(drawn):
             lowest = row == len(drawn) - 1 or drawn[row + 1][2] != begins
             timelines.time_axis(axes, data, labelled=lowest, begins=begins)
@@ -173,14 +171,12 @@ def facts_of(shown: Shown) -> list[tuple[str, str]]:
     dataset = shown.rows
     integrator = read_config(dataset).get("integrator", {})
     status = str(dataset.attrs.get("status", ""))
+    kind = "model" if is_averaged(dataset.attrs) else "formulation"
     lines = [
         (name, str(value))
         for name, value in (
             ("status", status if status != "finished" else ""),
-            (
-                "model" if is_averaged(dataset.attrs) else "formulation",
-                dataset.attrs.get("formulation") or integrator.get("formulation"),
-            ),
+            (kind, dataset.attrs.get("formulation") or integrator.get("formulation")),
             ("precision", dataset.attrs.get("precision") or integrator.get("precision")),
             ("tolerance", integrator.get("tolerance")),
             ("steps", dataset.attrs.get("steps")),
@@ -192,9 +188,8 @@ def facts_of(shown: Shown) -> list[tuple[str, str]]:
         lines.append((what, f"{float(dataset.attrs['attitude_error']):.1e} rad"))
     bound = "" if shown.complete else "≥ "  # of the samples that were read
     for name, drift in shown.largest.items():
-        lines.append(
-            (f"largest drift, {name.replace('_', ' ')}", f"{bound}{drift:.1e}" if drift else f"{bound}0")
-        )
+        largest = f"{drift:.1e}" if drift else "0"
+        lines.append((f"largest drift, {name.replace('_', ' ')}", bound + largest))
     return lines
 
 

@@ -84,7 +84,7 @@ def _poinsot(dataset: xarray.Dataset, along: Array, radii: Array, rates: Array, 
     eye = eye / np.linalg.norm(eye) * 2.2 * max(size, 1.0) * 1.2
     center = 0.35 * floor
     on_ellipsoid, on_plane = "polhode, on the ellipsoid of energy", "herpolhode, on the invariable plane"
-    start = np.zeros(3)
+    start, words = np.zeros(3), "angular momentum L"
     return Stage(
         root="poinsot",
         title="Poinsot's construction",
@@ -102,11 +102,7 @@ def _poinsot(dataset: xarray.Dataset, along: Array, radii: Array, rates: Array, 
             Line("plane/rim", parts.FAINT, parts.circle(size, along, floor), parts.SPACE, 1.6),
             *parts.grid("plane", floor, first, second, size, 4, 0.45, round_=True),
         ],
-        vectors=[
-            Vector(
-                "momentum", "L", parts.MOMENTUM, start, 1.2 * floor, parts.SPACE, "angular momentum L", 0.012
-            )
-        ],
+        vectors=[Vector("momentum", "L", parts.MOMENTUM, start, 1.2 * floor, words=words, radius=0.012)],
         spots=[Spot("plane/label", "invariable plane", parts.PALE, floor - 0.98 * size * second)],
         shells=[_shell(dataset, radii * scale)],
         camera=Camera(center + eye, center, -along),
