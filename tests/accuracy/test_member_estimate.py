@@ -45,8 +45,15 @@ def test_estimates_move_no_bit_of_the_motion(satellites: MemberResults) -> None:
 
 @pytest.mark.slow
 def test_a_tolerance_is_part_of_the_error(satellites: MemberResults) -> None:
-    loose = results_of("satellites, 1e-9").kept["attitude_error"].values
-    assert (loose > 1e3 * satellites.kept["attitude_error"].values).all()
+    """At 1e-9 the members lose digits; what each announces covers what it lost, far above what it announced at full precision."""
+    loose, full = results_of("satellites, 1e-9").kept, satellites.kept
+    apart = [
+        np.linalg.norm(loose["quaternion_final"].values + sign * full["quaternion_final"].values, axis=1)
+        for sign in (-1, 1)
+    ]
+    true = 2 * np.minimum(*apart)
+    assert (true > full["attitude_error"].values).all()
+    assert (loose["attitude_error"].values > true / 3).all()
 
 
 @pytest.mark.slow  # a compilation of its own
