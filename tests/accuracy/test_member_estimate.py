@@ -45,7 +45,7 @@ def test_estimates_move_no_bit_of_the_motion(satellites: MemberResults) -> None:
 
 @pytest.mark.slow
 def test_a_tolerance_is_part_of_the_error(satellites: MemberResults) -> None:
-    """At 1e-9 the members lose digits; what each announces covers what it lost, far above what it announced at full precision."""
+    """At 1e-9 the members lose digits, and what each announces covers what it lost."""
     loose, full = results_of("satellites, 1e-9").kept, satellites.kept
     apart = [
         np.linalg.norm(loose["quaternion_final"].values + sign * full["quaternion_final"].values, axis=1)
