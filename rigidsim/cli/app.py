@@ -4,8 +4,6 @@ A command is declared here, with its arguments and help, and does its work in a 
 ``rigidsim.cli.commands`` that is imported when it is invoked: help and completion load little but this.
 """
 
-from __future__ import annotations
-
 import gc
 import os
 import signal

@@ -1,7 +1,5 @@
 """Completions that the shell offers on Tab: scenes, runs, and keys of a config."""
 
-from __future__ import annotations
-
 import types
 from collections.abc import Iterable, Iterator
 from pathlib import Path

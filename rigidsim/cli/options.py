@@ -1,7 +1,5 @@
 """Arguments and options of the commands, and what the shell offers for them on Tab."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path

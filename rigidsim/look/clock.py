@@ -5,8 +5,6 @@ and beyond 292 years it wraps, so the integers are built and checked here. Where
 fit, the timeline is a plain sequence whose name says its unit.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -1,18 +1,13 @@
 """The summary page (markdown) beside the pictures."""
 
-from __future__ import annotations
-
 import re
-from typing import TYPE_CHECKING
 
 import numpy as np
+import xarray
 
 from rigidsim.look.plots import pretty_unit
 from rigidsim.look.roles import drifts, in_words, is_averaged, read_config, title_of
 from rigidsim.scene.readable import TimeWords
-
-if TYPE_CHECKING:
-    import xarray
 
 
 def summary_page(dataset: xarray.Dataset, thinned: xarray.Dataset) -> str:

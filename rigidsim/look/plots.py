@@ -4,21 +4,16 @@ A new observable or invariant needs no line here: it gets a plot of its own, or 
 the scalars that share its unit.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
+import xarray
 from numpy.typing import NDArray
 
 from rigidsim.look.roles import drift_of, in_words, is_averaged, put_back_of
 from rigidsim.scene.readable import angle_unit, si_scale
-
-if TYPE_CHECKING:
-    import xarray
 
 Color = tuple[int, int, int]
 

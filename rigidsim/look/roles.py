@@ -1,15 +1,11 @@
 """What a dataset tells of itself: its config and title, and the roles of variables by their attributes."""
 
-from __future__ import annotations
-
 import re
 import tomllib
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-if TYPE_CHECKING:
-    import xarray
-
+import xarray
 
 _ORBIT_NORM = re.compile(r"orbit_norm_(\d+)")
 _AVERAGED = ("spin_averaged", "orbit_averaged")

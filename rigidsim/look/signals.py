@@ -3,19 +3,15 @@
 All take a dataset in memory and give float64 arrays over its rows, or None if they can't be derived.
 """
 
-from __future__ import annotations
-
 import json
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import xarray
 from numpy.typing import NDArray
 
 from rigidsim.look.roles import read_config
 from rigidsim.look.solids import rotation_matrix
-
-if TYPE_CHECKING:
-    import xarray
 
 Array = NDArray[np.float64]
 

@@ -4,12 +4,10 @@ Every mesh is a list of separate triangles (no shared vertices), so that neighbo
 sharp colours; normals point outwards and are smooth where the solid is.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -53,11 +51,11 @@ class Mesh:
     picture: NDArray[np.uint8] | None = None
     places: Array | None = None
 
-    def moved(self, rotation: Array, shift: Array) -> Mesh:
+    def moved(self, rotation: Array, shift: Array) -> Self:
         """The mesh rotated by `rotation` (3, 3), then moved by `shift` (3,), metres."""
         return replace(self, vertices=self.vertices @ rotation.T + shift, normals=self.normals @ rotation.T)
 
-    def scaled(self, factor: float) -> Mesh:
+    def scaled(self, factor: float) -> Self:
         """The mesh with all lengths multiplied by `factor` > 0."""
         return replace(self, vertices=self.vertices * factor)
 

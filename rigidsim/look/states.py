@@ -1,19 +1,14 @@
 """Lanes of states over time: events, changes of chart, and how a run ended."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
+import xarray
 from numpy.typing import NDArray
 
 from rigidsim.look import signals
 from rigidsim.look.solids import rotation_matrix
 from rigidsim.look.stages.parts import PALE, PULL, Color, Plane
-
-if TYPE_CHECKING:
-    import xarray
 
 MOST_EVENTS = 2000
 """Largest number of events of one kind in a lane; of more, the first are shown."""

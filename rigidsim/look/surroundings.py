@@ -6,19 +6,15 @@ It is a JSON list of objects: ``{"what": "gravity", "acceleration"}``, ``{"what"
 older versions have none.
 """
 
-from __future__ import annotations
-
 import json
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import xarray
 from numpy.typing import NDArray
 
 from rigidsim.scene.bodies.presets import KNOWN, known_body
-
-if TYPE_CHECKING:
-    import xarray
 
 Array = NDArray[np.float64]
 Color = tuple[int, int, int]

@@ -4,8 +4,6 @@ The coasts are Natural Earth's, 1:110m, which are in the public domain; ``data/c
 Longitude zero is the body's x axis, as `rigidsim`'s Earth, whose equatorial moments are equal, leaves open.
 """
 
-from __future__ import annotations
-
 from functools import lru_cache
 from importlib.resources import files
 

@@ -1,7 +1,5 @@
 """A bounded number of rows from a dataset of any length."""
 
-from __future__ import annotations
-
 import numpy as np
 import xarray
 from numpy.typing import NDArray

@@ -1,7 +1,5 @@
 """Commands on configs: ``new``, ``check``, ``plan``, ``tradeoff``, ``schema``."""
 
-from __future__ import annotations
-
 import sys
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """``rigidsim info``: the summary of a run or a sweep, without what runs need."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from rigidsim.cli.screens.page import Page, print_json

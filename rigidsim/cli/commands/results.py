@@ -1,7 +1,5 @@
 """Commands on the results of a run or a sweep: ``analyse``, ``export``, ``plot``, ``view``."""
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager

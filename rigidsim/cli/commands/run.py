@@ -1,7 +1,5 @@
 """``rigidsim run``: integrate configs, and print how each run ended."""
 
-from __future__ import annotations
-
 import sys
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Commands on saved runs and sweeps: ``resume``, ``verify``."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import rigidsim.workflows.resume as resuming

@@ -1,7 +1,5 @@
 """``rigidsim sweep``: run every member of a config's ``[sweep]``; and what other commands do with sweeps."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 

@@ -1,22 +1,18 @@
 """Output of ``rigidsim analyse``: numbers with as many digits as errors leave, in readable units."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import mpmath
 from rich.box import SIMPLE_HEAD
 from rich.table import Table
 from rich.text import Text
 
+from rigidsim.analysis.result import Analysis, SignalAnalysis, SpectralLine
 from rigidsim.cli.screens.page import Page
 from rigidsim.scene.readable import YEAR, span_text, unit_for
-
-if TYPE_CHECKING:
-    from rigidsim.analysis.result import Analysis, SignalAnalysis, SpectralLine
-    from rigidsim.workflows.analyse import Saved
+from rigidsim.workflows.analyse import Saved
 
 _WIDE = 100  # columns, from which the tables of lines have all of theirs
 _SURE = 5.0  # errors, from which a secular rate is told once more

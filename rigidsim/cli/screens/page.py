@@ -1,7 +1,5 @@
 """What commands print: lines and tables, with colours on a terminal, and JSON for machines."""
 
-from __future__ import annotations
-
 import json
 import math
 import shutil

@@ -1,7 +1,5 @@
 """Output of ``rigidsim plan`` (what would be integrated, why, at what cost) and ``rigidsim tradeoff``."""
 
-from __future__ import annotations
-
 import math
 import re
 import textwrap

@@ -1,12 +1,10 @@
 """Output for sweeps: progress over members, and how they ended."""
 
-from __future__ import annotations
-
 import shlex
 import sys
 import time
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn
@@ -39,7 +37,7 @@ class SweepProgress(SweepObserver):
         self._members = self._before = 0
         self._begin = self._latest = time.perf_counter()
 
-    def __enter__(self) -> SweepProgress:
+    def __enter__(self) -> Self:
         if self._bar is not None:
             self._bar.start()
         return self

@@ -1,7 +1,5 @@
 """A run in plain words: how its config was understood, the verdict, advice, and what to do next."""
 
-from __future__ import annotations
-
 import math
 import shlex
 from collections.abc import Iterator, Sequence

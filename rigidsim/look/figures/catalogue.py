@@ -1,15 +1,14 @@
 """All figures by name: what each needs and consists of, and the page that suits a scene."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
+import xarray
 from matplotlib import rc_context
+from matplotlib.figure import Figure
 
 from rigidsim.look import signals
 from rigidsim.look.figure_names import FIGURES, OVERVIEW, SPECTRUM
@@ -18,10 +17,6 @@ from rigidsim.look.figures.composing import compose, shown_rows
 from rigidsim.look.figures.drift import drift
 from rigidsim.look.figures.panel import Panel
 from rigidsim.look.figures.style import STYLE
-
-if TYPE_CHECKING:
-    import xarray
-    from matplotlib.figure import Figure
 
 SUFFIXES = (".png", ".svg")
 _DOTS = 160  # per inch

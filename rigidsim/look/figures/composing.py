@@ -1,13 +1,13 @@
 """Composition of panels to a page: curves over time on the left, planes on the right, facts below."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
+import xarray
 from matplotlib import rc_context
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
 from rigidsim.look import signals
 from rigidsim.look.figures import timelines
@@ -17,11 +17,6 @@ from rigidsim.look.page import largest_drift
 from rigidsim.look.roles import drifts, is_averaged, read_config
 from rigidsim.look.thinning import thin
 from rigidsim.scene.readable import unit_for
-
-if TYPE_CHECKING:
-    import xarray
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 ROWS, FULL_READ = 20_000, 2_000_000  # that a figure draws; that are read for the largest drift
 

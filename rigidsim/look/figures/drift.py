@@ -1,12 +1,11 @@
 """Drifts of invariants against the bound that rounding explains."""
 
-from __future__ import annotations
-
 import textwrap
 from itertools import cycle
-from typing import TYPE_CHECKING
 
 import numpy as np
+import xarray
+from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
 from rigidsim.look import signals
@@ -14,11 +13,6 @@ from rigidsim.look.figures.panel import panel
 from rigidsim.look.figures.style import GREY, PALETTE, key, note
 from rigidsim.look.figures.timelines import clock
 from rigidsim.look.roles import drifts, put_backs
-
-if TYPE_CHECKING:
-    import xarray
-    from matplotlib.axes import Axes
-
 
 Array = NDArray[np.float64]
 

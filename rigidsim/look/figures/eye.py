@@ -3,13 +3,12 @@
 A flat drawing knows where every text will be, which matplotlib's own 3D axes don't.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
 from matplotlib.colors import to_rgb
 from matplotlib.patheffects import withStroke
@@ -17,9 +16,6 @@ from numpy.typing import NDArray
 
 from rigidsim.look.figures.scales import number
 from rigidsim.look.figures.style import PALE, X, Y, Z
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]

@@ -3,8 +3,6 @@
 Quick estimates for labels and for removing trends; `rigidsim analyse` has the digits.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,10 +1,8 @@
 """The path of a moving body: height over range, in the plane of an orbit, or in space."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
-
 import numpy as np
+import xarray
+from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
 from rigidsim.look import signals
@@ -13,10 +11,6 @@ from rigidsim.look.figures.panel import panel, recorded
 from rigidsim.look.figures.scales import si_scale
 from rigidsim.look.figures.style import INK, Z, curve, square, titled
 from rigidsim.scene.readable import span_text
-
-if TYPE_CHECKING:
-    import xarray
-    from matplotlib.axes import Axes
 
 Array = NDArray[np.float64]
 

@@ -1,16 +1,13 @@
 """A panel of a figure: what it needs of a dataset, and how that is drawn."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+import xarray
+from matplotlib.axes import Axes
 
 from rigidsim.look import signals
-
-if TYPE_CHECKING:
-    import xarray
-    from matplotlib.axes import Axes
 
 Find = Callable[["xarray.Dataset"], Any]
 Draw = Callable[["Axes", "xarray.Dataset", Any], None]

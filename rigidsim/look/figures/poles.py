@@ -1,10 +1,8 @@
 """Panels of axis directions: polar motion, pole path, nutation, a top from above, libration."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
-
 import numpy as np
+import xarray
+from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
 from rigidsim.look import signals
@@ -13,10 +11,6 @@ from rigidsim.look.figures.panel import panel, recorded
 from rigidsim.look.figures.scales import angle_scale, angle_text, si_scale
 from rigidsim.look.figures.style import BLUE, INK, ORANGE, VIOLET, curve, key, square
 from rigidsim.scene.readable import span_text
-
-if TYPE_CHECKING:
-    import xarray
-    from matplotlib.axes import Axes
 
 Array = NDArray[np.float64]
 _TURN = 2 * np.pi

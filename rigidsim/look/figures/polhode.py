@@ -5,11 +5,11 @@ sum I_i^2 w_i^2 = L^2 (Poinsot 1834): the curve that they share is the polhode. 
 without slipping on the plane w . L = 2 T, where it leaves the herpolhode.
 """
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import xarray
+from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from numpy.typing import NDArray
@@ -22,10 +22,6 @@ from rigidsim.look.figures.scales import number, si_scale
 from rigidsim.look.figures.style import GREY, PINK, Z, key, titled
 from rigidsim.look.solids import rotation_matrix
 from rigidsim.look.thinning import thinned_indices
-
-if TYPE_CHECKING:
-    import xarray
-    from matplotlib.axes import Axes
 
 Array = NDArray[np.float64]
 

@@ -1,12 +1,10 @@
 """Readable units of axes: time, prefixed SI units, and deg to microarcseconds for angles."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
+import xarray
 from numpy.typing import NDArray
 
 from rigidsim.scene.epochs import J2000
@@ -21,9 +19,6 @@ from rigidsim.scene.readable import (
     si_scale,
     unit_of,
 )
-
-if TYPE_CHECKING:
-    import xarray
 
 __all__ = ["TimeAxis", "angle_scale", "angle_text", "number", "si_scale", "time_axis_of"]
 

@@ -1,21 +1,17 @@
 """The figure of an analysis: amplitude spectra with lines marked and labelled."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import xarray
 from matplotlib import rc_context
+from matplotlib.figure import Figure
 
 from rigidsim.look.figures.style import STYLE, ShownFigure
 from rigidsim.scene.readable import DAY, YEAR, TimeUnit, unit_for
-
-if TYPE_CHECKING:
-    import xarray
-    from matplotlib.figure import Figure
 
 _CURVE, _LINE, _FOLDED, _UNKNOWN = "#9fb6cd", "#2166ac", "#b2182b", "#636363"
 _ARCSEC = math.pi / 648000

@@ -1,16 +1,16 @@
 """Style of figures: colours, fonts, the empty page with its heading, and curves with their key."""
 
-from __future__ import annotations
-
 import io
 import itertools
 import re
 import textwrap
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import xarray
 from matplotlib import colormaps
+from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
@@ -20,10 +20,6 @@ from numpy.typing import NDArray
 
 from rigidsim.look.roles import read_config, title_of
 from rigidsim.look.signals import joined
-
-if TYPE_CHECKING:
-    import xarray
-    from matplotlib.axes import Axes
 
 Array = NDArray[np.float64]
 

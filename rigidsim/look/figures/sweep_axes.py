@@ -1,19 +1,14 @@
 """Axes of a sweep's figure: positions of members along them, with labels and scales, and swept directions."""
 
-from __future__ import annotations
-
 import math
-from typing import TYPE_CHECKING
 
 import numpy as np
+import xarray
+from matplotlib.axis import Axis
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from rigidsim.look.plots import pretty_unit
-
-if TYPE_CHECKING:
-    import xarray
-    from matplotlib.axis import Axis
 
 Array = NDArray[np.float64]
 

@@ -1,11 +1,11 @@
 """Panels along time: their axes, curves, units and labels."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import xarray
+from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
 from rigidsim.look import signals
@@ -14,10 +14,6 @@ from rigidsim.look.figures.panel import panel, recorded
 from rigidsim.look.figures.scales import TimeAxis, angle_scale, angle_text, number, si_scale, time_axis_of
 from rigidsim.look.figures.style import BLUE, GREY, ORANGE, PALETTE, VIOLET, X, Y, Z, curve, key
 from rigidsim.scene.readable import DAY, named_unit, span_text, unit_for
-
-if TYPE_CHECKING:
-    import xarray
-    from matplotlib.axes import Axes
 
 Array = NDArray[np.float64]
 

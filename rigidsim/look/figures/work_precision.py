@@ -1,12 +1,12 @@
 """The work-precision figure: attitude error against cost of every measured setting, and the Pareto front."""
 
-from __future__ import annotations
-
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import xarray
 from matplotlib import rc_context
+from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
@@ -14,10 +14,6 @@ from matplotlib.lines import Line2D
 from rigidsim.look.figures.style import STYLE
 from rigidsim.scene.choices import method_named
 from rigidsim.scene.readable import span_text
-
-if TYPE_CHECKING:
-    import xarray
-    from matplotlib.axes import Axes
 
 _COLORS = {"single": "#8c8c8c", "double": "#2166ac", "extended": "#e08214", "quadruple": "#762a83"}
 _OTHER = "#1b9e77"

@@ -1,13 +1,12 @@
 """A body as stages draw it: meshes in units of its reach, arrows and trails of its motion, the camera."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any, Self
 
 import numpy as np
+import xarray
 
 from rigidsim.look import signals, surroundings
 from rigidsim.look.roles import read_config
@@ -15,9 +14,6 @@ from rigidsim.look.signals import values
 from rigidsim.look.solids import Mesh, body_meshes, point_positions, rotation_matrix
 from rigidsim.look.stages import parts
 from rigidsim.look.stages.parts import Array, Arrow, Camera, Stage, Trail, trail
-
-if TYPE_CHECKING:
-    import xarray
 
 FIELD = np.deg2rad(55.0)
 """Field of view from bottom to top (rad), the viewer's own."""
@@ -45,7 +41,7 @@ class Subject:
     solids: list[dict[str, Any]]
 
     @classmethod
-    def of(cls, dataset: xarray.Dataset) -> Subject:
+    def of(cls, dataset: xarray.Dataset) -> Self:
         """The body of a dataset in memory.
 
         Raises:

@@ -1,18 +1,13 @@
 """Stage of a body that flies in a uniform gravity: its path over a ground, and the body as it turns."""
 
-from __future__ import annotations
-
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
+import xarray
 
 from rigidsim.look import signals, surroundings
 from rigidsim.look.stages.bodies import FIELD, Subject, vectors_of, with_track
 from rigidsim.look.stages.parts import PALE, PULL, SPACE, Array, Camera, Picture, Spot, Vector, grid
-
-if TYPE_CHECKING:
-    import xarray
 
 
 def picture(dataset: xarray.Dataset, subject: Subject) -> Picture | None:

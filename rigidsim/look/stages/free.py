@@ -5,19 +5,13 @@ the plane w . L = 2 T there without slipping (Poinsot 1834): it leaves the polho
 herpolhode on the other.
 """
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
-
 import numpy as np
+import xarray
 
 from rigidsim.look import signals
 from rigidsim.look.stages import parts
 from rigidsim.look.stages.bodies import Subject, column, vectors_of
 from rigidsim.look.stages.parts import BODY, Array, Arrow, Camera, Line, Picture, Shell, Spot, Stage, Vector
-
-if TYPE_CHECKING:
-    import xarray
 
 ENERGY: tuple[int, int, int] = (120, 150, 200)
 _LEADING = ("angular_velocity", "polar_motion", "nutation_angle")

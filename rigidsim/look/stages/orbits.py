@@ -1,11 +1,9 @@
 """Stages of bodies on free and on prescribed orbits: the body before its planet, and the orbit."""
 
-from __future__ import annotations
-
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
+import xarray
 
 from rigidsim.look import signals, surroundings
 from rigidsim.look.solids import rotation_matrix
@@ -14,9 +12,6 @@ from rigidsim.look.stages.bodies import FIELD, Subject, column, direction_of, pl
 from rigidsim.look.stages.parts import SPACE, Array, Arrow, Camera, Line, Picture, Solid, Spot, Stage, Vector
 from rigidsim.look.surroundings import GREY, Globe, called
 from rigidsim.look.symbols import globe, graticule
-
-if TYPE_CHECKING:
-    import xarray
 
 ORBIT_BODY = 0.11  # reach of the enlarged body, in units of the orbit's largest distance
 NORMAL: tuple[int, int, int] = (190, 150, 255)

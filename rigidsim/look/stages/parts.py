@@ -5,8 +5,6 @@ of the body's reach (largest distance of a drawn point from the reference point)
 constant factor each.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 
 import numpy as np

@@ -3,21 +3,16 @@
 The pole's motion is far too small for the globe: it is drawn beside it in a plane of its own.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
+import xarray
 
 from rigidsim.look import signals, surroundings
 from rigidsim.look.stages import parts, precession
 from rigidsim.look.stages.bodies import Subject, column, source_arrows
 from rigidsim.look.stages.parts import BODY, Array, Arrow, Color, Line, Picture, Plane, Stage, Vector, trail
 from rigidsim.look.symbols import earth, globe, graticule
-
-if TYPE_CHECKING:
-    import xarray
 
 _LARGE = 1e5  # m: a smaller body is no globe
 _ROUND = 0.9  # of the smallest over the largest semi-axis

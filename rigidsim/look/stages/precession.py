@@ -4,12 +4,10 @@ If no attitude is known but an axis is (in an averaged model, which has no rotat
 points there and doesn't turn; a body of which nothing else is known has a stage of its own.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
+import xarray
 
 from rigidsim.look import signals, surroundings
 from rigidsim.look.roles import is_averaged, read_config
@@ -18,9 +16,6 @@ from rigidsim.look.stages.bodies import Subject, direction_of, eye_at, source_ar
 from rigidsim.look.stages.parts import SPACE, Array, Arrow, Camera, Color, Line, Picture, Plane, Spot, Stage
 from rigidsim.look.symbols import graticule
 from rigidsim.scene.readable import angle_unit, span_text
-
-if TYPE_CHECKING:
-    import xarray
 
 ECLIPTIC: Color = (226, 196, 90)
 PRECESSION: Color = (190, 150, 255)

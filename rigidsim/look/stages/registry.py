@@ -1,16 +1,12 @@
 """The kinds of scenes that have a stage of their own, the choice among them, and the stage of any other."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
-from typing import TYPE_CHECKING
+
+import xarray
 
 from rigidsim.look.stages import flight, free, orbits, planet, precession, top
 from rigidsim.look.stages.bodies import Subject, source_arrows, vectors_of, with_track
 from rigidsim.look.stages.parts import ARROW_REACH, Picture
-
-if TYPE_CHECKING:
-    import xarray
 
 KINDS: tuple[Callable[[xarray.Dataset, Subject], Picture | None], ...] = (
     top.picture,

@@ -1,11 +1,9 @@
 """Stage of a top: its pivot on a ground, gravity, and the trace of its figure axis, also seen from above."""
 
-from __future__ import annotations
-
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
+import xarray
 
 from rigidsim.look import signals, surroundings
 from rigidsim.look.solids import Mesh
@@ -13,9 +11,6 @@ from rigidsim.look.stages import parts
 from rigidsim.look.stages.bodies import FIELD, Subject, vectors_of
 from rigidsim.look.stages.parts import BODY, SPACE, Array, Camera, Line, Picture, Plane, Spot, Vector, trail
 from rigidsim.look.symbols import spinning_top
-
-if TYPE_CHECKING:
-    import xarray
 
 TRACE = 1.0  # where on the axis the traced point is, in reaches
 _SYMMETRIC = 1e-9  # of the moments

@@ -1,7 +1,5 @@
 """The page that the viewer opens with: scene, legend, plots, and summary; of several runs side by side."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any

@@ -2,14 +2,12 @@
 attitudes.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
+import xarray
 from numpy.typing import NDArray
 
 from rigidsim.look.clock import Clock, build_clock
@@ -20,9 +18,6 @@ from rigidsim.look.thinning import thin, thinned_indices
 from rigidsim.look.timeline.blueprint import build_comparison
 from rigidsim.look.timeline.drawn import DrawnRun
 from rigidsim.look.timeline.writing import chunks, recording_to
-
-if TYPE_CHECKING:
-    import xarray
 
 MOST = 6
 """Largest number of runs shown side by side."""

@@ -4,8 +4,6 @@ Meshes are given no normals:
 the viewer then shows their own colours from all sides, and edges tell the faces apart.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 

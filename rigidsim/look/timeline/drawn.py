@@ -1,12 +1,11 @@
 """Everything drawn of one run, ready to be sent to a recording: picture, plots, states and pages."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import Self
 
 import numpy as np
 import rerun as rr
+import xarray
 from numpy.typing import NDArray
 
 from rigidsim.look import signals
@@ -20,9 +19,6 @@ from rigidsim.look.states import States, charts_of, sections_of, states_of
 from rigidsim.look.thinning import thinned_indices
 from rigidsim.look.timeline import drawing, plotting
 from rigidsim.scene.readable import TimeWords
-
-if TYPE_CHECKING:
-    import xarray
 
 
 @dataclass(frozen=True)
@@ -51,7 +47,7 @@ class DrawnRun:
         shown: xarray.Dataset,
         steps: NDArray[np.int64],
         clock: Clock | None = None,
-    ) -> DrawnRun:
+    ) -> Self:
         """The drawing of a dataset from those of its rows that are in memory, on the clock that suits them.
 
         Raises:

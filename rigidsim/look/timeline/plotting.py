@@ -1,7 +1,5 @@
 """Plots, plane figures, states, the legend and the clock as rerun entities."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

@@ -1,17 +1,15 @@
 """Writing a run's timeline, whole or as the run goes on: with strict errors, and never on a full disk."""
 
-from __future__ import annotations
-
 import errno
 import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
+import xarray
 from rerun.error_utils import set_strict_mode, strict_mode
 
 from rigidsim.look.page import legible
@@ -19,9 +17,6 @@ from rigidsim.look.roles import title_of
 from rigidsim.look.thinning import thin, thinned_indices
 from rigidsim.look.timeline.blueprint import build_blueprint
 from rigidsim.look.timeline.drawn import DrawnRun
-
-if TYPE_CHECKING:
-    import xarray
 
 LIVE_ROWS = 100_000
 CHUNK = 4096  # rows per chunk: larger ones make the viewer slow, smaller ones heavy
