@@ -10,12 +10,10 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 import xarray
-from numpy.typing import NDArray
 
 from rigidsim.look.roles import drift_of, in_words, is_averaged, put_back_of
+from rigidsim.look.solids import Array, Color
 from rigidsim.scene.readable import angle_unit, si_scale
-
-Color = tuple[int, int, int]
 
 RED: Color = (235, 97, 89)
 GREEN: Color = (104, 190, 110)
@@ -42,8 +40,8 @@ class Series:
     name: str
     labels: list[str]
     colors: list[Color]
-    values: NDArray[np.float64]
-    error: NDArray[np.float64] | None = None
+    values: Array
+    error: Array | None = None
 
 
 @dataclass(frozen=True)
@@ -150,9 +148,7 @@ def _reading(variable: xarray.DataArray, unit: str) -> tuple[float, str]:
     return found.per_radian, found.symbol
 
 
-def _uncertainty(
-    dataset: xarray.Dataset, values: NDArray[np.float64], factor: float
-) -> NDArray[np.float64] | None:
+def _uncertainty(dataset: xarray.Dataset, values: Array, factor: float) -> Array | None:
     """The announced attitude error, growing like t^1.5 to its value at the end, if large enough to be
     seen.
     """
@@ -174,7 +170,7 @@ def _announced(dataset: xarray.Dataset) -> list[Level]:
     return [Level("attitude_error", f"error of the {what} at the end, rad", _ERROR, float(np.log10(error)))]
 
 
-def drift_floor(drifts: list[NDArray[np.float64]]) -> float:
+def drift_floor(drifts: list[Array]) -> float:
     """Value at which a drift of exactly zero is drawn: a tenth of the low end of all nonzero ones.
 
     A zero has no logarithm. A fixed floor would flatten the curves of double precision or stand above
@@ -229,7 +225,7 @@ def _variables(dataset: xarray.Dataset) -> Iterator[xarray.DataArray]:
             yield variable.transpose("time", ...)
 
 
-def _columns(variable: xarray.DataArray) -> NDArray[np.float64]:
+def _columns(variable: xarray.DataArray) -> Array:
     values = np.asarray(variable.values, dtype=np.float64).reshape(variable.shape[0], -1)
     return values[:, :_MOST_SERIES]
 
@@ -260,8 +256,8 @@ def _series(variable: xarray.DataArray, position: int, floor: float) -> Series:
 
 
 def _told_apart(
-    labels: list[str], colors: list[Color], values: NDArray[np.float64]
-) -> tuple[list[str], list[Color], NDArray[np.float64]]:
+    labels: list[str], colors: list[Color], values: Array
+) -> tuple[list[str], list[Color], Array]:
     """Of axes that coincide only the first, with all their names, since the last would cover the others."""
     kept: list[int] = []
     names: list[str] = []

@@ -8,12 +8,9 @@ from typing import Any
 
 import numpy as np
 import xarray
-from numpy.typing import NDArray
 
 from rigidsim.look.roles import read_config
-from rigidsim.look.solids import rotation_matrix
-
-Array = NDArray[np.float64]
+from rigidsim.look.solids import Array, rotation_matrix
 
 NEAR_AXIS = 0.35
 """Largest polar motion (rad) shown as such; beyond it, the body tumbles."""

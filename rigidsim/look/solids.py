@@ -17,6 +17,7 @@ from rigidsim.scene.bodies import shapes
 from rigidsim.scene.bodies.shapes import Arc, StraightPiece
 
 Array = NDArray[np.float64]
+Color = tuple[int, int, int]
 
 SEGMENTS = 64  # around the axis; a multiple of 8, so that colour sectors end on an edge
 MINOR_SEGMENTS = 32  # along an arc: around a tube or from pole to pole

@@ -4,10 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 import xarray
-from numpy.typing import NDArray
 
 from rigidsim.look import signals
-from rigidsim.look.solids import rotation_matrix
+from rigidsim.look.solids import Array, rotation_matrix
 from rigidsim.look.stages.parts import PALE, PULL, Color, Plane
 
 MOST_EVENTS = 2000
@@ -25,7 +24,7 @@ class States:
     """One lane of states: when they begin (changes,), s, their names, and colours by name."""
 
     name: str
-    seconds: NDArray[np.float64]
+    seconds: Array
     values: list[str]
     colors: dict[str, Color]
 

@@ -12,12 +12,9 @@ from typing import Any
 
 import numpy as np
 import xarray
-from numpy.typing import NDArray
 
+from rigidsim.look.solids import Array, Color
 from rigidsim.scene.bodies.presets import KNOWN, known_body
-
-Array = NDArray[np.float64]
-Color = tuple[int, int, int]
 
 _KEPLER_STEPS = 60  # of Newton's method; from E = M + e sin M it converges for any e < 1
 GREY: Color = (150, 154, 162)

@@ -10,12 +10,8 @@ from importlib.resources import files
 import numpy as np
 from numpy.typing import NDArray
 
-from rigidsim.look.solids import MINOR_SEGMENTS, Mesh, ball, revolved
+from rigidsim.look.solids import MINOR_SEGMENTS, Array, Color, Mesh, ball, revolved
 from rigidsim.scene.bodies.shapes import StraightPiece
-
-Array = NDArray[np.float64]
-Pixels = NDArray[np.uint8]
-Color = tuple[int, int, int]
 
 _BELTS = MINOR_SEGMENTS // 2  # each of two rings of faces, so that their edges are even
 _SHARP = np.cos(np.deg2rad(25.0))  # between the normals of two faces: what counts as an edge
@@ -113,7 +109,7 @@ def land_map(width: int = WIDTH) -> NDArray[np.bool_]:
 
 
 @lru_cache(maxsize=1)
-def earth_map() -> Pixels:
+def earth_map() -> NDArray[np.uint8]:
     """The map in colours, (height, width, 3), a little brighter towards the north."""
     land = land_map()
     latitude = (90 - (np.arange(len(land)) + 0.5) * 180 / len(land))[:, None]

@@ -6,15 +6,13 @@ from itertools import cycle
 import numpy as np
 import xarray
 from matplotlib.axes import Axes
-from numpy.typing import NDArray
 
 from rigidsim.look import signals
 from rigidsim.look.figures.panel import panel
 from rigidsim.look.figures.style import GREY, PALETTE, key, note
 from rigidsim.look.figures.timelines import clock
 from rigidsim.look.roles import drifts, put_backs
-
-Array = NDArray[np.float64]
+from rigidsim.look.solids import Array
 
 TYPICAL, MOST = 0.5, 50.0
 """In units of tolerance times sqrt(steps): a random walk of one rounding per step (Brouwer 1937), and the

@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 
 from rigidsim.look.figures.scales import number
 from rigidsim.look.figures.style import PALE, X, Y, Z
+from rigidsim.look.solids import Array
 
-Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 _AROUND, _ALONG = 144, 72  # facets of a surface

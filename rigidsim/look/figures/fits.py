@@ -6,9 +6,9 @@ Quick estimates for labels and for removing trends; `rigidsim analyse` has the d
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from rigidsim.look.solids import Array
+
 _TURN = 2 * np.pi
 _LINES, _ENOUGH = 4, 64  # sinusoids that are fitted beside a straight line, to so many samples or more
 _REFINEMENTS, _LEAST_CYCLES = 6, 1.2  # of the lines' frequencies; fewer cycles are like a straight line

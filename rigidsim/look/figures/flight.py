@@ -3,16 +3,14 @@
 import numpy as np
 import xarray
 from matplotlib.axes import Axes
-from numpy.typing import NDArray
 
 from rigidsim.look import signals
 from rigidsim.look.figures import eye as eyes
 from rigidsim.look.figures.panel import panel, recorded
 from rigidsim.look.figures.scales import si_scale
 from rigidsim.look.figures.style import INK, Z, curve, square, titled
+from rigidsim.look.solids import Array
 from rigidsim.scene.readable import span_text
-
-Array = NDArray[np.float64]
 
 _FLAT = 1e-3  # of a path's reach: it lies in a plane up to this thickness
 

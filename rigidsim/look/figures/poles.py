@@ -3,16 +3,15 @@
 import numpy as np
 import xarray
 from matplotlib.axes import Axes
-from numpy.typing import NDArray
 
 from rigidsim.look import signals
 from rigidsim.look.figures import fits, style, timelines
 from rigidsim.look.figures.panel import panel, recorded
 from rigidsim.look.figures.scales import angle_scale, angle_text, si_scale
 from rigidsim.look.figures.style import BLUE, INK, ORANGE, VIOLET, curve, key, square
+from rigidsim.look.solids import Array
 from rigidsim.scene.readable import span_text
 
-Array = NDArray[np.float64]
 _TURN = 2 * np.pi
 _SMALL = 0.05  # rad: sines of smaller angles read as angles
 _FAR = 0.5  # rad from its mean motion, up to which a pole's path is as on a plane to a tenth

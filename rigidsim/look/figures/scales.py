@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 import xarray
-from numpy.typing import NDArray
 
+from rigidsim.look.solids import Array
 from rigidsim.scene.epochs import J2000
 from rigidsim.scene.readable import (
     ANGLE_UNITS,
@@ -22,7 +22,6 @@ from rigidsim.scene.readable import (
 
 __all__ = ["TimeAxis", "angle_scale", "angle_text", "number", "si_scale", "time_axis_of"]
 
-Array = NDArray[np.float64]
 
 _MAS = math.pi / 180 / 3600e3
 

@@ -16,12 +16,10 @@ from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 from matplotlib.ticker import MaxNLocator
-from numpy.typing import NDArray
 
 from rigidsim.look.roles import read_config, title_of
 from rigidsim.look.signals import joined
-
-Array = NDArray[np.float64]
+from rigidsim.look.solids import Array
 
 X, Y, Z = "#d1495b", "#3a9a5b", "#2f6fbf"
 BLUE, ORANGE, VIOLET, TEAL, PINK = "#2f6fbf", "#d9822b", "#8f5bb5", "#17a2b0", "#c2327a"

@@ -6,11 +6,9 @@ import numpy as np
 import xarray
 from matplotlib.axis import Axis
 from matplotlib.ticker import MaxNLocator
-from numpy.typing import NDArray
 
 from rigidsim.look.plots import pretty_unit
-
-Array = NDArray[np.float64]
+from rigidsim.look.solids import Array
 
 _MOST_TOLD = 12  # values that are told at their ticks
 _CROWDED = 60  # characters side by side

@@ -15,13 +15,11 @@ from matplotlib import rc_context
 from matplotlib.axes import Axes
 from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
 from rigidsim.look.figures import sweep_axes
 from rigidsim.look.figures.style import GREY, MOST_VECTOR_POINTS, PALE, PALETTE, STYLE, blank, key, titled
 from rigidsim.look.figures.sweep_axes import along, label_of, named, title_of, value_text
-
-Array = NDArray[np.float64]
+from rigidsim.look.solids import Array
 
 INDICATORS = ("megno", "fli", "lyapunov")
 _ALWAYS = (

@@ -6,16 +6,14 @@ from typing import Any
 import numpy as np
 import xarray
 from matplotlib.axes import Axes
-from numpy.typing import NDArray
 
 from rigidsim.look import signals
 from rigidsim.look.figures.fits import secular
 from rigidsim.look.figures.panel import panel, recorded
 from rigidsim.look.figures.scales import TimeAxis, angle_scale, angle_text, number, si_scale, time_axis_of
 from rigidsim.look.figures.style import BLUE, GREY, ORANGE, PALETTE, VIOLET, X, Y, Z, curve, key
+from rigidsim.look.solids import Array
 from rigidsim.scene.readable import DAY, named_unit, span_text, unit_for
-
-Array = NDArray[np.float64]
 
 AXIS_COLORS = {"figure": BLUE, "spin": ORANGE, "momentum": VIOLET}
 _STILL = 1e-9  # of its size, below which what a curve does is rounding

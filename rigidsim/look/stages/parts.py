@@ -11,11 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigidsim.look.signals import across, finite_rows, joined, norms
-from rigidsim.look.solids import Mesh
+from rigidsim.look.solids import Array, Color, Mesh
 from rigidsim.look.thinning import thinned_indices
-
-Array = NDArray[np.float64]
-Color = tuple[int, int, int]
 
 SPACE, BODY, CENTRE = "", "body", "centre"
 """Where a part is attached: to space, to the body, or to its reference point. Frames add names of their

@@ -8,12 +8,12 @@ from pathlib import Path
 
 import numpy as np
 import xarray
-from numpy.typing import NDArray
 
 from rigidsim.look.clock import Clock, build_clock
 from rigidsim.look.page import legible
 from rigidsim.look.plots import Color, Plot, Series
 from rigidsim.look.signals import values
+from rigidsim.look.solids import Array
 from rigidsim.look.thinning import thin, thinned_indices
 from rigidsim.look.timeline.blueprint import build_comparison
 from rigidsim.look.timeline.drawn import DrawnRun
@@ -59,7 +59,7 @@ def write_comparison(named: Sequence[tuple[str, xarray.Dataset]], path: Path, *,
     return count
 
 
-def _part(clock: Clock, seconds: NDArray[np.float64]) -> Clock:
+def _part(clock: Clock, seconds: Array) -> Clock:
     """The common clock, for the times of one run."""
     whole = np.asarray(clock.ticks * clock.seconds_per_tick)
     places = np.clip(np.searchsorted(whole, seconds - 0.5 * clock.seconds_per_tick), 0, len(whole) - 1)
@@ -131,7 +131,7 @@ def attitude_differences(named: Sequence[tuple[str, xarray.Dataset]]) -> Plot | 
     return Plot("difference", title, "drift", series) if series else None
 
 
-def angle_between(one: NDArray[np.float64], other: NDArray[np.float64]) -> NDArray[np.float64]:
+def angle_between(one: Array, other: Array) -> Array:
     """Angle (rows,), rad, of the rotation from one attitude to another, (rows, 4) unit quaternions each.
 
     From the chord, so that small angles keep their digits: an arc cosine would lose those below 1e-8.
@@ -140,9 +140,7 @@ def angle_between(one: NDArray[np.float64], other: NDArray[np.float64]) -> NDArr
     return np.asarray(4 * np.arcsin(np.clip(chord / 2, 0.0, 1.0)))
 
 
-def _at(
-    times: NDArray[np.float64], theirs: NDArray[np.float64], quaternion: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def _at(times: Array, theirs: Array, quaternion: Array) -> Array:
     """Unit quaternions at given times: as sampled, on the arc between two samples, nan elsewhere."""
     unit = quaternion / np.linalg.norm(quaternion, axis=1, keepdims=True)
     after = np.clip(np.searchsorted(theirs, times), 0, len(theirs) - 1)

@@ -10,9 +10,8 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 import rerun as rr
-from numpy.typing import NDArray
 
-from rigidsim.look.solids import Mesh, ball
+from rigidsim.look.solids import Array, Mesh, ball
 from rigidsim.look.stages.parts import BODY, Arrow, Color, Line, Shell, Stage, Trail
 from rigidsim.look.symbols import graticule, sharp_edges
 
@@ -178,7 +177,7 @@ def _dimmed(color: Color, part: float) -> tuple[int, int, int]:
     return red, green, blue
 
 
-def stride_of(points: NDArray[np.float64], share: float) -> int:
+def stride_of(points: Array, share: float) -> int:
     """Stride between drawn rows: several in a long run whose points move by at most a share of their size."""
     if len(points) > SCENE_ROWS:
         for stride in (16, 4):
@@ -253,7 +252,7 @@ def _every(rows: slice, stride: int) -> slice:
     return slice(-(-rows.start // stride) * stride, rows.stop, stride)
 
 
-def _pieces(points: NDArray[np.float64], rows: slice, stride: int, length: int) -> pa.Array:
+def _pieces(points: Array, rows: slice, stride: int, length: int) -> pa.Array:
     """For each row, a strip of `length` + 1 points up to it, `stride` rows apart; built at once in Arrow."""
     ends = np.arange(rows.start, rows.stop, rows.step or 1)
     places = np.maximum(ends[:, None] - stride * np.arange(length, -1, -1), 0)

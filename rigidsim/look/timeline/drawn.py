@@ -12,6 +12,7 @@ from rigidsim.look import signals
 from rigidsim.look.clock import Clock, build_clock
 from rigidsim.look.page import config_page, notes_page, summary_page
 from rigidsim.look.plots import Plot, Series, plan_plots
+from rigidsim.look.solids import Array
 from rigidsim.look.stages.bodies import Subject
 from rigidsim.look.stages.parts import Picture, Plane
 from rigidsim.look.stages.registry import build_picture
@@ -33,7 +34,7 @@ class DrawnRun:
     planes: list[Plane]
     states: list[States]
     clock: Clock
-    seconds: NDArray[np.float64]
+    seconds: Array
     steps: NDArray[np.int64]
     pages: dict[str, str]
     words: TimeWords

@@ -5,10 +5,10 @@ from typing import Any
 
 import numpy as np
 import rerun as rr
-from numpy.typing import NDArray
 
 from rigidsim.look.plots import Plot
 from rigidsim.look.signals import joined
+from rigidsim.look.solids import Array
 from rigidsim.look.stages.parts import NEAR, Arrow, Color, Line, Plane, Stage, Trail, Vector
 from rigidsim.look.states import States
 
@@ -79,7 +79,7 @@ def draw_levels(recording: rr.RecordingStream, plots: Sequence[Plot], ends: list
             recording.send_columns(path, indexes=ends, columns=columns)
 
 
-def aggregation(plot: Plot, values: NDArray[np.float64]) -> rr.components.AggregationPolicy:
+def aggregation(plot: Plot, values: Array) -> rr.components.AggregationPolicy:
     """Which of the rows that fall into one pixel the viewer draws.
 
     Its default is their average, which is smooth, but shows a fast rotation with a vanishing
@@ -156,7 +156,7 @@ def plane_reach(plane: Plane) -> float:
     return float(np.abs(finite).max(initial=0.0)) or 1.0
 
 
-def flipped(points: NDArray[np.float64]) -> NDArray[np.float64]:
+def flipped(points: Array) -> Array:
     """Plane points for the viewer, whose second axis points down."""
     return points * np.array([1.0, -1.0])
 
