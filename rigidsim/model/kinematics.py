@@ -12,6 +12,7 @@ from typing import Any, TypeVar
 
 import heyoka as hy
 
+from rigidsim.model.inertia import ConstantInertia, Inertia
 from rigidsim.model.orbits.kepler_states import OrbitStates, orbit_states
 from rigidsim.model.orbits.point_mass_states import PointMassStates
 from rigidsim.model.orbits.table_states import TablePlace, table_states
@@ -67,9 +68,14 @@ class Kinematics:
         return in_common_unit(self.rate_states, self.numbers.rate_units, self.number)
 
     @cached_property
+    def inertia(self) -> Inertia:
+        """Tensor of what turns with the body, by which torques change the rates."""
+        return ConstantInertia.of(self.numbers, self.number, self.scene.context)
+
+    @cached_property
     def own_momentum(self) -> list[Symbolic]:
         """Angular momentum I w of the body itself, body axes."""
-        return self.body.momentum(self.numbers.inertia, self.rates, self.number, self.scene.context)
+        return self.inertia.times(self.rates)
 
     @staticmethod
     def carried(part: T | None) -> T:

@@ -101,14 +101,14 @@ class Mechanics(Kinematics):
     @cached_property
     def rotational_energy(self) -> Symbolic:
         """Kinetic energy of rotation of the body, w . I w / 2, and of all carriers."""
-        own = self.body.energy(self.rates, self.own_momentum)
+        own = self.inertia.energy(self.rates, self.own_momentum)
         others = [found for x in self.carriers if (found := x.carried_energy(self)) is not None]
         return hy.sum([own, *others]) if others else own
 
     @cached_property
     def starting_momentum(self) -> Vector:
         """Angular momentum of the body and all carriers at the start (mpf, SI), body axes."""
-        total = multiply(self.scene.body.inertia, self.scene.angular_velocity)
+        total = multiply(self.scene.turning_inertia, self.scene.angular_velocity)
         for carrier in self.carriers:
             momentum, _ = carrier.carried_at_start(self.scene)
             total = [x + y for x, y in zip(total, momentum, strict=True)]

@@ -71,8 +71,8 @@ def largest_rates(scene: Scene, drive: Drive | None = None) -> list[Any]:
     positive weights, so each bounds two rates and the smaller bound is sharp (Landau & Lifshitz, section 37).
     Otherwise |w_i| <= sqrt(2 E_kin,max (I^-1)_ii).
     """
-    context, body, w = scene.context, scene.body, scene.angular_velocity
-    inertia, inverse = body.inertia, scene.inverse_inertia
+    context, w = scene.context, scene.angular_velocity
+    inertia, inverse = scene.turning_inertia, scene.inverse_inertia
     zero = context.zero
     weighted = [dot(row, w) for row in inertia]
     twice_energy = dot(w, weighted)
@@ -232,8 +232,9 @@ def choose_scaling(scene: Scene, drive: Drive | None = None) -> Scaling:
 class ScaledNumbers:
     """The scene's constants in internal units (see ``Scaling``), as mpf."""
 
-    inertia: Matrix
-    inverse_inertia: Matrix
+    inertia: Matrix  # of the mass distribution
+    turning_inertia: Matrix  # of what turns with the body, see ``Scene``
+    inverse_inertia: Matrix  # of that
     rate_units: Vector
     arm: Vector | None  # M com |g|, body axes: potential energy is arm . vertical; None without a torque
     up: Vector | None  # unit vector against gravity, space axes; None without gravity
@@ -255,6 +256,7 @@ def scaled_numbers(scene: Scene, scaling: Scaling) -> ScaledNumbers:
         arm = [context.ldexp(a * strength, -scaling.energy) for a in scene.torque_arm]
     return ScaledNumbers(
         [[context.ldexp(x, -scaling.inertia) for x in row] for row in scene.body.inertia],
+        [[context.ldexp(x, -scaling.inertia) for x in row] for row in scene.turning_inertia],
         [[context.ldexp(x, scaling.inertia) for x in row] for row in scene.inverse_inertia],
         [context.ldexp(context.one, e) for e in scaling.rates],
         arm,

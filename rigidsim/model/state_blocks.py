@@ -11,12 +11,10 @@ from typing import Any
 import heyoka as hy
 
 from rigidsim.model.rotations import Symbolic, SymbolicMatrix
-from rigidsim.model.scaling import Rounder
-from rigidsim.scene.arithmetic import Matrix, negligible
 
 
 class RotatingBody:
-    """A body that turns: everything that is named after it, or follows from its inertia and rates.
+    """A body that turns: everything that is named after it.
 
     The names of its states begin with a prefix, which tells several bodies apart.
     """
@@ -27,18 +25,6 @@ class RotatingBody:
         self.quaternion = [prefix + name for name in ("qw", "qx", "qy", "qz")]  # scalar part first
         self.position = [prefix + name for name in "xyz"]  # of the centre of mass, space axes
         self.velocity = [prefix + name for name in ("vx", "vy", "vz")]
-
-    def momentum(
-        self, inertia: Matrix, rates: list[Symbolic], number: Rounder, context: Any
-    ) -> list[Symbolic]:
-        """Angular momentum I w, body axes, internal units; moments that are only rounding are left out."""
-        least = context.maximum([abs(x) for row in inertia for x in row]) * negligible(context)
-        products = [[(x, w) for x, w in zip(row, rates, strict=True) if abs(x) > least] for row in inertia]
-        return [hy.sum([number(x) * w for x, w in row]) for row in products]
-
-    def energy(self, rates: list[Symbolic], momentum: list[Symbolic]) -> Symbolic:
-        """Kinetic energy of rotation w . I w / 2."""
-        return 0.5 * hy.sum([w * x for w, x in zip(rates, momentum, strict=True)])
 
 
 BODY = RotatingBody()

@@ -59,7 +59,9 @@ class Scene:
         loads: the others, without those that are always zero.
         given_loads: all loads of the config, in its order.
         events: crossings that are recorded, or end the run.
-        inverse_inertia: pseudo-inverse of ``body.inertia``.
+        turning_inertia: tensor of what turns with the body: ``body.inertia``, the one of the mass
+            distribution, less the moments about their axes of what turns on bearings.
+        inverse_inertia: its pseudo-inverse.
         axes, epoch: what the space axes and time 0 are, if the config says so or a load implies it.
         figure: the body's figure axis, see ``[frame] figure_axis``.
         bodies: point masses besides the body; None if there are none.
@@ -71,6 +73,7 @@ class Scene:
     description: str
     context: Any
     body: RigidBody
+    turning_inertia: Matrix
     inverse_inertia: Matrix
     angular_velocity: Vector
     quaternion: Vector
@@ -161,6 +164,7 @@ def build_scene(experiment: Experiment, context: Any = None) -> Scene:
             description=config.description,
             context=context,
             body=body,
+            turning_inertia=body.inertia,
             inverse_inertia=inverse,
             angular_velocity=_initial_rates(config, body, inverse, quaternion, context),
             quaternion=quaternion,

@@ -18,13 +18,14 @@ from rigidsim.model import rotations
 from rigidsim.model.carriers import carried_beside
 from rigidsim.model.formulations.euler_angles import ANGLES, euler_states
 from rigidsim.model.formulations.formulation import Formulation, ModelPlan, Rounding, formulates
+from rigidsim.model.inertia import ConstantInertia
 from rigidsim.model.load import Load
 from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.scaling import Rounder, Scaling
 from rigidsim.model.state_blocks import AttitudeStates, StateBlock
 from rigidsim.scene import attitude as numeric
-from rigidsim.scene.arithmetic import apply, dot, multiply, negligible
+from rigidsim.scene.arithmetic import apply, dot, multiply
 from rigidsim.scene.choices import FORMULATIONS
 from rigidsim.scene.rotations import is_proper
 from rigidsim.scene.scene import Scene
@@ -54,10 +55,7 @@ class Canonical(Formulation):
             unit = [rotations.constant(float(i == j)) for j in range(3)]
             columns.append(rotations.euler_rates(self.sequence, angles, unit)[0])
         body = [hy.sum([k * p for k, p in zip(column, momenta, strict=True)]) for column in columns]
-        inverse = plan.numbers.inverse_inertia
-        tiny = max(abs(x) for row in inverse for x in row) * negligible(plan.scene.context)
-        products = [[(x, m) for x, m in zip(row, body, strict=True) if abs(x) > tiny] for row in inverse]
-        rates = [rotations.hy.sum([number(x) * m for x, m in row]) for row in products]
+        rates = ConstantInertia.of(plan.numbers, number, plan.scene.context).solved(body)
         return rates, replace(euler_states(plan.scene, rates, self.sequence), momenta=MOMENTA)
 
     def blocks(self, m: Mechanics, plan: ModelPlan) -> list[StateBlock]:

@@ -16,23 +16,17 @@ import heyoka as hy
 from rigidsim.model.averaged.average import Average
 from rigidsim.model.capabilities import is_wide
 from rigidsim.model.kinematics import in_common_unit
-from rigidsim.model.load import Load, Term
+from rigidsim.model.load import Load
 from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.orbits.table_states import Carried, TablePlace
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.scaling import Rounder, ScaledNumbers, Scaling, largest_rates
 from rigidsim.model.state_blocks import BODY, AttitudeStates, StateBlock
-from rigidsim.scene.arithmetic import dot, negligible
 from rigidsim.scene.choices import DEFAULT_FORMULATION, FORMULATIONS, Variables
 from rigidsim.scene.orbit_tables.pieces import TabulatedOrbit
 from rigidsim.scene.orbits import KeplerOrbit
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.surfaces import Surfaces
-
-_LEVI_CIVITA = {
-    (0, 1, 2): 1, (1, 2, 0): 1, (2, 0, 1): 1,
-    (0, 2, 1): -1, (2, 1, 0): -1, (1, 0, 2): -1,
-}  # fmt: skip
 
 
 class Unsuited(ValueError):
@@ -191,42 +185,9 @@ def rate_block(m: Mechanics, why: str) -> StateBlock:
         for w, e in zip(m.scene.angular_velocity, scaling.rates, strict=True)
     ]
     exponents = [e - scaling.time for e in scaling.rates]
-    turning = _rate_equations(m, [*m.torque, *m.inner_torque])
+    torque = [*m.torque, *m.inner_torque]
+    turning = m.inertia.accelerations(m.rate_states, m.numbers.rate_units, torque)
     return StateBlock(BODY.rates, turning, initial, exponents=exponents, why=why)
-
-
-def _rate_equations(m: Mechanics, torque: list[Term]) -> list[Symbolic]:
-    """Euler's equations I w' = (I w) x w + torque, solved for the scaled rates' derivatives.
-
-    Written as quadratic forms in the rates, so that principal and arbitrary body axes are one case: in
-    principal axes the coefficients that vanish are left out (Landau & Lifshitz, Mechanics, eq. 36.4-5).
-    """
-    context, numbers, states = m.scene.context, m.numbers, m.rate_states
-    zero = context.zero
-    inverse, inertia, units = numbers.inverse_inertia, numbers.inertia, numbers.rate_units
-    largest_inverse = context.maximum(abs(x) for row in inverse for x in row)
-    tiny = negligible(context)
-    scale = largest_inverse * context.maximum(abs(x) for row in inertia for x in row)
-    result = []
-    for i in range(3):
-        quadratic: dict[tuple[int, int], Any] = {}
-        for (axis, a, b), sign in _LEVI_CIVITA.items():
-            for j in range(3):
-                pair = (min(j, b), max(j, b))
-                term = sign * inverse[i][axis] * inertia[a][j] * units[j] * units[b] / units[i]
-                quadratic[pair] = quadratic.get(pair, zero) + term
-        terms = [
-            m.number(c) * (states[j] * states[b])
-            for (j, b), c in quadratic.items()
-            if abs(c) > tiny * (scale * units[j] * units[b] / units[i])
-        ]
-        for vector, expression in torque:
-            coefficient = dot(inverse[i], vector) / units[i]
-            size = largest_inverse * context.maximum(abs(x) for x in vector) / units[i]
-            if abs(coefficient) > tiny * size:
-                terms.append(m.number(coefficient) * expression)
-        result.append(hy.sum(terms))
-    return result
 
 
 REGISTERED: dict[str, type[Formulation]] = {}
