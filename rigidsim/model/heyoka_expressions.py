@@ -15,27 +15,18 @@ heyoka's own treatment of expressions, and what is done about it here:
 from __future__ import annotations
 
 import operator
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 import heyoka as hy
 
 from rigidsim.model.euler_poles import angles_of_matrix, starts_near_pole
 from rigidsim.model.kinematics import Kinematics
-from rigidsim.model.rotations import Symbolic, euler_from_matrix, quaternion_from_matrix
+from rigidsim.model.rotations import Symbolic, euler_from_matrix
 from rigidsim.model.scaling import Rounder
 from rigidsim.model.two_part import TwoPartTime, rounded
 from rigidsim.scene.expressions import tree as expressions
-from rigidsim.scene.expressions.tree import (
-    ATTITUDE_NAMES,
-    FLIGHT_NAMES,
-    RATE_NAMES,
-    Expression,
-    LineInTime,
-    Name,
-    Node,
-    line_of,
-)
+from rigidsim.scene.expressions.tree import Expression, LineInTime, Name, Node, line_of
 
 _NO_SIDES: Mapping[Node, Any] = {}
 _LINEAR = ("sum", "negative", "product", "quotient")
@@ -155,39 +146,3 @@ def plain_angles(m: Kinematics) -> list[Symbolic]:
 def carries_sign(m: Kinematics) -> bool:
     """Whether the quaternion's sign is a parameter: it matters, and the formulation loses it."""
     return m.surfaces.signed and m.attitude is not None and m.attitude.quaternion_sign != "state"
-
-
-def state_names(m: Kinematics, names: Collection[str], *, clocked: bool = True) -> dict[str, Any]:
-    """Expressions in SI units for the names that a user's expression reads; a ``TwoPartTime`` where the time
-    takes two numbers, and ``clocked``.
-
-    Parameters ``par[..]`` stand for what the state alone doesn't tell: after the sides of the surfaces, the
-    full turns of angles, then the sign of the quaternion, then the second number of the time.
-    """
-    context, scaling = m.scene.context, m.scaling
-
-    def si(expression: Symbolic, exponent: int) -> Symbolic:
-        return expression if exponent == 0 else m.number(context.ldexp(context.one, exponent)) * expression
-
-    found: dict[str, Any] = {"t": si(hy.time, scaling.time)}
-    if clocked and m.clocked:
-        place = len(m.surfaces.found) + len(m.surfaces.turning) + carries_sign(m)
-        found["t"] = TwoPartTime(context.ldexp(context.one, scaling.time), hy.par[place])
-    for name, state, e in zip(RATE_NAMES, m.rate_states, scaling.rates, strict=True):
-        found[name] = si(state, e - scaling.time)
-    if m.attitude is not None and set(names) & set(ATTITUDE_NAMES):
-        quaternion = m.attitude.quaternion
-        if m.attitude.quaternion_sign == "nearest" and m.surfaces.found:
-            quaternion = quaternion_from_matrix(m.matrix, differentiable=True)
-        if carries_sign(m):
-            sign = hy.par[len(m.surfaces.found) + len(m.surfaces.turning)]
-            quaternion = [sign * x for x in quaternion]
-        found |= zip(ATTITUDE_NAMES[:4], quaternion, strict=True)
-        found |= zip(ATTITUDE_NAMES[4:], plain_angles(m), strict=True)
-        turn = m.number(2 * context.pi)
-        for number, name in enumerate(m.surfaces.turning, start=len(m.surfaces.found)):
-            found[name] = found[name] + turn * hy.par[number]
-    if m.position is not None and m.velocity is not None:
-        found |= {n: si(x, scaling.length) for n, x in zip(FLIGHT_NAMES[:3], m.position, strict=True)}
-        found |= {n: si(v, scaling.speed) for n, v in zip(FLIGHT_NAMES[3:], m.velocity, strict=True)}
-    return {name: found[name] for name in names}

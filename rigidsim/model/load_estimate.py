@@ -20,10 +20,11 @@ from rigidsim.model.capabilities import Narrow, having
 from rigidsim.model.carriers import Carrier
 from rigidsim.model.formulations.formulation import Requirements
 from rigidsim.model.formulations.quaternion import quaternion_states
-from rigidsim.model.heyoka_expressions import state_names, to_heyoka
+from rigidsim.model.heyoka_expressions import to_heyoka
 from rigidsim.model.kinematics import in_common_unit
 from rigidsim.model.load import Load, Term, force_terms, torque_terms
 from rigidsim.model.mechanics import Mechanics
+from rigidsim.model.names import state_names
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.scaling import Drive, choose_scaling, scaled_numbers
 from rigidsim.model.state_blocks import BODY

@@ -35,7 +35,6 @@ from rigidsim.model.orbits.table_states import places_of
 from rigidsim.model.scaling import Scaling, amplitude_of, choose_scaling, scaled_numbers
 from rigidsim.model.state_blocks import BODY
 from rigidsim.scene.choices import AUTO, variables_named
-from rigidsim.scene.expressions.tree import ATTITUDE_NAMES, FLIGHT_NAMES
 from rigidsim.scene.registry import OBSERVABLES
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.surfaces import surfaces_of
@@ -129,9 +128,8 @@ def _choose_requirements(scene: Scene, loads: Sequence[Load]) -> Requirements:
     refuse_without_plane(scene, loads)
     readers = {need: [load.title for load in loads if need in load.reads] for need in ("attitude", "flight")}
     for event in scene.events:
-        for need, names in (("attitude", ATTITUDE_NAMES), ("flight", FLIGHT_NAMES)):
-            if event.reads & set(names):
-                readers[need].append(f"event {event.name}")
+        for need in event.states & set(readers):
+            readers[need].append(f"event {event.name}")
     if readers["attitude"] and not keeps_attitude:
         what = f'given "{asked}", but {readers["attitude"][0]} reads the attitude; choose "auto"'
         raise ConfigError(Problem("[integrator] formulation", what))

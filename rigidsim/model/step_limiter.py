@@ -26,11 +26,12 @@ import heyoka as hy
 
 from rigidsim.model.capabilities import Narrow, Rooted
 from rigidsim.model.euler_poles import components_of_factor, starts_in_pole
-from rigidsim.model.heyoka_expressions import state_names, to_heyoka
+from rigidsim.model.heyoka_expressions import to_heyoka
 from rigidsim.model.mechanics import Mechanics
+from rigidsim.model.names import state_names
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.state_blocks import StateBlock
-from rigidsim.scene.expressions.tree import ATTITUDE_NAMES
+from rigidsim.scene.expressions.names import EULER_NAMES
 from rigidsim.scene.transitions import WIDE, narrow_parts
 
 PACE = "pace"
@@ -56,7 +57,7 @@ def pace_block(m: Mechanics, before: StateBlock) -> list[StateBlock]:
 def _arguments(m: Mechanics) -> list[tuple[str, Symbolic]]:
     """(description, argument) of what is narrow in loads and events; dimensionless."""
     found = [(load.title, u) for load in m.loads if isinstance(load, Narrow) for u in load.narrow(m)]
-    angles = frozenset(ATTITUDE_NAMES[4:])
+    angles = frozenset(EULER_NAMES)
     for event in m.scene.events:
         names = state_names(m, event.reads, clocked=False)
         if event.reads & angles and starts_in_pole(m.scene):

@@ -11,14 +11,16 @@ import heyoka as hy
 
 from rigidsim.model.assembly import assemble_states
 from rigidsim.model.formulations.formulation import Formulation, ModelPlan
-from rigidsim.model.heyoka_expressions import carries_sign, plain_angles, state_names, to_heyoka
+from rigidsim.model.heyoka_expressions import carries_sign, plain_angles, to_heyoka
 from rigidsim.model.mechanics import Mechanics
+from rigidsim.model.names import state_names
 from rigidsim.model.orbits.table_states import Pieces
 from rigidsim.model.outputs import Invariant, Recorded, drift_outputs, find_invariants, recorded_variables
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.scaling import Rounder
 from rigidsim.model.state_blocks import StateBlock, joined
-from rigidsim.scene.expressions.tree import ATTITUDE_NAMES, names_used
+from rigidsim.scene.expressions.names import EULER_NAMES
+from rigidsim.scene.expressions.tree import names_used
 
 _LARGEST_EXPONENT = 1000  # of a recorded variable in SI: float64 ends at 2^1024, and sizes are known roughly
 _DIRECTIONS = {"any": 0, "up": 1, "down": -1}
@@ -245,7 +247,7 @@ class System:
     def turning(self) -> list[Symbolic]:
         """Euler angles, less the full turns that are parameters after the sides."""
         names = self.plan.surfaces.turning
-        angles = dict(zip(ATTITUDE_NAMES[4:], plain_angles(self.mechanics), strict=True)) if names else {}
+        angles = dict(zip(EULER_NAMES, plain_angles(self.mechanics), strict=True)) if names else {}
         return [angles[name] for name in names]
 
     @cached_property

@@ -7,11 +7,8 @@ from __future__ import annotations
 from typing import Any
 
 from rigidsim.errors import ConfigError, Problem
-from rigidsim.scene import attitude
+from rigidsim.scene.expressions.names import EULER_NAMES, PROVIDERS
 from rigidsim.scene.expressions.tree import (
-    ATTITUDE_NAMES,
-    FLIGHT_NAMES,
-    RATE_NAMES,
     Expression,
     ExpressionError,
     Node,
@@ -27,16 +24,9 @@ _TIMES = 8  # of a run's span, at which functions of time alone are tried
 
 def start_values(scene: Scene) -> dict[str, Any]:
     """Values (mpf, SI) at the start of all names that expressions may read."""
-    sequence = scene.config.integrator.euler_sequence
-    angles = scene.euler_angles
-    if angles is None:
-        matrix = attitude.rotation_matrix(scene.quaternion)
-        angles = attitude.euler_from_matrix(scene.context, matrix, sequence)
-    found = {"t": scene.start}
-    found |= zip(RATE_NAMES, scene.angular_velocity, strict=True)
-    found |= zip(ATTITUDE_NAMES, [*scene.quaternion, *angles], strict=True)
-    if scene.position is not None and scene.velocity is not None:
-        found |= zip(FLIGHT_NAMES, [*scene.position, *scene.velocity], strict=True)
+    found: dict[str, Any] = {}
+    for provider in PROVIDERS:
+        found |= provider.at_start(scene)
     return found
 
 
@@ -55,7 +45,7 @@ def _check_branch(scene: Scene) -> list[Problem]:
     """Refuse expressions that read Euler angles if the start is given by the other of an attitude's two
     triples: they use the one whose middle angle is in its range, as found in every formulation.
     """
-    read = frozenset().union(*(names_used(e) for _, e in scene.formulas())) & set(ATTITUDE_NAMES[4:])
+    read = frozenset().union(*(names_used(e) for _, e in scene.formulas())) & set(EULER_NAMES)
     if scene.euler_angles is None or not read:
         return []
     sequence, middle, pi = scene.config.integrator.euler_sequence, scene.euler_angles[1], scene.context.pi
@@ -75,11 +65,11 @@ def _check_branch(scene: Scene) -> list[Problem]:
 def _check_singular(scene: Scene, values: dict[str, Any]) -> list[Problem]:
     """Refuse loads that read Euler angles where these are singular at the start and have no derivatives."""
     formulas = [formula for load in scene.loads for formula in load.formulas()]
-    reading = [(where, names_used(e) & set(ATTITUDE_NAMES[4:])) for where, e in formulas]
+    reading = [(where, names_used(e) & set(EULER_NAMES)) for where, e in formulas]
     if not any(names for _, names in reading):
         return []
     context, sequence = scene.context, scene.config.integrator.euler_sequence
-    middle = values[ATTITUDE_NAMES[5]]
+    middle = values[EULER_NAMES[1]]
     proper = sequence[0] == sequence[2]
     if abs(context.sin(middle) if proper else context.cos(middle)) > _SINGULAR:
         return []

@@ -14,6 +14,7 @@ from rigidsim.errors import ConfigError, Problem
 from rigidsim.scene.arithmetic import Vector
 from rigidsim.scene.epochs import Epoch
 from rigidsim.scene.exact import ExactNumber
+from rigidsim.scene.expressions.names import Names
 from rigidsim.scene.expressions.tree import Expression
 from rigidsim.scene.fields import ConfigTable
 from rigidsim.scene.point_masses import PointMasses
@@ -38,6 +39,7 @@ class Surroundings:
         tables: texts of the tables that belong to the config, by name.
         span: start and end of the run, s (mpf).
         bodies: point masses besides the body.
+        names: what expressions may read.
     """
 
     number: int
@@ -50,6 +52,7 @@ class Surroundings:
     tables: Mapping[str, str] = field(default_factory=dict)
     span: tuple[Any, Any] | None = None
     bodies: PointMasses | None = None
+    names: Names = field(default_factory=Names)
 
     @property
     def carried_bodies(self) -> PointMasses:

@@ -14,15 +14,9 @@ from rigidsim.scene.bodies.body import RigidBody, build_body, inverse_inertia
 from rigidsim.scene.config import Experiment
 from rigidsim.scene.epochs import Epoch
 from rigidsim.scene.exact import ExactNumber
+from rigidsim.scene.expressions.names import Names, names_of
 from rigidsim.scene.expressions.parser import parse_expression
-from rigidsim.scene.expressions.tree import (
-    ATTITUDE_NAMES,
-    FLIGHT_NAMES,
-    RATE_NAMES,
-    Expression,
-    ExpressionError,
-    names_used,
-)
+from rigidsim.scene.expressions.tree import Expression, ExpressionError, names_used, states_read
 from rigidsim.scene.frame import Figure, figure_of, reference_normal
 from rigidsim.scene.point_masses import PointMasses, resolve_point_masses
 from rigidsim.scene.registry import LOAD_KINDS, SceneLoad, Surroundings
@@ -44,6 +38,11 @@ class Event:
     def reads(self) -> frozenset[str]:
         """Names that the expression uses."""
         return names_used(self.expression)
+
+    @property
+    def states(self) -> frozenset[str]:
+        """States without which the expression has no value."""
+        return states_read(self.expression)
 
 
 @dataclass(frozen=True)
@@ -150,7 +149,10 @@ def build_scene(experiment: Experiment, context: Any = None) -> Scene:
         masses = resolve_point_masses(
             config.bodies, table.host, table.coupling, body.mass, context, free_flight=free_flight
         )
-        resolved = _resolve_loads(config, body, context, masses, free_flight=free_flight, span=(start, end))
+        names = names_of(config)
+        resolved = _resolve_loads(
+            config, body, context, masses, names, free_flight=free_flight, span=(start, end)
+        )
         fields = [load.uniform_field for load in resolved if load.uniform_field is not None]
         gravity = [sum(x, context.zero) for x in zip(*fields, strict=True)] if fields else None
         for number, load in enumerate(resolved):
@@ -173,7 +175,7 @@ def build_scene(experiment: Experiment, context: Any = None) -> Scene:
             velocity=velocity,
             gravity=gravity,
             loads=tuple(load for load in resolved if load.acts() and load.uniform_field is None),
-            events=_resolve_events(config.events, config.parameters, free_flight=position is not None),
+            events=_resolve_events(config.events, config.parameters, names),
             start=start,
             end=end,
             samples=samples,
@@ -236,6 +238,7 @@ def _resolve_loads(
     body: RigidBody,
     context: Any,
     masses: PointMasses | None,
+    names: Names,
     *,
     free_flight: bool,
     span: tuple[Any, Any],
@@ -245,7 +248,7 @@ def _resolve_loads(
     fixed = config.parameters, body.center_of_mass, free_flight, config.frame.axes, config.time.epoch
     for number, fields in enumerate(config.loads):
         kind = LOAD_KINDS[fields.kind]  # type: ignore[attr-defined]
-        found.append(kind.resolve(fields, Surroundings(number, context, *fixed, tables, span, masses)))
+        found.append(kind.resolve(fields, Surroundings(number, context, *fixed, tables, span, masses, names)))
     return found
 
 
@@ -276,10 +279,9 @@ def _check_limits(limits: schema.Limits) -> None:
 
 
 def _resolve_events(
-    tables: Sequence[schema.EventTable], parameters: Mapping[str, ExactNumber], *, free_flight: bool
+    tables: Sequence[schema.EventTable], parameters: Mapping[str, ExactNumber], names: Names
 ) -> tuple[Event, ...]:
     """Read the expressions of ``[[events]]``."""
-    names = ("t", *RATE_NAMES, *ATTITUDE_NAMES, *(FLIGHT_NAMES if free_flight else ()))
     found = []
     for number, table in enumerate(tables):
         where = f"[[events]] number {number + 1} expression"

@@ -23,7 +23,8 @@ from pydantic import (
 
 from rigidsim.scene.bodies.table import Body
 from rigidsim.scene.choices import REDUCED
-from rigidsim.scene.expressions.tree import ATTITUDE_NAMES, FLIGHT_NAMES, RATE_NAMES, RESERVED
+from rigidsim.scene.expressions.names import BODY_NAMES
+from rigidsim.scene.expressions.tree import RESERVED
 from rigidsim.scene.fields import (
     Angle,
     AnyQuantity,
@@ -54,7 +55,6 @@ _ABOUT_NAME = (
     "1 to 100 letters, digits, dots, underscores and hyphens, not dots alone, since it names the run folder"
 )
 _ABOUT_LOADS = "loads that act on the body, each of a kind; without any the body rotates freely"
-STATE_NAMES = ("t", *RATE_NAMES, *ATTITUDE_NAMES, *FLIGHT_NAMES)
 
 
 class Initial(ConfigTable):
@@ -224,7 +224,7 @@ class Config(ConfigTable):
         for name in value:
             if not re.fullmatch(r"[A-Za-z_][A-Za-z0-9_]{0,40}", name):
                 raise refuse(f'given the name "{name[:40]}"; allowed: letters, digits and underscores')
-            if name in STATE_NAMES or name in RESERVED:
+            if name in BODY_NAMES or name in RESERVED:
                 raise refuse(f'given the name "{name}", which expressions use already; rename it')
         return value
 

@@ -11,11 +11,9 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from rigidsim.scene.arithmetic import GUARD_BITS, negligible
+from rigidsim.scene.expressions.names import PROVIDERS
 from rigidsim.scene.expressions.piecewise import on_sides
 from rigidsim.scene.expressions.tree import (
-    ATTITUDE_NAMES,
-    FLIGHT_NAMES,
-    RATE_NAMES,
     Expression,
     ExpressionError,
     Node,
@@ -23,14 +21,13 @@ from rigidsim.scene.expressions.tree import (
     evaluate,
     names_used,
     nodes,
+    readables,
 )
-from rigidsim.scene.initial_values import start_values
 from rigidsim.scene.scene import Scene
 
 _STATES = 4  # states at which expressions are compared; two that agree at all of them count as equal
 _TRIALS = 32  # attempts: some expressions have no value everywhere
 _BITS = 60  # of agreement, far fewer than the scene's arithmetic has
-_OUTER = ("phi", "psi")  # of the Euler angles, those that turn without end
 
 
 @dataclass(frozen=True)
@@ -69,8 +66,8 @@ def surfaces_of(scene: Scene) -> Surfaces:
                 if names_used(argument):
                     text = expression.text[slice(*node.span)]
                     arguments.setdefault(argument.root, Surface(argument, text, where))
-    names = frozenset().union(*(names_used(expression) for _, expression in expressions))
-    if not arguments and not names & set(ATTITUDE_NAMES):
+    read = {readable.name: readable for _, expression in expressions for readable in readables(expression)}
+    if not arguments and not any("attitude" in readable.states for readable in read.values()):
         return Surfaces()
     states = random_states(scene)
     context = scene.context
@@ -88,32 +85,24 @@ def surfaces_of(scene: Scene) -> Surfaces:
     turn = 2 * context.pi
     turning = tuple(
         name
-        for name in _OUTER
-        if any(changes(part, states, {name: lambda x: x + turn}, context) for part in parts)
+        for name, readable in sorted(read.items())
+        if readable.turns
+        and any(changes(part, states, {name: lambda x: x + turn}, context) for part in parts)
     )
-    opposite = {name: lambda x: -x for name in ATTITUDE_NAMES[:4]}
+    opposite = {name: lambda x: -x for name, readable in read.items() if readable.changes_sign}
     signed = any(changes(part, states, opposite, context) for part in parts)
     return Surfaces(tuple(found), places, turning, signed)
 
 
 def random_states(scene: Scene) -> list[dict[str, Any]]:
     """Values (mpf, SI) of all names at random states similar to the start, always the same ones."""
-    context, generator = scene.context, random.Random(0)
-    start = start_values(scene)
-    rates = max((abs(w) for w in scene.angular_velocity), default=context.zero) or context.one
+    generator = random.Random(0)
+    starts = [(provider, provider.at_start(scene)) for provider in PROVIDERS]
     states = []
     for _ in range(_TRIALS):
-        q = [context.mpf(generator.gauss(0, 1)) for _ in range(4)]
-        size = context.sqrt(sum(x * x for x in q))
-        state = {"t": scene.start + (scene.end - scene.start) * context.mpf(generator.random())}
-        state |= {name: rates * context.mpf(generator.uniform(-1, 1)) for name in RATE_NAMES}
-        state |= {name: x / size for name, x in zip(ATTITUDE_NAMES[:4], q, strict=True)}
-        state |= {name: context.mpf(generator.uniform(-3, 3)) for name in ATTITUDE_NAMES[4:]}
-        for name in FLIGHT_NAMES:
-            if name in start:
-                state[name] = start[name] * context.mpf(generator.uniform(0.5, 2)) + context.mpf(
-                    generator.uniform(-1, 1)
-                )
+        state: dict[str, Any] = {}
+        for provider, start in starts:
+            state |= provider.at_random(scene, start, generator)
         states.append(state)
     return states
 

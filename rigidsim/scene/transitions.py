@@ -47,7 +47,6 @@ part in 2^46 of the impulse in double precision, is no more than that of some st
 _BOUNDED: Mapping[str, float] = {
     "sin": 1, "cos": 1, "sign": 1, "tanh": 1, "erf": 1, "sigmoid": 1,
     "atan": 2, "asin": 2, "acos": 4, "atan2": 4,
-    "qw": 1, "qx": 1, "qy": 1, "qz": 1, "phi": 4, "theta": 4, "psi": 4,
 }  # fmt: skip
 
 
@@ -101,7 +100,7 @@ def _least(expression: Expression) -> float:
         if isinstance(node, Constant):
             return float(node.value)
         if not isinstance(node, Operation):
-            return -_BOUNDED.get(node.name, math.inf)
+            return -node.of.bound
         if node.operator == "sum":
             return float(sum(operands))
         if node.operator in ("exp", "sqrt", "sigmoid"):
@@ -129,7 +128,7 @@ def _bound(expression: Expression, *, signed: bool = False) -> float:
             value = float(node.value)
             return value if signed else abs(value)
         if not isinstance(node, Operation):
-            return _BOUNDED.get(node.name, math.inf)
+            return node.of.bound
         if node.operator in _BOUNDED:
             return _BOUNDED[node.operator]
         if node.operator == "sum":

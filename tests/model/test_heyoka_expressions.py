@@ -9,6 +9,7 @@ from equations import CLOSE, derivative, prepared
 from support import config, run_text
 
 from rigidsim.scene.exact import parse_number
+from rigidsim.scene.expressions.names import BODY_NAMES
 from rigidsim.scene.expressions.parser import parse_expression
 from rigidsim.scene.expressions.tree import FUNCTIONS, evaluate
 
@@ -36,7 +37,7 @@ def test_what_is_compiled_is_mpmaths_value_within_rounding(names: list[str]) -> 
     with mpmath.workdps(50):
         values = {key: mpmath.mpf(value) for key, value in RATES.items()}
         exact = [
-            float(evaluate(parse_expression(text, list(RATES), parameters=known), values, mpmath.mp))
+            float(evaluate(parse_expression(text, BODY_NAMES, parameters=known), values, mpmath.mp))
             for text in texts
         ]
     np.testing.assert_allclose(derivative(system, state)[:3], exact, rtol=CLOSE)

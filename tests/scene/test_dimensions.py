@@ -11,6 +11,7 @@ import pytest
 from rigidsim import ConfigError, parse
 from rigidsim.scene.arithmetic import context_for
 from rigidsim.scene.exact import ExactNumber, parse_quantity
+from rigidsim.scene.expressions.names import BODY_NAMES
 from rigidsim.scene.expressions.parser import parse_expression
 from rigidsim.scene.expressions.tree import (
     FUNCTIONS,
@@ -23,7 +24,6 @@ from rigidsim.scene.expressions.tree import (
 from rigidsim.scene.scene import build_scene
 
 PAGE = Path(__file__).parents[2] / "docs" / "expressions.md"
-NAMES = ["t", "wx", "wy", "wz", "qw", "qx", "qy", "qz", "phi", "theta", "psi", *"xyz", "vx", "vy", "vz"]
 GIVEN = {
     "k": "0.25", "c": "2e-4 N m s", "tau": "0.1 N m", "w0": "30 deg/s", "m": "2", "l": "10 cm", "T": "3 T",
 }  # fmt: skip
@@ -32,7 +32,7 @@ CONTEXT = context_for(50)
 
 
 def read(text: str, unit: str | None = None) -> Expression:
-    return parse_expression(text, NAMES, parameters=PARAMETERS, unit=unit)
+    return parse_expression(text, BODY_NAMES, parameters=PARAMETERS, unit=unit)
 
 
 def refused(text: str, unit: str | None = None) -> str:
@@ -148,7 +148,7 @@ end = 1
 def test_a_config_with_units_is_the_one_without() -> None:
     one = build_scene(parse(config('c = "200 mN m s"', "-c*wz", "phi - 90 deg")))
     other = build_scene(parse(config("c = 0.2", "-c*wz", "phi - pi/2")))
-    values = {name: CONTEXT.mpf(n + 1) / 7 for n, name in enumerate(NAMES)}
+    values = {name: CONTEXT.mpf(n + 1) / 7 for n, name in enumerate(BODY_NAMES)}
     for first, second in (
         (one.loads[0].components[2], other.loads[0].components[2]),  # type: ignore[attr-defined]
         (one.events[0].expression, other.events[0].expression),

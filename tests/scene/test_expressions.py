@@ -15,6 +15,7 @@ from hypothesis import strategies as st
 
 from rigidsim.scene.arithmetic import context_for
 from rigidsim.scene.exact import ExactNumber, parse_number
+from rigidsim.scene.expressions.names import BODY_NAMES
 from rigidsim.scene.expressions.parser import DEEPEST_NESTING, LONGEST_TEXT, parse_expression
 from rigidsim.scene.expressions.tree import (
     FUNCTIONS,
@@ -28,7 +29,7 @@ from rigidsim.scene.expressions.tree import (
     names_used,
 )
 
-NAMES = ("t", "wx", "wy")
+NAMES = {name: BODY_NAMES[name] for name in ("t", "wx", "wy")}
 CONTEXT = context_for(50)
 # A few dozen operations, each right to the context's last bit, on numbers of order one.
 CLOSE = mpmath.mpf(2) ** (12 - CONTEXT.prec)
@@ -258,9 +259,10 @@ def test_the_slowest_texts_are_still_quick() -> None:
 
 
 def test_limits_are_the_ones_stated() -> None:
-    assert parse("(" * DEEPEST_NESTING + "t" + ")" * DEEPEST_NESTING).root == Name("t", (0, 0))
+    time = Name("t", (0, 0), BODY_NAMES["t"])
+    assert parse("(" * DEEPEST_NESTING + "t" + ")" * DEEPEST_NESTING).root == time
     assert "at most 64 levels" in str(refused("(" * (DEEPEST_NESTING + 1) + "t"))
-    assert parse("t" + " " * (LONGEST_TEXT - 1)).root == Name("t", (0, 0))
+    assert parse("t" + " " * (LONGEST_TEXT - 1)).root == time
     assert "an expression of 2001 characters; at most 2000" in str(refused("t" + " " * LONGEST_TEXT))
     assert parse("wx^64 + wx^-64")
     # depth counts what is open, not what was closed

@@ -9,10 +9,11 @@ from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import Field, PlainValidator, WithJsonSchema
 
-from rigidsim.model.heyoka_expressions import state_names, to_heyoka
+from rigidsim.model.heyoka_expressions import to_heyoka
 from rigidsim.model.kinematics import Kinematics
 from rigidsim.model.load import Load, Term
 from rigidsim.model.load_words import span_words, value_text
+from rigidsim.model.names import state_names
 from rigidsim.model.rotations import Symbolic, apply, transpose
 from rigidsim.scene.arithmetic import Vector, cross, diagonal, norm, parallel
 from rigidsim.scene.arithmetic import apply as apply_numbers
@@ -20,14 +21,12 @@ from rigidsim.scene.arithmetic import transpose as transposed
 from rigidsim.scene.attitude import rotation_matrix
 from rigidsim.scene.expressions.parser import parse_expression
 from rigidsim.scene.expressions.tree import (
-    ATTITUDE_NAMES,
-    FLIGHT_NAMES,
-    RATE_NAMES,
     Constant,
     Expression,
     ExpressionError,
     evaluate,
     names_used,
+    states_read,
 )
 from rigidsim.scene.fields import Metre, Triple, refuse
 from rigidsim.scene.initial_values import start_values
@@ -98,11 +97,11 @@ class Applied(Load):
 
     @classmethod
     def resolve(cls, fields: Any, around: Surroundings) -> Applied:
-        names = ("t", *RATE_NAMES, *ATTITUDE_NAMES, *(FLIGHT_NAMES if around.free_flight else ()))
+        names, given = around.names, around.parameters
         components = []
         for i, text in enumerate(fields.components):
             try:
-                components.append(parse_expression(text, names, parameters=around.parameters, unit=cls.unit))
+                components.append(parse_expression(text, names, parameters=given, unit=cls.unit))
             except ExpressionError as error:
                 raise around.fault(f"components[{i}]", str(error)) from None
         point = getattr(fields, "point", None)
@@ -127,9 +126,8 @@ class Applied(Load):
     def reads(self) -> frozenset[str]:  # type: ignore[override]
         turns = self.title == "torque" or any(x != 0 for x in self.arm)
         crosses = (turns and self.frame == "space") or (self.pushes and self.frame == "body")
-        attitude = {"attitude"} if crosses or self.names & set(ATTITUDE_NAMES) else set()
-        flight = {"flight"} if self.pushes or self.names & set(FLIGHT_NAMES) else set()
-        return frozenset(attitude | flight)
+        found = frozenset().union(*(states_read(c) for c in self.components))
+        return found | ({"attitude"} if crosses else set()) | ({"flight"} if self.pushes else set())
 
     @property
     def described(self) -> str:  # type: ignore[override]

@@ -15,7 +15,7 @@ from fractions import Fraction
 
 from rigidsim.scene import units
 from rigidsim.scene.exact import ExactNumber, Quantity
-from rigidsim.scene.expressions.tree import FLIGHT_NAMES, RATE_NAMES
+from rigidsim.scene.expressions.names import Readable
 
 _WORD_OF_UNIT = re.compile(
     r"[ \t]*(?P<join>[*/]?)[ \t]*(?P<name>[A-Za-z][A-Za-z0-9_]*)"
@@ -71,14 +71,13 @@ class Measure:
 
 NUMBER = Measure(())
 ANY = Measure(None)
-_STATE = {"t": "s", **dict.fromkeys(RATE_NAMES, "rad/s")}
-_STATE |= dict(zip(FLIGHT_NAMES, ["m"] * 3 + ["m/s"] * 3, strict=True))
 
 
-def of_name(name: str) -> Measure:
-    """Dimension of time or a component of the state."""
-    unit = _STATE.get(name)
-    return NUMBER if unit is None else Measure(_SI[unit])
+def of_name(readable: Readable) -> Measure:
+    """Dimension of what a name stands for."""
+    if not readable.unit:
+        return NUMBER
+    return Measure(_SI.get(readable.unit) or units.powers(readable.unit))
 
 
 def of_number(number: ExactNumber) -> Measure:

@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import re
 import unicodedata
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any, NoReturn, TypeVar
@@ -26,6 +26,7 @@ from rigidsim.scene.arithmetic import context_for
 from rigidsim.scene.exact import ExactNumber, parse_number, with_unit
 from rigidsim.scene.expressions import dimensions
 from rigidsim.scene.expressions.dimensions import ANY, DimensionError, Measure, end_of_unit
+from rigidsim.scene.expressions.names import Readable
 from rigidsim.scene.expressions.piecewise import power, written_out
 from rigidsim.scene.expressions.tree import (
     FUNCTIONS,
@@ -86,7 +87,7 @@ class _Parsed:
 
 def parse_expression(
     text: str,
-    names: Collection[str],
+    names: Mapping[str, Readable],
     *,
     parameters: Mapping[str, ExactNumber] | None = None,
     jumps: bool = True,
@@ -96,7 +97,8 @@ def parse_expression(
 
     Args:
         text: one line of at most ``LONGEST_TEXT`` characters (which bounds the tree as well).
-        names: names of time and the state that are allowed here.
+        names: those of time and the state that are allowed here, by preference as ``Names``, whose messages
+            say what would bring others.
         parameters: named constants, which enter as exact numbers.
         jumps: whether piecewise constant functions are allowed.
         unit: SI unit of the value; None for any.
@@ -130,7 +132,7 @@ class _Parser:
     """Recursive descent with one token of lookahead: its ``kind``, ``token`` (text) and ``start``."""
 
     def __init__(
-        self, text: str, names: Collection[str], parameters: Mapping[str, ExactNumber], jumps: bool
+        self, text: str, names: Mapping[str, Readable], parameters: Mapping[str, ExactNumber], jumps: bool
     ) -> None:
         self.text, self.names, self.parameters, self.jumps = text, names, parameters, jumps
         self.constants = {**parameters, "pi": ExactNumber(Fraction(1), 1)}
@@ -269,7 +271,8 @@ class _Parser:
             return self.call(name, start)
         span = (start, self.end)
         if name in self.names:
-            return _Parsed(Name(name, span), dimensions.of_name(name))
+            readable = self.names[name]
+            return _Parsed(Name(name, span, readable), dimensions.of_name(readable))
         if name in self.constants:
             number = self.constants[name]
             value = number.alone
@@ -278,7 +281,8 @@ class _Parser:
             return _Parsed(Operation("exp", (Constant(ONE, span),), span))
         near = nearest(name, self.known) or nearest(name.lower(), self.known)
         near = self.about_units(name) if units.is_unit(name) else near
-        self.fail(f'unknown name "{name}"{near}; allowed: {", ".join(self.known)}', start)
+        allowed = "; ".join([", ".join(self.known), *getattr(self.names, "elsewhere", ())])
+        self.fail(f'unknown name "{name}"{near}; allowed: {allowed}', start)
 
     def quantity(self, start: int) -> _Parsed:
         """Parse a number and the unit after it."""

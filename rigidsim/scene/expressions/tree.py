@@ -13,6 +13,7 @@ from fractions import Fraction
 from typing import Any
 
 from rigidsim.scene.exact import ExactNumber
+from rigidsim.scene.expressions.names import Readable
 
 # Past any value that means something, and still quick to take the sine of: 5000 decimal digits fit.
 _LARGEST_BITS = 20_000
@@ -27,11 +28,6 @@ PIECEWISE = {"abs": 1, "sign": 1, "min": 2, "max": 2, "step": 1, "pulse": 3, "wr
 RESERVED = frozenset({*FUNCTIONS, *PIECEWISE, "pi", "e"})
 """Names that no parameter may have."""
 ONE = ExactNumber(Fraction(1))
-
-RATE_NAMES = ("wx", "wy", "wz")
-ATTITUDE_NAMES = ("qw", "qx", "qy", "qz", "phi", "theta", "psi")
-FLIGHT_NAMES = ("x", "y", "z", "vx", "vy", "vz")
-"""Names of the flight's states in expressions."""
 
 
 class ExpressionError(ValueError):
@@ -56,10 +52,11 @@ class Constant:
 
 @dataclass(frozen=True)
 class Name:
-    """Time or a component of the state."""
+    """Time, a component of the state, or another value of the scene; ``of`` says what is known of it."""
 
     name: str
     span: tuple[int, int] = field(compare=False)
+    of: Readable = field(compare=False)
 
 
 @dataclass(frozen=True)
@@ -174,6 +171,16 @@ def operations(expression: Expression) -> Iterator[Operation]:
 def names_used(expression: Expression) -> frozenset[str]:
     """Names of time and the state that the expression reads; parameters are already numbers."""
     return frozenset(node.name for node in nodes(expression) if isinstance(node, Name))
+
+
+def readables(expression: Expression) -> list[Readable]:
+    """What the names in the expression stand for, each once, in the order of its text."""
+    return list({node.name: node.of for node in nodes(expression) if isinstance(node, Name)}.values())
+
+
+def states_read(expression: Expression) -> frozenset[str]:
+    """States without which the expression has no value, see ``Readable.states``."""
+    return frozenset().union(*(readable.states for readable in readables(expression)))
 
 
 def constant_value(expression: Expression, context: Any) -> Any:
