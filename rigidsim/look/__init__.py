@@ -10,9 +10,9 @@ Two folders load what draws, and are imported only where a picture is drawn: `ti
 | `figure_names` | their names, without any import |
 | `stages` | stages by kind of scene, as numbers; a package of its own |
 | `plots`, `page`, `states` | variables to plots; the summary page; lanes of events, and sections |
-| `signals`, `roles` | what pictures show, recorded or worked out; what a dataset tells of itself |
+| `signals` | what a dataset tells of itself, and what pictures show, recorded or worked out |
 | `surroundings` | what stands around the body, from the dataset's attributes |
 | `solids`, `symbols` | meshes of bodies; toy tops, globes with their continents, edges |
-| `thinning`, `clock` | a bounded number of rows of any dataset; seconds to the viewer's integer timelines |
-| `viewer`, `live`, `film` | the viewer; following a run that goes on; pictures and films of a timeline |
+| `thinning` | a bounded number of rows of any dataset |
+| `viewer`, `film` | the viewer, also of a run that goes on; pictures and films of a timeline |
 """

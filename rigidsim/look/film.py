@@ -20,8 +20,7 @@ SIZE = (1600, 900)
 GIF_WIDTH = 1000
 FRAMES_PER_SECOND = {".gif": 12, ".mp4": 30}
 SECONDS = 6.0
-PICTURED_AT = 0.4
-"""Time of a single picture, as a fraction of the run: trails have begun, and curves go on."""
+PICTURED_AT = 0.4  # time of a single picture, as a fraction of the run: trails have begun, and curves go on
 _GIF_COLORS = 128
 _PATIENCE = 120.0  # seconds until a picture is given up
 
@@ -33,18 +32,14 @@ class NoGraphics(RuntimeError):
 def render(
     path: Path, target: Path, *, seconds: float = SECONDS, told: Callable[[int, int], None] | None = None
 ) -> Path:
-    """Draw a recording (``.rrd``) as a PNG picture, or a GIF or MP4 film of the whole run, as the suffix of
-    `target` says, which it returns.
-
-    Args:
-        seconds: duration of a film.
-        told: called with the number of frames drawn so far, and the total.
+    """Draw a recording (``.rrd``) as a PNG picture, or a GIF or MP4 film of the whole run lasting so many
+    seconds, as the suffix of `target` says, which it returns; `told` is given the numbers of frames drawn and
+    in all.
 
     Raises:
-        ValueError: another suffix.
-        FileNotFoundError: no such recording, or no viewer.
-        NoGraphics: no Vulkan driver; Mesa's software driver will do.
-        RuntimeError: no imageio-ffmpeg for an MP4 film, or the viewer failed.
+    ValueError: another suffix.
+    FileNotFoundError, NoGraphics: see ``HeadlessViewer``.
+    RuntimeError: no imageio-ffmpeg for an MP4 film, or the viewer failed.
     """
     suffix = target.suffix.lower()
     if suffix not in FORMATS:
@@ -114,16 +109,10 @@ def _encoder() -> Any:
 class HeadlessViewer:
     """The viewer without a screen, with a recording open in it and its time at rest; a context manager.
 
-    Attributes:
-        client: client of rerun, for what isn't offered here.
-        timeline: timeline that the page opened on.
-        start, end: its first and last integer.
-
     Raises (on entering):
-        FileNotFoundError: no such recording, or no viewer.
-        NoGraphics: no Vulkan driver; Mesa's software driver will do
-            (Debian: `apt-get install mesa-vulkan-drivers`).
-        RuntimeError: the viewer failed or took longer than two minutes.
+    FileNotFoundError: no such recording, or no viewer.
+    NoGraphics: no Vulkan driver; Mesa's software driver will do.
+    RuntimeError: the viewer failed or took longer than two minutes.
     """
 
     def __init__(self, path: Path, *, size: tuple[int, int] = SIZE) -> None:
@@ -131,7 +120,7 @@ class HeadlessViewer:
         self._size = size
         self._deadline = time.monotonic() + _PATIENCE
         self.client: Any = None
-        self.timeline = ""
+        self.timeline = ""  # that the page opened on, and its first and last integer
         self.start = self.end = 0
 
     def __enter__(self) -> Self:
@@ -189,10 +178,7 @@ class HeadlessViewer:
         raise self._failure("its picture never came to rest")
 
     def _open(self) -> None:
-        """Wait until the recording is loaded.
-
-        The viewer's own --screenshot-to fires after a few frames, before the plots have been read.
-        """
+        """Wait until the recording is loaded: --screenshot-to fires before the plots have been read."""
         from rerun.experimental import ViewerClient
 
         reason = "no answer in time"

@@ -6,7 +6,7 @@ import numpy as np
 import xarray
 
 from rigidsim.look.plots import pretty_unit
-from rigidsim.look.roles import drifts, in_words, is_averaged, read_config, title_of
+from rigidsim.look.signals import drifts, in_words, is_averaged, read_config, title_of
 from rigidsim.scene.readable import TimeWords
 
 

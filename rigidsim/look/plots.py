@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import xarray
 
-from rigidsim.look.roles import drift_of, in_words, is_averaged, put_back_of
+from rigidsim.look.signals import drift_of, in_words, is_averaged, put_back_of
 from rigidsim.look.solids import Array, Color
 from rigidsim.scene.readable import angle_unit, si_scale
 
@@ -25,16 +25,14 @@ _PALETTE: tuple[Color, ...] = (
     *((240, 190, 60), (80, 200, 215), (225, 115, 190), (150, 200, 90)),
     *((165, 135, 235), (235, 140, 80), (120, 165, 200), (200, 200, 120)),
 )
-DRIFTS = "all"
-"""Name of the drifts together."""
+DRIFTS = "all"  # name of the drifts together
 _MOST_SERIES = 16  # of one variable, so that a recorded matrix history stays readable
 
 
 @dataclass(frozen=True)
 class Series:
-    """One variable as it is plotted, or ``DRIFTS``: (rows, components), each with a label and a colour.
-
-    `error` (rows,) is how uncertain they are, to both sides; None where that isn't known or can't be seen.
+    """One variable as it is plotted, or ``DRIFTS``: (rows, components), each with a label and a colour, and
+    its uncertainty (rows,) to both sides; None where that isn't known or can't be seen.
     """
 
     name: str
@@ -56,10 +54,7 @@ class Level:
 
 @dataclass(frozen=True)
 class Plot:
-    """One plot: a title with the unit, a place on the page, its variables and levels.
-
-    `place` is one of "leading", "more", "drift".
-    """
+    """One plot: a title with the unit, a place ("leading", "more", "drift"), its variables and levels."""
 
     key: str
     title: str
@@ -69,9 +64,7 @@ class Plot:
 
     @property
     def range(self) -> tuple[float, float] | None:
-        """Limits for a plot of constant curves that don't magnify their rounding errors; None for other
-        plots.
-        """
+        """Limits for constant curves that don't magnify their rounding errors; None for other plots."""
         if self.place == "drift" or not self.series:
             return None
         middles = []
@@ -149,9 +142,7 @@ def _reading(variable: xarray.DataArray, unit: str) -> tuple[float, str]:
 
 
 def _uncertainty(dataset: xarray.Dataset, values: Array, factor: float) -> Array | None:
-    """The announced attitude error, growing like t^1.5 to its value at the end, if large enough to be
-    seen.
-    """
+    """The announced attitude error, growing like t^1.5 to that at the end, if large enough to be seen."""
     error = dataset.attrs.get("attitude_error")
     finite = values[np.isfinite(values)]
     if error is None or not len(finite) or not float(error) * factor > _SEEN * float(np.ptp(finite)):
@@ -171,10 +162,8 @@ def _announced(dataset: xarray.Dataset) -> list[Level]:
 
 
 def drift_floor(drifts: list[Array]) -> float:
-    """Value at which a drift of exactly zero is drawn: a tenth of the low end of all nonzero ones.
-
-    A zero has no logarithm. A fixed floor would flatten the curves of double precision or stand above
-    those of quadruple precision.
+    """Value at which a drift of exactly zero, which has no logarithm, is drawn: a tenth of the low end of all
+    nonzero ones, in any precision.
     """
     some = [values[:: max(len(values) // _FLOOR_ROWS, 1)].ravel() for values in drifts]
     magnitude = np.abs(np.concatenate(some)) if some else np.empty(0)

@@ -1,19 +1,74 @@
-"""Quantities that pictures show: recorded ones by name, others derived from attitude and rates.
+"""What a dataset tells of itself: its config and title, roles of variables, and what pictures show.
 
-All take a dataset in memory and give float64 arrays over its rows, or None if they can't be derived.
+Quantities are recorded ones by name, others derived from attitude and rates; all take a dataset in memory and
+give float64 arrays over its rows, or None if they can't be derived.
 """
 
 import json
+import re
+import tomllib
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 import xarray
 
-from rigidsim.look.roles import read_config
 from rigidsim.look.solids import Array, rotation_matrix
 
-NEAR_AXIS = 0.35
-"""Largest polar motion (rad) shown as such; beyond it, the body tumbles."""
+_ORBIT_NORM = re.compile(r"orbit_norm_(\d+)")
+_AVERAGED = ("spin_averaged", "orbit_averaged")  # model levels whose datasets have axes but no attitude
+
+
+def read_config(dataset: xarray.Dataset) -> dict[str, Any]:
+    """The embedded config as a dictionary; empty when there is none or it can't be read."""
+    try:
+        return tomllib.loads(str(dataset.attrs.get("config", "")))
+    except tomllib.TOMLDecodeError:
+        return {}
+
+
+def title_of(dataset: xarray.Dataset) -> str:
+    """Title of the run: attribute `title`, else the config's name."""
+    return str(dataset.attrs.get("title") or read_config(dataset).get("name") or "rigid body")
+
+
+def is_residual(variable: xarray.DataArray) -> bool:
+    """Whether a variable only holds the digits of another that don't fit its float64."""
+    return "residual_of" in variable.attrs
+
+
+def drift_of(variable: xarray.DataArray) -> str | None:
+    """The invariant whose relative drift a variable is; None for any other variable."""
+    return variable.attrs.get("drift_of")
+
+
+def put_back_of(variable: xarray.DataArray) -> str | None:
+    """The projected invariant whose corrections put back a variable holds; None for any other variable."""
+    return variable.attrs.get("put_back_of")
+
+
+def drifts(dataset: xarray.Dataset) -> dict[str, xarray.DataArray]:
+    """The drifts of a dataset by the name of their invariant."""
+    return {name: v for v in dataset.data_vars.values() if (name := drift_of(v))}
+
+
+def put_backs(dataset: xarray.Dataset) -> dict[str, xarray.DataArray]:
+    """Corrections put back into projected invariants, by their name."""
+    return {name: v for v in dataset.data_vars.values() if (name := put_back_of(v))}
+
+
+def in_words(name: str) -> str:
+    """A variable's name as people read it."""
+    orbit = _ORBIT_NORM.fullmatch(name)
+    return f"norm of orbit {orbit[1]}'s cosine and sine" if orbit else name.replace("_", " ")
+
+
+def is_averaged(attributes: Mapping[str, Any]) -> bool:
+    """Whether a dataset with these attributes is of an averaged model: it has axes, but no attitude."""
+    return attributes.get("formulation") in _AVERAGED
+
+
+NEAR_AXIS = 0.35  # largest polar motion (rad) shown as such; beyond it, the body tumbles
 _ALIKE = 1e-9  # moments nearer than this are one
 _STEADY = 1e-6  # a momentum that turns by less is fixed
 _SPREAD = 1e-5  # of the energy, up to which it counts as constant: more than rounding in single precision
@@ -50,10 +105,7 @@ def principal_rates(dataset: xarray.Dataset) -> Array | None:
 
 
 def turned(vectors: Array, matrix: Array) -> Array:
-    """Vectors (rows, 3), each times a matrix (3, 3).
-
-    Not by BLAS: over many rows it keeps its threads busy for ten times what this takes.
-    """
+    """Vectors (rows, 3), each times a matrix (3, 3); BLAS keeps its threads busy for ten times as long."""
     if np.array_equal(matrix, np.eye(3)):
         return vectors
     return np.einsum("tj,ij->ti", vectors, matrix)
@@ -92,11 +144,9 @@ def axis_names(dataset: xarray.Dataset) -> list[str]:
 
 
 def polar_motion(dataset: xarray.Dataset) -> Array | None:
-    """m1, m2 (rows, 2), rad: the spin axis seen from the figure axis; None if the spin departs too far from
-    it.
+    """m1, m2 (rows, 2), rad: the spin axis seen from the figure axis; None if it departs too far from that.
 
-    Recorded values if there are any. Otherwise components of the rates across the principal axis about which
-    the body spins, over that along it.
+    Recorded, or else the rates across the principal axis about which the body spins, over that along it.
     """
     recorded = values(dataset, "polar_motion")
     if recorded is not None and recorded.shape[1:] == (2,) and np.isfinite(recorded).any():
@@ -123,9 +173,7 @@ def near_axis(dataset: xarray.Dataset) -> bool:
 
 
 def figure_direction(dataset: xarray.Dataset) -> Array:
-    """Unit vector (3,) of the figure axis in body axes: as requested, else that of symmetry or largest
-    moment.
-    """
+    """Unit vector (3,) of the figure axis in body axes: as asked, of symmetry, or of the largest moment."""
     frame: Any = read_config(dataset).get("frame", {})
     asked = frame.get("figure_axis") if isinstance(frame, dict) else None
     if asked in ("x", "y", "z"):

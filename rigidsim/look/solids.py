@@ -21,8 +21,7 @@ Color = tuple[int, int, int]
 
 SEGMENTS = 64  # around the axis; a multiple of 8, so that colour sectors end on an edge
 MINOR_SEGMENTS = 32  # along an arc: around a tube or from pole to pole
-POINT = "point"
-"""A point mass, which has no shape and is drawn as a ball."""
+POINT = "point"  # a point mass, which has no shape and is drawn as a ball
 
 # Faces of a cuboid carry the colour of the body axis that they face; the negative side is darker.
 _AXIS_COLORS = ((214, 84, 76), (92, 172, 98), (78, 128, 205))
@@ -34,23 +33,14 @@ _LOWER = (200, 96, 62)
 
 @dataclass(frozen=True)
 class Mesh:
-    """A closed triangle mesh.
+    """A closed triangle mesh."""
 
-    Attributes:
-        vertices: (3 T, 3), metres, three per triangle and shared with none.
-        triangles: (T, 3) indices into `vertices`, anticlockwise as seen from outside.
-        normals: (3 T, 3), outward unit normals of the smooth surface.
-        colors: (3 T, 3) uint8, red green blue, constant over a triangle.
-        picture: (height, width, 3) uint8, texture in place of its colours; None for none.
-        places: (3 T, 2) in the picture, across and down, of its sizes.
-    """
-
-    vertices: Array
-    triangles: NDArray[np.uint32]
-    normals: Array
-    colors: NDArray[np.uint8]
-    picture: NDArray[np.uint8] | None = None
-    places: Array | None = None
+    vertices: Array  # (3 T, 3), metres, three per triangle and shared with none
+    triangles: NDArray[np.uint32]  # (T, 3) indices of vertices, anticlockwise as seen from outside
+    normals: Array  # (3 T, 3), outward unit normals of the smooth surface
+    colors: NDArray[np.uint8]  # (3 T, 3) red green blue, constant over a triangle
+    picture: NDArray[np.uint8] | None = None  # (height, width, 3), texture in place of its colours
+    places: Array | None = None  # (3 T, 2) in the picture, across and down, of its sizes
 
     def moved(self, rotation: Array, shift: Array) -> Self:
         """The mesh rotated by `rotation` (3, 3), then moved by `shift` (3,), metres."""
@@ -117,14 +107,11 @@ def solid_mesh(solid: str, dimensions: Mapping[str, Any]) -> Mesh:
 def body_meshes(drawing: str | None) -> list[Mesh]:
     """Meshes (metres) of a body from the dataset's `drawing` attribute, placed in body axes, one per solid.
 
-    Args:
-        drawing: JSON list of {"solid", "dimensions", "position", "quaternion"}: position of the
-            solid's centre of mass in body axes from the reference point, metres; quaternion
-            [w, x, y, z] turns the solid's axes to body axes. None or an empty list: a unit cube.
-            The volume of a `point` goes with its `mass_fraction`; the largest radius is a sixth of the reach.
-
-    Raises:
-        ValueError: JSON that is not such a list, or see `solid_mesh`.
+    It is a JSON list of {"solid", "dimensions", "position", "quaternion"}: position of the solid's centre of
+    mass in body axes from the reference point, metres; quaternion [w, x, y, z] turns the solid's axes to body
+    axes. None or an empty list: a unit cube. The volume of a `point` goes with its `mass_fraction`; the
+    largest radius is a sixth of the reach. ``ValueError`` for JSON that is not such a list, or see
+    `solid_mesh`.
     """
     solids = [(entry, entry.get("dimensions", {}), _placement(entry)) for entry in _parse(drawing)]
     extended = {

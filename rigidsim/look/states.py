@@ -9,13 +9,10 @@ from rigidsim.look import signals
 from rigidsim.look.solids import Array, rotation_matrix
 from rigidsim.look.stages.parts import PALE, PULL, Color, Plane
 
-MOST_EVENTS = 2000
-"""Largest number of events of one kind in a lane; of more, the first are shown."""
-CHART_LEFT = 0.5
-"""Singular factor below which the solver leaves a chart of Euler angles."""
+MOST_EVENTS = 2000  # largest number of events of one kind in a lane; of more, the first are shown
+CHART_LEFT = 0.5  # singular factor below which the solver leaves a chart of Euler angles
 _SHADES: tuple[Color, Color] = ((92, 148, 235), (240, 190, 60))
-_SECTION_POINTS = 8
-"""Least number of points for a section to be drawn."""
+_SECTION_POINTS = 8  # least number of points for a section to be drawn
 _PREFERRED = ("libration", "polar_motion", "tip", "nadir", "angular_velocity", "euler_angles")
 
 

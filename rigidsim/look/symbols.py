@@ -15,8 +15,7 @@ from rigidsim.scene.bodies.shapes import StraightPiece
 
 _BELTS = MINOR_SEGMENTS // 2  # each of two rings of faces, so that their edges are even
 _SHARP = np.cos(np.deg2rad(25.0))  # between the normals of two faces: what counts as an edge
-WIDTH = 720
-"""Width of the map in pixels: half a degree each, about what a screen resolves of half a globe."""
+WIDTH = 720  # width of the map in pixels: half a degree each, about what a screen resolves of half a globe
 _SEA, _LAND, _ICE = (58, 108, 176), (146, 156, 98), (226, 232, 236)
 _SOUTHERN_ICE, _NORTHERN_ICE = -60.0, (72.0, 80.0)  # degrees of latitude: land that is shown white
 

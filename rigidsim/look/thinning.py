@@ -4,16 +4,14 @@ import numpy as np
 import xarray
 from numpy.typing import NDArray
 
-from rigidsim.look.roles import is_residual
+from rigidsim.look.signals import is_residual
 
 ROWS_AT_ONCE = 1 << 21
 
 
 def thinned_indices(count: int, rows: int) -> NDArray[np.int64]:
-    """Indices (R,) into `count` >= 1 rows, evenly strided, R <= `rows` >= 2, with the first and the last.
-
-    Raises:
-        ValueError: `count` or `rows` out of range.
+    """Indices (R,) into `count` >= 1 rows, evenly strided, R <= `rows` >= 2, with the first and the last;
+    ``ValueError`` where these are out of range.
     """
     if count < 1:
         raise ValueError("the dataset has no samples: nothing to show")
@@ -24,13 +22,10 @@ def thinned_indices(count: int, rows: int) -> NDArray[np.int64]:
 
 
 def thin(dataset: xarray.Dataset, rows: int, at_once: int = ROWS_AT_ONCE) -> xarray.Dataset:
-    """The rows of `thinned_indices`, in memory; residuals are left out.
+    """The rows of `thinned_indices`, in memory, of variables along time; residuals are left out.
 
-    Only variables that have a time dimension, and of those only the rows asked for, are read, from `at_once`
-    rows of the file at a time: memory goes with `rows`, not with the length of the run.
-
-    Raises:
-        ValueError: no `time` dimension or coordinate, or see `thinned_indices`.
+    They are read from `at_once` rows of the file at a time: memory goes with `rows`, not with the length of
+    the run. ``ValueError`` without a `time` dimension or coordinate, or see `thinned_indices`.
     """
     if "time" not in dataset.dims or "time" not in dataset.coords:
         raise ValueError("the dataset has no time coordinate: nothing to show along time")

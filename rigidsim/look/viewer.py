@@ -39,17 +39,13 @@ NO_DISPLAY = (
 
 
 def open_viewer(path: Path, *, web: bool = False) -> int:
-    """Open a recording (`.rrd`) in the viewer and wait until it is closed. No usage statistics are sent.
-
-    Args:
-        web: serve the viewer on 127.0.0.1 only, until Ctrl-C; it prints the address to open.
-
-    Returns:
-        The viewer's exit code; 130 after Ctrl-C, which for `web` is the way to end it.
+    """Open a recording (`.rrd`) in the viewer, or with `web` serve it on 127.0.0.1 only and print the
+    address, and wait until it is closed; returns its exit code, 130 after Ctrl-C. No usage statistics are
+    sent.
 
     Raises:
-        FileNotFoundError: no such file, or no viewer in the installed rerun-sdk.
-        NoDisplay: a window is asked for where there is no screen.
+    FileNotFoundError: no such file, or no viewer in the installed rerun-sdk.
+    NoDisplay: a window is asked for where there is no screen.
     """
     with _running([str(existing(path))], DATA_PORT, ["--port", "auto"], web=web) as process:
         try:
@@ -61,13 +57,8 @@ def open_viewer(path: Path, *, web: bool = False) -> int:
 def follow(read: Callable[[], tuple[xarray.Dataset | None, bool]], *, web: bool = False) -> int:
     """Open the viewer on a run that goes on, and keep it up to date until the run or the viewer ends.
 
-    Args:
-        read: returns the dataset saved so far (None before there is one), and whether the run goes on.
-        web, and what is returned: as for ``open_viewer``.
-
-    Raises:
-        NoDisplay, FileNotFoundError: as for ``open_viewer``.
-        RuntimeError: the viewer ended before it listened.
+    `read` returns the dataset saved so far (None before there is one), and whether the run goes on; all else
+    is as for ``open_viewer``. ``RuntimeError`` if the viewer ended before it listened.
     """
     port = free_port()
     with _running([], port, ["--port", str(port), "--expect-data-soon"], web=web) as process:
@@ -104,10 +95,8 @@ def follow(read: Callable[[], tuple[xarray.Dataset | None, bool]], *, web: bool 
 def _running(
     recording: Sequence[str], port: int, windowed: Sequence[str], *, web: bool
 ) -> Iterator[subprocess.Popen[bytes]]:
-    """A viewer that is ended with the context.
-
-    It makes a folder for its catalogue where temporary files go and leaves it there when it is ended, so that
-    it is given a place that goes with it.
+    """A viewer that is ended with the context, and given a place for temporary files that goes with it, where
+    it would leave a folder for its catalogue.
     """
     if not web and not has_display():
         raise NoDisplay(NO_DISPLAY)
@@ -157,11 +146,7 @@ def _wait_for(process: subprocess.Popen[bytes], port: int) -> None:
 
 
 def viewer_binary() -> Path:
-    """Path of the viewer in the installed rerun-sdk.
-
-    Raises:
-        FileNotFoundError: rerun-sdk isn't installed, or without its viewer.
-    """
+    """Path of the viewer in the installed rerun-sdk; ``FileNotFoundError`` where it isn't."""
     found = find_spec("rerun_cli")
     if found is None or found.origin is None:
         raise FileNotFoundError("the rerun viewer isn't installed: pip install rerun-sdk")
@@ -176,11 +161,7 @@ def viewer_binary() -> Path:
 
 
 def existing(path: Path) -> Path:
-    """The path of a recording.
-
-    Raises:
-        FileNotFoundError: there is none.
-    """
+    """The path of a recording; ``FileNotFoundError`` if there is none."""
     if not Path(path).is_file():
         raise FileNotFoundError(f"no timeline at {path}: run with [output] timeline = true")
     return Path(path)

@@ -4,13 +4,7 @@ import math
 import shlex
 from collections.abc import Iterator, Sequence
 
-from rigidsim.scene.readable import (
-    epoch_of,
-    instant_text,
-    number_text,
-    span_text,
-    unit_of,
-)
+from rigidsim.scene.readable import epoch_of, instant_text, number_text, span_text, unit_of
 from rigidsim.session.verdict import Soundness, verdict_on
 from rigidsim.solve.status import Status
 from rigidsim.store.summary import Span, Start, Summary, UnderstoodBody

@@ -7,12 +7,12 @@ panels (``panel.Panel``: what it finds in a dataset, and how that is drawn).
 | module | holds |
 | --- | --- |
 | `catalogue` | all figures by name; `figure`, `save_figure`, and the page that suits the scene |
-| `panel`, `composing` | what a panel is, and panels composed to a page |
+| `panel`, `composing` | what a panel is, and units of its axes; panels composed to a page |
 | `timelines`, `drift` | panels over time |
-| `poles`, `polhode`, `flight` | where axes point; polhode, herpolhode, Poinsot's motion; a body's path |
+| `poles`, `polhode` | where axes point, and a body's path; polhode, herpolhode, Poinsot's motion |
 | `eye` | bodies in three dimensions on plain axes |
 | `fits` | secular parts, periods and ellipses for labels |
-| `scales`, `style` | units in which axes read well; colours, fonts, the page's heading, keys |
+| `style` | colours, fonts, the page's heading, keys |
 | `spectrum`, `work_precision`, `sweep_maps`, `sweep_axes` | figures of `analyse`, `tradeoff` and `sweep` |
 """
 

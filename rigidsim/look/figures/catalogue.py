@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 
 from rigidsim.look import signals
 from rigidsim.look.figure_names import FIGURES, OVERVIEW, SPECTRUM
-from rigidsim.look.figures import flight, poles, polhode, timelines
+from rigidsim.look.figures import poles, polhode, timelines
 from rigidsim.look.figures.composing import compose, shown_rows
 from rigidsim.look.figures.drift import drift
 from rigidsim.look.figures.panel import Panel
@@ -59,7 +59,7 @@ KINDS: dict[str, Kind] = {
     ),
     "polhode": Kind(_TURNS, (), [polhode.polhode, polhode.poinsot]),
     "herpolhode": Kind("an attitude and a momentum that stays put", (), [polhode.herpolhode]),
-    "path": Kind("position recorded", (), [flight.path]),
+    "path": Kind("position recorded", (), [poles.path]),
     "rates": Kind(_TURNS, [timelines.rates]),
     "attitude": Kind(_ATTITUDE, [timelines.attitude, timelines.wobble]),
     "drift": Kind("invariants", [drift]),
@@ -73,13 +73,10 @@ def available(dataset: xarray.Dataset) -> list[str]:
 
 
 def figure(dataset: xarray.Dataset, what: str = OVERVIEW) -> Figure:
-    """A figure of a run, possibly lazy, of any length: at most 20,000 rows are drawn.
-
-    Args:
-        what: a name of `FIGURES`.
+    """A figure of a run by its name in `FIGURES`; of a run of any length, possibly lazy, at most 20,000 rows.
 
     Raises:
-        ValueError: no such figure, none for this dataset, or a dataset without samples.
+    ValueError: no such figure, none for this dataset, or a dataset without samples.
     """
     check_name(what)
     rows = shown_rows(dataset).rows
@@ -98,11 +95,7 @@ def figure(dataset: xarray.Dataset, what: str = OVERVIEW) -> Figure:
 
 
 def check_name(what: str) -> None:
-    """Refuse an unknown name with a list of the figures.
-
-    Raises:
-        ValueError: no figure has this name.
-    """
+    """Refuse an unknown name by ``ValueError``, with a list of the figures."""
     if what not in FIGURES:
         close = get_close_matches(what, FIGURES, 1)
         hint = f"; did you mean {close[0]!r}?" if close else "."
@@ -112,13 +105,8 @@ def check_name(what: str) -> None:
 def save_figure(
     dataset: xarray.Dataset, path: str | Path, what: str = OVERVIEW, *, file_format: str | None = None
 ) -> Path:
-    """Draw a figure of a run to a file (see `figure`), which is whole when this returns its path.
-
-    Args:
-        file_format: see `figure_format`; by default given by the suffix of `path`.
-
-    Raises:
-        ValueError: another suffix, or as for `figure`.
+    """Draw a figure of a run to a file (see `figure`), which is whole when this returns its path, in the
+    format given or that of its suffix; ``ValueError`` for another suffix, too.
     """
     path = Path(path)
     file_format = file_format or figure_format(path)
@@ -128,11 +116,7 @@ def save_figure(
 
 
 def figure_format(path: Path) -> str:
-    """File format for a path's suffix: "png" or "svg".
-
-    Raises:
-        ValueError: another suffix.
-    """
+    """File format for a path's suffix: "png" or "svg"; ``ValueError`` for another."""
     if path.suffix.lower() not in SUFFIXES:
         raise ValueError(
             f"figure {path.name!r}: the suffix must be one of {', '.join(SUFFIXES)}, given {path.suffix!r}"
@@ -142,7 +126,7 @@ def figure_format(path: Path) -> str:
 
 def _leading(rows: xarray.Dataset) -> tuple[Sequence[Panel], Sequence[Panel]]:
     """Curves and planes of the page that suits a scene."""
-    moving = [flight.path] if flight.path.shows(rows) else []
+    moving = [poles.path] if poles.path.shows(rows) else []
     attitude = [timelines.rates, timelines.attitude]
     tilting = [timelines.obliquity, timelines.longitude]
     if librates(rows):

@@ -14,7 +14,7 @@ from rigidsim.look.figures import timelines
 from rigidsim.look.figures.panel import Panel
 from rigidsim.look.figures.style import GREY, INK, STYLE, blank
 from rigidsim.look.page import largest_drift
-from rigidsim.look.roles import drifts, is_averaged, read_config
+from rigidsim.look.signals import drifts, is_averaged, read_config
 from rigidsim.look.thinning import thin
 from rigidsim.scene.readable import unit_for
 
@@ -40,11 +40,7 @@ class Shown:
 
 
 def shown_rows(dataset: xarray.Dataset, most: int = ROWS, read: int = FULL_READ) -> Shown:
-    """Read at most so many rows from a dataset, possibly lazy, and all drifts of up to ``read`` samples.
-
-    Raises:
-        ValueError: no time coordinate, or no samples.
-    """
+    """Read at most so many rows from a dataset, possibly lazy, and all drifts of up to ``read`` samples."""
     rows = thin(dataset, most).assign_attrs(dataset.attrs)
     # A figure of few points shouldn't understate the drifts, unless reading them all takes long.
     complete = dataset.sizes["time"] <= max(read, rows.sizes["time"])
@@ -57,9 +53,7 @@ def shown_rows(dataset: xarray.Dataset, most: int = ROWS, read: int = FULL_READ)
 
 
 def beginning(axes: Axes, shown: Shown) -> float:
-    """Seconds that hold `_CYCLES` swings of the curves on axes, drawn from `shown.start`, if the run has many
-    more; otherwise 0.
-    """
+    """Seconds that hold `_CYCLES` swings of the curves drawn of `shown.start`; 0 if the run has few more."""
     seconds, whole = signals.seconds(shown.start), signals.seconds(shown.rows)
     length, span = float(seconds[-1] - seconds[0]), float(whole[-1] - whole[0])
     most = 0

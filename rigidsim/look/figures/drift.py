@@ -8,10 +8,9 @@ import xarray
 from matplotlib.axes import Axes
 
 from rigidsim.look import signals
-from rigidsim.look.figures.panel import panel
+from rigidsim.look.figures.panel import clock, panel
 from rigidsim.look.figures.style import GREY, PALETTE, key, note
-from rigidsim.look.figures.timelines import clock
-from rigidsim.look.roles import drifts, put_backs
+from rigidsim.look.signals import drifts, put_backs
 from rigidsim.look.solids import Array
 
 TYPICAL, MOST = 0.5, 50.0
@@ -38,7 +37,7 @@ def law(dataset: xarray.Dataset) -> Array | None:
 @panel(lambda dataset: drifts(dataset) or None)
 def drift(axes: Axes, dataset: xarray.Dataset, found: dict[str, xarray.DataArray]) -> None:
     """Magnitudes of all relative drifts on a logarithmic axis, over the band that rounding explains."""
-    time, _ = clock(dataset)
+    time = clock(dataset)[0]
     projected = put_backs(dataset)
     curves: list[Array] = []
     still: list[str] = []

@@ -14,7 +14,7 @@ from matplotlib.colors import to_rgb
 from matplotlib.patheffects import withStroke
 from numpy.typing import NDArray
 
-from rigidsim.look.figures.scales import number
+from rigidsim.look.figures.panel import number
 from rigidsim.look.figures.style import PALE, X, Y, Z
 from rigidsim.look.solids import Array
 

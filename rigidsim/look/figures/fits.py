@@ -29,13 +29,10 @@ class SecularLine:
 
 
 def secular(time: Array, angle: Array, *, level: bool = False) -> SecularLine:
-    """Straight line through an angle (rows,) that swings about it.
+    """Straight line through an angle (rows,) that swings about it; if `level`, only its mean.
 
     Evenly sampled, its strongest sinusoids of at least 1.5 periods are fitted with it, their periods too, so
     that a broken swing at the ends doesn't tilt it; all is weighted by a Hann window.
-
-    Args:
-        level: only the mean, without a rate.
     """
     finite = np.isfinite(angle)
     t, y = time[finite], angle[finite]
@@ -164,9 +161,8 @@ class FittedEllipse:
 
 
 def leading_ellipse(time: Array, plane: Array) -> FittedEllipse | None:
-    """The strongest periodic part of a point's motion in a plane (rows, 2), evenly sampled.
-
-    None if the strongest has less than 1.5 periods in the run, or none stands out.
+    """The strongest periodic part of a point's motion in a plane (rows, 2), evenly sampled; None if it has
+    less than 1.5 periods in the run, or none stands out.
     """
     steps = np.diff(time)
     if len(time) < 16 or not np.isfinite(plane).all() or np.ptp(steps) > 1e-3 * steps.mean():

@@ -1,16 +1,22 @@
-"""A panel of a figure: what it needs of a dataset, and how that is drawn."""
+"""Panels of figures: what one needs of a dataset, how it is drawn, and units in which its axes read well."""
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
 import xarray
 from matplotlib.axes import Axes
 
 from rigidsim.look import signals
+from rigidsim.look.solids import Array
+from rigidsim.scene import readable
+from rigidsim.scene.epochs import J2000
+from rigidsim.scene.readable import ANGLE_UNITS, YEAR, TimeUnit, angle_unit
 
-Find = Callable[["xarray.Dataset"], Any]
-Draw = Callable[["Axes", "xarray.Dataset", Any], None]
+Find = Callable[[xarray.Dataset], Any]
+Draw = Callable[[Axes, xarray.Dataset, Any], None]
 
 
 @dataclass(frozen=True)
@@ -45,3 +51,45 @@ def recorded(*names: str) -> Find:
         return next((table for table in tables if table is not None), None)
 
     return find
+
+
+_MAS = math.pi / 180 / 3600e3
+
+
+def angle_scale(values: Array) -> tuple[float, str]:
+    """Divisor and unit for angles in rad: deg, arcsec and mas as in tables, and µas and less below."""
+    unit, size = angle_unit(readable.largest(values)), readable.largest(values)
+    if unit.name == "turns":
+        unit = ANGLE_UNITS["deg"]
+    if 0 < size < 0.1 * _MAS:
+        exponent = 3 * math.floor(math.log10(size / _MAS) / 3 + 1e-9)
+        return _MAS * 10.0**exponent, {-3: "µas", -6: "nas"}.get(exponent, f"1e{exponent} mas")
+    return 1 / unit.per_radian, unit.name
+
+
+def angle_text(value: float, digits: int = 4) -> str:
+    """An angle in rad with its unit: ``206.3 mas``, ``23.44°``."""
+    scale, unit = angle_scale(np.array([value]))
+    text = number(value / scale, digits)
+    symbol = ANGLE_UNITS[unit].symbol if unit in ANGLE_UNITS else unit
+    return f"{text}{'' if symbol in '°″' else ' '}{symbol}"
+
+
+def number(value: float, digits: int = 4) -> str:
+    """A number to so many digits, with a true minus sign and no exponent where that is short."""
+    text = f"{value:.{digits}g}"
+    if "e" in text and 1e-4 <= abs(value) < 1e6:
+        text = f"{value:.0f}"
+    return text.replace("-", "−")
+
+
+def clock(dataset: xarray.Dataset) -> tuple[Array, TimeUnit, str]:
+    """Sample times as an axis shows them, their unit, and its label: years of the calendar, or time."""
+    seconds = signals.seconds(dataset)
+    unit = readable.unit_of(dataset.attrs, max(abs(float(seconds[0])), abs(float(seconds[-1]))))
+    time, epoch = seconds / unit.seconds, readable.epoch_of(dataset.attrs)
+    if epoch is None:
+        return time, unit, f"time [{unit.symbol}]"
+    if unit.seconds == YEAR:
+        return readable.julian_year(epoch) + time, unit, f"year ({epoch.uniform().scale})"
+    return time, unit, f"time since {'J2000' if epoch == J2000 else epoch} [{unit.symbol}]"

@@ -17,8 +17,7 @@ from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 from matplotlib.ticker import MaxNLocator
 
-from rigidsim.look.roles import read_config, title_of
-from rigidsim.look.signals import joined
+from rigidsim.look.signals import joined, read_config, title_of
 from rigidsim.look.solids import Array
 
 X, Y, Z = "#d1495b", "#3a9a5b", "#2f6fbf"

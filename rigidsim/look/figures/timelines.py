@@ -9,11 +9,10 @@ from matplotlib.axes import Axes
 
 from rigidsim.look import signals
 from rigidsim.look.figures.fits import secular
-from rigidsim.look.figures.panel import panel, recorded
-from rigidsim.look.figures.scales import TimeAxis, angle_scale, angle_text, number, si_scale, time_axis_of
+from rigidsim.look.figures.panel import angle_scale, angle_text, clock, number, panel, recorded
 from rigidsim.look.figures.style import BLUE, GREY, ORANGE, PALETTE, VIOLET, X, Y, Z, curve, key
 from rigidsim.look.solids import Array
-from rigidsim.scene.readable import DAY, named_unit, span_text, unit_for
+from rigidsim.scene.readable import DAY, named_unit, si_scale, span_text, unit_for
 
 AXIS_COLORS = {"figure": BLUE, "spin": ORANGE, "momentum": VIOLET}
 _STILL = 1e-9  # of its size, below which what a curve does is rounding
@@ -25,28 +24,22 @@ _TURNS = 720.0  # degrees, from which the mean growth of an angle is taken off
 _STEEP = 1.5  # rad of pitch, near which roll and yaw are ill-defined
 
 
-def clock(dataset: xarray.Dataset) -> tuple[Array, TimeAxis]:
-    """Sample times as the axis shows them, and the axis."""
-    axis = time_axis_of(dataset)
-    return axis.numbers(signals.seconds(dataset)), axis
-
-
 def time_axis(axes: Axes, dataset: xarray.Dataset, *, labelled: bool, begins: float = 0.0) -> None:
     """Set a panel's limits to the run's, or to so many seconds of its start; label the lowest panel."""
-    time, axis = clock(dataset)
-    end = time[0] + begins / axis.unit.seconds if begins else time[-1]
+    time, unit, label = clock(dataset)
+    end = time[0] + begins / unit.seconds if begins else time[-1]
     if time[0] != end:
         axes.set_xlim(time[0], end)
     axes.tick_params(labelbottom=labelled)
     if labelled:
-        axes.set_xlabel(axis.label + (f", the first {span_text(begins, 2)}" if begins else ""))
+        axes.set_xlabel(label + (f", the first {span_text(begins, 2)}" if begins else ""))
 
 
 def lines(
     axes: Axes, dataset: xarray.Dataset, table: Array, labels: Sequence[str | None], hues: Sequence[str]
 ) -> None:
     """Curves of the columns of `table` (rows, n) over time."""
-    time, _ = clock(dataset)
+    time = clock(dataset)[0]
     for column, label, hue in zip(table.T, labels, hues, strict=False):
         curve(axes, time, column, color=hue, label=label)
 
@@ -105,7 +98,7 @@ def attitude(axes: Axes, dataset: xarray.Dataset, _: Array) -> None:
         axes.set_prop_cycle(linestyle=["none"], marker=["."])
     else:
         table, labels = without_growth(dataset, table)
-    time, _axis = clock(dataset)
+    time = clock(dataset)[0]
     for column, label, hue in zip(table.T, labels, PALETTE, strict=False):
         axes.plot(time, column, color=hue, label=label, rasterized=len(time) > 6000)
     key(axes, "Euler angles" + (", within one turn" if lost else ""))
@@ -189,7 +182,7 @@ def longitude(axes: Axes, dataset: xarray.Dataset, shown: dict[str, tuple[Array,
     """Longitudes of the node, less the straight line through that of the first axis shown unless they swing
     as far about it as without it.
     """
-    seconds, axis = signals.seconds(dataset), time_axis_of(dataset)
+    seconds, unit = signals.seconds(dataset), clock(dataset)[1]
     table = np.stack([pair[1] for pair in shown.values()], axis=1)
     trend = secular(seconds, table[:, 0])
     rest = table - trend.at(seconds)[:, None]
@@ -197,7 +190,7 @@ def longitude(axes: Axes, dataset: xarray.Dataset, shown: dict[str, tuple[Array,
         _of_axes(axes, dataset, shown, table, "Longitude of the node", "longitude")
         return
     # precession is told by the year, whatever the axis of time is in
-    per = axis.unit if abs(trend.rate) * DAY > _QUICK else named_unit("yr")
+    per = unit if abs(trend.rate) * DAY > _QUICK else named_unit("yr")
     rate = angle_text(trend.rate * per.seconds, 3)
     title = f"Longitude of the node less its mean motion, {rate}/{per.symbol}"
     _of_axes(axes, dataset, shown, rest, title, "longitude − line")
@@ -233,9 +226,7 @@ def braking(axes: Axes, dataset: xarray.Dataset, shares: dict[str, Array]) -> No
 
 
 def swings(dataset: xarray.Dataset) -> tuple[Array, list[int]] | None:
-    """Libration angles (rows, 2), rad, less as many half turns as make them swing about zero, and these
-    numbers.
-    """
+    """Libration angles (rows, 2), rad, less half turns so that they swing about zero, and their numbers."""
     table = signals.values(dataset, "libration")
     if table is None:
         return None

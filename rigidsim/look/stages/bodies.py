@@ -9,14 +9,12 @@ import numpy as np
 import xarray
 
 from rigidsim.look import signals, surroundings
-from rigidsim.look.roles import read_config
-from rigidsim.look.signals import values
+from rigidsim.look.signals import read_config, values
 from rigidsim.look.solids import Mesh, body_meshes, point_positions, rotation_matrix
 from rigidsim.look.stages import parts
 from rigidsim.look.stages.parts import Array, Arrow, Camera, Stage, Trail, trail
 
-FIELD = np.deg2rad(55.0)
-"""Field of view from bottom to top (rad), the viewer's own."""
+FIELD = np.deg2rad(55.0)  # field of view from bottom to top (rad), the viewer's own
 USUAL_VIEW = (float(np.deg2rad(24.0)), float(np.deg2rad(-55.0)))
 """Elevation and azimuth (rad) of the eye where nothing asks for another."""
 NEAR = 6.0  # reaches: a body that moves further gets a track view of its own
@@ -42,11 +40,7 @@ class Subject:
 
     @classmethod
     def of(cls, dataset: xarray.Dataset) -> Self:
-        """The body of a dataset in memory.
-
-        Raises:
-            ValueError: an unreadable ``drawing``, see ``solids.body_meshes``.
-        """
+        """The body of a dataset in memory; ``ValueError`` for an unreadable ``drawing``."""
         drawing = dataset.attrs.get("drawing")
         meshes = body_meshes(drawing)
         reach = max(mesh.reach() for mesh in meshes)
@@ -259,10 +253,8 @@ def plane_view(points: Array) -> tuple[float, float]:
 
 
 def with_track(subject: Subject, body: Stage, notes: list[str]) -> list[Stage]:
-    """The body's stage, and a second one with its track if it moves far.
-
-    A position that moves by more than `NEAR` reaches can't be shown to the scale of the body: then the body
-    stays at the centre of the first stage, and is enlarged on the second.
+    """The body's stage, and a second one with its track if it moves by more than `NEAR` reaches: that can't
+    be shown to its scale, so that the body stays at the centre of the first and is enlarged on the second.
     """
     position, reach = subject.position, subject.reach
     if position is None:

@@ -38,8 +38,7 @@ FIGURE: Color = (120, 165, 255)
 @dataclass(frozen=True)
 class Arrow:
     """A vector along time: (rows, 3) in stage units, from the reference point, fixed to space or the body.
-
-    `words` are for the legend, which lists those that have some; the label stands at so many lengths.
+    Those with `words` are in the legend; the label stands at so many lengths.
     """
 
     name: str
@@ -140,42 +139,28 @@ class Camera:
 
 @dataclass(frozen=True)
 class Stage:
-    """One scene to be drawn under the entity `root`.
-
-    Attributes:
-        unit: metres per unit of length.
-        meshes: meshes of the body, body axes, stage units.
-        points: (P, 3) point masses of the body, to be joined to the reference point.
-        axis_length: length of the body axes; 0 for none.
-        quaternion: (rows, 4) float32 [x, y, z, w] as the viewer wants it, or None: no attitude.
-        translation: (rows, 3), of the reference point, or None if it stays at the origin.
-        origin: whether the origin of space is in the picture and marked.
-        frames: quaternions as above of frames that turn, to which parts may be attached, by name.
-        looked_from: name of the frame that the camera is in, or empty for space.
-        turns_with: root of another stage whose body turns alike about the same point (written once).
-        camera: None for the one that suits arrows and path.
-    """
+    """One scene to be drawn under the entity `root`."""
 
     root: str
     title: str
-    unit: float
-    meshes: list[Mesh] = field(default_factory=list)
-    points: Array = field(default_factory=lambda: np.zeros((0, 3)))
-    axis_length: float = 0.0
-    quaternion: NDArray[np.float32] | None = None
-    translation: Array | None = None
+    unit: float  # metres per unit of length
+    meshes: list[Mesh] = field(default_factory=list)  # of the body, body axes, stage units
+    points: Array = field(default_factory=lambda: np.zeros((0, 3)))  # masses, joined to the reference point
+    axis_length: float = 0.0  # of the body axes; 0 for none
+    quaternion: NDArray[np.float32] | None = None  # (rows, 4) x y z w; None: no attitude
+    translation: Array | None = None  # (rows, 3), of the reference point; None: it stays at the origin
     arrows: list[Arrow] = field(default_factory=list)
     trails: list[Trail] = field(default_factory=list)
-    origin: bool = False
+    origin: bool = False  # that of space is in the picture and marked
     lines: list[Line] = field(default_factory=list)
     spots: list[Spot] = field(default_factory=list)
     vectors: list[Vector] = field(default_factory=list)
     solids: list[Solid] = field(default_factory=list)
     shells: list[Shell] = field(default_factory=list)
-    frames: dict[str, NDArray[np.float32]] = field(default_factory=dict)
-    looked_from: str = ""
-    turns_with: str = ""
-    camera: Camera | None = None
+    frames: dict[str, NDArray[np.float32]] = field(default_factory=dict)  # quaternions of others, by name
+    looked_from: str = ""  # frame that the camera is in; empty for space
+    turns_with: str = ""  # root of a stage whose body turns alike about the same point (written once)
+    camera: Camera | None = None  # None for the one that suits arrows and path
 
 
 @dataclass(frozen=True)

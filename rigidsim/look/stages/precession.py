@@ -10,7 +10,7 @@ import numpy as np
 import xarray
 
 from rigidsim.look import signals, surroundings
-from rigidsim.look.roles import is_averaged, read_config
+from rigidsim.look.signals import is_averaged, read_config
 from rigidsim.look.stages import parts
 from rigidsim.look.stages.bodies import Subject, direction_of, eye_at, source_arrows
 from rigidsim.look.stages.parts import SPACE, Array, Arrow, Camera, Color, Line, Picture, Plane, Spot, Stage
@@ -19,10 +19,8 @@ from rigidsim.scene.readable import angle_unit, span_text
 
 ECLIPTIC: Color = (226, 196, 90)
 PRECESSION: Color = (190, 150, 255)
-POLE_REACH = 1.45
-"""Length of a pole's arrow, in units of the body's reach."""
-SOURCE_REACH = 1.75
-"""Length of an arrow to a source."""
+POLE_REACH = 1.45  # length of a pole's arrow, in units of the body's reach
+SOURCE_REACH = 1.75  # length of an arrow to a source
 _APART = 0.02  # rad, from which two arrows are told apart
 _UPRIGHT = 1e-9  # sine of the tilt, below which a pole has no node
 _SPARSE = 1.0  # rad of an orbit from one row to the next, from which a source can't be followed
@@ -30,9 +28,7 @@ _SPARSE = 1.0  # rad of an orbit from one row to the next, from which a source c
 
 def picture(dataset: xarray.Dataset, subject: Subject) -> Picture | None:
     """Picture of a body without attitude and rates whose figure axis or momentum is known in space; None for
-    others.
-
-    With a figure axis the body points along it; a tumbling body isn't drawn, as its attitude is unknown.
+    others. A tumbling body, known by its momentum alone, isn't drawn.
     """
     if subject.attitude is not None or subject.position is not None or "angular_velocity" in dataset:
         return None
@@ -76,9 +72,8 @@ def eye_of_pole(height: float = 0.05, radius: float = 1.95) -> Camera:
 
 
 def axis_in_space(dataset: xarray.Dataset, axis: str) -> Array | None:
-    """Unit vectors (rows, 3), space axes, of the axis named figure or momentum; None where not all are known.
-
-    As recorded, otherwise from its obliquity and node longitude if these refer to the XY plane.
+    """Unit vectors (rows, 3), space axes, of the axis named figure or momentum, as recorded, or from
+    obliquity and node longitude if these refer to the XY plane; None where not all are known.
     """
     found = signals.pole(dataset, axis)
     if found is None and not moving_plane(dataset):
@@ -126,10 +121,7 @@ def standing_note(dataset: xarray.Dataset, what: str) -> str:
 
 
 def followed_sources(dataset: xarray.Dataset, subject: Subject, notes: list[str]) -> list[Arrow]:
-    """Directions of sources that advance so little from row to row that the eye can follow.
-
-    Some others would seem to stand still if samples are whole revolutions apart.
-    """
+    """Directions of sources that advance little enough from row to row for the eye to follow."""
     seconds = signals.seconds(dataset)
     step = float(np.abs(np.diff(seconds)).mean()) if len(seconds) > 1 else 0.0
     orbits = [one.get("orbit", {}) for one in surroundings.told(dataset, "source")]

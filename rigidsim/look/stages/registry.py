@@ -4,14 +4,14 @@ from collections.abc import Callable
 
 import xarray
 
-from rigidsim.look.stages import flight, free, orbits, planet, precession, top
+from rigidsim.look.stages import free, orbits, planet, precession, top
 from rigidsim.look.stages.bodies import Subject, source_arrows, vectors_of, with_track
 from rigidsim.look.stages.parts import ARROW_REACH, Picture
 
 KINDS: tuple[Callable[[xarray.Dataset, Subject], Picture | None], ...] = (
     top.picture,
     orbits.free_orbit,
-    flight.picture,
+    orbits.flight,
     orbits.satellite,
     planet.picture,
     precession.picture,
@@ -21,11 +21,7 @@ KINDS: tuple[Callable[[xarray.Dataset, Subject], Picture | None], ...] = (
 
 
 def build_picture(dataset: xarray.Dataset) -> tuple[Picture, Subject]:
-    """The picture of a thinned dataset, in memory, and its body.
-
-    Raises:
-        ValueError: an unreadable ``drawing``, see ``solids.body_meshes``.
-    """
+    """Picture of a thinned dataset in memory, and its body; ``ValueError`` for an unreadable ``drawing``."""
     subject = Subject.of(dataset)
     pictures = (kind(dataset, subject) for kind in KINDS)
     found = next((picture for picture in pictures if picture is not None), None) or _any(dataset, subject)

@@ -17,9 +17,7 @@ _SYMMETRIC = 1e-9  # of the moments
 
 
 def picture(dataset: xarray.Dataset, subject: Subject) -> Picture | None:
-    """Picture of a body about a fixed point off its centre of mass under a uniform gravity; None for
-    others.
-    """
+    """Picture of a body on a fixed point off its centre of mass under uniform gravity; None for others."""
     pull = surroundings.gravity(dataset)
     arm = signals.attribute(dataset, "center_of_mass")
     if pull is None or subject.position is not None or subject.quaternion is None:

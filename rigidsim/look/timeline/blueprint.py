@@ -8,13 +8,12 @@ import rerun as rr
 import rerun.blueprint as rrb
 from rerun.blueprint.components import LinkAxis
 
-from rigidsim.look.clock import Clock
 from rigidsim.look.plots import Plot
 from rigidsim.look.stages.bodies import Subject, camera
 from rigidsim.look.stages.parts import Color, Plane, Stage
 from rigidsim.look.timeline import plotting
 from rigidsim.look.timeline.drawing import OLDER, fades, trail_path, trail_stride
-from rigidsim.look.timeline.drawn import DrawnRun
+from rigidsim.look.timeline.drawn import Clock, DrawnRun
 
 SCREEN_SECONDS = 60.0  # the longest that playing a whole run may take
 TURN_SECONDS = 3.0  # per turn of the body, when the run has few enough turns for it

@@ -9,20 +9,17 @@ from pathlib import Path
 import numpy as np
 import xarray
 
-from rigidsim.look.clock import Clock, build_clock
 from rigidsim.look.page import legible
 from rigidsim.look.plots import Color, Plot, Series
 from rigidsim.look.signals import values
 from rigidsim.look.solids import Array
 from rigidsim.look.thinning import thin, thinned_indices
 from rigidsim.look.timeline.blueprint import build_comparison
-from rigidsim.look.timeline.drawn import DrawnRun
+from rigidsim.look.timeline.drawn import Clock, DrawnRun, build_clock
 from rigidsim.look.timeline.writing import chunks, recording_to
 
-MOST = 6
-"""Largest number of runs shown side by side."""
-ROWS = 20_000
-"""Largest number of rows shown of each run."""
+MOST = 6  # largest number of runs shown side by side
+ROWS = 20_000  # largest number of rows shown of each run
 COLORS = ((92, 148, 235), (240, 190, 60), (104, 190, 110), (225, 115, 190), (80, 200, 215), (235, 140, 80))
 _FLOOR = 1e-18  # rad: below what a difference of attitudes in double precision can be
 
@@ -104,10 +101,9 @@ def _shade(color: Color, number: int) -> Color:
 
 
 def attitude_differences(named: Sequence[tuple[str, xarray.Dataset]]) -> Plot | None:
-    """log10 of the angle (rad) between the first run's attitude and each other's, at the first run's times.
-
-    Between the samples of another run its quaternions are interpolated on the arc. None if the first has
-    no attitude, or no other has one at its times.
+    """log10 of the angle (rad) between the first run's attitude and each other's, at the first run's times,
+    where quaternions are interpolated on the arc. None if the first has no attitude, or no other has one
+    then.
     """
     (first_name, first), *others = named
     base = values(first, "quaternion")

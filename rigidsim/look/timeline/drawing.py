@@ -17,8 +17,7 @@ from rigidsim.look.symbols import graticule, sharp_edges
 
 Columns = Iterable[rr.ComponentColumn]
 
-OLDER = 16
-"""Rows in one piece of a trail's older part."""
+OLDER = 16  # rows in one piece of a trail's older part
 SCENE_ROWS = 20_000  # above which arrows and trails are thinned, if their motion allows it
 _STILL = 0.01  # of an arrow's length, by which it may move between rows that are drawn
 _SMOOTH = 0.2  # of a trail's radius, between its corners: some thirty a turn

@@ -1,5 +1,6 @@
-"""Everything drawn of one run, ready to be sent to a recording: picture, plots, states and pages."""
+"""Everything drawn of one run, ready to be sent to a recording: clock, picture, plots, states and pages."""
 
+import math
 from dataclasses import dataclass, field
 from typing import Self
 
@@ -9,7 +10,6 @@ import xarray
 from numpy.typing import NDArray
 
 from rigidsim.look import signals
-from rigidsim.look.clock import Clock, build_clock
 from rigidsim.look.page import config_page, notes_page, summary_page
 from rigidsim.look.plots import Plot, Series, plan_plots
 from rigidsim.look.solids import Array
@@ -19,7 +19,63 @@ from rigidsim.look.stages.registry import build_picture
 from rigidsim.look.states import States, charts_of, sections_of, states_of
 from rigidsim.look.thinning import thinned_indices
 from rigidsim.look.timeline import drawing, plotting
-from rigidsim.scene.readable import TimeWords
+from rigidsim.scene.readable import DAY, YEAR, TimeWords
+
+_LARGEST = 2.0**62  # int64 with room for differences and for the viewer's own sentinels
+_LARGEST_NANOSECONDS = 9.2e18  # 291.5 years, just below 2**63 ns
+_UNITS = {0: "s", -3: "ms", -6: "µs", -9: "ns", -12: "ps", -15: "fs", -18: "as"}
+_WHOLE = (("yr", YEAR), ("d", DAY))
+_EXACT = 4 * np.finfo(np.float64).eps
+_RESOLUTION = 1e-3  # of the smallest step: what a tick of the timeline may be at most
+
+
+@dataclass(frozen=True)
+class Clock:
+    """Times of the rows as integers (rows,) of a viewer timeline: nanoseconds, or ticks named by it."""
+
+    name: str
+    ticks: NDArray[np.int64]
+    seconds_per_tick: float
+    duration: bool
+
+
+def build_clock(seconds: NDArray[np.float64]) -> Clock:
+    """The clock for sample times `seconds` (rows,); ``ValueError`` for one that isn't finite.
+
+    Nanoseconds are taken when the run stays within 291 years and either every time is a whole number of
+    nanoseconds or the smallest step has at least 1000 of them. Otherwise, where every time is a whole number
+    of years or days, the tick is that: the viewer's axes are read then. Else it is the power of 1000 seconds
+    that resolves the smallest step to 1e-3, or as close to that as 62 bits allow.
+    """
+    times = np.asarray(seconds, dtype=np.float64)
+    if not np.isfinite(times).all():
+        raise ValueError("time: every sample time must be finite")
+    largest = float(np.abs(times).max(initial=0.0))
+    steps = np.abs(np.diff(times))
+    steps = steps[steps > 0]
+    smallest = float(steps.min()) if len(steps) else max(largest, 1.0)
+
+    if largest < _LARGEST_NANOSECONDS * 1e-9 and smallest >= 1e-9 * (1 - 1e-6):
+        # Whole seconds apart, so that t*1e9 isn't rounded to float64 once more beyond 104 days.
+        floor = np.floor(times)
+        part = np.rint((times - floor) * 1e9)
+        ticks = floor.astype(np.int64) * 1_000_000_000 + part.astype(np.int64)
+        exact = bool((np.abs(ticks * 1e-9 - times) <= _EXACT * np.abs(times)).all())
+        if smallest * _RESOLUTION >= 1e-9 or exact:
+            return Clock("time", ticks, 1e-9, True)
+
+    for symbol, unit in _WHOLE:
+        whole = np.rint(times / unit)
+        exact = bool((np.abs(times - whole * unit) <= _EXACT * np.abs(times)).all())
+        if exact and unit <= smallest and largest / unit < 2.0**53:
+            return Clock(f"time [{symbol}]", whole.astype(np.int64), unit, False)
+    exponent = 3 * math.floor(math.log10(smallest * _RESOLUTION * (1 + 1e-9)) / 3)
+    while largest / 10.0**exponent > _LARGEST:
+        exponent += 3
+    # Powers of ten to 22 are exact in float64, their reciprocals aren't: multiply or divide.
+    scaled = times * 10.0**-exponent if exponent < 0 else times / 10.0**exponent
+    name = f"time [{_UNITS.get(exponent, f'1e{exponent} s')}]"
+    return Clock(name, np.rint(scaled).astype(np.int64), 10.0**exponent, False)
 
 
 @dataclass(frozen=True)
@@ -49,11 +105,7 @@ class DrawnRun:
         steps: NDArray[np.int64],
         clock: Clock | None = None,
     ) -> Self:
-        """The drawing of a dataset from those of its rows that are in memory, on the clock that suits them.
-
-        Raises:
-            ValueError: a time that isn't finite, or an unreadable ``drawing``.
-        """
+        """The drawing of a dataset from its rows that are in memory, on the clock that suits them."""
         seconds = signals.seconds(shown)
         start, end = float(seconds[0]), float(seconds[-1])
         clock = clock or build_clock(seconds)

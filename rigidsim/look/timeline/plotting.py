@@ -13,8 +13,7 @@ from rigidsim.look.stages.parts import NEAR, Arrow, Color, Line, Plane, Stage, T
 from rigidsim.look.states import States
 
 PIXELS = 500  # about the width of a plot
-CLOCK_ROWS = 2000
-"""Largest number of rows of the clock on the screen."""
+CLOCK_ROWS = 2000  # largest number of rows of the clock on the screen
 _INK: Color = (205, 210, 218)
 _FAINT: Color = (90, 96, 108)
 LEGEND_COLUMNS = 3
@@ -80,10 +79,9 @@ def draw_levels(recording: rr.RecordingStream, plots: Sequence[Plot], ends: list
 
 
 def aggregation(plot: Plot, values: Array) -> rr.components.AggregationPolicy:
-    """Which of the rows that fall into one pixel the viewer draws.
-
-    Its default is their average, which is smooth, but shows a fast rotation with a vanishing
-    amplitude: then the extremes are drawn. Of a drift only the largest is of interest.
+    """Which of the rows that fall into one pixel the viewer draws: by default their average, which is smooth,
+    but shows a fast rotation with a vanishing amplitude: then the extremes. Of a drift only the largest
+    counts.
     """
     if plot.place == "drift":
         return rr.components.AggregationPolicy.Max

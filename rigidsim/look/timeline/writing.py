@@ -13,7 +13,7 @@ import xarray
 from rerun.error_utils import set_strict_mode, strict_mode
 
 from rigidsim.look.page import legible
-from rigidsim.look.roles import title_of
+from rigidsim.look.signals import title_of
 from rigidsim.look.thinning import thin, thinned_indices
 from rigidsim.look.timeline.blueprint import build_blueprint
 from rigidsim.look.timeline.drawn import DrawnRun
@@ -25,23 +25,18 @@ _FIRST_BYTES = 1024 * _ROW_BYTES  # bodies, layout, page
 
 
 def write_timeline(dataset: xarray.Dataset, path: Path, *, rows: int = 100_000) -> int:
-    """Write a dataset as a rerun recording with its own layout.
+    """Write a dataset as a rerun recording with its own layout; returns the number of rows written.
 
     Args:
-        dataset: dataset of a run, or any part of it: what is missing isn't shown, every other numeric
-            variable along time gets a plot. It may be lazy: only the rows shown are read.
-        path: the file; it is whole when this returns.
-        rows: at most so many rows are shown, evenly strided, with the first and the last.
-
-    Returns:
-        The number of rows written.
+    dataset: of a run, or any part of it: what is missing isn't shown, every other numeric variable along
+    time gets a plot. It may be lazy: only the rows shown are read.
+    path: the file; it is whole when this returns.
+    rows: at most so many rows are shown, evenly strided, with the first and the last.
 
     Raises:
-        ValueError: no samples, a time that isn't finite, `rows` < 2 or an unreadable `drawing`.
-        RuntimeError: the environment variable RERUN switches recording off.
-        OSError: the file can't be written, or there is no room for it.
-
-    The viewer draws in float32: the picture is for looking, the dataset for measuring.
+    ValueError: no samples, a time that isn't finite, `rows` < 2 or an unreadable `drawing`.
+    RuntimeError: the environment variable RERUN switches recording off.
+    OSError: the file can't be written, or there is no room for it.
     """
     shown = thin(dataset, rows)
     count = shown.sizes["time"]
@@ -61,12 +56,7 @@ def chunks(first: int, count: int) -> Iterator[slice]:
 
 @contextmanager
 def recording_to(path: Path, name: str, rows: int, blueprint: rrb.Blueprint) -> Iterator[rr.RecordingStream]:
-    """A recording of at most so many rows, with its layout, whose file is whole when the block ends.
-
-    Raises:
-        RuntimeError: the environment variable RERUN switches recording off.
-        OSError: there is no room for it.
-    """
+    """A recording of at most so many rows, with its layout, whose file is whole when the block ends."""
     check_room(path, rows)
     with strict():
         # The context manager finishes the file: without it there is no footer.
@@ -80,10 +70,7 @@ def recording_to(path: Path, name: str, rows: int, blueprint: rrb.Blueprint) -> 
 
 @contextmanager
 def strict() -> Iterator[None]:
-    """Turn errors of the rerun API into exceptions inside the block.
-
-    Otherwise wrong lengths, shapes and times are dropped with a warning.
-    """
+    """Turn errors of the rerun API into exceptions; wrong shapes and times would be dropped otherwise."""
     before = strict_mode()
     set_strict_mode(True)
     try:
@@ -110,10 +97,7 @@ class LiveRecording:
         self.rows = 0
 
     def update(self, dataset: xarray.Dataset) -> None:
-        """Send the new rows of a dataset that has all samples so far.
-
-        Where the scales of the picture have changed with the new samples, everything is sent again.
-        """
+        """Send the new rows of all so far; everything where the scales have changed with them."""
         if not dataset.sizes["time"]:
             return
         steps = thinned_indices(dataset.sizes["time"], LIVE_ROWS)
