@@ -60,7 +60,7 @@ def _shown(column: TableColumn, parts: list[np.ndarray], source: TableSource) ->
 
 def _dates(table: Table, source: TableSource) -> tuple[Epoch, TableColumn] | None:
     """Date of time 0 and the column of times, if known and the calendar covers all rows; else None."""
-    if not table.dated:
+    if table.members:  # datasets of sweeps hold no dates
         return None
     times = next((c for c in table.columns if re.fullmatch(r"(.*_)?time", c.variable)), None)
     if times is None or not table.rows or not (source.naming.epoch or source.attributes.get("epoch")):

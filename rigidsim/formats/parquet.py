@@ -8,7 +8,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from rigidsim.formats.registry import Format, TableSource
-from rigidsim.formats.tables import BLOCK_ROWS, Table
+from rigidsim.formats.tables import Table
 
 
 def write_parquet(table: Table, path: Path, source: TableSource) -> None:
@@ -30,7 +30,7 @@ def write_parquet(table: Table, path: Path, source: TableSource) -> None:
             fields.append(pa.field(column.part_name(part), kind, nullable=column.kind == "M", metadata=told))
     schema = pa.schema(fields, metadata={str(key): str(value) for key, value in source.attributes.items()})
     with pq.ParquetWriter(path, schema, compression="zstd", use_dictionary=False) as writer:
-        for block in table.blocks(rows=8 * BLOCK_ROWS):
+        for block in table.blocks():
             arrays = [pa.array(part) for parts in block for part in parts]
             writer.write_table(pa.Table.from_arrays(arrays, schema=schema))
 

@@ -1,27 +1,33 @@
 """A dataset as flat tables, read block by block, from which CSV, Parquet and the CCSDS messages are written.
 
-One table has a row per sample; each event, and the Lyapunov estimates, have a table of their own. A vector
-becomes a column per component (``angular_velocity_x``), and a column knows the residuals that hold its digits
-beyond double.
+A run's first table has a row per sample; each event, and the Lyapunov estimates, have a table of their own. A
+sweep's has a row per member; variables with a dimension besides the members' (the samples of whole series,
+occurrences of an event, spectral lines) form a long table for that dimension, and every table begins with the
+member's number and the values that identify it. A vector becomes a column per component
+(``angular_velocity_x``), and a column knows the residuals that hold its digits beyond double.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
 from itertools import product
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 import xarray
 
 from rigidsim.formats.digits import RADIAN, converted
 from rigidsim.scene.readable import AngleUnit
-from rigidsim.store.netcdf import CHUNK_ROWS
+from rigidsim.store.sweeps.dataset import boxes
 from rigidsim.store.variables import LABELS, parts_in
 
-BLOCK_ROWS = 2 * CHUNK_ROWS
 BLOCK_NUMBERS = 1 << 21  # 16 MB
+MEMBER = "member"
+REASON = "failed_reason"
+_LONG = ("time", "sample", "line")
+_FIRST = ("status", "warnings", "steps")
 
 
 @dataclass(frozen=True)
@@ -77,74 +83,184 @@ class TableColumn:
 
 @dataclass(frozen=True)
 class Table:
-    """Columns along one dimension.
+    """Columns along one dimension of a run, or along a sweep's members, the last axis varying fastest; in a
+    long table a member's own rows follow one another.
 
     Attributes:
-        main: dimension of the table that carries the run's name.
-        dated: whether its times may be given as dates.
+        members: dimensions of a sweep's members; empty for a run.
+        reasons: why members failed, by member.
+        block_numbers: numbers held in memory at once.
     """
 
-    main: ClassVar[str] = "time"
-    dated: ClassVar[bool] = True
     dim: str
     columns: tuple[TableColumn, ...]
     dataset: xarray.Dataset
     bits: int = 53
+    members: tuple[str, ...] = ()
+    values: tuple[TableColumn, ...] = ()
+    reasons: dict[int, str] = field(default_factory=dict)
+    block_numbers: int = BLOCK_NUMBERS
+
+    @property
+    def _long(self) -> bool:
+        return bool(self.members) and self.dim != MEMBER
+
+    @property
+    def _outer(self) -> dict[str, int]:
+        """Dimensions of its rows, but a long table's own, with their sizes."""
+        return {dim: self.dataset.sizes[dim] for dim in self.members or (self.dim,)}
+
+    @property
+    def _each(self) -> int:
+        """Rows per member: 1, or in a long table as many as any member has."""
+        return int(self.dataset.sizes[self.dim]) if self._long else 1
 
     @property
     def rows(self) -> int:
-        """Number of rows."""
-        return int(self.dataset.sizes[self.dim])
+        """Largest number of rows: a long table leaves out rows without any number."""
+        return math.prod(self._outer.values()) * self._each
 
     @property
     def extent(self) -> str:
         """Description of its rows, for the comment at a file's top."""
-        return f"{self.rows} rows along {self.dim}"
+        if not self.members:
+            return f"{self.rows} rows along {self.dim}"
+        told = f"{math.prod(self._outer.values())} members along {', '.join(self.members)}"
+        return f"{told}, each along {self.dim}" if self._long else told
 
     def column(self, name: str) -> TableColumn | None:
         """The column with the given name; None if there is none."""
         return next((column for column in self.columns if column.name == name), None)
 
-    def blocks(
-        self, columns: Sequence[TableColumn] | None = None, rows: int = BLOCK_ROWS
-    ) -> Iterator[list[list[np.ndarray]]]:
-        """Parts of each column, block by block: ``block[column][part]`` has shape (at most ``rows``,)."""
+    def blocks(self, columns: Sequence[TableColumn] | None = None) -> Iterator[list[list[np.ndarray]]]:
+        """Parts of each column, block by block: ``block[column][part]`` has shape (rows of the block,)."""
         wanted = self.columns if columns is None else columns
-        names = dict.fromkeys(part for column in wanted for part in column.parts)
-        for first in range(0, self.rows, rows):
-            here = {self.dim: slice(first, first + rows)}
-            read = {name: self.dataset[name].isel(here).values for name in names}
-            yield [self._values(column, read) for column in wanted]
+        numbers, each, outer = sum(len(c.parts) for c in self.columns), self._each, self._outer
+        for first, shape, flat in boxes(list(outer.values()), each * numbers, self.block_numbers):
+            width = each if len(flat) > 1 else min(each, max(1, self.block_numbers // numbers))
+            for low in range(0, each, width):
+                here = {dim: slice(i, i + n) for dim, i, n in zip(outer, first, shape, strict=True)}
+                steps = range(low, min(low + width, each))
+                if self._long:
+                    here[self.dim] = slice(steps.start, steps.stop)
+                yield self._block(wanted, _Block(self.dataset.isel(here), flat, steps))
 
-    def _values(self, column: TableColumn, read: Mapping[str, np.ndarray]) -> list[np.ndarray]:
-        """Parts of one column."""
+    def _block(self, wanted: Sequence[TableColumn], block: _Block) -> list[list[np.ndarray]]:
+        """Parts of some columns; rows of a long table without any number are left out."""
+        if not self._long:
+            return [self._parts(column, block) for column in wanted]
+        numbers = [self._parts(column, block)[0] for column in self.values]
+        kept = np.any([~np.isnan(values) for values in numbers], axis=0)
+        return [[part[kept] for part in self._parts(column, block)] for column in wanted]
+
+    def _parts(self, column: TableColumn, block: _Block) -> list[np.ndarray]:
+        """The parts of one column, (rows of the block,) each."""
+        if self.members and column.name == MEMBER:
+            return [np.repeat(np.arange(block.members.start, block.members.stop), len(block.steps))]
+        if self.members and column.name == REASON:
+            return [np.array([self.reasons.get(member, "") for member in block.members], dtype=object)]
+        if self._long and column.name == self.dim and self.dim not in self.dataset.variables:
+            return [np.tile(np.arange(block.steps.start, block.steps.stop), len(block.members))]
+        dims = (*self._outer, self.dim) if self._long else tuple(self._outer)
         key: Any = (slice(None), *column.index)
-        parts = [np.asarray(read[part][key]) for part in column.parts]
+        parts = [block.rows(name, dims)[key] for name in column.parts]
+        for number in range(1, len(parts)):  # members of fewer bits than others have no residuals: nan
+            empty = np.isnan(parts[number]) & ~np.isnan(parts[0])
+            parts[number] = np.where(empty, 0.0, parts[number])
         unit = column.angle_unit
         return parts if unit is None else converted(parts, unit, column.bits(self.bits))
 
 
-def tables_of(dataset: xarray.Dataset, angle_unit: AngleUnit | None = None, bits: int = 53) -> list[Table]:
-    """The table along time, then those along other dimensions."""
+class _Block:
+    """Members, with some of their samples, that are read together."""
+
+    def __init__(self, dataset: xarray.Dataset, members: range, steps: range) -> None:
+        self.members, self.steps = members, steps
+        self._dataset = dataset
+        self._read: dict[str, np.ndarray] = {}
+
+    def rows(self, name: str, dims: Sequence[str]) -> np.ndarray:
+        """A variable with one row for each point of some dimensions, (rows, *components), repeated along
+        those that it lacks.
+        """
+        if name not in self._read:
+            variable = self._dataset[name].variable
+            own = {str(dim): size for dim, size in variable.sizes.items() if dim not in dims}
+            wide = variable.set_dims({dim: self._dataset.sizes[dim] for dim in dims} | own)
+            self._read[name] = wide.transpose(*dims, *own).values.reshape(-1, *own.values())
+        return self._read[name]
+
+
+def tables_of(
+    dataset: xarray.Dataset, angle_unit: AngleUnit | None, bits: int, block_numbers: int
+) -> list[Table]:
+    """The table along time, or of a sweep's members, then the others."""
+    if dataset.attrs.get("kind") == "sweep":
+        return _tables_of_members(dataset, angle_unit, bits, block_numbers)
     variables = dataset.variables
     names = [str(name) for name, found in variables.items() if found.dims and found.dtype.kind in "fM"]
     names.sort(key=lambda name: (name != "time", name not in dataset.coords))
     columns: dict[str, list[TableColumn]] = {}
     for name in names:
-        columns.setdefault(str(variables[name].dims[0]), []).extend(columns_of(dataset, name, angle_unit))
+        dim = str(variables[name].dims[0])
+        columns.setdefault(dim, []).extend(_columns_of(dataset, name, angle_unit, (dim,)))
     return [Table(dim, tuple(found), dataset, bits) for dim, found in columns.items() if found]
 
 
-def columns_of(
-    dataset: xarray.Dataset, name: str, angle_unit: AngleUnit | None = None, rows: Sequence[str] = ()
+def _tables_of_members(
+    dataset: xarray.Dataset, angle_unit: AngleUnit | None, bits: int, block_numbers: int
+) -> list[Table]:
+    """The table of the members, then the long tables."""
+    members = tuple(map(str, dataset["status"].dims))
+    axes = [str(name) for name, variable in dataset.variables.items() if "swept_key" in variable.attrs]
+    axes.sort(key=lambda name: next((i for i, dim in enumerate(members) if name in (dim, f"{dim}_value")), 0))
+    labels = [c for name in axes for c in _columns_of(dataset, name, angle_unit, members)]
+    kept: dict[str, list[TableColumn]] = {MEMBER: []}
+    names = [str(name) for name, found in dataset.data_vars.items() if set(members) <= set(found.dims)]
+    names.sort(key=lambda name: (_FIRST.index(name) if name in _FIRST else len(_FIRST), name))
+    for name in names:
+        dim = next((str(dim) for dim in dataset[name].dims if _is_long(str(dim), members)), MEMBER)
+        rows = (*members, dim)
+        kept.setdefault(dim, []).extend(_columns_of(dataset, name, angle_unit, rows))
+    reasons: dict[int, str] = {}
+    if "failed" in dataset.dims:
+        numbers, texts = dataset["failed_member"].values, dataset[REASON].values
+        reasons = {int(member): str(text) for member, text in zip(numbers, texts, strict=True)}
+    found = []
+    for dim, values in kept.items():
+        columns = [_made(MEMBER, "i", "number of the member, the last axis fastest"), *labels]
+        if dim != MEMBER:
+            told = _columns_of(dataset, dim, None, (dim,)) if dim in dataset.variables else []
+            columns += told or [_made(dim, "i", "which of the member's, counted from 0")]
+        columns += values
+        if dim == MEMBER and reasons:
+            columns.append(_made(REASON, "U", "why a member didn't end well"))
+        found.append(
+            Table(dim, tuple(columns), dataset, bits, members, tuple(values), reasons, block_numbers)
+        )
+    return found
+
+
+def _is_long(dim: str, members: Sequence[str]) -> bool:
+    """Whether a dimension's points become rows; points of others, components of vectors, become columns."""
+    return dim not in members and (dim in _LONG or dim.endswith("_occurrence"))
+
+
+def _made(name: str, kind: str, long_name: str) -> TableColumn:
+    """A column that isn't a variable of the dataset."""
+    return TableColumn(name, "", (), (name,), {"units": "1", "long_name": long_name}, kind)
+
+
+def _columns_of(
+    dataset: xarray.Dataset, name: str, angle_unit: AngleUnit | None, rows: Sequence[str]
 ) -> list[TableColumn]:
     """Columns of a variable, one per component; none for a residual, which its value's columns include. Rows
-    run along some dimensions, by default the variable's first.
+    run along some dimensions.
     """
     variable = dataset[name]
     if "residual_of" in variable.attrs:
         return []
-    beside = [str(dim) for dim in variable.dims if str(dim) not in (rows or (variable.dims[0],))]
+    beside = [str(dim) for dim in variable.dims if str(dim) not in rows]
     parts = tuple(parts_in(dataset, name))
     unit = angle_unit if variable.attrs.get("units") == RADIAN else None
     kind = variable.dtype.kind if variable.dtype.kind in "fMi" else "U"

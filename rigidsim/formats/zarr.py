@@ -9,7 +9,6 @@ from typing import Any
 import xarray
 
 from rigidsim.formats.digits import RADIAN, converted
-from rigidsim.formats.member_tables import MemberTable
 from rigidsim.formats.registry import Format, TableSource
 from rigidsim.formats.tables import Table
 from rigidsim.scene.readable import AngleUnit
@@ -27,9 +26,9 @@ def write_zarr(table: Table, path: Path, source: TableSource) -> None:
     """
     dataset = table.dataset
     attributes = {str(key): _json(value) for key, value in source.attributes.items()}
-    members = table.members if isinstance(table, MemberTable) else ()
+    members = table.members
     dim = members[0] if members else table.dim
-    rows = _slab(table) if isinstance(table, MemberTable) else BLOCK_ROWS
+    rows = _slab(table) if members else BLOCK_ROWS
     along = dataset[[name for name in dataset.variables if dim in dataset[name].dims]]
     for first in range(0, max(dataset.sizes[dim], 1), rows):
         block = _plain(along.isel({dim: slice(first, first + rows)}), source)
@@ -86,7 +85,7 @@ def _chunks(variable: xarray.DataArray, members: Sequence[str]) -> tuple[int, ..
     return chunk_shape(variable.shape[:of_members], variable.shape[of_members:])
 
 
-def _slab(table: MemberTable) -> int:
+def _slab(table: Table) -> int:
     """Values of the first axis whose members are held in memory at once."""
     dataset, first = table.dataset, table.members[0]
     numbers = sum(found.size for found in dataset.variables.values() if first in found.dims)

@@ -25,7 +25,6 @@ Overrides = Sequence[str] | Mapping[str, Any]
 NEW = "the command rigidsim new lists commented ones to start from"
 _LARGEST_TABLE = 3_000_000  # bytes
 _LARGEST_FILE = 4_000_000  # bytes; a body of tens of thousands of points still fits
-_EARLIER_MARK = "#:set "
 
 
 @dataclass(frozen=True, repr=False)
@@ -234,34 +233,3 @@ def _text(where: str, name: str, path: Path) -> str:
 
 def _section(name: str, text: str) -> str:
     return f"\n[tables.{json.dumps(name)}]\ntext = '''\n{text.rstrip()}\n'''\n"
-
-
-def parse_earlier(text: str, *, source: str, overrides: Overrides = ()) -> Experiment:
-    """Read a text that the first version of rigidsim wrote into a run's files; see ``parse``.
-
-    Those kept what ``--set`` had replaced in ``#:set KEY=VALUE`` comments at the end. Anywhere else, and in
-    every other text, such a line is a comment like any other.
-
-    Raises:
-        ConfigError: with every problem found.
-    """
-    body, kept = _split_earlier(text)
-    if isinstance(overrides, Mapping):
-        overrides = assignments_of(overrides)
-    return parse(body, source=source, overrides=[*kept, *overrides])
-
-
-def has_earlier_settings(text: str) -> bool:
-    """Whether a text ends in the comments for which ``parse_earlier`` exists."""
-    return bool(_split_earlier(text)[1])
-
-
-def _split_earlier(text: str) -> tuple[str, list[str]]:
-    lines = text.rstrip("\n").split("\n")
-    first = len(lines)
-    while first and lines[first - 1].startswith(_EARLIER_MARK):
-        first -= 1
-    if first == len(lines):
-        return text, []
-    kept = [line.removeprefix(_EARLIER_MARK).strip() for line in lines[first:]]
-    return "\n".join([*lines[:first], ""]), kept

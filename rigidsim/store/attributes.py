@@ -20,18 +20,16 @@ class Use(Enum):
     SETTING = "must be the same when a dataset is verified"
     PLATFORM = "versions and machine features that bits can depend on"
     REPEATED = "stands in the summary, too"
-    STEPS = "belongs to steps; earlier versions wrote it for closed forms, too"
 
 
 class RootAttributes(BaseModel):
-    """Root attributes; those that are None, as some are in older versions and in segments, aren't written.
+    """Root attributes; those that are None, as some are in segments, aren't written.
 
     Tables are JSON texts; wall and CPU seconds are sums over all sessions; times are UTC.
 
     Attributes:
         config: the TOML text of what was run, one visible value per key; its digest is config_sha256.
-        config_given: the text as it was given, before settings replaced values in it; older files have none,
-            and keep settings in ``#:set`` comments at the end of config.
+        config_given: the text as it was given, before settings replaced values in it.
         config_set: the settings (KEY=VALUE), one per line.
         modelling_error, attitude_error: largest error of an averaged model's directions until the end, and
             estimate for the end of the run, rad.
@@ -57,8 +55,8 @@ class RootAttributes(BaseModel):
     status: Annotated[str, Use.SETTING]
     config: str
     config_sha256: Annotated[str, Use.REPEATED]
-    config_given: str | None = None
-    config_set: str | None = None
+    config_given: str
+    config_set: str
     formulation: Annotated[str, Use.SYSTEM, Use.SETTING]
     euler_sequence: Annotated[str, Use.SYSTEM]
     euler_partner_sequence: str | None = None
@@ -70,7 +68,7 @@ class RootAttributes(BaseModel):
     method: Annotated[str | None, Use.SYSTEM] = None
     hold_invariants: Annotated[int | None, Use.SYSTEM] = None
     hold_from_step: Annotated[int | None, Use.SYSTEM] = None
-    taylor_order: Annotated[int | None, Use.SYSTEM, Use.SETTING, Use.REPEATED, Use.STEPS] = None
+    taylor_order: Annotated[int | None, Use.SYSTEM, Use.SETTING, Use.REPEATED] = None
     compact_mode: Annotated[int, Use.SYSTEM, Use.SETTING, Use.REPEATED]
     high_accuracy: Annotated[int, Use.SETTING]
     batch_size: Annotated[int, Use.SETTING]
@@ -129,12 +127,10 @@ class RootAttributes(BaseModel):
         return {name: value for name, value in found.items() if value is not None}
 
     def changed(self, use: Use, now: RootAttributes) -> Iterator[tuple[str, Any, Any]]:
-        """Name, value here and value now of those that differ; what an older version didn't record, or
-        recorded of steps that aren't taken, counts as unchanged.
-        """
-        others, ignored = now.of_use(use), set(_names(Use.STEPS)) - now.of_use(Use.STEPS).keys()
+        """Name, value here and value now of those that differ; what isn't known here counts as unchanged."""
+        others = now.of_use(use)
         for name, value in self.of_use(use).items():
-            if name not in ignored and value != others.get(name):
+            if value != others.get(name):
                 yield name, value, others.get(name)
 
 
@@ -144,8 +140,10 @@ def _names(use: Use) -> list[str]:
 
 def read_attributes(path: Path) -> RootAttributes:
     """The root attributes of a dataset or segment."""
+    found = netcdf.root_attributes(path)
+    netcdf.check_version(found.get("schema_version"), path)
     try:
-        return RootAttributes.model_validate(netcdf.root_attributes(path))
+        return RootAttributes.model_validate(found)
     except ValidationError as error:
         first = error.errors(include_url=False)[0]
         where = ".".join(str(step)[:40] for step in first["loc"])

@@ -1,9 +1,4 @@
-"""Datasets and segments as netCDF-4 files, written with h5py, for any reader of netCDF.
-
-What makes an HDF5 file a netCDF-4 file is a handful of conventions: named dimensions are dimension scales
-(HDF5 Dimension Scale specification), which refer to the variables along them and these to them;
-``_Netcdf4Dimid`` and ``_Netcdf4Coordinates`` number them; objects keep the order of their creation;
-``_NCProperties`` names the writer (NetCDF Users' Guide, appendix "File Format Specifications").
+"""Datasets and segments as netCDF-4 files, for any reader of netCDF.
 
 HDF5 compresses with zlib, which is most of the time of writing a dense run. ISA-L (through python-isal) gives
 the same format in a tenth of it, so that whole chunks are compressed here; without it, zlib is used.
@@ -16,12 +11,12 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+import h5netcdf
 import h5py
 import numpy as np
-from h5py import h5ds
 
 from rigidsim.errors import RunFolderError
-from rigidsim.store.variables import BARE_DIMENSION, Extra, Variable, used_labels
+from rigidsim.store.variables import SCHEMA_VERSION, Extra, Variable, used_labels
 
 try:
     from isal.isal_zlib import compress as _deflate
@@ -40,26 +35,22 @@ Block = Mapping[str, Sequence[np.ndarray]]
 
 Created = Mapping[str, h5py.Dataset]
 """Variables in a file under construction, by the names of their parts."""
-_LEAST_CHUNK_ROWS = 1024  # for variables along a dimension that can grow
 
 
 class NetcdfFile:
     """A netCDF-4 file under construction, in a new, empty HDF5 file; see ``writing``."""
 
-    def __init__(self, file: h5py.File) -> None:
-        self._file = file
-        self._sizes: dict[str, int] = {}
-        self._variables: dict[str, tuple[h5py.Dataset, tuple[str, ...]]] = {}
-        writer = f"version=2,h5py={h5py.__version__},hdf5={h5py.version.hdf5_version}"
-        file.attrs["_NCProperties"] = np.bytes_(writer)
+    def __init__(self, file: h5py.File, labelled: h5netcdf.File) -> None:
+        self._file, self._labelled = file, labelled
 
     def dimension(self, name: str, size: int) -> None:
         """Declare a dimension, possibly again; size 0 makes it unlimited, since netCDF has no empty ones."""
-        self._sizes.setdefault(name, size)
+        if name not in self._labelled.dimensions:
+            self._labelled.dimensions[name] = size
 
     def has(self, name: str) -> bool:
         """Whether a variable of this name was created."""
-        return name in self._variables
+        return name in self._labelled.variables
 
     def variable(
         self,
@@ -78,11 +69,9 @@ class NetcdfFile:
             chunk: shape of chunks; a single number for chunks of so many rows; None for contiguous storage.
             gzip: the level at which its chunks are compressed after a byte shuffle.
         """
-        shape = tuple(self._sizes[dim] for dim in dims)
-        if chunk is None and 0 in shape:
-            chunk = (_LEAST_CHUNK_ROWS,)
         if chunk is not None:
-            chunk = (*chunk, *(max(1, size) for size in shape[len(chunk) :]))
+            sizes = [self._labelled.dimensions[dim].size for dim in dims]
+            chunk = (*chunk, *(max(1, size) for size in sizes[len(chunk) :]))
         filters = {} if gzip is None else {"compression": "gzip", "compression_opts": gzip, "shuffle": True}
         return self._created(name, dims, "<i8" if whole else "<f8", attributes, chunks=chunk, **filters)
 
@@ -92,59 +81,32 @@ class NetcdfFile:
         kind = h5py.string_dtype()
         self._created(name, (dim,), kind, attributes)[...] = np.array(texts, dtype=kind)
 
+    def _created(
+        self, name: str, dims: Sequence[str], dtype: Any, attributes: Mapping[str, Any], **how: Any
+    ) -> h5py.Dataset:
+        self._labelled.create_variable(name, tuple(dims), dtype, **how)
+        created = self._file[name]
+        _attributes(created, attributes)
+        return created
+
     def attributes(self, attributes: Mapping[str, Any]) -> None:
         """Write attributes of the whole file: strings and numbers."""
         _attributes(self._file, attributes)
 
     def group(self, name: str, arrays: Mapping[str, np.ndarray]) -> None:
-        """Write arrays of numbers as a group without labels; an empty group isn't written."""
+        """Write arrays of numbers as a group without labels; those without elements aren't written."""
         group = self._file.create_group(name, track_order=True)
         for key, values in arrays.items():
             if values.size:
                 stored = np.asarray(values, "<i8" if values.dtype.kind == "i" else "<f8")
                 group.create_dataset(key, data=stored, track_order=True)
 
-    def _created(
-        self, name: str, dims: Sequence[str], dtype: Any, attributes: Mapping[str, Any], **how: Any
-    ) -> h5py.Dataset:
-        created = self._dataset(name, tuple(self._sizes[dim] for dim in dims), dtype, **how)
-        self._variables[name] = created, tuple(dims)
-        numbers = np.array([list(self._sizes).index(dim) for dim in dims], dtype="<i4")
-        created.attrs["_Netcdf4Dimid"] = numbers[0]
-        created.attrs["_Netcdf4Coordinates"] = numbers
-        _attributes(created, attributes)
-        return created
-
-    def _dataset(self, name: str, shape: tuple[int, ...], dtype: Any, **how: Any) -> h5py.Dataset:
-        most = tuple(size or None for size in shape) if 0 in shape else None
-        return self._file.create_dataset(name, shape, dtype, maxshape=most, track_order=True, **how)
-
-    def finish(self) -> None:
-        """Connect variables and dimensions once all of them are there."""
-        scales: dict[str, h5py.Dataset] = {}
-        for number, (dim, size) in enumerate(self._sizes.items()):
-            own, dims = self._variables.get(dim, (None, ()))
-            if own is not None and dims == (dim,):
-                own.make_scale(dim)
-                scales[dim] = own
-            else:  # a variable, never written, stands for a dimension without a coordinate
-                chunks = None if size else (_LEAST_CHUNK_ROWS,)
-                scales[dim] = self._dataset(dim, (size,), ">f4", chunks=chunks)
-                scales[dim].make_scale(f"{BARE_DIMENSION}{size:10}")
-                scales[dim].attrs["_Netcdf4Dimid"] = np.int32(number)
-        for name, (created, dims) in self._variables.items():
-            for axis, dim in enumerate(dims):
-                if dims != (name,):
-                    created.dims[axis].attach_scale(scales[dim])
-
 
 @contextmanager
 def writing(target: Any) -> Iterator[NetcdfFile]:
     """A new netCDF-4 file in a file object open for reading and writing; complete when the block ends."""
-    with h5py.File(target, "w", track_order=True) as file:
-        made = NetcdfFile(file)
-        yield made
-        made.finish()
+    with h5py.File(target, "w", track_order=True) as file, h5netcdf.File(file, "w") as labelled:
+        yield NetcdfFile(file, labelled)
 
 
 def _attributes(owner: Any, attributes: Mapping[str, Any]) -> None:
@@ -244,6 +206,17 @@ def reading(path: Path) -> Iterator[Any]:
         raise RunFolderError(f"{path}: can't be read ({error})") from None
 
 
+def check_version(version: Any, path: Path) -> None:
+    """Refuse all schema versions but this one, with what to do."""
+    if not isinstance(version, int) or isinstance(version, bool):
+        raise RunFolderError(f"{path}: names no schema version; it is no dataset of rigidsim")
+    if version != SCHEMA_VERSION:
+        remedy = "update rigidsim" if version > SCHEMA_VERSION else "run its config again, which it holds"
+        raise RunFolderError(
+            f"{path}: has schema version {version}, and this rigidsim reads {SCHEMA_VERSION}; {remedy}"
+        )
+
+
 def root_attributes(path: Path) -> dict[str, Any]:
     """Root attributes of a dataset or segment as Python values, and its ``rows``."""
     try:
@@ -265,13 +238,7 @@ def read_group(path: Path, name: str) -> dict[str, np.ndarray]:
     with reading(path) as file:
         if not isinstance(file.get(name), h5py.Group):
             return {}
-        arrays = {key: np.asarray(data[()]) for key, data in file[name].items() if _is_data(key, data)}
+        arrays = {key: np.asarray(data[()]) for key, data in file[name].items()}
     if any(values.dtype.kind not in "if" for values in arrays.values()):
         raise RunFolderError(f"{path}: its {name} holds something else than numbers")
     return arrays
-
-
-def _is_data(name: str, item: Any) -> bool:
-    """Whether an item is an array; older files also hold dimension scales of each array."""
-    dimension = name[-2:-1] == "_" and name[-1:].isdigit()
-    return isinstance(item, h5py.Dataset) and not (dimension and h5ds.is_scale(item.id))

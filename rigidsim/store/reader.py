@@ -1,6 +1,6 @@
 """The one reader of datasets: a run's, a sweep's, or what the segments of an unfinished run hold, lazily.
 
-Files are opened with distrust. One may be torn, foreign, from a newer version, or made to hurt: declare rows
+Files are opened with distrust. One may be torn, foreign, from another version, or made to hurt: declare rows
 that it doesn't hold (a few kilobytes that unpack to terabytes of zeros), or point to other files, whose
 content it would show as data. Whatever isn't a whole dataset of rigidsim is refused before it is read.
 """
@@ -19,11 +19,13 @@ from xarray.backends import AbstractDataStore, BackendArray
 from xarray.core import indexing
 
 from rigidsim.errors import RunFolderError
-from rigidsim.store.netcdf import reading, root_attributes
-from rigidsim.store.variables import LABELS, OF_THE_RUN, SCHEMA_VERSION, is_bare_dimension
+from rigidsim.store.netcdf import check_version, reading, root_attributes
+from rigidsim.store.variables import LABELS, OF_THE_RUN
 
 _MOST_VARIABLES = 10_000
 _GROUPS = ("checkpoint", "events")
+_BARE = b"This is a netCDF dimension but not a netCDF variable"
+"""Beginning of the ``NAME`` of the empty variable that netCDF-4 keeps for a dimension without coordinates."""
 
 
 def open_dataset(
@@ -42,7 +44,7 @@ def open_dataset(
         Values beyond double precision have residuals beside them, see ``variables.parts_in``.
 
     Raises:
-        RunFolderError: a file is damaged, foreign, of a newer schema version, or lacks what it declares.
+        RunFolderError: a file is damaged, foreign, of another schema version, or lacks what it declares.
     """
     try:
         inspect(path)
@@ -64,7 +66,8 @@ def inspect(path: Path) -> None:
     if path.is_symlink():
         raise RunFolderError(f"{path}: is a symbolic link; a run's files are files of its folder")
     with h5py.File(path, "r") as file:
-        _check_version(file.attrs.get("schema_version"), path)
+        version = file.attrs.get("schema_version")
+        check_version(version.item() if hasattr(version, "item") else version, path)
         if len(file) > _MOST_VARIABLES:
             raise RunFolderError(f"{path}: holds {len(file)} variables; it is no dataset of rigidsim")
         of_sweep = file.attrs.get("kind") == "sweep"
@@ -86,25 +89,11 @@ def inspect(path: Path) -> None:
             raise RunFolderError(f"{path}: has no coordinate time; it is no dataset of rigidsim")
 
 
-def _check_version(found: Any, path: Path) -> None:
-    """Refuse schema versions that this version of rigidsim doesn't know."""
-    version = found.item() if hasattr(found, "item") else found
-    if not isinstance(version, int) or isinstance(version, bool):
-        raise RunFolderError(f"{path}: names no schema version; it is no dataset of rigidsim")
-    if version > SCHEMA_VERSION:
-        raise RunFolderError(
-            f"{path}: has schema version {version}, newer than this rigidsim reads ({SCHEMA_VERSION}); "
-            "update rigidsim"
-        )
-    if version < 1:
-        raise RunFolderError(f"{path}: has schema version {version}, which never was one")
-
-
 def _check_numbers(item: Any, name: str, path: Path) -> None:
     """Require that every declared row is stored, so that none is read as a fill value."""
     if item.dtype.kind not in "fiuSOV" or item.dtype.hasobject:
         raise RunFolderError(f"{path}: the variable {name!a} holds no numbers")
-    if name != "time" and is_bare_dimension(item):
+    if name != "time" and bytes(item.attrs.get("NAME", b"")).startswith(_BARE):
         return
     size = item.size or 0
     if item.chunks is None:

@@ -1,7 +1,7 @@
 """Seals: a file's last bytes hold the SHA-256 of all others, so that damage is known before anything is read.
 
-HDF5 readers ignore bytes after the end of their data. A file without a seal was torn, or written by
-another program, or by a version that didn't seal yet.
+HDF5 readers ignore bytes after the end of their data. A file without a seal was torn, or written by another
+program.
 """
 
 from __future__ import annotations
@@ -12,9 +12,7 @@ import stat
 from pathlib import Path
 
 from rigidsim.errors import RunFolderError
-from rigidsim.store.netcdf import root_attributes
-from rigidsim.store.provenance import file_sha256
-from rigidsim.store.variables import SCHEMA_VERSION
+from rigidsim.store.netcdf import check_version, root_attributes
 
 _MARK = b"\nrigidsim sha256 "
 _LENGTH = len(_MARK) + 64 + 1
@@ -98,23 +96,12 @@ def check_whole(path: Path) -> tuple[str, str]:
 
 
 def refuse_damaged(path: Path, expected: str | None) -> None:
-    """Check a run's complete dataset against its seal (those of the first schema version have none), and
-    against the SHA-256 that the summary beside it gives, if any.
+    """Check a run's complete dataset against its seal, and against the SHA-256 that the summary beside it
+    gives, if any.
     """
-    try:
-        unsealed = read_seal(path) is None
-        digest = file_sha256(path) if unsealed else check_whole(path)[1]
-    except OSError as error:
-        raise RunFolderError(f"{path}: can't be read: {error.strerror or error}") from None
+    _, digest = check_whole(path)
     labels = root_attributes(path)
-    version = labels.get("schema_version")
-    if not isinstance(version, int) or version > SCHEMA_VERSION:
-        raise RunFolderError(
-            f"{path}: has schema version {version}; this rigidsim reads versions up to {SCHEMA_VERSION}; "
-            "install a newer one"
-        )
-    if version > 1 and unsealed:
-        raise RunFolderError(f"{path}: is torn or was edited: its end holds no seal of rigidsim")
+    check_version(labels.get("schema_version"), path)
     if "segment" in labels:
         raise RunFolderError(f"{path}: is a segment of an unfinished run, no complete dataset")
     if expected not in (None, digest):

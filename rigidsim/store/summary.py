@@ -1,7 +1,6 @@
 """Contents of ``summary.json``: one definition by which it is written, read with distrust, and shown.
 
-A field that isn't given isn't written, so that summaries of older versions, which say less, are read and
-written again as they are.
+A field that isn't given isn't written.
 """
 
 from __future__ import annotations
@@ -11,13 +10,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Annotated, Any, Self
 
-from pydantic import (
-    Field,
-    StrictBool,
-    StrictInt,
-    StrictStr,
-    ValidationError,
-)
+from pydantic import Field, StrictBool, StrictInt, StrictStr, ValidationError
 
 from rigidsim.errors import RunFolderError
 from rigidsim.scene.choices import DEFAULT_METHOD
@@ -98,7 +91,7 @@ class Brief(SummaryPart):
     name: Annotated[Text, Claim()] = ""
     description: Annotated[StrictStr, Claim()] = ""
     status: Annotated[StrictStr, Field(pattern=r"^[a-z_: -]{1,40}$"), Claim(of_end=True)]
-    message: Annotated[Text, Claim(since=4, of_end=True)] = ""  # in the unit that suits, since then
+    message: Annotated[Text, Claim(of_end=True)] = ""
     exit_code: Annotated[StrictInt, Claim(of_end=True)] = 0
 
     @property
@@ -111,7 +104,7 @@ class Summary(Brief):
     """Summary of a run that ended.
 
     Attributes:
-        warnings, warning_codes: texts, and a ``WarningCode`` for each; older summaries have only texts.
+        warnings, warning_codes: texts, and a ``WarningCode`` for each.
         time_reached: time of the last sample, or of the event that ended the run, s.
         engine_time: time that the integration reached, s; its own steps go past the last sample.
         loads: what acts on the body, in a reader's terms.
@@ -124,7 +117,7 @@ class Summary(Brief):
     warning_codes: tuple[Text, ...] = ()
     samples: Annotated[StrictInt, Claim()]
     samples_planned: Annotated[StrictInt, Claim()]
-    time_reached: Annotated[FiniteNumber, Claim(beside="engine_time")]
+    time_reached: Annotated[FiniteNumber, Claim()]
     engine_time: Annotated[FiniteNumber | None, Claim()] = None
     formulation: Annotated[Text, Claim()]
     states: Annotated[tuple[Text, ...], Claim()]

@@ -18,15 +18,10 @@ Four = tuple[FiniteNumber, FiniteNumber, FiniteNumber, FiniteNumber]
 class Claim:
     """Marks a field that follows from the config alone, so that running it again must confirm it.
 
-    Attributes:
-        since: schema version of the dataset from which the field has its present meaning.
-        of_end: whether it tells how the run ended, which an interruption changes.
-        beside: field whose absence, in older summaries, gives this one another meaning; empty for none.
+    ``of_end``: whether it tells how the run ended, which an interruption changes.
     """
 
-    since: int = 1
     of_end: bool = False
-    beside: str = ""
 
 
 class SummaryPart(BaseModel):
@@ -147,7 +142,7 @@ class InvariantDrift(SummaryPart):
     largest_drift: Annotated[FiniteNumber | None, Claim()]
     final_drift: Annotated[FiniteNumber | None, Claim()]
     bound: Annotated[FiniteNumber, Claim()]
-    put_back: Annotated[FiniteNumber | None, Claim(since=3)] = None  # from then on with its sign
+    put_back: Annotated[FiniteNumber | None, Claim()] = None
     why: Annotated[Text, Claim()]
     numerical: Annotated[StrictBool, Claim()]
 
@@ -276,7 +271,7 @@ class EventTimes(SummaryPart):
     EARLY: ClassVar[int] = 5
     first: Annotated[FiniteNumber, Claim()]
     last: Annotated[FiniteNumber, Claim()]
-    early: Annotated[tuple[FiniteNumber, ...], Claim(since=4)] = ()
+    early: Annotated[tuple[FiniteNumber, ...], Claim()] = ()
 
 
 class Advice(SummaryPart):

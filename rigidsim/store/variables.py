@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 if TYPE_CHECKING:
-    import h5py
     import xarray
 
 LABELS: dict[str, list[str]] = {
@@ -31,18 +30,7 @@ OF_THE_RUN = ("point_mass",)
 """Coordinates whose labels depend on the run: names of ``[[bodies]]``."""
 
 SCHEMA_VERSION = 4
-"""1: without seals. 2: files end with the SHA-256 of their content; checkpoints. 3: what was put back of held
-invariants along time (runs that hold none have the same variables as before). 4: dates along time (runs
-without an epoch have the same variables as before).
-"""
-
-BARE_DIMENSION = "This is a netCDF dimension but not a netCDF variable."
-"""Beginning of the ``NAME`` of the empty variable that netCDF-4 keeps for a dimension without coordinates."""
-
-
-def is_bare_dimension(item: h5py.Dataset) -> bool:
-    """Whether an item is the empty variable of a dimension without coordinates."""
-    return bytes(item.attrs.get("NAME", b"")).startswith(BARE_DIMENSION[:-1].encode())
+"""That of 0.1.0. Versions before were never released; files of any other version are refused."""
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -12,10 +12,9 @@ import xarray
 from rigidsim.errors import RESUME, RigidsimError, RunFolderError
 from rigidsim.formats import FOR_SWEEPS
 from rigidsim.formats.digits import angle_unit_named
-from rigidsim.formats.member_tables import member_tables
 from rigidsim.formats.naming import Naming
 from rigidsim.formats.registry import Format, TableSource, format_named
-from rigidsim.formats.tables import BLOCK_NUMBERS, Table, tables_of
+from rigidsim.formats.tables import BLOCK_NUMBERS, tables_of
 from rigidsim.scene.arithmetic import working_bits
 from rigidsim.store import atomic
 from rigidsim.store.run import SavedRun
@@ -73,16 +72,13 @@ def export(
         _refuse_for_sweeps(saved, file_format, naming)
         opened = saved.dataset
     with opened as dataset:
-        tables: Sequence[Table]
-        if isinstance(saved, SavedRun):
-            bits = _bits(dataset)
-            tables = tables_of(dataset, unit, bits)
-        else:
-            bits = _bits_of_members(dataset)
-            tables = member_tables(dataset, unit, bits, block_numbers)
+        bits = _bits(dataset) if isinstance(saved, SavedRun) else _bits_of_members(dataset)
+        first, *others = tables_of(dataset, unit, bits, block_numbers)
         attributes = dict(dataset.attrs, status=saved.status)
         source = TableSource(name, bits, attributes, naming or Naming(), unit)
-        kept = {_beside(target, table): table for table in (tables if found.side_tables else tables[:1])}
+        kept = {target: first}
+        if found.side_tables:
+            kept |= {target.with_name(f"{target.stem}.{t.dim}{target.suffix}"): t for t in others}
         for path in kept:
             _refuse_existing(path, found, force)
         for path, table in kept.items():
@@ -128,13 +124,6 @@ def _bits_of_members(dataset: xarray.Dataset) -> int:
     if chosen or any(key.startswith("integrator") for key in axes):
         return _PART_BITS * max(len(parts_in(dataset, str(name))) for name in dataset.data_vars)
     return working_bits(integrator.precision)
-
-
-def _beside(target: Path, table: Table) -> Path:
-    """File of a table; that of samples, or of members, is the target itself."""
-    return (
-        target if table.dim == table.main else target.with_name(f"{target.stem}.{table.dim}{target.suffix}")
-    )
 
 
 def _refuse_existing(path: Path, found: Format, force: bool) -> None:

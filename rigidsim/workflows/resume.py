@@ -11,7 +11,7 @@ import numpy as np
 
 from rigidsim.errors import FORCE, RunFolderError, either
 from rigidsim.model.load import Load
-from rigidsim.scene.config import Experiment, Overrides, has_earlier_settings, parse, parse_earlier
+from rigidsim.scene.config import Experiment, Overrides, parse
 from rigidsim.scene.python_values import assignments_of
 from rigidsim.scene.scene import build_scene
 from rigidsim.scene.toml_text import assignments
@@ -32,7 +32,6 @@ from rigidsim.store.seal import check_seal
 from rigidsim.store.segments import Chain, read_chain
 from rigidsim.store.summary import Summary
 from rigidsim.store.summary_parts import Caution, WarningCode
-from rigidsim.store.variables import SCHEMA_VERSION
 from rigidsim.workflows.certify import certified
 from rigidsim.workflows.embedded import as_begun, embedded, text_difference
 
@@ -152,19 +151,7 @@ def _config(folder: RunFolder, overrides: Sequence[str]) -> Experiment:
         text = folder.config.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
         raise RunFolderError(f"{folder.config}: can't be read ({error})") from None
-    finished = folder.dataset.exists() and not folder.segments.exists()
-    first = folder.dataset if finished else min(folder.segments.glob("*.h5"), default=None)
-    try:
-        earlier = first is not None and "config_given" not in root_attributes(first)
-    except RunFolderError:
-        first, earlier = None, False
-    if first is None and has_earlier_settings(text):
-        raise RunFolderError(
-            f"{folder.config}: ends with #:set comments, in which an earlier version kept what --set had "
-            "replaced, and nothing was saved that says so; write the values into their tables, remove the "
-            f"comments, and run it again with {FORCE}"
-        )
-    return (parse_earlier if earlier else parse)(text, source=str(folder.config))
+    return parse(text, source=str(folder.config))
 
 
 def _guarded(experiment: Experiment, overrides: Sequence[str]) -> Experiment:
@@ -254,13 +241,6 @@ def _compared(prepared: InitialValueProblem, chain: Chain) -> str:
     """Differences in versions or machine from the run's beginning; empty if there are none."""
     last = chain.paths[-1]
     saved = read_attributes(last)
-    version, oldest = saved.schema_version, 3 if prepared.holds_invariants else 2
-    oldest = oldest if prepared.scene.epoch is None else 4
-    if not oldest <= version <= SCHEMA_VERSION:
-        raise RunFolderError(
-            f"{last}: has schema version {version}; only runs of versions {oldest} to {SCHEMA_VERSION} can "
-            "be resumed; begin a new run"
-        )
     now = attributes_now(prepared, assemble(prepared), chain.run)
     for name, then, value in saved.changed(Use.SYSTEM, now):
         raise RunFolderError(f"{last}: cannot be resumed from: its {name} is {then}, now {value}")

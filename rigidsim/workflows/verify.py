@@ -21,7 +21,7 @@ from rigidsim.store.folder import RunFolder, find_run
 from rigidsim.store.netcdf import root_attributes
 from rigidsim.store.reader import open_dataset
 from rigidsim.store.run import Run, open_run
-from rigidsim.store.seal import check_seal, read_seal
+from rigidsim.store.seal import check_seal
 from rigidsim.store.summary import Brief, Summary
 from rigidsim.store.summary_parts import Claim
 from rigidsim.workflows.embedded import as_begun, embedded, text_difference
@@ -108,13 +108,13 @@ def verify(path: str | Path, *, observer: Observer | None = None) -> Verdict:
             raise KeyboardInterrupt
         if not again.folder.dataset.exists():
             raise RunFolderError(f"{dataset}: the second run {again.outcome.message}; nothing was compared")
-        differing, first, samples = _compare(dataset, again.folder.dataset, saved.schema_version)
+        differing, first, samples = _compare(dataset, again.folder.dataset)
         now = read_attributes(again.folder.dataset)
     if folder is not None and not folder.summary.exists():
         problems.append(f"{folder.summary}: is missing; it was written with the dataset")
     elif folder is not None:
         claimed = folder.read_summary()
-        problems += _summary_problems(claimed, again.outcome, folder, saved.schema_version)
+        problems += _summary_problems(claimed, again.outcome, folder)
         problems += _timeline_problems(claimed, folder)
     for name, then, value in saved.changed(Use.SETTING, now):
         problems.append(f"{name} is {then} in the dataset, {value} when run again")
@@ -149,8 +149,7 @@ def _file_problems(dataset: Path, folder: RunFolder | None) -> list[str]:
     """Faults that the files themselves show, before anything is integrated."""
     problems = []
     try:
-        if read_seal(dataset) is not None or root_attributes(dataset).get("schema_version", 1) > 1:
-            check_seal(dataset)
+        check_seal(dataset)
     except RunFolderError as error:
         problems.append(error.for_command_line())
     if folder is None:
@@ -169,7 +168,7 @@ def _file_problems(dataset: Path, folder: RunFolder | None) -> list[str]:
     return problems
 
 
-def _compare(saved: Path, again: Path, version: int) -> tuple[list[str], Difference | None, int]:
+def _compare(saved: Path, again: Path) -> tuple[list[str], Difference | None, int]:
     """Names of the variables that differ, the earliest difference, and the number of samples."""
     differing: list[str] = []
     earliest: Difference | None = None
@@ -177,8 +176,6 @@ def _compare(saved: Path, again: Path, version: int) -> tuple[list[str], Differe
     with open_dataset(saved, **stored) as one, open_dataset(again, **stored) as other:
         names = {str(n) for file in (one, other) for n, v in file.variables.items() if v.dtype.kind == "f"}
         for name in sorted(names):
-            if name not in one.variables and _recorded_since(name, other[name], version):
-                continue
             known = name in one.variables and name in other.variables
             if not known or one[name].shape != other[name].shape:
                 differing.append(name)
@@ -195,14 +192,6 @@ def _compare(saved: Path, again: Path, version: int) -> tuple[list[str], Differe
         return differing, earliest, one.sizes["time"]
 
 
-def _recorded_since(name: str, variable: xarray.DataArray, version: int) -> bool:
-    """Whether a dataset of an earlier schema version lacks a variable because no run recorded it then: dates
-    (residuals name what they belong to), and corrections put back along time.
-    """
-    date = "time_scale" in variable.attrs or variable.attrs.get("residual_of") == "julian_date"
-    return (date and version < 4) or ("put_back_of" in variable.attrs and version < 3)
-
-
 def _first_difference(name: str, one: xarray.DataArray, other: xarray.DataArray) -> Difference | None:
     for first in range(0, one.shape[0] if one.ndim else 1, _ROWS_AT_ONCE):
         rows: Any = slice(first, first + _ROWS_AT_ONCE) if one.ndim else ()
@@ -215,13 +204,13 @@ def _first_difference(name: str, one: xarray.DataArray, other: xarray.DataArray)
     return None
 
 
-def _summary_problems(saved: Brief, again: Brief, folder: RunFolder, version: int) -> list[str]:
+def _summary_problems(saved: Brief, again: Brief, folder: RunFolder) -> list[str]:
     """The first claim of a summary that running again doesn't confirm, in words; empty if all hold."""
     if not isinstance(saved, Summary):
         return []  # a run that was killed claims nothing
     # once there is a dataset, an interruption can only have hit its timeline or its segments' removal
     ended = saved.status != Status.INTERRUPTED.value
-    claims = (_claims(summary, version, ended=ended) for summary in (saved, again))
+    claims = (_claims(summary, ended=ended) for summary in (saved, again))
     found = list(_differences("", *claims))
     if not found:
         return []
@@ -229,24 +218,21 @@ def _summary_problems(saved: Brief, again: Brief, folder: RunFolder, version: in
     return [f"{folder.summary}: says that {found[0]}{more}"]
 
 
-def _claims(part: BaseModel, version: int, *, ended: bool) -> dict[str, Any]:
-    """The fields marked as claims, in this part and in parts within, as plain values; an older summary lacks
-    some.
-    """
+def _claims(part: BaseModel, *, ended: bool) -> dict[str, Any]:
+    """The fields marked as claims, in this part and in parts within, as plain values."""
     found: dict[str, Any] = {}
     given = part.model_dump(mode="json", exclude_unset=True)
     for name in (n for n in type(part).model_fields if n in given):
         marks = type(part).model_fields[name].metadata
         claim, value = next((m for m in marks if isinstance(m, Claim)), None), getattr(part, name)
         if claim is not None:
-            known = not claim.beside or claim.beside in given
-            if known and version >= claim.since and (ended or not claim.of_end):
+            if ended or not claim.of_end:
                 found[name] = given[name]
         elif isinstance(value, BaseModel):
-            found[name] = _claims(value, version, ended=ended)
+            found[name] = _claims(value, ended=ended)
         elif isinstance(value, dict):
             parts = {key: item for key, item in value.items() if isinstance(item, BaseModel)}
-            found[name] = {key: _claims(item, version, ended=ended) for key, item in parts.items()}
+            found[name] = {key: _claims(item, ended=ended) for key, item in parts.items()}
     return found
 
 
@@ -276,9 +262,7 @@ def _short(value: Any) -> str:
 
 
 def _timeline_problems(saved: Brief, folder: RunFolder) -> list[str]:
-    """Problems with the timeline that a summary names, if it is missing or changed; older summaries name
-    none.
-    """
+    """Problems with the timeline that a summary names, if it is missing or changed."""
     if not isinstance(saved, Summary) or saved.timeline_sha256 is None:
         return []
     if not folder.timeline.is_file() or folder.timeline.is_symlink():

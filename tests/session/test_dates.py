@@ -6,18 +6,16 @@ import warnings
 from fractions import Fraction
 from pathlib import Path
 
-import h5py
 import numpy as np
 import pytest
 import xarray
 from support import EAGER, config, run_text
 
 import rigidsim
-from rigidsim import ConfigError, RunFolderError
+from rigidsim import ConfigError
 from rigidsim.scene.epochs import parse_epoch
 from rigidsim.session.dataset import refuse_taken_names
 from rigidsim.solve.problem import prepare
-from rigidsim.store.seal import seal
 
 FLYBY = parse_epoch("2029-04-13T21:46:00 TDB")
 J2000 = Fraction(2451545)
@@ -85,35 +83,6 @@ def test_a_run_with_an_epoch_has_its_dates_as_coordinates(tmp_path: Path) -> Non
     with cut.opened(indexed=False) as bare:
         assert not bare.xindexes
     assert rigidsim.verify(run.folder.path).identical
-
-
-def as_of_schema_3(folder: Path) -> None:
-    """What an earlier version would have written of the same run."""
-    dataset, checkpoint = folder / "dataset.h5", folder / "checkpoint.h5"
-    with h5py.File(dataset, "r+") as file:
-        file.attrs["schema_version"] = 3
-        for name in [n for n in file if "time_scale" in file[n].attrs]:
-            base = name.removesuffix("_lo")
-            del file[name]
-            assert base.endswith(("year", "julian_date", "date"))
-        for name in [n for n in file if n.endswith("julian_date_lo")]:
-            del file[name]
-    previous, _ = seal(dataset)
-    with h5py.File(checkpoint, "r+") as file:
-        file.attrs["previous_seal"], file.attrs["schema_version"] = previous, 3
-    seal(checkpoint)
-    (folder / "summary.json").unlink()
-
-
-def test_earlier_runs_with_an_epoch_lack_dates_and_nothing_else(tmp_path: Path) -> None:
-    """They verify; they can't be resumed, since half of the result would have dates."""
-    text = config(time='end = 2\nsamples = 9\nepoch = "J2000"', more=FLIP)
-    run = run_text(text, out=tmp_path)
-    as_of_schema_3(run.folder.path)
-    verdict = rigidsim.verify(run.folder.dataset)
-    assert (verdict.differing, verdict.samples) == ([], 9)
-    with pytest.raises(RunFolderError, match=r"only runs of versions 4 to"):
-        rigidsim.resume(run.folder.path, until="3")
 
 
 @pytest.mark.parametrize(

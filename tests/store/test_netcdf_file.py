@@ -1,11 +1,9 @@
-"""What h5py writes is what the netCDF libraries take for their own."""
+"""What is written is what the netCDF libraries take for their own."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
-import h5py
 import netCDF4
 import numpy as np
 import pytest
@@ -59,65 +57,3 @@ def test_every_library_reads_dimensions_values_and_attributes(path: Path) -> Non
             np.testing.assert_array_equal(dataset.rates.sel(axis="y"), VALUES[:, 1])
             np.testing.assert_array_equal(dataset.event_rates, VALUES[:2])
             assert dataset.nothing.shape == (0, 3)
-
-
-def test_it_is_what_h5netcdf_writes(path: Path, tmp_path: Path) -> None:
-    """Types, spaces, layouts and attributes of everything in it, but the writer's name."""
-    import h5netcdf
-
-    other = tmp_path / "other.h5"
-    with h5netcdf.File(other, "w") as file:
-        file.attrs.update({"title": "a text, grüße", "empty": "", "count": 3, "size": 0.1})
-        file.attrs["many"] = np.array([1.0, 2.5])
-        file.dimensions = {"time": 10, "axis": 3}
-        names = file.create_variable("axis", ("axis",), h5py.string_dtype())
-        names[...] = np.array(["x", "y", "z"], dtype=object)
-        names.attrs["long_name"] = "an axis"
-        options = {"compression": "gzip", "compression_opts": 4, "shuffle": True}
-        time = file.create_variable("time", ("time",), "<f8", chunks=(4,), **options)
-        time[...] = VALUES[:, 0]
-        time.attrs["units"] = "s"
-        rates = file.create_variable("rates", ("time", "axis"), "<f8", chunks=(4, 3), **options)
-        rates[...] = VALUES
-        rates.attrs["units"] = "rad s-1"
-        file.dimensions["event"] = 2
-        file.create_variable("event_rates", ("event", "axis"), "<f8")[...] = VALUES[:2]
-        file.dimensions["none"] = 0
-        file.create_variable("nothing", ("none", "axis"), "<f8", chunks=(1024, 3)).attrs["event"] = "none"
-    found, expected = structure(path), structure(other)
-    assert sorted(found) == sorted(expected)
-    for name in set(expected) - {"nothing"}:  # h5netcdf gives it no _Netcdf4Dimid, netCDF's own library does
-        assert found[name] == expected[name], name
-
-
-def structure(path: Path) -> dict[str, Any]:
-    """Each object's type, extent, layout and filters, and its attributes' types, extents and values."""
-    with h5py.File(path, "r") as file:
-        return {"/": _attributes(file), **{name: _object(file[name]) for name in file}}
-
-
-def _object(dataset: h5py.Dataset) -> tuple[Any, ...]:
-    how = dataset.id.get_create_plist()
-    filters = [how.get_filter(number)[:3] for number in range(how.get_nfilters())]
-    return (
-        *(dataset.dtype, dataset.shape, dataset.maxshape, dataset.chunks, filters),
-        *(how.get_attr_creation_order(), how.get_obj_track_times(), how.fill_value_defined()),
-        _attributes(dataset),
-    )
-
-
-def _attributes(owner: Any) -> list[tuple[Any, ...]]:
-    found = []
-    for name in sorted(set(owner.attrs) - {"_NCProperties"}):
-        of = owner.attrs.get_id(name)
-        kind = of.get_type()
-        text = (kind.is_variable_str(), kind.get_cset()) if isinstance(kind, h5py.h5t.TypeStringID) else None
-        value: Any = owner.attrs[name]
-        if name == "DIMENSION_LIST":
-            value = [[owner.file[reference].name for reference in axis] for axis in value]
-        elif name == "REFERENCE_LIST":
-            value = sorted((owner.file[reference].name, int(axis)) for reference, axis in value)
-        found.append(
-            (name, str(of.dtype), text, of.get_space().get_simple_extent_type(), of.shape, repr(value))
-        )
-    return found

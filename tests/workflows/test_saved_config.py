@@ -1,17 +1,14 @@
-"""What was run stands in a run's config; what was given is known beside it; older folders go on."""
+"""What was run stands in a run's config; what was given is known beside it."""
 
 from __future__ import annotations
 
-import io
 from pathlib import Path
 
-import h5py
 import pytest
-from support import IMPATIENT, config, loaded, same_bits
+from support import IMPATIENT, config, loaded
 
 import rigidsim
 from rigidsim import RunFolderError
-from rigidsim.store import seal
 from rigidsim.workflows.embedded import embedded
 
 TEXT = config(time="end = 10 # long\nevery = 0.5", more="# the end", name="cut")
@@ -27,31 +24,6 @@ def guarded(text: str, out: Path) -> rigidsim.Run:
 def whole(tmp_path_factory: pytest.TempPathFactory) -> rigidsim.Run:
     experiment = rigidsim.parse(TEXT, overrides=[*SETTINGS, "limits.max_steps=100000"])
     return rigidsim.run(experiment, out=tmp_path_factory.mktemp("whole"))
-
-
-def made_earlier(file: Path, text: str) -> None:
-    """The file as the first version wrote it: settings in comments of the embedded config."""
-    content = file.read_bytes()
-    file.write_bytes(content[: -len(seal.sealed(io.BytesIO()))])
-    with h5py.File(file, "r+") as opened:
-        del opened.attrs["config_given"], opened.attrs["config_set"]
-        opened.attrs.modify("config", text)
-    seal.seal(file)
-
-
-def earlier_text(*more: str) -> str:
-    lines = [*SETTINGS, "limits.max_steps=20", *more]
-    return TEXT.rstrip("\n") + "\n" + "".join(f"#:set {line.strip()}\n" for line in lines)
-
-
-@pytest.fixture
-def earlier(tmp_path: Path) -> rigidsim.Run:
-    """A run that a guard of the first version stopped."""
-    run = guarded(TEXT, tmp_path / "earlier")
-    (segment,) = run.folder.segments.iterdir()
-    made_earlier(segment, earlier_text())
-    run.folder.config.write_text(earlier_text())
-    return run
 
 
 def test_the_folder_says_what_was_run_and_the_dataset_what_was_given(whole: rigidsim.Run) -> None:
@@ -90,27 +62,3 @@ def test_an_earlier_end_is_no_prolonging(tmp_path: Path) -> None:
         rigidsim.resume(run.folder.path)
     run.folder.config.write_text(text.replace("end = 60", "end = 65"))
     assert loaded(rigidsim.resume(run.folder.path, overrides=["limits.max_steps=100000"])).time[-1] == 65
-
-
-def test_a_folder_of_the_first_version_is_resumed(earlier: rigidsim.Run, whole: rigidsim.Run) -> None:
-    done = rigidsim.resume(earlier.folder.path, overrides=["limits.max_steps=100000"], tuning=IMPATIENT)
-    same_bits(done, whole)
-    assert "#:set" not in done.folder.config.read_text()
-    assert loaded(done).attrs["config"] == done.folder.config.read_text()
-    assert rigidsim.verify(done.folder.path).identical
-
-
-def test_a_prolonged_folder_of_the_first_version_is_resumed(earlier: rigidsim.Run) -> None:
-    """Its later end stood in comments of config.toml alone when it was killed."""
-    earlier.folder.config.write_text(earlier_text("time.end=70"))
-    done = rigidsim.resume(earlier.folder.path, overrides=["limits.max_steps=100000"])
-    assert loaded(done).time[-1] == 70
-    assert "end = 70 # long" in done.folder.config.read_text()
-
-
-def test_a_dataset_of_the_first_version_is_verified(whole: rigidsim.Run, tmp_path: Path) -> None:
-    kept = tmp_path / "kept.h5"
-    kept.write_bytes(whole.folder.dataset.read_bytes())
-    made_earlier(kept, earlier_text())
-    assert rigidsim.verify(kept).identical
-    assert "end = 60 # long" in embedded(kept).text

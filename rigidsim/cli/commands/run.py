@@ -7,7 +7,7 @@ import rigidsim.workflows.run as workflow
 from rigidsim.cli.screens.page import print_json
 from rigidsim.cli.screens.summary import print_summary
 from rigidsim.errors import RigidsimError
-from rigidsim.scene.config import Experiment, has_earlier_settings
+from rigidsim.scene.config import Experiment
 from rigidsim.scene.scene import build_scene
 from rigidsim.session import progress
 from rigidsim.session.understood import cautions_about, cautions_of
@@ -35,13 +35,6 @@ def run(
         experiments = [sweeps.single_member(experiment, member or 0) for experiment in experiments]
     if not experiments:
         raise RigidsimError("run: give a CONFIG, or --from a dataset; rigidsim run --help shows an example")
-    for experiment in experiments:
-        if has_earlier_settings(experiment.given):
-            print(
-                f"rigidsim: {experiment.source}: #:set comments at its end set nothing (an earlier version "
-                "kept there what --set had replaced); write the values where their keys stand",
-                file=sys.stderr,
-            )
     worst = 0
     for experiment in experiments:
         _warn(experiment)
