@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from rigidsim.scene.sweeps.sweep import Sweep
@@ -12,10 +10,6 @@ from rigidsim.store.sweeps.gathered import Gathered, TileReader
 from rigidsim.store.sweeps.run import ErrorsOfMembers, SweepCost, SweepSummary
 from rigidsim.store.sweeps.sources import ALWAYS, Sources
 
-_NOT_ESTIMATED = (
-    "errors of the attitude aren't estimated of {:,} members, which an earlier version ran in batches (their "
-    "attitude_error is nan): rigidsim run CONFIG --member N estimates one, --force runs all of them again"
-)
 _ERRORS = {
     "attitude": ("attitude_error", "rad"),
     "position": ("position_error", "m"),
@@ -26,32 +20,40 @@ _ERRORS = {
 """Announced errors of members: their variables and units."""
 
 
-@dataclass
-class _Counted:
-    """Counts over all members."""
-
-    outcomes: np.ndarray
-    warned: np.ndarray
-    steps: int
-    unestimated: int
-    worst: dict[str, float]
-    errors: dict[str, ErrorsOfMembers]
-
-
 def summary_of(
     wanted: Sweep, sources: Sources, reader: TileReader, found: Gathered, wall: float, cpu: float
 ) -> SweepSummary:
     """Contents of ``summary.json`` for a complete sweep; seconds of this process."""
-    counted = _count(sources, reader)
-    outcomes = {OUTCOMES[i]: int(n) for i, n in enumerate(counted.outcomes) if n}
+    ended_as, warned_of = np.zeros(len(OUTCOMES), dtype=np.int64), np.zeros(len(WARNINGS), dtype=np.int64)
+    steps = 0
+    worst: dict[str, float] = {}
+    estimated: dict[str, list[np.ndarray]] = {name: [] for name in _ERRORS}
+    always = sources.found[ALWAYS]
+    order = np.argsort(always.tile, kind="stable")
+    edges = np.flatnonzero(np.diff(always.tile[order])) + 1
+    for group in np.split(order, edges):
+        tile = reader.tile(int(always.tile[group[0]]))
+        rows = always.row[group]
+        ended_as += np.bincount(tile.arrays["status"][rows], minlength=len(OUTCOMES))
+        bits = tile.arrays["warnings"][rows]
+        warned_of += np.array([int((bits >> bit & 1).sum()) for bit in range(len(WARNINGS))])
+        steps += int(tile.arrays["steps"][rows].sum())
+        for name, seen in estimated.items():
+            if (variable := _ERRORS[name][0]) in tile.arrays:
+                values = tile.arrays[variable][rows]
+                seen.append(values[~np.isnan(values)])
+        for name, values in tile.arrays.items():
+            if name.endswith("_drift_largest"):
+                largest = np.nanmax(values[rows], initial=0.0)
+                drift = name.removesuffix("_largest")
+                worst[drift] = max(worst.get(drift, 0.0), float(largest))
+    outcomes = {OUTCOMES[i]: int(n) for i, n in enumerate(ended_as) if n}
     failing = wanted.count - sum(outcomes.get(status, 0) for status in ENDED_WELL)
-    warned = {WARNINGS[i]: int(n) for i, n in enumerate(counted.warned) if n}
+    warned = {WARNINGS[i]: int(n) for i, n in enumerate(warned_of) if n}
     warnings = {code: f"{number:,} members are warned of: {code}" for code, number in warned.items()}
     if failing:
         said = f"{failing:,} members didn't end well; failed_member and failed_reason say which"
         warnings = {"members_failed": said, **warnings}
-    if counted.unestimated:
-        warnings["attitude_not_estimated"] = _NOT_ESTIMATED.format(counted.unestimated)
     engines: dict[str, int] = {}
     for made in found.made:
         for engine, number in made["engines"].items():
@@ -82,7 +84,7 @@ def summary_of(
         engines=engines,
         why_alone=next((made["why_alone"] for made in found.made if made.get("why_alone")), None),
         cost=SweepCost(
-            steps=counted.steps,
+            steps=steps,
             cpu_seconds=sum(made["cpu_seconds"] for made in found.made),
             wall_seconds_of_tiles=sum(made["wall_seconds"] for made in found.made),
             tiles=len(found.made),
@@ -90,48 +92,18 @@ def summary_of(
             session_wall_seconds=wall,
             session_cpu_seconds=cpu,
         ),
-        largest_drifts=counted.worst,
-        estimated_errors=counted.errors,
+        largest_drifts=worst,
+        estimated_errors={
+            name: ErrorsOfMembers(
+                members=len(values),
+                median=float(np.median(values)),
+                largest=float(values.max()),
+                units=_ERRORS[name][1],
+            )
+            for name, parts in estimated.items()
+            if len(values := np.concatenate([np.zeros(0), *parts]))
+        },
         config_sha256=wanted.experiment.sha256,
         provenance=kinds[0] if kinds else {},
         mixed_provenance=mixed,
     )
-
-
-def _count(sources: Sources, reader: TileReader) -> _Counted:
-    outcomes, warned = np.zeros(len(OUTCOMES), dtype=np.int64), np.zeros(len(WARNINGS), dtype=np.int64)
-    steps = unestimated = 0
-    worst: dict[str, float] = {}
-    estimated: dict[str, list[np.ndarray]] = {name: [] for name in _ERRORS}
-    always = sources.found[ALWAYS]
-    order = np.argsort(always.tile, kind="stable")
-    edges = np.flatnonzero(np.diff(always.tile[order])) + 1
-    for group in np.split(order, edges):
-        tile = reader.tile(int(always.tile[group[0]]))
-        rows = always.row[group]
-        ended = tile.arrays["status"][rows]
-        outcomes += np.bincount(ended, minlength=len(OUTCOMES))
-        if tile.made.get("unestimated"):
-            well = np.isin(ended, [OUTCOMES.index(status) for status in ENDED_WELL])
-            unestimated += int((well & np.isnan(tile.arrays["attitude_error"][rows])).sum())
-        bits = tile.arrays["warnings"][rows]
-        warned += np.array([int((bits >> bit & 1).sum()) for bit in range(len(WARNINGS))])
-        steps += int(tile.arrays["steps"][rows].sum())
-        for name, found in estimated.items():
-            if (variable := _ERRORS[name][0]) in tile.arrays:
-                values = tile.arrays[variable][rows]
-                found.append(values[~np.isnan(values)])
-        for name, values in tile.arrays.items():
-            if name.endswith("_drift_largest"):
-                largest = np.nanmax(values[rows], initial=0.0)
-                drift = name.removesuffix("_largest")
-                worst[drift] = max(worst.get(drift, 0.0), float(largest))
-    told: dict[str, ErrorsOfMembers] = {}
-    for name, parts in estimated.items():
-        values = np.concatenate([np.zeros(0), *parts])
-        if len(values):
-            median, largest = float(np.median(values)), float(values.max())
-            told[name] = ErrorsOfMembers(
-                members=len(values), median=median, largest=largest, units=_ERRORS[name][1]
-            )
-    return _Counted(outcomes, warned, steps, unestimated, worst, told)
