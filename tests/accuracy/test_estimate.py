@@ -13,7 +13,6 @@ from support import run_estimated as run_text
 
 import rigidsim
 from rigidsim.accuracy.estimates.estimate import estimate_errors
-from rigidsim.accuracy.estimates.margins import Margins
 from rigidsim.accuracy.setting import Setting
 from rigidsim.accuracy.trial import try_setting
 from rigidsim.solve.assembly import assemble, sampler
@@ -206,12 +205,6 @@ def test_what_part_of_a_long_run_was_examined_is_said() -> None:
     assert " windows beyond" in accuracy["estimated_how"]
     true = true_error(run, text)
     assert true <= COVERED * accuracy["estimated_attitude_error"] <= COVERED * HONEST * true
-    whole = estimate_errors(
-        prepare(rigidsim.parse(text)), run.summary["cost"]["steps"], 12000.0, margins=Margins(all_steps=10**9)
-    )
-    assert whole is not None
-    assert whole.share == 1
-    assert whole.how.endswith(", over the run")
 
 
 def test_errors_grow_in_a_passage_that_no_beginning_shows() -> None:

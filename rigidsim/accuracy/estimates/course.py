@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from rigidsim.accuracy.estimates.margins import Margins
+from rigidsim.accuracy.estimates import margins
 from rigidsim.model.capabilities import Ahead, having, is_wide
 from rigidsim.model.formulations.formulation import Rounding
 from rigidsim.model.system import System
@@ -154,9 +154,7 @@ _WITHIN_MONTH = 4.0
 """Steps at least in a quarter of the Moon's month, as long as the body turns no slower than it revolves."""
 
 
-def ensemble_of(
-    course: Course, part: float, first: float, tolerance: float, margins: Margins
-) -> ShadowEnsemble:
+def ensemble_of(course: Course, part: float, first: float, tolerance: float) -> ShadowEnsemble:
     """The ensemble at the start of a run."""
     prepared, own = course.prepared, course.own
     precision, system = prepared.precision, prepared.system
@@ -165,7 +163,7 @@ def ensemble_of(
     follows = tolerance > TIGHT or not course.loose  # it is as loose as the run
     if own is not None and own.system.stepwise:
         carrier: EnsembleCarrier = StepperCarrier(system, course.start, course.end, course.steps, own)
-    elif own is not None and follows and _by_itself(course, own.integrator, part, tolerance, margins):
+    elif own is not None and follows and _by_itself(course, own.integrator, part, tolerance):
         carrier = OwnCarrier(system, own.integrator, tolerance if course.same_states else None)
         if course.loose:
             series = SeriesErrors(system, prepared.effective_tolerance, own.integrator)
@@ -192,19 +190,19 @@ def ensemble_of(
             np.array(units).reshape(-1, 1),
             np.zeros((0, 1)),
         ),
-        _perturbations(course, stand_in, margins),
+        _perturbations(course, stand_in),
         float(precision.epsilon),
         rounded=np.array([precision.exact(precision.number(x)) != x for x in system.initial]),
         series=None if series is None else series.of_step,
     )
 
 
-def _by_itself(course: Course, own: TaylorEngine, part: float, tolerance: float, margins: Margins) -> bool:
+def _by_itself(course: Course, own: TaylorEngine, part: float, tolerance: float) -> bool:
     """Whether the run's own integrator carries its ensemble, at least at first."""
     if tolerance <= TIGHT or (part < 1 and not course.same_states):
-        return course.steps * part < margins.most_own_steps
+        return course.steps * part < margins.MOST_OWN_STEPS
     if course.prepared.system.formulation.rounding is Rounding.MOMENTA:
-        return course.steps * part <= margins.canonical_steps
+        return course.steps * part <= margins.CANONICAL_STEPS
     return course.same_states or course.steps * part < own_until(own)
 
 
@@ -217,34 +215,34 @@ def plain_perturbations(system: System) -> Perturbations:
     return replace(plain, clock=_OF_SERIES * plain.clock, together=_WITHIN_MONTH)
 
 
-def _perturbations(course: Course, stand_in: bool, margins: Margins) -> Perturbations:
+def _perturbations(course: Course, stand_in: bool) -> Perturbations:
     """Errors of a step."""
     prepared = course.prepared
     plain, rounding = plain_perturbations(prepared.system), prepared.system.formulation.rounding
     if prepared.system.stepwise and course.loose:
         plain = replace(
-            plain, own=margins.cut_off * prepared.effective_tolerance / float(prepared.precision.epsilon)
+            plain, own=margins.CUT_OFF * prepared.effective_tolerance / float(prepared.precision.epsilon)
         )
     if prepared.system.clocked and acts_at_moments_alone(prepared.scene):
         plain = replace(plain, clock=0.0)
     if rounding is Rounding.PLAIN:
         return plain
-    series = margins.angle_series
+    series = margins.ANGLE_SERIES
     if prepared.system.clocked:
         # steps are relative to the largest state, which angles are until they are brought back into one turn;
         # where the few steps through a spike decide, nothing averages that
         turned = float(prepared.system.rate_bound) * (course.end - course.start) / max(course.steps, 1)
         series *= 2 * math.pi + STEPS_BETWEEN * math.ldexp(turned, prepared.system.scaling.time)
-    angles = replace(plain, own=plain.own * margins.angles, series=series)
+    angles = replace(plain, own=plain.own * margins.ANGLES, series=series)
     if rounding is Rounding.ANGLES:
         return angles
     # momenta: the nearer the singularity, the more do they lose in passing it
-    more = min(max(margins.near / max(course.nearest, 1e-150), 1.0), margins.angles)
-    more *= max(1.0, min(margins.very_near / max(course.nearest, 1e-150), 10.0))
+    more = min(max(margins.NEAR / max(course.nearest, 1e-150), 1.0), margins.ANGLES)
+    more *= max(1.0, min(margins.VERY_NEAR / max(course.nearest, 1e-150), 10.0))
     carried = replace(angles, own=plain.own * more)
     if not stand_in:
         return carried
-    return replace(carried, shared=plain.own * _condition(course), series=margins.momentum_series)
+    return replace(carried, shared=plain.own * _condition(course), series=margins.MOMENTUM_SERIES)
 
 
 def _condition(course: Course) -> float:

@@ -14,8 +14,8 @@ from collections.abc import Callable
 
 import numpy as np
 
+from rigidsim.accuracy.estimates import margins
 from rigidsim.accuracy.estimates.course import Course, Followed, ensemble_of, power_of_time
-from rigidsim.accuracy.estimates.margins import Margins
 from rigidsim.accuracy.models.carrying import carrying
 from rigidsim.accuracy.models.side_by_side import Unmeasured
 from rigidsim.errors import ConfigError
@@ -43,55 +43,53 @@ quarters: (e^x - 1) / (e^(x/4) - 1) = 4^2.5.
 _SMALL = 1e-100  # rad/s: errors that stay small however they grow
 
 
-def follow(course: Course, margins: Margins, go_on: Callable[[], bool]) -> Followed:
+def follow(course: Course, go_on: Callable[[], bool]) -> Followed:
     """Follow a run's shadow ensemble."""
     with borrowed(course.stepper):
-        return _follow_as_needed(course, margins, go_on)
+        return _follow_as_needed(course, go_on)
 
 
-def _follow_as_needed(course: Course, margins: Margins, go_on: Callable[[], bool]) -> Followed:
-    part = min(1.0, _affordable(course, margins) / max(course.steps, 1))
-    if part < 1 and not _waypoints(course, part, margins):
-        part = max(part, min(1.0, margins.all_steps / course.steps))
-    if part < 1 and _power_of_slow_motion(course, go_on) > margins.most_power:
+def _follow_as_needed(course: Course, go_on: Callable[[], bool]) -> Followed:
+    part = min(1.0, _affordable(course) / max(course.steps, 1))
+    if part < 1 and not _waypoints(course, part):
+        part = max(part, min(1.0, margins.ALL_STEPS / course.steps))
+    if part < 1 and _power_of_slow_motion(course, go_on) > margins.MOST_POWER:
         part = 1.0
-    found, tight = _follow_loosely(course, part, margins, go_on)
+    found, tight = _follow_loosely(course, part, go_on)
     if found.windows and found.spread.whole[0] and not course.same_states and go_on():
         # what sets in between windows, or shows in none: quaternions follow it, which lose less than momenta
-        twin = _follow_loosely(course, _affordable_by_twin(course, margins), margins, go_on)
+        twin = _follow_loosely(course, _affordable_by_twin(course), go_on)
         spread = twin[0].spread
-        if course.suspicious(spread, course.start, margins.most_power):
+        if course.suspicious(spread, course.start, margins.MOST_POWER):
             found, tight = twin
-    if not tight and go_on() and _drifted(course, found.spread, margins):
-        found, *_ = _follow(course, 1.0, TIGHT, margins, go_on)
+    if not tight and go_on() and _drifted(course, found.spread):
+        found, *_ = _follow(course, 1.0, TIGHT, go_on)
     return found
 
 
-def _drifted(course: Course, spread: Spread, margins: Margins) -> bool:
+def _drifted(course: Course, spread: Spread) -> bool:
     """Whether errors grow so much that a motion is to be followed tightly, but not so that all is lost."""
     largest = course.leading(spread).max(initial=0.0)
-    if not (spread.whole[0] and course.steps < margins.tight_steps):
+    if not (spread.whole[0] and course.steps < margins.TIGHT_STEPS):
         return False
-    if not margins.drifted < largest < margins.gone * course.lost:
+    if not margins.DRIFTED < largest < margins.GONE * course.lost:
         return False
-    return course.suspicious(spread, course.start, margins.most_power)
+    return course.suspicious(spread, course.start, margins.MOST_POWER)
 
 
-def _follow_loosely(
-    course: Course, part: float, margins: Margins, go_on: Callable[[], bool]
-) -> tuple[Followed, bool]:
+def _follow_loosely(course: Course, part: float, go_on: Callable[[], bool]) -> tuple[Followed, bool]:
     """As ``_follow``, as loosely as the motion bears: code of a lower order takes less time to compile and to
     run. What isn't the run's motion any more, or can't be held against it and shows growth, is followed anew.
     """
     if not _can_be_checked(course, part):
-        return _follow(course, part, TOLERANCE, margins, go_on)[:2]
-    found, tight, astray = _follow(course, part, LOOSE, margins, go_on)
+        return _follow(course, part, TOLERANCE, go_on)[:2]
+    found, tight, astray = _follow(course, part, LOOSE, go_on)
     if not course.same_states:
-        astray = not tight and course.suspicious(found.spread, course.start, margins.most_power)
+        astray = not tight and course.suspicious(found.spread, course.start, margins.MOST_POWER)
     if astray and go_on():
-        by_itself = course.own is not None and not course.loose and course.steps < margins.most_anew
-        tightly = by_itself or _drifted(course, found.spread, margins)
-        found, tight, _ = _follow(course, part, TIGHT if tightly else TOLERANCE, margins, go_on)
+        by_itself = course.own is not None and not course.loose and course.steps < margins.MOST_ANEW
+        tightly = by_itself or _drifted(course, found.spread)
+        found, tight, _ = _follow(course, part, TIGHT if tightly else TOLERANCE, go_on)
     return found, tight
 
 
@@ -103,45 +101,45 @@ def _can_be_checked(course: Course, part: float) -> bool:
     return not course.same_states or bool(course.waypoints.between(last / 2, last))
 
 
-def _affordable(course: Course, margins: Margins) -> float:
+def _affordable(course: Course) -> float:
     """Steps that may be followed: a fixed number whatever they cost, or a small part of the run's cost."""
     if course.prepared.system.stepwise:
-        return max(margins.switching_steps, margins.switching_share * course.steps)
-    dearer = dict(margins.dearer).get(course.prepared.precision.name)
+        return max(margins.SWITCHING_STEPS, margins.SWITCHING_SHARE * course.steps)
+    dearer = margins.DEARER.get(course.prepared.precision.name)
     if dearer is None:
         return course.steps
-    budget = margins.share * dearer * course.steps  # in steps of double precision
+    budget = margins.SHARE * dearer * course.steps  # in steps of double precision
     if course.own is not None and not course.same_states:
         canonical = course.prepared.system.formulation.rounding is Rounding.MOMENTA
-        if course.steps > (margins.canonical_steps if canonical else margins.all_steps):
+        if course.steps > (margins.CANONICAL_STEPS if canonical else margins.ALL_STEPS):
             # windows, which nothing else can look at
-            return max(margins.own_steps, budget / (PERTURBED + 1))
-    return _of_double(course, budget, margins)
+            return max(margins.OWN_STEPS, budget / (PERTURBED + 1))
+    return _of_double(course, budget)
 
 
-def _of_double(course: Course, budget: float, margins: Margins) -> float:
+def _of_double(course: Course, budget: float) -> float:
     """Steps of the run that may be followed in double precision by code that is compiled for it."""
-    passes = "x" in course.prepared.system.states and course.uneven > margins.uneven
-    least = margins.passing_steps if passes else margins.all_steps
-    more = 1.0 if course.same_states else margins.charts
-    return more * max(least, (budget - margins.unrolling) / margins.lane)
+    passes = "x" in course.prepared.system.states and course.uneven > margins.UNEVEN
+    least = margins.PASSING_STEPS if passes else margins.ALL_STEPS
+    more = 1.0 if course.same_states else margins.CHARTS
+    return more * max(least, (budget - margins.UNROLLING) / margins.LANE)
 
 
-def _affordable_by_twin(course: Course, margins: Margins) -> float:
+def _affordable_by_twin(course: Course) -> float:
     """The part of a run in double precision that its twin in quaternions may follow."""
-    return min(1.0, _of_double(course, margins.share * course.steps, margins) / course.steps)
+    return min(1.0, _of_double(course, margins.SHARE * course.steps) / course.steps)
 
 
 def _follow(
-    course: Course, part: float, tolerance: float, margins: Margins, go_on: Callable[[], bool]
+    course: Course, part: float, tolerance: float, go_on: Callable[[], bool]
 ) -> tuple[Followed, bool, bool]:
     """Follow a part of a run, and all of it where that is called for; whether it was followed tightly, and
     whether it was given up since the motion, followed loosely, isn't the run's any more.
     """
-    start, steps, power = course.start, course.steps, margins.most_power
-    waypoints = _waypoints(course, part, margins) if part < 1 else []
-    first = part * margins.beginning if waypoints else part
-    ensemble = interruptible(lambda: ensemble_of(course, part, first, tolerance, margins))
+    start, steps, power = course.start, course.steps, margins.MOST_POWER
+    waypoints = _waypoints(course, part) if part < 1 else []
+    first = part * margins.BEGINNING if waypoints else part
+    ensemble = interruptible(lambda: ensemble_of(course, part, first, tolerance))
     spread = ensemble.spread
 
     def go_to(share: float) -> bool:
@@ -158,21 +156,21 @@ def _follow(
             going = go_to(soon)
         if going:
             _prepare(ensemble, steps * (first - soon))
-    on_course = _stay_on_course(course, ensemble, first, margins, go_on)
+    on_course = _stay_on_course(course, ensemble, first, go_on)
     if on_course:
         go_to(first)
     seen: list[Spread] = []
     if first < 1 and spread.whole[0] and on_course:
-        wary = margins.wary_power if steps < margins.wary_steps else power
+        wary = margins.WARY_POWER if steps < margins.WARY_STEPS else power
         whole = course.suspicious(spread, start, wary)
         if not whole and waypoints:
             seen = _windows(course, ensemble, waypoints, part - first, go_on)
             beginnings = zip(seen, waypoints, strict=False)
             whole = any(course.suspicious(s, waypoint.time, power) for s, waypoint in beginnings)
-        for stage in (margins.stage / steps, 1.0) if whole else ():
+        for stage in (margins.STAGE / steps, 1.0) if whole else ():
             if first < stage <= 1 and not ensemble.all_lost(course.lost):
                 _prepare(ensemble, steps * (stage - first))
-                on_course = on_course and _stay_on_course(course, ensemble, stage, margins, go_on)
+                on_course = on_course and _stay_on_course(course, ensemble, stage, go_on)
                 if on_course:
                     go_to(stage)
                     first = stage
@@ -181,28 +179,28 @@ def _follow(
         reached = (float(ensemble.time[0]) - start) / (course.end - start)
         return Followed(spread, min(first, reached)), tight, not on_course
     length = (part - first) / len(waypoints) * (course.end - start)
-    least = 1.0 if course.same_states else margins.between_windows
+    least = 1.0 if course.same_states else margins.BETWEEN_WINDOWS
     more = _more(spread, start + length, seen, least)
     return Followed(spread, first, len(seen), part - first, more), tight, False
 
 
 def _stay_on_course(
-    course: Course, ensemble: ShadowEnsemble, share: float, margins: Margins, go_on: Callable[[], bool]
+    course: Course, ensemble: ShadowEnsemble, share: float, go_on: Callable[[], bool]
 ) -> bool:
     """Follow a run loosely past its waypoints until a share of it; False as soon as it is another motion."""
     loosely = isinstance(ensemble.carrier, BatchCarrier) and ensemble.carrier.tolerance == LOOSE
     if course.waypoints is None or not (loosely and course.same_states):
         return True
     there = course.waypoints.between(0, share * course.steps)
-    for waypoint in reversed(there[:: -margins.looks]):
+    for waypoint in reversed(there[:: -margins.LOOKS]):
         if waypoint.time <= ensemble.time[0]:
             continue
         spread = ensemble.follow(waypoint.time, go_on, course.lost)
         if not spread.whole[0] or ensemble.time[0] < waypoint.time:
             break  # lost, or stopped
-        grown = margins.safety * float(course.leading(spread).max(initial=0.0))
+        grown = margins.SAFETY * float(course.leading(spread).max(initial=0.0))
         own_error = float(course.prepared.precision.epsilon) * grown
-        if ensemble.away_from(waypoint.state) > margins.strayed + own_error:
+        if ensemble.away_from(waypoint.state) > margins.STRAYED + own_error:
             return False
     return True
 
@@ -211,15 +209,15 @@ def _prepare(ensemble: ShadowEnsemble, steps: float) -> None:
     interruptible(lambda: ensemble.prepare_for(steps))
 
 
-def _waypoints(course: Course, part: float, margins: Margins) -> list[Waypoint]:
+def _waypoints(course: Course, part: float) -> list[Waypoint]:
     """Where windows begin; none if the ensemble's states differ from the run's."""
     system = course.prepared.system
-    own = course.own is not None and part * course.steps < margins.most_own_steps
+    own = course.own is not None and part * course.steps < margins.MOST_OWN_STEPS
     if course.waypoints is None or system.stepwise or not (own or course.same_states):
         return []
     there = course.waypoints.between(part * course.steps, course.steps)
-    count = int(part * course.steps * (1 - margins.beginning) / margins.window)
-    count = min(count, margins.windows, len(there))
+    count = int(part * course.steps * (1 - margins.BEGINNING) / margins.WINDOW)
+    count = min(count, margins.WINDOWS, len(there))
     return [there[(2 * n + 1) * len(there) // (2 * count)] for n in range(count)]
 
 

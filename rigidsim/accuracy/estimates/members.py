@@ -16,8 +16,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from rigidsim.accuracy.estimates import margins
 from rigidsim.accuracy.estimates.course import UNCERTAIN, plain_perturbations
-from rigidsim.accuracy.estimates.margins import AS_LARGE, LABEL, LAST_BITS, MARGINS, Margins
 from rigidsim.solve.batch.family import Family, Numbers
 from rigidsim.solve.batch.run import BatchBlock
 from rigidsim.solve.batch.shadow_lanes import MemberCarrier, ShadowLanes
@@ -63,8 +63,8 @@ class MemberErrors:
 class MemberEstimates:
     """Estimates for a family's members, with what they need compiled once."""
 
-    def __init__(self, family: Family, width: int, margins: Margins = MARGINS) -> None:
-        self._traced, self._width, self._margins = family.traced, width, margins
+    def __init__(self, family: Family, width: int) -> None:
+        self._traced, self._width = family.traced, width
         self._system, self._prepared = family.traced.system, family.traced.prepared
         self._epsilon = float(self._prepared.precision.epsilon)
         self._lanes: dict[float | None, ShadowLanes] = {}
@@ -110,10 +110,10 @@ class MemberEstimates:
         )
         by_chance = self._by_chance
         spread = self._followed(starts) if by_chance else self._compared(block, some, starts)
-        label = LABEL * self._epsilon * np.maximum(abs(begin_seconds), np.abs(seconds))
+        label = margins.LABEL * self._epsilon * np.maximum(abs(begin_seconds), np.abs(seconds))
         pace = numbers.doubles(system.rate_bound)[places]
-        level = self._margins.safety * self._epsilon if by_chance else self._margins.compared
-        last, path = LAST_BITS * self._epsilon, self._margins.path if by_chance else 1.0
+        level = margins.SAFETY * self._epsilon if by_chance else margins.COMPARED
+        last, path = margins.LAST_BITS * self._epsilon, margins.PATH if by_chance else 1.0
         with np.errstate(over="ignore"):
 
             def at_end(name: str, size: np.ndarray | float, most: np.ndarray | float) -> np.ndarray:
@@ -125,8 +125,8 @@ class MemberEstimates:
             rates = at_end("rates", last, 2.0)
             extent, fastest = spread.largest("distance"), spread.largest("speed")
             moved = last * extent + np.ldexp(label, -units) * fastest
-            position = path * at_end("position", moved, AS_LARGE * extent)
-            velocity = path * at_end("velocity", last * fastest, AS_LARGE * fastest)
+            position = path * at_end("position", moved, margins.AS_LARGE * extent)
+            velocity = path * at_end("velocity", last * fastest, margins.AS_LARGE * fastest)
         length, speed = (numbers.whole_numbers(e)[places] for e in (scaling.length, scaling.speed))
         return np.array([attitude, rates, np.ldexp(position, length), np.ldexp(velocity, speed)])
 
@@ -153,7 +153,7 @@ class MemberEstimates:
         return self._lanes[tolerance]
 
     def _followed(self, starts: Starts) -> Spread:
-        margins, epsilon = self._margins, self._epsilon
+        epsilon = self._epsilon
         lost, lead = math.pi / epsilon, "attitude" if self._measures.carried else "rates"
         plain = plain_perturbations(self._prepared.system)
         errors = replace(plain, own=plain.own * max(self._prepared.effective_tolerance / epsilon, 1.0))
@@ -173,7 +173,7 @@ class MemberEstimates:
                 power = np.log(grown / early) / math.log(1 / _EARLY)
             far = (grown > _DRIFTED / tolerance) & (power > _FASTER)
             if tighter is None:
-                far &= spread.whole & (grown < margins.gone * lost) & (starts.steps < margins.tight_steps)
+                far &= spread.whole & (grown < margins.GONE * lost) & (starts.steps < margins.TIGHT_STEPS)
             again = np.flatnonzero(far | (~spread.whole & (tolerance == LOOSE)))
             if len(again):
                 anew, early[again] = through(tighter, again)
