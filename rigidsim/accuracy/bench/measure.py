@@ -14,8 +14,10 @@ from __future__ import annotations
 import math
 import random
 import statistics
+import threading
 import time
 from collections.abc import Callable, Sequence
+from concurrent.futures import Future
 from dataclasses import dataclass, field
 from enum import StrEnum
 
@@ -25,10 +27,12 @@ from rigidsim.accuracy.bench.plan import (
     DEFAULT,
     Plan,
     ReferenceSolution,
-    ReferenceThread,
+    Solutions,
     attitude_task,
+    best_reference,
     every_setting,
     make_plan,
+    reference_tasks,
 )
 from rigidsim.accuracy.bench.worker import Task, ask
 from rigidsim.accuracy.comparison import angles_between
@@ -158,16 +162,31 @@ def measure(
         settings = every_setting(plan.exact, full=full)
     rows = [Row(s) for s in dict.fromkeys([DEFAULT, *settings])]
     explored = begun + _EXPLORING * budget
-    references = ReferenceThread(experiment, plan, explored, _GRACE, wanted=reference == "best")
-    references.start()
+    integrated = _references(experiment, reference_tasks(plan, wanted=reference == "best"), explored)
     told(f"attitudes of {len(rows)} settings")
     _explore(experiment, plan, rows, budget, explored)
     told("the reference")
-    references.join()
-    found, wide = references.found({row.setting: row.attitudes for row in rows if row.measured})
+    measured = {row.setting: row.attitudes for row in rows if row.measured}
+    found, wide = best_reference(plan, integrated.result(), measured)
     told("speeds")
     done = _time(experiment, plan, rows, repeats, begun + 1.1 * budget, told)
     return Measurement(experiment, plan, rows, found, wide, done, time.monotonic() - begun)
+
+
+def _references(experiment: Experiment, tasks: Sequence[Task], deadline: float) -> Future[Solutions]:
+    """Integrate references while the settings are tried."""
+    found: Future[Solutions] = Future()
+
+    def integrate() -> None:
+        try:
+            answers = ask(experiment, tasks, deadline=deadline, first_by=time.monotonic() + _GRACE)
+            trials = {tasks[a.index].setting: a.trial for a in answers if a.problem is None}
+            found.set_result({s: trial.attitudes for s, trial in trials.items() if trial is not None})
+        except BaseException as error:  # raised in the main thread
+            found.set_exception(error)
+
+    threading.Thread(target=integrate, daemon=True).start()
+    return found
 
 
 # --- attitudes -------------------------------------------------------------------------------------------

@@ -4,14 +4,12 @@ references, integrated in a process of their own while the settings are tried.
 
 from __future__ import annotations
 
-import threading
-import time
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rigidsim.accuracy.bench.worker import Task, ask
+from rigidsim.accuracy.bench.worker import Task
 from rigidsim.accuracy.comparison import angles_between
 from rigidsim.accuracy.error_law import exact_method
 from rigidsim.accuracy.motion import run_pilot
@@ -171,58 +169,35 @@ def attitude_task(plan: Plan, setting: Setting, patience: float, *, wide: bool) 
     return Task(setting, "attitudes", times, patience)
 
 
-class ReferenceThread(threading.Thread):
-    """Integrates the references while the settings are tried (in a process of its own)."""
+def reference_tasks(plan: Plan, *, wanted: bool) -> list[Task]:
+    """What to integrate as references, beside what is measured: the closed form if there is one."""
+    if plan.exact:
+        return [attitude_task(plan, exact_to(LEAST_DIGITS, plan.exact).setting, _WITHOUT_END, wide=False)]
+    return [
+        attitude_task(plan, setting, _WITHOUT_END, wide=precision == LEAST_DIGITS)
+        for precision in (("quadruple", LEAST_DIGITS) if wanted else ())
+        for setting in best_and_second(precision)
+    ]
 
-    def __init__(
-        self, experiment: Experiment, plan: Plan, deadline: float, grace: float, *, wanted: bool
-    ) -> None:
-        super().__init__(daemon=True)
-        self._experiment, self._deadline, self._grace = experiment, deadline, grace
-        self._exact = exact_to(LEAST_DIGITS, plan.exact).setting if plan.exact else None
-        self._tasks: list[Task] = []
-        if self._exact is not None:
-            self._tasks = [attitude_task(plan, self._exact, _WITHOUT_END, wide=False)]
-        elif wanted:
-            self._tasks = [
-                attitude_task(plan, setting, _WITHOUT_END, wide=precision == LEAST_DIGITS)
-                for precision in ("quadruple", LEAST_DIGITS)
-                for setting in best_and_second(precision)
-            ]
-        self._found: dict[Setting, list[np.ndarray]] = {}
-        self._failure: BaseException | None = None
 
-    def run(self) -> None:
-        """See ``Thread``."""
-        try:
-            first_by = time.monotonic() + self._grace
-            for answer in ask(self._experiment, self._tasks, deadline=self._deadline, first_by=first_by):
-                if answer.problem is None and answer.trial is not None:
-                    self._found[self._tasks[answer.index].setting] = answer.trial.attitudes
-        except BaseException as error:  # reported in the main thread
-            self._failure = error
-
-    def found(self, measured: Solutions) -> tuple[ReferenceSolution, ReferenceSolution | None]:
-        """The reference, and a separate one for quadruple precision if needed; of what was measured over the
-        same times the best serves if there is nothing better. Raises ``RigidsimError`` if there is none.
-        """
-        if self._failure is not None:
-            raise self._failure
-        if self._exact is not None and self._exact in self._found:
-            exact = self._found[self._exact]
-            own = np.full(len(exact[0]), closed_form_error(LEAST_DIGITS))
-            how = f"closed form to {LEAST_DIGITS} digits"
-            return ReferenceSolution(self._exact, exact, own, how), None
-        wide = _best_of(LEAST_DIGITS, self._found)
-        for precision, solutions in (
-            ("quadruple", self._found), ("extended", measured), ("double", measured),
-        ):  # fmt: skip
-            best = _best_of(precision, solutions)
-            if best is not None:
-                return best, wide
-        raise RigidsimError(
-            "tradeoff: no reference could be integrated within the budget; give a larger --budget"
-        )
+def best_reference(
+    plan: Plan, integrated: Solutions, measured: Solutions
+) -> tuple[ReferenceSolution, ReferenceSolution | None]:
+    """The reference, and a separate one for quadruple precision if needed; of what was measured over the same
+    times the best serves if there is nothing better. Raises ``RigidsimError`` if there is none.
+    """
+    exact = exact_to(LEAST_DIGITS, plan.exact or DEFAULT.method).setting
+    if plan.exact and exact in integrated:
+        attitudes = integrated[exact]
+        own = np.full(len(attitudes[0]), closed_form_error(LEAST_DIGITS))
+        return ReferenceSolution(exact, attitudes, own, f"closed form to {LEAST_DIGITS} digits"), None
+    for precision in ("quadruple", "extended", "double"):
+        best = _best_of(precision, integrated if precision == "quadruple" else measured)
+        if best is not None:
+            return best, _best_of(LEAST_DIGITS, integrated)
+    raise RigidsimError(
+        "tradeoff: no reference could be integrated within the budget; give a larger --budget"
+    )
 
 
 def _best_of(precision: str | int, solutions: Solutions) -> ReferenceSolution | None:

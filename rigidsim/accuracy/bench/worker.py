@@ -11,16 +11,17 @@ are repeated until they can be told from noise. Recording costs the same in ever
 from __future__ import annotations
 
 import math
+import os
 import pickle
-import queue
 import statistics
 import subprocess
 import sys
 import tempfile
-import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
+from multiprocessing.connection import Connection
 from typing import Literal
 
 import mpmath
@@ -124,7 +125,7 @@ def _per_unit(one_pass: Callable[[int], None], count: int, most: int, patience: 
 def work() -> None:
     """Do the tasks given on stdin, answering on stdout."""
     text, source, tasks = pickle.load(sys.stdin.buffer)
-    experiment = parse(text, source=source)
+    experiment, answers = parse(text, source=source), Connection(sys.stdout.fileno(), readable=False)
     for task in tasks:
         measure = _attitudes if task.kind == "attitudes" else _speed
         try:
@@ -135,8 +136,7 @@ def work() -> None:
             found = Answer(problem=str(error))
         except (OverflowError, ZeroDivisionError, ValueError) as error:
             found = Answer(problem=f"{type(error).__name__}: {error}")
-        pickle.dump(found, sys.stdout.buffer)
-        sys.stdout.buffer.flush()
+        answers.send(found)
 
 
 # --- in the process that asks ----------------------------------------------------------------------------
@@ -151,60 +151,34 @@ def ask(
     deadline (``time.monotonic``), that of the first answer at least ``first_by``, the process is stopped, and
     the tasks that are left have no answer.
     """
+    command = [sys.executable, "-c", "from rigidsim.accuracy.bench import worker; worker.work()"]
+    pipe = subprocess.PIPE
     following = 0
     while following < len(tasks):
-        child = _Child(experiment, tasks[following:])
-        try:
-            while following < len(tasks):
-                until = deadline if following else max(deadline, first_by)
-                found = child.answers.get(timeout=max(0.0, until - time.monotonic()))
-                if found is None:
-                    break
-                yield replace(found, index=following)
+        with (
+            tempfile.TemporaryFile() as errors,
+            subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=errors) as child,
+        ):
+            assert child.stdin is not None
+            assert child.stdout is not None
+            try:
+                with suppress(BrokenPipeError), child.stdin:  # if it is gone, the end of its answers tells
+                    pickle.dump((experiment.text, experiment.source, tasks[following:]), child.stdin)
+                with Connection(os.dup(child.stdout.fileno()), writable=False) as answers:
+                    while following < len(tasks):
+                        until = deadline if following else max(deadline, first_by)
+                        if not answers.poll(max(0.0, until - time.monotonic())):
+                            return
+                        yield replace(answers.recv(), index=following)
+                        following += 1
+            except (EOFError, OSError):  # it ended, perhaps within an answer
+                code = child.wait()
+            finally:
+                child.kill()
+            if following < len(tasks):
+                errors.seek(0)
+                last = errors.read().decode(errors="replace").splitlines()[-1:]
+                words = "".join(f" ({line.strip()})" for line in last)
+                problem = f"the process that measured it ended with code {code}{words}"
+                yield Answer(problem=problem, index=following)
                 following += 1
-        except queue.Empty:
-            return
-        finally:
-            words = child.end()
-        if following < len(tasks):
-            yield Answer(problem=f"the process that measured it ended with {words}", index=following)
-            following += 1
-
-
-class _Child:
-    """A process with its tasks."""
-
-    def __init__(self, experiment: Experiment, tasks: Sequence[Task]) -> None:
-        self._errors = tempfile.TemporaryFile()  # noqa: SIM115  (closed at the end)
-        self._process = subprocess.Popen(
-            [sys.executable, "-c", "from rigidsim.accuracy.bench import worker; worker.work()"],
-            stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=self._errors,
-        )  # fmt: skip
-        self.answers: queue.Queue[Answer | None] = queue.Queue()
-        self._reader = threading.Thread(target=self._read, daemon=True)
-        self._reader.start()
-        assert self._process.stdin is not None
-        try:
-            with self._process.stdin as pipe:
-                pickle.dump((experiment.text, experiment.source, tasks), pipe)
-        except BrokenPipeError:  # it is gone already: the end of its answers tells
-            pass
-
-    def _read(self) -> None:
-        assert self._process.stdout is not None
-        try:
-            while True:
-                self.answers.put(pickle.load(self._process.stdout))
-        except (EOFError, pickle.UnpicklingError):
-            self.answers.put(None)
-
-    def end(self) -> str:
-        """Stop the process if it still runs; its exit code and the last line that it wrote on stderr."""
-        if self._reader.is_alive():
-            self._process.kill()
-        code = self._process.wait()
-        self._reader.join(timeout=5)
-        self._errors.seek(0)
-        lines = self._errors.read().decode(errors="replace").splitlines()
-        self._errors.close()
-        return f"code {code} ({lines[-1].strip()})" if lines else f"code {code}"
