@@ -12,18 +12,16 @@ from __future__ import annotations
 
 import time
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from concurrent.futures import Future
 from concurrent.futures import wait as wait_for
-from contextlib import AbstractContextManager, nullcontext
 from threading import Thread
 from typing import Any
 
 from rigidsim.errors import RigidsimError, StoppedError
-from rigidsim.scene.sweeps.sweep import Sweep
 from rigidsim.store.sweeps.generation import Generation
 from rigidsim.workflows.sweeps.members import tile_image
-from rigidsim.workflows.sweeps.ways import S, T, task
+from rigidsim.workflows.sweeps.ways import Way, task
 
 _AHEAD = 2  # tiles out for each thread
 _MOST_DEATHS = 5  # times that Dask may give a tile up, after several workers died at it each time
@@ -31,8 +29,8 @@ _LOOK_SECONDS = 5
 _TELL_SECONDS = 0.2
 
 
-class Cluster:
-    """A Dask scheduler's workers.
+class Cluster(Way):
+    """A Dask scheduler's workers, which have nothing to do for a sweep before its first tile.
 
     Args:
         address: address of the scheduler, such as ``tcp://10.0.0.1:8786``.
@@ -42,16 +40,6 @@ class Cluster:
 
     def __init__(self, address: str, patience: float = 20.0, alone: float = 120.0) -> None:
         self._address, self._patience, self._alone = address, patience, alone
-
-    def ready_for(self, sweep: Sweep) -> AbstractContextManager[object]:
-        """See ``Way``; workers that aren't this sweep's own have nothing to do for it before its first
-        tile.
-        """
-        return nullcontext()
-
-    def each(self, function: Callable[[S], T], tasks: Sequence[S]) -> Iterable[T]:
-        """See ``Way``."""
-        return map(function, tasks)
 
     def images(self, generation: Generation, tiles: Sequence[int]) -> Iterator[tuple[int, bytes]]:
         """See ``Way``.

@@ -28,7 +28,7 @@ from rigidsim.workflows.sweeps.cluster import Cluster
 from rigidsim.workflows.sweeps.members import batches_of, recording, sweep_of
 from rigidsim.workflows.sweeps.plan import refuse_untold_tiles, tile_length
 from rigidsim.workflows.sweeps.summary import summary_of
-from rigidsim.workflows.sweeps.ways import OneProcess, Way, Workers
+from rigidsim.workflows.sweeps.ways import Way, Workers
 
 
 class SweepObserver:
@@ -129,7 +129,7 @@ def _way(workers: int, scheduler: str | None) -> Way:
             "rigidsim.sweep: workers read the script again that started them, and come upon the sweep "
             'itself: put what the script does under  if __name__ == "__main__":'
         )
-    return Workers(workers) if workers > 1 else OneProcess()
+    return Workers(workers) if workers > 1 else Way()
 
 
 def run_sweep(

@@ -21,7 +21,7 @@ from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wai
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
 from pathlib import Path
-from typing import Any, Protocol, TypeVar
+from typing import Any, TypeVar
 
 from rigidsim.errors import StoppedError
 from rigidsim.scene.sweeps.sweep import Sweep
@@ -35,16 +35,24 @@ _MOST_DEATHS = 5
 _WATCH_SECONDS = 1.0
 
 
-class Way(Protocol):
-    """Computes tiles; no bit depends on which way is used."""
+def task(generation: Generation, tile: int) -> tuple[str, list[int], tuple[str, ...], bool | None]:
+    """Arguments of ``tile_image`` for a tile."""
+    work, _ = generation.work_of(tile)
+    return generation.config, generation.members_of(tile).tolist(), work.keep, generation.apart
+
+
+class Way:
+    """Computes tiles; no bit depends on which way is used. This one does in this process, one by one."""
 
     def ready_for(self, sweep: Sweep) -> AbstractContextManager[object]:
         """Get ready for a sweep's tiles, beside whatever is still to be looked at before any is computed; at
         the end of the context whatever was started is ended.
         """
+        return nullcontext()
 
     def each(self, function: Callable[[S], T], tasks: Sequence[S]) -> Iterable[T]:
         """Like ``map``, beside whatever this process does meanwhile where others can."""
+        return map(function, tasks)
 
     def images(self, generation: Generation, tiles: Sequence[int]) -> Iterator[tuple[int, bytes]]:
         """Numbers and sealed files of tiles, in any order, within the context of ``ready_for``.
@@ -53,32 +61,11 @@ class Way(Protocol):
             KeyboardInterrupt: the work was interrupted.
             RigidsimError: no more tiles can be computed.
         """
-
-
-def task(generation: Generation, tile: int) -> tuple[str, list[int], tuple[str, ...], bool | None]:
-    """Arguments of ``tile_image`` for a tile."""
-    work, _ = generation.work_of(tile)
-    return generation.config, generation.members_of(tile).tolist(), work.keep, generation.apart
-
-
-class OneProcess:
-    """Computes tiles in this process, one after the other."""
-
-    def ready_for(self, sweep: Sweep) -> AbstractContextManager[object]:
-        """See ``Way``."""
-        return nullcontext()
-
-    def each(self, function: Callable[[S], T], tasks: Sequence[S]) -> Iterable[T]:
-        """See ``Way``."""
-        return map(function, tasks)
-
-    def images(self, generation: Generation, tiles: Sequence[int]) -> Iterator[tuple[int, bytes]]:
-        """See ``Way``."""
         for tile in tiles:
             yield tile, tile_image(*task(generation, tile))
 
 
-class Workers:
+class Workers(Way):
     """``count`` worker processes that compute tiles, which this process saves."""
 
     def __init__(self, count: int) -> None:
