@@ -16,12 +16,10 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import cache
 from threading import Lock
-from typing import Any, Generic, Protocol, TypeVar
+from typing import Any, Generic, TypeVar
 
 import heyoka as hy
 import numpy as np
-
-from rigidsim.solve.precision import Scalar
 
 T = TypeVar("T")
 
@@ -37,46 +35,10 @@ DISK_LIMIT = 256 << 20
 """
 
 
-class CompiledFunction(Protocol):
-    """Function returned by ``heyoka.cfunc``; its ``llvm_states`` print what it was compiled for."""
-
-    llvm_states: Any
-
-    def __call__(self, *inputs: Any, **options: Any) -> np.ndarray:
-        """From inputs (k,) or (k, n) to outputs, in its own precision."""
-
-
-class TaylorEngine(Protocol):
-    """Integrator returned by ``heyoka.taylor_adaptive``.
-
-    Attributes:
-        time, dtime: current time, internal units; the second as two numbers whose sum it is.
-        state, pars: (states,) and parameters up to the last that is read; views that can be assigned to.
-        order, tol: order and tolerance of the Taylor series.
-        tc: (states, order + 1), Taylor coefficients of the latest step that was asked to keep them.
-        decomposition: terms of which a step's derivatives consist.
-    """
-
-    time: Scalar
-    dtime: tuple[Scalar, Scalar]
-    state: np.ndarray
-    pars: np.ndarray
-    order: int
-    tol: Scalar
-    tc: np.ndarray
-    decomposition: list[Any]
-
-    def step(self, max_delta_t: Scalar, *, write_tc: bool = False) -> tuple[Any, Scalar]:
-        """Take one step: its outcome and size."""
-
-    def propagate_until(self, t: Scalar, **options: Any) -> tuple[Any, ...]:
-        """Take many steps: outcome, smallest and largest step, their count, dense output and the callback."""
-
-    def propagate_grid(self, grid: np.ndarray, **options: Any) -> tuple[Any, ...]:
-        """Take many steps; the last item is the states at given times instead of dense output."""
-
-    def update_d_output(self, t: Scalar) -> np.ndarray:
-        """State at a time within the latest step, in a buffer that is reused."""
+CompiledFunction = Any
+"""What ``heyoka.cfunc`` returns: from inputs (k,) or (k, n) to outputs, in its own precision."""
+TaylorEngine = Any
+"""What ``heyoka.taylor_adaptive`` returns; times and states in internal units."""
 
 
 class Kept(Generic[T]):
@@ -217,26 +179,22 @@ def evaluate_rows(
     constants: np.ndarray | None = None,
     times: np.ndarray | None = None,
 ) -> np.ndarray:
-    """Evaluate a compiled function at each row of states.
+    """Values (outputs, n) of a compiled function at each row of states (n, states).
 
     In single and double precision heyoka takes rows several at a time and the rest one by one, which differs
     in the last bit. Rows are padded to whole groups there, so that a row's bits don't depend on the block
     that it came in.
 
     Args:
-        states: (n, states).
         constants: the function's parameters, (k,) for all rows or (k, n).
         times: (n,), internal units, where the function may depend on them.
-
-    Returns:
-        (outputs, n).
     """
     count = len(states)
     group = _GROUP if states.dtype in (np.float32, np.float64) else 1
     padded = -(-count // group) * group
     # compiled expressions without parameters don't accept an array of them
     arguments = {}
-    if times is not None and getattr(function, "is_time_dependent", False):
+    if times is not None and function.is_time_dependent:
         arguments["time"] = _padded(np.asarray(times, dtype=states.dtype), padded)
     if constants is not None:
         table = np.repeat(constants[:, None], padded, axis=1) if constants.ndim == 1 else constants

@@ -10,7 +10,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
 
 import heyoka as hy
 import numpy as np
@@ -200,7 +199,7 @@ def _bits(system: System, expressions: Sequence[hy.expression]) -> list[int]:
     random = np.random.default_rng(0)
     states = random.uniform(-1.0, 1.0, (STATES, len(system.states)))
     states[0] = [float(x) for x in system.initial]
-    compiled: Any = compiled_function(expressions, system.variables, compact_mode=True)
+    compiled = compiled_function(expressions, system.variables, compact_mode=True)
     parameters = random.uniform(-1.0, 1.0, (STATES, compiled.nparams))
     sides = len(system.surfaces)
     parameters[:, sides : sides + len(system.turning)] *= end - start  # full turns, for rates of order one

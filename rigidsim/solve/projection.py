@@ -204,8 +204,7 @@ class Projection:
         if self._chart not in self._functions:
             self._functions[self._chart] = self._compile()
         self._residuals, self._correction = self._functions[self._chart]
-        compiled: Any = self._correction
-        self._timed = bool(compiled.is_time_dependent)  # by what the equations lack
+        self._timed = bool(self._correction.is_time_dependent)  # by what the equations lack
         self._loaded = self._chart
 
     def project(self, state: np.ndarray, time: Scalar) -> None:

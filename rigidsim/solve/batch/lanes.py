@@ -1,20 +1,18 @@
 """Lanes of one batch integrator: members of a family, several at a time, from their start to the last sample.
 
 A lane's bits depend neither on its neighbours nor on its place, but on the number of lanes, so that this is
-recorded. If a state is no longer finite, heyoka stops all lanes at once: the others are repeated.
+recorded. If a state is no longer finite, heyoka stops all lanes at once: each is repeated by itself.
 """
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import heyoka as hy
 import numpy as np
 
-from rigidsim.solve.batch.lane_results import IDLE, Found, LaneResults, until_next
 from rigidsim.solve.compiled import Kept
 from rigidsim.solve.events import DIRECTIONS
 from rigidsim.solve.step_bounds import bounds_of_sparse_series, longest_step
@@ -25,15 +23,44 @@ _ARRIVED, _LOST = hy.taylor_outcome.time_limit, hy.taylor_outcome.err_nf_state
 
 _engines: Kept[Any] = Kept(16)
 
+_Motions = tuple[np.ndarray, ...]
+"""Of motions to be integrated: initial and parameters (.., n), start (n,), times (samples, n), and bounds of
+steps (n,).
+"""
+
+
+@dataclass(frozen=True)
+class Found:
+    """One crossing: its event, lane, time (internal units) and state."""
+
+    event: int
+    lane: int
+    time: float
+    state: np.ndarray
+
+
+@dataclass
+class LaneResults:
+    """Results of members integrated side by side.
+
+    Attributes:
+        states: (samples, states, members) at the sample times; nan from where a member ended.
+        finite, arrived: whether the state stayed finite, and the last sample was reached, (members,).
+        steps: steps taken, (members,).
+        found: crossings on the way, for members that have any.
+    """
+
+    states: np.ndarray
+    finite: np.ndarray
+    arrived: np.ndarray
+    steps: np.ndarray
+    found: dict[int, list[Found]] = field(default_factory=dict)
+
 
 @dataclass(frozen=True)
 class BatchSystem:
-    """What a batch integrator is compiled from.
-
-    Attributes:
-        equations: equations over heyoka's variables and ``par``.
-        events: expressions of the same, with directions.
-        parameters: number of parameters that both read.
+    """What a batch integrator is compiled from: equations and events (with directions) over heyoka's
+    variables and ``par``, and the number of parameters that both read.
     """
 
     equations: Sequence[tuple[Any, Any]]
@@ -46,28 +73,6 @@ class BatchSystem:
 def recommended_width() -> int:
     """Number of lanes that this processor handles at once in double precision."""
     return int(hy.recommended_simd_size())
-
-
-@dataclass(frozen=True)
-class _Motions:
-    """Motions to be integrated: initial and parameters (.., n), start (n,), times (samples, n), and bounds of
-    their steps (n,).
-    """
-
-    initial: np.ndarray
-    parameters: np.ndarray
-    start: np.ndarray
-    times: np.ndarray
-    longest: np.ndarray
-
-    def of(self, which: Sequence[int]) -> _Motions:
-        return _Motions(
-            self.initial[:, which],
-            self.parameters[:, which],
-            self.start[which],
-            self.times[:, which],
-            self.longest[which],
-        )
 
 
 def _grouped(values: np.ndarray, width: int) -> np.ndarray:
@@ -89,18 +94,10 @@ class BatchEngine:
         read = [right for _, right in system.equations] + [expression for expression, _ in system.events]
         self._used = max((int(str(p).removeprefix("p")) + 1 for p in hy.get_params(read)), default=0)
         self._log: list[Found] = []
-        described = (
-            system.equations,
-            system.events,
-            system.parameters,
-            system.tolerance,
-            system.compact,
-            width,
-        )
         if system.events:  # whose callbacks belong to this object
             self._integrator = self._compiled()
         else:
-            self._integrator = _engines.get(described, self._compiled)
+            self._integrator = _engines.get((system, width), self._compiled)
         self._longest = longest_step(self._integrator.order, np.float64)
 
     def _compiled(self) -> Any:
@@ -141,38 +138,44 @@ class BatchEngine:
             most_steps: largest number of steps of a member.
         """
         count = initial.shape[1]
-        result = LaneResults.empty(len(times), len(initial), count)
-        motions = _Motions(initial, parameters, start, times, self.longest(initial, parameters, start))
-        if len(times) <= 2 and bool((times[:-1] == start).all()) and bool((times[-1] > start).all()):
-            if len(times) == 2:
-                result.states[0] = initial
-            result.states[-1] = np.nan  # of those that are lost on the way
-            self._in_turn(result, motions, most_steps)
-            return result
+        result = LaneResults(
+            np.empty((len(times), *initial.shape)),
+            np.ones(count, dtype=bool),
+            np.ones(count, dtype=bool),
+            np.zeros(count, dtype=np.int64),
+        )
+        terms = self._series(initial, parameters, start)
+        motions = initial, parameters, start, times, self._bounds(terms)
+        # members with about as many steps run side by side, so that none waits for long
+        last = len(terms) - 1
+        pace = np.maximum(terms[-1] ** (1 / last), terms[-2] ** (1 / (last - 1)))
+        order = np.argsort(pace * (times[-1] - start), kind="stable").tolist()
+        # natural steps, the last of which is shortened to end there, in place of a grid of times
+        ends = len(times) <= 2 and bool((times[:-1] == start).all() and (times[-1] > start).all())
+        together = self._to_ends if ends else self._through_samples
         for first in range(0, count, self.width):
-            waiting = list(range(first, min(first + self.width, count)))
-            while waiting:
-                lost = self._together(result, waiting, motions, most_steps)
-                if not lost or len(waiting) == 1:
-                    break
-                for member in lost:  # alone, so that it gets as far as possible
-                    self._together(result, [member], motions, most_steps)
-                waiting = [member for member in waiting if member not in lost]
+            members = order[first : first + self.width]
+            if together(result, members, motions, most_steps) and len(members) > 1:
+                for member in members:  # alone, so that it gets as far as possible
+                    together(result, [member], motions, most_steps)
         return result
 
     def longest(self, initial: np.ndarray, parameters: np.ndarray, start: np.ndarray) -> np.ndarray:
         """Bounds of members' steps (members,), from all terms of the series at their start."""
-        terms = self._integrator.tc  # (states, terms, lanes)
-        still = np.zeros(self.width)
-        sizes = []
+        return self._bounds(self._series(initial, parameters, start))
+
+    def _bounds(self, terms: np.ndarray) -> np.ndarray:
+        return np.minimum(bounds_of_sparse_series(terms), self._longest)
+
+    def _series(self, initial: np.ndarray, parameters: np.ndarray, start: np.ndarray) -> np.ndarray:
+        """Largest coefficient of each term of members' series at their start, (terms, members)."""
+        still, sizes = np.zeros(self.width), []
         given = (_grouped(x, self.width) for x in (initial, parameters, start))
         for states, read, begin in zip(*given, strict=True):
             self._set(states, read, begin)
             self._integrator.step(still, write_tc=True)  # compute a series without moving
-            sizes.append(np.abs(terms).max(axis=0))
-        self._log.clear()
-        found = np.concatenate(sizes, axis=1)[:, : len(start)]
-        return np.minimum(bounds_of_sparse_series(found), self._longest)
+            sizes.append(np.abs(self._integrator.tc).max(axis=0))
+        return np.concatenate(sizes, axis=1)[:, : len(start)]
 
     def onward(
         self,
@@ -196,88 +199,56 @@ class BatchEngine:
         return np.concatenate(list(there), axis=1)[:, :count], then.ravel()[:count], taken.ravel()[:count]
 
     def _set(self, states: np.ndarray, parameters: np.ndarray, begin: np.ndarray) -> None:
+        self._log.clear()
         self._integrator.set_time(begin)
         self._integrator.state[:] = states
         if self._used:
             self._integrator.pars[:] = parameters[: self._used]
 
-    def _in_turn(self, result: LaneResults, motions: _Motions, most_steps: int) -> None:
-        """Run members of which only the end is wanted: each that arrives frees its lane for the next."""
-        integrator, width = self._integrator, self.width
-        state, numbers = integrator.state, integrator.pars
-        waiting = deque(range(motions.initial.shape[1]))
-        inside, taken = [IDLE] * width, [0] * width
-        target, bounds, begun = np.zeros(width), np.empty(width), [0.0] * width
-        high, low = np.zeros(width), np.zeros(width)
-        # one lane at a time below: numbers out of arrays cost ten times
-        starts, ends, longest = motions.start.tolist(), motions.times[-1].tolist(), motions.longest.tolist()
-        pace = 0.0
-
-        def enter(lanes: Sequence[int]) -> None:
-            """The next members, or nobody: a lane that has arrived already, with the state of some member."""
-            for lane in lanes:
-                member = waiting.popleft() if waiting else IDLE
-                there = max(member, 0)
-                state[:, lane] = motions.initial[:, there]
-                if self._used:
-                    numbers[:, lane] = motions.parameters[: self._used, there]
-                bounds[lane] = longest[there]
-                inside[lane], taken[lane] = member, 0
-                begun[lane] = high[lane] = starts[there]
-                low[lane], target[lane] = 0.0, starts[there] if member == IDLE else ends[there]
-            integrator.set_dtime(high, low)
-
-        enter(range(width))
-        while inside.count(IDLE) < width:
-            self._log.clear()
-            most = until_next(high.tolist(), inside, target.tolist(), begun, taken, most_steps, pace)
-            integrator.propagate_until(target, max_steps=most, max_delta_t=bounds)
-            outcomes = integrator.propagate_res
-            high, low = map(np.array, integrator.dtime)
-            taken = [before + now[3] for before, now in zip(taken, outcomes, strict=True)]
-            for crossing in self._log:
-                if inside[crossing.lane] != IDLE:
-                    result.found.setdefault(inside[crossing.lane], []).append(crossing)
-            if any(now[0] == _LOST for now in outcomes):
-                waiting.extendleft(result.lost(inside, taken, [now[0] == _LOST for now in outcomes]))
-                enter(range(width))
-                continue
-            arrived = (high == target).tolist()
-            ended = [
-                lane
-                for lane, member in enumerate(inside)
-                if member != IDLE and (arrived[lane] or taken[lane] >= most_steps)
-            ]
-            for lane in ended:
-                member = inside[lane]
-                result.steps[member], result.arrived[member] = taken[lane], arrived[lane]
-                # nothing is known at the end about members that didn't arrive
-                result.states[-1, :, member] = state[:, lane] if arrived[lane] else np.nan
-                pace = taken[lane] / float(high[lane] - begun[lane]) if arrived[lane] else pace
-            if ended:
-                enter(ended)
-
-    def _together(
-        self, result: LaneResults, members: list[int], motions: _Motions, most_steps: int
-    ) -> list[int]:
-        """Run one group; returns the members whose state was lost, because of which the others must be
-        repeated.
-        """
+    def _to_ends(self, result: LaneResults, members: list[int], motions: _Motions, most_steps: int) -> bool:
+        """Run one group of which only the ends are wanted; returns whether a state was lost."""
+        initial, parameters, start, times, longest = self._of(motions, members)
         integrator, count = self._integrator, len(members)
-        here = motions.of(members + [members[0]] * (self.width - count))
-        self._log.clear()
-        self._set(here.initial, here.parameters, here.start)
+        self._set(initial, parameters, start)
+        integrator.propagate_until(times[-1], max_steps=most_steps, max_delta_t=longest)
+        outcomes = integrator.propagate_res[:count]
+        lost = np.array([outcome[0] == _LOST for outcome in outcomes])
+        arrived = (np.array(integrator.time) == times[-1])[:count] & ~lost
+        result.states[0][:, members] = initial[:, :count]
+        result.states[-1][:, members] = np.where(arrived, integrator.state[:, :count], np.nan)
+        result.steps[members] = [outcome[3] for outcome in outcomes]
+        self._note(result, members, arrived, lost)
+        return bool(lost.any())
+
+    def _of(self, motions: _Motions, members: list[int]) -> list[np.ndarray]:
+        """The numbers of one group's lanes, those without a member as the first."""
+        lanes = members + [members[0]] * (self.width - len(members))
+        return [numbers[..., lanes] for numbers in motions]
+
+    def _note(self, result: LaneResults, members: list[int], arrived: np.ndarray, lost: np.ndarray) -> None:
+        result.arrived[members], result.finite[members] = arrived, ~lost
+        if self._system.events:
+            for place, member in enumerate(members):
+                result.found[member] = [crossing for crossing in self._log if crossing.lane == place]
+
+    def _through_samples(
+        self, result: LaneResults, members: list[int], motions: _Motions, most_steps: int
+    ) -> bool:
+        """Run one group; returns whether a state was lost."""
+        initial, parameters, start, times, longest = self._of(motions, members)
+        integrator, count = self._integrator, len(members)
+        self._set(initial, parameters, start)
         taken = np.zeros(count, dtype=np.int64)
         arrived, lost = np.ones(count, dtype=bool), np.zeros(count, dtype=bool)
-        first, begin, left = 0, here.start, most_steps
+        first, begin, left = 0, start, most_steps
         while True:
-            part = here.times[first : first + _GRID]
-            known = bool(first == 0 and (part[0] == here.start).all())
+            part = times[first : first + _GRID]
+            known = bool(first == 0 and (part[0] == start).all())
             if known and len(part) == 1:
                 found = np.array(integrator.state)[None]
             else:
                 grid = part if known else np.vstack([begin, part])
-                _, found = integrator.propagate_grid(grid, max_steps=left, max_delta_t=here.longest)
+                _, found = integrator.propagate_grid(grid, max_steps=left, max_delta_t=longest)
                 outcomes = integrator.propagate_res[:count]
                 taken += [now[3] for now in outcomes]
                 arrived[:] = [now[0] == _ARRIVED for now in outcomes]
@@ -285,12 +256,9 @@ class BatchEngine:
             skipped = 0 if known else 1
             result.states[first : first + len(part), :, members] = found[skipped:, :, :count]
             first, begin, left = first + _GRID, part[-1], most_steps - int(taken.max())
-            if not arrived.all() or first >= len(here.times) or left <= 0:
+            if not arrived.all() or first >= len(times) or left <= 0:
                 break
         result.states[first:, :, members] = np.nan
-        result.steps[members], result.finite[members] = taken, ~lost
-        result.arrived[members] = arrived & (first >= len(here.times))
-        if self._system.events:
-            for place, member in enumerate(members):
-                result.found[member] = [crossing for crossing in self._log if crossing.lane == place]
-        return [member for member, gone in zip(members, lost.tolist(), strict=True) if gone]
+        result.steps[members] = taken
+        self._note(result, members, arrived & (first >= len(times)), lost)
+        return bool(lost.any())

@@ -12,8 +12,7 @@ from typing import Any
 import heyoka as hy
 import numpy as np
 
-from rigidsim.solve.batch.lane_results import LaneResults
-from rigidsim.solve.batch.lanes import BatchEngine, BatchSystem
+from rigidsim.solve.batch.lanes import BatchEngine, BatchSystem, LaneResults
 from rigidsim.solve.batch.tracing import TracedSystem
 from rigidsim.solve.compiled import compiled_function
 from rigidsim.solve.events import BESIDE, STATES, TIMES, exponents_of

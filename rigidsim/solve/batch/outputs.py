@@ -12,9 +12,7 @@ import numpy as np
 from rigidsim.model.tangents import GROWTH
 from rigidsim.solve.batch.family import Numbers
 from rigidsim.solve.batch.tracing import TracedSystem
-from rigidsim.solve.compiled import compiled_function
-
-_GROUP = 64  # a multiple of every SIMD width: padded to it, a column's bits don't depend on its place
+from rigidsim.solve.compiled import compiled_function, evaluate_rows
 
 Values = dict[str, np.ndarray]
 
@@ -142,22 +140,12 @@ class BatchOutputs:
         if not expressions:
             return np.empty((0, samples, m))
         function, read = self._compiled(expressions, count)
-        columns = samples * m
-        padded = -(-columns // _GROUP) * _GROUP
-
-        def spread(rows: Sequence[np.ndarray]) -> np.ndarray:
-            """Rows, each (samples, m) or (m,) for all samples alike, as one array (rows, padded)."""
-            table = np.empty((len(rows), padded))
-            for line, row in zip(table, rows, strict=True):
-                line[:columns].reshape(samples, m)[:] = row
-                line[columns:] = line[columns - 1]
-            return table
-
-        arguments = {}
-        if function.is_time_dependent:
-            arguments["time"] = spread([times])[0]
+        # parameters of members are inputs like their states
+        every = (samples, m)
+        rows = [states[:, n] if n < count else np.broadcast_to(swept[n - count], every) for n in read]
+        inputs = np.stack(rows).reshape(len(rows), -1)
+        constants = None
         if function.nparams and begun is not None:
-            arguments["pars"] = spread(list(begun))
-        rows = [states[:, n] if n < count else swept[n - count] for n in read]
-        found = np.asarray(function(spread(rows), **arguments))
-        return found[:, :columns].reshape(len(expressions), samples, m)
+            constants = np.repeat(begun[:, None], samples, axis=1).reshape(len(begun), -1)
+        found = evaluate_rows(function, inputs.T, constants, times.ravel())
+        return found.reshape(len(expressions), samples, m)

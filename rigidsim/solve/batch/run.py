@@ -9,8 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rigidsim.solve.batch.family import Family, Numbers
-from rigidsim.solve.batch.lane_results import LaneResults
-from rigidsim.solve.batch.lanes import recommended_width
+from rigidsim.solve.batch.lanes import LaneResults, recommended_width
 from rigidsim.solve.batch.motion import BatchMotion, EventExpressions
 from rigidsim.solve.batch.outputs import BatchOutputs, Values
 from rigidsim.solve.precision import precision_of

@@ -1,13 +1,13 @@
 """Closed-form rotations, and the arithmetics that evaluate them: float64 arrays, and mpmath at any precision.
 
-Formulas are written once, against ``Arithmetic``. What differs is how a phase is reduced: in double, rate
+Formulas are written once, for either. What differs is how a phase is reduced: in double, rate
 and time are pairs hi + lo, so that turns are counted to some 30 digits and nothing is lost at 1e8 radians.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, ClassVar, Protocol
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -15,48 +15,6 @@ from rigidsim.scene.arithmetic import Matrix, cross, dot
 
 Pair = tuple[Any, Any]
 """Real and imaginary part, or high and low part, of a number."""
-
-
-class Arithmetic(Protocol):
-    """Operations that the formulas need.
-
-    Attributes:
-        bits: bits of the results' significand.
-    """
-
-    bits: int
-
-    def number(self, value: Any) -> Any:
-        """A constant, from mpf."""
-
-    def exp(self, x: Any) -> Any:
-        """Exponential."""
-
-    def cos(self, x: Any) -> Any:
-        """Cosine."""
-
-    def sin(self, x: Any) -> Any:
-        """Sine."""
-
-    def sqrt(self, x: Any) -> Any:
-        """Square root."""
-
-    def floor(self, x: Any) -> Any:
-        """Largest whole number that doesn't exceed the argument."""
-
-    def sinh_scaled(self, k: int, z: Any, grown: Any, shrunk: Any) -> Any:
-        """c sinh(k z) exp(-abs(z)) from grown, shrunk = c exp(+-k abs(z) - abs(z)), accurate near zero
-        too.
-        """
-
-    def elapsed(self, time: Any) -> Any:
-        """A time as a plain number."""
-
-    def reduced(self, time: Any, rate: Any, offset: Any) -> Pair:
-        """Whole number nearest to ``rate * time + offset`` (constants in mpf), and the remainder."""
-
-    def angle(self, time: Any, rate: Any, count: Any, step: Any, offset: Any) -> Any:
-        """``rate * time + step * count + offset`` in radians, up to whole turns; constants in mpf, rad."""
 
 
 class Digits:
@@ -72,7 +30,7 @@ class Digits:
         return self._context.mpf(value)
 
     def sinh_scaled(self, k: int, z: Any, grown: Any, shrunk: Any) -> Any:
-        """See ``Arithmetic``; from the exponentials, with as many guard bits as cancel."""
+        """c sinh(k z) exp(-abs(z)) from grown, shrunk = c exp(+-k abs(z) - abs(z)), accurate near zero."""
         context = self._context
         size = abs(k * z)
         if size >= 1 or size == 0:
@@ -80,15 +38,17 @@ class Digits:
         return context.sinh(k * z) / context.cosh(k * z) * (grown + shrunk) / 2
 
     def elapsed(self, time: Any) -> Any:
+        """A time as a plain number."""
         return time
 
     def reduced(self, time: Any, rate: Any, offset: Any) -> Pair:
+        """Whole number nearest to ``rate * time + offset`` (constants in mpf), and the remainder."""
         whole = self.number(rate) * time + self.number(offset)
         count = self._context.nint(whole)
         return count, whole - count
 
     def angle(self, time: Any, rate: Any, count: Any, step: Any, offset: Any) -> Any:
-        """See ``Arithmetic``; mpmath reduces angles of any size itself."""
+        """``rate * time + step * count + offset`` in radians, up to whole turns; constants in mpf, rad."""
         return self.number(rate) * time + self.number(step) * count + self.number(offset)
 
 
@@ -102,7 +62,7 @@ class Doubles:
         return float(value)
 
     def sinh_scaled(self, k: int, z: Any, grown: Any, shrunk: Any) -> Any:
-        """See ``Arithmetic``; tanh is accurate near zero."""
+        """See ``Digits``; tanh is accurate near zero."""
         return np.tanh(k * z) * (grown + shrunk) / 2
 
     def elapsed(self, time: Pair) -> Any:
@@ -116,12 +76,15 @@ class Doubles:
         return count + more, (high - more) + low
 
     def angle(self, time: Pair, rate: Any, count: Any, step: Any, offset: Any) -> Any:
-        """See ``Arithmetic``; computed in turns until the end, so that whole ones are dropped exactly."""
+        """See ``Digits``; computed in turns until the end, so that whole ones are dropped exactly."""
         turn = 2 * rate.context.pi
         turns = sum_of(product_of(_pair(rate / turn), time), _pair(offset / turn))
         turns = sum_of(turns, product_of(_pair(step / turn), (count, np.zeros_like(count))))
         high, low = two_sum(turns[0] - np.rint(turns[0]), turns[1])
         return 2 * np.pi * ((high - np.rint(high)) + low)
+
+
+Arithmetic = Digits | Doubles
 
 
 def two_sum(a: Any, b: Any) -> Pair:

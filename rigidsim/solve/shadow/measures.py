@@ -12,7 +12,7 @@ import numpy as np
 from rigidsim.model.heyoka_expressions import TANGENT
 from rigidsim.model.state_blocks import AttitudeStates
 from rigidsim.model.system import System
-from rigidsim.solve.compiled import compiled_function
+from rigidsim.solve.compiled import compiled_function, evaluate_rows
 
 _GROUPS = {
     "rates": ("wx", "wy", "wz"),
@@ -21,7 +21,6 @@ _GROUPS = {
 }
 _APART = ("pace", "work", "stride")
 """States that nothing depends on."""
-_PADDED = 64  # columns of a compiled function, so that their bits don't depend on their place
 
 
 @dataclass(frozen=True)
@@ -138,16 +137,10 @@ def padded_function(
     """Compiled function of states (states, n), parameters (parameters, n) and times (n,); the bits of a
     column don't depend on the others.
     """
-    compiled: Any = compiled_function(expressions, variables, compact_mode=True, fp_type=float, **options)
-
-    def evaluate(states: np.ndarray, parameters: np.ndarray, times: np.ndarray) -> np.ndarray:
-        count = states.shape[1]
-        missing = -count % _PADDED
-        inputs = np.pad(np.concatenate([states, parameters]), ((0, 0), (0, missing)), mode="edge")
-        given = {"time": np.pad(times, (0, missing), mode="edge")} if compiled.is_time_dependent else {}
-        return np.asarray(compiled(np.ascontiguousarray(inputs), **given))[:, :count]
-
-    return evaluate
+    compiled = compiled_function(expressions, variables, compact_mode=True, fp_type=float, **options)
+    return lambda states, parameters, times: evaluate_rows(
+        compiled, np.concatenate([states, parameters]).T, times=times
+    )
 
 
 def _quaternion(attitude: AttitudeStates, angles: np.ndarray) -> np.ndarray:
