@@ -40,8 +40,7 @@ from experiments.common import Check, table
 from rigidsim.accuracy.estimates.members import MemberEstimates
 from rigidsim.scene.config import parse
 from rigidsim.scene.sweeps.sweep import Sweep
-from rigidsim.solve.batch.family import Families, Family, Numbers
-from rigidsim.solve.batch.members import Members
+from rigidsim.solve.batch.family import Families, Family, Members, Numbers
 from rigidsim.solve.batch.run import BatchRun
 
 MEMBERS, MANY, ROUNDS = 4096, 150_000, 3

@@ -97,8 +97,7 @@ def test_a_lane_that_is_lost_takes_nobody_with_it(monkeypatch: pytest.MonkeyPatc
 
 
 def _first_rates(sweep: Sweep, member: int) -> np.ndarray:
-    from rigidsim.solve.batch.family import Families
-    from rigidsim.solve.batch.members import Members
+    from rigidsim.solve.batch.family import Families, Members
 
     (_, numbers), *_ = Families(Members(sweep)).sort().groups
     return np.asarray(numbers.initial[:3, numbers.members.tolist().index(member)])

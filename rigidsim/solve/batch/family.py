@@ -1,11 +1,11 @@
-"""Families: members that share their equations, and the numbers in which they differ."""
+"""Members of a sweep as the batch engine sees them, and families of those that share their equations."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from enum import Enum
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any
 
 import heyoka as hy
@@ -15,17 +15,18 @@ from rigidsim.errors import ConfigError
 from rigidsim.model.scaling import Drive
 from rigidsim.scene.choices import DEFAULT_METHOD, FULL, variables_named
 from rigidsim.scene.config import Experiment
+from rigidsim.scene.exact import ExactNumber
+from rigidsim.scene.sweeps.sweep import Sweep
 from rigidsim.scene.toml_text import key_steps
 from rigidsim.scene.tracing.numbers import Traced, Untraceable
-from rigidsim.solve.batch.members import Members
-from rigidsim.solve.batch.replay import Held, Replay
+from rigidsim.solve.batch.replay import Replay, SharedReals, real_of
 from rigidsim.solve.batch.tracing import TRACED_TABLES, TracedSystem, trace
 from rigidsim.solve.effects.effect import registered_effects
 from rigidsim.solve.precision import precision_of
 from rigidsim.solve.problem import prepare
 
+_HELD = 1 << 16  # values of axes that are held, each worked out once for all members that share it
 _AT_ONCE = 2048  # members whose numbers are worked out together
-_MOST_HELD = 8  # families of which numbers of whole axes are held, some megabytes each
 
 
 class Alone(Enum):
@@ -94,36 +95,101 @@ def _reason_of_system(traced: TracedSystem) -> Alone | None:
     return Alone.ANGLES if joined else None
 
 
-@dataclass
-class Family:
-    """Members that share the equations of a traced system, and their kind (see ``Members``).
+class AxisNumbers:
+    """Values of a sweep's axes."""
+
+    def __init__(self, sweep: Sweep) -> None:
+        self.sweep = sweep
+        self._words: dict[int, dict[str, int]] = {}
+        self._reals = lru_cache(_HELD)(self._reals_of)
+
+    def traced(self, place: int) -> bool:
+        """Whether an axis has numbers that can become parameters."""
+        axis = self.sweep.axes[place]
+        return axis.numeric and key_steps(axis.key, "axes")[0] in TRACED_TABLES
+
+    def _reals_of(self, place: int, index: int) -> list[hy.real]:
+        return [real_of(number) for number in self.sweep.axes[place].exact(index)]
+
+    def columns(self, place: int, which: np.ndarray) -> list[SharedReals]:
+        """The numbers that members have, a column for each key, from the index of each one's value."""
+        needed, index = np.unique(which, return_inverse=True)
+        columns = zip(*(self._reals(place, i) for i in needed.tolist()), strict=True)
+        return [SharedReals(np.array(column), index) for column in columns]
+
+    def codes(self, place: int, which: np.ndarray) -> np.ndarray:
+        """Codes below the axis's length, equal for members whose axis values have the same text."""
+        text = self.sweep.axes[place].values.text
+        known = self._words.setdefault(place, {})
+        needed, index = np.unique(which, return_inverse=True)
+        found = [known.setdefault(text(i), len(known)) for i in needed.tolist()]
+        return np.array(found, dtype=np.int64)[index]
+
+
+class Members:
+    """Members of a ``[sweep]`` as the batch engine sees them, renumbered from 0 in the order given.
+
+    Args:
+        members: all by default.
+        axes: the sweep's axes, as far as they are worked out already.
 
     Attributes:
-        held: what follows from values of single axes, worked out once; None where it takes too much memory.
+        keys: dotted keys of the numbers that become parameters, such as ``initial.angular_velocity[2]``.
+        kinds: code of everything else that differs, such as a formulation or a time, (members,): members of
+            different kinds belong to different families; zeros if nothing else differs.
     """
+
+    def __init__(
+        self, sweep: Sweep, members: Sequence[int] | None = None, axes: AxisNumbers | None = None
+    ) -> None:
+        self._chosen = np.arange(sweep.count) if members is None else np.asarray(members, dtype=np.int64)
+        self._axes = AxisNumbers(sweep) if axes is None else axes
+        self.sweep, self.count = sweep, len(self._chosen)
+        self.keys: list[str] = []
+        self.kinds = np.zeros(self.count, dtype=np.int64)
+        self._traced: list[tuple[int, np.ndarray]] = []
+        rows = np.unravel_index(self._chosen, sweep.shape) if sweep.product else None
+        for place, axis in enumerate(sweep.axes):
+            which = self._chosen if rows is None else rows[place]
+            if self._axes.traced(place):
+                self.keys += axis.columns
+                self._traced.append((place, which))
+            else:
+                self.kinds = self.kinds * axis.values.count + self._axes.codes(place, which)
+
+    def experiment(self, member: int) -> Experiment:
+        """A member's own experiment."""
+        return self.sweep.experiment_of(int(self._chosen[member]))
+
+    def exact(self, member: int) -> list[ExactNumber]:
+        """A member's exact numbers for ``keys``, SI."""
+        return [x for place, which in self._traced for x in self.sweep.axes[place].exact(int(which[member]))]
+
+    def columns(self, members: np.ndarray) -> list[SharedReals]:
+        """The numbers of some members for each key (see ``AxisNumbers``)."""
+        found: list[SharedReals] = []
+        for place, which in self._traced:
+            found += self._axes.columns(place, which[members])
+        return found
+
+
+@dataclass
+class Family:
+    """Members that share the equations of a traced system, and their kind (see ``Members``)."""
 
     traced: TracedSystem
     kind: int
-    held: Held | None = None
 
 
 @dataclass(frozen=True)
 class Numbers:
-    """Numbers of a family's members, float64.
-
-    Attributes:
-        members: indices of the members.
-        initial: (states, members), internal units.
-        parameters: (parameters of the traced system, members).
-        replay: evaluates anything else that follows from their numbers, for these and others.
-        places: of these members among those of ``replay``, (members,).
-    """
+    """Numbers of a family's members (indices), float64."""
 
     members: np.ndarray
-    initial: np.ndarray
-    parameters: np.ndarray
-    replay: Replay
-    places: np.ndarray
+    initial: np.ndarray  # (states, members), internal units
+    parameters: np.ndarray  # (parameters of the traced system, members)
+    replay: Replay  # evaluates anything else that follows from their numbers, for these and others
+    places: np.ndarray  # of these members among those of ``replay``
 
     @classmethod
     def of(cls, traced: TracedSystem, members: np.ndarray, replay: Replay, places: np.ndarray) -> Numbers:
@@ -151,25 +217,18 @@ class Numbers:
 
 @dataclass
 class Sorted:
-    """Members sorted into families.
-
-    Attributes:
-        groups: each family with its members' numbers.
-        alone: members that run by themselves, with the reason.
-        refused: members that no run accepts, with the error of a single run.
-    """
+    """Members sorted into families."""
 
     groups: list[tuple[Family, Numbers]] = field(default_factory=list)
-    alone: dict[int, Alone] = field(default_factory=dict)
-    refused: dict[int, ConfigError] = field(default_factory=dict)
+    alone: dict[int, Alone] = field(default_factory=dict)  # those that run by themselves
+    refused: dict[int, ConfigError] = field(default_factory=dict)  # those that no run accepts
 
 
 class Families:
     """Sorts members into families, each traced when its first member is met.
 
     Args:
-        members: all members of the sweep.
-        most_refused: number of refused members after which the rest stays unsorted; no limit by default.
+        most_refused: number of refused members after which the rest stays unsorted.
         most_untraced: number of members that can't be traced after which no other is tried; no limit by
             default, since a process would run others one by one than one that begins elsewhere.
     """
@@ -182,7 +241,7 @@ class Families:
         self.known: list[Family] = []
 
     def sort(self) -> Sorted:
-        """Sort members into families."""
+        """Sort all members."""
         result = Sorted()
         for first in range(0, self._members.count, _AT_ONCE):
             self._sort_some(np.arange(first, min(first + _AT_ONCE, self._members.count)), result)
@@ -228,8 +287,7 @@ class Families:
             return error
         except Untraceable:
             return Alone.UNTRACEABLE
-        held: Held | None = {} if len(self.known) < _MOST_HELD else None
-        return _reason_of_system(traced) or Family(traced, int(self._members.kinds[member]), held)
+        return _reason_of_system(traced) or Family(traced, int(self._members.kinds[member]))
 
     def _taken(self, family: Family, waiting: np.ndarray, result: Sorted) -> np.ndarray:
         """Put the waiting members of a family into the result; returns those that are left."""
@@ -237,8 +295,7 @@ class Families:
         if not len(candidates):
             return waiting
         graph = family.traced.graph
-        columns = self._members.columns(candidates, whole=family.held is not None)
-        replay = Replay(graph, columns, len(candidates), family.held)
+        replay = Replay(graph, self._members.columns(candidates), len(candidates))
         agree = np.flatnonzero(replay.agreeing(list(graph.guards)))
         taken = candidates[agree]
         if not len(taken):

@@ -106,8 +106,7 @@ class BatchMotion:
 
     def compile(self) -> None:
         """Compile the integrators that ``run`` uses."""
-        for engine in ("_plain", "_along"):
-            getattr(self, engine)
+        _ = self._plain, self._along
 
     def run(
         self,
@@ -117,14 +116,12 @@ class BatchMotion:
         times: np.ndarray,
         most_steps: int,
     ) -> tuple[LaneResults, np.ndarray | None]:
-        """Take members to their last samples; returns the motion's lanes, and the states of motion and
-        tangent vector (samples, states, members), None where the scene has none.
+        """Take members to their last samples, as ``BatchEngine.run``; returns the motion's lanes, and the
+        states of motion and tangent vector (samples, states, members), None where the scene has none.
 
         Args:
-            initial: (states, members), tangent vectors included; parameters: (parameters, members), those of
-                events after those of the equations.
-            start: (members,), times: (samples, members), internal units.
-            most_steps: largest number of steps of a member.
+            initial: (states, members), tangent vectors included.
+            parameters: (parameters, members), those of events after those of the equations.
         """
         motion = self._plain.run(initial[: self._traced.moving], parameters, start, times, most_steps)
         if self._along is None:

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import heyoka as hy
@@ -28,32 +27,16 @@ _FAILURES = (ZeroDivisionError, ValueError, OverflowError, TypeError)
 Reals = Any  # an array of hy.real, or one hy.real
 
 
-@dataclass(frozen=True, eq=False)
-class Index:
-    """Which of some values each member has, (members,).
-
-    ``axis`` is the place of the axis if these are all of its values: what follows from them alone is the same
-    for other members, too.
-    """
-
-    which: np.ndarray
-    axis: int | None = None
-
-
 class SharedReals(NamedTuple):
     """Numbers of members: the values that there are, and which each member has; None where all have one."""
 
     values: Any
-    shared: Index | None = None
+    shared: np.ndarray | None = None
 
     def of_each(self, count: int) -> np.ndarray:
         """The numbers of so many members."""
-        each = self.values if self.shared is None else self.values[self.shared.which]
+        each = self.values if self.shared is None else self.values[self.shared]
         return np.broadcast_to(each, count)
-
-
-Held = dict[Any, tuple[Any, int | None]]
-"""What follows from the values of one axis alone, with its place; None for constants."""
 
 
 def real_of(number: ExactNumber) -> hy.real:
@@ -92,15 +75,12 @@ class Replay:
 
     Args:
         columns: for each column of the graph the members' swept numbers; those of one axis share their index.
-        held: what was found for a whole axis, for any members of the same sweep.
     """
 
-    def __init__(self, graph: Graph, columns: Sequence[SharedReals], count: int, held: Held | None) -> None:
+    def __init__(self, graph: Graph, columns: Sequence[SharedReals], count: int) -> None:
         self._graph, self._columns, self._count = graph, columns, count
-        self._held: Held = {} if held is None else held
         self._found: dict[Any, SharedReals] = {}
-        self._each = Index(np.arange(count))
-        self._axes = {c.shared.axis: c.shared for c in columns if c.shared and c.shared.axis is not None}
+        self._each = np.arange(count)
 
     def agreeing(self, guards: Sequence[Guard]) -> np.ndarray:
         """Mask of the members that make all decisions as the representative does, (members,)."""
@@ -121,14 +101,8 @@ class Replay:
 
     def _once(self, key: Any, work: Callable[..., SharedReals], *given: Any) -> SharedReals:
         if key not in self._found:
-            if key in self._held:
-                values, axis = self._held[key]
-                self._found[key] = SharedReals(values, None if axis is None else self._axes[axis])
-            else:
-                with np.errstate(all="ignore"):
-                    values, index = self._found[key] = work(*given)
-                if index is None or index.axis is not None:
-                    self._held[key] = values, None if index is None else index.axis
+            with np.errstate(all="ignore"):
+                self._found[key] = work(*given)
         return self._found[key]
 
     def _agreeing(self, guard: Guard) -> SharedReals:
@@ -144,14 +118,13 @@ class Replay:
         found[np.isinf(found)] = np.nan
         return SharedReals(found, index)
 
-    def _together(self, *nodes: int) -> tuple[list[Reals], Index | None]:
+    def _together(self, *nodes: int) -> tuple[list[Reals], np.ndarray | None]:
         """Values of nodes by a common index."""
         found = [self.number(node) for node in nodes]
-        indices = {index for _, index in found if index is not None}
+        indices = {id(index): index for _, index in found if index is not None}
         if len(indices) <= 1:
-            return [values for values, _ in found], next(iter(indices), None)
-        each = [values if index is None else values[index.which] for values, index in found]
-        return each, self._each
+            return [values for values, _ in found], next(iter(indices.values()), None)
+        return [values if index is None else values[index] for values, index in found], self._each
 
     def _worked_out(self, operation: str, arguments: tuple[Any, ...]) -> SharedReals:
         if operation == "constant":

@@ -27,54 +27,32 @@ here, before it holds the others any longer, and run by itself.
 
 @dataclass(frozen=True)
 class BatchEvents:
-    """Crossings of one event in a block, in the order of members and time.
-
-    Attributes:
-        member: (n,), places in the block.
-        time: (n,) seconds.
-        values: recorded variables, (n, components), SI.
-    """
+    """Crossings of one event in a block, in the order of members and time (n,)."""
 
     name: str
-    member: np.ndarray
-    time: np.ndarray
-    values: Values
+    member: np.ndarray  # places in the block
+    time: np.ndarray  # seconds
+    values: Values  # recorded variables, (n, components), SI
 
 
 @dataclass(frozen=True)
 class BatchBlock:
-    """Results of some members of a family.
+    """Results of some members of a family; m members and their samples."""
 
-    Attributes:
-        members: indices of the members in the sweep, (m,).
-        places: their places in the numbers from which they were run, (m,).
-        times: seconds, (samples,).
-        start: (m,), moments: of the samples, (samples, m), each member's internal unit of time.
-        states: states of the motion, (samples, states, m), internal units.
-        values: recorded variables, (samples, m, components), SI; NaN from where a member ended.
-        drifts: relative drifts by the names of the invariants, (samples, m).
-        status: how each ended, (m,) objects; None where a lane gave up and the member is to be run by itself.
-        reached: samples that each got to, (m,).
-        steps: steps taken, (m,).
-        drift_bound: relative drift that rounding alone explains, (m,).
-        events: crossings of each event.
-        width: lanes of the integrator, on which the last bits depend.
-    """
-
-    members: np.ndarray
-    places: np.ndarray
-    times: np.ndarray
-    start: np.ndarray
-    moments: np.ndarray
-    states: np.ndarray
-    values: Values
-    drifts: Values
-    status: np.ndarray
-    reached: np.ndarray
+    members: np.ndarray  # indices in the sweep
+    places: np.ndarray  # in the numbers from which they were run
+    times: np.ndarray  # (samples,), seconds
+    start: np.ndarray  # (m,), each member's internal unit of time
+    moments: np.ndarray  # (samples, m), likewise
+    states: np.ndarray  # of the motion, (samples, states, m), internal units
+    values: Values  # recorded variables, (samples, m, components), SI; NaN from where a member ended
+    drifts: Values  # relative drifts by the names of the invariants, (samples, m)
+    status: np.ndarray  # (m,) objects; None where a lane gave up and the member is to be run by itself
+    reached: np.ndarray  # number of samples, (m,)
     steps: np.ndarray
-    drift_bound: np.ndarray
+    drift_bound: np.ndarray  # relative drift that rounding alone explains, (m,)
     events: list[BatchEvents]
-    width: int
+    width: int  # lanes of the integrator, on which the last bits depend
 
 
 class BatchRun:

@@ -54,18 +54,12 @@ class Parameters:
 
 @dataclass(frozen=True)
 class TracedSystem:
-    """The system that all members of a family share.
+    """The system that all members of a family share."""
 
-    Attributes:
-        prepared: the representative member's own problem, in plain numbers.
-        system: the same, whose coefficients are expressions of ``parameters``.
-        graph: how numbers follow from the swept ones; its guards decide which members belong here.
-    """
-
-    prepared: InitialValueProblem
-    system: System
+    prepared: InitialValueProblem  # the representative member's own, in plain numbers
+    system: System  # the same, whose coefficients are expressions of ``parameters``
     parameters: Parameters
-    graph: Graph
+    graph: Graph  # how numbers follow from the swept ones; its guards decide which members belong here
 
     @cached_property
     def moving(self) -> int:
@@ -97,12 +91,9 @@ def trace(
     numbers: Sequence[ExactNumber],
     drive: Callable[[], Drive | None] = lambda: None,
 ) -> TracedSystem:
-    """Build the system of a member with its swept numbers as parameters.
+    """Build the system of a member with its swept numbers, by their keys, as parameters.
 
     Args:
-        representative: the member.
-        keys: keys of its numbers that differ between members, such as ``initial.angular_velocity[2]``.
-        numbers: the member's numbers for these keys.
         drive: estimated effect of loads of unknown size, if there are any: a power of two in the
             units, which has to be the same whoever is the representative.
 

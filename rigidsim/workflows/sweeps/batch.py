@@ -27,8 +27,7 @@ from rigidsim.session.members import (
     warning_bits,
     warnings_variable,
 )
-from rigidsim.solve.batch.family import Alone, Families, Family, Sorted, batchable
-from rigidsim.solve.batch.members import AxisNumbers, Members
+from rigidsim.solve.batch.family import Alone, AxisNumbers, Families, Family, Members, Sorted, batchable
 from rigidsim.solve.batch.run import BatchBlock, BatchRun
 from rigidsim.solve.problem import prepare
 from rigidsim.solve.status import Status

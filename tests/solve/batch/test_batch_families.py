@@ -11,8 +11,7 @@ from support import config
 
 from rigidsim import ConfigError, parse
 from rigidsim.scene.sweeps.sweep import Sweep
-from rigidsim.solve.batch.family import Alone, Families, Family, batchable
-from rigidsim.solve.batch.members import Members
+from rigidsim.solve.batch.family import Alone, Families, Family, Members, batchable
 from rigidsim.solve.problem import prepare
 
 FREE = config(
@@ -214,5 +213,5 @@ def test_numbers_of_many_members_are_those_of_each_in_every_bit_of_the_scenes_ar
         graph = family.traced.graph  # whose values are those of the first member, worked out by mpmath
         for node, value in enumerate(graph.values):
             values, index = numbers.replay.number(node)
-            found = values if index is None else values[index.which[0]]
+            found = values if index is None else values[index[0]]
             assert graph.context.mpf(str(found)) == value, graph.nodes[node]

@@ -7,8 +7,7 @@ from test_batch_families import FREE, ORBIT, PLANAR, TOP, TORQUE, swept
 
 import rigidsim
 from rigidsim.scene.sweeps.sweep import Sweep
-from rigidsim.solve.batch.family import Families
-from rigidsim.solve.batch.members import Members
+from rigidsim.solve.batch.family import Families, Members
 from rigidsim.solve.batch.run import BatchBlock, BatchRun
 from rigidsim.solve.status import Status
 
