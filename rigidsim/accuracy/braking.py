@@ -5,8 +5,6 @@ later time is known ahead (``rigidsim.model.averaged.course``): some hundred ste
 moments give the mean pace.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from typing import Any

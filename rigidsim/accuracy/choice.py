@@ -8,8 +8,6 @@ accuracy that the run really kept is certified afterwards (``rigidsim.accuracy.c
 Choices depend on counts alone, never on a clock, so that a config always chooses the same.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

@@ -1,19 +1,14 @@
 """Error laws: the error that rounding and the motion itself leave to a good integration."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 from rigidsim.scene.scene import Scene
+from rigidsim.solve.closed_form import ClosedForm, NoClosedForm, closed_form_of
 from rigidsim.solve.error_growth import Growth, measure_growth
 from rigidsim.solve.precision import precision_of
 from rigidsim.solve.problem import InitialValueProblem, double_twin
 from rigidsim.solve.projection import LATE, steps_between
-
-if TYPE_CHECKING:
-    from rigidsim.solve.closed_form import ClosedForm
 
 CLOSED_FORM = 50.0
 """In eps: error of a sample from a closed form, thirty operations and sines right to 4 ulp, at any time."""
@@ -70,8 +65,6 @@ def held_error(
 
 def closed_form_if_any(scene: Scene, *, driven: bool = False) -> tuple[ClosedForm | None, str]:
     """The closed form of a scene's motion, or None and the reason why there is none."""
-    from rigidsim.solve.closed_form import NoClosedForm, closed_form_of
-
     try:
         return closed_form_of(scene, driven=driven), ""
     except NoClosedForm as none:

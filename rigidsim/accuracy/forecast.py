@@ -4,8 +4,6 @@ Laws: errors of rounding grow like t^1.5 (Brouwer 1937), or t with projected inv
 at most like t^2; both times the motion's own growth. Short motions are tried whole.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import replace

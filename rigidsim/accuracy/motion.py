@@ -1,7 +1,5 @@
 """Forecast of a whole motion from its beginning: its steps, their cost, and the growth of its errors."""
 
-from __future__ import annotations
-
 import math
 import time
 from collections.abc import Callable, Sequence

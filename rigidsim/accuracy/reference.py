@@ -7,8 +7,6 @@ go along the same motion, which amplifies their errors alike, however strongly: 
 difference from another as their errors per step are, but for scatter.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace

@@ -2,8 +2,6 @@
 as a count, so that no clock decides what is chosen; and the accuracy that a config asks for.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Collection
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Trials: a motion integrated in memory, without files, to compare settings."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace

@@ -1,11 +1,11 @@
 """Decomposition of a dataset's signals into secular rates and labelled lines."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+import xarray
 
 from rigidsim.analysis.decomposition import Decomposition, amplitude_spectrum, decompose
 from rigidsim.analysis.labels import Known, label, reversed_label, settled
@@ -13,9 +13,6 @@ from rigidsim.analysis.refinement import at_nyquist
 from rigidsim.analysis.result import Analysis, SignalAnalysis, SpectralLine
 from rigidsim.analysis.signals import EquidistantTimes, Signal, clock_of, signals_of
 from rigidsim.errors import RigidsimError
-
-if TYPE_CHECKING:
-    import xarray
 
 SPECTRUM_POINTS = 4000
 _BLEND = 0.05  # bins by which a line can be off that has absorbed closer ones

@@ -9,8 +9,6 @@ computed in double precision, the remainder in the signal's own: each step gains
 more.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

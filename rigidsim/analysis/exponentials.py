@@ -5,12 +5,10 @@ of many exponentials is a product of two narrow matrices. In double precision th
 at any length, since phases are reduced in integers. Beyond it numbers are integers in fixed point.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, replace
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -94,16 +92,13 @@ class Sum:
             flat = flat + np.polynomial.polynomial.polyval(x, [complex(c) for c in self.polynomial])
         return np.asarray(flat)
 
-    def slope(self) -> Sum:
+    def slope(self) -> Self:
         """The derivative, per sample."""
-        context = self.context
-        turn = context.mpc(0, 2 * context.pi)
-        return Sum(
-            context,
-            self.count,
-            tuple(2 * m * c / self.count for m, c in enumerate(self.polynomial) if m),
-            self.frequencies,
-            tuple(turn * f * a for f, a in zip(self.frequencies, self.amplitudes, strict=True)),
+        turn = self.context.mpc(0, 2 * self.context.pi)
+        return replace(
+            self,
+            polynomial=tuple(2 * m * c / self.count for m, c in enumerate(self.polynomial) if m),
+            amplitudes=tuple(turn * f * a for f, a in zip(self.frequencies, self.amplitudes, strict=True)),
         )
 
     def left_of(self, parts: Sequence[tuple[Reals, Reals]], bits: int) -> Complexes:

@@ -5,8 +5,6 @@ unfolded only if one combination of known frequencies beyond Nyquist's fits it, 
 nearly as simple.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace

@@ -3,8 +3,6 @@
 The steps are computed in double precision, the remainder in the signal's own; see ``decomposition``.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, replace
 from typing import Any

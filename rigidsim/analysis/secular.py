@@ -6,8 +6,6 @@ have in common is f''' = k f' (k = 1 / tau^2, or -w^2): from the curvature in th
 follows the slope that the rate has taken over.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,22 +1,18 @@
 """Signals of a dataset: its variables along time as real and complex signals, with every digit."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import mpmath
 import numpy as np
+import xarray
 from numpy.typing import NDArray
 
 from rigidsim.analysis.refinement import SignalSamples
 from rigidsim.errors import RigidsimError
 from rigidsim.store.variables import parts_in
-
-if TYPE_CHECKING:
-    import xarray
 
 Reals = NDArray[np.float64]
 

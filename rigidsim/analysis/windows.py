@@ -5,8 +5,6 @@ bins (of one turn over the whole length) away a share of p!^2 / (pi D^(2p+1)), a
 that is p + 1 bins wide on either side.
 """
 
-from __future__ import annotations
-
 import itertools
 from dataclasses import dataclass
 from functools import lru_cache

@@ -1,12 +1,12 @@
 """``rigidsim analyse``: secular rates and labelled lines of a run, as a table, a dataset and a figure."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+import xarray
 
 from rigidsim.analysis.analyse import analyse_dataset
 from rigidsim.analysis.labels import Known
@@ -17,9 +17,6 @@ from rigidsim.store import atomic
 from rigidsim.store.run import Run, open_run
 from rigidsim.workflows.known_frequencies import known_frequencies
 from rigidsim.workflows.read import parse
-
-if TYPE_CHECKING:
-    import xarray
 
 FIGURES = (".png", ".svg")
 

@@ -1,7 +1,5 @@
 """Certifying a finished run against an independent solution, if its config asks for an accuracy."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any, TypeVar
 

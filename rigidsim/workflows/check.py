@@ -1,7 +1,5 @@
 """Validation only: whether a config could be run, and how it was understood."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The experiment that a run's file embeds, with the defaults that were in force when the run began."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path

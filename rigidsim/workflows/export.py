@@ -1,7 +1,5 @@
 """``rigidsim export``: the dataset of a run or a sweep in other tools' formats."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path

@@ -4,8 +4,6 @@ Free bodies and heavy tops have theirs from the closed form (elliptic functions)
 ephemerides from mean elements, librations on a circular orbit from the linearised equations.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import mpmath

@@ -1,7 +1,5 @@
 """``rigidsim plan``: what would be integrated and why, and what it will cost, from a short pilot."""
 
-from __future__ import annotations
-
 import math
 import time
 from collections.abc import Mapping, Sequence

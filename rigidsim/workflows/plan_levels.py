@@ -1,7 +1,5 @@
 """Comparison of model levels, cost and error: ``plan``'s part on ``[model]``."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from contextlib import suppress

@@ -1,7 +1,5 @@
 """Reading experiments once all kinds of loads and all observables are registered."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Resuming a run that was interrupted, killed or stopped, and prolonging a finished one, bit for bit."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from decimal import Decimal

@@ -1,7 +1,5 @@
 """Running an experiment: choose what the config leaves to be chosen, run, certify, and retry on failure."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path

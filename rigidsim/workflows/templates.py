@@ -1,7 +1,5 @@
 """Commented configs to start from: one for each kind of scene."""
 
-from __future__ import annotations
-
 import re
 import tomllib
 from importlib.resources import files

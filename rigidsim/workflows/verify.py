@@ -1,7 +1,5 @@
 """Verifying a run bit for bit: integrated again from its config and compared number by number."""
 
-from __future__ import annotations
-
 import tempfile
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace

@@ -1,7 +1,5 @@
 """``rigidsim view``: runs in the viewer, a running one followed as it goes on, or drawn to a file."""
 
-from __future__ import annotations
-
 import tempfile
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager

@@ -9,8 +9,6 @@ A time budget bounds it all: long motions are measured over their beginning, qua
 of it, and what doesn't fit is listed as left out. Nothing is extrapolated.
 """
 
-from __future__ import annotations
-
 import math
 import random
 import statistics

@@ -2,8 +2,6 @@
 references, integrated in a process of their own while the settings are tried.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 

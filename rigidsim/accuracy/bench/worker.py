@@ -8,8 +8,6 @@ Speed is measured per natural step (of a closed form: per sample), in passes ove
 are repeated until they can be told from noise. Recording costs the same in every setting and isn't counted.
 """
 
-from __future__ import annotations
-
 import math
 import os
 import pickle

@@ -2,8 +2,6 @@
 integrator or code compiled for it, how its motions are perturbed, and what was learnt.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, field, replace
 

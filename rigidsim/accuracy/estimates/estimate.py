@@ -6,8 +6,6 @@ series that the tolerance allows. Their growth is measured over the whole run or
 allows. If the motion has a closed form, some samples are simply compared with that.
 """
 
-from __future__ import annotations
-
 import math
 import sys
 from collections.abc import Callable

@@ -7,8 +7,6 @@ that is a good part of the run's length: longer than a beginning or windows can 
 to time. The run's average over the rotation and the orbits carries errors alike, and takes few steps.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 

@@ -9,8 +9,6 @@ tighter one and compared at their samples. That costs no more than an ensemble w
 chance.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, replace
 

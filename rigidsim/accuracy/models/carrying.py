@@ -7,8 +7,6 @@ The average over the orbits serves where there is one, whose steps are few whate
 carries errors alike, up to terms that averaging leaves out.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace

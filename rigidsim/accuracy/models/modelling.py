@@ -7,8 +7,6 @@ the span. A run that is hardly longer than the windows is followed to its end in
 integration itself are another matter (``rigidsim.accuracy.estimates.estimate``).
 """
 
-from __future__ import annotations
-
 import math
 import time
 from collections.abc import Callable, Mapping, Sequence

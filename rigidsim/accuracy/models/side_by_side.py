@@ -1,7 +1,5 @@
 """A reduced model and the full one side by side over a window, from the same state."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace

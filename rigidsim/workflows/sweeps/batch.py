@@ -1,7 +1,5 @@
 """Running a tile's members in batches: families that share equations, and the rest one by one."""
 
-from __future__ import annotations
-
 import math
 import time
 from collections.abc import Sequence

@@ -1,7 +1,5 @@
 """Checks that refuse a sweep before any of its members runs."""
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections.abc import Callable, Iterable, Iterator

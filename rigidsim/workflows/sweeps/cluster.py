@@ -8,8 +8,6 @@ tile is computed again, and whoever fetches it waits meanwhile, for ever if no w
 fetches, while this one keeps checking whether there are workers.
 """
 
-from __future__ import annotations
-
 import time
 from collections import Counter
 from collections.abc import Iterator, Sequence

@@ -1,7 +1,5 @@
 """Computing members of a sweep tile by tile: in batches if possible, otherwise one by one."""
 
-from __future__ import annotations
-
 import re
 import time
 from collections.abc import Sequence

@@ -1,7 +1,5 @@
 """Cost of a sweep, and the number of members per tile."""
 
-from __future__ import annotations
-
 import math
 
 from rigidsim.errors import ConfigError, Problem, either

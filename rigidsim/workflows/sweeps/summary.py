@@ -1,7 +1,5 @@
 """Summary of all members of a sweep: how they ended, warnings, errors, and the cost."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from rigidsim.scene.sweeps.sweep import Sweep

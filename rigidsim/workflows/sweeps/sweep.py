@@ -1,7 +1,5 @@
 """Running a sweep: tiles of members until all are there, then the dataset; resumable whatever ends it."""
 
-from __future__ import annotations
-
 import json
 import multiprocessing
 import os

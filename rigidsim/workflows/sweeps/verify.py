@@ -1,13 +1,12 @@
 """Verifying a sweep bit for bit: some members, drawn at random, are run again and compared."""
 
-from __future__ import annotations
-
 import random
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import xarray
 
 from rigidsim.errors import RESUME, ConfigError, Problem, RunFolderError
 from rigidsim.scene.sweeps.sweep import Sweep
@@ -16,9 +15,6 @@ from rigidsim.store import provenance
 from rigidsim.store.sweeps.run import SavedSweep, open_sweep
 from rigidsim.workflows.sweeps.members import run_members, sweep_of
 from rigidsim.workflows.verify import Difference, Verdict
-
-if TYPE_CHECKING:
-    import xarray
 
 MEMBERS = 100
 """Number of members that are run again by default."""

@@ -6,8 +6,6 @@ leaves half of it there, and the pool waits for the rest for ever; what fits one
 512 bytes) arrives whole or not at all.
 """
 
-from __future__ import annotations
-
 import multiprocessing
 import os
 import shutil
