@@ -44,7 +44,7 @@ def assignments_of(changes: Mapping[str, Any]) -> list[str]:
                 {f"{key}.{mark}{_key(inner)}{mark}": given for inner, given in value.items()}
             )
         else:
-            found.append(f"{_key(key)}={'' if value is None else _inline(value, str(key))}")
+            found.append(f"{_key(key)}={'' if value is None else inline(value, str(key))}")
     return found
 
 
@@ -54,7 +54,7 @@ def _item(value: Any, where: str) -> Any:
         table = tomlkit.table()
         for key, inner in value.items():
             if inner is not None:
-                table[_key(key)] = tomlkit.value(_inline(inner, f"{where}.{key}"))
+                table[_key(key)] = tomlkit.value(inline(inner, f"{where}.{key}"))
         return table
     plain = _plain(value)
     if isinstance(plain, list) and plain and all(isinstance(entry, Mapping) for entry in plain):
@@ -62,11 +62,11 @@ def _item(value: Any, where: str) -> Any:
         for number, entry in enumerate(plain):
             tables.append(_item(entry, f"{where}[{number}]"))
         return tables
-    return tomlkit.value(_inline(value, where))
+    return tomlkit.value(inline(value, where))
 
 
-def _inline(value: Any, where: str, depth: int = 0) -> str:
-    """One value on one line."""
+def inline(value: Any, where: str = "value", depth: int = 0) -> str:
+    """A TOML value on one line."""
     plain = _plain(value)
     if depth > _DEEPEST:
         raise ConfigError(Problem(where, "nested too deeply"))
@@ -80,12 +80,12 @@ def _inline(value: Any, where: str, depth: int = 0) -> str:
         return _number(plain, where)
     if isinstance(plain, Mapping):
         inner = (
-            f"{tomlkit.string(_key(k)).as_string()} = {_inline(v, f'{where}.{k}', depth + 1)}"
+            f"{tomlkit.string(_key(k)).as_string()} = {inline(v, f'{where}.{k}', depth + 1)}"
             for k, v in plain.items()
         )
         return "{" + ", ".join(inner) + "}"
     if isinstance(plain, list):
-        entries = (_inline(entry, f"{where}[{n}]", depth + 1) for n, entry in enumerate(plain))
+        entries = (inline(entry, f"{where}[{n}]", depth + 1) for n, entry in enumerate(plain))
         return "[" + ", ".join(entries) + "]"
     raise ConfigError(Problem(where, f"given {shown(value)}; {_ALLOWED}"))
 
@@ -102,7 +102,8 @@ def _plain(value: Any) -> Any:
     if isinstance(value, Fraction):
         return f"{value.numerator}/{value.denominator}" if value.denominator != 1 else value.numerator
     if hasattr(value, "_mpf_"):
-        return _terminating(fraction_of(value)) if _is_finite(value) else value
+        _, mantissa, exponent, _ = value._mpf_
+        return _terminating(fraction_of(value)) if mantissa or not exponent else value  # infinities have none
     if isinstance(value, numbers.Integral):
         return int(value)
     if isinstance(value, numbers.Real) or kind == "f":
@@ -112,11 +113,6 @@ def _plain(value: Any) -> Any:
     if isinstance(value, Sequence):
         return list(value)
     return value
-
-
-def _is_finite(value: Any) -> bool:
-    _, mantissa, exponent, _ = value._mpf_
-    return bool(mantissa) or not exponent
 
 
 def _shortest(value: Any) -> str:
@@ -142,8 +138,3 @@ def _key(key: Any) -> str:
     if not isinstance(key, str) or not key:
         raise ConfigError(Problem("config", f'given the key {shown(key)}; a key is a text, such as "end"'))
     return key
-
-
-def inline_text(value: Any) -> str:
-    """A TOML value as written on one line."""
-    return _inline(value, "value")

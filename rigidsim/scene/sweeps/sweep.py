@@ -7,18 +7,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from dataclasses import replace as exchanged
 
-import tomlkit
-from tomlkit.exceptions import TOMLKitError
-
 from rigidsim.errors import ConfigError, MemberError, Problem, either
 from rigidsim.scene.choices import AUTO, FULL
-from rigidsim.scene.config import Experiment, parse, validated
-from rigidsim.scene.python_values import toml_text
+from rigidsim.scene.config import Experiment, validated
 from rigidsim.scene.sweep_table import INDICATORS, SweepTable
-from rigidsim.scene.sweeps.axes import Axis, axis_name, clashes
-from rigidsim.scene.sweeps.keys import refuse_unsettable, unit_and_length
+from rigidsim.scene.sweeps.axes import Axis, axis_name, clashes, refuse_unsettable, unit_and_length
 from rigidsim.scene.sweeps.values import axis_values
-from rigidsim.scene.sweeps.written import nearest_double
 from rigidsim.scene.toml_text import apply_overrides, key_steps, parse_toml
 
 MOST_MEMBERS = 100_000_000
@@ -33,19 +27,12 @@ _SAME_FOR_ALL = {
 
 @dataclass(frozen=True)
 class Sweep:
-    """All members of an experiment with a ``[sweep]``.
+    """All members of an experiment with a ``[sweep]``."""
 
-    Attributes:
-        experiment: the config as it was given, with its ``[sweep]``.
-        base: the single experiment that the members vary.
-        axes: axes in the order of the config; the last varies fastest in a product.
-        added: name of what members record only for indicators, if anything.
-    """
-
-    experiment: Experiment
-    base: Experiment
-    axes: tuple[Axis, ...]
-    added: str = ""
+    experiment: Experiment  # as it was given, with its ``[sweep]``
+    base: Experiment  # the single experiment that the members vary
+    axes: tuple[Axis, ...]  # in the order of the config; the last varies fastest in a product
+    added: str = ""  # name of what members record only for indicators, if anything
 
     @classmethod
     def of(cls, experiment: Experiment) -> Sweep:
@@ -132,7 +119,7 @@ class Sweep:
         for axis, index in zip(self.axes, self.indices(member), strict=True):
             text = axis.values.text(index)
             if axis.numeric:
-                numbers = [f"{nearest_double(x):.6g}" for x in axis.exact(index)]
+                numbers = [f"{float(x):.6g}" for x in axis.exact(index)]
                 text = f"[{', '.join(numbers)}]" if axis.values.components else numbers[0]
             unit = f" {axis.unit}" if axis.numeric and axis.unit != "1" else ""
             found.append(f"{axis.name} = {text}{unit}")
@@ -170,10 +157,8 @@ class Sweep:
         """The error with the member named besides the key, unless it names the member already."""
         if isinstance(error, MemberError):
             return error
-        named = ", ".join(
-            f"{axis.name} = {shown_text(text)}"
-            for axis, text in zip(self.axes, self.texts(member), strict=True)
-        )
+        texts = (text if len(text) <= 40 else text[:37] + "..." for text in self.texts(member))
+        named = ", ".join(f"{axis.name} = {text}" for axis, text in zip(self.axes, texts, strict=True))
         problems = [
             Problem(f"[sweep] member {member} ({named})", self._reason(problem)) for problem in error.problems
         ]
@@ -186,11 +171,6 @@ class Sweep:
             return f"{problem.where}: {problem.what}"
         names = ", ".join(f'"{name}"' for name in self.table.keep if name in INDICATORS)
         return f"[sweep] keep: given {names}: {problem.what.removeprefix(added)}"
-
-
-def shown_text(text: str) -> str:
-    """A value's text, shortened for messages."""
-    return text if len(text) <= 40 else text[:37] + "..."
 
 
 def _plain_key(key: str) -> str:
@@ -210,7 +190,8 @@ def _counts(table: SweepTable, axes: Sequence[Axis]) -> list[Problem]:
             given = ", ".join(f'"{axis.key}" {axis.values.count}' for axis in axes)
             what = f'given "zip", which needs axes of one length: {given}; or choose mode = "product"'
             return [Problem("[sweep] mode", what)]
-        return [] if "member" not in {axis.name for axis in axes} else [_taken("member")]
+        taken = 'the name "member" is taken; give that axis another'
+        return [Problem("[sweep] axes", taken)] if "member" in {axis.name for axis in axes} else []
     count = math.prod(sizes)
     if count > MOST_MEMBERS:
         given = " x ".join(f"{size:,}" for size in sizes)
@@ -220,23 +201,9 @@ def _counts(table: SweepTable, axes: Sequence[Axis]) -> list[Problem]:
     return []
 
 
-def _taken(name: str) -> Problem:
-    return Problem("[sweep] axes", f'the name "{name}" is taken; give that axis another')
-
-
 def _without_sweep(experiment: Experiment) -> Experiment:
     """The config without its ``[sweep]``, everything else as written."""
-    tables = parse_toml(experiment.text, experiment.source)
-    del tables["sweep"]
-    text = ""
-    try:
-        document = tomlkit.parse(experiment.text)
-        document.remove("sweep")
-        text = document.as_string()
-        same = parse_toml(text, experiment.source) == tables
-    except (TOMLKitError, ConfigError, KeyError, ValueError):
-        same = False
-    base = parse(text if same else toml_text(tables), source=experiment.source)
+    base = experiment.having(["sweep="])
     if base.config.integrator.hold_invariants == "auto":  # which members of a sweep haven't
         base = base.having(["integrator.hold_invariants=false"])
-    return exchanged(base, given=experiment.given, settings=experiment.settings)
+    return base

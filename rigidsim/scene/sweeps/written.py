@@ -10,12 +10,11 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from fractions import Fraction
-from functools import cache
 from typing import Any
 
 import mpmath
 
-from rigidsim.scene.exact import ExactNumber, decimal_text, fraction_of, in_its_unit, with_unit
+from rigidsim.scene.exact import ExactNumber, decimal_text, in_its_unit, with_unit
 from rigidsim.scene.validation_messages import shown
 
 DIGITS = 40
@@ -51,24 +50,6 @@ class Written:
         return f'"{plain}"' if "/" in plain or "*" in plain else plain
 
 
-def nearest_double(number: ExactNumber) -> float:
-    """The double nearest to a number, for labels."""
-    value = number.rational
-    if number.pi_power:
-        value = fraction_of(number.at(_labelling()))
-    try:
-        return value.numerator / value.denominator
-    except OverflowError:
-        return math.inf if value > 0 else -math.inf
-
-
-@cache
-def _labelling() -> Any:
-    context = mpmath.MPContext()
-    context.prec = 200
-    return context
-
-
 def long_context() -> Any:
     """A context in which values that aren't rational are worked out, before they are ``rounded``."""
     context = mpmath.MPContext()
@@ -91,17 +72,10 @@ Entry = tuple[Written, ...]
 
 @dataclass(frozen=True)
 class AxisValues:
-    """Values of an axis.
-
-    Attributes:
-        count: number of values.
-        components: components of each value; 0 for plain numbers, and for values that aren't numbers.
-        entry: function that gives the numbers of a value; None if values aren't numbers.
-        word: function that gives the TOML text of a value that isn't a number; None for numbers.
-    """
+    """Values of an axis: by their index, either the numbers of each, or the TOML text of what is none."""
 
     count: int
-    components: int
+    components: int  # of each value; 0 for plain numbers, and for values that aren't numbers
     entry: Callable[[int], Entry] | None
     word: Callable[[int], str] | None = None
 

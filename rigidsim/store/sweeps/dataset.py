@@ -12,7 +12,6 @@ import numpy as np
 
 from rigidsim.scene.sweeps.axes import Axis
 from rigidsim.scene.sweeps.sweep import Sweep
-from rigidsim.scene.sweeps.written import nearest_double
 from rigidsim.store import atomic
 from rigidsim.store.atomic import sink
 from rigidsim.store.netcdf import NetcdfFile, writing
@@ -102,7 +101,7 @@ def _coordinates(file: NetcdfFile, sweep: Sweep) -> str:
 
 def label_numbers(axis: Axis) -> np.ndarray:
     """The values of an axis as doubles, (count,) or (count, components); their texts are exact."""
-    found = np.array([[nearest_double(x) for x in axis.exact(i)] for i in range(axis.values.count)])
+    found = np.array([[float(x) for x in axis.exact(i)] for i in range(axis.values.count)])
     return found if axis.values.components else found[:, 0]
 
 
