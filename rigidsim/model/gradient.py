@@ -104,8 +104,8 @@ class GradientSource:
         if self.ephemeris is not None:
             return context.mpf(MEAN_DISTANCE[self.ephemeris])
         if self.pair is not None:
-            axis = self.pair.semi_major_axis(context)
-            return self.pair.encounter(context)[0] if axis is None else axis
+            ellipse = self.pair.ellipse(context)
+            return self.pair.encounter(context)[0] if ellipse is None else ellipse[0]
         assert self.position is not None
         return norm(context, self.position)
 

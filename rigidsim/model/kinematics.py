@@ -13,9 +13,8 @@ from typing import Any, TypeVar
 import heyoka as hy
 
 from rigidsim.model.inertia import ConstantInertia, Inertia
-from rigidsim.model.orbits.kepler_states import OrbitStates, orbit_states
 from rigidsim.model.orbits.point_mass_states import PointMassStates
-from rigidsim.model.orbits.table_states import TablePlace, table_states
+from rigidsim.model.orbits.prescribed import OrbitStates, TablePlace, orbit_states, table_states
 from rigidsim.model.rotations import Symbolic, SymbolicMatrix, apply, length, transpose
 from rigidsim.model.scaling import Rounder, ScaledNumbers, Scaling
 from rigidsim.model.state_blocks import BODY, AttitudeStates, RotatingBody, StateBlock

@@ -31,7 +31,7 @@ from rigidsim.model.load import Load, force_terms, loads_of, torque_terms
 from rigidsim.model.load_estimate import estimate_drive, probe, start_of
 from rigidsim.model.loads.uniform_gravity import UniformGravity
 from rigidsim.model.observables.observable import NEEDS
-from rigidsim.model.orbits.table_states import places_of
+from rigidsim.model.orbits.prescribed import places_of
 from rigidsim.model.scaling import Scaling, amplitude_of, choose_scaling, scaled_numbers
 from rigidsim.model.state_blocks import BODY
 from rigidsim.scene.choices import AUTO, variables_named

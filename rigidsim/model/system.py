@@ -14,7 +14,7 @@ from rigidsim.model.formulations.formulation import Formulation, ModelPlan
 from rigidsim.model.heyoka_expressions import carries_sign, plain_angles, to_heyoka
 from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.names import state_names
-from rigidsim.model.orbits.table_states import Pieces
+from rigidsim.model.orbits.prescribed import Pieces
 from rigidsim.model.outputs import Invariant, Recorded, drift_outputs, find_invariants, recorded_variables
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.scaling import Rounder

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 from pydantic import Field, StrictStr
@@ -71,31 +71,20 @@ class PointMassBody(ConfigTable):
 
 @dataclass(frozen=True)
 class PointMasses:
-    """Point masses at the start of a run; numbers are mpf, SI, space axes.
-
-    Attributes:
-        strengths: gravitational parameters, m^3/s^2.
-        positions, velocities: one vector for each.
-        host: index of the one that the rigid body is; None if it is none of them.
-        full: whether they feel the reaction to the rigid body's torques and the forces of its shape.
-    """
+    """Point masses at the start of a run; numbers are mpf, SI, space axes."""
 
     names: tuple[str, ...]
-    strengths: Vector
+    strengths: Vector  # gravitational parameters, m^3/s^2
     positions: tuple[Vector, ...]
     velocities: tuple[Vector, ...]
-    host: int | None
-    full: bool
+    host: int | None  # index of the one that the rigid body is; None if it is none of them
+    full: bool  # whether they feel the reaction to the body's torques and the forces of its shape
 
     def constant(self, context: Any, mass: Any | None) -> Any:
         """G for masses in kg: by the host's own mass (kg), if that is known and reacts."""
         if self.full and self.host is not None and mass is not None:
             return self.strengths[self.host] / mass
         return context.mpf(GRAVITATIONAL_CONSTANT)
-
-    def moved(self, positions: tuple[Vector, ...], velocities: tuple[Vector, ...]) -> PointMasses:
-        """The same masses elsewhere."""
-        return replace(self, positions=positions, velocities=velocities)
 
     def encounter(self, context: Any, one: int, other: int) -> tuple[Any, Any]:
         """See ``closest``, for two of the masses."""

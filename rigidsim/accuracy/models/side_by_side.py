@@ -211,9 +211,10 @@ def with_bodies(scene: Scene, prepared: InitialValueProblem, states: Sequence[An
     system, context = prepared.system, scene.context
     names, exponents = system.states, system.state_exponents
     held = {n: context.ldexp(x, e) for n, x, e in zip(names, states, exponents, strict=True)}
-    masses = scene.bodies.moved(
-        tuple([held[f"{name}_{x}"] for x in "xyz"] for name in scene.bodies.names),
-        tuple([held[f"{name}_v{x}"] for x in "xyz"] for name in scene.bodies.names),
+    masses = replace(
+        scene.bodies,
+        positions=tuple([held[f"{name}_{x}"] for x in "xyz"] for name in scene.bodies.names),
+        velocities=tuple([held[f"{name}_v{x}"] for x in "xyz"] for name in scene.bodies.names),
     )
     return replace(scene, bodies=masses, loads=tuple(load.among(masses) for load in scene.loads))
 

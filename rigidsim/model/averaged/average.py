@@ -31,7 +31,7 @@ from rigidsim.model.averaged.sources import Source, sources_of, unit
 from rigidsim.model.averaged.spectrum import BodySpectrum, body_spectrum
 from rigidsim.model.capabilities import gradient_source_of
 from rigidsim.model.load import Load
-from rigidsim.model.orbits.table_states import Carried
+from rigidsim.model.orbits.prescribed import Carried
 from rigidsim.model.scaling import Scaling
 from rigidsim.scene import attitude
 from rigidsim.scene.arithmetic import Vector, apply, cross, dot, negligible, norm, working_bits

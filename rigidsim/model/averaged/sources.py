@@ -54,12 +54,12 @@ class Source:
         given = number, source, 3 * source.gravitational_parameter / source.distance(context) ** 3
         if (pair := source.pair) is not None:
             least, rate = pair.encounter(context)
-            if (axis := pair.semi_major_axis(context)) is None:
+            if (ellipse := pair.ellipse(context)) is None:
                 return cls(*given, passing_rate=float(rate))
             # what the others do to axis and eccentricity is of the size of their share in the acceleration
-            perturbed, motion = pair.perturbation(context), pair.mean_motion(context)
+            perturbed, (axis, e, motion) = pair.perturbation(context), ellipse
             closer = float(least / axis) * max(1 - 2 * perturbed, 0.5)
-            e = min(pair.eccentricity(context) + 2 * perturbed, _ALMOST_PARABOLIC)
+            e = min(e + 2 * perturbed, _ALMOST_PARABOLIC)
             doubt = perturbed * motion
             return cls(*given, motion, e, closer**-3, doubt, doubt, float(rate))
         if source.ephemeris is not None:

@@ -23,8 +23,7 @@ from rigidsim.model.averaged.orbit_terms import (
     turned,
 )
 from rigidsim.model.mechanics import Mechanics
-from rigidsim.model.orbits.kepler_states import OrbitStates
-from rigidsim.model.orbits.table_states import ElementStates, element_states
+from rigidsim.model.orbits.prescribed import ElementStates, OrbitStates, element_states
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.scaling import Rounder
 from rigidsim.model.state_blocks import StateBlock

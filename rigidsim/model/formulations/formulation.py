@@ -18,7 +18,7 @@ from rigidsim.model.capabilities import is_wide
 from rigidsim.model.kinematics import in_common_unit
 from rigidsim.model.load import Load
 from rigidsim.model.mechanics import Mechanics
-from rigidsim.model.orbits.table_states import Carried, TablePlace
+from rigidsim.model.orbits.prescribed import Carried, TablePlace
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.scaling import Rounder, ScaledNumbers, Scaling, largest_rates
 from rigidsim.model.state_blocks import BODY, AttitudeStates, StateBlock

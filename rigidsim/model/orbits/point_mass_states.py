@@ -130,25 +130,16 @@ class PointMassPair:
         """Sum of both gravitational parameters, m^3/s^2."""
         return self.masses.strengths[self.host] + self.masses.strengths[self.number]
 
-    def semi_major_axis(self, context: Any) -> Any | None:
-        """Semi-major axis, m (mpf); None if they aren't bound to each other."""
+    def ellipse(self, context: Any) -> tuple[Any, float, float] | None:
+        """Semi-major axis (m, mpf), eccentricity and mean motion (rad/s) of a bound pair, or None."""
         speed = norm(context, self._moving)
         inverse = 2 / norm(context, self.place) - speed * speed / self._attraction
-        return 1 / inverse if inverse > 0 else None
-
-    def eccentricity(self, context: Any) -> float:
-        """Eccentricity of the ellipse of a bound pair."""
-        axis = self.semi_major_axis(context)
-        assert axis is not None
-        momentum = norm(context, cross(self.place, self._moving))
+        if not inverse > 0:
+            return None
+        axis, momentum = 1 / inverse, norm(context, cross(self.place, self._moving))
         squared = 1 - momentum * momentum / (self._attraction * axis)
-        return float(context.sqrt(squared)) if squared > 0 else 0.0
-
-    def mean_motion(self, context: Any) -> float:
-        """Mean motion of a bound pair, rad/s."""
-        axis = self.semi_major_axis(context)
-        assert axis is not None
-        return float(context.sqrt(self._attraction / axis) / axis)
+        e = float(context.sqrt(squared)) if squared > 0 else 0.0
+        return axis, e, float(context.sqrt(self._attraction / axis) / axis)
 
     def encounter(self, context: Any) -> tuple[Any, Any]:
         """Least distance (m) and the angular rate there (rad/s), mpf."""

@@ -1,13 +1,20 @@
-"""Tabulated orbits carried as states, so that the engine interpolates no table.
+"""Prescribed orbits carried as states: Kepler orbits, so that no angle grows with time, and tabulated ones,
+so that the engine interpolates no table.
 
-Between two rows each element is a polynomial of u, the elapsed fraction of the interval:
+cos(n t) of a growing time loses digits (engine-notes: 1e-5 rad after 1e5 radians). A Kepler orbit's eccentric
+anomaly E enters through c = cos E and s = sin E, which are states:
+
+    E' = n / (1 - e c),   c' = -E' s,   s' = E' c,   r = a (1 - e c),
+
+and so do a moving node and periapsis, each as a pair that turns uniformly. (Kepler; Danby 1988, ch. 6.)
+
+Between two rows of a table each element is a polynomial of u, the elapsed fraction of the interval:
 
     u' = 1 / L,    x' = (c_1 + 2 c_2 u + ... + 5 c_5 u^4) / L,
 
 with coefficients that are parameters of the compiled equations. Steps end at the rows, where the parameters
 of the next piece take over and the states are put on the table's own values (``Pieces``): nothing adds up.
-The place on the orbit is the eccentric longitude K, carried by its cosine c and sine s, so that no angle
-grows:
+The place on the orbit is the eccentric longitude K, carried by its cosine c and sine s as well:
 
     K' = (l' + k' s - h' c) / (1 - k c - h s),    r = a (1 - k c - h s).
 
@@ -27,19 +34,84 @@ from typing import Any
 
 import heyoka as hy
 
-from rigidsim.model.orbits.kepler_states import OrbitStates
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.scaling import Rounder
 from rigidsim.model.state_blocks import StateBlock
 from rigidsim.model.two_part import as_factor, rounded
 from rigidsim.scene.arithmetic import GUARD_BITS
 from rigidsim.scene.orbit_tables.pieces import AXIS, LONGITUDE, TabulatedOrbit
+from rigidsim.scene.orbits import KeplerOrbit
 
 _POWERS = 5  # of the polynomials; as many parameters for each element
 _LEAST = -5
 """Exponent, in bits of the working precision, of what is set to zero: elements are of order one, so that
 anything smaller is a remnant of a zero and could underflow single precision.
 """
+
+
+@dataclass(frozen=True)
+class OrbitStates:
+    """The part of a system of equations that carries an orbit; vectors in space axes."""
+
+    block: StateBlock  # its norms stay 1, since each pair of states is a cosine and a sine
+    direction: list[Symbolic]  # unit vector towards the attracting body
+    normal: list[Symbolic]  # of the plane; the attracting body moves about it directly
+    inverse_distance: Symbolic  # semi-major axis over distance, 1 for a circle
+
+
+def orbit_states(
+    orbit: KeplerOrbit, tag: str, time_unit: Any, start: Any, context: Any, number: Rounder
+) -> OrbitStates:
+    """Carry a Kepler orbit as states, whose names end with a tag; start and unit of time in s (mpf)."""
+    names: list[str] = []
+    derivatives: list[Symbolic] = []
+    initial: list[Any] = []
+    norms: list[Symbolic] = []
+
+    def constant(value: Any) -> Symbolic:
+        return as_factor(number(value))  # exact 0 and 1 vanish from products
+
+    def pair(name: str, angle: Any, rate: Symbolic | None) -> tuple[Symbolic, Symbolic]:
+        """Cosine and sine of an angle: constants if it is fixed, two states if it moves."""
+        if rate is None:
+            return constant(context.cos(angle)), constant(context.sin(angle))
+        c, s = hy.make_vars(f"cos_{name}{tag}", f"sin_{name}{tag}")
+        names.extend((str(c), str(s)))
+        derivatives.extend((-(rate * s), rate * c))
+        initial.extend((context.cos(angle), context.sin(angle)))
+        norms.append(hy.sqrt(c * c + s * s))
+        return c, s
+
+    def uniform(rate: Any) -> Symbolic | None:
+        return None if rate == 0 else constant(rate * time_unit)
+
+    e = orbit.eccentricity
+    anomaly = orbit.eccentric_anomaly(context, start)
+    motion = constant(orbit.mean_motion * time_unit)
+    if orbit.circular:
+        c, s = pair("anomaly", anomaly, motion)
+        inverse = hy.expression(1.0)
+        along, across = c, s
+    else:
+        c = hy.make_vars(f"cos_anomaly{tag}")
+        inverse = 1.0 / (1.0 - number(e) * c)
+        c, s = pair("anomaly", anomaly, motion * inverse)
+        along = (c - number(e)) * inverse
+        across = number(context.sqrt(1 - e * e)) * s * inverse
+    w_c, w_s = pair(
+        "periapsis", orbit.periapsis + orbit.periapsis_rate * start, uniform(orbit.periapsis_rate)
+    )
+    n_c, n_s = pair("node", orbit.ascending_node + orbit.node_rate * start, uniform(orbit.node_rate))
+    i_c, i_s = constant(context.cos(orbit.inclination)), constant(context.sin(orbit.inclination))
+    # R3(node) R1(inclination) R3(periapsis) (cos, sin, 0) of the true anomaly
+    x = w_c * along - w_s * across
+    y = w_s * along + w_c * across
+    direction = [n_c * x - n_s * (i_c * y), n_s * x + n_c * (i_c * y), i_s * y]
+    normal = [n_s * i_s, -(n_c * i_s), i_c]
+    return OrbitStates(StateBlock(names, derivatives, initial, norms), direction, normal, inverse)
+
+
+# --- tables -------------------------------------------------------------------------------------------------
 
 
 class Carried(Enum):
@@ -210,7 +282,6 @@ class Pieces:
                 self._rows.append({})
             self._rows[-1][orbit] = row
         self._known: dict[int, list[Any]] = {}
-        self._longitudes: dict[TabulatedOrbit, Any] = {}
 
     def number_at(self, time: Any) -> int:
         """Number of the piece that begins at or contains a time (internal units, working precision)."""
@@ -240,7 +311,7 @@ class Pieces:
                 if element != LONGITUDE:
                     found[_name(element, tag)] = begin[element] / _unit(orbit, element)
             if LONGITUDE in elements and place.longitude is Carried.MEAN:
-                since = begin[LONGITUDE] - self._start_of(orbit)
+                since = begin[LONGITUDE] - orbit.starting_longitude(self._start)
                 found[_name(LONGITUDE, tag)] = orbit.context.ldexp(since, -orbit.longitude_exponent)
             elif LONGITUDE in elements:
                 turned = orbit.eccentric_longitude(begin, begin[LONGITUDE])
@@ -254,12 +325,6 @@ class Pieces:
             if orbit in self._rows[before]:
                 return self._rows[before][orbit]
         return orbit.number_at(self._start)
-
-    def _start_of(self, orbit: TabulatedOrbit) -> Any:
-        """Mean longitude at the start of the run, rad (mpf)."""
-        if orbit not in self._longitudes:
-            self._longitudes[orbit] = orbit.starting_longitude(self._start)
-        return self._longitudes[orbit]
 
     def _of(self, orbit: TabulatedOrbit, row: int) -> list[Any]:
         times, piece = orbit.table.times, orbit.piece(row)
