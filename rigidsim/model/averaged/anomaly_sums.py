@@ -23,11 +23,13 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
 import numpy as np
+
+from rigidsim.model.averaged.spectrum import eccentric_anomalies
 
 _POINTS = ((0.3, 64), (0.6, 256), (1.0, 8192))
 """Points per turn up to an eccentricity; harmonics beyond are below double precision up to 0.6."""
@@ -47,13 +49,12 @@ class AnomalySums:
     strength: float  # 3 G M / (a^3 n^2)
     eccentricity: float
     multiple: int  # k = 2 p
-    points: int
+    most: int = 1 << 30  # points per turn; as many as are enough
 
-    @classmethod
-    def of(cls, moments: np.ndarray, strength: float, eccentricity: float, multiple: int) -> AnomalySums:
-        """Sums with enough points."""
-        points = next(count for most, count in _POINTS if eccentricity < most)
-        return cls(moments, strength, eccentricity, multiple, points)
+    @cached_property
+    def points(self) -> int:
+        """Points per turn."""
+        return min(self.most, next(count for most, count in _POINTS if self.eccentricity < most))
 
     @property
     def turns(self) -> int:
@@ -69,11 +70,7 @@ class AnomalySums:
     @cached_property
     def place(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Position along P and T, and distance, over a, (n, 1)."""
-        e, mean = self.eccentricity, self.mean
-        anomaly = mean + e * np.sin(mean)
-        for _ in range(60):
-            step = (anomaly - e * np.sin(anomaly) - mean) / (1 - e * np.cos(anomaly))
-            anomaly = anomaly - np.clip(step, -0.5, 0.5)
+        e, anomaly = self.eccentricity, eccentric_anomalies(self.mean, self.eccentricity)
         x, y = np.cos(anomaly) - e, math.sqrt(1 - e * e) * np.sin(anomaly)
         return x[:, None], y[:, None], np.hypot(x, y)[:, None]
 
@@ -155,9 +152,8 @@ def second_order(
     moments: tuple[float, ...], strength: float, eccentricity: float, multiple: int
 ) -> tuple[float, ...]:
     """Coefficients of K for a body and an orbit, in the units of ``AnomalySums``."""
-    sums = AnomalySums.of(np.array(moments), strength, eccentricity, multiple)
-    points = min(sums.points, _MOST_POINTS)
-    return tuple(replace(sums, points=points).second_order().tolist())
+    sums = AnomalySums(np.array(moments), strength, eccentricity, multiple, _MOST_POINTS)
+    return tuple(sums.second_order().tolist())
 
 
 def _terms(along: np.ndarray, across: np.ndarray) -> list[np.ndarray]:

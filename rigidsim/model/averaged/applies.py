@@ -50,13 +50,13 @@ than a weak harmonic's part at them.
 
 def refuse_scene(scene: Scene, loads: Sequence[Load]) -> None:
     """Raise a ConfigError for a scene that is of no kind that has averages."""
-    config, level = scene.config, scene.config.model.level
+    config, level, integrator = scene.config, scene.config.model.level, scene.config.integrator
+    sources = [source for load in loads if (source := gradient_source_of(load)) is not None]
     alone = [load for load in loads if gradient_source_of(load) is None]
-    integrator = config.integrator
-    against = ""
+    against = carried_beside(loads)
     if scene.free_flight:
         against = "the body has a position and flies"
-    elif against := carried_beside(loads):
+    elif against:
         pass
     elif not loads:
         against = "no torque acts, so that the direction of the angular momentum rests"
@@ -92,22 +92,19 @@ def refuse_scene(scene: Scene, loads: Sequence[Load]) -> None:
         against = 'coupling = "full" makes the bodies feel every rotation of this one'
         raise refused(level, against, 'set [body] coupling to "one_way", or choose level = "full"')
     elif level == ORBIT_AVERAGED:
-        sources = [gradient_source_of(load) for load in loads]
-        if beside := [source.pair.name for source in sources if source is not None and source.pair]:
+        if beside := [source.pair.name for source in sources if source.pair]:
             against = f'the orbit of the point mass "{beside[0]}" is integrated, so that there is no '
             against += "ellipse to average over"
             remedy = 'choose "spin_averaged", or write the elements of the orbit into a table '
             raise refused(level, against, remedy + '(orbit = {table = "elements.csv"})')
-        if any(source is not None and source.ephemeris for source in sources):
+        if any(source.ephemeris for source in sources):
             against = "the source of an ephemeris has no elements to average over"
             raise refused(level, against, 'choose "spin_averaged", or give it an orbit with a node_rate')
     if against:
         raise refused(level, against)
     if alone and config.model.short_period:
-        what = (
-            f"given true, but what {alone[0].title} does within a rotation isn't added back; set it to false"
-        )
-        raise ConfigError(Problem("[model] short_period", what))
+        what = f"given true, but what {alone[0].title} does within a rotation isn't added back; "
+        raise ConfigError(Problem("[model] short_period", what + "set it to false"))
 
 
 def refuse_frequencies(
@@ -116,14 +113,11 @@ def refuse_frequencies(
     sources: Sequence[Source],
     moving: tuple[BodySpectrum, float] | None = None,
 ) -> Resonance | None:
-    """Refuse a motion whose frequencies aren't far enough apart.
+    """Refuse a motion whose frequencies aren't far enough apart, with a ConfigError that names the resonance
+    that no average can keep, or what is too fast; the one that is kept, if any.
 
-    Args:
-        moving: for a rotation that torques change, its harmonics at another time, and how many seconds lie
-            between: resonances that it passes too fast to be captured are no reason to refuse it.
-
-    Raises:
-        ConfigError: names a resonance that no average can keep, or what is too fast.
+    A rotation that torques change comes with its harmonics at another time, and the seconds between
+    (``moving``): resonances that it passes too fast to be captured are no reason to refuse it.
     """
     for source in sources:
         _refuse_passing(scene, spectrum, source)
@@ -158,14 +152,6 @@ def told_of_resonances(sources: Sequence[Source]) -> str:
     return f"; resonances were looked for {', '.join(told)}" if told else ""
 
 
-def separatrix_refused(level: str) -> ConfigError:
-    """The error for a body that turns about its intermediate axis."""
-    return refused(
-        level,
-        "the body turns about its intermediate axis, where its wobble takes forever and nothing averages",
-    )
-
-
 def swing_of(spectrum: BodySpectrum, source: Source) -> float:
     """Angle (rad) by which the terms removed by averaging over the rotation swing the momentum."""
     sizes = np.where(spectrum.oscillating, np.abs(spectrum.harmonics), 0.0)
@@ -178,14 +164,10 @@ def _refuse_resonance(
     scene: Scene, spectrum: BodySpectrum, source: Source, moving: tuple[BodySpectrum, float] | None
 ) -> Resonance | None:
     """Refuse resonances; return the one that can be kept, if it is the only one."""
-    found = np.flatnonzero(spectrum.oscillating.ravel())
+    found = np.flatnonzero(spectrum.strong(_WEAK))
     if not len(found):
         return None
     sizes = np.abs(spectrum.harmonics).ravel()[found]
-    keep = sizes > _WEAK * max(float(x) for x in spectrum.motion.moments)
-    found, sizes = found[keep], sizes[keep]
-    if not len(found):
-        return None
     i, j = (orders.ravel()[found] for orders in spectrum.orders)
     body = spectrum.frequencies.ravel()[found]
     orbit = source.harmonics
@@ -222,11 +204,12 @@ def _refuse_resonance(
         if not rate[worst] < slow[worst]:
             worst = np.unravel_index(int(np.argmax(swing)), rate.shape)
         at = int(i[worst[0]]), int(j[worst[0]]), int(k[worst[1]])
+        period = span_text(2 * np.pi / rate[worst]) if rate[worst] > 0 else "forever"
         raise refused(
             scene.config.model.level,
-            f"{_combination(spectrum, at, float(body[worst[0]]))} of the body's precession g and wobble l "
+            f"{_combination(at, float(body[worst[0]]))} of the body's precession g and wobble l "
             f"and of the mean motion n of [[loads]] {source.name} is only "
-            f"{float(rate[worst]):.3g} rad/s, once in {_period(float(rate[worst]))}, where its angle "
+            f"{float(rate[worst]):.3g} rad/s, once in {period}, where its angle "
             f"librates within {float(width[worst]):.3g} rad/s: a resonance, which no average may pass over",
             remedy,
         )
@@ -241,9 +224,7 @@ def _refuse_passing(scene: Scene, spectrum: BodySpectrum, source: Source) -> Non
     """
     if source.passing_rate is None or source.motion > 0:
         return
-    sizes = np.abs(spectrum.harmonics)
-    seen = spectrum.oscillating & (sizes > _WEAK * max(float(x) for x in spectrum.motion.moments))
-    rates = np.append(np.abs(spectrum.frequencies[seen]), abs(spectrum.rates[0]))
+    rates = np.append(np.abs(spectrum.frequencies[spectrum.strong(_WEAK)]), abs(spectrum.rates[0]))
     most = PASSING * source.passing_rate
     if rates.min() < most:
         raise refused(
@@ -265,7 +246,7 @@ def _offered(scene: Scene, spectrum: BodySpectrum, source: Source) -> Resonance 
     return Resonance(motion, source, multiple, scene.context) if multiple > 0 else None
 
 
-def _combination(spectrum: BodySpectrum, orders: tuple[int, int, int], body: float) -> str:
+def _combination(orders: tuple[int, int, int], body: float) -> str:
     """A combination of frequencies as text ("2 g - 2 l - 3 n"); g alone turns a symmetric body's tensor."""
     i, j, k = orders
     signed = -k if body > 0 else k
@@ -305,10 +286,6 @@ def _refuse_slow_orbit(scene: Scene, spectrum: BodySpectrum, source: Source) -> 
             f"source of [[loads]] number {source.number} goes round; up to {SWING} is allowed",
             'choose "spin_averaged"',
         )
-
-
-def _period(rate: float) -> str:
-    return span_text(2 * np.pi / rate) if rate > 0 else "forever"
 
 
 def refused(level: str, against: str, remedy: str = 'choose level = "full"') -> ConfigError:

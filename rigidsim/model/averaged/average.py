@@ -15,17 +15,10 @@ from typing import Any
 
 import numpy as np
 
-from rigidsim.model.averaged.applies import (
-    AXIAL,
-    refuse_frequencies,
-    refuse_scene,
-    separatrix_refused,
-    swing_of,
-)
-from rigidsim.model.averaged.driven import Driven, driven_by, frame_along
+from rigidsim.model.averaged.applies import AXIAL, refuse_frequencies, refuse_scene, refused, swing_of
+from rigidsim.model.averaged.driven import Driven, driven_by, frame_along, passing
 from rigidsim.model.averaged.free_motion import FreeMotion, Separatrix, free_motion
 from rigidsim.model.averaged.orbit_terms import nutation
-from rigidsim.model.averaged.passages import passing
 from rigidsim.model.averaged.resonance import Resonance, SlowStart
 from rigidsim.model.averaged.sources import Source, sources_of, unit
 from rigidsim.model.averaged.spectrum import BodySpectrum, body_spectrum
@@ -43,33 +36,16 @@ _ROUNDS = 4  # iterations; each gains a factor of the nutation's size
 DIRECTION = ["sx", "sy", "sz"]
 """States: direction of the momentum, space axes; its mean if nothing is added back."""
 TOLD = (
-    "angular_momentum",
-    "angular_momentum_norm",
-    "energy",
-    "figure_axis",
-    "spin_axis",
-    "momentum_axis",
-    "right_ascension",
-    "declination",
-    "obliquity",
-    "node_longitude",
-    "point_mass_position",
-    "point_mass_velocity",
-    "orbital_energy",
-    "orbital_angular_momentum",
-    "orbital_linear_momentum",
-)
+    "angular_momentum", "angular_momentum_norm", "energy", "figure_axis", "spin_axis", "momentum_axis",
+    "right_ascension", "declination", "obliquity", "node_longitude", "point_mass_position",
+    "point_mass_velocity", "orbital_energy", "orbital_angular_momentum", "orbital_linear_momentum",
+)  # fmt: skip
 """Observables that an averaged motion can provide, as far as the scene has them."""
 
 
 @dataclass(frozen=True)
 class Average:
-    """An averaged motion; numbers are mpf, SI.
-
-    Attributes:
-        driven: what torques of the body alone do; None without such torques. Then ``motion`` and ``energy``
-            are those of the start.
-    """
+    """An averaged motion; numbers are mpf, SI; if driven, ``motion`` and ``energy`` are the start's."""
 
     level: str
     short_period: bool
@@ -81,7 +57,7 @@ class Average:
     figure: int  # +1 or -1 if the figure axis or its opposite is circled and stays near the momentum, else 0
     resonance: Resonance | None = None
     slow: SlowStart | None = None
-    driven: Driven | None = None
+    driven: Driven | None = None  # what torques of the body alone do
 
     @property
     def over_orbits(self) -> bool:
@@ -152,14 +128,10 @@ class Average:
 def average_of(
     scene: Scene, loads: Sequence[Load], scaling: Scaling, along: Average | None = None
 ) -> Average:
-    """The averaged motion that a scene's ``[model] level`` asks for.
+    """The averaged motion that a scene's ``[model] level`` asks for; ConfigError if it doesn't apply.
 
-    Args:
-        along: the average whose motion has come to this scene's start: it is the same one from there, with
-            its resonance, and its frequencies were checked where it began.
-
-    Raises:
-        ConfigError: an average that doesn't apply, with the reason and what to do.
+    ``along`` is the average whose motion has come to this scene's start: it is the same one from there, with
+    its resonance, and its frequencies were checked where it began.
     """
     refuse_scene(scene, loads)
     context, body, table = scene.context, scene.body, scene.config.model
@@ -183,7 +155,8 @@ def average_of(
             return _driven(scene, alone, sources, spectrum, unit(context, vector), scaling, along)
         motion = free_motion(context, body, momentum, norm(context, vector))
     except Separatrix:
-        raise separatrix_refused(table.level) from None
+        what = "the body turns about its intermediate axis, where its wobble takes forever and nothing "
+        raise refused(table.level, what + "averages") from None
     start = unit(context, vector)
     found = Average(
         table.level,
@@ -275,11 +248,7 @@ def _left_out_at_start(
         if pull is not None:
             product = float(source.strength) * pull @ integral
             # r x (I r) is the sum over a, b of r_a r_b e_a x I e_b
-            total += [
-                product[1, 2] - product[2, 1],
-                product[2, 0] - product[0, 2],
-                product[0, 1] - product[1, 0],
-            ]
+            total += [product[i, j] - product[j, i] for i, j in ((1, 2), (2, 0), (0, 1))]
     return total
 
 

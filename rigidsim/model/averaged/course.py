@@ -40,12 +40,7 @@ _NODES = 256
 
 
 class NoCourse(Exception):
-    """Raised if the mean torques can't be followed; its text says why.
-
-    Attributes:
-        until: seconds (of the scene) up to which they can; None if not even at the start, or if the end of
-            the run makes no difference.
-    """
+    """Raised if the mean torques can't be followed, or up to some time of the scene (s) alone; says why."""
 
     def __init__(self, why: str, until: float | None = None) -> None:
         super().__init__(why)
@@ -62,9 +57,8 @@ _SEPARATRIX = (
 class Wave:
     """What a torque does within a rotation, at one place of the course; internal units.
 
-    Attributes:
-        harmonics: Fourier coefficients over the amplitude of the torque across the momentum, turned back by
-            the mean precession, over L times the rate of the amplitude: rad.
+    The harmonics are Fourier coefficients over the amplitude of the torque across the momentum, turned back
+    by the mean precession, over L times the rate of the amplitude: rad.
     """
 
     periodic: np.ndarray  # P and Q less their mean course, over ``_GRID`` amplitudes, (2, n)
@@ -74,11 +68,6 @@ class Wave:
     harmonics: np.ndarray
     orders: np.ndarray
     phase: np.ndarray  # of the precession less its mean course, at the amplitudes
-
-    @property
-    def ratio(self) -> np.ndarray:
-        """(g + j l) / l of each harmonic."""
-        return np.asarray(self.precession / self.wobble + self.orders)
 
 
 def wave_of(torques: DrivingTorques, axial: float, transverse: float) -> Wave:
@@ -233,7 +222,8 @@ def _followed(
             third = rate(now + step / 2 * second)
             fourth = rate(now + step * third)
         later = now + step / 6 * (first + 2 * second + 2 * third + fourth)
-        if not np.isfinite(later).all() or _parameter(ratio, later) > PARAMETER:
+        parameter = 0.0 if ratio == 1 else float((1 - ratio) * (later[1] / later[0]) ** 2)
+        if not np.isfinite(later).all() or parameter > PARAMETER:
             part /= 2
             if part < _NEAR:
                 failure = _SEPARATRIX
@@ -247,10 +237,6 @@ def _followed(
             failure = "the torques change the motion too often to be followed ahead of the run"
             break
     return np.array(times), np.array(amplitudes), fastest, failure
-
-
-def _parameter(ratio: float, amplitudes: np.ndarray) -> float:
-    return 0.0 if ratio == 1 else float((1 - ratio) * (amplitudes[1] / amplitudes[0]) ** 2)
 
 
 def _seconds(torques: DrivingTorques, time: float) -> float:

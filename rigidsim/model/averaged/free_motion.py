@@ -36,7 +36,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from rigidsim.scene.arithmetic import Matrix, Vector, dot, negligible
+from rigidsim.scene.arithmetic import Matrix, Vector, cross, dot, negligible
 from rigidsim.scene.bodies.body import RigidBody
 
 
@@ -88,13 +88,8 @@ class FreeMotion:
 
 
 def free_motion(context: Any, body: RigidBody, momentum: Vector, size: Any = None) -> FreeMotion:
-    """The free motion of a body.
-
-    Args:
-        size: another size of the momentum, in the same direction in the body; None keeps its own.
-
-    Raises:
-        Separatrix: L circles neither axis of extreme moment.
+    """The free motion of a body, perhaps with another size of the momentum in the same direction in the body;
+    Separatrix if L circles neither axis of extreme moment.
     """
     tiny = negligible(context)
     length = context.sqrt(dot(momentum, momentum))
@@ -117,8 +112,9 @@ def free_motion(context: Any, body: RigidBody, momentum: Vector, size: Any = Non
         context.sqrt(abs(of_third * second / (second - third))),
         context.sqrt(abs(of_first * third / (third - first))),
     ]
-    complete, cosines, sines, deltas = _means(context, parameter)
-    squares = [a * a * x for a, x in zip(amplitudes, (cosines, sines, deltas), strict=True)]
+    complete, sines = context.ellipk(parameter), mean_square_sine(parameter, context.sqrt, _MEANS)
+    means = 1 - sines, sines, 1 - parameter * sines  # of cn^2, sn^2, dn^2
+    squares = [a * a * x for a, x in zip(amplitudes, means, strict=True)]
     pace = size * context.sqrt(abs(of_first * (third - second) / (first * second * third)))
     n = third * (second - first) / (first * (second - third))
     turning = context.ellippi(n, parameter) / complete
@@ -154,9 +150,7 @@ def _ordered(context: Any, body: RigidBody, momentum: Vector, length: Any) -> tu
         picked = (0, 1, 2) if beyond > 0 else (2, 1, 0)
     symmetric = middle - least <= tiny or most - middle <= tiny
     chosen = [axes[i] for i in picked]
-    a, b, c = chosen
-    handed = dot([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]], c)
-    if handed < 0:
+    if dot(cross(chosen[0], chosen[1]), chosen[2]) < 0:
         chosen[0] = [-x for x in chosen[0]]
     return [moments[i] for i in picked], chosen, symmetric
 
@@ -174,23 +168,6 @@ def _symmetric(context: Any, moments: Vector, axes: Matrix, parts: Vector, size:
         size / moments[0],
         context.zero,
     )
-
-
-def _means(context: Any, parameter: Any) -> tuple[Any, Any, Any, Any]:
-    """K, <cn^2>, <sn^2>, <dn^2>; with more digits inside, since (K - E) / k^2 loses some for small k^2."""
-    before = context.prec
-    try:
-        if parameter != 0:
-            context.prec = before + max(0, -context.mag(parameter)) + 10
-        if parameter == 0 or context.prec > 20 * before:
-            half = context.one / 2
-            return context.pi / 2, half, half, context.one
-        first, second = context.ellipk(parameter), context.ellipe(parameter)
-        sines = (first - second) / (parameter * first)
-        found = first, 1 - sines, sines, second / first
-    finally:
-        context.prec = before
-    return +found[0], +found[1], +found[2], +found[3]
 
 
 _MEANS = 40  # arithmetic-geometric means; each squares what is left
@@ -224,10 +201,6 @@ class Polhodes:
         """Energy of rotation, J, of amplitudes P and Q."""
         first, _, third = self.moments
         return (self.ratio * transverse * transverse / first + axial * axial / third) / 2
-
-    def size(self, context: Any, axial: Any, transverse: Any) -> Any:
-        """Size of the momentum, kg m^2/s, of amplitudes P and Q."""
-        return context.sqrt(self.ratio * transverse * transverse + axial * axial)
 
     def momentum(self, context: Any, axial: Any, transverse: Any, cosine: Any, sine: Any) -> Vector:
         """Angular momentum where f has this cosine and sine, body axes, kg m^2/s."""

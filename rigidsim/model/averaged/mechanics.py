@@ -8,21 +8,43 @@ from typing import Any
 
 import heyoka as hy
 
-from rigidsim.model.averaged.average import DIRECTION, TOLD
-from rigidsim.model.averaged.orbit_terms import Ellipse, nutation, second_order
+from rigidsim.model.averaged.average import DIRECTION, TOLD, Average
+from rigidsim.model.averaged.orbit_terms import (
+    Ellipse,
+    OrbitPlace,
+    TableTerms,
+    nutation,
+    plane_vectors,
+    second_order,
+)
 from rigidsim.model.averaged.sources import Source
-from rigidsim.model.averaged.sources_seen import SourcesSeen
 from rigidsim.model.load import Load, Term
+from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.orbits.point_mass_states import PointMassPair
+from rigidsim.model.orbits.prescribed import OrbitStates, element_states
 from rigidsim.model.rotations import Symbolic
+from rigidsim.model.state_blocks import StateBlock
 from rigidsim.model.two_part import as_factor
 from rigidsim.scene.arithmetic import cross, dot
+from rigidsim.scene.orbit_tables.pieces import TabulatedOrbit
 from rigidsim.scene.orbits import KeplerOrbit
 
 
 @dataclass(frozen=True)
-class AveragedMechanics(SourcesSeen):
+class AveragedMechanics(Mechanics):
     """Mechanics of an averaged motion; ``rates`` is the rate at which the momentum turns, in space axes."""
+
+    average: Average | None = None
+
+    @property
+    def of(self) -> Average:
+        """The average that is carried."""
+        return self.carried(self.average)
+
+    @property
+    def unit(self) -> Any:
+        """Internal unit of time, s (mpf)."""
+        return self.scene.context.ldexp(self.scene.context.one, self.scaling.time)
 
     @property
     def turning_rate(self) -> Any:
@@ -40,6 +62,84 @@ class AveragedMechanics(SourcesSeen):
         """False: the energy of the free rotation is a constant."""
         return False
 
+    # --- where the sources are ------------------------------------------------------------------------------
+
+    def orbit(self, orbit: KeplerOrbit) -> OrbitStates:
+        """See ``Kinematics``; here a function of time, without states.
+
+        The digits that the phase loses as time goes on shift the direction only in proportion to the
+        nutation, and a torque without states of its own allows steps twice as long.
+        """
+        e = orbit.eccentricity
+        shape = () if orbit.circular else (e, self.scene.context.sqrt(1 - e * e))
+        direction, inverse = self._place(orbit).seen(*map(self.number, shape))
+        return OrbitStates(StateBlock([], [], []), direction, self._normal(orbit), inverse)
+
+    def _place(self, orbit: KeplerOrbit) -> OrbitPlace:
+        """Position of a source on its orbit."""
+        mean = self._moving(orbit.mean_anomaly, orbit.mean_motion)
+        e = hy.expression(self.number(orbit.eccentricity))
+        anomaly = mean if orbit.circular else hy.kepE(e, mean)
+        return OrbitPlace(hy.cos(anomaly), hy.sin(anomaly), *self.plane_vectors(orbit))
+
+    def plane_vectors(self, orbit: KeplerOrbit) -> tuple[list[Symbolic], list[Symbolic]]:
+        """P and T of an orbit."""
+        return plane_vectors(
+            self._turned(orbit.inclination, 0),
+            self._turned(orbit.ascending_node, orbit.node_rate),
+            self._turned(orbit.periapsis, orbit.periapsis_rate),
+        )
+
+    def _normal(self, orbit: KeplerOrbit) -> list[Symbolic]:
+        c, s = self._turned(orbit.inclination, 0)
+        node_c, node_s = self._turned(orbit.ascending_node, orbit.node_rate)
+        return [node_s * s, -(node_c * s), c]
+
+    def _in_plane(self, orbit: KeplerOrbit) -> tuple[Symbolic, Symbolic, Symbolic | None]:
+        """Position over a, from the node, and a/r if it varies."""
+        mean = self._moving(orbit.mean_anomaly, orbit.mean_motion)
+        if orbit.circular:
+            return hy.cos(mean), hy.sin(mean), None
+        context, e = self.scene.context, orbit.eccentricity
+        anomaly = hy.kepE(hy.expression(self.number(e)), mean)
+        c, sine = hy.cos(anomaly), hy.sin(anomaly)
+        x, y = c - self.number(e), self.number(context.sqrt(1 - e * e)) * sine
+        w_c, w_s = self._turned(orbit.periapsis, orbit.periapsis_rate)
+        return w_c * x - w_s * y, w_s * x + w_c * y, 1.0 / (1.0 - self.number(e) * c)
+
+    def _turned(self, angle: Any, rate: Any) -> tuple[Symbolic, Symbolic]:
+        """Cosine and sine of an angle that advances uniformly."""
+        if rate == 0:
+            context = self.scene.context
+            return as_factor(self.number(context.cos(angle))), as_factor(self.number(context.sin(angle)))
+        moving = self._moving(angle, rate)
+        return hy.cos(moving), hy.sin(moving)
+
+    def _moving(self, angle: Any, rate: Any) -> Symbolic:
+        """An angle that advances uniformly."""
+        start = hy.expression(self.number(angle))
+        if rate == 0:
+            return start
+        return start + self.number(rate * self.unit) * hy.time
+
+    @cached_property
+    def _by_table(self) -> dict[TabulatedOrbit, TableTerms]:
+        """For each table, its contribution to an average over orbits."""
+        return {
+            table: TableTerms(
+                element_states(table, place, self.scaling.time, self.scene.start, self.number), self.number
+            )
+            for table, place in self.tables.items()
+        }
+
+    def table(self, orbit: TabulatedOrbit) -> OrbitStates:
+        """Averaged over the orbit it has no direction unless the mean longitude is carried."""
+        return self._by_table[orbit].seen if self.of.over_orbits else super().table(orbit)
+
+    def table_block(self, table: TabulatedOrbit) -> StateBlock:
+        """The states of a tabulated orbit."""
+        return self.table(table).block
+
     # --- equations ------------------------------------------------------------------------------------------
 
     @property
@@ -52,8 +152,7 @@ class AveragedMechanics(SourcesSeen):
         """Derivatives of the states, per internal unit of time."""
         s = self.direction
         if self.of.over_orbits:
-            parts = [self._secular(source) for source in self.of.sources]
-            return cross([hy.sum([part[i] for part in parts]) for i in range(3)], s)
+            return cross(total([self._secular(source) for source in self.of.sources]), s)
         pull = self._pull(s)
         if self.of.figure == 0:
             return cross(pull, s)
@@ -70,24 +169,22 @@ class AveragedMechanics(SourcesSeen):
         """Secular pull -(k/2) (1 - e^2)^(-3/2) (n . s) n to second order; the pull of a source at rest."""
         context, s = self.scene.context, self.direction
         if source.table is not None:
-            unit = self.scene.context.ldexp(self.scene.context.one, self.scaling.time)
-            return self._by_table[source.table].secular(self.of.rate(source) * unit, s)
+            return self._by_table[source.table].secular(self.of.rate(source) * self.unit, s)
         if source.orbit is None:
             return self._pull_of(source, s)
         normal = self.orbit(source.orbit).normal
-        unit = context.ldexp(context.one, self.scaling.time)
         size = source.secular_strength(context) * self.of.motion.excess / self.of.motion.momentum
-        factor = as_factor(self.number(-size * unit)) * dot(normal, s)
-        second = self._second_order(source, normal, unit)
+        factor = as_factor(self.number(-size * self.unit)) * dot(normal, s)
+        second = self._second_order(source, normal)
         return [factor * x + y for x, y in zip(normal, second, strict=True)]
 
-    def _second_order(self, source: Source, normal: list[Symbolic], unit: Any) -> list[Symbolic]:
+    def _second_order(self, source: Source, normal: list[Symbolic]) -> list[Symbolic]:
         """Second-order term grad K of ``rigidsim.model.averaged.orbit_terms``."""
         orbit, s = source.orbit, self.direction
         assert orbit is not None
         context = self.scene.context
         steady, across = second_order(float(orbit.eccentricity))
-        size = self.of.rate(source) ** 2 / (4 * orbit.mean_motion) * unit
+        size = self.of.rate(source) ** 2 / (4 * orbit.mean_motion) * self.unit
         z = dot(normal, s)
         factor = self.number(size * context.mpf(across)) * (1.0 - 3.0 * (z * z))
         gradient = [factor * x for x in normal]
@@ -102,8 +199,7 @@ class AveragedMechanics(SourcesSeen):
 
     def _pull(self, s: list[Symbolic]) -> list[Symbolic]:
         """G s, the sum of k (a/r)^3 (s . r) r, per internal unit of time; s' is its cross product with s."""
-        parts = [self._pull_of(source, s) for source in self.of.sources]
-        return [hy.sum([part[i] for part in parts]) for i in range(3)]
+        return total([self._pull_of(source, s) for source in self.of.sources])
 
     def _pull_of(self, source: Source, s: list[Symbolic]) -> list[Symbolic]:
         orbit = source.orbit
@@ -118,8 +214,7 @@ class AveragedMechanics(SourcesSeen):
         return [factor * x for x in direction]
 
     def _strength(self, source: Source) -> Symbolic:
-        context = self.scene.context
-        return as_factor(self.number(self.of.rate(source) * context.ldexp(context.one, self.scaling.time)))
+        return as_factor(self.number(self.of.rate(source) * self.unit))
 
     def _pull_in_plane(self, source: Source, orbit: KeplerOrbit, s: list[Symbolic]) -> list[Symbolic]:
         """The same pull from components in the orbit's plane, whose node may turn, with fewer products."""
@@ -183,8 +278,7 @@ class AveragedMechanics(SourcesSeen):
         """Nutation with the period of a source's orbit, rad."""
         context, rate = self.scene.context, self.of.rate(source)
         if source.table is not None:
-            unit = context.ldexp(context.one, self.scaling.time)
-            return self._by_table[source.table].nutation(rate * unit, s)
+            return self._by_table[source.table].nutation(rate * self.unit, s)
         assert source.orbit is not None
         ellipse = Ellipse.of(context, source.orbit)
         size = self.number(rate / (2 * ellipse.motion * ellipse.root**3))
@@ -227,7 +321,7 @@ class AveragedMechanics(SourcesSeen):
 
     @cached_property
     def torque(self) -> list[Term]:
-        """Empty: an averaged motion has no torque along body axes."""
+        """None along body axes."""
         return []
 
     @cached_property
@@ -237,10 +331,15 @@ class AveragedMechanics(SourcesSeen):
 
     @cached_property
     def potential_energy(self) -> Symbolic | None:
-        """None: an averaged motion doesn't record potential energy."""
+        """None is recorded."""
         return None
 
     @cached_property
     def power(self) -> Symbolic | None:
         """None: the mean power is zero."""
         return None
+
+
+def total(vectors: list[list[Symbolic]]) -> list[Symbolic]:
+    """Sum of vectors."""
+    return [hy.sum([vector[i] for vector in vectors]) for i in range(3)]

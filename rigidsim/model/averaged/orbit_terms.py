@@ -1,4 +1,4 @@
-"""The torque of a source averaged over its Kepler orbit, and the terms removed, to first order.
+"""The torque of a source averaged over its orbit, and the terms removed, to first order.
 
 With k = 3 (G M / a^3) (excess / L) the direction s of the momentum changes as
 
@@ -26,18 +26,27 @@ potentials, h = k s . (Q - <Q>) s / 2 and H = k s . J s / 2 with s' = grad h x s
 
 x, y, z being the parts of s along P, T and n, c0 = <(a/r)^3 C> and c1 = <(a/r)^3 cos(2 f) C> over
 n (1 - e^2)^(3/2): c1 = -(1/4 + e^2/6) (1 - e^2)^(-3) / n. For the Earth and the Sun it is 6e-6 of the
-precession.
+precession. An orbit by a table has the same terms with its instantaneous axis, eccentricity and plane; what
+goes round with its pericentre is periodic, and left out of the second order.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, Protocol
 
+import heyoka as hy
 import numpy as np
 
+from rigidsim.model.orbits.prescribed import ElementStates, OrbitStates
+from rigidsim.model.rotations import Symbolic
+from rigidsim.model.scaling import Rounder
+from rigidsim.model.two_part import as_factor, rounded
 from rigidsim.scene.arithmetic import Vector, cross, dot
+from rigidsim.scene.orbit_tables.pieces import AXIS
 from rigidsim.scene.orbits import KeplerOrbit
 
 _POINTS = 4096
@@ -52,6 +61,9 @@ class Functions(Protocol):
     def sin(self, x: Any) -> Any:
         """Sine."""
 
+    def sqrt(self, x: Any) -> Any:
+        """Square root."""
+
     def atan2(self, y: Any, x: Any) -> Any:
         """Angle of the point (x, y)."""
 
@@ -64,6 +76,14 @@ class OrbitPlace:
     sine: Any
     pericentre: Vector
     across: Vector
+
+    def seen(self, e: Any = None, root: Any = None) -> tuple[list[Symbolic], Symbolic]:
+        """Direction, and semi-major axis over distance, for e and sqrt(1 - e^2); for a circle without."""
+        x, y, inverse = self.cosine, self.sine, hy.expression(1.0)
+        if e is not None:
+            inverse = 1.0 / (1.0 - e * x)
+            x, y = (x - e) * inverse, root * y * inverse
+        return [x * p + y * t for p, t in zip(self.pericentre, self.across, strict=True)], inverse
 
 
 @dataclass(frozen=True)
@@ -118,7 +138,8 @@ def nutation(
     """
     e, root = ellipse.eccentricity, ellipse.root
     b = e / (1 + root)
-    mean = -_cosines(lambda k: (-b) ** k * (1 + k * root), e)
+    once, twice, thrice = ((-b) ** k * (1 + k * root) for k in (1, 2, 3))  # means of cos(k f)
+    mean = -(twice / 2 + e * once / 2 + e * thrice / 6)
     c, sn = place.cosine, place.sine
     # the true minus the eccentric anomaly, then the true anomaly
     ahead = 0 if ellipse.circular else 2 * functions.atan2(number(b) * sn, 1 - number(b) * c)
@@ -143,11 +164,6 @@ def nutation(
     return [size * x for x in cross(tensor, s)]
 
 
-def _cosines(mean: Any, e: Any) -> Any:
-    """cos(2 f) / 2 + e cos(f) / 2 + e cos(3 f) / 6 for means of cos(k f)."""
-    return mean(2) / 2 + e * mean(1) / 2 + e * mean(3) / 6
-
-
 def plane_vectors(
     tilt: tuple[Any, Any], node: tuple[Any, Any], periapsis: tuple[Any, Any]
 ) -> tuple[Vector, Vector]:
@@ -160,12 +176,15 @@ def plane_vectors(
     return turned((first, second), (cw, sw))
 
 
-def equinoctial_axes(q: Any, p: Any, chi: Any) -> tuple[Vector, Vector]:
-    """Unit vectors in the orbit's plane, from which longitudes count and across, from the elements q and p
-    (see ``rigidsim.scene.orbit_tables.pieces``) and chi = sqrt(1 - p^2 - q^2).
-    """
-    product = 2 * p * q
-    return [1 - 2 * p * p, product, -2 * p * chi], [product, 1 - 2 * q * q, 2 * q * chi]
+def place_by_elements(
+    functions: Functions, elements: Mapping[str, Any], anomaly: Any, periapsis: Any
+) -> OrbitPlace:
+    """The place of an eccentric anomaly, by elements q and p of ``rigidsim.scene.orbit_tables.pieces``."""
+    q, p = elements["q"], elements["p"]
+    chi, product = functions.sqrt(1.0 - p * p - q * q), 2 * p * q
+    axes = [1 - 2 * p * p, product, -2 * p * chi], [product, 1 - 2 * q * q, 2 * q * chi]
+    turn = functions.cos(periapsis), functions.sin(periapsis)
+    return OrbitPlace(functions.cos(anomaly), functions.sin(anomaly), *turned(axes, turn))
 
 
 def turned(axes: tuple[Vector, Vector], turn: tuple[Any, Any]) -> tuple[Vector, Vector]:
@@ -173,3 +192,66 @@ def turned(axes: tuple[Vector, Vector], turn: tuple[Any, Any]) -> tuple[Vector, 
     (first, second), (c, s) = axes, turn
     along = [c * x + s * y for x, y in zip(first, second, strict=True)]
     return along, [c * y - s * x for x, y in zip(first, second, strict=True)]
+
+
+@dataclass(frozen=True)
+class TableTerms:
+    """A tabulated orbit as an average uses it."""
+
+    states: ElementStates
+    number: Rounder
+
+    def _value(self, element: str) -> Symbolic:
+        return rounded(self.states.values[element])
+
+    @cached_property
+    def _cubed(self) -> Symbolic:
+        """(mean axis / axis)^3."""
+        axis = self._value(AXIS)
+        return 1.0 / (axis * axis * axis)
+
+    @cached_property
+    def ellipse(self) -> Ellipse:
+        """Ellipse of the moment, its mean motion per internal unit of time."""
+        k, h = self._value("k"), self._value("h")
+        square = k * k + h * h
+        return Ellipse(hy.sqrt(square), square, hy.sqrt(1.0 - square), rounded(self.states.pace), False)
+
+    @cached_property
+    def place(self) -> OrbitPlace | None:
+        """Position of the source; None if the mean longitude isn't carried."""
+        longitude = self.states.mean_longitude
+        if longitude is None:
+            return None
+        elements = {name: self._value(name) for name in "qp"}
+        periapsis = hy.atan2(self._value("h"), self._value("k"))
+        anomaly = hy.kepE(self.ellipse.eccentricity, longitude - periapsis)
+        return place_by_elements(hy, elements, anomaly, periapsis)
+
+    @cached_property
+    def seen(self) -> OrbitStates:
+        """Orbit states as where the orbit is resolved; no direction if the position is unknown."""
+        at, states = self.place, self.states
+        if at is None:
+            return OrbitStates(states.block, [], states.normal, hy.expression(1.0))
+        direction, inverse = at.seen(self.ellipse.eccentricity, self.ellipse.root)
+        return OrbitStates(states.block, direction, states.normal, inverse / self._value(AXIS))
+
+    def secular(self, rate: Any, s: list[Symbolic]) -> list[Symbolic]:
+        """Vector whose product with s is s', to second order; k (mpf) is that at the mean axis."""
+        normal, ellipse = self.states.normal, self.ellipse
+        z = dot(normal, s)
+        first = as_factor(self.number(-rate)) * (ellipse.secular_factor * self._cubed * z)
+        # (k^2 / 4) c1 (1 - 3 z^2)
+        across = ellipse.across * (self._cubed * self._cubed) / ellipse.motion
+        second = as_factor(self.number(rate * rate / 4)) * (across * (3.0 * (z * z) - 1.0))
+        factor = first + second
+        return [factor * x for x in normal]
+
+    def nutation(self, rate: Any, s: list[Symbolic]) -> list[Symbolic]:
+        """See ``orbit_terms.nutation``; ``rate`` as above."""
+        assert self.place is not None
+        root = self.ellipse.root
+        size = self._cubed / (self.ellipse.motion * (root * root * root))
+        factor = as_factor(self.number(rate / 2)) * size
+        return nutation(hy, self.ellipse, self.place, factor, s, lambda x: x)

@@ -183,7 +183,7 @@ class Resonance:
         back = transpose(attitude.rotation_matrix(slow.quaternion))
         along, across = (_doubles(apply(back, v)) for v in (place.pericentre, place.across))
         momentum = _doubles([x / unit for x in self.whole(slow)])
-        sums = AnomalySums.of(np.array(self._ratios), *self._drive, self.multiple)
+        sums = AnomalySums(np.array(self._ratios), *self._drive, self.multiple)
         anomaly = float(self.anomaly(time) % (2 * context.pi * sums.turns))
         added, turn = (sums.at(anomaly, x) for x in sums.removed(along, across, momentum))
         return [unit * context.mpf(float(x)) for x in added], [context.mpf(float(x)) for x in turn]

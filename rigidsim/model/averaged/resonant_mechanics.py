@@ -18,8 +18,8 @@ from typing import Any
 import heyoka as hy
 
 from rigidsim.model.averaged.average import TOLD
-from rigidsim.model.averaged.mechanics import AveragedMechanics
-from rigidsim.model.averaged.orbit_terms import Ellipse, plane_vectors
+from rigidsim.model.averaged.mechanics import AveragedMechanics, total
+from rigidsim.model.averaged.orbit_terms import Ellipse
 from rigidsim.model.averaged.resonance import Resonance
 from rigidsim.model.rotations import Symbolic, apply, quaternion_kinematics, quaternion_matrix
 from rigidsim.model.two_part import as_factor
@@ -75,14 +75,8 @@ class ResonantMechanics(AveragedMechanics):
     @cached_property
     def orbit_seen(self) -> tuple[list[Symbolic], list[Symbolic]]:
         """Unit vectors P and T of the source's orbit, components along a, b, c."""
-        orbit = self.resonance.orbit
-        vectors = plane_vectors(
-            self._turned(orbit.inclination, 0),
-            self._turned(orbit.ascending_node, orbit.node_rate),
-            self._turned(orbit.periapsis, orbit.periapsis_rate),
-        )
         turned = transpose(self.slow_matrix)
-        along, across = (apply(turned, vector) for vector in vectors)
+        along, across = (apply(turned, v) for v in self.plane_vectors(self.resonance.orbit))
         return along, across
 
     @property
@@ -210,7 +204,7 @@ class ResonantMechanics(AveragedMechanics):
         _, bent = self._mean_torque
         driven = cross(about, [q - b for q, b in zip(self._second_torque, bent, strict=True)])
         if parts:
-            pull = apply(transpose(self.slow_matrix), [hy.sum([x[i] for x in parts]) for i in range(3)])
+            pull = apply(transpose(self.slow_matrix), total(parts))
             level = dot(pull, about)
             driven = [d + whole * (g - level * x) for d, g, x in zip(driven, pull, about, strict=True)]
         return [x + d / size for x, d in zip(free, driven, strict=True)]

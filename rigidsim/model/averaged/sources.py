@@ -11,13 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from rigidsim.model.averaged.orbit_terms import (
-    Ellipse,
-    OrbitPlace,
-    equinoctial_axes,
-    plane_vectors,
-    turned,
-)
+from rigidsim.model.averaged.orbit_terms import Ellipse, OrbitPlace, place_by_elements, plane_vectors
 from rigidsim.model.averaged.spectrum import orbit_harmonics
 from rigidsim.model.capabilities import gradient_source_of
 from rigidsim.model.gradient import GradientSource
@@ -141,7 +135,11 @@ class Source:
     def place(self, context: Any, time: Any) -> OrbitPlace:
         """Position on the orbit at a time, numbers (mpf)."""
         if self.table is not None:
-            return self._place_by_table(context, self.table, time)
+            found = self.table.at(time)
+            ellipse, longitude = self.ellipse(context, time), self.table.starting_longitude(time)
+            periapsis = context.atan2(found["h"], found["k"])
+            anomaly = eccentric_anomaly(context, longitude - periapsis, ellipse.eccentricity)
+            return place_by_elements(context, found, anomaly, periapsis)
         orbit = self.orbit
         assert orbit is not None
         anomaly = orbit.eccentric_anomaly(context, time)
@@ -153,26 +151,13 @@ class Source:
         tilt, node, periapsis = ((context.cos(x), context.sin(x)) for x in angles)
         return OrbitPlace(context.cos(anomaly), context.sin(anomaly), *plane_vectors(tilt, node, periapsis))
 
-    @staticmethod
-    def _place_by_table(context: Any, table: TabulatedOrbit, time: Any) -> OrbitPlace:
-        found = table.at(time)
-        k, h = found["k"], found["h"]
-        e, periapsis = context.sqrt(k * k + h * h), context.atan2(h, k)
-        anomaly = eccentric_anomaly(context, table.starting_longitude(time) - periapsis, e)
-        axes = equinoctial_axes(found["q"], found["p"], context.sqrt(1 - found["q"] ** 2 - found["p"] ** 2))
-        turn = context.cos(periapsis), context.sin(periapsis)
-        return OrbitPlace(context.cos(anomaly), context.sin(anomaly), *turned(axes, turn))
-
     def pull(self, context: Any, time: Any) -> np.ndarray | None:
         """(a/r)^3 r r^T, (3, 3), at a time (a point mass: at the start); None for an ephemeris."""
-        if self.pair is not None:
-            length = norm(context, self.pair.place)
-            direction = np.array([float(x / length) for x in self.pair.place])
+        place = self.of.position if self.pair is None else self.pair.place
+        if place is not None:
+            length = norm(context, place)
+            direction = np.array([float(x / length) for x in place])
             return np.outer(direction, direction) * float(self.of.distance(context) / length) ** 3
-        if self.of.position is not None:
-            length = norm(context, self.of.position)
-            direction = np.array([float(x / length) for x in self.of.position])
-            return np.outer(direction, direction)
         if not self.has_elements:
             return None
         e, at = float(self.ellipse(context, time).eccentricity), self.place(context, time)

@@ -52,6 +52,11 @@ class BodySpectrum:
         found[0, 0] = False
         return np.asarray(found)
 
+    def strong(self, weak: float) -> np.ndarray:
+        """Mask of those that are larger than a part of the largest moment, (3, points)."""
+        sizes = np.abs(self.harmonics)
+        return np.asarray(self.oscillating & (sizes > weak * max(float(x) for x in self.motion.moments)))
+
     def phases(self, matrix: np.ndarray) -> tuple[float, float]:
         """Phases (rad) of precession and wobble for a rotation from the principal axes of ``motion`` to a
         frame with z along the momentum.
@@ -60,7 +65,8 @@ class BodySpectrum:
         first, second, _ = (float(x) for x in self.motion.amplitudes)
         wobble = 0.0
         if first > 0 and second > 0 and not self.motion.symmetric:
-            amplitude = math.atan2(m[1] / self._signed(second), m[0] / first)
+            signed = second if self.motion.moments[2] > self.motion.moments[1] else -second
+            amplitude = math.atan2(m[1] / signed, m[0] / first)
             wobble = _wobble_angle(amplitude, float(self.motion.parameter))
         at = np.array([self._at(entry, wobble) for entry in self.turns.reshape(_POINTS, 9).T]).reshape(3, 3)
         if self.motion.symmetric:
@@ -72,10 +78,6 @@ class BodySpectrum:
             return math.atan2(seen[1], seen[0]) - math.atan2(own[1], own[0]), 0.0
         turned = matrix @ at.T
         return math.atan2(turned[1, 0] - turned[0, 1], turned[0, 0] + turned[1, 1]), wobble
-
-    def _signed(self, second: float) -> float:
-        i2, i3 = float(self.motion.moments[1]), float(self.motion.moments[2])
-        return second if i3 > i2 else -second
 
     @staticmethod
     def _at(values: np.ndarray, angle: float) -> float:
@@ -149,15 +151,21 @@ def orbit_harmonics(eccentricity: float) -> np.ndarray:
     """Sizes (Frobenius norms) of the harmonics k >= 0 of (a/r)^3 r r^T, the mean first."""
     points = 512 if eccentricity < 0.6 else 4096
     mean = 2 * np.pi * np.arange(points) / points
-    anomaly = mean + eccentricity * np.sin(mean)
-    for _ in range(60):
-        step = (anomaly - eccentricity * np.sin(anomaly) - mean) / (1 - eccentricity * np.cos(anomaly))
-        anomaly = anomaly - np.clip(step, -0.5, 0.5)
+    anomaly = eccentric_anomalies(mean, eccentricity)
     x, y = np.cos(anomaly) - eccentricity, math.sqrt(1 - eccentricity**2) * np.sin(anomaly)
     fifth = (x * x + y * y) ** -2.5
     parts = [np.fft.fft(f * fifth) / points for f in (x * x, x * y, x * y, y * y)]
     sizes = np.sqrt(sum(np.abs(p) ** 2 for p in parts))
     return np.asarray(sizes[: points // 2])
+
+
+def eccentric_anomalies(mean: np.ndarray, e: float) -> np.ndarray:
+    """Solutions E of Kepler's equation M = E - e sin E."""
+    anomaly = mean + e * np.sin(mean)
+    for _ in range(60):
+        step = (anomaly - e * np.sin(anomaly) - mean) / (1 - e * np.cos(anomaly))
+        anomaly = anomaly - np.clip(step, -0.5, 0.5)
+    return anomaly
 
 
 def _turned(precession: np.ndarray, nodding: np.ndarray, own: np.ndarray) -> np.ndarray:
