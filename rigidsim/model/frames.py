@@ -120,14 +120,17 @@ def _orbit_plane(loads: Sequence[Load]) -> OrbitPlane:
 
 def fixed_plane(m: Mechanics, normal: Vector, described: str) -> ReferencePlane:
     """A plane with a fixed unit normal (mpf, space axes); worked out exactly and rounded once."""
-    context = m.scene.context
+    first, second, normal = map(m.fixed, plane_axes(m.scene.context, normal))
+    return ReferencePlane(first, second, normal, described)
+
+
+def plane_axes(context: Any, normal: Vector) -> tuple[Vector, Vector, Vector]:
+    """X', Y' and the unit normal (mpf) of a plane."""
     x, y, z = normal
     one, zero = context.one, context.zero
     level = x == 0 and y == 0
     first = [one, zero, zero] if level else [one - x * x / (1 + z), -x * y / (1 + z), -x]
-    axes = (first, cross(normal, first), normal)
-    first, second, normal = map(m.fixed, axes)
-    return ReferencePlane(first, second, normal, described)
+    return first, cross(normal, first), normal
 
 
 def _moving(normal: list[Symbolic], described: str) -> ReferencePlane:

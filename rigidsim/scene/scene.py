@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
-from functools import partial
+from dataclasses import dataclass, replace
 from typing import Any, TypeVar
 
 from rigidsim.errors import ConfigError, Problem
-from rigidsim.scene import attitude, schema
-from rigidsim.scene.arithmetic import Matrix, Vector, apply, context_for, dot, transpose
+from rigidsim.scene import schema, starts
+from rigidsim.scene.arithmetic import Matrix, Vector, context_for
 from rigidsim.scene.bodies.body import RigidBody, build_body, inverse_inertia
 from rigidsim.scene.config import Experiment
 from rigidsim.scene.epochs import Epoch
@@ -135,12 +134,11 @@ def build_scene(experiment: Experiment, context: Any = None) -> Scene:
             return None
 
     body = attempt(build_body, config.body, context, config.integrator.euler_sequence)
-    orientation = attempt(_initial_attitude, config, context)
+    attempt(starts.check_ways, config.initial, context)
     times = attempt(sample_times, config.time, context)
     attempt(_check_limits, config.limits)
-    if body is None or orientation is None or times is None or problems:
+    if body is None or times is None or problems:
         raise ConfigError(problems, experiment.source)
-    quaternion, angles = orientation
     start, end, samples = times
     try:
         inverse = inverse_inertia(context, body)
@@ -161,16 +159,16 @@ def build_scene(experiment: Experiment, context: Any = None) -> Scene:
             off_center = any(x != 0 for x in body.center_of_mass)
             if position is not None or off_center:
                 raise _fail("body", "mass", "missing; uniform_gravity needs it")
-        return Scene(
+        scene = Scene(
             name=config.name,
             description=config.description,
             context=context,
             body=body,
             turning_inertia=body.inertia,
             inverse_inertia=inverse,
-            angular_velocity=_initial_rates(config, body, inverse, quaternion, context),
-            quaternion=quaternion,
-            euler_angles=angles,
+            angular_velocity=[context.zero] * 3,
+            quaternion=[context.one] + [context.zero] * 3,
+            euler_angles=None,
             position=position,
             velocity=velocity,
             gravity=gravity,
@@ -187,6 +185,7 @@ def build_scene(experiment: Experiment, context: Any = None) -> Scene:
             bodies=masses,
             given_loads=tuple(resolved),
         )
+        return _with_start(scene, starts.start_of(scene, _with_start))
     except ConfigError as error:
         raise error.at(experiment.source) from None
 
@@ -195,41 +194,13 @@ def _fail(table: str, key: str, text: str) -> ConfigError:
     return ConfigError(Problem(f"[{table}] {key}".strip(), text))
 
 
-def _initial_attitude(config: schema.Config, context: Any) -> tuple[Vector, Vector | None]:
-    sequence, refusal = config.integrator.euler_sequence, partial(_fail, "initial")
-    given = attitude.given_attitude(context, config.initial, sequence, refusal)
-    return given or ([context.one] + [context.zero] * 3, None)
-
-
-def _initial_rates(
-    config: schema.Config, body: RigidBody, inverse: Matrix, quaternion: Vector, context: Any
-) -> Vector:
-    table = config.initial
-    if (table.angular_velocity is None) == (table.angular_momentum is None):
-        given, joined = ("neither", "nor") if table.angular_velocity is None else ("both", "and")
-        what = f"given {given} this {joined} angular_momentum; exactly one is needed"
-        raise _fail("initial", "angular_velocity", what)
-    if table.angular_velocity is not None:
-        key, rates = "angular_velocity", [x.at(context) for x in table.angular_velocity]
-    else:
-        assert table.angular_momentum is not None
-        to_body = transpose(attitude.rotation_matrix(quaternion))
-        key, momentum = "angular_momentum", apply(to_body, [x.at(context) for x in table.angular_momentum])
-        rates = apply(inverse, momentum)
-        if _along_massless(body, momentum):
-            what = "has a part along the axis that has no moment of inertia; make that part zero"
-            raise _fail("initial", key, what)
-    if _along_massless(body, rates):
-        what = "has a spin about the axis that has no moment of inertia, where a spin means nothing; "
-        raise _fail("initial", key, what + "make that component zero")
-    return rates
-
-
-def _along_massless(body: RigidBody, vector: Vector) -> bool:
-    """Whether a vector has a part along an axis without inertia (a rod's)."""
-    axes = zip(body.principal_moments, body.principal_axes, strict=True)
-    return any(
-        moment == 0 and abs(dot(axis, vector)) > max(map(abs, vector)) * 1e-14 for moment, axis in axes
+def _with_start(scene: Scene, start: starts.Start) -> Scene:
+    rates = scene.angular_velocity if start.angular_velocity is None else start.angular_velocity
+    return replace(
+        scene,
+        quaternion=start.quaternion,
+        angular_velocity=rates,
+        euler_angles=start.euler_angles,
     )
 
 

@@ -35,6 +35,7 @@ from rigidsim.scene.fields import (
     Metre,
     Momentum,
     OneOf,
+    Pair,
     Rate,
     Second,
     Speed,
@@ -72,6 +73,24 @@ class Initial(ConfigTable):
     """
     euler_angles: Triple[Angle] | None = Field(None, examples=[["10 deg", "23.44 deg", "0 deg"]])
     """phi, theta, psi of [integrator] euler_sequence, intrinsic; instead of quaternion"""
+    pole: Pair[Angle] | None = Field(None, examples=[["317.68 deg", "52.89 deg"]])
+    """right ascension and declination (J2000) of the figure axis; instead of quaternion, where [frame] axes
+    says what the space axes are
+    """
+    prime_meridian: Angle | None = Field(None, examples=["176.6 deg"])
+    """the IAU's W, beside pole: from the ascending node of the body's equator on that of J2000, along the
+    body's equator, to the figure's prime meridian (body x where the figure axis is z); by default 0
+    """
+    obliquity: Angle | None = Field(None, examples=["23.44 deg"])
+    """angle of the figure axis from the normal of [frame] reference; with node_longitude,
+    instead of quaternion
+    """
+    node_longitude: Angle | None = Field(None, examples=["35.4 deg"])
+    """longitude of the node where the body's equator rises through the plane of [frame] reference; without
+    prime_meridian the figure's prime meridian starts there
+    """
+    spin_period: Second | None = Field(None, examples=["25 h"])
+    """time of a turn about the figure axis, instead of angular_velocity; negative: the other way round"""
     position: Triple[Metre] | None = Field(None, examples=[["7000 km", 0, 0]])
     """position of the centre of mass, in space axes; with it or velocity the body flies freely"""
     velocity: Triple[Speed] | None = Field(None, examples=[[0, "7.5 km/s", 0]])

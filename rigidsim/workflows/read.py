@@ -5,7 +5,8 @@ from pathlib import Path
 from typing import Any
 
 import rigidsim.model.loads
-import rigidsim.model.partial_invariants  # noqa: F401  (both enter what they define into rigidsim.scene.registry)
+import rigidsim.model.partial_invariants
+import rigidsim.model.starts  # noqa: F401  (each enters what it defines into a registry of rigidsim.scene)
 from rigidsim.errors import ConfigError, Problem
 from rigidsim.scene.config import Experiment, load, parse
 from rigidsim.scene.schema import config_model

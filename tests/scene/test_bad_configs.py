@@ -156,7 +156,7 @@ IN_ONE_TABLE: dict[str, list[tuple[str, ...]]] = {
     "spin": [
         ('euler_angles = ["1 s", 0, 0]', "euler_angles[0]", "which is rad"),
         ('quaternion = ["1 m", 0, 0, 0]', "quaternion[0]", '"m" is a unit, where only a number without one'),
-        ("angular_momentum = [1, 0, 0]", "angular_velocity", "given both this and angular_momentum"),
+        ("angular_momentum = [1, 0, 0]", "angular_momentum", "given beside angular_velocity"),
         ("quaternion = [1, 0, 0, 0]\neuler_angles = [0, 0, 0]", "euler_angles", "given beside quaternion"),
         ("quaternion = [0, 0, 0, 0]", "quaternion", "given zero", "[w, x, y, z]"),
         ("quaternion = [1, 0, 0]", "quaternion", "given 3 entries; exactly 4"),
@@ -165,7 +165,7 @@ IN_ONE_TABLE: dict[str, list[tuple[str, ...]]] = {
         ("angular_velocty = [1, 0, 0]", "angular_velocty", 'did you mean "angular_velocity"?'),
         ('angular_velocity = "fast"', "angular_velocity", 'given "fast"; an array of 3 is allowed'),
         ("omega = [1, 0, 0]", "omega", 'did you mean "angular_velocity"?'),
-        ("", "angular_velocity", "given neither this nor angular_momentum", "exactly one"),
+        ("", "angular_velocity", "missing", "exactly one of angular_velocity, angular_momentum"),
     ],
     "name": [
         ("3", "given 3; a string is allowed"),

@@ -26,8 +26,8 @@ from rigidsim.model.observables.observable import (
     register_all,
     told,
 )
-from rigidsim.model.observables.steadiness import is_planet, steady_directions
-from rigidsim.model.rotations import Symbolic, unit
+from rigidsim.model.observables.steadiness import is_planet, steady_directions, steady_meridian
+from rigidsim.model.rotations import Symbolic, apply, unit
 from rigidsim.scene.frame import ECLIPTIC, OBLIQUITY
 
 AXIS = ("axis",)
@@ -44,14 +44,29 @@ def _on_plane(m: Mechanics) -> list[list[Symbolic]]:
     return [plane.components(axis) for axis in three_axes(m)]
 
 
-def _on_sky(m: Mechanics) -> list[list[Symbolic]]:
-    """Components of each axis along equatorial axes: the space axes, unless these are the ecliptic's."""
-    axes, context = three_axes(m), m.scene.context
+def _on_sky(m: Mechanics, axes: list[list[Symbolic]]) -> list[list[Symbolic]]:
+    """Components of axes along equatorial axes: the space axes, unless these are the ecliptic's."""
+    context = m.scene.context
     if m.scene.axes != ECLIPTIC:
         return axes
     angle = OBLIQUITY.at(context)
     c, s = m.fixed([context.cos(angle), context.sin(angle)])
     return [[x, c * y - s * z, s * y + c * z] for x, y, z in axes]
+
+
+def _meridian(m: Mechanics) -> list[Angle]:
+    """W: with the pole (x, y, z) and the prime meridian f, the node is along (-y, x, 0), and W is
+    atan2(f_z, x f_y - y f_x), times the cosine of the declination.
+    """
+    figure = m.scene.figure
+    (x, y, _), (fx, fy, fz) = _on_sky(m, [m.figure_space, apply(m.matrix, m.fixed(figure.first))])
+    return [Angle(fz, x * fy - y * fx)]
+
+
+def _no_meridian(m: Mechanics) -> str | None:
+    if m.scene.axes is not None:
+        return None
+    return "it counts from the equator of J2000, but what the space axes are isn't known; set [frame] axes"
 
 
 def _sky(convention: str) -> Callable[[Mechanics], Mapping[str, str]]:
@@ -83,15 +98,24 @@ register_all(
     ),
     continuous_angles(
         "right_ascension", AXIS, "right ascension of the figure, spin and momentum axes",
-        lambda m: [Angle(y, x) for x, y, _ in _on_sky(m)],
+        lambda m: [Angle(y, x) for x, y, _ in _on_sky(m, three_axes(m))],
         frame="space axes", needs=("attitude",), steady=steady_directions,
         attributes=_sky("longitude from X towards Y, turns counted; NaN at the poles"),
     ),
     Observable(
         "declination", AXIS, "rad", "declination of the figure, spin and momentum axes",
-        lambda m: [hy.atan2(z, hy.sqrt(x * x + y * y)) for x, y, z in _on_sky(m)],
+        lambda m: [hy.atan2(z, hy.sqrt(x * x + y * y)) for x, y, z in _on_sky(m, three_axes(m))],
         frame="space axes", needs=("attitude",), by_default=only_when_named,
         attributes=_sky("positive north of the equator"),
+    ),
+    continuous_angles(
+        "prime_meridian", (), "angle of the prime meridian, the IAU's W", _meridian,
+        frame="space axes", needs=("attitude",), steady=steady_meridian, absent=_no_meridian,
+        attributes=told(
+            "from where the equator of the figure axis rises through the mean equator of J2000, along it in "
+            "the direct sense to the figure's first axis; turns counted; NaN at the poles",
+            figure=True,
+        ),
     ),
     Observable(
         "obliquity", AXIS, "rad", "obliquity of the figure, spin and momentum axes",

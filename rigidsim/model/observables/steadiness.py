@@ -18,7 +18,7 @@ Where these leave more than half a radian open the turns are counted along the m
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import heyoka as hy
@@ -150,3 +150,11 @@ def steady_rotation(m: Mechanics) -> Steady | None:
         apart += abs(inverse - 1 / found.polar)  # L varies as well
     changes = size * (1 - context.cos(min(found.wobble, context.pi))) * apart
     return Steady([rate], float(changes + 2 * found.drift + away), float(2 * found.wobble))
+
+
+def steady_meridian(m: Mechanics) -> Steady | None:
+    """Steadiness of the turn about the figure axis, which counts backwards where the spin is retrograde."""
+    found = steady_rotation(m)
+    if found is None or dot(apply(m.scene.body.inertia, m.scene.angular_velocity), m.scene.figure.pole) > 0:
+        return found
+    return replace(found, rates=[-rate for rate in found.rates])

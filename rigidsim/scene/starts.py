@@ -1,0 +1,269 @@
+"""Starts: the ways in which ``[initial]`` gives an attitude and rates, one entry each.
+
+A way has the key that chooses it, and the keys that it takes beside. One way gives the attitude (by default
+the body axes are along the space axes) and one the rates. Ways that need mechanics, such as the plane of an
+orbit, are registered by the rooms above.
+
+An attitude from the pole of the body's equator is R = R3(node) R1(tilt) R3(turn) F^T, with the figure's
+equator and pole as columns of F: the equator rises through the plane at the node, its pole is tilted from the
+plane's normal, and the turn leads along it from the node to the prime meridian. Against the equator of J2000
+these are a + 90 deg, 90 deg - d and W for the pole's right ascension a and declination d (Archinal et al.
+2018, Celest. Mech. Dyn. Astr. 130, 22, figure 1).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+from rigidsim.errors import ConfigError, Problem
+from rigidsim.scene import attitude
+from rigidsim.scene.arithmetic import Vector, apply, dot, negligible, transpose
+from rigidsim.scene.bodies.body import RigidBody
+from rigidsim.scene.exact import ExactNumber
+from rigidsim.scene.frame import ECLIPTIC, EQUATOR, OBLIQUITY, Figure
+from rigidsim.scene.schema import Config, Initial
+
+
+class Begun(Protocol):
+    """A scene of which all but the start is known."""
+
+    @property
+    def config(self) -> Config: ...  # noqa: D102
+    @property
+    def context(self) -> Any: ...  # noqa: D102
+    @property
+    def body(self) -> RigidBody: ...  # noqa: D102
+    @property
+    def inverse_inertia(self) -> Any: ...  # noqa: D102
+    @property
+    def figure(self) -> Figure: ...  # noqa: D102
+    @property
+    def axes(self) -> str | None: ...  # noqa: D102
+    @property
+    def quaternion(self) -> Vector: ...  # noqa: D102
+
+
+@dataclass(frozen=True)
+class Start:
+    """Where the rotation begins.
+
+    Attributes:
+        quaternion: unit quaternion, body to space.
+        angular_velocity: body axes, rad/s; None from a way that gives the attitude alone.
+        euler_angles: as given, rad; None if given otherwise.
+    """
+
+    quaternion: Vector
+    angular_velocity: Vector | None = None
+    euler_angles: Vector | None = None
+
+
+@dataclass(frozen=True)
+class Way:
+    """One way to give a part of the start.
+
+    Attributes:
+        key: the key of ``[initial]`` that chooses it.
+        resolve: from the scene so far to a ``Start``, or to an angular velocity for a way to give rates;
+            raises ``ConfigError``.
+        needed: keys that must stand beside it.
+        allowed: keys that may stand beside it.
+        check: refuses numbers that are wrong whatever the scene, in the arithmetic of a context.
+    """
+
+    key: str
+    resolve: Callable[[Any], Any]
+    needed: tuple[str, ...] = ()
+    allowed: tuple[str, ...] = ()
+    check: Callable[[Initial, Any], None] = lambda table, context: None
+
+    @property
+    def described(self) -> str:
+        """Its keys, for messages."""
+        return " with ".join((self.key, *self.needed))
+
+
+ATTITUDES: dict[str, Way] = {}
+RATES: dict[str, Way] = {}
+_BESIDE = ("prime_meridian", "node_longitude")  # which give nothing alone
+
+
+def register_start(ways: dict[str, Way], way: Way) -> None:
+    """Register a way in ``ATTITUDES`` or ``RATES``; ``ValueError`` if its key is taken."""
+    if ways.setdefault(way.key, way) is not way:
+        raise ValueError(f"a start by {way.key} is registered already")
+
+
+def refusal(key: str, text: str) -> ConfigError:
+    """The error that names a key of ``[initial]``."""
+    return ConfigError(Problem(f"[initial] {key}", text))
+
+
+def check_ways(table: Initial, context: Any) -> None:
+    """Refuse what contradicts itself before anything is worked out."""
+    attitude_way, rates_way = (
+        _chosen(table, ATTITUDES, "attitude"),
+        _chosen(table, RATES, "start of the rates"),
+    )
+    if rates_way is None:
+        raise refusal("angular_velocity", f"missing; exactly one of {_either(RATES)} is needed")
+    beside = {key for way in (attitude_way,) if way for key in (*way.needed, *way.allowed)}
+    for key in _BESIDE:
+        if getattr(table, key) is not None and key not in beside:
+            takers = [way.key for way in ATTITUDES.values() if key in (*way.needed, *way.allowed)]
+            raise refusal(key, f"given without {' or '.join(takers)}, beside which it counts; add that")
+    for way in (attitude_way, rates_way):
+        if way is not None:
+            way.check(table, context)
+
+
+def _chosen(table: Initial, ways: dict[str, Way], what: str) -> Way | None:
+    """The way whose keys are given; None without any."""
+    given = [way for way in ways.values() if getattr(table, way.key) is not None]
+    if len(given) > 1:
+        text = f"given beside {given[0].key}; only one {what} is allowed: remove one of them"
+        raise refusal(given[1].key, text)
+    for way in given:
+        for key in way.needed:
+            if getattr(table, key) is None:
+                raise refusal(key, f"missing; {way.key} needs it")
+    return given[0] if given else None
+
+
+def _either(ways: dict[str, Way]) -> str:
+    return ", ".join(way.described for way in ways.values())
+
+
+def start_of(scene: Any, with_start: Callable[[Any, Start], Any]) -> Start:
+    """Work out the start of a scene.
+
+    Args:
+        scene: the scene with any start.
+        with_start: puts a start into it.
+    """
+    table, context = scene.config.initial, scene.context
+    way, rates = _chosen(table, ATTITUDES, ""), _chosen(table, RATES, "")
+    start = way.resolve(scene) if way else Start([context.one] + [context.zero] * 3)
+    assert rates is not None
+    velocity = rates.resolve(with_start(scene, start))
+    if along_massless(scene.body, velocity):
+        what = "has a spin about the axis that has no moment of inertia, where a spin means nothing; "
+        raise refusal(rates.key, what + "make that component zero")
+    return Start(start.quaternion, velocity, start.euler_angles)
+
+
+def along_massless(body: RigidBody, vector: Vector) -> bool:
+    """Whether a vector has a part along an axis without inertia (a rod's)."""
+    axes = zip(body.principal_moments, body.principal_axes, strict=True)
+    return any(
+        moment == 0 and abs(dot(axis, vector)) > max(map(abs, vector)) * 1e-14 for moment, axis in axes
+    )
+
+
+# --- attitudes ----------------------------------------------------------------------------------------------
+
+
+def _as_written(scene: Begun) -> Start:
+    sequence = scene.config.integrator.euler_sequence
+    given = attitude.given_attitude(scene.context, scene.config.initial, sequence, refusal)
+    assert given is not None
+    return Start(given[0], euler_angles=given[1])
+
+
+def _check_written(table: Initial, context: Any) -> None:
+    attitude.given_attitude(context, table, "zxz", refusal)
+
+
+def upright(scene: Begun, node: Any, tilt: Any, turn: Any) -> Vector:
+    """Quaternion of R3(node) R1(tilt) R3(turn) F^T, body axes to those of the plane (radians)."""
+    context, figure = scene.context, scene.figure
+    turned = attitude.quaternion_from_euler(context, [node, tilt, turn], "zxz")
+    columns = transpose([figure.first, figure.second, figure.pole])
+    w, x, y, z = attitude.quaternion_from_matrix(context, columns)
+    return attitude.unit_quaternion(context, attitude.product(turned, [w, -x, -y, -z]))
+
+
+def from_equator(scene: Begun, key: str) -> Vector:
+    """Quaternion that takes axes of the equator and equinox of J2000 to the scene's space axes; refused,
+    naming a key, where these are unknown.
+    """
+    context = scene.context
+    if scene.axes is None:
+        what = "counts from the equator of J2000, but what the space axes are isn't known; set [frame] axes "
+        raise refusal(key, f'{what}to "{EQUATOR}" or "{ECLIPTIC}", or give the attitude otherwise')
+    angle = -OBLIQUITY.at(context) / 2 if scene.axes == ECLIPTIC else context.zero
+    return [context.cos(angle), context.sin(angle), context.zero, context.zero]
+
+
+def _from_pole(scene: Begun) -> Start:
+    table, context = scene.config.initial, scene.context
+    assert table.pole is not None
+    to_space = from_equator(scene, "pole")
+    ascension, declination = (x.at(context) for x in table.pole)
+    quarter = context.pi / 2
+    if abs(declination) > quarter * (1 + negligible(context)):
+        degrees = context.nstr(context.degrees(declination), 8)
+        raise refusal("pole", f"given a declination of {degrees} deg; -90 to 90 deg is allowed")
+    turn = meridian(scene)
+    plain = upright(scene, ascension + quarter, quarter - declination, turn)
+    return Start(attitude.product(to_space, plain))
+
+
+def meridian(scene: Begun) -> Any:
+    """The angle ``prime_meridian``, by default 0."""
+    given: ExactNumber | None = scene.config.initial.prime_meridian
+    return scene.context.zero if given is None else given.at(scene.context)
+
+
+# --- rates --------------------------------------------------------------------------------------------------
+
+
+def _given_rates(scene: Begun) -> Vector:
+    table = scene.config.initial
+    assert table.angular_velocity is not None
+    return [x.at(scene.context) for x in table.angular_velocity]
+
+
+def _from_momentum(scene: Begun) -> Vector:
+    table = scene.config.initial
+    assert table.angular_momentum is not None
+    to_body = transpose(attitude.rotation_matrix(scene.quaternion))
+    momentum = apply(to_body, [x.at(scene.context) for x in table.angular_momentum])
+    if along_massless(scene.body, momentum):
+        what = "has a part along the axis that has no moment of inertia; make that part zero"
+        raise refusal("angular_momentum", what)
+    return apply(scene.inverse_inertia, momentum)
+
+
+def spin_rate(scene: Begun) -> Any:
+    """Rate (mpf, rad/s) about the figure axis that ``spin_period`` means."""
+    period = scene.config.initial.spin_period
+    assert period is not None
+    return 2 * scene.context.pi / period.at(scene.context)
+
+
+def _check_period(table: Initial, context: Any) -> None:
+    assert table.spin_period is not None
+    if table.spin_period.at(context) == 0:
+        raise refusal("spin_period", "given 0 s; any other time is allowed, a negative one for retrograde")
+
+
+def _from_period(scene: Begun) -> Vector:
+    rate = spin_rate(scene)
+    return [rate * x for x in scene.figure.pole]
+
+
+for _way in (
+    Way("quaternion", _as_written, check=_check_written),
+    Way("euler_angles", _as_written),
+    Way("pole", _from_pole, allowed=("prime_meridian",)),
+):
+    register_start(ATTITUDES, _way)
+for _way in (
+    Way("angular_velocity", _given_rates),
+    Way("angular_momentum", _from_momentum),
+    Way("spin_period", _from_period, check=_check_period),
+):
+    register_start(RATES, _way)
