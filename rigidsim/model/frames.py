@@ -50,7 +50,7 @@ from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.orbit_planes import OrbitPlane
 from rigidsim.model.rotations import Symbolic, along, apply, transpose, unit
 from rigidsim.model.two_part import as_factor
-from rigidsim.scene.arithmetic import Vector, cross, norm
+from rigidsim.scene.arithmetic import Matrix, Vector, cross, norm
 from rigidsim.scene.frame import ORBIT
 from rigidsim.scene.orbits import KeplerOrbit
 from rigidsim.scene.scene import Scene
@@ -124,13 +124,13 @@ def fixed_plane(m: Mechanics, normal: Vector, described: str) -> ReferencePlane:
     return ReferencePlane(first, second, normal, described)
 
 
-def plane_axes(context: Any, normal: Vector) -> tuple[Vector, Vector, Vector]:
+def plane_axes(context: Any, normal: Vector) -> Matrix:
     """X', Y' and the unit normal (mpf) of a plane."""
     x, y, z = normal
     one, zero = context.one, context.zero
     level = x == 0 and y == 0
     first = [one, zero, zero] if level else [one - x * x / (1 + z), -x * y / (1 + z), -x]
-    return first, cross(normal, first), normal
+    return [first, cross(normal, first), normal]
 
 
 def _moving(normal: list[Symbolic], described: str) -> ReferencePlane:
