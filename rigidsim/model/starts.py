@@ -9,8 +9,8 @@ from rigidsim.scene.arithmetic import apply, negligible, norm, transpose
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.starts import (
     ATTITUDES,
-    Start,
-    Way,
+    InitialRotation,
+    StartForm,
     from_equator,
     meridian,
     refusal,
@@ -19,7 +19,7 @@ from rigidsim.scene.starts import (
 )
 
 
-def _from_obliquity(scene: Scene) -> Start:
+def _from_obliquity(scene: Scene) -> InitialRotation:
     """The attitude of the node on the reference plane and of the obliquity, as the observables."""
     table, context = scene.config.initial, scene.context
     assert table.obliquity is not None
@@ -39,7 +39,7 @@ def _from_obliquity(scene: Scene) -> Start:
         east, north, up = apply(inside, scene.figure.pole)
         node, tilt = context.atan2(east, -north), context.atan2(context.hypot(east, north), up)
         quaternion = attitude.product(equator, upright(scene, node, tilt, meridian(scene)))
-    return Start(attitude.unit_quaternion(context, quaternion))
+    return InitialRotation(attitude.unit_quaternion(context, quaternion))
 
 
-register_start(ATTITUDES, Way("obliquity", _from_obliquity, ("node_longitude",), ("prime_meridian",)))
+register_start(ATTITUDES, StartForm("obliquity", _from_obliquity, ("node_longitude",), ("prime_meridian",)))

@@ -194,7 +194,7 @@ def _fail(table: str, key: str, text: str) -> ConfigError:
     return ConfigError(Problem(f"[{table}] {key}".strip(), text))
 
 
-def _with_start(scene: Scene, start: starts.Start) -> Scene:
+def _with_start(scene: Scene, start: starts.InitialRotation) -> Scene:
     rates = scene.angular_velocity if start.angular_velocity is None else start.angular_velocity
     return replace(
         scene,

@@ -46,7 +46,7 @@ class Begun(Protocol):
 
 
 @dataclass(frozen=True)
-class Start:
+class InitialRotation:
     """Where the rotation begins.
 
     Attributes:
@@ -61,13 +61,13 @@ class Start:
 
 
 @dataclass(frozen=True)
-class Way:
+class StartForm:
     """One way to give a part of the start.
 
     Attributes:
         key: the key of ``[initial]`` that chooses it.
-        resolve: from the scene so far to a ``Start``, or to an angular velocity for a way to give rates;
-            raises ``ConfigError``.
+        resolve: from the scene so far to an ``InitialRotation``, or of rates to an angular velocity; raises
+            ``ConfigError``.
         needed: keys that must stand beside it.
         allowed: keys that may stand beside it.
         check: refuses numbers that are wrong whatever the scene, in the arithmetic of a context.
@@ -85,12 +85,12 @@ class Way:
         return " with ".join((self.key, *self.needed))
 
 
-ATTITUDES: dict[str, Way] = {}
-RATES: dict[str, Way] = {}
+ATTITUDES: dict[str, StartForm] = {}
+RATES: dict[str, StartForm] = {}
 _BESIDE = ("prime_meridian", "node_longitude")  # which give nothing alone
 
 
-def register_start(ways: dict[str, Way], way: Way) -> None:
+def register_start(ways: dict[str, StartForm], way: StartForm) -> None:
     """Register a way in ``ATTITUDES`` or ``RATES``; ``ValueError`` if its key is taken."""
     if ways.setdefault(way.key, way) is not way:
         raise ValueError(f"a start by {way.key} is registered already")
@@ -119,7 +119,7 @@ def check_ways(table: Initial, context: Any) -> None:
             way.check(table, context)
 
 
-def _chosen(table: Initial, ways: dict[str, Way], what: str) -> Way | None:
+def _chosen(table: Initial, ways: dict[str, StartForm], what: str) -> StartForm | None:
     """The way whose keys are given; None without any."""
     given = [way for way in ways.values() if getattr(table, way.key) is not None]
     if len(given) > 1:
@@ -132,11 +132,11 @@ def _chosen(table: Initial, ways: dict[str, Way], what: str) -> Way | None:
     return given[0] if given else None
 
 
-def _either(ways: dict[str, Way]) -> str:
+def _either(ways: dict[str, StartForm]) -> str:
     return ", ".join(way.described for way in ways.values())
 
 
-def start_of(scene: Any, with_start: Callable[[Any, Start], Any]) -> Start:
+def start_of(scene: Any, with_start: Callable[[Any, InitialRotation], Any]) -> InitialRotation:
     """Work out the start of a scene.
 
     Args:
@@ -145,13 +145,13 @@ def start_of(scene: Any, with_start: Callable[[Any, Start], Any]) -> Start:
     """
     table, context = scene.config.initial, scene.context
     way, rates = _chosen(table, ATTITUDES, ""), _chosen(table, RATES, "")
-    start = way.resolve(scene) if way else Start([context.one] + [context.zero] * 3)
+    start = way.resolve(scene) if way else InitialRotation([context.one] + [context.zero] * 3)
     assert rates is not None
     velocity = rates.resolve(with_start(scene, start))
     if along_massless(scene.body, velocity):
         what = "has a spin about the axis that has no moment of inertia, where a spin means nothing; "
         raise refusal(rates.key, what + "make that component zero")
-    return Start(start.quaternion, velocity, start.euler_angles)
+    return InitialRotation(start.quaternion, velocity, start.euler_angles)
 
 
 def along_massless(body: RigidBody, vector: Vector) -> bool:
@@ -165,11 +165,11 @@ def along_massless(body: RigidBody, vector: Vector) -> bool:
 # --- attitudes ----------------------------------------------------------------------------------------------
 
 
-def _as_written(scene: Begun) -> Start:
+def _as_written(scene: Begun) -> InitialRotation:
     sequence = scene.config.integrator.euler_sequence
     given = attitude.given_attitude(scene.context, scene.config.initial, sequence, refusal)
     assert given is not None
-    return Start(given[0], euler_angles=given[1])
+    return InitialRotation(given[0], euler_angles=given[1])
 
 
 def _check_written(table: Initial, context: Any) -> None:
@@ -197,7 +197,7 @@ def from_equator(scene: Begun, key: str) -> Vector:
     return [context.cos(angle), context.sin(angle), context.zero, context.zero]
 
 
-def _from_pole(scene: Begun) -> Start:
+def _from_pole(scene: Begun) -> InitialRotation:
     table, context = scene.config.initial, scene.context
     assert table.pole is not None
     to_space = from_equator(scene, "pole")
@@ -208,7 +208,7 @@ def _from_pole(scene: Begun) -> Start:
         raise refusal("pole", f"given a declination of {degrees} deg; -90 to 90 deg is allowed")
     turn = meridian(scene)
     plain = upright(scene, ascension + quarter, quarter - declination, turn)
-    return Start(attitude.product(to_space, plain))
+    return InitialRotation(attitude.product(to_space, plain))
 
 
 def meridian(scene: Begun) -> Any:
@@ -256,14 +256,14 @@ def _from_period(scene: Begun) -> Vector:
 
 
 for _way in (
-    Way("quaternion", _as_written, check=_check_written),
-    Way("euler_angles", _as_written),
-    Way("pole", _from_pole, allowed=("prime_meridian",)),
+    StartForm("quaternion", _as_written, check=_check_written),
+    StartForm("euler_angles", _as_written),
+    StartForm("pole", _from_pole, allowed=("prime_meridian",)),
 ):
     register_start(ATTITUDES, _way)
 for _way in (
-    Way("angular_velocity", _given_rates),
-    Way("angular_momentum", _from_momentum),
-    Way("spin_period", _from_period, check=_check_period),
+    StartForm("angular_velocity", _given_rates),
+    StartForm("angular_momentum", _from_momentum),
+    StartForm("spin_period", _from_period, check=_check_period),
 ):
     register_start(RATES, _way)
