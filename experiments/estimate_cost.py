@@ -32,10 +32,10 @@ import rigidsim
 from rigidsim.session.diagnostics import Diagnostics
 from rigidsim.session.recorder import SampleStatistics
 from rigidsim.solve.assembly import assemble, sampler
+from rigidsim.solve.effects.waypoints import SampleTrail
 from rigidsim.solve.problem import prepare
 from rigidsim.solve.sample_block import SampleBlock
 from rigidsim.solve.sampler import SampleReceiver
-from rigidsim.solve.trail import SampleTrail
 
 SHORT = 1.0
 """Seconds of an integration, below which what counts is milliseconds."""

@@ -17,11 +17,11 @@ from rigidsim.errors import ConfigError
 from rigidsim.session.diagnostics import Diagnostics
 from rigidsim.session.recorder import SampleStatistics
 from rigidsim.solve.assembly import Assembly, assemble, sampler
+from rigidsim.solve.effects.waypoints import SampleTrail
 from rigidsim.solve.problem import InitialValueProblem, prepare
 from rigidsim.solve.sample_block import SampleBlock
 from rigidsim.solve.sampler import Progress, SampleReceiver
 from rigidsim.solve.status import Status
-from rigidsim.solve.trail import SampleTrail
 from rigidsim.store.summary_parts import WarningCode
 
 MOST_STEPS = 100_000

@@ -22,11 +22,11 @@ from rigidsim.session.diagnostics import Diagnostics
 from rigidsim.session.recorder import SampleStatistics
 from rigidsim.solve.assembly import assemble, sampler
 from rigidsim.solve.closed_form import ClosedForm, NoClosedForm, closed_form_of
+from rigidsim.solve.effects.waypoints import SampleTrail
 from rigidsim.solve.problem import InitialValueProblem, prepare
 from rigidsim.solve.sample_block import SampleBlock
 from rigidsim.solve.sampler import SampleReceiver
 from rigidsim.solve.status import Status
-from rigidsim.solve.trail import SampleTrail
 from rigidsim.store.summary_parts import WarningCode
 
 FACTOR = 3.0

@@ -21,12 +21,11 @@ from rigidsim.session.recorder import SampleStatistics
 from rigidsim.session.session import AdviceLimits
 from rigidsim.session.understood import time_words
 from rigidsim.solve.corrected_stepper import CorrectedStepper
-from rigidsim.solve.effects.waypoints import Waypoints
+from rigidsim.solve.effects.waypoints import SampleTrail, Waypoints
 from rigidsim.solve.problem import InitialValueProblem, prepare
 from rigidsim.solve.sampler import Progress
 from rigidsim.solve.stepper import OwnErrors
 from rigidsim.solve.taylor_stepper import TaylorStepper
-from rigidsim.solve.trail import SampleTrail
 from rigidsim.store.summary_parts import Advice, AdviceCode, Caution, WarningCode
 
 NEAR_SINGULAR = 1e-3

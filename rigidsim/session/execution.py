@@ -17,11 +17,11 @@ from rigidsim.session.recorder import Checkpoints, Recorder, SampleStatistics
 from rigidsim.session.session import Guards, Interruption, Observer, RunCost, Session
 from rigidsim.session.summary import cost_so_far, summarise
 from rigidsim.solve.assembly import assemble, sampler
+from rigidsim.solve.effects.waypoints import SampleTrail
 from rigidsim.solve.lyapunov import LyapunovSpectrum
 from rigidsim.solve.problem import InitialValueProblem
 from rigidsim.solve.sampler import Progress
 from rigidsim.solve.status import Status
-from rigidsim.solve.trail import SampleTrail
 from rigidsim.store import provenance
 from rigidsim.store.attributes import RootAttributes
 from rigidsim.store.folder import RunFolder

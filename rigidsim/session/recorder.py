@@ -19,13 +19,13 @@ from rigidsim.session.dataset import dates_of, drift_name, put_back_name
 from rigidsim.solve.assembly import Assembly
 from rigidsim.solve.checkpoint import Arrays, SavedPart, check_versions, numbers, pack_versions
 from rigidsim.solve.corrected_stepper import Position
+from rigidsim.solve.effects.waypoints import SampleTrail
 from rigidsim.solve.evaluate import Evaluator, RecordedParts
 from rigidsim.solve.events import pack_events, unpack_events
 from rigidsim.solve.problem import InitialValueProblem
 from rigidsim.solve.projection import put_back_by_invariant
 from rigidsim.solve.sample_block import SampleBlock
 from rigidsim.solve.sampler import SampleReceiver
-from rigidsim.solve.trail import SampleTrail
 from rigidsim.store import netcdf
 from rigidsim.store.netcdf import CHUNK_ROWS
 from rigidsim.store.run import MemoryWriter

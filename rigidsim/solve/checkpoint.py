@@ -98,10 +98,11 @@ def pack_versions(versions: Mapping[str, int]) -> Arrays:
 
 def check_versions(arrays: Mapping[str, np.ndarray], versions: Mapping[str, int]) -> None:
     """Raise a ValueError, with what to do, for a checkpoint of other parts or other versions of them."""
-    found = {name: int(n[0]) for name, n in arrays.items() if name.startswith(_VERSION)}
-    found = {name.removeprefix(_VERSION): version for name, version in found.items()}
-    # a part that an older checkpoint lacks begins anew
-    found = {name: 1 for name in versions if not name.startswith(_REGISTERED)} | found
+    found = {n.removeprefix(_VERSION): int(v[0]) for n, v in arrays.items() if n.startswith(_VERSION)}
+    if not found:
+        raise ValueError(
+            "an earlier version of rigidsim began it; resume it with that version, or begin a new run"
+        )
     for name in sorted(found.keys() ^ versions.keys()):
         title = name.removeprefix(_REGISTERED)
         if name in found:

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 
 import heyoka as hy
 import numpy as np
@@ -68,13 +68,7 @@ class Convergence:
 
     def arrays(self) -> dict[str, np.ndarray]:
         """The arrays to be saved."""
-        return {
-            "number": np.array([self.number], dtype=np.int64),
-            "state": self.state,
-            "sums": self.sums,
-            "times": np.array(self.times),
-            "exponents": np.array(self.exponents),
-        }
+        return {one.name: np.atleast_1d(np.asarray(getattr(self, one.name))) for one in fields(self)}
 
     @classmethod
     def from_arrays(cls, arrays: Mapping[str, np.ndarray]) -> Convergence:

@@ -139,15 +139,13 @@ def prepare_scene(
             given = scene.context.mpf(tolerance)
         if given is not None:
             _check_tolerance(given, precision)
-        step_control = _auto(precision) if given is None else precision.number(given)
         check_start(scene)
         if scene.config.model.level == AUTO:
             what = 'given "auto", which run and plan settle by [integrator] accuracy_axis; choose a level'
             raise ConfigError(Problem("[model] level", what))
         system = build_system(plan_model(scene, loads, along=along), precision.number)
         averaged = not system.formulation.resolves_rotation and scene.bodies is None  # orbits need all digits
-        if averaged and asked == "auto" and tolerance is None:
-            step_control = _auto_of_averages(precision)
+        step_control = _auto(precision, averaged=averaged) if given is None else precision.number(given)
         _refuse_spectrum(system)
         if loads:
             _refuse_non_finite_start(system, precision)
@@ -199,21 +197,15 @@ def _auto_bits(epsilon: float) -> int:
     return 0 if math.ceil(needed) - needed >= _SPARE_ORDER else _AUTO_BITS
 
 
-def _auto(precision: Precision) -> Scalar | None:
-    """The tolerance for "auto"; None for the epsilon itself."""
-    bits = _auto_bits(float(precision.epsilon))
-    return precision.number(mpmath.ldexp(precision.epsilon, -bits)) if bits else None
-
-
-def _auto_of_averages(precision: Precision) -> Scalar | None:
-    """The tolerance for "auto" of an averaged motion.
+def _auto(precision: Precision, *, averaged: bool) -> Scalar | None:
+    """The tolerance for "auto"; None for the epsilon itself.
 
     The terms averaged away are far above double precision's epsilon, and a step moves the direction by at
     most 1e-6 rad: ten bits less lose nothing and make runs of ``spin_averaged`` cheaper by a quarter.
     """
-    if precision.bits < _BITS_OF_AVERAGES[0]:
-        return _auto(precision)
-    return precision.number(mpmath.ldexp(precision.epsilon, _BITS_OF_AVERAGES[1]))
+    least, looser = _BITS_OF_AVERAGES
+    bits = looser if averaged and precision.bits >= least else -_auto_bits(float(precision.epsilon))
+    return precision.number(mpmath.ldexp(precision.epsilon, bits)) if bits else None
 
 
 def _check_tolerance(tolerance: mpmath.mpf, precision: Precision) -> None:

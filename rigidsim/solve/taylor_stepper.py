@@ -95,11 +95,14 @@ class TaylorStepper(Stepper):
         events = engine_events(system, self.precision, self.log, start=self._start)
         return hy.taylor_adaptive(system.equations, initial, nt_events=events, **options)
 
+    def _system_of(self, chart: int) -> System:
+        found = self.system if chart == 0 else self.system.partner
+        assert found is not None
+        return found
+
     def use(self, chart: int) -> None:
         if chart not in self._charts:
-            wanted = self.system if chart == 0 else self.system.partner
-            assert wanted is not None
-            self._charts[chart] = interruptible(lambda: self._compiled(wanted))
+            self._charts[chart] = interruptible(lambda: self._compiled(self._system_of(chart)))
         self._chart, self._integrator = chart, self._charts[chart]
         self._longest = self._bounds[chart]
 

@@ -77,11 +77,12 @@ def test_a_run_that_is_prolonged_past_the_count_is_the_run_in_one_go(
 
 
 def as_by_an_earlier_version(checkpoint: Path) -> None:
-    """Take away what says how it projects, and seal it again."""
+    """Take away the versions of its parts, and seal it again."""
     content = checkpoint.read_bytes()
     checkpoint.write_bytes(content[: -len(seal.sealed(io.BytesIO()))])
     with h5py.File(checkpoint, "r+") as file:
-        del file["checkpoint/late_projection"]
+        for name in [name for name in file["checkpoint"] if name.startswith("version_")]:
+            del file["checkpoint"][name]
     seal.seal(checkpoint)
 
 

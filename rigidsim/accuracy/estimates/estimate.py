@@ -20,12 +20,11 @@ from rigidsim.accuracy.estimates.course import Course, Followed, exponential_gro
 from rigidsim.accuracy.estimates.following import follow
 from rigidsim.model.system import System
 from rigidsim.solve.closed_form import ClosedForm
-from rigidsim.solve.effects.waypoints import Waypoints
+from rigidsim.solve.effects.waypoints import SampleTrail, Waypoints
 from rigidsim.solve.precision import Precision, precision_of
 from rigidsim.solve.problem import InitialValueProblem, double_twin
 from rigidsim.solve.shadow.measures import Spread
 from rigidsim.solve.taylor_stepper import TaylorStepper
-from rigidsim.solve.trail import SampleTrail
 
 _VECTORS = {"rates": ("wx", "wy", "wz"), "position": ("x", "y", "z"), "velocity": ("vx", "vy", "vz")}
 

@@ -27,8 +27,8 @@ from rigidsim.accuracy.models.side_by_side import (
 )
 from rigidsim.model.averaged.average import Average
 from rigidsim.model.averaged.free_motion import FreeMotion
+from rigidsim.solve.effects.waypoints import SampleTrail
 from rigidsim.solve.problem import InitialValueProblem
-from rigidsim.solve.trail import SampleTrail
 
 _ORBITS = 8  # of the slowest source, from which a growth is told from what goes round with it
 _FEWEST_ORBITS = 2

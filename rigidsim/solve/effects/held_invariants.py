@@ -13,11 +13,6 @@ from rigidsim.solve.effects.effect import Effect
 from rigidsim.solve.projection import LATE, NOTED, Projection
 from rigidsim.solve.stepper import Stepper
 
-_LATE_PROJECTION = 1
-"""How ``hold_invariants = "auto"`` projects: 0 (where it is missing) compiled a second integrator whose
-coefficients have two parts; 1 adds at each correction what the coefficients lack.
-"""
-
 
 class HeldInvariants(Effect):
     """Projection from the beginning, or from ``LATE`` steps on, until when states are noted."""
@@ -57,19 +52,12 @@ class HeldInvariants(Effect):
         self._projection.memory[...] = memory
 
     def pack(self, memory: np.ndarray) -> dict[str, np.ndarray]:
-        return {"rhythm_held": memory, "late_projection": np.array([_LATE_PROJECTION], dtype=np.int64)}
+        return {"rhythm_held": memory, "late_projection": np.ones(1, dtype=np.int64)}
 
     def unpack(self, arrays: Mapping[str, np.ndarray]) -> np.ndarray:
-        """See ``Effect``; what an earlier version projected late is refused: its bits can't be had again."""
         memory = arrays.get("rhythm_held", np.zeros(0))
         if memory.shape != self._projection.memory.shape:
             raise ValueError(f"the checkpoint remembers {memory.shape} numbers of projections")
-        begun = self._projection.late and int(arrays["counts"][0]) > LATE
-        if begun and int(arrays.get("late_projection", np.zeros(1))[0]) != _LATE_PROJECTION:
-            raise ValueError(
-                "an earlier version of rigidsim began it, which projected "
-                'hold_invariants = "auto" in another way; resume it with that version, or begin a new run'
-            )
         return memory
 
     def of_samples(self, times: np.ndarray) -> dict[str, Any]:

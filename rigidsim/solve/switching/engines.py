@@ -79,8 +79,7 @@ class SwitchedEngines(TaylorStepper):
     @property
     def _probe(self) -> Probe:
         if self._chart not in self._probes:
-            system = self.system if self._chart == 0 else self.system.partner
-            assert system is not None
+            system = self._system_of(self._chart)
             self._probes[self._chart] = interruptible(lambda: Probe(system, self.precision))
         return self._probes[self._chart]
 
@@ -128,14 +127,8 @@ class SwitchedEngines(TaylorStepper):
         """Continue with the equations of this chart along the current surfaces."""
         key = self._chart, self._along, tuple(self._modes[j] for j in self._held)
         if key not in self._slid:
-            system = self.system if self._chart == 0 else self.system.partner
-            assert system is not None
-            first = key == (0, (), ()) and hasattr(self, "_integrator")
-            along, held = self._along, self._held
-            compiled = (
-                self._integrator if first else interruptible(lambda: self._compiled(system, along, held))
-            )
-            self._slid[key] = compiled
+            system, along, held = self._system_of(self._chart), self._along, self._held
+            interruptible(lambda: self._compiled(system, along, held))
         entered = self._slid[key]
         if entered is not self._integrator:
             entered.dtime = self._integrator.dtime

@@ -29,6 +29,7 @@ HELD = 2
 it has (``HELD + m``) or the opposite one (``-HELD - m``); see ``rigidsim.solve.switching.sliding``.
 """
 _ROUNDINGS = 32.0  # units of rounding of an argument's terms, below which it is zero
+PARALLEL = 1e-9  # relative difference of fields that count as equal
 _RATE_ROUNDINGS = 1024.0  # the same for its rate, whose terms are products of derivatives
 
 
@@ -134,6 +135,20 @@ class Continuation:
     tangential: bool = False
 
 
+def contributions(looks: Mapping[tuple[int, ...], Look]) -> tuple[np.ndarray, np.ndarray, bool]:
+    """Field without sides and what each side adds, (surfaces, states), float64, from looks at all
+    combinations of sides; and whether these add up to all fields.
+    """
+    fields = {sides: look.field.astype(np.float64) for sides, look in looks.items()}
+    m = len(next(iter(fields)))
+    above, below = fields[(1,) * m], fields[(-1,) * m]
+    base = (above + below) / 2
+    parts = np.array([(above - fields[tuple(-1 if i == k else 1 for i in range(m))]) / 2 for k in range(m)])
+    size = sum(map(np.abs, fields.values()))
+    off = [np.abs(field - (base + np.array(sides) @ parts)) for sides, field in fields.items()]
+    return base, parts, bool(np.all(np.array(off) <= PARALLEL * size))
+
+
 class Fields:
     """Fields of all combinations of sides of some surfaces, at one state."""
 
@@ -157,19 +172,7 @@ class Fields:
     @property
     def add_up(self) -> bool:
         """Whether the contributions of all surfaces to the field add up."""
-        m = len(self.surfaces)
-        above = self._looks[(1,) * m].field.astype(np.float64)
-        below = self._looks[(-1,) * m].field.astype(np.float64)
-        parts = []
-        for k in range(m):
-            other = self._looks[tuple(-1 if i == k else 1 for i in range(m))].field.astype(np.float64)
-            parts.append((above - other) / 2)
-        for sides, look in self._looks.items():
-            expected = (above + below) / 2 + sum(s * part for s, part in zip(sides, parts, strict=True))
-            size = np.abs(above) + np.abs(below) + np.abs(look.field.astype(np.float64))
-            if np.any(np.abs(expected - look.field.astype(np.float64)) > 1e-9 * size):
-                return False
-        return True
+        return contributions(self._looks)[2]
 
     def idle(self) -> list[int]:
         """Surfaces on which the motion stays, or which it touches, whatever the sides."""

@@ -29,7 +29,7 @@ from rigidsim.model.rotations import Symbolic
 from rigidsim.model.step_limiter import slopes
 from rigidsim.model.system import System
 from rigidsim.solve.precision import Scalar
-from rigidsim.solve.switching.sides import HELD, SLIDES, Continuation, Look, Probe
+from rigidsim.solve.switching.sides import HELD, PARALLEL, SLIDES, Continuation, Look, Probe, contributions
 
 MOST_AT_ONCE = 3
 """Largest number of surfaces along which a motion slides at once."""
@@ -111,7 +111,6 @@ _NEAR = 4.0
 """Roundings of its argument within which a rate is zero."""
 _DIFFERENCES = 64.0
 """Bound of the error of a derivative by differences of that size, in units of the square root of epsilon."""
-_PARALLEL = 1e-9  # relative
 _GROWING = "swings about it grow from nothing, so that what follows isn't unique"
 _BLENDS = (
     "it comes to rest there with another surface, and what either side adds to the motion points in "
@@ -156,7 +155,7 @@ class Meeting:
         there is no rest; a text if that can't be decided.
         """
         fixed = dict.fromkeys(others, 1)
-        looks: dict[tuple[int, int], Look] = {
+        looks: dict[tuple[int, ...], Look] = {
             (s, t): self.at({**fixed, i: s, m: t}, self.state, self.time)
             for s, t in ((1, 1), (1, -1), (-1, 1), (-1, -1))
         }
@@ -179,8 +178,8 @@ class Meeting:
             return 0
         if back < out:
             return _GROWING
-        base, of_i, of_m = _parts({s: look.field.astype(np.float64) for s, look in looks.items()})
-        if base is None:
+        base, (of_i, of_m), add_up = contributions(looks)
+        if not add_up:
             return 0
         gradient = here.gradients[m].astype(np.float64)
         share = float(gradient @ of_i) / float(gradient @ of_m)
@@ -193,7 +192,7 @@ class Meeting:
         leaves = abs(self._drift(i, {**fixed, i: 1, m: 1}, field)) > self._tolerance * strongest
         if leaves:
             return 0
-        alike = np.linalg.norm(of_i - share * of_m) <= _PARALLEL * np.linalg.norm(of_i)
+        alike = np.linalg.norm(of_i - share * of_m) <= PARALLEL * np.linalg.norm(of_i)
         return sign if alike else _BLENDS
 
     @property
@@ -255,14 +254,3 @@ class Meeting:
         return any(
             abs(float(here.rate(j) - other.rate(j))) > self.probe.rate_noise(here, j) for other in opposite
         )
-
-
-def _parts(
-    fields: Mapping[tuple[int, int], np.ndarray],
-) -> tuple[np.ndarray | None, np.ndarray, np.ndarray]:
-    """Base field and the contribution of each of the two sides; no base if the two don't add up."""
-    base: np.ndarray = (fields[1, 1] + fields[-1, -1]) / 2
-    first, second = (fields[1, 1] - fields[-1, 1]) / 2, (fields[1, 1] - fields[1, -1]) / 2
-    size = sum(map(np.abs, fields.values()))
-    together = fields[-1, 1] - (base - first + second)
-    return (base if np.all(np.abs(together) <= _PARALLEL * size) else None), first, second
