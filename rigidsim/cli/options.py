@@ -20,6 +20,11 @@ def offered(what: str) -> Callable[[str], list[Any]]:
     return complete
 
 
+def _option(flag: str, metavar: str, text: str, *others: str, **more: Any) -> Any:
+    """An option with its value's name, its help, and other flags for it."""
+    return typer.Option(flag, *others, metavar=metavar, help=text, **more)
+
+
 Configs = Annotated[list[Path], typer.Argument(metavar="CONFIG...", help="TOML files.")]
 ConfigPath = Annotated[Path, typer.Argument(metavar="CONFIG", help="TOML file of the experiment.")]
 RunPath = Annotated[
@@ -30,14 +35,14 @@ RunPath = Annotated[
 ]
 SetOption = Annotated[
     list[str] | None,
-    typer.Option(
+    _option(
         "--set",
-        metavar="KEY=VALUE",
-        help="Replace a value, such as time.end=10; nothing after = removes the key; repeatable.",
+        "KEY=VALUE",
+        "Replace a value, such as time.end=10; nothing after = removes the key; repeatable.",
         autocompletion=offered("settings"),
     ),
 ]
-OutOption = Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder of the run folders.")]
+OutOption = Annotated[Path, _option("--out", "DIR", "Folder of the run folders.")]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON for machines.")]
 SceneArgument = Annotated[
     str | None,
@@ -52,50 +57,37 @@ NameArgument = Annotated[
 AnyConfigs = Annotated[
     list[Path] | None, typer.Argument(metavar="CONFIG...", help="TOML files.", show_default=False)
 ]
-FromOption = Annotated[
-    Path | None, typer.Option("--from", metavar="DATASET", help="Run the config that a dataset embeds.")
-]
+FromOption = Annotated[Path | None, _option("--from", "DATASET", "Run the config that a dataset embeds.")]
 ScanOption = Annotated[
     list[str] | None,
-    typer.Option(
+    _option(
         "--sweep",
-        metavar="KEY=SPEC",
-        help="Run once for each value of a key, time.end=[1,2] or KEY=linspace(0,1,11); repeatable.",
+        "KEY=SPEC",
+        "Run once for each value of a key, time.end=[1,2] or KEY=linspace(0,1,11); repeatable.",
     ),
 ]
 MemberOption = Annotated[
-    int | None,
-    typer.Option("--member", metavar="N", min=0, help="Of a sweep: member N by itself, counted from 0."),
+    int | None, _option("--member", "N", "Of a sweep: member N by itself, counted from 0.", min=0)
 ]
 WorkersOption = Annotated[
-    int, typer.Option("--workers", metavar="N", min=1, help="Processes of this machine that run members.")
+    int, _option("--workers", "N", "Processes of this machine that run members.", min=1)
 ]
 SchedulerOption = Annotated[
     str | None,
-    typer.Option(
-        "--scheduler",
-        metavar="ADDRESS",
-        help="Dask scheduler whose workers run members (rigidsim\\[cluster]).",
-    ),
+    _option("--scheduler", "ADDRESS", "Dask scheduler whose workers run members (rigidsim\\[cluster])."),
 ]
 TilesOption = Annotated[
-    str | None, typer.Option("--tiles", metavar="A:B", help="Only tiles A to B-1: a share, for job arrays.")
+    str | None, _option("--tiles", "A:B", "Only tiles A to B-1: a share, for job arrays.")
 ]
-UntilOption = Annotated[
-    str | None, typer.Option("--until", metavar="END", help='A later end, such as "2 h" or 5000.')
-]
+UntilOption = Annotated[str | None, _option("--until", "END", 'A later end, such as "2 h" or 5000.')]
 GuardOption = Annotated[
     list[str] | None,
-    typer.Option(
-        "--set", metavar="KEY=VALUE", help="A guard of this session, such as limits.max_steps=1000000."
-    ),
+    _option("--set", "KEY=VALUE", "A guard of this session, such as limits.max_steps=1000000."),
 ]
 ResumeWorkersOption = Annotated[
-    int, typer.Option("--workers", metavar="N", min=1, help="Of a sweep: processes that run members.")
+    int, _option("--workers", "N", "Of a sweep: processes that run members.", min=1)
 ]
-MembersOption = Annotated[
-    int, typer.Option("--members", metavar="N", help="Of a sweep: how many members, drawn at random.")
-]
+MembersOption = Annotated[int, _option("--members", "N", "Of a sweep: how many members, drawn at random.")]
 RunPaths = Annotated[
     list[Path],
     typer.Argument(
@@ -105,58 +97,53 @@ RunPaths = Annotated[
     ),
 ]
 WhatOption = Annotated[
-    list[str] | None,
-    typer.Option("--what", metavar="NAME", help="Figure to draw; repeatable. all: every one the run has."),
+    list[str] | None, _option("--what", "NAME", "Figure to draw; repeatable. all: every one the run has.")
 ]
 FigureOption = Annotated[
     Path | None,
-    typer.Option(
+    _option(
         "--out",
-        metavar="FILE",
-        help="PNG or SVG, or a folder for several; default figure.png or figure_NAME.png in the run.",
+        "FILE",
+        "PNG or SVG, or a folder for several; default figure.png or figure_NAME.png in the run.",
     ),
 ]
-FormatOption = Annotated[
-    str, typer.Option("--format", metavar="FORMAT", help=f"{', '.join(FORMATS[:-1])} or {FORMATS[-1]}.")
-]
+FormatOption = Annotated[str, _option("--format", "FORMAT", f"{', '.join(FORMATS[:-1])} or {FORMATS[-1]}.")]
 AngleUnitOption = Annotated[
     str | None,
-    typer.Option(
+    _option(
         "--angle-unit",
-        metavar="UNIT",
-        help="For csv, parquet and zarr: rad, turns, deg, arcsec or mas; columns are named by it.",
+        "UNIT",
+        "For csv, parquet and zarr: rad, turns, deg, arcsec or mas; columns are named by it.",
     ),
 ]
 EpochOption = Annotated[
     str | None,
-    typer.Option(
+    _option(
         "--epoch",
-        metavar="TIME",
-        help="What time 0 is, where the config doesn't say, for aem, oem and the dates of csv: "
+        "TIME",
+        "What time 0 is, where the config doesn't say, for aem, oem and the dates of csv: "
         '"2029-04-13T21:46:00 TDB".',
     ),
 ]
 AxesOption = Annotated[
     str | None,
-    typer.Option(
+    _option(
         "--axes",
+        "NAME",
+        "For aem and oem: what the space axes are, where the config doesn't say: ICRF, EME2000, ...",
         "--frame",
-        metavar="NAME",
-        help="For aem and oem: what the space axes are, where the config doesn't say: ICRF, EME2000, ...",
     ),
 ]
 VariableOption = Annotated[
     list[str] | None,
-    typer.Option(
+    _option(
         "--variable",
-        metavar="NAME",
-        help="A variable (obliquity) or one of its signals (obliquity.figure); repeatable. Default: "
+        "NAME",
+        "A variable (obliquity) or one of its signals (obliquity.figure); repeatable. Default: "
         "those that the scene is about.",
     ),
 ]
 AnalysisOption = Annotated[
     Path | None,
-    typer.Option(
-        "--out", metavar="FILE", help="Dataset; default analysis.h5 in the run. The figure goes beside it."
-    ),
+    _option("--out", "FILE", "Dataset; default analysis.h5 in the run. The figure goes beside it."),
 ]

@@ -7,27 +7,15 @@ older versions have none.
 """
 
 import json
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import xarray
 
 from rigidsim.look.solids import Array, Color
-from rigidsim.scene.bodies.presets import KNOWN, known_body
+from rigidsim.scene.bodies.presets import KNOWN, KnownBody, known_body
 
 _KEPLER_STEPS = 60  # of Newton's method; from E = M + e sin M it converges for any e < 1
-GREY: Color = (150, 154, 162)
-
-
-@dataclass(frozen=True)
-class Globe:
-    """An attracting body as it is drawn: its name, also in a sentence, radius (m) and colour."""
-
-    name: str
-    called: str
-    radius: float
-    color: Color
 
 
 _COLORS: dict[str, Color] = {
@@ -42,7 +30,6 @@ _COLORS: dict[str, Color] = {
     "Uranus": (150, 205, 215),
     "Neptune": (80, 120, 205),
 }
-GLOBES = tuple(Globe(one.name, one.called, one.radius, _COLORS[one.name]) for one in KNOWN)
 
 
 def told(dataset: xarray.Dataset, what: str) -> list[dict[str, Any]]:
@@ -63,20 +50,24 @@ def gravity(dataset: xarray.Dataset) -> Array | None:
     return None
 
 
-def globe_of(one: dict[str, Any]) -> Globe | None:
-    """The known body with this gravitational parameter; None if it is no known one."""
-    known = known_body(float(one.get("gravitational_parameter") or 0.0))
-    return None if known is None else next(globe for globe in GLOBES if globe.name == known.name)
+def body_of(one: dict[str, Any]) -> KnownBody | None:
+    """The known body with the gravitational parameter of what was told; None if it is no known one."""
+    return known_body(float(one.get("gravitational_parameter") or 0.0))
 
 
-def named_globe(name: str) -> Globe | None:
+def named_body(name: str) -> KnownBody | None:
     """The known body of this name; None if it is no known one."""
-    return next((globe for globe in GLOBES if globe.name.lower() == name.lower()), None)
+    return next((body for body in KNOWN if body.name.lower() == name.lower()), None)
 
 
-def called(globe: Globe | None, unknown: str) -> str:
-    """The attracting body in a sentence: ``the Sun``, ``Saturn``, or ``the`` and a word if unknown."""
-    return f"the {unknown}" if globe is None else globe.called
+def called(body: KnownBody | None, unknown: str) -> str:
+    """An attracting body in a sentence: ``the Sun``, ``Saturn``, or ``the`` and a word if unknown."""
+    return f"the {unknown}" if body is None else body.called
+
+
+def color_of(body: KnownBody | None, unknown: Color = (150, 154, 162)) -> Color:
+    """The colour of an attracting body."""
+    return unknown if body is None else _COLORS[body.name]
 
 
 def source_path(one: dict[str, Any], seconds: Array) -> Array | None:

@@ -6,7 +6,7 @@ from pathlib import Path
 import rigidsim.workflows.check as validation
 import rigidsim.workflows.plan as planning
 import rigidsim.workflows.tradeoff as measuring
-from rigidsim.cli.screens.page import Page, print_json
+from rigidsim.cli.screens.page import Page, answer, print_json
 from rigidsim.cli.screens.plan import print_plan, print_tradeoff
 from rigidsim.cli.screens.summary import print_checked
 from rigidsim.cli.screens.sweeps import print_sweep_plan
@@ -34,10 +34,7 @@ def check(configs: list[Path], overrides: list[str] | None, as_json: bool) -> in
     for path in configs:
         found = validation.check(path, overrides=overrides or [])
         valid = valid and found.valid
-        if as_json:
-            print_json(found.as_dict())
-        else:
-            print_checked(found)
+        answer(as_json, found.as_dict(), print_checked, found)
     return 0 if valid else 2
 
 
@@ -67,10 +64,7 @@ def tradeoff(
     result = measuring.tradeoff(
         experiment, out=out, budget=budget, repeats=repeats, full=full, force=force, told=told
     ).as_dict()
-    if as_json:
-        print_json(result)
-    else:
-        print_tradeoff(result)
+    answer(as_json, result, print_tradeoff, result)
 
 
 def schema() -> None:

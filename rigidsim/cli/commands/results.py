@@ -8,7 +8,7 @@ from pathlib import Path
 import rigidsim.workflows.analyse as analysing
 import rigidsim.workflows.export as exporting
 from rigidsim.cli.screens.analysis import print_analysis
-from rigidsim.cli.screens.page import print_json
+from rigidsim.cli.screens.page import answer
 from rigidsim.errors import RigidsimError
 from rigidsim.formats.naming import Naming
 from rigidsim.look.figure_names import OVERVIEW, SPECTRUM
@@ -29,10 +29,7 @@ def analyse(run_path: Path, variable: list[str] | None, lines: int, out: Path | 
     opened = open_run(run_path)
     analysis = analysing.analyse(opened, variable or (), lines=lines)
     saved = analysing.save(analysis, out or opened.folder.analysis)
-    if as_json:
-        print_json(analysis.as_dict())
-    else:
-        print_analysis(analysis, saved)
+    answer(as_json, analysis.as_dict(), print_analysis, analysis, saved)
 
 
 def export(

@@ -4,7 +4,7 @@ import sys
 from pathlib import Path
 
 import rigidsim.workflows.run as workflow
-from rigidsim.cli.screens.page import print_json
+from rigidsim.cli.screens.page import answer
 from rigidsim.cli.screens.summary import print_summary
 from rigidsim.errors import RigidsimError
 from rigidsim.scene.config import Experiment
@@ -57,10 +57,7 @@ def _warn(experiment: Experiment) -> None:
 
 def print_run(result: Run, as_json: bool) -> int:
     """Print a run's summary; returns its exit code."""
-    if as_json:
-        print_json(result.summary)
-    else:
-        print_summary(result.outcome, result.place)
+    answer(as_json, result.summary, print_summary, result.outcome, result.place)
     code = result.outcome.exit_code
     if code:
         print(f"rigidsim: {result.outcome.message}", file=sys.stderr)

@@ -6,11 +6,12 @@ import rigidsim.workflows.resume as resuming
 import rigidsim.workflows.verify as verifying
 from rigidsim.cli.commands import sweep as sweeps
 from rigidsim.cli.commands.run import print_run
-from rigidsim.cli.screens.page import print_json
+from rigidsim.cli.screens.page import answer
 from rigidsim.cli.screens.summary import print_verdict
 from rigidsim.errors import RigidsimError
 from rigidsim.session import progress
 from rigidsim.store.sweeps.folder import is_sweep
+from rigidsim.workflows.sweeps.verify import verify_sweep
 
 
 def resume(
@@ -32,12 +33,10 @@ def resume(
 def verify(run_path: Path, members: int, as_json: bool) -> int:
     """Integrate again and compare."""
     if is_sweep(run_path):
-        verdict, what = sweeps.verify_sweep(run_path, members=members), "member"
+        verdict, what = verify_sweep(run_path, members=members), "member"
     else:
         with progress.observer() as observer:
             verdict, what = verifying.verify(run_path, observer=observer), "sample"
-    if as_json:
-        print_json(verdict.as_dict())
-    else:
-        print_verdict(verdict.as_dict(), what)
+    told = verdict.as_dict()
+    answer(as_json, told, print_verdict, told, what)
     return 0 if verdict.identical else 1

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import rigidsim.workflows.sweeps.sweep as workflow
-from rigidsim.cli.screens.page import print_json
+from rigidsim.cli.screens.page import answer
 from rigidsim.cli.screens.sweeps import SweepProgress, print_sweep
 from rigidsim.errors import RigidsimError
 from rigidsim.scene.config import Experiment
@@ -12,9 +12,8 @@ from rigidsim.scene.sweeps.values import scanned
 from rigidsim.store.sweeps.run import SavedSweep, open_sweep
 from rigidsim.workflows.read import load
 from rigidsim.workflows.sweeps.members import single_member
-from rigidsim.workflows.sweeps.verify import verify_sweep
 
-__all__ = ["info", "resume", "run_scanned", "single_member", "sweep", "verify_sweep"]
+__all__ = ["info", "resume", "run_scanned", "single_member", "sweep"]
 
 
 def sweep(
@@ -63,10 +62,7 @@ def info(path: Path, as_json: bool) -> None:
 
 def _print(result: SavedSweep, as_json: bool) -> int:
     """Print a sweep; returns its exit code."""
-    if as_json:
-        print_json(result.summary)
-    else:
-        print_sweep(result)
+    answer(as_json, result.summary, print_sweep, result)
     return int(result.summary.get("exit_code", 0))
 
 

@@ -4,7 +4,7 @@ import json
 import math
 import shutil
 import sys
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, TypeAlias
 
 from rich.box import SIMPLE_HEAD
@@ -60,6 +60,14 @@ class Page:
         for row in rows:
             table.add_row(*map(Text.assemble, row))
         self.console.print(table)
+
+
+def answer(as_json: bool, result: Any, screen: Callable[..., None], *shown: Any) -> None:
+    """Print a result as JSON for machines, or what a screen shows of it."""
+    if as_json:
+        print_json(result)
+    else:
+        screen(*shown)
 
 
 def print_json(value: Any, *, indent: int | None = None) -> None:

@@ -24,7 +24,7 @@ def print_plan(plan: RunPlan, out: Console | None = None) -> None:
     """Print the result of ``rigidsim plan``."""
     on = Page(out)
     on.say((plan.name, "bold"), f"  {plan.state_count} states, {plan.formulation}")
-    print_understood(plan.body, plan.start, plan.time, on, plan.loads)
+    print_understood(plan, plan.loads, on)
     for surface in plan.switching:
         on.say(f"  steps end on the kinks and jumps of {surface.surface} ({surface.where})")
     if plan.turning:
@@ -98,7 +98,7 @@ def _print_equations(shared: Sequence[str], equations: Sequence[str], on: Page) 
     lines: list[str] = []
     for equation in [*shared, *equations]:
         lines += textwrap.wrap(
-            _shortened(equation),
+            _NUMBER.sub(lambda found: f"{float(found[0]):.{_DIGITS}g}", equation),
             max(on.width, 40),
             initial_indent="  ",
             subsequent_indent=" " * 8,
@@ -110,11 +110,6 @@ def _print_equations(shared: Sequence[str], equations: Sequence[str], on: Page) 
     more = len(lines) - _MOST_LINES
     if more > 0:
         on.say((f"  and {more} more lines; `--json` has all of them, with all digits", "dim"))
-
-
-def _shortened(line: str) -> str:
-    """A line with its numbers to six significant digits."""
-    return _NUMBER.sub(lambda found: f"{float(found[0]):.{_DIGITS}g}", line)
 
 
 def print_tradeoff(result: dict[str, Any]) -> None:

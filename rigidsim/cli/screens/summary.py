@@ -10,15 +10,16 @@ from typing import TYPE_CHECKING, Any
 from rich.console import Console
 
 from rigidsim.cli.screens.page import Page, Styled
-from rigidsim.cli.screens.words import advice_line, next_lines, understood, verdict_line
+from rigidsim.cli.screens.words import advice_line, body_text, next_lines, start_text, time_text, verdict_line
 from rigidsim.errors import ConfigError
 from rigidsim.scene.choices import method_named, variables_named
 from rigidsim.scene.readable import YEAR, TimeWords, span_text
-from rigidsim.store.summary import Brief, Span, Start, Summary, UnderstoodBody
+from rigidsim.store.summary import Brief, Summary
 from rigidsim.store.summary_parts import ENGINE, Accuracy, InvariantDrift, Modelling, TableErrors
 
 if TYPE_CHECKING:
     from rigidsim.workflows.check import Checked
+    from rigidsim.workflows.plan import RunPlan
 
 
 def _initial(value: float | tuple[float, ...] | None) -> str:
@@ -57,12 +58,16 @@ def print_summary(summary: Brief, folder: str, out: Console | None = None, *, lo
         on.line("" if number else "next", command, "cyan")
 
 
-def print_understood(
-    body: UnderstoodBody | None, start: Start | None, time: Span | None, on: Page, loads: Sequence[str] = ()
-) -> None:
-    """Print body, start, time and loads as they were understood."""
-    for label, text in understood(body, start, time, loads):
-        on.line(label, text)
+def print_understood(told: Checked | RunPlan | Summary, loads: Sequence[str], on: Page) -> None:
+    """Print body, start, time (as far as an older summary has them) and loads as they were understood."""
+    if told.body is not None:
+        on.line("body", body_text(told.body))
+    if told.start is not None:
+        on.line("start", start_text(told.start))
+    if told.time is not None:
+        on.line("time", time_text(told.time))
+    for load in loads:
+        on.line("load", load)
 
 
 def from_step(step: int | None) -> str:
@@ -71,7 +76,7 @@ def from_step(step: int | None) -> str:
 
 
 def _print_ended(summary: Summary, loads: Sequence[str], on: Page) -> None:
-    print_understood(summary.body, summary.start, summary.time, on, loads)
+    print_understood(summary, loads, on)
     how = f"tolerance {summary.tolerance:.3g}"
     method = method_named(summary.method)
     if not method.has_steps:
@@ -131,18 +136,13 @@ def _event(summary: Summary, name: str) -> str:
     early = times.early or (times.first,)
     if count > len(early):  # a few, and the last one
         early = early[:3]
-    words = _words(summary)
+    span = summary.time  # none of an older version
+    start, end = (span.start_s, span.end_s) if span else (0.0, summary.time_reached)
+    words = TimeWords.of({"epoch": span.epoch, "time_unit": span.unit} if span else {}, start, end)
     told = [words.moment(time) for time in early]
     if count > len(told):
         told += ["..."] * (count > len(told) + 1) + [words.moment(times.last)]
     return f"{name}: {count:,}, at {', '.join(told)}"
-
-
-def _words(summary: Summary) -> TimeWords:
-    time = summary.time
-    if time is None:  # of an older version
-        return TimeWords.of({}, 0.0, summary.time_reached)
-    return TimeWords.of({"epoch": time.epoch, "time_unit": time.unit}, time.start_s, time.end_s)
 
 
 def _print_invariants(summary: Summary, on: Page) -> None:
@@ -156,13 +156,8 @@ def _print_invariants(summary: Summary, on: Page) -> None:
         rows.append([name, _initial(row.initial), largest, _drift(row.final_drift), _drift(row.bound)])
         rows[-1] += [_drift(row.put_back)] if held else []
     if not on.fits(columns, rows):
-        least = columns.index("final")
-        columns, rows = _without(columns, least), [_without(row, least) for row in rows]
+        columns, rows = columns[:3] + columns[4:], [row[:3] + row[4:] for row in rows]
     on.table(columns, rows)
-
-
-def _without(row: list[Any], place: int) -> list[Any]:
-    return [cell for n, cell in enumerate(row) if n != place]
 
 
 def _print_accuracy(accuracy: Accuracy, on: Page, what: str) -> None:
@@ -236,7 +231,7 @@ def print_checked(found: Checked) -> None:
         return
     on = Page()
     on.say((found.source, "bold"), "  ", ("valid", "bold green"))
-    print_understood(found.body, found.start, found.time, on, found.loads)
+    print_understood(found, found.loads, on)
     for caution in found.cautions:
         on.line("warning", caution.text, "bold red")
 

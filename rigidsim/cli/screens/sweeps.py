@@ -47,12 +47,10 @@ class SweepProgress(SweepObserver):
             self._bar.stop()
 
     def checking(self, sweep: Sweep) -> None:
-        """See ``SweepObserver``."""
         self._name = sweep.experiment.config.name
         self._say(f"{sweep.count:,} members: trying out what they are made of")
 
     def started(self, folder: Path, members: int, done: int) -> None:
-        """See ``SweepObserver``."""
         self._members, self._before = members, done
         self._begin = self._latest = time.perf_counter()
         there = f", {done:,} are there already" if done else ""
@@ -61,7 +59,6 @@ class SweepProgress(SweepObserver):
             self._task = self._bar.add_task(self._name, total=members, completed=done, said="")
 
     def progressed(self, done: int) -> None:
-        """See ``SweepObserver``."""
         now = time.perf_counter()
         rate = (done - self._before) / max(now - self._begin, 1e-9)
         said = f"{done:,} of {self._members:,} members, {rate:.3g} a second, "
@@ -73,11 +70,9 @@ class SweepProgress(SweepObserver):
             self._say(said)
 
     def completing(self) -> None:
-        """See ``SweepObserver``."""
         self._say("writing dataset.h5")
 
     def nothing_left(self) -> None:
-        """See ``SweepObserver``."""
         self._say("nothing is left to do: all members were run before", always=True)
 
     def _say(self, text: str, *, always: bool = False) -> None:

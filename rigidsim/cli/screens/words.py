@@ -2,7 +2,7 @@
 
 import math
 import shlex
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 
 from rigidsim.scene.readable import epoch_of, instant_text, number_text, span_text, unit_of
 from rigidsim.session.verdict import Soundness, verdict_on
@@ -14,20 +14,6 @@ _DIGITS = 6
 _FEWER = 4
 _FAR = 1e4  # m, from where on km read better
 _STRAIGHT = 1e-9  # of a direction's component: what is less is shown as zero
-
-
-def understood(
-    body: UnderstoodBody | None, start: Start | None, time: Span | None, loads: Sequence[str] = ()
-) -> Iterator[tuple[str, str]]:
-    """Labels and texts for whatever is present (older summaries have less)."""
-    if body is not None:
-        yield "body", body_text(body)
-    if start is not None:
-        yield "start", start_text(start)
-    if time is not None:
-        yield "time", time_text(time)
-    for load in loads:
-        yield "load", load
 
 
 def body_text(body: UnderstoodBody) -> str:

@@ -12,7 +12,8 @@ from rigidsim.look import signals, surroundings
 from rigidsim.look.signals import read_config, values
 from rigidsim.look.solids import Mesh, body_meshes, point_positions, rotation_matrix
 from rigidsim.look.stages import parts
-from rigidsim.look.stages.parts import Array, Arrow, Camera, Stage, Trail, trail
+from rigidsim.look.stages.parts import Array, Arrow, Camera, Stage, Trail
+from rigidsim.scene.bodies.presets import KnownBody
 
 FIELD = np.deg2rad(55.0)  # field of view from bottom to top (rad), the viewer's own
 USUAL_VIEW = (float(np.deg2rad(24.0)), float(np.deg2rad(-55.0)))
@@ -79,7 +80,7 @@ class Subject:
             points=self.points * size,
             quaternion=None if self.quaternion is None else parts.viewer_quaternion(self.quaternion),
             translation=path,
-            trails=[trail("track", parts.TRACK, path, words=words)],
+            trails=[Trail("track", parts.TRACK, path, words=words)],
         )
 
     @property
@@ -124,11 +125,11 @@ def vectors_of(
         notes.append(f"{words} (cyan): 1 unit = {1 / factor:.6g} rad/s")
         if paths:
             words = "polhode: ω's path in the body"
-            trails.append(trail("polhode", parts.POLHODE, in_body, in_body=True, words=words))
+            trails.append(Trail("polhode", parts.POLHODE, in_body, in_body=True, words=words))
             notes.append("polhode (pink): the path of the tip of ω in body axes, carried by the body")
         if paths and attitude is not None:
             words = "herpolhode: ω's path in space"
-            trails.append(trail("herpolhode", parts.VELOCITY, tip, with_centre=True, words=words))
+            trails.append(Trail("herpolhode", parts.VELOCITY, tip, with_centre=True, words=words))
             notes.append("herpolhode (cyan): the path of the tip of ω in space axes")
     if trails:
         notes.append("trails: bright for the time just passed, dark for the whole run")
@@ -138,15 +139,14 @@ def vectors_of(
 def source_arrows(dataset: xarray.Dataset, subject: Subject, length: float) -> list[Arrow]:
     """Directions in space to attracting bodies: from orbits, recorded point masses, or the recorded nadir."""
     arrows = []
-    for key, globe, name, path in [*_masses(dataset), *_sources(dataset, subject)]:
+    for key, body, name, path in [*_masses(dataset), *_sources(dataset, subject)]:
         way = length * path / np.linalg.norm(path, axis=1, keepdims=True)
-        called = surroundings.called(globe, name)
-        color = globe.color if globe else parts.SOURCE
+        called, color = surroundings.called(body, name), surroundings.color_of(body, parts.SOURCE)
         arrows.append(Arrow(key, f"to {called}", color, way, False, f"direction of {called}"))
     return arrows
 
 
-_Towards = Iterator[tuple[str, surroundings.Globe | None, str, Array]]
+_Towards = Iterator[tuple[str, KnownBody | None, str, Array]]
 """Key, known body, name, and vectors (rows, 3), space axes, to attracting bodies."""
 
 
@@ -159,7 +159,7 @@ def _sources(dataset: xarray.Dataset, subject: Subject) -> _Towards:
             path = np.einsum("tij,tj->ti", subject.attitude, nadir)
         if path is not None:
             name = str(one.get("ephemeris", "source"))
-            yield f"source{number}", surroundings.globe_of(one), name, path
+            yield f"source{number}", surroundings.body_of(one), name, path
 
 
 def _masses(dataset: xarray.Dataset) -> _Towards:
@@ -173,7 +173,7 @@ def _masses(dataset: xarray.Dataset) -> _Towards:
     for number, name in enumerate(names):
         if host in names and name != host:
             path = positions[:, number] - positions[:, names.index(host)]
-            yield f"mass{number}", surroundings.named_globe(name), name, path
+            yield f"mass{number}", surroundings.named_body(name), name, path
 
 
 def eye_at(
@@ -270,7 +270,7 @@ def with_track(subject: Subject, body: Stage, notes: list[str]) -> list[Stage]:
     unit = reach if near else max(float(np.nanmax(np.abs(position - center))), reach)
     translation = (position - center) / unit
     if near:
-        track = trail("track", parts.TRACK, translation, words="track of the centre of mass")
+        track = Trail("track", parts.TRACK, translation, words="track of the centre of mass")
         return [replace(body, translation=translation, trails=[*body.trails, track])]
     enlarged = TRACK_BODY * unit / reach
     notes.append(

@@ -10,9 +10,11 @@ from rigidsim.look.solids import rotation_matrix
 from rigidsim.look.stages import bodies, parts
 from rigidsim.look.stages.bodies import FIELD, Subject, column, direction_of, plane_view, vectors_of
 from rigidsim.look.stages.parts import SPACE, Array, Arrow, Camera, Line, Picture, Solid, Spot, Stage, Vector
-from rigidsim.look.surroundings import GREY, Globe, called
+from rigidsim.look.surroundings import called, color_of
 from rigidsim.look.symbols import globe, graticule
+from rigidsim.scene.bodies.presets import KnownBody
 
+_Planet = KnownBody | None
 ORBIT_BODY = 0.11  # reach of the enlarged body, in units of the orbit's largest distance
 NORMAL: tuple[int, int, int] = (190, 150, 255)
 FORWARD: tuple[int, int, int] = (150, 205, 110)
@@ -27,7 +29,7 @@ def free_orbit(dataset: xarray.Dataset, subject: Subject) -> Picture | None:
     if len(listed) != 1 or subject.position is None:
         return None
     position = subject.position - np.asarray(listed[0]["position"], dtype=float)
-    planet = surroundings.globe_of(listed[0])
+    planet = surroundings.body_of(listed[0])
     arrows, trails, notes = vectors_of(dataset, subject, paths=False)
     name = called(planet, "attracting point")
     down = -position / np.linalg.norm(position, axis=1, keepdims=True)
@@ -57,7 +59,7 @@ def satellite(dataset: xarray.Dataset, subject: Subject) -> Picture | None:
         if angles is None or not np.isfinite(angles).all():
             return None
         quaternion = parts.quaternion_of(local @ _turned(angles))
-    planet = surroundings.globe_of(listed[0])
+    planet = surroundings.body_of(listed[0])
     known = replace(subject, quaternion=quaternion, attitude=rotation_matrix(quaternion))
     notes = ["in the local frame the planet's surface is drawn near the body, and not to scale"]
     stages = [_in_local_frame(dataset, known, local, planet), _orbit(known, -source, planet, notes)]
@@ -89,7 +91,7 @@ def _turned(angles: Array) -> Array:
     return np.asarray(found)
 
 
-def _orbit(subject: Subject, position: Array, planet: Globe | None, notes: list[str]) -> Stage:
+def _orbit(subject: Subject, position: Array, planet: _Planet, notes: list[str]) -> Stage:
     """The orbit (rows, 3), m, from the planet, and the planet, both to one scale, with the body enlarged."""
     distance = np.linalg.norm(position, axis=1)
     unit = float(np.nanmax(distance))
@@ -107,14 +109,14 @@ def _orbit(subject: Subject, position: Array, planet: Globe | None, notes: list[
     rings = graticule(np.full(3, radius)) if radius > 0.1 else []
     return replace(
         subject.enlarged(ORBIT_BODY, title, unit, places, "orbit"),
-        solids=[Solid("planet", globe(np.full(3, radius), planet.color if planet is not None else GREY))],
+        solids=[Solid("planet", globe(np.full(3, radius), color_of(planet)))],
         spots=[Spot("planet", name, parts.PALE, np.array([0.0, 0.0, radius + 0.06]))],
         lines=[Line(f"graticule/{k}", (20, 24, 30), ring, SPACE, 0.7, 0.5) for k, ring in enumerate(rings)],
         camera=Camera(1.3 / np.sin(FIELD / 2) * direction, np.zeros(3), np.array([0.0, 0.0, 1.0])),
     )
 
 
-def _in_local_frame(dataset: xarray.Dataset, subject: Subject, local: Array, planet: Globe | None) -> Stage:
+def _in_local_frame(dataset: xarray.Dataset, subject: Subject, local: Array, planet: _Planet) -> Stage:
     """The body above its planet, whose surface is drawn near it, not to scale, z down."""
     attitude = subject.attitude
     assert attitude is not None
@@ -126,9 +128,9 @@ def _in_local_frame(dataset: xarray.Dataset, subject: Subject, local: Array, pla
     # in space, as all moving parts are; the view looks from the local frame
     tip = 1.3 * np.einsum("tij,tj->ti", relative, np.broadcast_to(axis, (len(relative), 3)))
     words = "trace of the body axis that points down"
-    trails = [parts.trail("local/axis_trace", parts.FIGURE, tip, words=words, head=True)]
+    trails = [parts.Trail("local/axis_trace", parts.FIGURE, tip, words=words, head=True)]
     center = np.array([0.0, 0.0, _BELOW + _HORIZON])
-    surface = globe(np.full(3, _HORIZON), planet.color if planet is not None else GREY)
+    surface = globe(np.full(3, _HORIZON), color_of(planet))
     name = f"to {called(planet, 'source')}"
     vectors = [
         ("nadir", name, parts.SOURCE, (0, 0, 1.75), f"nadir: {name}"),

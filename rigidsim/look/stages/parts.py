@@ -6,6 +6,7 @@ constant factor each.
 """
 
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -53,20 +54,25 @@ class Arrow:
 
 @dataclass(frozen=True)
 class Trail:
-    """A moving point along time: (rows, 3) in stage units; `whole` (points, 3) is its thinned path.
-    Neighbours are joined if they are close enough; with `head` the point itself is marked.
-    """
+    """A moving point along time: (rows, 3) in stage units; with `head` it is marked itself."""
 
     name: str
     color: Color
     points: Array
-    line: bool
-    whole: Array
-    whole_line: bool
     in_body: bool = False
     with_centre: bool = False
     words: str = ""
     head: bool = False
+
+    @cached_property
+    def whole(self) -> Array:
+        """Its thinned path (points, 3)."""
+        return finite_rows(self.points[thinned_indices(len(self.points), CURVE_POINTS)])
+
+    @cached_property
+    def line(self) -> bool:
+        """Whether neighbours are close enough to be joined."""
+        return joined(self.points, NEAR)
 
 
 @dataclass(frozen=True)
@@ -189,22 +195,6 @@ class Picture:
     planes: list[Plane] = field(default_factory=list)
     leading: tuple[str, ...] = ()
     notes: list[str] = field(default_factory=list)
-
-
-def trail(
-    name: str,
-    color: Color,
-    points: Array,
-    *,
-    in_body: bool = False,
-    with_centre: bool = False,
-    words: str = "",
-    head: bool = False,
-) -> Trail:
-    """A trail of a moving point (rows, 3)."""
-    whole = finite_rows(points[thinned_indices(len(points), CURVE_POINTS)])
-    line, whole_line = joined(points, NEAR), joined(whole, NEAR)
-    return Trail(name, color, points, line, whole, whole_line, in_body, with_centre, words, head)
 
 
 def longest(vectors: Array) -> float:

@@ -11,8 +11,9 @@ import xarray
 from rigidsim.look import signals, surroundings
 from rigidsim.look.stages import parts, precession
 from rigidsim.look.stages.bodies import Subject, column, source_arrows
-from rigidsim.look.stages.parts import BODY, Array, Arrow, Color, Line, Picture, Plane, Stage, Vector, trail
+from rigidsim.look.stages.parts import BODY, Array, Arrow, Color, Line, Picture, Plane, Stage, Trail, Vector
 from rigidsim.look.symbols import earth, globe, graticule
+from rigidsim.scene.bodies.presets import KNOWN, KnownBody
 
 _LARGE = 1e5  # m: a smaller body is no globe
 _ROUND = 0.9  # of the smallest over the largest semi-axis
@@ -32,7 +33,7 @@ def picture(dataset: xarray.Dataset, subject: Subject) -> Picture | None:
     known = _known(name, float(axes.max()))
     name = name or (known.name.lower() if known else "")
     half = axes / axes.max()
-    mesh = earth(half) if name == "earth" else globe(half, known.color if known else _UNKNOWN)
+    mesh = earth(half) if name == "earth" else globe(half, surroundings.color_of(known, _UNKNOWN))
     figure = signals.figure_direction(dataset)
     turns, averaged = subject.attitude is not None, "angular_velocity" not in dataset
     if not turns and averaged:
@@ -79,11 +80,11 @@ def picture(dataset: xarray.Dataset, subject: Subject) -> Picture | None:
     return Picture(f"rotation of {called} in space", [stage], planes, _LEADING, notes)
 
 
-def _known(name: str, radius: float) -> surroundings.Globe | None:
+def _known(name: str, radius: float) -> KnownBody | None:
     """The known planet with this name, or else with this equatorial radius (m); None if unknown."""
     if name:
-        return surroundings.named_globe(name)
-    near = min(surroundings.GLOBES, key=lambda one: abs(one.radius - radius))
+        return surroundings.named_body(name)
+    near = min(KNOWN, key=lambda one: abs(one.radius - radius))
     return near if abs(near.radius / radius - 1) < _ALIKE else None
 
 
@@ -121,7 +122,7 @@ def _in_its_own_axes(dataset: xarray.Dataset, stage: Stage, figure: Array, notes
     words = "spin axis" if factor == 1.0 else f"spin axis, {times} farther from the figure axis"
     stage.arrows.append(Arrow("spin_axis", "spin axis", parts.VELOCITY, shown, True, words))
     stage.trails.append(
-        trail("polar_motion", parts.POLHODE, shown, in_body=True, words="path of the spin axis")
+        Trail("polar_motion", parts.POLHODE, shown, in_body=True, words="path of the spin axis")
     )
     notes.append(f"the angle between spin axis and figure axis is drawn {times} too large")
 

@@ -53,7 +53,7 @@ def picture(dataset: xarray.Dataset, subject: Subject) -> Picture | None:
         color = parts.FIGURE if name == "figure" else parts.MOMENTUM
         shown, words = POLE_REACH * axis, f"{name} axis"
         stage.arrows.append(Arrow(f"{name}_axis", words, color, shown, False, words))
-        path = parts.trail(f"{name}_path", color, shown, words=f"path of the {words}")
+        path = parts.Trail(f"{name}_path", color, shown, words=f"path of the {words}")
         # of samples too far apart it would be a cloud; on the circle of precession it wouldn't be seen
         if path.line and np.ptp(axis[:, 2]) > _APART:
             stage.trails.append(path)

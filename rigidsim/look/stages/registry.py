@@ -1,12 +1,109 @@
-"""The kinds of scenes that have a stage of their own, the choice among them, and the stage of any other."""
+"""The picture of a scene: kinds that have stages of their own, a free body's by Poinsot, any other's.
+
+The tip of a free body's angular velocity keeps to the ellipsoid of energy, sum I_i w_i^2 = 2 T of the body's
+axes, which touches the plane w . L = 2 T without slipping (Poinsot 1834): it leaves the polhode on the one
+and the herpolhode on the other.
+"""
 
 from collections.abc import Callable
 
+import numpy as np
 import xarray
 
-from rigidsim.look.stages import free, orbits, planet, precession, top
-from rigidsim.look.stages.bodies import Subject, source_arrows, vectors_of, with_track
-from rigidsim.look.stages.parts import ARROW_REACH, Picture
+from rigidsim.look import signals
+from rigidsim.look.stages import orbits, parts, planet, precession, top
+from rigidsim.look.stages.bodies import Subject, column, source_arrows, vectors_of, with_track
+from rigidsim.look.stages.parts import BODY, Array, Arrow, Camera, Line, Picture, Shell, Spot, Stage, Vector
+
+ENERGY: tuple[int, int, int] = (120, 150, 200)
+_LEADING = ("angular_velocity", "polar_motion", "nutation_angle")
+
+
+def free(dataset: xarray.Dataset, subject: Subject) -> Picture | None:
+    """Picture of a body whose energy and momentum are constant; None for others."""
+    constants, rates = signals.energy_and_momentum(dataset), column(dataset, "angular_velocity", 3)
+    if constants is None or rates is None or subject.position is not None:
+        return None
+    moments, twice, _ = constants
+    radii = np.sqrt(twice / moments)  # of the ellipsoid of energy, rad/s, along the principal axes
+    arrows, trails, notes = vectors_of(dataset, subject, paths=subject.attitude is None)
+    stage = subject.stage(arrows, trails)
+    stages = [stage]
+    if subject.attitude is None:
+        notes.append("no attitude was recorded: the body is shown in its own axes and doesn't turn")
+        stage.shells.append(_shell(dataset, 1.6 * radii / float(np.linalg.norm(rates, axis=1).max())))
+        return Picture("free rotation", stages, [], _LEADING, notes)
+    # the principal axis nearest to the first angular velocity
+    along = signals.principal_axes(dataset) @ rates[0]
+    k = int(np.abs(along).argmax())
+    followed = signals.principal_axes(dataset)[k] * (1 if along[k] >= 0 else -1)
+    tip = np.einsum("tij,j->ti", subject.attitude, 1.15 * followed)
+    words = f"trace of the body's {_axis_name(followed)} axis"
+    trace = parts.Trail("axis_trace", parts.FIGURE, tip, with_centre=True, words=words)
+    if trace.line:  # of samples too far apart it would be a cloud
+        stage.trails.append(trace)
+    momentum = signals.steady_momentum(dataset)
+    if momentum is not None:
+        stages.append(_poinsot(dataset, momentum, radii, rates, stage))
+        notes.append(
+            "Poinsot's construction: the ellipsoid of energy (blue), which turns with the body, rolls on the "
+            "invariable plane; the point of contact is the tip of ω"
+        )
+    return Picture("free rotation", stages, [], _LEADING, notes)
+
+
+def _shell(dataset: xarray.Dataset, radii: Array) -> Shell:
+    # principal axes are rows: the rotation from these to body axes is the transpose
+    turn = parts.quaternion_of(signals.principal_axes(dataset).T[None])[0]
+    return Shell("energy_ellipsoid", radii, ENERGY, BODY, turn[[1, 2, 3, 0]])
+
+
+def _axis_name(axis: Array) -> str:
+    k = int(np.abs(axis).argmax())
+    if abs(axis[k]) < 1 - 1e-9:
+        return "principal"
+    return ("" if axis[k] > 0 else "−") + "xyz"[k]
+
+
+def _poinsot(dataset: xarray.Dataset, along: Array, radii: Array, rates: Array, body: Stage) -> Stage:
+    """The ellipsoid with these semi-axes on the plane across the momentum's direction."""
+    scale = 1.0 / float(radii.max())
+    velocity = next(arrow for arrow in body.arrows if arrow.name == "angular_velocity")
+    tip = velocity.vectors * (parts.longest(rates) / parts.ARROW_REACH * scale)
+    heights = tip @ along
+    reach = float(np.sqrt(max(np.nanmax((tip**2).sum(axis=1) - heights**2), 0.0)))
+    size = 1.2 * max(reach, 0.8)
+    floor = float(np.nanmean(heights)) * along
+    first, second = signals.across(along)
+    # With L downwards, as books show it: the plane is the floor that the ellipsoid rolls on.
+    eye = -along * 0.55 + first * 1.35 + second * 0.9
+    eye = eye / np.linalg.norm(eye) * 2.2 * max(size, 1.0) * 1.2
+    center = 0.35 * floor
+    on_ellipsoid, on_plane = "polhode, on the ellipsoid of energy", "herpolhode, on the invariable plane"
+    start, words = np.zeros(3), "angular momentum L"
+    return Stage(
+        root="poinsot",
+        title="Poinsot's construction",
+        unit=1.0,
+        quaternion=body.quaternion,
+        turns_with=body.root,
+        arrows=[
+            Arrow("angular_velocity", "", parts.VELOCITY, tip, False, "angular velocity ω", radius=0.014)
+        ],
+        trails=[
+            parts.Trail("polhode", parts.POLHODE, rates * scale, in_body=True, words=on_ellipsoid),
+            parts.Trail("herpolhode", (90, 225, 160), tip, words=on_plane),
+        ],
+        lines=[
+            Line("plane/rim", parts.FAINT, parts.circle(size, along, floor), parts.SPACE, 1.6),
+            *parts.grid("plane", floor, first, second, size, 4, 0.45, round_=True),
+        ],
+        vectors=[Vector("momentum", "L", parts.MOMENTUM, start, 1.2 * floor, words=words, radius=0.012)],
+        spots=[Spot("plane/label", "invariable plane", parts.PALE, floor - 0.98 * size * second)],
+        shells=[_shell(dataset, radii * scale)],
+        camera=Camera(center + eye, center, -along),
+    )
+
 
 KINDS: tuple[Callable[[xarray.Dataset, Subject], Picture | None], ...] = (
     top.picture,
@@ -15,7 +112,7 @@ KINDS: tuple[Callable[[xarray.Dataset, Subject], Picture | None], ...] = (
     orbits.satellite,
     planet.picture,
     precession.picture,
-    free.picture,
+    free,
 )
 """Functions that return the picture of a scene of their kind, or None for others; the first that has one."""
 
@@ -35,6 +132,6 @@ def _any(dataset: xarray.Dataset, subject: Subject) -> Picture:
     if subject.attitude is None:
         notes.append("no attitude was recorded: the body is shown in its own axes and doesn't turn")
     else:
-        arrows += source_arrows(dataset, subject, 0.95 * ARROW_REACH)
+        arrows += source_arrows(dataset, subject, 0.95 * parts.ARROW_REACH)
     stages = with_track(subject, subject.stage(arrows, trails), notes)
     return Picture("motion of a rigid body", stages, [], ("angular_velocity",), notes)

@@ -9,7 +9,7 @@ from rigidsim.look import signals, surroundings
 from rigidsim.look.solids import Mesh
 from rigidsim.look.stages import parts
 from rigidsim.look.stages.bodies import FIELD, Subject, vectors_of
-from rigidsim.look.stages.parts import BODY, SPACE, Array, Camera, Line, Picture, Plane, Spot, Vector, trail
+from rigidsim.look.stages.parts import BODY, SPACE, Array, Camera, Line, Picture, Plane, Spot, Trail, Vector
 from rigidsim.look.symbols import spinning_top
 
 TRACE = 1.0  # where on the axis the traced point is, in reaches
@@ -40,7 +40,7 @@ def picture(dataset: xarray.Dataset, subject: Subject) -> Picture | None:
     assert attitude is not None
     arrows = [replace(a, vectors=a.vectors * (1.25 if a.name == "angular_momentum" else 1.1)) for a in arrows]
     tip = TRACE * attitude @ axis
-    trails = [trail("tip", parts.FIGURE, tip, words="trace of the axis", head=True)]
+    trails = [Trail("tip", parts.FIGURE, tip, words="trace of the axis", head=True)]
     lowest = min(float(np.nanmin(tip @ up)), float((subject.meshes[0].vertices @ axis).min()))
     # A top that dips below its pivot stands on a post, not on a floor that it would pass through.
     post = not (lowest > -0.02 and float(np.nanmin(tip @ up)) > 0.25)

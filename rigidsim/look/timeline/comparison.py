@@ -45,14 +45,14 @@ def write_comparison(named: Sequence[tuple[str, xarray.Dataset]], path: Path, *,
     apart = attitude_differences([(name, table) for name, _, table in shown])
     titles = [legible(name) for name, _ in named]
     blueprint = build_comparison(list(zip(titles, drawn, strict=True)), clock, apart)
+    if apart is not None:
+        drawn[0].plots.append(apart)
     count, name = sum(map(len, seconds)), " and ".join(name for name, _ in named)
     with recording_to(path, name, count, blueprint) as recording:
         for run in drawn:
             run.draw_static(recording, legend=run is drawn[0])
             for part in chunks(0, len(run.seconds)):
                 run.draw_rows(recording, part)
-        if apart is not None:
-            drawn[0].draw_plots(recording, [apart])
     return count
 
 

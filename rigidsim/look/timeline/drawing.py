@@ -1,7 +1,7 @@
 """Stages as rerun entities: static parts, and columns of what changes.
 
-Meshes are given no normals:
-the viewer then shows their own colours from all sides, and edges tell the faces apart.
+Meshes are given no normals: the viewer then shows their own colours from all sides, and edges tell the faces
+apart.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -11,8 +11,9 @@ import numpy as np
 import pyarrow as pa
 import rerun as rr
 
+from rigidsim.look.signals import joined
 from rigidsim.look.solids import Array, Mesh, ball
-from rigidsim.look.stages.parts import BODY, Arrow, Color, Line, Shell, Stage, Trail
+from rigidsim.look.stages.parts import BODY, NEAR, Arrow, Color, Line, Shell, Stage, Trail
 from rigidsim.look.symbols import graticule, sharp_edges
 
 Columns = Iterable[rr.ComponentColumn]
@@ -154,21 +155,19 @@ def _draw_trail_static(recording: rr.RecordingStream, path: str, trail: Trail) -
     if len(trail.whole) > 1:
         whole = (
             rr.LineStrips3D([trail.whole], colors=[dark], radii=rr.Radius.ui_points(0.8))
-            if trail.whole_line
+            if joined(trail.whole, NEAR)
             else rr.Points3D(trail.whole, colors=[dark], radii=rr.Radius.ui_points(1.0))
         )
         recording.log(f"{path}/whole", whole, static=True)
+    styles: list[tuple[str, Any, Color, float]] = [("recent", rr.Points3D, trail.color, 2.0)]
     if trail.line:
-        older = rr.LineStrips3D.from_fields(colors=[faded], radii=rr.Radius.ui_points(1.2))
-        recording.log(f"{path}/older", older, static=True)
-        recent = rr.LineStrips3D.from_fields(colors=[trail.color], radii=rr.Radius.ui_points(1.8))
-        recording.log(f"{path}/recent", recent, static=True)
-    else:
-        points = rr.Points3D.from_fields(colors=[trail.color], radii=rr.Radius.ui_points(2.0))
-        recording.log(f"{path}/recent", points, static=True)
+        lines = rr.LineStrips3D
+        styles = [("older", lines, faded, 1.2), ("recent", lines, trail.color, 1.8)]
     if trail.head:
-        head = rr.Points3D.from_fields(colors=[trail.color], radii=rr.Radius.ui_points(4.5))
-        recording.log(f"{path}/head", head, static=True)
+        styles.append(("head", rr.Points3D, trail.color, 4.5))
+    for name, kind, color, size in styles:
+        style = kind.from_fields(colors=[color], radii=rr.Radius.ui_points(size))
+        recording.log(f"{path}/{name}", style, static=True)
 
 
 def _dimmed(color: Color, part: float) -> tuple[int, int, int]:

@@ -169,12 +169,6 @@ class DrawnRun:
         plotting.draw_plot_rows(recording, self.plots, times, rows)
         plotting.draw_plane_rows(recording, self.planes, times, rows)
 
-    def draw_plots(self, recording: rr.RecordingStream, plots: list[Plot]) -> None:
-        """Draw additional plots over all rows, with their styles."""
-        plotting.draw_plot_styles(recording, plots)
-        rows = slice(0, len(self.seconds))
-        plotting.draw_plot_rows(recording, plots, self._times(rows), rows)
-
     def _times(self, rows: slice | NDArray[np.int64]) -> list[rr.TimeColumn]:
         return [self._clock_column(self.clock.ticks[rows]), rr.TimeColumn("step", sequence=self.steps[rows])]
 
