@@ -12,23 +12,100 @@ space coordinates; only the scalar goes last: Q1 Q2 Q3 QC = x y z w.
 
 from __future__ import annotations
 
+import math
 import re
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from datetime import UTC, datetime
-from decimal import Decimal
+from decimal import Context, Decimal, localcontext
 from pathlib import Path
+from typing import Any, get_args
 
+import mpmath
 import numpy as np
 
 from rigidsim.errors import RigidsimError
 from rigidsim.formats.digits import decimals
-from rigidsim.formats.naming import Labels, labels
-from rigidsim.formats.registry import Format, TableSource
+from rigidsim.formats.registry import Format, Naming, TableSource, named_epoch
 from rigidsim.formats.tables import Table, TableColumn
 from rigidsim.scene.epochs import DIGITS, Epoch
+from rigidsim.scene.frame import ECLIPTIC, EQUATOR, OBLIQUITY, SpaceAxes
+from rigidsim.scene.rotations import product
+from rigidsim.scene.validation_messages import nearest, shown
 
 _LONGEST_LINE = 254
 _KILO = -3  # metres to kilometres, exactly, as a shift of the decimal point
+_BITS = 160  # far beyond the 16 digits of a message
+_WIDE = Context(prec=60)
+
+
+@dataclass(frozen=True)
+class Labels:
+    """Epoch and axes that a message names, with remarks for its comments.
+
+    ``turn``: cosine and sine of the angle about X from the message's axes to the scene's, and of half of it;
+    None if the standard knows the scene's.
+    """
+
+    epoch: Epoch
+    frame: str
+    notes: list[str]
+    turn: tuple[Decimal, Decimal, Decimal, Decimal] | None = None
+
+    def attitude(self, quaternion: list[Decimal]) -> list[Decimal]:
+        """Quaternions w x y z from body axes to the message's axes, given those to the scene's."""
+        if self.turn is None:
+            return quaternion
+        with localcontext(_WIDE):
+            return product([*self.turn[2:], Decimal(0), Decimal(0)], quaternion)
+
+    def vector(self, components: list[Decimal]) -> list[Decimal]:
+        """A vector in the scene's axes resolved along the message's."""
+        if self.turn is None:
+            return components
+        (x, y, z), (cosine, sine) = components, self.turn[:2]
+        with localcontext(_WIDE):
+            return [x, cosine * y - sine * z, sine * y + cosine * z]
+
+
+def labels(naming: Naming, attributes: Mapping[str, Any]) -> Labels:
+    """Epoch and axes of a message, from the options given and the run's own attributes."""
+    epoch = named_epoch(naming, attributes)
+    axes = _axes(naming.axes, str(attributes.get("axes", "")))
+    note = f"{epoch} is time zero of the scene"
+    if axes != ECLIPTIC:
+        return Labels(epoch, axes, [note])
+    arcsec = float(OBLIQUITY) * 180 / math.pi * 3600
+    words = f"turned about X by the obliquity to {EQUATOR}: {arcsec:.3f} arcsec (IAU 2006)"
+    context = mpmath.MPContext()
+    context.prec = _BITS
+    angle = OBLIQUITY.at(context)
+    c, s, c_half, s_half = (
+        Decimal(mpmath.nstr(f(x), 45)) for x in (angle, angle / 2) for f in (context.cos, context.sin)
+    )
+    notes = [note, f"its space axes, {axes}, were {words}"]
+    return Labels(epoch, EQUATOR, notes, (c, s, c_half, s_half))
+
+
+def _axes(given: str, known: str) -> str:
+    names = get_args(SpaceAxes)
+    if not given and not known:
+        raise RigidsimError(
+            "the run doesn't say what its space axes are, which a message must: give [frame] axes in the "
+            f"config, or --axes here ({', '.join(names)}, or a name in capitals that sender and receiver "
+            "agree on); csv needs none"
+        )
+    if known and given and given != known:
+        raise RigidsimError(
+            f'--axes: given {shown(given)}, but the run\'s axes are "{known}"; leave the option out'
+        )
+    near = nearest(given, names)
+    if given and given not in names and (near or not re.fullmatch(r"[A-Z][A-Z0-9_]{0,60}", given)):
+        raise RigidsimError(
+            f"--axes: given {shown(given)}{near}; allowed: {', '.join(names)}, or another name in capitals, "
+            "digits and underscores"
+        )
+    return given or known
 
 
 def write_aem(table: Table, path: Path, source: TableSource) -> None:

@@ -14,8 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from rigidsim.formats.digits import texts
-from rigidsim.formats.naming import named_epoch
-from rigidsim.formats.registry import Format, TableSource
+from rigidsim.formats.registry import Format, TableSource, named_epoch
 from rigidsim.formats.tables import Table, TableColumn
 from rigidsim.scene.epochs import DIGITS, Epoch
 

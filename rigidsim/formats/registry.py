@@ -1,19 +1,56 @@
-"""Formats: their description, and the lookup by name."""
+"""Formats: their description, their lookup by name, and what they are told of a run besides its numbers."""
 
 from __future__ import annotations
 
 import importlib.util
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from rigidsim.errors import RigidsimError
 from rigidsim.formats import FORMATS
-from rigidsim.formats.naming import Naming
-from rigidsim.formats.tables import Table
+from rigidsim.scene.epochs import Epoch, parse_epoch
 from rigidsim.scene.readable import AngleUnit
+
+if TYPE_CHECKING:
+    from rigidsim.formats.tables import Table
+
+
+@dataclass(frozen=True)
+class Naming:
+    """Values that a run's config may have left open.
+
+    Attributes:
+        epoch: time zero of the scene, as in ``[time] epoch``; empty for the config's.
+        axes: the scene's space axes, as in ``[frame] axes``, or another name that sender and receiver agree
+            on (capitals, digits and underscores); empty for the config's.
+        object_name: name of the body; empty for the run's name.
+    """
+
+    epoch: str = ""
+    axes: str = ""
+    object_name: str = ""
+    object_id: str = "UNKNOWN"
+    center: str = "UNKNOWN"
+
+
+def named_epoch(naming: Naming, attributes: Mapping[str, Any]) -> Epoch:
+    """Date of time 0, from the run or from an option."""
+    given, known = naming.epoch, str(attributes.get("epoch", ""))
+    try:
+        epoch = parse_epoch(given) if given else None
+    except ValueError as error:
+        raise RigidsimError(f"--epoch: {error}") from None
+    if not known and epoch is None:
+        raise RigidsimError(
+            "the run doesn't say what its time 0 is, which a message must: give [time] epoch in the config, "
+            'or --epoch "2029-04-13T21:46:00 TDB" here (scales TDB, TT and UTC)'
+        )
+    if known and epoch is not None and str(epoch) != known:
+        raise RigidsimError(f"--epoch: given {epoch}, but time 0 of the run is {known}; leave the option out")
+    return epoch or parse_epoch(known)
 
 
 @dataclass(frozen=True)

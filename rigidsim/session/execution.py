@@ -23,8 +23,8 @@ from rigidsim.solve.problem import InitialValueProblem
 from rigidsim.solve.sampler import Progress
 from rigidsim.solve.status import Status
 from rigidsim.store import provenance
-from rigidsim.store.attributes import RootAttributes
 from rigidsim.store.folder import RunFolder
+from rigidsim.store.provenance import RootAttributes
 from rigidsim.store.run import MemoryRun, MemoryWriter, Run, SavedRun
 from rigidsim.store.segments import Arrays, Chain, SegmentWriter
 from rigidsim.store.summary import Summary

@@ -17,7 +17,7 @@ from rigidsim.solve.problem import InitialValueProblem
 from rigidsim.solve.projection import LATE
 from rigidsim.solve.sampler import Progress
 from rigidsim.solve.status import Status
-from rigidsim.store.attributes import RootAttributes, Use
+from rigidsim.store.provenance import RootAttributes, Use
 from rigidsim.store.summary import Summary, as_fields
 from rigidsim.store.summary_parts import (
     Accuracy,

@@ -7,7 +7,7 @@ import fcntl
 import json
 import os
 import shutil
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,6 +17,7 @@ from rigidsim.errors import FORCE, OUT, RESUME, RunFolderError, StoppedWritingEr
 from rigidsim.look.figure_names import FIGURES
 from rigidsim.store import atomic, provenance, segments
 from rigidsim.store.summary import Brief, read_summary
+from rigidsim.store.summary_parts import SummaryPart
 
 _REOPENED = ".segments.reopened"
 
@@ -36,6 +37,7 @@ class WorkFolder:
     """Common base of the folders of runs and sweeps."""
 
     path: Path
+    kind: ClassVar[str]
     kept: ClassVar[str]  # what remains when writing stops, for messages
     resumed: ClassVar[str]  # what the command that resumes does with the rest, for messages
     # the lock by which it is seen whether a process is at work: a shared one disturbs nobody else who looks,
@@ -99,6 +101,26 @@ class WorkFolder:
         if self.path.exists() and not self.path.is_dir():
             raise RunFolderError(f"{self.path}: is no folder; choose another {OUT} or name")
 
+    def content(self, ours: Collection[str]) -> set[str]:
+        """Names of what the folder holds; refuses what no such work writes."""
+        self.refuse_a_file()
+        names = set()
+        for path in self.path.iterdir() if self.path.exists() else ():
+            if path.name not in ours and not path.name.startswith("."):
+                raise RunFolderError(
+                    f"{self.path}: holds {path.name}, which no {self.kind} writes; choose another {OUT} or "
+                    "name"
+                )
+            if path.is_symlink():
+                raise RunFolderError(f"{path}: is a symbolic link, which no {self.kind} writes; remove it")
+            names.add(path.name)
+        return names
+
+    def write_summary(self, summary: SummaryPart) -> None:
+        """Write ``summary.json`` atomically."""
+        text = json.dumps(summary.as_dict(), indent=2, allow_nan=False)
+        atomic.write_bytes(self.summary, (text + "\n").encode())
+
     def unwritable(self, error: OSError) -> RunFolderError:
         """The error to raise if nothing can be written."""
         return RunFolderError(
@@ -110,6 +132,7 @@ class WorkFolder:
 class RunFolder(WorkFolder):
     """Paths of one run."""
 
+    kind = "run"
     kept = "what was saved stays"
     resumed = "continues from there"
     seen_by = fcntl.LOCK_SH
@@ -146,20 +169,9 @@ class RunFolder(WorkFolder):
         files += [self.figure_of(name) for name in FIGURES]
         files += [self.analysis, self.spectrum]
         folders = [self.segments, self.set_aside]
-        ours = files + folders
         try:
-            self.refuse_a_file()
-            present = list(self.path.iterdir()) if self.path.exists() else []
-            foreign = [p.name for p in present if p not in ours and not p.name.startswith(".")]
-            if foreign:
-                raise RunFolderError(
-                    f"{self.path}: holds {foreign[0]}, which no run writes; choose another {OUT} or name"
-                )
-            for path in present:
-                if path.is_symlink():
-                    raise RunFolderError(f"{path}: is a symbolic link, which no run writes; remove it")
-            held = [p for p in present if p in (self.dataset, self.summary, self.segments)]
-            if held and not force:
+            present = self.content([path.name for path in files + folders])
+            if not force and present & {self.dataset.name, self.summary.name, self.segments.name}:
                 what = "a finished run" if self.dataset.exists() else "an unfinished run"
                 raise RunFolderError(
                     f"{self.path}: holds {what}; {FORCE} replaces it, another {OUT} puts this one elsewhere"
@@ -222,11 +234,6 @@ class RunFolder(WorkFolder):
         atomic.sync_folder(self.path)
         for path in (self.summary, self.timeline, self.dataset, self.checkpoint):
             path.unlink(missing_ok=True)
-
-    def write_summary(self, summary: Brief) -> None:
-        """Write ``summary.json`` atomically."""
-        text = json.dumps(summary.as_dict(), indent=2, allow_nan=False)
-        atomic.write_bytes(self.summary, (text + "\n").encode())
 
     def note_timeline(self, summary: Brief, drawn: Path) -> None:
         """Record in the summary the timeline that was redrawn for a complete run, for ``verify``."""

@@ -34,6 +34,7 @@ from rigidsim.store.summary_parts import (
     Text,
     Three,
     WarningCode,
+    first_of,
 )
 
 _LARGEST_FILE = 16_000_000  # bytes; a summary has some kilobytes
@@ -186,16 +187,9 @@ def read_summary(path: Path) -> Brief:
         if not isinstance(content, dict):
             raise ValueError("no JSON object")
         return (Summary if "cost" in content else Brief).model_validate(_visible(content))
-    except ValidationError as error:
-        first = error.errors(include_url=False)[0]
-        where = ".".join(str(step)[:40] for step in first["loc"])
-        raise RunFolderError(
-            f"{path}: is damaged or no summary of rigidsim ({where!a}: {first['msg']})"
-        ) from None
-    except RecursionError:
-        raise RunFolderError(f"{path}: is damaged or no summary of rigidsim (nested too deeply)") from None
-    except (OSError, ValueError) as error:
-        raise RunFolderError(f"{path}: is damaged or no summary of rigidsim ({str(error)[:200]})") from None
+    except (OSError, ValueError, RecursionError) as error:
+        why = first_of(error) if isinstance(error, ValidationError) else str(error)[:200]
+        raise RunFolderError(f"{path}: is damaged or no summary of rigidsim ({why})") from None
 
 
 def _visible(value: Any) -> Any:

@@ -6,7 +6,16 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Annotated, Any, ClassVar, Self
 
-from pydantic import BaseModel, ConfigDict, Field, StrictBool, StrictInt, StrictStr, field_validator
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    StrictBool,
+    StrictInt,
+    StrictStr,
+    ValidationError,
+    field_validator,
+)
 
 FiniteNumber = Annotated[float, Field(strict=True, allow_inf_nan=False)]
 Text = Annotated[StrictStr, Field(max_length=20_000)]
@@ -37,6 +46,12 @@ class SummaryPart(BaseModel):
     def as_dict(self) -> dict[str, Any]:
         """Fields for JSON, without those that weren't given."""
         return self.model_dump(mode="json", exclude_unset=True)
+
+
+def first_of(error: ValidationError) -> str:
+    """The first thing that is wrong, and where."""
+    first = error.errors(include_url=False)[0]
+    return f"{'.'.join(str(step)[:40] for step in first['loc'])!a}: {first['msg']}"
 
 
 ENGINE = "engine"

@@ -7,8 +7,8 @@ from pathlib import Path
 from rigidsim.errors import RunFolderError
 from rigidsim.scene.config import Experiment, parse
 from rigidsim.scene.registry import OBSERVABLES
-from rigidsim.store.attributes import read_attributes
 from rigidsim.store.netcdf import check_version, root_attributes
+from rigidsim.store.provenance import read_attributes
 
 
 def embedded(dataset: Path, *, overrides: Sequence[str] = ()) -> Experiment:

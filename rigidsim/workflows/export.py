@@ -10,8 +10,7 @@ import xarray
 from rigidsim.errors import RESUME, RigidsimError, RunFolderError
 from rigidsim.formats import FOR_SWEEPS
 from rigidsim.formats.digits import angle_unit_named
-from rigidsim.formats.naming import Naming
-from rigidsim.formats.registry import Format, TableSource, format_named
+from rigidsim.formats.registry import Format, Naming, TableSource, format_named
 from rigidsim.formats.tables import BLOCK_NUMBERS, tables_of
 from rigidsim.scene.arithmetic import working_bits
 from rigidsim.store import atomic

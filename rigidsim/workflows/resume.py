@@ -21,9 +21,9 @@ from rigidsim.solve.assembly import assemble
 from rigidsim.solve.problem import InitialValueProblem, prepare
 from rigidsim.solve.status import Status
 from rigidsim.store import atomic
-from rigidsim.store.attributes import Use, read_attributes
 from rigidsim.store.folder import RunFolder, find_run
 from rigidsim.store.netcdf import root_attributes
+from rigidsim.store.provenance import Use, read_attributes
 from rigidsim.store.reader import open_dataset
 from rigidsim.store.run import SavedRun, open_run
 from rigidsim.store.seal import check_seal

@@ -14,9 +14,9 @@ from rigidsim.errors import RESUME, RunFolderError
 from rigidsim.session.session import Observer
 from rigidsim.solve.status import Status
 from rigidsim.store import provenance
-from rigidsim.store.attributes import Use, read_attributes
 from rigidsim.store.folder import RunFolder, find_run
 from rigidsim.store.netcdf import root_attributes
+from rigidsim.store.provenance import Use, read_attributes
 from rigidsim.store.reader import open_dataset
 from rigidsim.store.run import Run, open_run
 from rigidsim.store.seal import check_seal

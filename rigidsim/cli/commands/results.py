@@ -10,7 +10,7 @@ import rigidsim.workflows.export as exporting
 from rigidsim.cli.screens.analysis import print_analysis
 from rigidsim.cli.screens.page import answer
 from rigidsim.errors import RigidsimError
-from rigidsim.formats.naming import Naming
+from rigidsim.formats.registry import Naming
 from rigidsim.look.figure_names import OVERVIEW, SPECTRUM
 from rigidsim.look.figures import available, check_name, figure_format, save_figure
 from rigidsim.look.figures.spectrum import save_spectrum

@@ -16,8 +16,7 @@ from rigidsim.store import atomic
 from rigidsim.store.atomic import sink
 from rigidsim.store.netcdf import NetcdfFile, writing
 from rigidsim.store.seal import seal
-from rigidsim.store.sweeps.gathered import Described, Gathered, TileReader
-from rigidsim.store.sweeps.sources import Sources, plain
+from rigidsim.store.sweeps.sources import Described, Gathered, Sources, TileReader, plain
 from rigidsim.store.variables import LABELS
 
 _GZIP = 4

@@ -17,8 +17,7 @@ import numpy as np
 from rigidsim.errors import FORCE, OUT, RESUME, RunFolderError
 from rigidsim.store import atomic
 from rigidsim.store.folder import FileOf, WorkFolder
-from rigidsim.store.sweeps.generation import Generation
-from rigidsim.store.sweeps.tile import Tile, read_tile
+from rigidsim.store.sweeps.tiles import Generation, Tile, read_tile
 
 KIND = "sweep"
 _GENERATION = re.compile(r"g(\d{3})\.json")
@@ -28,6 +27,7 @@ _GENERATION = re.compile(r"g(\d{3})\.json")
 class SweepFolder(WorkFolder):
     """Paths of one sweep, and what is stored there."""
 
+    kind = KIND
     kept = "the tiles that are complete stay"
     resumed = "computes the others"
     seen_by = fcntl.LOCK_EX
@@ -126,19 +126,11 @@ class SweepFolder(WorkFolder):
 
     def begin(self, *, force: bool) -> None:
         """Make the folder ready; RunFolderError if it holds something else, or can't be written."""
-        ours = {"config.toml", "tiles", "dataset.h5", "summary.json"}
+        ours = ["config.toml", "tiles", "dataset.h5", "summary.json"]
         try:
-            self.refuse_a_file()
+            present = self.content([*ours, *(path.name for path in self.path.glob("figure*"))])
             self.path.mkdir(parents=True, exist_ok=True)
-            there = [p for p in self.path.iterdir() if not p.name.startswith(".")]
-            for path in there:
-                if path.is_symlink():
-                    raise RunFolderError(f"{path}: is a symbolic link, which no sweep writes; remove it")
-                if path.name not in ours and not path.name.startswith("figure"):
-                    raise RunFolderError(
-                        f"{self.path}: holds {path.name}, which no sweep writes; choose another {OUT} or name"
-                    )
-            if there and not self.is_sweep and not force:
+            if not (self.is_sweep or force or all(name.startswith(".") for name in present)):
                 raise RunFolderError(f"{self.path}: holds a run; {FORCE} replaces it, another {OUT} or name "
                                      "puts the sweep elsewhere")  # fmt: skip
             if force:
@@ -156,11 +148,6 @@ class SweepFolder(WorkFolder):
             for path in folder.glob(".*.partial"):
                 if not _alive(path):
                     path.unlink(missing_ok=True)
-
-    def write_summary(self, content: dict[str, Any]) -> None:
-        """Write ``summary.json`` atomically."""
-        text = json.dumps(content, indent=2, allow_nan=False)
-        atomic.write_bytes(self.summary, (text + "\n").encode())
 
 
 def _alive(partial: Path) -> bool:

@@ -13,9 +13,9 @@ from pydantic import Field, ValidationError
 
 from rigidsim.errors import RESUME, RunFolderError
 from rigidsim.store.seal import check_seal, check_whole
-from rigidsim.store.summary_parts import SummaryPart
+from rigidsim.store.summary_parts import SummaryPart, first_of
 from rigidsim.store.sweeps.folder import SweepFolder
-from rigidsim.store.sweeps.generation import Generation
+from rigidsim.store.sweeps.tiles import Generation
 
 if TYPE_CHECKING:
     import xarray
@@ -186,8 +186,8 @@ def _so_far(folder: SweepFolder) -> SweepSummary:
     try:
         summary = SweepSummary.model_validate(folder.read_summary())
     except ValidationError as error:
-        where = ".".join(str(step)[:40] for step in error.errors(include_url=False)[0]["loc"])
-        raise RunFolderError(f"{folder.summary}: is damaged or no summary of rigidsim ({where!a})") from None
+        why = first_of(error)
+        raise RunFolderError(f"{folder.summary}: is damaged or no summary of rigidsim ({why})") from None
     generations = folder.generations()
     if not generations:
         return summary

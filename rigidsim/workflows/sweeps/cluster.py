@@ -17,7 +17,7 @@ from threading import Thread
 from typing import Any
 
 from rigidsim.errors import RigidsimError, StoppedError
-from rigidsim.store.sweeps.generation import Generation
+from rigidsim.store.sweeps.tiles import Generation
 from rigidsim.workflows.sweeps.members import tile_image
 from rigidsim.workflows.sweeps.ways import Way, task
 

@@ -20,7 +20,7 @@ from rigidsim.solve.problem import prepare
 from rigidsim.store import provenance
 from rigidsim.store.run import MemoryRun
 from rigidsim.store.sweeps.sources import plain
-from rigidsim.store.sweeps.tile import Tile, TileVariable
+from rigidsim.store.sweeps.tiles import Tile, TileVariable
 from rigidsim.workflows.analyse import analyse
 from rigidsim.workflows.read import parse
 from rigidsim.workflows.run import run

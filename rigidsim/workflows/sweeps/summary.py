@@ -4,9 +4,8 @@ import numpy as np
 
 from rigidsim.scene.sweeps.sweep import Sweep
 from rigidsim.session.members import ENDED_WELL, OUTCOMES, WARNINGS
-from rigidsim.store.sweeps.gathered import Gathered, TileReader
 from rigidsim.store.sweeps.run import ErrorsOfMembers, SweepCost, SweepSummary
-from rigidsim.store.sweeps.sources import ALWAYS, Sources
+from rigidsim.store.sweeps.sources import ALWAYS, Gathered, Sources, TileReader
 
 _ERRORS = {
     "attitude": ("attitude_error", "rad"),

@@ -14,10 +14,9 @@ from rigidsim.scene.toml_text import apply_overrides, parse_toml
 from rigidsim.scene.validation_messages import shown
 from rigidsim.store.sweeps.dataset import write_dataset
 from rigidsim.store.sweeps.folder import SweepFolder
-from rigidsim.store.sweeps.gathered import TileReader, gather
-from rigidsim.store.sweeps.generation import Generation
 from rigidsim.store.sweeps.run import SavedSweep, open_sweep
-from rigidsim.store.sweeps.sources import sources_of
+from rigidsim.store.sweeps.sources import TileReader, gather, sources_of
+from rigidsim.store.sweeps.tiles import Generation
 from rigidsim.store.variables import SCHEMA_VERSION
 from rigidsim.workflows.read import Given, as_experiment
 from rigidsim.workflows.sweeps.batch import why_alone
@@ -300,5 +299,5 @@ def _completed(wanted: Sweep, folder: SweepFolder, wall: float, cpu: float) -> S
     }
     digest = write_dataset(folder.dataset, wanted, sources, reader, found, attributes)
     summary = summary.having(dataset_sha256=digest)
-    folder.write_summary(summary.as_dict())
+    folder.write_summary(summary)
     return SavedSweep(folder, summary)

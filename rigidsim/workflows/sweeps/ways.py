@@ -23,7 +23,7 @@ from typing import Any, TypeVar
 
 from rigidsim.errors import StoppedError
 from rigidsim.scene.sweeps.sweep import Sweep
-from rigidsim.store.sweeps.generation import Generation
+from rigidsim.store.sweeps.tiles import Generation
 from rigidsim.workflows.sweeps.members import get_ready, tile_image
 
 S = TypeVar("S")
