@@ -6,27 +6,15 @@ Everything here works on blocks of many members at once and on samples alone, wh
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from rigidsim.model.tangents import GROWTH
 from rigidsim.solve.indicators import indicators
+from rigidsim.store.sweeps.tiles import ALWAYS, Kept, KeptVariable
 from rigidsim.store.variables import Variable, part_name
-
-ALWAYS = "always"
-"""The item that is kept for every member, asked for or not."""
-
-
-@dataclass(frozen=True)
-class KeptVariable:
-    """One variable for the members of a tile, (members, ...), and its item of ``[sweep] keep``."""
-
-    dims: tuple[str, ...]
-    values: np.ndarray
-    attributes: Mapping[str, Any] = field(default_factory=dict)
-    item: str = ALWAYS
 
 
 def kept(
@@ -39,10 +27,6 @@ def kept(
 ) -> KeptVariable:
     """A kept variable with its labels."""
     return KeptVariable(dims, values, {"units": units, "long_name": long_name, **more}, item)
-
-
-Kept = dict[str, KeptVariable]
-"""Kept variables by name."""
 
 
 @dataclass(frozen=True)

@@ -193,9 +193,10 @@ def _values(
     for low, high in pairwise(edges):
         if keys[low] < 0:
             continue
-        held = reader.tile(int(keys[low])).arrays.get(name)
+        held = reader.tile(int(keys[low])).kept.get(name)
         if held is not None:
-            values[(slice(low, high), *(slice(0, n) for n in held.shape[1:]))] = held[rows[low:high]]
+            place = (slice(low, high), *(slice(0, n) for n in held.values.shape[1:]))
+            values[place] = held.values[rows[low:high]]
     return values
 
 

@@ -14,10 +14,8 @@ import numpy as np
 from rigidsim.errors import RESUME, RunFolderError
 from rigidsim.scene.sweeps.sweep import Sweep
 from rigidsim.store.sweeps.folder import SweepFolder
-from rigidsim.store.sweeps.tiles import Generation, Tile, TileVariable, Work, ranges_of
+from rigidsim.store.sweeps.tiles import ALWAYS, Generation, KeptVariable, Tile, Work, ranges_of
 
-ALWAYS = "always"
-"""The item that is kept for every member."""
 _NOWHERE = -1
 _TILES_IN_MEMORY = 96
 
@@ -153,7 +151,7 @@ def _same_axes(sweep: Sweep, then: Sweep) -> bool:
 class Described:
     """A variable as tiles describe it; ``extra``: largest sizes of dimensions besides the members'."""
 
-    variable: TileVariable
+    variable: KeptVariable
     whole: bool
     extra: tuple[int, ...]
 
@@ -205,10 +203,10 @@ def gather(sources: Sources, reader: TileReader) -> Gathered:
     for key, wanted in _tiles(sources).items():
         tile = reader.tile(key)
         found.made.append(tile.made)
-        for name, variable in tile.variables.items():
+        for name, variable in tile.kept.items():
             if variable.item not in wanted:
                 continue
-            values = tile.arrays.get(name, np.zeros((len(tile.members), *(0 for _ in variable.dims))))
+            values = variable.values
             known = found.variables.get(name)
             if known is None:
                 whole = values.dtype.kind == "i"
@@ -217,8 +215,8 @@ def gather(sources: Sources, reader: TileReader) -> Gathered:
                 raise RunFolderError(f"{reader.place}: tiles disagree about {name}")
             else:
                 known.extra = tuple(map(max, known.extra, values.shape[1:]))
-        if "time" in tile.arrays and "series" in wanted and alike:
-            common, alike = _common(common, tile.arrays["time"])
+        if "time" in tile.kept and tile.kept["time"].values.size and "series" in wanted and alike:
+            common, alike = _common(common, tile.kept["time"].values)
         if tile.reasons:
             for member in np.flatnonzero(always.tile == key):
                 why = tile.reasons.get(int(always.row[member]))

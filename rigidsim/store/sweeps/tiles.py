@@ -23,6 +23,8 @@ from rigidsim.store.netcdf import writing
 from rigidsim.store.seal import check_seal, refuse_special, sealed
 
 _FORMAT = 1
+ALWAYS = "always"
+"""The item that is kept for every member, asked for or not."""
 
 
 @dataclass(frozen=True)
@@ -150,12 +152,19 @@ class Generation:
 
 
 @dataclass(frozen=True)
-class TileVariable:
-    """A variable in a tile: dimensions besides the members', and the item of ``keep`` that it is of."""
+class KeptVariable:
+    """One variable for some members, (members, ...) float64 or int64: its dimensions besides theirs, and the
+    item of ``[sweep] keep`` that it is of.
+    """
 
     dims: tuple[str, ...]
-    attributes: Mapping[str, Any]
-    item: str
+    values: np.ndarray
+    attributes: Mapping[str, Any] = field(default_factory=dict)
+    item: str = ALWAYS
+
+
+Kept = dict[str, KeptVariable]
+"""Kept variables by name."""
 
 
 @dataclass(frozen=True)
@@ -165,16 +174,13 @@ class Tile:
     Attributes:
         config_sha256: SHA-256 of the config that the members belong to.
         members: indices of the members, (n,) int64.
-        arrays: arrays by name, (n, ...) float64 or int64; empty ones are left out.
-        variables: descriptions of the arrays.
         reasons: by place in the tile, why members failed.
         made: engines, versions, seconds, ...: everything that differs between repetitions.
     """
 
     config_sha256: str
     members: np.ndarray
-    arrays: Mapping[str, np.ndarray]
-    variables: Mapping[str, TileVariable]
+    kept: Kept
     reasons: Mapping[int, str] = field(default_factory=dict)
     made: Mapping[str, Any] = field(default_factory=dict)
 
@@ -182,7 +188,7 @@ class Tile:
         """The sealed file's bytes."""
         described = {
             name: {"dims": list(v.dims), "attributes": dict(v.attributes), "item": v.item}
-            for name, v in self.variables.items()
+            for name, v in self.kept.items()
         }
         buffer = io.BytesIO()
         with writing(buffer) as file:
@@ -197,7 +203,7 @@ class Tile:
                 }
             )
             file.group("tile", {"members": self.members.astype(np.int64)})
-            file.group("kept", self.arrays)
+            file.group("kept", {name: v.values for name, v in self.kept.items()})
         return bytes(sealed(buffer))
 
 
@@ -209,15 +215,16 @@ def read_tile(path: Path, config_sha256: str) -> Tile:
         with h5py.File(path, "r") as file:
             if int(file.attrs.get("tile_format", [0])[0]) != _FORMAT:
                 raise RunFolderError(f"{path}: is no tile that this version of rigidsim reads")
-            described = json.loads(file.attrs["variables"])
+            members, held = np.asarray(file["tile"]["members"][()]), file["kept"]
+            kept: Kept = {}
+            for name, v in json.loads(file.attrs["variables"]).items():
+                empty = np.zeros((len(members), *(0 for _ in v["dims"])))
+                values = np.asarray(held[name][()]) if name in held else empty
+                kept[name] = KeptVariable(tuple(v["dims"]), values, v["attributes"], v["item"])
             tile = Tile(
                 str(file.attrs["config_sha256"]),
-                np.asarray(file["tile"]["members"][()]),
-                {name: np.asarray(data[()]) for name, data in file["kept"].items()},
-                {
-                    name: TileVariable(tuple(v["dims"]), v["attributes"], v["item"])
-                    for name, v in described.items()
-                },
+                members,
+                kept,
                 {int(place): str(why) for place, why in json.loads(file.attrs["reasons"]).items()},
                 json.loads(file.attrs["made"]),
             )

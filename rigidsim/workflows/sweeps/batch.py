@@ -13,7 +13,7 @@ from rigidsim.accuracy.estimates.members import MemberErrors, MemberEstimates
 from rigidsim.errors import ConfigError
 from rigidsim.scene.sweeps.sweep import Sweep
 from rigidsim.session.dataset import dataset_variables
-from rigidsim.session.kept import Kept, KeptVariable, MemberSeries, Points, kept_events, kept_of_series
+from rigidsim.session.kept import MemberSeries, Points, kept_events, kept_of_series
 from rigidsim.session.members import (
     ENDED_WELL,
     OUTCOMES,
@@ -30,6 +30,7 @@ from rigidsim.solve.batch.run import BatchBlock, BatchRun
 from rigidsim.solve.problem import prepare
 from rigidsim.solve.status import Status
 from rigidsim.store.summary_parts import WarningCode
+from rigidsim.store.sweeps.tiles import Kept, KeptVariable
 from rigidsim.store.variables import Variable
 
 _ONE_BY_ONE = ("frequencies",)

@@ -14,13 +14,12 @@ from rigidsim.model.tangents import GROWTH
 from rigidsim.scene.config import Experiment
 from rigidsim.scene.sweep_table import INDICATORS
 from rigidsim.scene.sweeps.sweep import Sweep
-from rigidsim.session.kept import Kept, KeptVariable
 from rigidsim.session.members import MemberResults, run_alone
 from rigidsim.solve.problem import prepare
 from rigidsim.store import provenance
 from rigidsim.store.run import MemoryRun
 from rigidsim.store.sweeps.sources import plain
-from rigidsim.store.sweeps.tiles import Tile, TileVariable
+from rigidsim.store.sweeps.tiles import Kept, KeptVariable, Tile
 from rigidsim.workflows.analyse import analyse
 from rigidsim.workflows.read import parse
 from rigidsim.workflows.run import run
@@ -94,8 +93,7 @@ def tile_image(config: str, members: Sequence[int], keep: Sequence[str], apart: 
     return Tile(
         sweep.experiment.sha256,
         np.array(members, dtype=np.int64),
-        {name: variable.values for name, variable in results.kept.items()},
-        {name: TileVariable(v.dims, v.attributes, v.item) for name, v in results.kept.items()},
+        results.kept,
         results.reasons,
         made,
     ).image()

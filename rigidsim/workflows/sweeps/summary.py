@@ -5,7 +5,8 @@ import numpy as np
 from rigidsim.scene.sweeps.sweep import Sweep
 from rigidsim.session.members import ENDED_WELL, OUTCOMES, WARNINGS
 from rigidsim.store.sweeps.run import ErrorsOfMembers, SweepCost, SweepSummary
-from rigidsim.store.sweeps.sources import ALWAYS, Gathered, Sources, TileReader
+from rigidsim.store.sweeps.sources import Gathered, Sources, TileReader
+from rigidsim.store.sweeps.tiles import ALWAYS
 
 _ERRORS = {
     "attitude": ("attitude_error", "rad"),
@@ -29,19 +30,19 @@ def summary_of(
     order = np.argsort(always.tile, kind="stable")
     edges = np.flatnonzero(np.diff(always.tile[order])) + 1
     for group in np.split(order, edges):
-        tile = reader.tile(int(always.tile[group[0]]))
-        rows = always.row[group]
-        ended_as += np.bincount(tile.arrays["status"][rows], minlength=len(OUTCOMES))
-        bits = tile.arrays["warnings"][rows]
+        tile, rows = reader.tile(int(always.tile[group[0]])), always.row[group]
+        arrays = {name: variable.values[rows] for name, variable in tile.kept.items()}
+        ended_as += np.bincount(arrays["status"], minlength=len(OUTCOMES))
+        bits = arrays["warnings"]
         warned_of += np.array([int((bits >> bit & 1).sum()) for bit in range(len(WARNINGS))])
-        steps += int(tile.arrays["steps"][rows].sum())
+        steps += int(arrays["steps"].sum())
         for name, seen in estimated.items():
-            if (variable := _ERRORS[name][0]) in tile.arrays:
-                values = tile.arrays[variable][rows]
+            if (variable := _ERRORS[name][0]) in arrays:
+                values = arrays[variable]
                 seen.append(values[~np.isnan(values)])
-        for name, values in tile.arrays.items():
+        for name, values in arrays.items():
             if name.endswith("_drift_largest"):
-                largest = np.nanmax(values[rows], initial=0.0)
+                largest = np.nanmax(values, initial=0.0)
                 drift = name.removesuffix("_largest")
                 worst[drift] = max(worst.get(drift, 0.0), float(largest))
     outcomes = {OUTCOMES[i]: int(n) for i, n in enumerate(ended_as) if n}

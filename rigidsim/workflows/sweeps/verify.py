@@ -10,9 +10,9 @@ import xarray
 
 from rigidsim.errors import RESUME, ConfigError, Problem, RunFolderError
 from rigidsim.scene.sweeps.sweep import Sweep
-from rigidsim.session.kept import Kept
 from rigidsim.store import provenance
 from rigidsim.store.sweeps.run import SavedSweep, open_sweep
+from rigidsim.store.sweeps.tiles import Kept
 from rigidsim.workflows.sweeps.members import run_members, sweep_of
 from rigidsim.workflows.verify import Difference, Verdict
 
