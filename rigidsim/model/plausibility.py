@@ -5,8 +5,6 @@ Only about the Sun, the planets and the Moon, recognised by their gravitational 
 implausible: scenes without units are free.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Sequence
 from fractions import Fraction

@@ -18,8 +18,6 @@ Euler angles have no series in a pole of their sequence. Where a motion starts i
 the first step leaves it by a millionth of a turn, and those that follow grow with the distance.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 import heyoka as hy

@@ -8,8 +8,6 @@ compiler may round a product otherwise. Past a growth of e**500 the vector would
 states; long before, the motion is known to be chaotic, and its growth is recorded as NaN.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Mapping, Sequence
 

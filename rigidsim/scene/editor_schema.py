@@ -5,8 +5,6 @@ numbers, and every key has a title. A TOML file has no null, and an editor shows
 is rewritten in TOML's terms; it stays within draft 7, which every editor's checker knows.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from fractions import Fraction
 from typing import Any

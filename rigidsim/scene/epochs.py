@@ -4,8 +4,6 @@ Days of TT and TDB have 86,400 s. Seconds of UTC are those of TAI, and some of i
 table of leap seconds is IANA's (the package tzdata), made from the IERS's, and says until when it is known.
 """
 
-from __future__ import annotations
-
 import math
 import re
 from bisect import bisect_right
@@ -49,7 +47,7 @@ class Epoch:
         digits = f"{fraction:0{DIGITS}}".rstrip("0")
         return f"{date.fromordinal(self.day)}T{clock}{'.' if digits else ''}{digits}"
 
-    def after(self, seconds: Decimal) -> Epoch:
+    def after(self, seconds: Decimal) -> "Epoch":
         """The instant some seconds later, to 1e-14 s; ``ValueError`` past years 1 to 9999 or known UTC."""
         ticks = int(_WIDE.scaleb(seconds, DIGITS).to_integral_value(context=_WIDE))
         uniform = self._uniform() + ticks
@@ -65,7 +63,7 @@ class Epoch:
             day, rest = day - 1, rest + _DAY
         return _dated(self.scale, day, rest)
 
-    def uniform(self) -> Epoch:
+    def uniform(self) -> "Epoch":
         """The same instant in a scale whose days all have 86,400 s: TT for UTC, otherwise its own."""
         if self.scale != "UTC":
             return self

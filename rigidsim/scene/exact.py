@@ -4,8 +4,6 @@ A config's ``0.1`` is one tenth until the moment that it becomes a coefficient o
 working precision; binary floating point never stands in between.
 """
 
-from __future__ import annotations
-
 import math
 import re
 from dataclasses import dataclass, field
@@ -68,7 +66,7 @@ class ExactNumber:
         return float(self.at(_for_doubles()))
 
     @property
-    def alone(self) -> ExactNumber:
+    def alone(self) -> "ExactNumber":
         """The number without information on its unit."""
         return ExactNumber(self.rational, self.pi_power)
 

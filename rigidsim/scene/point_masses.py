@@ -1,7 +1,5 @@
 """``[[bodies]]``: point masses under mutual gravity, as keys and with every number worked out."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any

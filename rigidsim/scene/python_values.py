@@ -1,7 +1,5 @@
 """Python values as TOML text, for configs written in code."""
 
-from __future__ import annotations
-
 import numbers
 from collections.abc import Mapping, Sequence
 from decimal import Decimal

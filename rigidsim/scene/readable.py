@@ -5,13 +5,11 @@ A config's ``[time] unit`` and ``epoch`` are stored in the dataset's attributes 
 ``epoch``; without a unit the span chooses one.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from decimal import Decimal
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -130,7 +128,7 @@ class TimeWords:
     span: float
 
     @classmethod
-    def of(cls, attributes: Mapping[str, Any], start: float, end: float) -> TimeWords:
+    def of(cls, attributes: Mapping[str, Any], start: float, end: float) -> Self:
         """Wording for a run from ``start`` to ``end`` (s) whose attributes may have a unit and an epoch."""
         largest = max(abs(start), abs(end))
         suiting = unit_for(largest)

@@ -2,8 +2,6 @@
 tables, and in place in its text (``--set KEY=VALUE``).
 """
 
-from __future__ import annotations
-
 import re
 import tomllib
 from collections.abc import Callable, Sequence

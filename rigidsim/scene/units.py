@@ -5,8 +5,6 @@ a power of pi, and pi itself is filled in later at the run's own precision. Ever
 by exact decimals, except the atomic mass constant (CODATA 2022, measured) and the sidereal day.
 """
 
-from __future__ import annotations
-
 import re
 from fractions import Fraction
 from functools import lru_cache

@@ -1,7 +1,5 @@
 """Messages for the schema validator's errors, which name the key and the remedy."""
 
-from __future__ import annotations
-
 import difflib
 from collections.abc import Collection, Iterable, Mapping
 from decimal import Decimal

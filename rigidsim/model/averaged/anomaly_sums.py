@@ -18,8 +18,6 @@ momentum by the shortest turn; the k_j come from a fit over all orientations. Fo
 times as large, for half-integers e times.
 """
 
-from __future__ import annotations
-
 import functools
 import math
 from collections.abc import Callable

@@ -7,8 +7,6 @@ over the least moment, so that within 2 sqrt(c U) of zero it librates (Chirikov 
 momentum by U / (L nu) elsewhere.
 """
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Sequence

@@ -6,8 +6,6 @@ size would remain, and change the rate of precession with it (the osculating and
 1977).
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

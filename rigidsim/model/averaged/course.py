@@ -11,8 +11,6 @@ precession, g + j l = 0, the torque across the momentum stands still for a while
 (stationary phase; Neishtadt 1975), in a direction that an average can't know: an error that is announced.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property

@@ -14,8 +14,6 @@ average carries: an error that is announced. If the frequency changes by less th
 accelerates, the angle may be captured (Neishtadt 1975; Goldreich & Peale 1966), and the average is refused.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

@@ -4,8 +4,6 @@ Besides the momentum's direction the amplitudes P and Q of ``free_motion`` are s
 direction as before, with the mean tensor of the present polhode.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any

@@ -29,12 +29,10 @@ Nothing is singular in a rotation about the third axis (Q = 0), nor for a symmet
 mean over time is one over f with the weight 1 / dn.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Self
 
 from rigidsim.scene.arithmetic import Matrix, Vector, cross, dot, negligible
 from rigidsim.scene.bodies.body import RigidBody
@@ -184,7 +182,7 @@ class Polhodes:
     root: Any
 
     @classmethod
-    def of(cls, context: Any, motion: FreeMotion) -> Polhodes:
+    def of(cls, context: Any, motion: FreeMotion) -> Self:
         """The family to which a free motion's polhode belongs."""
         first, second, third = motion.moments
         ratio = context.one

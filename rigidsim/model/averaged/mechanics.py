@@ -1,7 +1,5 @@
 """Mechanics of an averaged motion: directions of the body's axes in space, but no rotation about them."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any

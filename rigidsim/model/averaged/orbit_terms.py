@@ -30,13 +30,11 @@ precession. An orbit by a table has the same terms with its instantaneous axis, 
 goes round with its pericentre is periodic, and left out of the second order.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Protocol
+from typing import Any, Protocol, Self
 
 import heyoka as hy
 import numpy as np
@@ -99,7 +97,7 @@ class Ellipse:
     circular: bool
 
     @classmethod
-    def of(cls, context: Any, orbit: KeplerOrbit) -> Ellipse:
+    def of(cls, context: Any, orbit: KeplerOrbit) -> Self:
         """The ellipse of an orbit with constant elements (mpf, rad/s)."""
         e = orbit.eccentricity
         return cls(e, e * e, context.sqrt(1 - e * e), orbit.mean_motion, orbit.circular)

@@ -20,13 +20,11 @@ body, and for a nearly spherical one, whose free wobble is as slow, bend c away 
 obliquity. ``anomaly_sums`` has what this mean leaves out to second order.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
@@ -117,7 +115,7 @@ class Resonance:
         zero, plus, minus = (abs(float(x)) for x in self.coefficients)
         return math.sqrt(4 * float(self.strength) * max(zero, plus, minus) / float(self.motion.moments[2]))
 
-    def among(self, sources: Sequence[Source]) -> Resonance:
+    def among(self, sources: Sequence[Source]) -> Self:
         """The same resonance with the same one of these sources."""
         (source,) = (x for x in sources if x.number == self.source.number)
         return replace(self, source=source)

@@ -9,8 +9,6 @@ N is the torque's mean in the body; Q is that of second order, which acts on the
 L_0 G x s, the average over rotation and orbits of all other sources.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any

@@ -2,12 +2,10 @@
 masses beside the body.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
@@ -43,7 +41,7 @@ class Source:
     passing_rate: float | None = None  # of a point mass: angular rate at the closest approach, rad/s
 
     @classmethod
-    def at_start(cls, context: Any, number: int, source: GradientSource) -> Source:
+    def at_start(cls, context: Any, number: int, source: GradientSource) -> Self:
         """The source as it moves at the start."""
         given = number, source, 3 * source.gravitational_parameter / source.distance(context) ** 3
         if (pair := source.pair) is not None:

@@ -9,8 +9,6 @@ are sums of harmonics c_ij exp i (i g t + j l t). A source's (a/r)^3 r r^T is on
 is in double precision: it decides whether an average applies, and gives small corrections.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from functools import cached_property

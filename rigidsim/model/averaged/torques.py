@@ -9,12 +9,10 @@ closed means, of whose matrix the products about two axes vanish:
 with the coefficients d about the principal axes. Any other is summed over nodes of f.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, Self
 
 import heyoka as hy
 import numpy as np
@@ -61,7 +59,7 @@ class DrivingTorques:
     @classmethod
     def of(
         cls, scene: Scene, scaling: Scaling, numbers: ScaledNumbers, polhodes: Polhodes, loads: Sequence[Load]
-    ) -> DrivingTorques:
+    ) -> Self:
         """The torques of these loads."""
         context, others = scene.context, []
         damping = [context.zero] * 3

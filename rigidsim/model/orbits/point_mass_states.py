@@ -6,8 +6,6 @@ in the units of length and speed of the scene's flight. Where the coupling is fu
 as well: what a load makes of the body's velocity is taken off theirs in proportion to the masses.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any

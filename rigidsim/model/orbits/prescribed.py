@@ -23,8 +23,6 @@ the elements alone, and what is added back to one the mean longitude, which ente
 from its start in a unit of which the whole table has less than one.
 """
 
-from __future__ import annotations
-
 import math
 from bisect import bisect_right
 from collections.abc import Mapping, Sequence

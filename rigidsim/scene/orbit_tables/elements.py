@@ -8,8 +8,6 @@
 A column without a unit is in SI (radians). Numbers keep their digits, as everywhere in a config.
 """
 
-from __future__ import annotations
-
 import csv
 import re
 from collections.abc import Mapping, Sequence

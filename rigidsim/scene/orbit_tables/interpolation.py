@@ -9,8 +9,6 @@ Errors are measured by leaving out and interpolating every other row; for the el
 ``rigidsim.scene.orbit_tables.pieces``.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass

@@ -11,8 +11,6 @@ rows all are interpolated (``rigidsim.scene.orbit_tables.interpolation``). Witho
 the mean longitude advances at the rate of Kepler's third law, or of ``period``.
 """
 
-from __future__ import annotations
-
 from bisect import bisect_right
 from collections.abc import Callable, Mapping
 from functools import cached_property

@@ -1,11 +1,10 @@
 """A sweep: the members of ``[sweep]``, each a single experiment identified by its exact values."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from dataclasses import replace as exchanged
+from typing import Self
 
 from rigidsim.errors import ConfigError, MemberError, Problem, either
 from rigidsim.scene.choices import AUTO, FULL
@@ -35,7 +34,7 @@ class Sweep:
     added: str = ""  # name of what members record only for indicators, if anything
 
     @classmethod
-    def of(cls, experiment: Experiment) -> Sweep:
+    def of(cls, experiment: Experiment) -> Self:
         """The sweep of a config.
 
         Raises:

@@ -4,8 +4,6 @@ Random values depend on seed, key, index and component alone: an axis that is pr
 it had, and any process can draw any of them.
 """
 
-from __future__ import annotations
-
 import hashlib
 import math
 import re

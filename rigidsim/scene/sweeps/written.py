@@ -4,13 +4,11 @@ A value is the same number whatever else the axis holds, so that its values iden
 is prolonged keeps those that it had.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any
+from typing import Any, Self
 
 import mpmath
 
@@ -29,7 +27,7 @@ class Written:
     unit: str = ""
 
     @classmethod
-    def of(cls, value: Any) -> Written:
+    def of(cls, value: Any) -> Self:
         """Read a TOML value as a number; ValueError if it is none."""
         return cls(*in_its_unit(value))
 

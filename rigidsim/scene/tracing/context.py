@@ -1,7 +1,5 @@
 """Arithmetic of a scene that is worked out for all members of a sweep at once (see ``numbers``)."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from functools import reduce
 from typing import Any

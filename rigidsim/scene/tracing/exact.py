@@ -1,7 +1,5 @@
 """Swept numbers as written in a config, and in expressions (see ``numbers``)."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from fractions import Fraction
 from typing import Any

@@ -7,8 +7,6 @@ the representative does have its equations, and their coefficients follow from t
 are traced again.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from fractions import Fraction
@@ -49,7 +47,7 @@ class Graph:
     guards: dict[Guard, None] = field(default_factory=dict)
     _known: dict[Any, int] = field(default_factory=dict)
 
-    def made(self, operation: str, arguments: tuple[Any, ...], value: Any) -> Traced:
+    def made(self, operation: str, arguments: tuple[Any, ...], value: Any) -> "Traced":
         """The number of a node, new or known."""
         key = (operation, tuple(a._mpf_ if hasattr(a, "_mpf_") else a for a in arguments))
         if key not in self._known:
