@@ -75,7 +75,10 @@ def inline(value: Any, where: str = "value", depth: int = 0) -> str:
     if isinstance(plain, int):
         return str(plain)
     if isinstance(plain, Decimal):
-        return _number(plain, where)
+        if not plain.is_finite():
+            raise ConfigError(Problem(where, f"given {plain}; finite numbers are allowed"))
+        text = str(plain).lower().replace("e+", "e")
+        return text if "." in text or "e" in text else f"{text}.0"
     if isinstance(plain, Mapping):
         inner = (
             f"{tomlkit.string(_key(k)).as_string()} = {inline(v, f'{where}.{k}', depth + 1)}"
@@ -101,7 +104,11 @@ def _plain(value: Any) -> Any:
         return f"{value.numerator}/{value.denominator}" if value.denominator != 1 else value.numerator
     if hasattr(value, "_mpf_"):
         _, mantissa, exponent, _ = value._mpf_
-        return _terminating(fraction_of(value)) if mantissa or not exponent else value  # infinities have none
+        if exponent and not mantissa:  # infinite, or not a number
+            return value
+        exact = fraction_of(value)
+        power = exact.denominator.bit_length() - 1  # of two
+        return Decimal(f"{exact.numerator * 5**power}e{-power}")
     if isinstance(value, numbers.Integral):
         return int(value)
     if isinstance(value, numbers.Real) or kind == "f":
@@ -117,19 +124,6 @@ def _shortest(value: Any) -> str:
     """The shortest decimal that denotes a number, without numpy's wrapping."""
     text = str(value)
     return text[text.find("(") + 1 : text.find(")")].strip("'") if "(" in text else text
-
-
-def _terminating(value: Fraction) -> Decimal:
-    """A fraction with a power of two as denominator, exactly."""
-    power = value.denominator.bit_length() - 1
-    return Decimal(f"{value.numerator * 5**power}e{-power}")
-
-
-def _number(value: Decimal, where: str) -> str:
-    if not value.is_finite():
-        raise ConfigError(Problem(where, f"given {value}; finite numbers are allowed"))
-    text = str(value).lower().replace("e+", "e")
-    return text if "." in text or "e" in text else f"{text}.0"
 
 
 def _key(key: Any) -> str:

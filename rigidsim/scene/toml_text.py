@@ -122,14 +122,21 @@ def written(text: str, overrides: Sequence[str], meant: dict[str, Any], source: 
 
 def _apply(table: dict[str, Any], assignment: str, where: str, read: Callable[[str], Any]) -> None:
     key, value_text = _parts(assignment, where)
-    if not value_text:
-        _remove(table, key, where)
-        return
+    target, last = _found(table, key, where, new=bool(value_text))
     try:
         value = read(value_text)
     except (ValueError, RecursionError):
         value = value_text
-    _assign(table, key, value, where)
+    try:
+        if not value_text:
+            del target[last]
+        elif isinstance(target, list) == isinstance(last, str):
+            raise TypeError
+        else:
+            target[last] = value
+    except (TypeError, LookupError):
+        purpose = "set" if value_text else "remove"
+        raise ConfigError(Problem(where, _nothing(target, last, purpose))) from None
 
 
 def _plain_value(text: str) -> Any:
@@ -180,24 +187,6 @@ def key_steps(key: str, where: str) -> list[str | int]:
         if not match[5]:
             return steps
         begin = match.end()
-
-
-def _assign(table: dict[str, Any], key: str, value: Any, where: str) -> None:
-    target, last = _found(table, key, where, new=True)
-    try:
-        if isinstance(target, list) == isinstance(last, str):
-            raise TypeError
-        target[last] = value
-    except (TypeError, IndexError):
-        raise ConfigError(Problem(where, _nothing(target, last))) from None
-
-
-def _remove(table: dict[str, Any], key: str, where: str) -> None:
-    target, last = _found(table, key, where, new=False)
-    try:
-        del target[last]
-    except (TypeError, LookupError):
-        raise ConfigError(Problem(where, _nothing(target, last, "remove"))) from None
 
 
 def _found(table: dict[str, Any], key: str, where: str, *, new: bool) -> tuple[Any, str | int]:

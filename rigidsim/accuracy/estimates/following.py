@@ -277,7 +277,7 @@ def _most_folds(course: Course) -> float:
     """
     scene, context = course.prepared.scene, course.prepared.scene.context
     sources = sources_of(scene, course.prepared.system.plan.loads)
-    orbit = sources[0].orbit if len(sources) == 1 else None
+    orbit = sources[0].of.orbit if len(sources) == 1 else None
     if not all(source.has_elements for source in sources) or (orbit is not None and orbit.node_rate == 0):
         return 0.0
     momentum = float(norm(context, apply(scene.body.inertia, scene.angular_velocity)))

@@ -140,8 +140,8 @@ def refuse_frequencies(
 
 def told_of_resonances(sources: Sequence[Source]) -> str:
     """How resonances with point masses were looked for; empty without point masses."""
-    bound = [source.pair.name for source in sources if source.pair and source.motion > 0]
-    passing = [source.pair.name for source in sources if source.pair and source.motion == 0]
+    masses = [(source.of.pair.name, source.motion > 0) for source in sources if source.of.pair]
+    bound, passing = ([name for name, holds in masses if holds is held] for held in (True, False))
     told = []
     if bound:
         told.append(f"with the osculating orbits of the start for {', '.join(bound)}")
@@ -238,7 +238,7 @@ def _offered(scene: Scene, spectrum: BodySpectrum, source: Source) -> Resonance 
     motion = spectrum.motion
     least, middle, most = motion.moments
     axial = least < middle < most and motion.tilt(scene.context) <= AXIAL
-    if source.orbit is None or not axial:
+    if source.of.orbit is None or not axial:
         return None
     multiple = round(2 * float(motion.momentum / most) / source.motion)
     return Resonance(motion, source, multiple, scene.context) if multiple > 0 else None

@@ -155,42 +155,24 @@ def average_of(
     except Separatrix:
         what = "the body turns about its intermediate axis, where its wobble takes forever and nothing "
         raise refused(table.level, what + "averages") from None
-    start = unit(context, vector)
-    found = Average(
-        table.level,
-        table.short_period,
-        motion,
-        sources,
-        start,
-        dot(momentum, scene.angular_velocity) / 2,
-        sum(swing_of(spectrum, source) for source in sources),
-        _figure(scene, motion),
-    )
+    start, energy = unit(context, vector), dot(momentum, scene.angular_velocity) / 2
+    swing, figure = sum(swing_of(spectrum, source) for source in sources), _figure(scene, motion)
+    found = Average(table.level, table.short_period, motion, sources, start, energy, swing, figure)
     if found.over_orbits:
         return replace(found, start=_mean_over_orbits(scene, found))
     return found
 
 
 def _resonant(scene: Scene, resonance: Resonance, sources: Sequence[Source]) -> Average:
-    context, table, motion = scene.context, scene.config.model, resonance.motion
+    context, level, motion = scene.context, scene.config.model.level, resonance.motion
     slow = resonance.start(scene)
     momentum = resonance.whole(slow)
     motion = replace(motion, momentum=norm(context, momentum))
     resonance = replace(resonance, motion=motion)
-    start = apply(attitude.rotation_matrix(slow.quaternion), momentum)
+    start = unit(context, apply(attitude.rotation_matrix(slow.quaternion), momentum))
     energy = sum(x * x / i for x, i in zip(momentum, motion.moments, strict=True)) / 2
-    return Average(
-        table.level,
-        False,
-        motion,
-        sources,
-        unit(context, start),
-        energy,
-        0.0,
-        _figure(scene, motion),
-        resonance,
-        slow,
-    )
+    figure = _figure(scene, motion)
+    return Average(level, False, motion, sources, start, energy, 0.0, figure, resonance, slow)
 
 
 def _driven(
@@ -203,24 +185,16 @@ def _driven(
     along: Average | None,
 ) -> Average:
     """The average under torques of the body alone as well."""
-    context, table = scene.context, scene.config.model
+    context, level = scene.context, scene.config.model.level
     epsilon = 2.0 ** (1 - working_bits(scene.config.integrator.precision))
     driven = driven_by(scene, scaling, alone, epsilon)
     driven = passing(scene, driven, sources) if along is None else driven
     start = [x - context.mpf(float(y)) for x, y in zip(direction, driven.direction, strict=True)]
     motion = driven.motion(driven.axial, driven.transverse)
-    steady = driven.course.tilt <= AXIAL
-    return Average(
-        table.level,
-        False,
-        motion,
-        sources,
-        unit(context, start),
-        driven.polhodes.energy(driven.axial, driven.transverse),
-        sum((swing_of(spectrum, source) for source in sources), driven.course.swing),
-        _figure(scene, motion) if steady else 0,
-        driven=driven,
-    )
+    energy = driven.polhodes.energy(driven.axial, driven.transverse)
+    swing = sum((swing_of(spectrum, source) for source in sources), driven.course.swing)
+    figure, start = _figure(scene, motion) if driven.course.tilt <= AXIAL else 0, unit(context, start)
+    return Average(level, False, motion, sources, start, energy, swing, figure, driven=driven)
 
 
 def _figure(scene: Scene, motion: FreeMotion) -> int:

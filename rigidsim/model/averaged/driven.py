@@ -94,16 +94,13 @@ class Driven:
         sines = mean_square_sine(wave.parameter, math.sqrt, means_needed(wave.parameter, 2.0**-60))
         share = (transverse / size) ** 2
         squares = [ratio * share * (1 - sines), share * sines]
-        return FreeMotion(
-            math.ldexp(size, scaling.momentum),
-            [float(x) for x in polhodes.moments],
-            polhodes.axes,
-            wave.parameter,
-            [*squares, 1 - sum(squares)],
-            [abs(x) / size for x in (root * transverse, transverse, axial)],
-            math.ldexp(wave.precession, -scaling.time),
-            0.0 if polhodes.symmetric else math.ldexp(abs(wave.wobble), -scaling.time),
-        )
+        squares.append(1 - sum(squares))
+        moments = [float(x) for x in polhodes.moments]
+        amplitudes = [abs(x) / size for x in (root * transverse, transverse, axial)]
+        wobble = 0.0 if polhodes.symmetric else abs(wave.wobble)
+        rates = (math.ldexp(x, -scaling.time) for x in (wave.precession, wobble))
+        size = math.ldexp(size, scaling.momentum)
+        return FreeMotion(size, moments, polhodes.axes, wave.parameter, squares, amplitudes, *rates)
 
     def detuned(self, motion: FreeMotion, size: float, shape: float) -> float:
         """Change of ``FreeMotion.excess`` over the momentum (s), to which precession is in proportion, by

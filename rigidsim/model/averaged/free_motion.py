@@ -96,9 +96,12 @@ def free_motion(context: Any, body: RigidBody, momentum: Vector, size: Any = Non
         axes = [[-x for x in axes[0]], axes[1], [-x for x in axes[2]]]
     parts = [dot(axis, momentum) / length for axis in axes]
     size = length if size is None else size
-    if symmetric:
-        return _symmetric(context, moments, axes, parts, size)
     first, second, third = moments
+    if symmetric:
+        across = context.sqrt(parts[0] ** 2 + parts[1] ** 2)
+        squares, amplitudes = [across**2 / 2, across**2 / 2, parts[2] ** 2], [across, across, parts[2]]
+        moments, zero = [first, first, third], context.zero
+        return FreeMotion(size, moments, axes, zero, squares, amplitudes, size / first, zero)
     # (L^2 - 2 E I) / L^2 for the moments of the third and the first axis
     of_third = sum(x * x * (1 - third / i) for x, i in zip(parts[:2], moments[:2], strict=True))
     of_first = sum(x * x * (1 - first / i) for x, i in zip(parts[1:], moments[1:], strict=True))
@@ -116,16 +119,9 @@ def free_motion(context: Any, body: RigidBody, momentum: Vector, size: Any = Non
     pace = size * context.sqrt(abs(of_first * (third - second) / (first * second * third)))
     n = third * (second - first) / (first * (second - third))
     turning = context.ellippi(n, parameter) / complete
-    return FreeMotion(
-        size,
-        moments,
-        axes,
-        parameter,
-        squares,
-        amplitudes,
-        size / third + size * (1 / first - 1 / third) * turning,
-        context.pi * pace / (2 * complete),
-    )
+    precession = size / third + size * (1 / first - 1 / third) * turning
+    wobble = context.pi * pace / (2 * complete)
+    return FreeMotion(size, moments, axes, parameter, squares, amplitudes, precession, wobble)
 
 
 def _ordered(context: Any, body: RigidBody, momentum: Vector, length: Any) -> tuple[Vector, Matrix, bool]:
@@ -151,21 +147,6 @@ def _ordered(context: Any, body: RigidBody, momentum: Vector, length: Any) -> tu
     if dot(cross(chosen[0], chosen[1]), chosen[2]) < 0:
         chosen[0] = [-x for x in chosen[0]]
     return [moments[i] for i in picked], chosen, symmetric
-
-
-def _symmetric(context: Any, moments: Vector, axes: Matrix, parts: Vector, size: Any) -> FreeMotion:
-    across = context.sqrt(parts[0] ** 2 + parts[1] ** 2)
-    half = across**2 / 2
-    return FreeMotion(
-        size,
-        [moments[0], moments[0], moments[2]],
-        axes,
-        context.zero,
-        [half, half, parts[2] ** 2],
-        [across, across, parts[2]],
-        size / moments[0],
-        context.zero,
-    )
 
 
 _MEANS = 40  # arithmetic-geometric means; each squares what is left

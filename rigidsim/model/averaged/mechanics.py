@@ -123,20 +123,12 @@ class AveragedMechanics(Mechanics):
     @cached_property
     def _by_table(self) -> dict[TabulatedOrbit, TableTerms]:
         """For each table, its contribution to an average over orbits."""
-        return {
-            table: TableTerms(
-                element_states(table, place, self.scaling.time, self.scene.start, self.number), self.number
-            )
-            for table, place in self.tables.items()
-        }
+        given, number = (self.scaling.time, self.scene.start, self.number), self.number
+        return {x: TableTerms(element_states(x, at, *given), number) for x, at in self.tables.items()}
 
     def table(self, orbit: TabulatedOrbit) -> OrbitStates:
         """Averaged over the orbit it has no direction unless the mean longitude is carried."""
         return self._by_table[orbit].seen if self.of.over_orbits else super().table(orbit)
-
-    def table_block(self, table: TabulatedOrbit) -> StateBlock:
-        """The states of a tabulated orbit."""
-        return self.table(table).block
 
     # --- equations ------------------------------------------------------------------------------------------
 
@@ -166,11 +158,11 @@ class AveragedMechanics(Mechanics):
     def _secular(self, source: Source) -> list[Symbolic]:
         """Secular pull -(k/2) (1 - e^2)^(-3/2) (n . s) n to second order; the pull of a source at rest."""
         context, s = self.scene.context, self.direction
-        if source.table is not None:
-            return self._by_table[source.table].secular(self.of.rate(source) * self.unit, s)
-        if source.orbit is None:
+        if source.of.table is not None:
+            return self._by_table[source.of.table].secular(self.of.rate(source) * self.unit, s)
+        if source.of.orbit is None:
             return self._pull_of(source, s)
-        normal = self.orbit(source.orbit).normal
+        normal = self.orbit(source.of.orbit).normal
         size = source.secular_strength(context) * self.of.motion.excess / self.of.motion.momentum
         factor = as_factor(self.number(-size * self.unit)) * dot(normal, s)
         second = self._second_order(source, normal)
@@ -178,7 +170,7 @@ class AveragedMechanics(Mechanics):
 
     def _second_order(self, source: Source, normal: list[Symbolic]) -> list[Symbolic]:
         """Second-order term grad K of ``rigidsim.model.averaged.orbit_terms``."""
-        orbit, s = source.orbit, self.direction
+        orbit, s = source.of.orbit, self.direction
         assert orbit is not None
         context = self.scene.context
         steady, across = second_order(float(orbit.eccentricity))
@@ -200,11 +192,11 @@ class AveragedMechanics(Mechanics):
         return total([self._pull_of(source, s) for source in self.of.sources])
 
     def _pull_of(self, source: Source, s: list[Symbolic]) -> list[Symbolic]:
-        orbit = source.orbit
+        orbit = source.of.orbit
         if orbit is not None:
             return self._pull_in_plane(source, orbit, s)
-        if source.pair is not None:
-            return self._pull_of_mass(source, source.pair, s)
+        if source.of.pair is not None:
+            return self._pull_of_mass(source, source.of.pair, s)
         direction, inverse = source.of.seen(self)
         factor = self._strength(source) * dot(direction, s)
         if inverse is not None:
@@ -240,13 +232,6 @@ class AveragedMechanics(Mechanics):
         factor = size * (dot(place, s) * (inverse * inverse * inverse * (inverse * inverse)))
         return [factor * x for x in place]
 
-    def _offset(self, s: list[Symbolic], turning: list[Symbolic]) -> list[Symbolic]:
-        """Offset of the circled axis from the momentum, rad; ``turning`` is s' per internal unit of time."""
-        context = self.scene.context
-        moment = self.of.motion.transverse / self.of.motion.momentum
-        factor = as_factor(self.number(context.ldexp(-moment, -self.scaling.time)))
-        return [factor * x for x in cross(s, turning)]
-
     # --- what is recorded -----------------------------------------------------------------------------------
 
     @cached_property
@@ -265,8 +250,11 @@ class AveragedMechanics(Mechanics):
                     momentum = [x + y for x, y in zip(momentum, more, strict=True)]
         if not sign:
             return momentum, lost, momentum
-        away = self._offset(momentum, cross(self._pull(momentum), momentum))
-        motion = self.of.motion
+        # the circled axis is offset from the momentum by -a s x s', as above
+        context, motion = self.scene.context, self.of.motion
+        offset = context.ldexp(-(motion.transverse / motion.momentum), -self.scaling.time)
+        factor = as_factor(self.number(offset))
+        away = [factor * x for x in cross(momentum, cross(self._pull(momentum), momentum))]
         ratio = self.number(1 - motion.moments[2] / motion.transverse)
         figure = [float(sign) * (x + d) for x, d in zip(momentum, away, strict=True)]
         spin = [x + ratio * d for x, d in zip(momentum, away, strict=True)]
@@ -275,12 +263,12 @@ class AveragedMechanics(Mechanics):
     def _nutation(self, source: Source, s: list[Symbolic]) -> list[Symbolic]:
         """Nutation with the period of a source's orbit, rad."""
         context, rate = self.scene.context, self.of.rate(source)
-        if source.table is not None:
-            return self._by_table[source.table].nutation(rate * self.unit, s)
-        assert source.orbit is not None
-        ellipse = Ellipse.of(context, source.orbit)
+        if source.of.table is not None:
+            return self._by_table[source.of.table].nutation(rate * self.unit, s)
+        assert source.of.orbit is not None
+        ellipse = Ellipse.of(context, source.of.orbit)
         size = self.number(rate / (2 * ellipse.motion * ellipse.root**3))
-        return nutation(hy, ellipse, self._place(source.orbit), size, s, self.number)
+        return nutation(hy, ellipse, self._place(source.of.orbit), size, s, self.number)
 
     @cached_property
     def momentum_size(self) -> Any:

@@ -59,8 +59,8 @@ class Resonance:
     @property
     def orbit(self) -> KeplerOrbit:
         """The source's orbit."""
-        assert self.source.orbit is not None
-        return self.source.orbit
+        assert self.source.of.orbit is not None
+        return self.source.of.orbit
 
     @property
     def name(self) -> str:

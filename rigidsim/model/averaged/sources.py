@@ -14,10 +14,8 @@ from rigidsim.model.averaged.spectrum import orbit_harmonics
 from rigidsim.model.capabilities import gradient_source_of
 from rigidsim.model.gradient import GradientSource
 from rigidsim.model.load import Load
-from rigidsim.model.orbits.point_mass_states import PointMassPair
 from rigidsim.scene.arithmetic import Vector, eccentric_anomaly, norm
-from rigidsim.scene.orbit_tables.pieces import AXIS, TabulatedOrbit
-from rigidsim.scene.orbits import KeplerOrbit
+from rigidsim.scene.orbit_tables.pieces import AXIS
 from rigidsim.scene.scene import Scene
 
 _DAY = 86400.0
@@ -68,29 +66,18 @@ class Source:
         return cls(*given, abs(float(orbit.mean_motion)), e, (1 - e) ** -3, slow)
 
     @property
-    def orbit(self) -> KeplerOrbit | None:
-        """Kepler orbit on which the source moves, or None."""
-        return self.of.orbit
-
-    @property
-    def table(self) -> TabulatedOrbit | None:
-        """Table that gives the source's orbit, or None."""
-        return self.of.table
-
-    @property
-    def pair(self) -> PointMassPair | None:
-        """Point mass that the source is, and the one that the body is, or None."""
-        return self.of.pair
-
-    @property
     def name(self) -> str:
         """What messages call it."""
-        return f"number {self.number}" if self.pair is None else f'number {self.number} ("{self.pair.name}")'
+        return (
+            f"number {self.number}"
+            if self.of.pair is None
+            else f'number {self.number} ("{self.of.pair.name}")'
+        )
 
     @property
     def has_elements(self) -> bool:
         """Whether the source has an orbit to average over."""
-        return self.orbit is not None or self.table is not None
+        return self.of.orbit is not None or self.of.table is not None
 
     @property
     def harmonics(self) -> np.ndarray:
@@ -99,46 +86,46 @@ class Source:
 
     def strength_at(self, context: Any, time: Any) -> Any:
         """3 G M / a^3 (mpf, 1/s^2) at a time."""
-        if self.table is None:
+        if self.of.table is None:
             return self.strength
-        axis = self.table.at(time)[AXIS] / self.table.semi_major_axis
+        axis = self.of.table.at(time)[AXIS] / self.of.table.semi_major_axis
         return self.strength if axis == 1 else self.strength / axis**3
 
     def ellipse(self, context: Any, time: Any) -> Ellipse:
         """Shape and mean motion of the source's orbit at a time, numbers (mpf)."""
-        if self.table is not None:
-            found = self.table.at(time)
+        if self.of.table is not None:
+            found = self.of.table.at(time)
             square = found["k"] ** 2 + found["h"] ** 2
             root = context.sqrt(1 - square)
-            return Ellipse(context.sqrt(square), square, root, self.table.motion(found[AXIS]), False)
-        assert self.orbit is not None
-        return Ellipse.of(context, self.orbit)
+            return Ellipse(context.sqrt(square), square, root, self.of.table.motion(found[AXIS]), False)
+        assert self.of.orbit is not None
+        return Ellipse.of(context, self.of.orbit)
 
     def secular_strength(self, context: Any) -> Any:
         """3 G M / (2 a^3) (1 - e^2)^(-3/2) (mpf, 1/s^2) of an orbit, the largest in a table."""
-        if self.table is not None:
-            rest = 1 - self.table.largest_eccentricity**2
-            size = self.strength * (self.table.semi_major_axis / self.table.smallest_axis) ** 3
+        if self.of.table is not None:
+            rest = 1 - self.of.table.largest_eccentricity**2
+            size = self.strength * (self.of.table.semi_major_axis / self.of.table.smallest_axis) ** 3
             return size / (2 * rest * context.sqrt(rest))
-        assert self.orbit is not None
-        return self.strength * Ellipse.of(context, self.orbit).secular_factor
+        assert self.of.orbit is not None
+        return self.strength * Ellipse.of(context, self.of.orbit).secular_factor
 
     def normal(self, context: Any, time: Any) -> Vector:
         """Unit normal of the orbit's plane, space axes; at time zero if the node moves uniformly."""
-        if self.table is not None:
-            return self.table.normal(time)
-        assert self.orbit is not None
-        return self.orbit.normal(context)
+        if self.of.table is not None:
+            return self.of.table.normal(time)
+        assert self.of.orbit is not None
+        return self.of.orbit.normal(context)
 
     def place(self, context: Any, time: Any) -> OrbitPlace:
         """Position on the orbit at a time, numbers (mpf)."""
-        if self.table is not None:
-            found = self.table.at(time)
-            ellipse, longitude = self.ellipse(context, time), self.table.starting_longitude(time)
+        if self.of.table is not None:
+            found = self.of.table.at(time)
+            ellipse, longitude = self.ellipse(context, time), self.of.table.starting_longitude(time)
             periapsis = context.atan2(found["h"], found["k"])
             anomaly = eccentric_anomaly(context, longitude - periapsis, ellipse.eccentricity)
             return place_by_elements(context, found, anomaly, periapsis)
-        orbit = self.orbit
+        orbit = self.of.orbit
         assert orbit is not None
         anomaly = orbit.eccentric_anomaly(context, time)
         angles = (
@@ -151,7 +138,7 @@ class Source:
 
     def pull(self, context: Any, time: Any) -> np.ndarray | None:
         """(a/r)^3 r r^T, (3, 3), at a time (a point mass: at the start); None for an ephemeris."""
-        place = self.of.position if self.pair is None else self.pair.place
+        place = self.of.position if self.of.pair is None else self.of.pair.place
         if place is not None:
             length = norm(context, place)
             direction = np.array([float(x / length) for x in place])

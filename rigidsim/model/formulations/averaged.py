@@ -122,7 +122,7 @@ class Averaged(Formulation):
         for orbit in plan.tables:
             what = "elements of" if average.over_orbits else "where"
             which = "the source's orbit" if average.over_orbits else "the source is"
-            block = m.table_block(orbit)
+            block = m.table(orbit).block
             blocks.append(replace(block, why=f'gravity_gradient: {what} {which}, by "{orbit.name}"'))
         return m, blocks
 

@@ -21,17 +21,10 @@ from rigidsim.scene.exact import parse_number
 from rigidsim.scene.validation_messages import nearest, shown
 
 TIME = "time"
-UNITS = {
-    TIME: "s",
-    "semi_major_axis": "m",
-    "eccentricity": "1",
-    "inclination": "rad",
-    "ascending_node": "rad",
-    "periapsis": "rad",
-    "longitude_of_periapsis": "rad",
-    "mean_anomaly": "rad",
-    "mean_longitude": "rad",
-}
+_ANGLES = (
+    "inclination", "ascending_node", "periapsis", "longitude_of_periapsis", "mean_anomaly", "mean_longitude"
+)  # fmt: skip
+UNITS = {TIME: "s", "semi_major_axis": "m", "eccentricity": "1"} | dict.fromkeys(_ANGLES, "rad")
 """Columns that a table may have, with the SI units into which they are read."""
 FEWEST_ROWS = 8
 """Least number of rows, so that every other row still suffices for a check of the interpolation."""

@@ -22,8 +22,6 @@ AXIS, LONGITUDE = "axis", "longitude"
 EXCENTRIC, TILTED = ("k", "h"), ("q", "p")
 _LARGEST_ERROR = 0.1  # rad, of the direction when every other row is left out
 NEAREST = 7
-ORDER = 6
-"""Order of convergence in the rows' spacing."""
 
 
 class Interpolation:
@@ -35,11 +33,6 @@ class Interpolation:
         self._count = min(NEAREST, len(times))
         self._derivatives: dict[int, tuple[np.ndarray, np.ndarray]] = {}
         self._weights: dict[tuple[Any, ...], tuple[np.ndarray, np.ndarray]] = {}
-
-    @property
-    def pieces(self) -> int:
-        """Number of pieces."""
-        return len(self.times) - 1
 
     def piece(self, number: int) -> np.ndarray:
         """Coefficients (6, columns) of the powers of (t - t_i) / (t_{i+1} - t_i)."""
@@ -86,7 +79,7 @@ class Interpolation:
 def left_out(times: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Every other row's number, and values (rows, columns) interpolated there from the others, in float64."""
     kept = Interpolation(list(times[::2]), values[::2])
-    rows = np.arange(1, 2 * kept.pieces, 2)
+    rows = np.arange(1, 2 * len(kept.times) - 2, 2)
     found = []
     for row in rows:
         part = kept.piece(int(row) // 2)
@@ -103,7 +96,7 @@ class InterpolationError:
 
     direction: float
     distance: float
-    expected: float = 2.0**-ORDER
+    expected: float = 2.0**-6  # an error of the sixth order
 
 
 def interpolation_error(

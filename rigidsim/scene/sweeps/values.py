@@ -261,14 +261,8 @@ def _scaled(radius: Written, unit: Sequence[Fraction]) -> Entry:
 
 
 def scanned(experiment: Experiment, scan: Sequence[str]) -> Experiment:
-    """An experiment with additional sweep axes.
-
-    Args:
-        scan: ``KEY=SPEC`` texts: a TOML array of values, a call such as ``linspace(from, to, count)`` (see
-            the error's text), or a TOML table as ``[sweep] axes`` has it.
-
-    Raises:
-        ConfigError: a text can't be read.
+    """An experiment with additional sweep axes, by ``KEY=SPEC`` texts: a TOML array of values, a call such as
+    ``linspace(from, to, count)``, or a TOML table as ``[sweep] axes`` has it.
     """
     settings = []
     for text in scan:

@@ -33,18 +33,14 @@ class Guard:
 class Graph:
     """Operations on the swept numbers, each once, in an order in which they can be worked out.
 
-    Attributes:
-        context: mpmath context of the scene, in which the representative is worked out.
-        nodes: (operation, arguments): "column" (its number), "constant" (an mpf), or an operation on nodes
-            of ``Traced`` or ``TracingContext``.
-        values: the representative's values, mpf.
-        guards: decisions so far, each once.
+    Nodes are (operation, arguments): "column" (its number), "constant" (an mpf), or an operation on nodes of
+    ``Traced`` or ``TracingContext``.
     """
 
-    context: Any
+    context: Any  # mpmath context of the scene, in which the representative is worked out
     nodes: list[tuple[str, tuple[Any, ...]]] = field(default_factory=list)
-    values: list[Any] = field(default_factory=list)
-    guards: dict[Guard, None] = field(default_factory=dict)
+    values: list[Any] = field(default_factory=list)  # the representative's, mpf
+    guards: dict[Guard, None] = field(default_factory=dict)  # decisions so far, each once
     _known: dict[Any, int] = field(default_factory=dict)
 
     def made(self, operation: str, arguments: tuple[Any, ...], value: Any) -> "Traced":
