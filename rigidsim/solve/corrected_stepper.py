@@ -52,13 +52,8 @@ _NEAR = 3
 
 
 class CorrectedStepper:
-    """Takes steps and applies effects when they are due.
-
-    Attributes:
-        whole_times: whether time is a single number at each stride's start.
-
-    Args:
-        stride: largest number of natural steps between corrections; affects results within rounding.
+    """Takes steps and applies effects when they are due, at most ``stride`` natural steps apart (which
+    affects results within rounding). With ``whole_times`` time is a single number at each stride's start.
     """
 
     def __init__(self, stepper: Stepper, effects: Sequence[Effect], *, stride: int = STRIDE) -> None:

@@ -25,16 +25,11 @@ def correction(
 ) -> tuple[list[Symbolic], list[Symbolic]]:
     """What a correction is worked out from, and what comes of it.
 
-    Args:
-        states: n of them, the variables.
-        residuals: (value - initial) / scale of each of the m projected scalars.
-        lacking: of each state's derivative (``lacking_rates``); empty where nothing is.
-
-    Returns:
-        The inputs: states, the time since the latest correction, one over the interval that the next is
-        expected within, and of each scalar its residual's integral until then, what was put back, and the
-        residual that was left. The outputs: what to take off the states, the integrals, what was put back,
-        and the square of the size of the part that puts invariants back.
+    Residuals are (value - initial) / scale of each projected scalar; what is lacking of each state's
+    derivative (``lacking_rates``) may be empty. The inputs: states, the time since the latest correction, one
+    over the interval that the next is expected within, and of each scalar its residual's integral until then,
+    what was put back, and the residual that was left. The outputs: what to take off the states, the
+    integrals, what was put back, and the square of the size of the part that puts invariants back.
     """
     m, x = len(residuals), list(states)
     elapsed, pace = hy.make_vars("elapsed", "pace_of_corrections")
@@ -68,9 +63,6 @@ def freedoms_of(system: System, number: Rounder) -> list[Symbolic]:
     which the same change would look smaller than one of the spin. Not at all where the state stands exactly
     where it began: it has no drift to be put back, and a rate or a direction that is exactly zero for good
     would leave it, to grow about an unstable axis.
-
-    Args:
-        number: rounds an mpf once to the precision of the correction.
     """
     units = [0] * len(system.states)
     for i in system.angle_states:

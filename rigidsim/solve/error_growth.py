@@ -40,8 +40,8 @@ class Growth:
     """Measured growth of errors.
 
     Attributes:
-        factor: largest growth of an offset in rates and attitude, over the linear growth |w| t / sqrt 3 of
-            a stable motion; 1 where it is no larger than a few times that.
+        factor: largest growth of an offset in rates and attitude, over the linear growth |w| t / sqrt 3
+            of a stable motion; 1 where it is no larger than a few times that.
     """
 
     factor: float
@@ -58,13 +58,8 @@ class Growth:
 
 
 def measure_growth(system: System, precision: Precision, start: float, end: float) -> Growth:
-    """Compare the motion with motions that leave it by a tiny offset at several times.
-
-    Errors made far from an unstable axis grow during the next passage near it, so a comparison from the
-    start alone would not do.
-
-    Args:
-        system: built for ``precision``, which should be double: stability has no precision.
+    """Compare the motion with motions that leave it by a tiny offset at several times: errors made far from
+    an unstable axis grow during the next passage near it. The precision should be double: stability has none.
     """
     apart = ("x", "y", "z", "vx", "vy", "vz", "pace")
     followed = [i for i, name in enumerate(system.states) if name not in apart]

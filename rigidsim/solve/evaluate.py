@@ -82,14 +82,9 @@ class _PartnerChart:
 
 
 class Evaluator:
-    """Evaluates a system's outputs on blocks of states.
-
-    Attributes:
-        initial: initial values of the invariants' components, in internal units.
-        code: one of the compiled functions, for provenance.
-
-    Args:
-        countable: whether the motion between sparse samples can be followed.
+    """Evaluates a system's outputs on blocks of states; ``initial`` are the initial values of the invariants'
+    components, in internal units, and ``code`` is one of the compiled functions, for provenance. Angles
+    between sparse samples are followed if that is ``countable``.
     """
 
     version: ClassVar[int] = 1

@@ -111,14 +111,11 @@ def engine_events(
     start: Scalar | None = None,
     offsets: int | None = None,
 ) -> list[hy.nt_event]:
-    """heyoka's events for a system's crossings.
+    """heyoka's events for a system's crossings; ``offsets`` is the index of the first of the parameters that
+    are added to the expressions, one each.
 
     The engine finds a zero at the very beginning of a step twice, and misses the one that follows within it.
-    So an expression that is zero at the start has far less than a rounding added.
-
-    Args:
-        start: start of the motion; None if it may begin at a zero anywhere.
-        offsets: index of the first of the parameters that are added to the expressions, one each.
+    So an expression that is zero at the start, if there is one, has far less than a rounding added.
     """
 
     def callback(index: int) -> Callable[[TaylorEngine, Scalar, int], None]:

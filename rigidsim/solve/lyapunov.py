@@ -89,14 +89,9 @@ def lyapunov_spectrum(
     go_on: Callable[[Convergence], bool],
     done: Convergence | None = None,
 ) -> LyapunovSpectrum | None:
-    """Integrate the variational equations over a run.
-
-    Args:
-        go_on: called with the progress at each orthogonalisation; False ends the integration.
-
-    Returns:
-        The spectrum; None if it was ended early, the tangent vectors stopped being finite, or steps became
-        so small that an interval takes millions.
+    """Integrate the variational equations over a run, as long as ``go_on``, called at each orthogonalisation,
+    is true; None if it was ended early, the tangent vectors stopped being finite, or steps became so small
+    that an interval takes millions.
     """
     moving = motion_states(system)
     states, count = len(system.states), len(moving)

@@ -40,14 +40,14 @@ class Precision:
     """One working precision.
 
     Attributes:
-        name: as in the config ("double", or "50 digits").
         scalar: heyoka's ``fp_type`` and the arrays' dtype.
-        cheap: whether a step costs about as much as a Python call (then blocks of steps are taken at once).
-        compact: whether the integrator is compiled in compact mode (unrolled code of the widest types takes
-            minutes to compile).
+        cheap: whether a step costs about as much as a Python call (then blocks of steps are taken at
+            once).
+        compact: whether the integrator is compiled in compact mode (unrolled code of the widest types
+            takes minutes to compile).
     """
 
-    name: str
+    name: str  # as in the config ("double", or "50 digits")
     bits: int
     scalar: Any  # a constructor, numpy's dtype and heyoka's fp_type in one
     cheap: bool

@@ -96,13 +96,8 @@ class InitialValueProblem:
 
 
 def prepare(experiment: Experiment, *, loads: Sequence[Load] = ()) -> InitialValueProblem:
-    """Work out an experiment up to its equations.
-
-    Args:
-        loads: your own loads, besides those of the config.
-
-    Raises:
-        ConfigError: with what was given, what is allowed and where.
+    """Work out an experiment, with loads of your own, up to its equations; a ConfigError says what was given,
+    what is allowed and where.
     """
     if experiment.config.sweep is not None:
         what = (
@@ -122,13 +117,8 @@ def prepare_scene(
     tolerance: float | None = None,
     along: Average | None = None,
 ) -> InitialValueProblem:
-    """Like ``prepare``, for a scene that differs from the experiment's own.
-
-    Args:
-        along: the average, already chosen, of a motion that this scene is a part of.
-
-    Raises:
-        ConfigError: with what was given, what is allowed and where.
+    """Like ``prepare``, for a scene that differs from the experiment's own; ``along`` is the average, already
+    chosen, of a motion that this scene is a part of.
     """
     loads = own_loads(loads)
     try:

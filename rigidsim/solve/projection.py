@@ -81,14 +81,8 @@ def one_higher(precision: Precision) -> Precision:
 
 
 def put_back_by_invariant(names: Sequence[str], rows: np.ndarray) -> dict[str, np.ndarray]:
-    """Corrections put back by invariant: with their sign for a scalar, the norm for several components, as
-    drifts are recorded.
-
-    Args:
-        rows: (n, projected scalars), as ``Projection.corrections``.
-
-    Returns:
-        For each invariant (n,) float64; a row's bits depend on that row alone.
+    """Corrections put back, of rows (n, projected scalars), by invariant (n,): with their sign for a scalar,
+    the norm for several components, as drifts are recorded. A row's bits depend on that row alone.
     """
     columns: dict[str, list[np.ndarray]] = {}
     for name, column in zip(names, rows.T, strict=True):

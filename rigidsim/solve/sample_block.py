@@ -29,23 +29,18 @@ class SampleBlock:
     """Consecutive samples; all columns have one row for each.
 
     Attributes:
-        first: index of the first sample.
-        times: (n,), internal units, in the run's precision.
-        states: (n, states), internal units, in the run's precision, angles wrapped.
-        turns: (n, 3) int64, full turns of the angle states; (n, 0) without angle states.
-        chart: (n,) int64, 0 in the asked Euler sequence, 1 in its partner.
-        reference: (n, 3) float64, rad: in the partner chart the asked angles shortly before each sample, from
-            which it has its turns and its branch; zeros in the asked chart, (n, 0) without angle states.
-        put_back: (n, projected scalars) float64, what was put back of each until the sample.
+        reference: (n, 3) float64, rad: in the partner chart the asked angles shortly before each sample,
+            from which it has its turns and its branch; zeros in the asked chart, (n, 0) without angle
+            states.
     """
 
-    first: int
-    times: np.ndarray
-    states: np.ndarray
-    turns: np.ndarray
-    chart: np.ndarray
+    first: int  # index of the first sample
+    times: np.ndarray  # (n,), internal units, in the run's precision
+    states: np.ndarray  # (n, states), internal units, in the run's precision, angles wrapped
+    turns: np.ndarray  # (n, 3) int64, full turns of the angle states; (n, 0) without angle states
+    chart: np.ndarray  # (n,) int64, 0 in the asked Euler sequence, 1 in its partner
     reference: np.ndarray
-    put_back: np.ndarray
+    put_back: np.ndarray  # (n, projected scalars) float64, what was put back of each until the sample
 
     @classmethod
     def of(
@@ -57,11 +52,8 @@ class SampleBlock:
         put_back: np.ndarray = _NOTHING,
         reference: np.ndarray | None = None,
     ) -> SampleBlock:
-        """Samples between which turns, chart and corrections don't change.
-
-        Args:
-            put_back: (projected scalars,), corrections for all samples; not copied.
-            reference: one row for each sample; None if it doesn't change either.
+        """Samples between which turns, chart and corrections (not copied) don't change, nor the reference
+        angles unless they are given, one row for each.
         """
         n = len(times)
         turns = np.array([angles.turns], dtype=np.int64)

@@ -165,17 +165,12 @@ class SampleBuffer:
         return self.handed % self._receiver.rows_together == 0
 
     def hand_over(self, *, patiently: bool = False) -> tuple[int, StepBoundary] | None:
-        """Hand what is collected to the receiver.
+        """Hand what is collected to the receiver; ``patiently`` only if it is much or old, and if much, just
+        the samples that make it ``whole``.
 
-        Args:
-            patiently: only if it is much or old; if much, just the samples that make it ``whole``.
-
-        Returns:
-            If the receiver wants no sample past one of them: its index and a boundary before it; the
-            others are dropped.
-
-        Raises:
-            KeyboardInterrupt: from the receiver; samples that it didn't take keep waiting.
+        If the receiver wants no sample past one of them, its index and a boundary before it are returned, and
+        the others dropped. A KeyboardInterrupt of the receiver is passed on: samples that it didn't take keep
+        waiting.
         """
         waiting, rows = self.count - self.handed, self._pacing.rows_at_once
         waited = time.perf_counter() - self._handed_at

@@ -21,14 +21,11 @@ from rigidsim.solve.precision import Precision, Scalar, precision_of
 
 
 class SampleClock:
-    """Times of the samples, block by block.
+    """Times of the samples, block by block; ``exponent`` is that of the internal unit of time.
 
     Attributes:
         start: start of the motion, a scalar of the precision; a list of times may begin later.
         part_count: number of float64 that hold a label together with its residual to the integration's time.
-
-    Args:
-        exponent: binary exponent of the internal unit of time.
 
     Raises:
         ConfigError: neighbouring samples fall on the same number of this precision.

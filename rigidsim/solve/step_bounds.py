@@ -32,14 +32,11 @@ def longest_step(order: int, number: type) -> float:
 
 
 def bound_of_sparse_series(coefficients: np.ndarray) -> float:
-    """Bound of a step from all Taylor coefficients, if it is far below that from the last two, which the
-    engine uses; infinity elsewhere.
+    """Bound of a step from all Taylor coefficients (states, order + 1) of any step from there, if it is far
+    below that from the last two, which the engine uses; infinity elsewhere.
 
     From rest under a torque that grows with time, a quaternion's series have every third term only: the last
     two are zero, and the engine would take any step at all.
-
-    Args:
-        coefficients: (states, order + 1), Taylor coefficients of any step from there.
     """
     return _bound([max(abs(float(x)) for x in column) for column in coefficients.T])
 

@@ -17,19 +17,13 @@ from rigidsim.solve.precision import Precision, Scalar
 
 @dataclass(frozen=True)
 class Mark:
-    """A natural step boundary.
+    """A natural step boundary."""
 
-    Attributes:
-        time: two numbers whose sum it is, internal units.
-        state: (states,), internal units.
-        memory: whatever else the stepper's later steps depend on, as a value that stays as it is.
-    """
-
-    time: tuple[Scalar, Scalar]
-    state: np.ndarray
+    time: tuple[Scalar, Scalar]  # two numbers whose sum it is, internal units
+    state: np.ndarray  # (states,), internal units
     events: int = 0
     steps: int = 0
-    memory: Any = None
+    memory: Any = None  # whatever else the stepper's later steps depend on, as a value that stays as it is
 
 
 class Watcher(Protocol):

@@ -127,16 +127,9 @@ class AxisNumbers:
 
 
 class Members:
-    """Members of a ``[sweep]`` as the batch engine sees them, renumbered from 0 in the order given.
-
-    Args:
-        members: all by default.
-        axes: the sweep's axes, as far as they are worked out already.
-
-    Attributes:
-        keys: dotted keys of the numbers that become parameters, such as ``initial.angular_velocity[2]``.
-        kinds: code of everything else that differs, such as a formulation or a time, (members,): members of
-            different kinds belong to different families; zeros if nothing else differs.
+    """Members of a ``[sweep]`` as the batch engine sees them, renumbered from 0 in the order given, all by
+    default. ``keys`` are those of the numbers that become parameters; ``kinds``, (members,), codes of
+    everything else that differs: members of different kinds belong to different families.
     """
 
     def __init__(

@@ -44,16 +44,14 @@ class LaneResults:
     """Results of members integrated side by side.
 
     Attributes:
-        states: (samples, states, members) at the sample times; nan from where a member ended.
         finite, arrived: whether the state stayed finite, and the last sample was reached, (members,).
-        steps: steps taken, (members,).
         found: crossings on the way, for members that have any.
     """
 
-    states: np.ndarray
+    states: np.ndarray  # (samples, states, members) at the sample times; nan from where a member ended
     finite: np.ndarray
     arrived: np.ndarray
-    steps: np.ndarray
+    steps: np.ndarray  # steps taken, (members,)
     found: dict[int, list[Found]] = field(default_factory=dict)
 
 
@@ -130,12 +128,8 @@ class BatchEngine:
         times: np.ndarray,
         most_steps: int,
     ) -> LaneResults:
-        """Integrate members to their last samples.
-
-        Args:
-            initial: (states, members); parameters likewise.
-            start: (members,), times: (samples, members), internal units.
-            most_steps: largest number of steps of a member.
+        """Integrate members to their last samples: initial (states, members), parameters likewise, start
+        (members,) and times (samples, members) in internal units, and the largest number of steps of each.
         """
         count = initial.shape[1]
         result = LaneResults(

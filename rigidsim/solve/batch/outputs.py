@@ -74,11 +74,8 @@ class BatchOutputs:
         begun: np.ndarray,
         along: np.ndarray | None = None,
     ) -> list[np.ndarray]:
-        """All outputs, each (samples, m).
-
-        Args:
-            states, times: motion (samples, states, m) and times (samples, m), internal units.
-            along: the states with tangent vectors; without them their growth is unknown.
+        """All outputs, each (samples, m), of states (samples, states, m) and times (samples, m), internal
+        units; ``along`` has tangent vectors, without which their growth is unknown.
         """
         rows, of_motion, growth = self._parts
         found = self._evaluated(of_motion, states, swept, times, begun)

@@ -71,10 +71,8 @@ def _reals(values: np.ndarray) -> Reals:
 class Replay:
     """A graph's numbers for some members; nan where an operation has no result.
 
-    Each operation is done once for the values that there are: in a product of axes members share most.
-
-    Args:
-        columns: for each column of the graph the members' swept numbers; those of one axis share their index.
+    Each operation is done once for the values that there are: in a product of axes members share most. The
+    columns of one axis share their index.
     """
 
     def __init__(self, graph: Graph, columns: Sequence[SharedReals], count: int) -> None:

@@ -18,11 +18,8 @@ _LANES = 8
 
 
 class ShadowLanes:
-    """Batch integrator of the motion alone, without its tangent vectors and events.
-
-    Args:
-        width: lanes of the batch that ran the members.
-        tolerance: tolerance of the steps; None for epsilon.
+    """Batch integrator of the motion alone, without its tangent vectors and events, as wide as the one that
+    ran the members; tolerance None is for epsilon.
     """
 
     def __init__(self, traced: TracedSystem, width: int, tolerance: float | None) -> None:
@@ -47,20 +44,14 @@ class ShadowLanes:
         return self._engine.longest(starts.states, self.read(starts), starts.begin)
 
     def at_samples(self, starts: Starts, times: np.ndarray, most: int) -> np.ndarray:
-        """States (samples, states, motions), nan from where a motion ended.
-
-        Args:
-            times: (samples, motions), internal units.
-            most: largest number of steps of each.
+        """States (samples, states, motions), nan from where a motion ended, at times (samples, motions), with
+        so many steps each at most.
         """
         return self._engine.run(starts.states, self.read(starts), starts.begin, times, most).states
 
     def onward(self, steps: int, *given: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """States (states, n) and times (n,) after so many steps, or at the ends, not finite if lost; and the
-        steps taken (n,).
-
-        Args:
-            given: states, parameters, times and ends, bounds of steps, as ``BatchEngine.onward`` has them.
+        """As ``BatchEngine.onward``: states and times after so many steps, or at the ends, not finite if
+        lost; and the steps taken (n,).
         """
         onward: Any = self._engine.onward
         found, times, taken = onward(*given, steps)

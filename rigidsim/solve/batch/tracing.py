@@ -91,11 +91,9 @@ def trace(
     numbers: Sequence[ExactNumber],
     drive: Callable[[], Drive | None] = lambda: None,
 ) -> TracedSystem:
-    """Build the system of a member with its swept numbers, by their keys, as parameters.
-
-    Args:
-        drive: estimated effect of loads of unknown size, if there are any: a power of two in the
-            units, which has to be the same whoever is the representative.
+    """Build the system of a member with its swept numbers, by their keys, as parameters. ``drive`` is the
+    estimated effect of loads of unknown size, if there are any: a power of two in the units, which has to be
+    the same whoever is the representative.
 
     Raises:
         ConfigError: the member is refused, as a single run of it would be.

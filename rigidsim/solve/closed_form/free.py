@@ -125,11 +125,10 @@ def spinning(context: Any, axes: Matrix, spin: Any) -> SymmetricFree:
 
 
 def free_motion(context: Any, moments: Vector, axes: Matrix, rates: Vector, tiny: Any) -> Motion:
-    """The free motion of a body.
+    """The free motion of a body, of which one moment may be zero (a rod's), whose axis then keeps its rate.
 
     Args:
         context: mpmath context to work in, with at least twice the digits wanted.
-        moments: principal moments; one may be zero (a rod's), whose axis then keeps its rate.
         tiny: relative size below which a difference of moments, or a component of L, is rounding.
 
     Raises:

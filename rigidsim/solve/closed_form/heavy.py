@@ -87,8 +87,8 @@ def heavy_motion(
     Args:
         context: mpmath context to work in, with twice the digits wanted (double roots lose half).
         axes: right-handed, body axes; the third from the fixed point to the centre of mass.
-        moments: across and along the axis, about the fixed point; the second may be zero, and axis 3 then
-            keeps its rate.
+        moments: across and along the axis, about the fixed point; the second may be zero (see
+            ``free_motion``).
         pull: M g l > 0, in units that agree with those of moments and rates.
         vertical: unit vector against gravity at the start, body axes.
     """

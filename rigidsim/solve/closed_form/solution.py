@@ -25,11 +25,8 @@ from rigidsim.solve.precision import Precision, Scalar
 
 
 def choose_motion(context: mpmath.MPContext, scene: Scene, scaling: Scaling) -> Motion:
-    """Closed-form rotation of a scene without loads, or with uniform gravity alone.
-
-    Args:
-        context: mpmath context to work in, with at least twice the scene's digits.
-        scaling: units of time and inertia that the motion is given in.
+    """Closed-form rotation of a scene without loads, or with uniform gravity alone, in the units of a
+    scaling; the context has at least twice the scene's digits.
 
     Raises:
         NoClosedForm: no closed form is known for the motion.
@@ -108,16 +105,9 @@ class ClosedForm:
         return self.motion.title + ("; parabola of the centre of mass" if self.scene.free_flight else "")
 
     def states(self, system: System, precision: Precision, times: np.ndarray, start: Scalar) -> np.ndarray:
-        """States of a system at given times.
-
-        Args:
-            system: a system of this scene, in the formulation "quaternion" or "rates".
-            times: (n,) in internal units, in the precision (``SampleClock.internal``).
-            start: time at which the motion begins, a scalar of the precision, internal units.
-
-        Returns:
-            (n, states), internal units, in the precision. Double and single are evaluated in arrays of
-            doubles, other precisions number by number in mpmath.
+        """States (n, states) at times (n,) in the precision, internal units, of a system of this scene in the
+        formulation "quaternion" or "rates". Double and single are evaluated in arrays of doubles, other
+        precisions number by number in mpmath.
 
         Raises:
             ValueError: the system has states that no closed form gives.

@@ -123,9 +123,7 @@ class Theta:
 
 
 def theta(lattice: Lattice, kind: int, shift: Any, *, tau_factor: int = 1) -> Theta:
-    """theta_kind(v + i shift
-    q), or if the lattice's series are hyperbolic, theta_kind(shift + i y
-    q').
+    """theta_kind(v + i shift | q), or if the lattice's series are hyperbolic, theta_kind(shift + i y | q').
 
     Args:
         shift: constant part of the argument, within half a period of the lattice.

@@ -23,11 +23,8 @@ STEPS_BETWEEN = 32
 
 
 class AngleWrapping(Effect):
-    """Counts the full turns removed from the angle states.
-
-    Args:
-        context: mpmath context with more digits than the precision.
-        unit: binary exponent of the angle states' unit, rad.
+    """Counts the full turns removed from the angle states, whose unit is 2^unit rad; the context has more
+    digits than the precision.
     """
 
     def __init__(

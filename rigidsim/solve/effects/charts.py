@@ -63,12 +63,9 @@ class Lift:
         return math.copysign(1.0, singular_factor(self._sequence, middle, math))
 
     def __call__(self, before: Sequence[float], angles: Angles) -> tuple[Angles, int, float]:
-        """The requested angles nearest to some shortly before.
-
-        Returns:
-            The requested angles; +1 or -1 within rounding of their singularity (else 0): whether the sum or
-            the difference of the outer ones is all that is known; and how far the first one swung if the
-            middle one stayed on its branch.
+        """The requested angles nearest to some shortly before; +1 or -1 within rounding of their singularity
+        (else 0): whether the sum or the difference of the outer ones is all that is known; and how far the
+        first one swung if the middle one stayed on its branch.
         """
         first, middle, last = across(self._partner, list(angles), math)
         side = pole_of_partner(self._partner, list(angles), math)
@@ -100,10 +97,7 @@ class Charts(Effect):
     """The chart that a run is in, and the changes between charts.
 
     Called by the engine after each natural step. Which chart it is, and the requested angles, are in the
-    memory of the wrapping, which comes before it.
-
-    Args:
-        whole: puts time on a single number before a change; None where it may be two.
+    memory of the wrapping, which comes before it. Before a change ``whole`` puts time on a single number.
     """
 
     def __init__(

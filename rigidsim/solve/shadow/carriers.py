@@ -270,10 +270,7 @@ class SeriesErrors:
 
     Errors are those of the series' order, a whole number, and one more term may gain nothing at all (its
     coefficient has a phase): they are looked at with the tolerance as it is. Where they don't stand out of
-    double precision's rounding, that is done with 80 bits.
-
-    Args:
-        integrator: integrator of system and tolerance in double precision; compiled if None.
+    double precision's rounding, that is done with 80 bits. Without an integrator in double one is compiled.
     """
 
     def __init__(self, system: System, tolerance: float, integrator: TaylorEngine | None = None) -> None:

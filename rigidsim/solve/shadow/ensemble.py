@@ -82,29 +82,23 @@ class Perturbations:
     """Errors that a step adds to each state, in epsilons.
 
     Attributes:
-        own: random error relative to the state's own size.
-        shared: random error relative to the largest state's size.
-        series: truncation error of the series, over its value in these states.
-        first: error at the start relative to the state's own size.
-        clock: error of the time, for loads that depend on it.
-        ahead: internal time by which the time in which such a load counts is ahead of the scene's.
-        together: most steps with the same error of the time. Over a load's period it would average out, which
-            those of single steps don't.
+        together: most steps with the same error of the time. Over a load's period it would average out,
+            which those of single steps don't.
     """
 
-    own: float = 0.4
-    shared: float = 0.0
-    series: float = 1.0
-    first: float = 0.5
-    clock: float = 0.3
-    ahead: float = 0.0
+    own: float = 0.4  # random error relative to the state's own size
+    shared: float = 0.0  # random error relative to the largest state's size
+    series: float = 1.0  # truncation error of the series, over its value in these states
+    first: float = 0.5  # error at the start relative to the state's own size
+    clock: float = 0.3  # error of the time, for loads that depend on it
+    ahead: float = 0.0  # internal time by which the time in which such a load counts is ahead of the scene's
     together: float = math.inf
 
 
 class ShadowEnsemble:
-    """Motions, and the perturbed ones beside each of them.
-
-    The random draws are the same for all motions and each time, so that results don't depend on the company.
+    """Motions, and the perturbed ones beside each of them: ``time`` is what was reached, (motions,), and
+    ``spread`` what was seen. The random draws are the same for all motions and each time, so that results
+    don't depend on the company.
 
     Args:
         perturbations: errors of a step, in units of ``epsilon``.
@@ -112,9 +106,6 @@ class ShadowEnsemble:
         series: truncation errors (states,) of a step that begins in a state at a time, for a tolerance far
             above epsilon.
         stretches: number of stretches at least, of motions with many steps.
-
-    Attributes:
-        time, spread: what was reached, (motions,), and seen.
     """
 
     def __init__(
@@ -185,11 +176,8 @@ class ShadowEnsemble:
         go_on: Callable[[], bool] = lambda: True,
         lost: float = math.inf,
     ) -> Spread:
-        """Follow the motions to their ends, or to a time before, unless all is lost sooner.
-
-        Args:
-            go_on: called between stretches; False ends the work.
-            lost: spread of the attitude (or the rates) past which nothing more can be learnt.
+        """Follow the motions to their ends, or to a time before, while ``go_on`` says so between stretches,
+        unless the attitude (or the rates) spreads so far that nothing more can be learnt.
         """
         ends = np.minimum(self._starts.end, until)
         with np.errstate(all="ignore"):

@@ -28,19 +28,15 @@ class Starts:
     """Motions to be followed; internal units.
 
     Attributes:
-        states: initial states (states, motions).
         begin, end: times, (motions,).
-        steps: steps that each is expected to take, (motions,).
-        rate_units: factors that bring the body rates to a common unit, (3, motions).
-        parameters: of the equations, (parameters, motions).
     """
 
-    states: np.ndarray
+    states: np.ndarray  # initial states (states, motions)
     begin: np.ndarray
     end: np.ndarray
-    steps: np.ndarray
-    rate_units: np.ndarray
-    parameters: np.ndarray
+    steps: np.ndarray  # steps that each is expected to take, (motions,)
+    rate_units: np.ndarray  # factors that bring the body rates to a common unit, (3, motions)
+    parameters: np.ndarray  # of the equations, (parameters, motions)
 
     def of(self, which: np.ndarray) -> Starts:
         """The starts of some motions."""
@@ -49,10 +45,6 @@ class Starts:
 
 class Measures:
     """Groups of a system's states, and angles between attitudes.
-
-    Args:
-        states: number of states that belong to the motion, all by default.
-        parameters: variables of the system's expressions beside its states.
 
     Attributes:
         places: indices of the states of each quantity ("rates", "attitude", "position", "velocity").
@@ -87,12 +79,9 @@ class Measures:
         which: np.ndarray,
         unit: np.ndarray | float = 1.0,
     ) -> dict[str, np.ndarray]:
-        """Root mean square differences (motions,) of each quantity, as ``Spread`` names them.
-
-        Args:
-            states: (states, motions); apart: (states, motions, others).
-            which: numbers of these motions among the starts.
-            unit: what differences are told in, (motions,).
+        """Root mean square differences (motions,) of each quantity, as ``Spread`` names them, in units
+        (motions,): of states (states, motions) and others that are ``apart`` (states, motions, others), where
+        ``which`` are their numbers among the starts.
         """
         places, found = self.places, {}
         wrong = np.sqrt(np.add.reduce(apart * apart, axis=2) / apart.shape[2]) / unit

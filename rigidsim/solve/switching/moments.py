@@ -27,11 +27,8 @@ _MOST_PARTS = 500  # of an interval that shrinks to the arithmetic's precision
 
 
 class Moments:
-    """The moments of one surface.
-
-    Attributes:
-        of_time: whether its argument depends on time alone.
-        at_known_time: whether the argument is a line in time, whose values have hardly any rounding.
+    """The moments of one surface, ``of_time`` if its argument depends on time alone; ``at_known_time`` if
+    that is a line in time, whose values have hardly any rounding.
     """
 
     def __init__(self, system: System, precision: Precision, place: int) -> None:
@@ -135,11 +132,8 @@ def _zero(
 ) -> Any | None:
     """A zero of a function near a number, to the precision of the arithmetic; None if there is none.
 
-    Regula falsi with halved ordinates (Dowell & Jarratt 1971, BIT 11, 168).
-
-    Args:
-        middles: of narrow things, between whose ends zeros are looked for too.
-        side: the sign that the function has before the zero, if there are two as near.
+    Regula falsi with halved ordinates (Dowell & Jarratt 1971, BIT 11, 168). Zeros are looked for between the
+    middles of narrow things, too; of two as near it is that before which the function has the sign ``side``.
     """
     try:
         for _ in range(_MOST_WIDER):

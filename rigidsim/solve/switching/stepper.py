@@ -217,11 +217,8 @@ class SwitchingStepper(SurfaceRoots):
 
     def _unresolved(self, j: int, alone: bool) -> bool:
         """Whether the change of the field on a surface matters even for what two numbers leave out of its
-        moment. Where something ends the state tells its impulse, by which the rest is judged; where it
+        moment. Where something ends alone the state tells its impulse, by which the rest is judged; where it
         begins, nothing is known yet.
-
-        Args:
-            alone: whether no other moment is at this time.
         """
         before, after = (
             self._probe.look(self.state, self.time, self._parameters({j: side * self._modes[j]})).field

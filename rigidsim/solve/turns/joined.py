@@ -72,17 +72,10 @@ _POLE = 1e-6  # size of an angle's sine and cosine below which dense samples are
 class JoinedAngles:
     """The angles of a system that are joined from sample to sample.
 
-    Between dense samples they take the nearest way. Between sparse ones they advance steadily, if that is
-    known (``rigidsim.model.observables.steadiness``), and are followed along the motion elsewhere. An angle
-    that is undefined is NaN; only of Euler angles in their pole the first keeps the value it had, and the
-    last is what it leaves of the turn that both share.
-
-    Attributes:
-        dense: whether the samples tell all turns.
-        sparse: whether angles are followed along the motion, since the samples are too sparse to tell turns.
-
-    Args:
-        countable: whether the motion between sparse samples can be followed.
+    Between dense samples, which tell all turns, they take the nearest way. Between sparse ones they advance
+    steadily, if that is known (``rigidsim.model.observables.steadiness``), and are followed along the motion
+    elsewhere, if that is ``countable``. An angle that is undefined is NaN; only of Euler angles in their pole
+    the first keeps the value it had, and the last is what it leaves of the turn that both share.
     """
 
     def __init__(
