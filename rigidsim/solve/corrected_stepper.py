@@ -47,8 +47,7 @@ class Position:
     next_sample: int  # index of the first sample that isn't handed over
 
 
-_NEAR = 3
-"""Number of steps (with its next guess) below which they are sooner taken one by one than together."""
+_NEAR = 3  # number of steps up to which they are sooner taken one by one than together
 
 
 class CorrectedStepper:
@@ -127,22 +126,15 @@ class CorrectedStepper:
         it, without corrections there; returns the boundary before that.
         """
         most = self.stepper.steps - boundary.mark.steps  # within which it lies, where they reach it
-        end, goal, slow = float(self.stepper.time), float(moment), False
         self.back_to(boundary)
-        while most > 1:
-            here, begin, whole = self.boundary(), float(self.stepper.time), most
-            part, size = most // 2, (end - begin) / most
-            if not slow and begin < goal < end:  # where steps of equal size would end
-                part = min(max(int((goal - begin) / size), 1), most - 1)
+        while most > _NEAR:
+            here, part = self.boundary(), most // 2
             self.skip(part)
             if self.stepper.time >= moment:
-                most, end = part, float(self.stepper.time)
+                most = part
                 self.back_to(here)
             else:
                 most -= part
-                if goal - float(self.stepper.time) < _NEAR * size:
-                    break
-            slow = not slow and 2 * most > whole
         while True:
             before = self.boundary()
             self.stepper.step()

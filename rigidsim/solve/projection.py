@@ -246,11 +246,6 @@ class Projection:
         """Corrections so far, (scalars,), over the drifts' scales: to first order the drifts without them."""
         return self._sums[len(self.names) :].copy()
 
-    @property
-    def skipped(self) -> int:
-        """Number of corrections left out because they were not small."""
-        return int(self._times[2])
-
     # --- arithmetic -------------------------------------------------------------------------------------
 
     def _widened(self, state: np.ndarray) -> np.ndarray:

@@ -53,11 +53,6 @@ class SampleClock:
 
     def at(self, index: int) -> Scalar:
         """One sample's time in internal units, a scalar of the precision."""
-        precision = self._precision
-        whole = self._whole[precision.bits]
-        plain = precision.cheap and precision.bits >= 53 and self._samples.times is None
-        if plain and whole is not None and self._fits(index, precision):  # arrays take ten times as long
-            return (whole[0] + precision.scalar(index) * whole[1]) / whole[2] * self._per_second
         return self.internal(index, index + 1)[0]
 
     def label(self, index: int) -> float:

@@ -39,22 +39,18 @@ class Waypoints(Effect):
     memory: Kept = {}, 1
 
     def apply(self, stepper: Stepper, stride: int) -> bool:
-        steps = stepper.steps
-        self.note(steps // stride, steps, stepper.time, stepper.state, stepper.chart)
-        return True
-
-    def note(self, number: int, steps: int, time: Scalar, state: np.ndarray, chart: int) -> None:
-        """Note the boundary of correction ``number``."""
         kept, spacing = self.memory
+        number, state = stepper.steps // stride, stepper.state
         if number % spacing:
-            return
+            return True
         # numbers of more than 80 bits aren't numpy's own
         plain = state.astype(np.float64) if state.dtype.kind == "f" else np.array([float(x) for x in state])
-        kept = {**kept, number: Waypoint(steps, float(time), plain, chart)}
+        kept = {**kept, number: Waypoint(stepper.steps, float(stepper.time), plain, stepper.chart)}
         if len(kept) > _MOST:
             spacing *= 2
             kept = {n: waypoint for n, waypoint in kept.items() if n % spacing == 0}
         self.memory = kept, spacing
+        return True
 
     def back_to(self, memory: Kept, stepper: Stepper) -> None:
         self.memory = memory

@@ -23,7 +23,7 @@ from __future__ import annotations
 
 import math
 import time as clock_time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import heyoka as hy
@@ -102,30 +102,31 @@ def doubtful_rows(jumps: np.ndarray, angles: np.ndarray, sequence: str) -> np.nd
     return np.flatnonzero((np.abs(jumps).max(axis=1) > _DOUBTFUL) & factor[:-1] & factor[1:])
 
 
-class _Plain:
+Follower = Callable[[np.ndarray, np.ndarray], np.ndarray | None]
+"""Function from ascending times (n,) and the state at the first to the states; None if the motion doesn't get
+there.
+"""
+
+
+def _by_grids(system: System, *, compact: bool) -> Follower:
     """Follows a motion with the engine's own grids."""
+    start = np.zeros(len(system.states))
+    engine = compiled_engine(system.equations, start, tol=_TOLERANCE, compact_mode=compact)
 
-    def __init__(self, system: System, *, compact: bool) -> None:
-        start = np.zeros(len(system.states))
-        self._engine = compiled_engine(system.equations, start, tol=_TOLERANCE, compact_mode=compact)
+    def states(times: np.ndarray, state: np.ndarray) -> np.ndarray | None:
+        engine.time = times[0]
+        engine.state[:] = state
+        outcome, *_, found = engine.propagate_grid(times, max_steps=_STEPS * len(times))
+        return np.asarray(found) if outcome == hy.taylor_outcome.time_limit else None
 
-    def states(self, times: np.ndarray, state: np.ndarray) -> np.ndarray | None:
-        """States at ascending times (n,), beginning with the first; None if the motion doesn't get there."""
-        self._engine.time = times[0]
-        self._engine.state[:] = state
-        outcome, *_, states = self._engine.propagate_grid(times, max_steps=_STEPS * len(times))
-        return np.asarray(states) if outcome == hy.taylor_outcome.time_limit else None
+    return states
 
 
-class _Stepwise:
+def _by_steps(stepper: TaylorStepper) -> Follower:
     """Follows a motion with switching surfaces or tabulated orbits step by step."""
 
-    def __init__(self, stepper: TaylorStepper) -> None:
-        self._stepper = stepper
-
-    def states(self, times: np.ndarray, state: np.ndarray) -> np.ndarray | None:
-        """See ``_Plain.states``."""
-        stepper, found = self._stepper, [state]
+    def states(times: np.ndarray, state: np.ndarray) -> np.ndarray | None:
+        found = [state]
         stepper.back_to(replace(stepper.mark(), time=(float(times[0]), 0.0), state=state))
         stepper.settle()
         for _ in range(_STEPS * len(times)):
@@ -136,6 +137,8 @@ class _Stepwise:
             if len(found) == len(times):
                 return np.array(found)
         return None
+
+    return states
 
 
 class TurnCounter:
@@ -214,13 +217,11 @@ class TurnCounter:
         rate = math.sqrt(3) * bound
         span = system.scene.samples
         radians = rate * float(span.exact_last - span.begin)
-        compact = system.wide or radians < _WORTH_BUILDING
         start = math.ldexp(float(span.begin), -system.scaling.time)
-        self._follower: _Plain | _Stepwise
         if system.stepwise:
-            self._follower = _Stepwise(stepper_of(system, double, _TOLERANCE, start))
+            self._states = _by_steps(stepper_of(system, double, _TOLERANCE, start))
         else:
-            self._follower = _Plain(system, compact=compact)
+            self._states = _by_grids(system, compact=system.wide or radians < _WORTH_BUILDING)
         self._largest = math.ldexp(rate, system.scaling.time)
         self._built = True
 
@@ -228,7 +229,7 @@ class TurnCounter:
         """Times (n + 1,), states, angles (n + 1, angles) and largest rate between two times."""
         times = np.linspace(time, end, parts + 1)
         times[0], times[-1] = time, end
-        states = self._follower.states(times, state)
+        states = self._states(times, state)
         if states is None or not np.isfinite(states).all():
             return None
         values = np.asarray(self._function(np.ascontiguousarray(states.T), time=times))

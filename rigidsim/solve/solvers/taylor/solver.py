@@ -35,8 +35,6 @@ class TaylorSolver(StepwiseSolver):
         self.ways = WayFinder(self.corrected, self.stepper, clock, self.pacing)
 
     def go_on(self, boundary: StepBoundary, most: int | None) -> bool:
-        if not self.ways.known:
-            self.ways.look_ahead(boundary)
         started, before = time.perf_counter(), self.stepper.steps
         way, count = self.ways.choose(self.buffer.count, self.buffer.upcoming)
         take = {

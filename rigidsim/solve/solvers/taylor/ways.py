@@ -21,17 +21,15 @@ Single steps are what remains between the others, and all that pays beyond 80 bi
 from __future__ import annotations
 
 import math
-import time
 from dataclasses import dataclass
 from enum import Enum
 
-from rigidsim.solve.corrected_stepper import STRIDE, CorrectedStepper, StepBoundary
+from rigidsim.solve.corrected_stepper import STRIDE, CorrectedStepper
 from rigidsim.solve.precision import Scalar
 from rigidsim.solve.sampler import Pacing
 from rigidsim.solve.sampling import SampleClock
 from rigidsim.solve.taylor_stepper import TaylorStepper
 
-_LONG = 1e-3  # seconds; a step that takes longer isn't taken twice to be measured
 _SPARE = 4  # steps that a skip of steps of mean length ends early: a few are far from the mean
 
 
@@ -73,35 +71,17 @@ class WayFinder:
         self._pacing, self.numbers = pacing, pacing.solver or Ways()
         self._last = float(clock.at(clock.count - 1))
         self._paces: dict[SampleWay, float] = {}  # steps per second, as measured last
-        self._alone = 0.0  # those of a step that is taken for nothing else
         self._skipped, self._mean = 0, math.inf  # steps of the latest skip, and their mean length
         self._even = True  # whether skips by the mean length have never gone past their sample
         self.longest = 0.0
 
     def measured(self, way: SampleWay, steps: int, seconds: float) -> None:
-        """Learn the duration of so many steps; single steps are measured before anything is chosen."""
+        """Learn the duration of so many steps."""
         self._paces[way] = max(steps, 1) / max(seconds, 1e-9)
 
-    @property
-    def known(self) -> bool:
-        """Whether anything has been measured."""
-        return bool(self._paces)
-
-    def look_ahead(self, boundary: StepBoundary) -> None:
-        """Measure the duration of a step from a boundary, which is here, by one that is taken back."""
-        for _ in range(2):  # the first is slow, as is everything that is done for the first time
-            started = time.perf_counter()
-            self._stepper.step()
-            elapsed = time.perf_counter() - started
-            self._corrected.back_to(boundary)
-            if elapsed > _LONG:
-                break
-        self.measured(SampleWay.STEP, 1, elapsed)
-        self._alone = self._paces[SampleWay.STEP]
-
     def _most(self, way: SampleWay) -> int:
-        """Number of steps in a chunk."""
-        pace = self._paces.get(way, max(self._paces[SampleWay.STEP], self._alone))
+        """Number of steps in a chunk; one while nothing is known."""
+        pace = self._paces.get(way, self._paces.get(SampleWay.STEP, 0.0))
         return max(1, int(pace * self._pacing.chunk_seconds))
 
     def skipped(self, steps: int, span: float) -> None:
