@@ -10,8 +10,6 @@ the body axes as B that is the dataset's own quaternion, which turns a vector fr
 space coordinates; only the scalar goes last: Q1 Q2 Q3 QC = x y z w.
 """
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence

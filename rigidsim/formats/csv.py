@@ -5,8 +5,6 @@
 reads it as float64 (which rounds numbers beyond double to the nearest one); ``dtype=str`` keeps every digit.
 """
 
-from __future__ import annotations
-
 import re
 from decimal import Decimal
 from pathlib import Path

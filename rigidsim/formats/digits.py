@@ -1,7 +1,5 @@
 """Numbers as decimals from which the same bits can be restored, and angles in other units."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from decimal import ROUND_HALF_EVEN, Context, Decimal

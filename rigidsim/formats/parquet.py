@@ -1,7 +1,5 @@
 """Apache Parquet: float64 columns with their residuals, units in each column's metadata."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pyarrow as pa

@@ -1,7 +1,5 @@
 """Formats: their description, their lookup by name, and what they are told of a run besides its numbers."""
 
-from __future__ import annotations
-
 import importlib.util
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -75,7 +73,7 @@ class Format:
         folder: what such a folder is called, and a file that identifies one; None if it writes a file.
     """
 
-    write: Callable[[Table, Path, TableSource], None]
+    write: "Callable[[Table, Path, TableSource], None]"
     angles: bool = False
     side_tables: bool = False
     folder: tuple[str, str] | None = None

@@ -7,8 +7,6 @@ member's number and the values that identify it. A vector becomes a column per c
 (``angular_velocity_x``), and a column knows the residuals that hold its digits beyond double.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
@@ -145,7 +143,7 @@ class Table:
                     here[self.dim] = slice(steps.start, steps.stop)
                 yield self._block(wanted, _Block(self.dataset.isel(here), flat, steps))
 
-    def _block(self, wanted: Sequence[TableColumn], block: _Block) -> list[list[np.ndarray]]:
+    def _block(self, wanted: Sequence[TableColumn], block: "_Block") -> list[list[np.ndarray]]:
         """Parts of some columns; rows of a long table without any number are left out."""
         if not self._long:
             return [self._parts(column, block) for column in wanted]
@@ -153,7 +151,7 @@ class Table:
         kept = np.any([~np.isnan(values) for values in numbers], axis=0)
         return [[part[kept] for part in self._parts(column, block)] for column in wanted]
 
-    def _parts(self, column: TableColumn, block: _Block) -> list[np.ndarray]:
+    def _parts(self, column: TableColumn, block: "_Block") -> list[np.ndarray]:
         """The parts of one column, (rows of the block,) each."""
         if self.members and column.name == MEMBER:
             return [np.repeat(np.arange(block.members.start, block.members.stop), len(block.steps))]

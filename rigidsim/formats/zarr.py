@@ -1,7 +1,5 @@
 """Zarr (format 2, which every reader knows): the dataset unchanged, including residuals and labels."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any

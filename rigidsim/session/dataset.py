@@ -1,7 +1,5 @@
 """What a run's dataset holds: variables along time, those along events, and root attributes."""
 
-from __future__ import annotations
-
 import json
 import math
 from collections.abc import Sequence

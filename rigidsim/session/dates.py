@@ -5,8 +5,6 @@ of its size, some 1e-20 s. Blocks are cut at multiples of a fixed count of sampl
 sample alone.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import date

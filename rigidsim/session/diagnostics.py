@@ -2,8 +2,6 @@
 have done better at about the same cost.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
@@ -58,7 +56,7 @@ class Diagnostics:
         corrected: CorrectedStepper | None = None,
         go_on: Callable[[], bool] = lambda: True,
         own: Callable[[], OwnErrors | None] = lambda: None,
-    ) -> Diagnostics:
+    ) -> "Diagnostics":
         """The diagnostics with an estimate of the errors; a ``go_on`` that gives False ends it without a
         result.
         """
@@ -88,7 +86,7 @@ class Diagnostics:
             found = replace(found, how=found.how + beside)
         return replace(self, estimate=found)
 
-    def modelled(self, trail: SampleTrail | None, go_on: Callable[[], bool] = lambda: True) -> Diagnostics:
+    def modelled(self, trail: SampleTrail | None, go_on: Callable[[], bool] = lambda: True) -> "Diagnostics":
         """The diagnostics with the error of a reduced model; arguments as for ``estimated``."""
         try:
             return replace(self, modelling=measure_modelling(self.prepared, trail, go_on))

@@ -1,7 +1,5 @@
 """How a run ended, in words: which event ended it, or where and why it broke down."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import Any
 

@@ -1,7 +1,5 @@
 """One session of a run: integrate and save segments; if the run ended, complete its files; summarise."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Sequence
 from contextlib import suppress

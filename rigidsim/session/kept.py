@@ -3,8 +3,6 @@
 Everything here works on blocks of many members at once and on samples alone, wherever they come from.
 """
 
-from __future__ import annotations
-
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any

@@ -1,7 +1,5 @@
 """The Lyapunov spectrum of a run, saved on the way because it costs tens of times as much as the run."""
 
-from __future__ import annotations
-
 import io
 import time
 from pathlib import Path

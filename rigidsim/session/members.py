@@ -1,7 +1,5 @@
 """Running members of a sweep: what is kept of each, how each ended, and why if it failed."""
 
-from __future__ import annotations
-
 import re
 from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
@@ -53,7 +51,7 @@ class MemberResults:
     estimating: float = 0.0
 
     @classmethod
-    def together(cls, parts: Sequence[MemberResults]) -> MemberResults:
+    def together(cls, parts: "Sequence[MemberResults]") -> "MemberResults":
         """Several groups of members joined in order."""
         counts = [len(part.kept["status"].values) for part in parts]
         reasons: dict[int, str] = {}

@@ -1,7 +1,5 @@
 """Progress of a run: plain lines, or on a terminal and in notebooks a bar with rate and ETA."""
 
-from __future__ import annotations
-
 import sys
 import time
 from collections.abc import Callable, Iterator

@@ -3,8 +3,6 @@
 Statistics over all samples let the end of a run be judged without reading them again.
 """
 
-from __future__ import annotations
-
 import copy
 import math
 import sys

@@ -1,7 +1,5 @@
 """The work of one process on a run: who watches it, what it costs, and what may end it."""
 
-from __future__ import annotations
-
 import signal
 import threading
 import time
@@ -212,7 +210,7 @@ class Phases:
         """Note the time of the engine alone in all sessions; it is part of other phases."""
         self.wall[ENGINE] = seconds
 
-    def begin_again(self, *, keep: Iterable[str] = ("choose",)) -> Phases:
+    def begin_again(self, *, keep: Iterable[str] = ("choose",)) -> "Phases":
         """Phases for another attempt: this one's time counts as a single phase, except those to keep."""
         again = Phases()
         for old, new in ((self.wall, again.wall), (self.cpu, again.cpu)):
@@ -236,7 +234,7 @@ class Session:
     phases: Phases = field(default_factory=Phases)
     tuning: Tuning = field(default_factory=Tuning)
 
-    def another(self) -> Session:
+    def another(self) -> "Session":
         """Session for the next attempt after this one missed the accuracy; its cost includes this one's."""
         return Session(
             self.observer, effort=self.effort, phases=self.phases.begin_again(), tuning=self.tuning

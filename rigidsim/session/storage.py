@@ -1,7 +1,5 @@
 """Disk space that a run takes until it is complete, and whether there is enough."""
 
-from __future__ import annotations
-
 import math
 import os
 import shutil

@@ -1,7 +1,5 @@
 """Filling in the summary of a run once its end is known: cost, drifts, accuracy, warnings."""
 
-from __future__ import annotations
-
 import math
 import sys
 from collections.abc import Mapping, Sequence

@@ -1,7 +1,5 @@
 """How a config was understood, as values to show, and what in it is suspicious."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from rigidsim.model.load import Load

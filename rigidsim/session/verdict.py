@@ -1,7 +1,5 @@
 """Verdict on a run's soundness from its summary, as one value for decisions; the wording is elsewhere."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from enum import Enum
 

@@ -4,8 +4,6 @@ New content is written under a hidden name beside its destination, which no othe
 disk and then renamed; so a file with its final name is whole, whatever kills the process or fills the disk.
 """
 
-from __future__ import annotations
-
 import io
 import os
 import shutil

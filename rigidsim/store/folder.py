@@ -1,7 +1,5 @@
 """The run folder: ``config.toml``, ``dataset.h5``, ``timeline.rrd``, ``summary.json``, ``segments/``."""
 
-from __future__ import annotations
-
 import errno
 import fcntl
 import json
@@ -28,7 +26,7 @@ class FileOf:
     def __init__(self, name: str) -> None:
         self._name = name
 
-    def __get__(self, folder: WorkFolder, owner: type[WorkFolder]) -> Path:
+    def __get__(self, folder: "WorkFolder", owner: "type[WorkFolder]") -> Path:
         return folder.path / self._name
 
 

@@ -4,8 +4,6 @@ HDF5 compresses with zlib, which is most of the time of writing a dense run. ISA
 the same format in a tenth of it, so that whole chunks are compressed here; without it, zlib is used.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path

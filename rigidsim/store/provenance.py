@@ -2,8 +2,6 @@
 machine and settings among them, as far as they can change bits.
 """
 
-from __future__ import annotations
-
 import hashlib
 import platform
 import sys
@@ -185,7 +183,7 @@ class RootAttributes(BaseModel):
         found = {name: getattr(self, name) for name in _names(use)}
         return {name: value for name, value in found.items() if value is not None}
 
-    def changed(self, use: Use, now: RootAttributes) -> Iterator[tuple[str, Any, Any]]:
+    def changed(self, use: Use, now: "RootAttributes") -> Iterator[tuple[str, Any, Any]]:
         """Name, value here and value now of those that differ; what isn't known here counts as unchanged."""
         others = now.of_use(use)
         for name, value in self.of_use(use).items():

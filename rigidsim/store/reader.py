@@ -5,8 +5,6 @@ that it doesn't hold (a few kilobytes that unpack to terabytes of zeros), or poi
 content it would show as data. Whatever isn't a whole dataset of rigidsim is refused before it is read.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Runs on disk, finished or partial, opened for reading, and runs in memory."""
 
-from __future__ import annotations
-
 import sys
 import tempfile
 from abc import abstractmethod
@@ -51,10 +49,10 @@ class Run:
 
     @property
     @abstractmethod
-    def dataset(self) -> xarray.Dataset:
+    def dataset(self) -> "xarray.Dataset":
         """The labelled dataset."""
 
-    def plot(self, what: str = "overview") -> Figure:
+    def plot(self, what: str = "overview") -> "Figure":
         """A figure of the run, by default the page that suits the scene; a notebook shows it.
 
         Args:
@@ -154,7 +152,7 @@ class SavedRun(Run):
         return self.folder.dataset.exists() or bool(segments.segment_paths(self.folder.segments))
 
     @property
-    def dataset(self) -> xarray.Dataset:
+    def dataset(self) -> "xarray.Dataset":
         """The dataset, read lazily; for an unfinished run, what its segments hold.
 
         Raises:
@@ -169,7 +167,7 @@ class SavedRun(Run):
             claimed = None if self.folder.segments.exists() else self.outcome.dataset_digest
             refuse_damaged(self.folder.dataset, claimed)
 
-    def opened(self, *, indexed: bool = True) -> xarray.Dataset:
+    def opened(self, *, indexed: bool = True) -> "xarray.Dataset":
         """As ``dataset``; without ``indexed``, sample times aren't loaded and can't be selected by."""
         from rigidsim.store.reader import open_dataset
 
@@ -219,7 +217,7 @@ class MemoryRun(Run):
         return "memory"
 
     @cached_property
-    def dataset(self) -> xarray.Dataset:
+    def dataset(self) -> "xarray.Dataset":
         """The dataset, in memory."""
         import xarray
 

@@ -4,8 +4,6 @@ HDF5 readers ignore bytes after the end of their data. A file without a seal was
 program.
 """
 
-from __future__ import annotations
-
 import hashlib
 import io
 import stat

@@ -5,8 +5,6 @@ sample is saved when its segment has its final name; a crash can only cost later
 that it belongs to and the seal of the one before, so that a missing, foreign or old one is noticed.
 """
 
-from __future__ import annotations
-
 import io
 import os
 import shutil

@@ -3,8 +3,6 @@
 A field that isn't given isn't written.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterable
 from pathlib import Path

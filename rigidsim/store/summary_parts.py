@@ -1,7 +1,5 @@
 """Parts of the summaries of runs: fields and which of them are claims, codes, cost, invariants, accuracy."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from enum import Enum
 from typing import Annotated, Any, ClassVar, Self

@@ -1,7 +1,5 @@
 """Names and labels of a dataset's variables (the interface's section 3)."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import count, takewhile
@@ -87,7 +85,7 @@ def part_name(name: str, part: int) -> str:
     return name + ("", "_lo")[part] if part < 2 else f"{name}_lo{part}"
 
 
-def parts_in(dataset: xarray.Dataset, name: str) -> list[str]:
+def parts_in(dataset: "xarray.Dataset", name: str) -> list[str]:
     """Names of a value's parts in a dataset, whose sum, smallest first, is the exact value."""
     residuals = takewhile(dataset.variables.__contains__, (part_name(name, part) for part in count(1)))
     return [name, *takewhile(lambda residual: "residual_of" in dataset[residual].attrs, residuals)]

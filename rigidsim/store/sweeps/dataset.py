@@ -1,7 +1,5 @@
 """The dataset of a sweep: all members labelled along its axes, gathered from its tiles."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import pairwise

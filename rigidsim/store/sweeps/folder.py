@@ -1,7 +1,5 @@
 """The folder of a sweep: ``config.toml``, ``tiles/``, ``dataset.h5``, ``summary.json``."""
 
-from __future__ import annotations
-
 import fcntl
 import json
 import os

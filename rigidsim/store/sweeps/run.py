@@ -1,7 +1,5 @@
 """Sweeps on disk: the dataset, read lazily, and the summary."""
 
-from __future__ import annotations
-
 import time
 from dataclasses import dataclass
 from functools import cached_property
@@ -120,7 +118,7 @@ class SavedSweep:
         return self.status == "finished"
 
     @property
-    def dataset(self) -> xarray.Dataset:
+    def dataset(self) -> "xarray.Dataset":
         """All members, read lazily.
 
         Raises:

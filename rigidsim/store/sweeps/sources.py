@@ -2,8 +2,6 @@
 there hold: variables, their sizes, and times.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache

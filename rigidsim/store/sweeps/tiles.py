@@ -4,8 +4,6 @@ A sweep begins with one generation; a longer axis or one more output adds anothe
 was new. A tile holds the results of some members: sealed, written once, and read with distrust.
 """
 
-from __future__ import annotations
-
 import hashlib
 import io
 import json
@@ -131,7 +129,7 @@ class Generation:
         return json.dumps(content) + "\n"
 
     @classmethod
-    def read(cls, path: Path, number: int) -> Generation:
+    def read(cls, path: Path, number: int) -> "Generation":
         """Read a ``gNNN.json``; RunFolderError if it is damaged."""
         try:
             content = json.loads(path.read_text(encoding="utf-8"))
