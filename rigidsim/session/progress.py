@@ -89,8 +89,8 @@ class _Watching(Observer):
 class LineObserver(_Watching):
     """One plain line every few seconds."""
 
-    def __init__(self, clock: Callable[[], float] = time.perf_counter) -> None:
-        super().__init__(clock)
+    def __init__(self) -> None:
+        super().__init__()
         self._latest = self._begin
         self._tried, self._verb = "", "trying"
 

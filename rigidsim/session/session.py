@@ -3,7 +3,7 @@
 import signal
 import threading
 import time
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -210,13 +210,12 @@ class Phases:
         """Note the time of the engine alone in all sessions; it is part of other phases."""
         self.wall[ENGINE] = seconds
 
-    def begin_again(self, *, keep: Iterable[str] = ("choose",)) -> "Phases":
-        """Phases for another attempt: this one's time counts as a single phase, except those to keep."""
+    def begin_again(self) -> "Phases":
+        """Phases for another attempt: this one's time counts as a single phase, but for the choice's."""
         again = Phases()
         for old, new in ((self.wall, again.wall), (self.cpu, again.cpu)):
-            kept = {name: old[name] for name in keep if name in old}
-            new |= kept
-            new[NOT_KEPT] = sum(v for name, v in old.items() if name not in kept and name != ENGINE)
+            new |= {name: seconds for name, seconds in old.items() if name == "choose"}
+            new[NOT_KEPT] = sum(v for name, v in old.items() if name not in ("choose", ENGINE))
         again._since = self._since
         return again
 

@@ -149,13 +149,7 @@ def _accuracy(found: Diagnostics) -> Accuracy:
 
 def _tables(found: Diagnostics) -> dict[str, TableErrors]:
     orbits = [table_of(load) for load in found.prepared.system.plan.loads]
-    return {
-        orbit.name: TableErrors(
-            direction=orbit.error.direction, distance=orbit.error.distance, expected=orbit.error.expected
-        )
-        for orbit in orbits
-        if orbit is not None
-    }
+    return {orbit.name: TableErrors(**vars(orbit.error)) for orbit in orbits if orbit is not None}
 
 
 def _modelling(found: Diagnostics) -> Modelling | None:

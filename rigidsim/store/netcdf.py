@@ -60,12 +60,8 @@ class NetcdfFile:
         gzip: int | None = None,
         whole: bool = False,
     ) -> h5py.Dataset:
-        """Create a variable of doubles, or of integers, along declared dimensions.
-
-        Args:
-            attributes: texts and numbers.
-            chunk: shape of chunks; a single number for chunks of so many rows; None for contiguous storage.
-            gzip: the level at which its chunks are compressed after a byte shuffle.
+        """Create a variable of doubles, or of integers, along declared dimensions; ``chunk`` may be just the
+        number of rows; chunks are compressed at the level ``gzip`` after a byte shuffle.
         """
         if chunk is not None:
             sizes = [self._labelled.dimensions[dim].size for dim in dims]
@@ -186,6 +182,17 @@ def declare(
     }
 
 
+def write_blocks(
+    file: NetcdfFile, variables: Sequence[Variable], blocks: Sequence[Block], attributes: Mapping[str, Any]
+) -> None:
+    """Write all blocks, which may be none, without compression."""
+    rows = sum(len(block["time"][0]) for block in blocks)
+    created = declare(file, variables, rows, attributes, compressed=False)
+    for variable in variables if rows else ():
+        for name, values in zip(variable.part_names(), joined_parts(blocks, variable), strict=True):
+            created[name][...] = values.reshape(created[name].shape)
+
+
 def add_extras(file: NetcdfFile, extras: Sequence[Extra]) -> None:
     """Write variables with dimensions of their own."""
     for extra in extras:
@@ -226,7 +233,7 @@ def root_attributes(path: Path) -> dict[str, Any]:
                 for key, value in file.attrs.items()
                 if not key.startswith("_")
             }
-            return {**found, "rows": int(file["time"].shape[0])}
+            return {**found, "rows": int(file["time"].shape[0]) if "time" in file else 0}
     except (OSError, KeyError, AttributeError, IndexError, RuntimeError, ValueError) as error:
         raise RunFolderError(f"{path}: can't be read as a dataset of rigidsim ({error})") from None
 

@@ -1,5 +1,6 @@
 """Runs on disk, finished or partial, opened for reading, and runs in memory."""
 
+import io
 import sys
 import tempfile
 from abc import abstractmethod
@@ -10,17 +11,15 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
-import numpy as np
-
 from rigidsim.errors import FORCE, RESUME, RunFolderError, either
 from rigidsim.look import viewer
-from rigidsim.store import atomic, segments
+from rigidsim.store import atomic, netcdf, segments
 from rigidsim.store.folder import RunFolder, find_run
-from rigidsim.store.netcdf import Block, joined_parts
+from rigidsim.store.netcdf import Block
 from rigidsim.store.seal import refuse_damaged
 from rigidsim.store.summary import Brief, Summary
 from rigidsim.store.sweeps.folder import is_sweep
-from rigidsim.store.variables import Extra, Variable, used_labels
+from rigidsim.store.variables import Extra, Variable
 
 if TYPE_CHECKING:
     import xarray
@@ -197,7 +196,7 @@ class MemoryWriter:
         if len(block["time"][0]):
             self.blocks.append(block)
 
-    def flush(self, checkpoint: Mapping[str, np.ndarray], events: Mapping[str, np.ndarray]) -> None:
+    def flush(self, checkpoint: segments.Arrays, events: segments.Arrays) -> None:
         """Do nothing: a run in memory can't be resumed."""
 
 
@@ -221,22 +220,12 @@ class MemoryRun(Run):
         """The dataset, in memory."""
         import xarray
 
-        found: dict[str, xarray.Variable] = {}
-        for variable in self.variables:
-            parts = joined_parts(self.blocks, variable) if self.blocks else [np.empty(0)] * variable.parts
-            for part, (name, values) in enumerate(zip(variable.part_names(), parts, strict=True)):
-                shaped = values.reshape(-1, *variable.shape)
-                attributes = variable.part_attributes(part)
-                found[name] = xarray.Variable(("time", *variable.dims), shaped, attributes)
-        for extra in self.extras:
-            found[extra.name] = xarray.Variable(extra.dims, extra.values, dict(extra.attributes))
-        coordinates = {"time": found.pop("time")}
-        for dim, names in used_labels(self.variables).items():
-            labels = np.array(names)
-            coordinates[dim] = xarray.Variable((dim,), labels, {"long_name": dim.replace("_", " ")})
-        coordinates |= {n: found.pop(n) for n in list(found) if found[n].dims == (n,)}
-        told = xarray.Dataset(found, coords=coordinates, attrs=dict(self.attributes))
-        return xarray.decode_cf(told)  # dates, and coordinates besides time
+        buffer = io.BytesIO()
+        with netcdf.writing(buffer) as file:
+            netcdf.write_blocks(file, self.variables, self.blocks, self.attributes)
+            netcdf.add_extras(file, self.extras)
+        with xarray.open_dataset(buffer, engine="h5netcdf") as opened:
+            return opened.load()
 
     def concluded(self, outcome: Brief) -> Self:
         """The same run with another summary."""

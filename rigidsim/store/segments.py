@@ -112,14 +112,9 @@ class SegmentWriter:
         self, blocks: Sequence[netcdf.Block], checkpoint: Arrays, events: Arrays, place: Mapping[str, Any]
     ) -> memoryview:
         """A whole segment in memory."""
-        buffer, rows = io.BytesIO(), self._rows if blocks else 0
+        buffer = io.BytesIO()
         with netcdf.writing(buffer) as file:
-            attributes = {**self._attributes, **place}
-            created = netcdf.declare(file, self._variables, rows, attributes, compressed=False)
-            for variable in self._variables if rows else ():
-                parts = netcdf.joined_parts(blocks, variable)
-                for name, values in zip(variable.part_names(), parts, strict=True):
-                    created[name][...] = values.reshape(created[name].shape)
+            netcdf.write_blocks(file, self._variables, blocks, {**self._attributes, **place})
             file.group("checkpoint", checkpoint)
             file.group("events", events)
         return sealed(buffer)

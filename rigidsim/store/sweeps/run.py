@@ -10,7 +10,7 @@ import numpy as np
 from pydantic import Field, ValidationError
 
 from rigidsim.errors import RESUME, RunFolderError
-from rigidsim.store.seal import check_seal, check_whole
+from rigidsim.store.seal import check_seal, refuse_damaged
 from rigidsim.store.summary_parts import SummaryPart, first_of
 from rigidsim.store.sweeps.folder import SweepFolder
 from rigidsim.store.sweeps.tiles import Generation
@@ -152,15 +152,10 @@ class SavedSweep:
 
     def _refuse_damaged_dataset(self) -> None:
         try:
-            _, digest = check_whole(self.folder.dataset)
+            refuse_damaged(self.folder.dataset, self.outcome.dataset_sha256)
         except RunFolderError as error:
             again = f"; remove it, and {RESUME} writes it again" if self.folder.tiles.is_dir() else ""
             raise RunFolderError(f"{error}{again}") from None
-        expected = self.outcome.dataset_sha256
-        if expected not in (None, digest):
-            raise RunFolderError(
-                f"{self.folder.dataset}: isn't the dataset that summary.json beside it was written for"
-            )
 
     def __repr__(self) -> str:
         return f"<Sweep {self.outcome.name!r} ({self.place}): {self.status}>"
