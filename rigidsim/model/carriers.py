@@ -52,10 +52,24 @@ class Carrier(Protocol):
         """Its momentum (mpf, kg m^2/s, body axes) and kinetic energy (mpf, J) at the start."""
 
 
+@runtime_checkable
+class Lending(Protocol):
+    """If ``lends``, its own energy changes by what its drive does alone: that work is a function of the
+    state, and ``supplied_power`` tells only the drive's work on the body.
+    """
+
+    lends: bool
+
+
 def carried_beside(loads: Iterable[Load]) -> str:
     """Why momentum is carried by more than the body, for what can't do with that; empty if it isn't."""
     found = next((load.title for load in loads if isinstance(load, Carrier)), "")
     return f"{found} carries angular momentum beside the body" if found else ""
+
+
+def lends(carrier: object) -> bool:
+    """Whether it is ``Lending``."""
+    return isinstance(carrier, Lending) and carrier.lends
 
 
 def momentum_terms(carriers: Iterable[Carrier], m: Kinematics) -> list[Term]:

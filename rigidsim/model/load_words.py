@@ -9,6 +9,7 @@ from typing import Any
 from rigidsim.scene.bodies.presets import known_body
 from rigidsim.scene.orbits import KeplerOrbit
 from rigidsim.scene.readable import number_text, span_text
+from rigidsim.scene.tracing.numbers import plain
 
 _DIGITS = 4
 _KILOMETRES = 1e4  # m, from where on km read better
@@ -74,6 +75,15 @@ def orbit_text(orbit: KeplerOrbit, strength: Any) -> str:
     if orbit.inclination:
         parts.append(f"inclination {value_text(math.degrees(orbit.inclination), 'deg')}")
     return ", ".join(parts)
+
+
+def axis_text(axis: Sequence[Any]) -> str:
+    """A unit vector in body axes: ``the body's z axis``, or its components."""
+    unit = [float(plain(x)) for x in axis]
+    for name, x in zip("xyz", unit, strict=True):
+        if abs(x) == 1:
+            return f"the body's {'-' if x < 0 else ''}{name} axis"
+    return "(" + ", ".join(number_text(x, _DIGITS) for x in unit) + ") in body axes"
 
 
 def direction_text(vector: Sequence[Any]) -> str:

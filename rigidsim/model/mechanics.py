@@ -9,7 +9,7 @@ from typing import Any
 import heyoka as hy
 
 from rigidsim.model.capabilities import KeepsAxial, having, linear_potential_of
-from rigidsim.model.carriers import Carrier, inner_torque, momentum_terms
+from rigidsim.model.carriers import Carrier, inner_torque, lends, momentum_terms
 from rigidsim.model.kinematics import Kinematics
 from rigidsim.model.load import Load, Term, force_terms, torque_terms
 from rigidsim.model.rotations import Symbolic, apply
@@ -101,9 +101,23 @@ class Mechanics(Kinematics):
     @cached_property
     def rotational_energy(self) -> Symbolic:
         """Kinetic energy of rotation of the body, w . I w / 2, and of all carriers."""
+        return self._rotational(self.carriers)
+
+    @cached_property
+    def kept_rotational_energy(self) -> Symbolic:
+        """The same without carriers whose energy changes by what their drives do alone."""
+        return self._rotational([x for x in self.carriers if not lends(x)])
+
+    def _rotational(self, carriers: list[Carrier]) -> Symbolic:
         own = self.inertia.energy(self.rates, self.own_momentum)
-        others = [found for x in self.carriers if (found := x.carried_energy(self)) is not None]
+        others = [found for x in carriers if (found := x.carried_energy(self)) is not None]
         return hy.sum([own, *others]) if others else own
+
+    @cached_property
+    def lent_energy(self) -> Symbolic | None:
+        """Kinetic energy of those carriers; None without any."""
+        found = [x.carried_energy(self) for x in self.carriers if lends(x)]
+        return hy.sum([x for x in found if x is not None]) if found else None
 
     @cached_property
     def starting_momentum(self) -> Vector:
@@ -196,15 +210,30 @@ class Mechanics(Kinematics):
         return any(carrier.supplied_power(self) is not None for carrier in self.carriers)
 
     @property
+    def drives_work(self) -> bool:
+        """The same, drives that keep a rate included."""
+        return self.driven_within or self.lent_energy is not None
+
+    @property
     def conserves_energy(self) -> bool:
-        """Whether every acting load has a time-independent potential, and no carrier is driven."""
+        """Whether every acting load has a time-independent potential, and no carrier is driven: then the
+        energy stays, but for what drives lend that keep a rate.
+        """
         kept = all(load.conservative or not (load.torque(self) or load.force(self)) for load in self.loads)
         return kept and not self.driven_within
 
     @cached_property
     def energy(self) -> Symbolic:
         """Kinetic energy (rotation, and translation if the centre of mass moves) plus potential energy."""
-        terms = [self.rotational_energy]
+        return self._with_rotational(self.rotational_energy)
+
+    @cached_property
+    def kept_energy(self) -> Symbolic:
+        """The same with ``kept_rotational_energy``."""
+        return self._with_rotational(self.kept_rotational_energy)
+
+    def _with_rotational(self, rotational: Symbolic) -> Symbolic:
+        terms = [rotational]
         mass = self.scene.body.mass
         if self.velocity is not None and mass is not None:
             context, scaling = self.scene.context, self.scaling

@@ -15,6 +15,7 @@ import numpy as np
 from rigidsim.errors import ConfigError, Problem
 from rigidsim.model.averaged.average import Average
 from rigidsim.model.capabilities import GradientAlone, Reacting, orbit_of, table_of
+from rigidsim.model.carriers import Carrier
 from rigidsim.model.formulations.averaged import Averaged
 from rigidsim.model.formulations.formulation import (
     REGISTERED,
@@ -212,14 +213,16 @@ def refuse_odd_loads(scene: Scene, requirements: Requirements, loads: Sequence[L
     Both are one attitude: an odd load would depend on the formulation, on whether its attitude has a sign at
     all, and on how that was continued.
     """
+    carriers = [x for x in loads_of(scene) if isinstance(x, Carrier)]  # whose states any load may read
     for load in loads:
         if "attitude" not in load.reads or not requirements.attitude:
             continue
+        others = [x for x in carriers if x is not load]
         m = probe(scene, requirements, [load])
         terms = [*torque_terms(load, m), *(force_terms(load, m) if m.velocity is not None else [])]
         if not terms:
             continue
-        names, start = start_of(m, [load])
+        names, start = start_of(m, [load, *others])
         generator = np.random.default_rng(0)  # the same each time
         states = start[:, None] + generator.uniform(-1, 1, (len(names), _STATES))
         rows = [names.index(name) for name in BODY.quaternion]

@@ -15,7 +15,7 @@ from typing import Any, Protocol, runtime_checkable
 import heyoka as hy
 
 from rigidsim.model.rotations import Symbolic, SymbolicMatrix
-from rigidsim.scene.arithmetic import Matrix, Vector, dot, norm
+from rigidsim.scene.arithmetic import Matrix, Vector, cross, dot, norm
 from rigidsim.scene.scene import Scene
 
 Rounder = Callable[[Any], Any]
@@ -138,6 +138,14 @@ class Swift(Protocol):
 
 
 @runtime_checkable
+class Gyroscopic(Protocol):
+    """A load that carries angular momentum relative to the body."""
+
+    def gyroscopic_momentum(self, scene: Scene) -> Vector:
+        """That momentum at the start (mpf, kg m^2/s, body axes)."""
+
+
+@runtime_checkable
 class BoundsFlight(Protocol):
     """A load that keeps the body near."""
 
@@ -162,6 +170,21 @@ def source_rate(scene: Scene) -> Any:
     """Fastest angular rate of any source seen from the body, rad/s; zero without one."""
     rates = [load.fastest_rate(scene) for load in scene.loads if isinstance(load, Swift)]
     return scene.context.maximum(rates or [scene.context.zero])
+
+
+def gyroscopic_rate(scene: Scene) -> Any:
+    """Upper bound of the rate at which the momenta that the body carries make it nutate, rad/s.
+
+    For a single one I w' = h x w: the other two eigenvalues of I^-1 [h]x are +-i sqrt(h . I h / det I).
+    """
+    context, inertia = scene.context, scene.turning_inertia
+    total = context.zero
+    for load in scene.loads:
+        if isinstance(load, Gyroscopic):
+            h = load.gyroscopic_momentum(scene)
+            volume = dot(inertia[0], cross(inertia[1], inertia[2]))
+            total += context.sqrt(dot(h, [dot(row, h) for row in inertia]) / volume)
+    return total
 
 
 def _flight_scales(scene: Scene, drive: Drive | None) -> tuple[Any, Any]:
@@ -207,7 +230,7 @@ def choose_scaling(scene: Scene, drive: Drive | None = None) -> Scaling:
         fastest = context.maximum([fastest, context.sqrt(potential / swing_moment)])
     masses, count = scene.bodies, range(0 if scene.bodies is None else len(scene.bodies.names))
     met = [masses.encounter(context, i, j)[1] for i in count for j in count if i < j] if masses else []
-    fastest = context.maximum([fastest, source_rate(scene), *met])
+    fastest = context.maximum([fastest, source_rate(scene), gyroscopic_rate(scene), *met])
     time = -exponent(context, fastest)
     if fastest == 0:  # at rest for good: any unit will do, the horizon is the natural one
         time = exponent(context, scene.end - scene.start)

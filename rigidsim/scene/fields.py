@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
+from decimal import Decimal
 from itertools import product
 from typing import Annotated, Any, TypeVar
 
@@ -134,6 +135,19 @@ Acceleration = Annotated[ExactNumber, InUnit("m/s^2")]
 GravitationalParameter = Annotated[ExactNumber, InUnit("m^3/s^2")]
 Damping = Annotated[ExactNumber, InUnit("kg m^2/s")]
 AnyQuantity = Annotated[ExactNumber, InUnit("")]
+
+
+def _formula(value: Any) -> str:
+    """The text of an expression; a bare number is one too."""
+    if isinstance(value, bool) or not isinstance(value, str | int | Decimal | float):
+        raise refuse(f'given {shown(value)}; an expression in quotes is allowed, such as "k*sin(t)^2"')
+    return value if isinstance(value, str) else str(value)
+
+
+Formula = Annotated[
+    str, PlainValidator(_formula), WithJsonSchema({"anyOf": [{"type": "string"}, {"type": "number"}]})
+]
+"""An expression as it is written, or a number."""
 
 
 def _exactly(count: int) -> BeforeValidator:

@@ -6,7 +6,7 @@ that a config, a schema or a message never needs a second list of names.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any, ClassVar, Protocol
 
@@ -40,6 +40,7 @@ class Surroundings:
         span: start and end of the run, s (mpf).
         bodies: point masses besides the body.
         names: what expressions may read.
+        table: array of tables that it stands in.
     """
 
     number: int
@@ -53,6 +54,7 @@ class Surroundings:
     span: tuple[Any, Any] | None = None
     bodies: PointMasses | None = None
     names: Names = field(default_factory=Names)
+    table: str = "loads"
 
     @property
     def carried_bodies(self) -> PointMasses:
@@ -62,7 +64,7 @@ class Surroundings:
 
     def fault(self, key: str, text: str) -> ConfigError:
         """The error that names a key of this load."""
-        return ConfigError(Problem(f"[[loads]] number {self.number + 1} {key}".rstrip(), text))
+        return ConfigError(Problem(f"[[{self.table}]] number {self.number + 1} {key}".rstrip(), text))
 
 
 class SceneLoad:
@@ -75,6 +77,9 @@ class SceneLoad:
             loads add up to the scene's gravity. None for all others.
         axes: what the space axes are in its own equations; None if these hold in any axes.
         epoch: date of time 0 in its own equations; None if these have none.
+        bearing: moment (mpf, kg m^2) and unit axis (body axes) of what turns on a bearing of its own, which
+            torques on the body don't accelerate about that axis; None for all others.
+        inner_momentum: angular momentum relative to the body at the start (mpf, body axes); None for none.
     """
 
     Fields: ClassVar[type[LoadFields] | None] = None
@@ -82,6 +87,8 @@ class SceneLoad:
     uniform_field: Vector | None = None
     axes: str | None = None
     epoch: Epoch | None = None
+    bearing: tuple[Any, Vector] | None = None
+    inner_momentum: Vector | None = None
 
     @classmethod
     def resolve(cls, fields: Any, around: Surroundings) -> SceneLoad:
@@ -136,6 +143,9 @@ class Named(Protocol):
 LOAD_KINDS: dict[str, type[SceneLoad]] = {}
 """Kinds of ``[[loads]]`` by name."""
 
+TABLES: dict[str, type[SceneLoad]] = {}
+"""Loads with an array of tables of their own, by its name in the config: ``[[rotors]]``."""
+
 OBSERVABLES: dict[str, Any] = {}
 """What can be recorded, by name, in the order in which a dataset holds it (``Named``)."""
 
@@ -154,6 +164,16 @@ def register_load(kind: type[SceneLoad]) -> type[SceneLoad]:
         raise ValueError(f'a load of kind "{name}" is registered already ({LOAD_KINDS[name].__name__})')
     LOAD_KINDS[name] = kind
     return kind
+
+
+def register_table(name: str) -> Callable[[type[SceneLoad]], type[SceneLoad]]:
+    """Register loads whose keys are an array of tables of their own in the config (a class decorator)."""
+
+    def register(kind: type[SceneLoad]) -> type[SceneLoad]:
+        TABLES[name] = kind
+        return kind
+
+    return register
 
 
 def register_observable(observable: Named) -> None:

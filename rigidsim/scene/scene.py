@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any, TypeVar
 
 from rigidsim.errors import ConfigError, Problem
@@ -18,7 +18,8 @@ from rigidsim.scene.expressions.parser import parse_expression
 from rigidsim.scene.expressions.tree import Expression, ExpressionError, names_used, states_read
 from rigidsim.scene.frame import Figure, figure_of, reference_normal
 from rigidsim.scene.point_masses import PointMasses, resolve_point_masses
-from rigidsim.scene.registry import LOAD_KINDS, SceneLoad, Surroundings
+from rigidsim.scene.registry import LOAD_KINDS, TABLES, SceneLoad, Surroundings
+from rigidsim.scene.rotors import refuse_odd_rotors, turning_inertia
 from rigidsim.scene.sample_times import SampleTimes, sample_times
 
 T = TypeVar("T")
@@ -55,7 +56,8 @@ class Scene:
         position, velocity: those of the centre of mass, space axes; None unless the body moves freely.
         gravity: sum of all uniform fields, space axes, m/s^2; None without such a load.
         loads: the others, without those that are always zero.
-        given_loads: all loads of the config, in its order.
+        given_loads: all of ``[[loads]]``, in their order.
+        tabled: all of loads with tables of their own, such as rotors, by the table's name.
         events: crossings that are recorded, or end the run.
         turning_inertia: tensor of what turns with the body: ``body.inertia``, the one of the mass
             distribution, less the moments about their axes of what turns on bearings.
@@ -91,6 +93,7 @@ class Scene:
     config: schema.Config
     bodies: PointMasses | None = None
     given_loads: tuple[SceneLoad, ...] = ()
+    tabled: Mapping[str, tuple[SceneLoad, ...]] = field(default_factory=dict)
 
     @property
     def free_flight(self) -> bool:
@@ -141,16 +144,19 @@ def build_scene(experiment: Experiment, context: Any = None) -> Scene:
         raise ConfigError(problems, experiment.source)
     start, end, samples = times
     try:
-        inverse = inverse_inertia(context, body)
         position, velocity = _translation(config, body, context)
         free_flight, table = position is not None, config.body
         masses = resolve_point_masses(
             config.bodies, table.host, table.coupling, body.mass, context, free_flight=free_flight
         )
         names = names_of(config)
-        resolved = _resolve_loads(
+        given, tabled = _resolve_loads(
             config, body, context, masses, names, free_flight=free_flight, span=(start, end)
         )
+        resolved = [*given, *(load for found in tabled.values() for load in found)]
+        bearings = [load.bearing for load in resolved if load.bearing is not None]
+        inverse = inverse_inertia(context, body)
+        turning = turning_inertia(context, body, bearings) if bearings else (body.inertia, inverse)
         fields = [load.uniform_field for load in resolved if load.uniform_field is not None]
         gravity = [sum(x, context.zero) for x in zip(*fields, strict=True)] if fields else None
         for number, load in enumerate(resolved):
@@ -164,8 +170,8 @@ def build_scene(experiment: Experiment, context: Any = None) -> Scene:
             description=config.description,
             context=context,
             body=body,
-            turning_inertia=body.inertia,
-            inverse_inertia=inverse,
+            turning_inertia=turning[0],
+            inverse_inertia=turning[1],
             angular_velocity=[context.zero] * 3,
             quaternion=[context.one] + [context.zero] * 3,
             euler_angles=None,
@@ -183,7 +189,8 @@ def build_scene(experiment: Experiment, context: Any = None) -> Scene:
             reference=reference_normal(config.frame, context),
             config=config,
             bodies=masses,
-            given_loads=tuple(resolved),
+            given_loads=tuple(given),
+            tabled=tabled,
         )
         return _with_start(scene, starts.start_of(scene, _with_start))
     except ConfigError as error:
@@ -213,14 +220,21 @@ def _resolve_loads(
     *,
     free_flight: bool,
     span: tuple[Any, Any],
-) -> list[SceneLoad]:
+) -> tuple[list[SceneLoad], dict[str, tuple[SceneLoad, ...]]]:
+    """Those of ``[[loads]]``, and those with tables of their own by the table's name."""
     found = []
     tables = {name: table.text for name, table in config.tables.items()}
     fixed = config.parameters, body.center_of_mass, free_flight, config.frame.axes, config.time.epoch
     for number, fields in enumerate(config.loads):
         kind = LOAD_KINDS[fields.kind]  # type: ignore[attr-defined]
         found.append(kind.resolve(fields, Surroundings(number, context, *fixed, tables, span, masses, names)))
-    return found
+    refuse_odd_rotors(config.rotors, body, context)
+    around = Surroundings(0, context, *fixed, tables, span, masses, names)
+    tabled = {}
+    for name, kind in TABLES.items():
+        places = enumerate(getattr(config, name))
+        tabled[name] = tuple(kind.resolve(x, replace(around, number=n, table=name)) for n, x in places)
+    return found, tabled
 
 
 def _translation(config: schema.Config, body: RigidBody, context: Any) -> tuple[Vector | None, Vector | None]:

@@ -48,6 +48,7 @@ from rigidsim.scene.frame import Frame
 from rigidsim.scene.integrator_table import Integrator
 from rigidsim.scene.point_masses import PointMassBody
 from rigidsim.scene.registry import LOAD_KINDS, OBSERVABLES, LoadFields
+from rigidsim.scene.rotors import RotorTable
 from rigidsim.scene.sample_times import Time
 from rigidsim.scene.sweep_table import SweepTable
 
@@ -207,6 +208,8 @@ class Config(ConfigTable):
     loads: list[LoadFields] = Field(default_factory=list, description=_ABOUT_LOADS)
     bodies: list[PointMassBody] = Field(default_factory=list, max_length=64)
     """point masses under mutual gravity, integrated with the body"""
+    rotors: list[RotorTable] = Field(default_factory=list, max_length=64)
+    """wheels in the body, free, driven or at fixed rates"""
     events: list[EventTable] = Field(default_factory=list)
     """events: zero crossings of an expression of time and the state"""
     frame: Frame = Field(default_factory=Frame.model_construct)
@@ -228,7 +231,7 @@ class Config(ConfigTable):
     )
     """texts of tables that loads refer to; the text of files beside the config is copied here"""
 
-    @field_validator("events", "bodies")
+    @field_validator("events", "bodies", "rotors")
     @classmethod
     def _different(cls, value: list[Any], info: ValidationInfo) -> list[Any]:
         names = [table.name for table in value]

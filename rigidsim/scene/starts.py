@@ -13,16 +13,17 @@ these are a + 90 deg, 90 deg - d and W for the pole's right ascension a and decl
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
 
 from rigidsim.errors import ConfigError, Problem
 from rigidsim.scene import attitude
 from rigidsim.scene.arithmetic import Vector, apply, dot, negligible, transpose
-from rigidsim.scene.bodies.body import RigidBody
+from rigidsim.scene.bodies.body import RigidBody, inverse_inertia
 from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.frame import ECLIPTIC, EQUATOR, OBLIQUITY, Figure
+from rigidsim.scene.registry import SceneLoad
 from rigidsim.scene.schema import Config, Initial
 
 
@@ -36,7 +37,7 @@ class Begun(Protocol):
     @property
     def body(self) -> RigidBody: ...  # noqa: D102
     @property
-    def inverse_inertia(self) -> Any: ...  # noqa: D102
+    def loads(self) -> Sequence[SceneLoad]: ...  # noqa: D102
     @property
     def figure(self) -> Figure: ...  # noqa: D102
     @property
@@ -234,7 +235,10 @@ def _from_momentum(scene: Begun) -> Vector:
     if along_massless(scene.body, momentum):
         what = "has a part along the axis that has no moment of inertia; make that part zero"
         raise refusal("angular_momentum", what)
-    return apply(scene.inverse_inertia, momentum)
+    for load in scene.loads:
+        if load.inner_momentum is not None:
+            momentum = [x - h for x, h in zip(momentum, load.inner_momentum, strict=True)]
+    return apply(inverse_inertia(scene.context, scene.body), momentum)
 
 
 def spin_rate(scene: Begun) -> Any:

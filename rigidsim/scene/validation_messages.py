@@ -11,10 +11,10 @@ from pydantic import BaseModel, ValidationError
 from rigidsim.errors import ConfigError, Problem
 
 _TABLES = (
-    "body", "initial", "loads", "bodies", "frame", "time", "integrator", "output", "limits", "parameters",
-    "events", "sweep", "tables",
+    "body", "initial", "loads", "bodies", "rotors", "frame", "time", "integrator", "output", "limits",
+    "parameters", "events", "sweep", "tables",
 )  # fmt: skip
-_ARRAYS_OF_TABLES = ("loads", "bodies", "events")
+_ARRAYS_OF_TABLES = ("loads", "bodies", "rotors", "events")
 _MEANT = {
     "box": "cuboid", "brick": "cuboid", "ball": "sphere", "disc": "disk", "hoop": "ring", "bar": "rod",
     "stick": "rod", "pipe": "tube", "rectangle": "plate", "square": "plate", "donut": "torus",

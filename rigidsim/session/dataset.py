@@ -10,7 +10,9 @@ from typing import Any
 import numpy as np
 
 from rigidsim.errors import ConfigError, Problem
+from rigidsim.model.loads.rotor import rotors_of
 from rigidsim.model.outputs import Invariant
+from rigidsim.scene.scene import Scene
 from rigidsim.session.dates import Dates
 from rigidsim.solve.assembly import Assembly
 from rigidsim.solve.evaluate import Evaluator, RecordedParts
@@ -70,12 +72,18 @@ def dates_of(prepared: InitialValueProblem) -> Dates | None:
     return None if scene.epoch is None else Dates(scene.epoch, scene.samples)
 
 
+def labels_of_the_run(scene: Scene) -> dict[str, Sequence[str]]:
+    """Labels of the dimensions ``OF_THE_RUN``."""
+    bodies = () if scene.bodies is None else scene.bodies.names
+    return {"point_mass": bodies, "rotor": [rotor.name for rotor in rotors_of(scene)]}
+
+
 def recorded_variables(prepared: InitialValueProblem) -> list[Variable]:
     """Time and the recorded variables; each with residuals beyond double precision.
 
     In single precision time has one too, since its labels are exact to a double.
     """
-    parts, bodies = prepared.precision.part_count, prepared.scene.bodies
+    parts, labels = prepared.precision.part_count, labels_of_the_run(prepared.scene)
     result = [time_variable(prepared.clock.part_count)]
     for recorded in prepared.system.recorded:
         attributes: dict[str, Any] = {"units": recorded.units, "long_name": recorded.long_name}
@@ -89,7 +97,7 @@ def recorded_variables(prepared: InitialValueProblem) -> list[Variable]:
         attributes |= recorded.attributes
         if recorded.invariant:
             attributes["invariant"] = 1
-        own = {"point_mass": bodies.names} if bodies is not None and "point_mass" in recorded.dims else {}
+        own = {name: labels[name] for name in recorded.dims if name in labels}
         result.append(Variable(recorded.name, recorded.dims, attributes, parts, own))
     return result
 
@@ -259,7 +267,8 @@ def root_attributes(
 def _surroundings(prepared: InitialValueProblem) -> list[dict[str, Any]]:
     """Gravity and the pictured objects of every load."""
     scene = prepared.scene
-    shown = [load.pictured() for load in (*scene.loads, *prepared.python_loads)]
+    locked = [x for found in scene.tabled.values() for x in found if not x.acts()]  # and drawn all the same
+    shown = [load.pictured() for load in (*scene.loads, *locked, *prepared.python_loads)]
     if scene.gravity is not None:
         shown.append({"what": "gravity", "acceleration": [float(g) for g in scene.gravity]})
     return [one for one in shown if one is not None]

@@ -64,7 +64,8 @@ def span_of(scene: Scene) -> Span:
 def told_loads(prepared: InitialValueProblem) -> tuple[str, ...]:
     """The loads in a reader's terms, one sentence for each."""
     plan = prepared.system.plan
-    return tuple(load.told(plan.scene) for load in plan.loads)
+    locked = [x for found in plan.scene.tabled.values() for x in found if not x.acts()]
+    return tuple(load.told(plan.scene) for load in [*plan.loads, *locked] if isinstance(load, Load))
 
 
 def time_words(scene: Scene) -> TimeWords:

@@ -24,8 +24,8 @@ LABELS: dict[str, list[str]] = {
 }
 """Coordinates besides time, with their labels."""
 
-OF_THE_RUN = ("point_mass",)
-"""Coordinates whose labels depend on the run: names of ``[[bodies]]``."""
+OF_THE_RUN = ("point_mass", "rotor")
+"""Coordinates whose labels depend on the run: names of ``[[bodies]]`` and ``[[rotors]]``."""
 
 SCHEMA_VERSION = 4
 """That of 0.1.0. Versions before were never released; files of any other version are refused."""

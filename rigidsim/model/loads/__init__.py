@@ -9,6 +9,7 @@ from rigidsim.model.loads import (  # noqa: F401  (each enters its kind; a new l
     central_gravity,
     gravity_gradient,
     magnetic_dipole,
+    rotor,
     uniform_gravity,
     viscous_torque,
 )

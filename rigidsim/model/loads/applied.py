@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
-from decimal import Decimal
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Any, ClassVar, Literal
 
-from pydantic import Field, PlainValidator, WithJsonSchema
+from pydantic import Field
 
 from rigidsim.model.heyoka_expressions import to_heyoka
 from rigidsim.model.kinematics import Kinematics
@@ -28,26 +27,13 @@ from rigidsim.scene.expressions.tree import (
     names_used,
     states_read,
 )
-from rigidsim.scene.fields import Metre, Triple, refuse
+from rigidsim.scene.fields import Formula, Metre, Triple
 from rigidsim.scene.initial_values import start_values
 from rigidsim.scene.registry import LoadFields, Surroundings, register_load
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.transitions import narrow_parts, root_parts
-from rigidsim.scene.validation_messages import shown
 
 _LONGEST = 60  # characters of an expression that are shown
-
-
-def _component(value: Any) -> str:
-    """The component as an expression's text; a bare number is one too."""
-    if isinstance(value, bool) or not isinstance(value, str | int | Decimal | float):
-        raise refuse(f'given {shown(value)}; an expression in quotes is allowed, such as "k*sin(t)^2"')
-    return value if isinstance(value, str) else str(value)
-
-
-Formula = Annotated[
-    str, PlainValidator(_component), WithJsonSchema({"anyOf": [{"type": "string"}, {"type": "number"}]})
-]
 
 
 def _axes(default: str) -> Any:

@@ -9,6 +9,7 @@ import heyoka as hy
 
 from rigidsim.model import first_integrals, fixed_axes
 from rigidsim.model.capabilities import Attracting, having
+from rigidsim.model.carriers import lends
 from rigidsim.model.euler_poles import Poles, angles_of_matrix, squared_factor
 from rigidsim.model.frames import jacobi_constant
 from rigidsim.model.loads.central_gravity import CentralGravity
@@ -39,7 +40,7 @@ def _driven(m: Mechanics) -> Any:
 def momentum_scale(m: Mechanics) -> tuple[Any, str]:
     """abs(L) at the start, or the momentum that gravity can build up, if that is larger."""
     scene, context = m.scene, m.scene.context
-    initial = norm(context, apply(scene.body.inertia, scene.angular_velocity))
+    initial = norm(context, apply(scene.turning_inertia, scene.angular_velocity))
     for carrier in m.carriers:
         initial += norm(context, carrier.carried_at_start(scene)[0])
     fed = potential_amplitude(scene) + loads_amplitude(scene) + _driven(m)
@@ -53,13 +54,14 @@ def momentum_scale(m: Mechanics) -> tuple[Any, str]:
     return swing, "angular momentum that the loads can build up"
 
 
-def rotational_scale(m: Mechanics) -> tuple[Any, str]:
-    """Initial rotational energy, plus M g l about a fixed point."""
+def rotational_scale(m: Mechanics, *, kept: bool = False) -> tuple[Any, str]:
+    """Initial rotational energy, plus M g l about a fixed point; if ``kept``, without what drives lend."""
     scene, context = m.scene, m.scene.context
-    momentum = apply(scene.body.inertia, scene.angular_velocity)
+    momentum = apply(scene.turning_inertia, scene.angular_velocity)
     kinetic = dot(scene.angular_velocity, momentum) / 2
     for carrier in m.carriers:
-        kinetic += carrier.carried_at_start(scene)[1]
+        if not (kept and lends(carrier)):
+            kinetic += carrier.carried_at_start(scene)[1]
     carried = context.maximum(scene.body.principal_moments) * source_rate(scene) ** 2 / 2
     amplitude = potential_amplitude(scene) + loads_amplitude(scene) + carried + _driven(m)
     if kinetic + amplitude == 0:
@@ -68,10 +70,15 @@ def rotational_scale(m: Mechanics) -> tuple[Any, str]:
     return kinetic + amplitude, name
 
 
-def energy_scale(m: Mechanics) -> tuple[Any, str]:
+def kept_energy_scale(m: Mechanics) -> tuple[Any, str]:
+    """The same for ``Mechanics.kept_energy``."""
+    return energy_scale(m, kept=True)
+
+
+def energy_scale(m: Mechanics, *, kept: bool = False) -> tuple[Any, str]:
     """Energy scale: ``rotational_scale`` plus the largest kinetic energy of the flight."""
     scene, context = m.scene, m.scene.context
-    scale, name = rotational_scale(m)
+    scale, name = rotational_scale(m, kept=kept)
     if m.velocity is None or scene.velocity is None:
         return scale, name
     pull = norm(context, scene.gravity) if scene.gravity else context.zero
@@ -131,13 +138,13 @@ def _momentum_kept(m: Mechanics) -> str | None:
 
 
 def _conservative(m: Mechanics) -> str | None:
-    if not m.conserves_energy:
+    if not m.conserves_energy or m.lent_energy is not None:
         return None
     return "all loads have a potential that doesn't depend on time" if m.loads else "no load acts"
 
 
 def _rotation_alone(m: Mechanics) -> str | None:
-    return _torque_free(m) if m.scene.free_flight and not m.driven_within else None
+    return _torque_free(m) if m.scene.free_flight and not m.drives_work else None
 
 
 def _vertical_only(m: Mechanics) -> str | None:
@@ -201,7 +208,22 @@ def _euler_poles(m: Mechanics) -> Poles | None:
 
 def _energy_balance(m: Mechanics) -> list[Symbolic]:
     unit = m.scene.context.ldexp(m.scene.context.one, m.work_unit - m.scaling.energy)
-    return [m.energy - m.number(unit) * hy.make_vars(WORK)]
+    return [m.kept_energy - m.number(unit) * hy.make_vars(WORK)]
+
+
+def _work(m: Mechanics) -> list[Symbolic]:
+    """The state, and what drives have put into what they drive since the start."""
+    state = hy.make_vars(WORK)
+    if m.lent_energy is None:
+        return [state]
+    unit = m.scene.context.ldexp(m.scene.context.one, m.work_unit - m.scaling.energy)
+    lent = [x.carried_at_start(m.scene)[1] for x in m.carriers if lends(x)]
+    begun = m.scene.context.ldexp(sum(lent, m.scene.context.zero), -m.scaling.energy)
+    return [hy.sum([m.number(unit) * state, m.lent_energy, hy.expression(m.number(-begun))])]
+
+
+def _work_exponent(m: Mechanics) -> int:
+    return m.work_unit if m.lent_energy is None else m.scaling.energy
 
 
 def linear_momentum(m: Mechanics) -> list[Symbolic]:
@@ -274,7 +296,7 @@ register_all(
     Observable(
         "jacobi_constant", (), "J", "Jacobi's constant", lambda m: [jacobi_constant(m)],
         same_unit(ENERGY, 1), "", ("jacobi",),
-        _rests_in_orbit, energy_scale,
+        _rests_in_orbit, kept_energy_scale,
     ),
     Observable(
         "kovalevskaya_constant", (), "rad4 s-4", "Kovalevskaya's constant",
@@ -293,13 +315,13 @@ register_all(
         first_integrals.goryachev_chaplygin_scale,
     ),
     Observable(
-        "work", (), "J", "work of the loads without a potential", lambda m: [hy.make_vars(WORK)],
-        same_unit(lambda m: m.work_unit, 1), "", ("work",),
+        "work", (), "J", "work of the loads without a potential", _work,
+        same_unit(_work_exponent, 1), "", ("work",),
     ),
     Observable(
         "energy_balance", (), "J", "energy less the work done", _energy_balance,
         same_unit(ENERGY, 1), "", ("work",), lambda m: "energy changes by the work of the loads",
-        energy_scale,
+        kept_energy_scale,
     ),
     Observable(
         "rotational_energy", (), "J", "kinetic energy of rotation",

@@ -84,6 +84,9 @@ _NO_VERTICAL = _unless(
 _NO_POINT_MASSES = _unless(
     lambda scene: scene.bodies is not None, "there are no [[bodies]]; add them, or leave it out"
 )
+_NO_ROTORS = _unless(
+    lambda scene: scene.tabled.get("rotors"), "there are no [[rotors]]; add them, or leave it out"
+)
 _NO_SOURCE = _unless(
     lambda scene: first_source(loads_of(scene)) is not None,
     "no load has a source whose direction it would count from (gravity_gradient, central_gravity, or "
@@ -144,6 +147,8 @@ NEEDS: dict[str, Need] = {
             m.velocity is not None and m.attitude is not None and fixed_axes.attracting_line(m) is not None
         )
     ),
+    "rotors": Need(lambda m: bool(m.scene.tabled.get("rotors")), missing=_NO_ROTORS),
+    "fixed_rotors": Need(lambda m: m.lent_energy is not None and not m.driven_within, missing=_NO_ROTORS),
     "point_masses": Need(lambda m: m.scene.bodies is not None, missing=_NO_POINT_MASSES),
     "free_fall": Need(lambda m: m.velocity is not None and fixed_axes.falls_freely(m)),
     "attractor": Need(lambda m: m.velocity is not None and any(isinstance(x, Attracting) for x in m.loads)),

@@ -141,7 +141,7 @@ def _flat(vectors: Sequence[list[Symbolic]]) -> list[Symbolic]:
 def _kept(m: Mechanics) -> str | None:
     if not _masses(m).full:
         return "the point masses feel each other's gravity alone"
-    if m.driven_within or any(not isinstance(load, Reacting) for load in m.acting):
+    if m.drives_work or any(not isinstance(load, Reacting) for load in m.acting):
         return None
     return "all forces are those of the bodies on each other"
 

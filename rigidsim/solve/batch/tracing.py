@@ -25,7 +25,7 @@ from rigidsim.scene.tracing.numbers import Graph, Traced, Untraceable
 from rigidsim.solve.precision import precision_of
 from rigidsim.solve.problem import InitialValueProblem, prepare
 
-TRACED_TABLES = ("body", "initial", "loads", "parameters")
+TRACED_TABLES = ("body", "initial", "loads", "rotors", "parameters")
 """Config tables whose numbers may become parameters."""
 _PARAMETER = "swept_"
 

@@ -1,0 +1,322 @@
+"""Gyrostats against equations of their own, closed forms, and what is known of their stability."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Any
+
+import heyoka as hy
+import numpy as np
+import pytest
+from gyrostats import Wheel, exact, followed
+from scipy.integrate import solve_ivp
+from scipy.spatial.transform import Rotation
+from support import config, loaded, run_text, same_bits, wide
+
+import rigidsim
+
+MOMENTS, RATES = [1, 2, 2.5], [0.3, 1.0, 0.5]
+FREE = Wheel([1, 0.5, -0.3], 0.2, 3)
+FIXED = Wheel([0, 1, 0], 0.1, -2, fixed=True)
+DRIVEN = Wheel(
+    [0, 0, 1], 0.3, -4, torque=lambda t, w, r: exact("0.05") * hy.sin(t) - exact("0.1") * w[2] * r[0][0]
+)
+MOTOR = "0.05*sin(t) - 0.1*wz*(1 - 2*(qy^2 + qz^2))"
+
+
+def scene(
+    *wheels: Wheel, end: float, samples: int = 21, motors: dict[int, str] | None = None, **more: str
+) -> str:
+    """A scene's text; ``more`` as for ``support.config``, its ``integrator`` and ``loads`` for instance."""
+    tables = ""
+    for k, wheel in enumerate(wheels):
+        tables += f'[[rotors]]\nname = "w{k}"\naxis = {list(wheel.axis)}\n'
+        tables += f"moment = {wheel.moment}\nrate = {wheel.rate}\nfixed = {str(wheel.fixed).lower()}\n"
+        tables += f'torque = "{motors[k]}"\n' if motors and k in motors else ""
+    body = more.pop("body", f"principal_moments = {MOMENTS}")
+    initial = more.pop("initial", f"angular_velocity = {RATES}")
+    return config(body=body, initial=initial, time=f"end = {end}\nsamples = {samples}", **more) + tables
+
+
+def matrices(data: Any) -> np.ndarray:
+    """Rotation matrices of a dataset's quaternions, with all their digits."""
+    w, x, y, z = wide(data, "quaternion").T
+    rows = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+    ]
+    return np.moveaxis(np.array(rows), 2, 0)
+
+
+def assert_followed(data: Any, truth: tuple[np.ndarray, np.ndarray, np.ndarray], within: float) -> None:
+    rates, attitudes, spins = truth
+    assert np.abs(wide(data, "angular_velocity") - rates).max() <= within * np.abs(rates).max()
+    assert np.abs(matrices(data) - attitudes).max() <= within
+    assert np.abs(wide(data, "rotor_rate") - spins).max() <= within * max(1, float(np.abs(spins).max()))
+
+
+# --- against equations of their own -------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("integrator", "within"),
+    [
+        ('precision = "double"\nhold_invariants = true', 1e-12),
+        ('precision = "extended"\nhold_invariants = true', 1e-15),
+    ],
+    ids=["double", "80 bits"],
+)
+def test_several_rotors_over_a_thousand_radians(integrator: str, within: float) -> None:
+    wheels = (FREE, FIXED, Wheel([0, 1, 1], 0.1, 1))
+    data = run_text(scene(*wheels, end=1000, integrator=integrator)).dataset
+    assert_followed(data, followed(MOMENTS, wheels, RATES, np.eye(3), data["time"].values), within)
+
+
+@pytest.mark.parametrize("formulation", ["quaternion", "rotation_matrix", "euler_angles"])
+@pytest.mark.parametrize(
+    ("precision", "within"),
+    # rounding in some hundreds of steps, amplified a few times by the motion
+    [('"single"', 2e-4), ('"double"', 5e-13), ('"extended"', 2e-16), ('"quadruple"', 1e-18), ("50", 1e-18)],
+)
+def test_free_fixed_and_driven_rotors_in_every_formulation(
+    formulation: str, precision: str, within: float
+) -> None:
+    if formulation != "quaternion" and precision not in ('"double"', '"extended"'):
+        pytest.skip("one formulation is enough")
+    wheels = (FREE, DRIVEN, FIXED)
+    integrator = f'precision = {precision}\nformulation = "{formulation}"'
+    run = run_text(scene(*wheels, end=50, motors={1: MOTOR}, integrator=integrator))
+    times = run.dataset["time"].values
+    assert_followed(run.dataset, followed(MOMENTS, wheels, RATES, np.eye(3), times), within)
+    rows = run.summary["invariants"]
+    assert {name for name, row in rows.items() if not row["numerical"]} == {
+        "angular_momentum", "angular_momentum_norm", "energy_balance",
+    }  # fmt: skip
+    assert all(row["largest_drift"] <= row["bound"] for row in rows.values())
+
+
+def test_rates_alone_are_enough() -> None:
+    text = scene(FREE, FIXED, end=50, integrator='formulation = "rates"')
+    data = run_text(text, 'output.record=["angular_velocity", "rotor_rate"]').dataset
+    rates, _, spins = followed(MOMENTS, (FREE, FIXED), RATES, np.eye(3), data["time"].values)
+    np.testing.assert_allclose(data["angular_velocity"].values, rates.astype(float), rtol=0, atol=2e-13)
+    np.testing.assert_allclose(data["rotor_rate"].values, spins.astype(float), rtol=0, atol=2e-13)
+
+
+def test_a_wheel_whose_momentum_dwarfs_the_bodys() -> None:
+    wheel = Wheel([1, 2, 3], 0.05, 3000)
+    run = run_text(scene(wheel, end=20), estimate=True)
+    truth = followed(MOMENTS, (wheel,), RATES, np.eye(3), run.dataset["time"].values)
+    # 1500 rad of nutation, to whose frequency h / I the rounding of h alone adds 1e-16
+    assert_followed(run.dataset, truth, 5e-13)
+    error = np.abs(matrices(run.dataset) - truth[1]).max()
+    assert error / 3 <= run.summary["accuracy"]["estimated_attitude_error"] <= 10 * error
+
+
+def test_the_gradient_of_gravity_feels_the_whole_tensor() -> None:
+    """On an eccentric orbit, against scipy: the rates by I_b, the torque by I."""
+    load = (
+        'kind = "gravity_gradient"\ngravitational_parameter = 1\n'
+        "orbit = {semi_major_axis = 1, eccentricity = 0.2, mean_anomaly = 0.3}"
+    )
+    data = loaded(run_text(scene(FREE, FIXED, end=20, loads=load)))
+    inertia = np.diag(MOMENTS).astype(float)
+    a = np.array(FREE.axis) / np.linalg.norm(FREE.axis)
+    turning = inertia - FREE.moment * np.outer(a, a)
+    h = FREE.moment * (FREE.rate + a @ RATES) * a + FIXED.moment * FIXED.rate * np.array(FIXED.axis)
+
+    def place(time: float) -> np.ndarray:
+        mean, e = time + 0.3, 0.2
+        anomaly = mean
+        for _ in range(50):
+            anomaly -= (anomaly - e * np.sin(anomaly) - mean) / (1 - e * np.cos(anomaly))
+        return np.array([np.cos(anomaly) - e, np.sqrt(1 - e * e) * np.sin(anomaly), 0.0])
+
+    def slope(time: float, state: np.ndarray) -> np.ndarray:
+        momentum, matrix = state[:3], state[3:].reshape(3, 3)
+        w = np.linalg.solve(turning, momentum - h)
+        seen = matrix.T @ place(time)
+        torque = 3 / np.linalg.norm(seen) ** 5 * np.cross(seen, inertia @ seen)
+        return np.concatenate([np.cross(momentum, w) + torque, (matrix @ np.cross(np.eye(3), w)).ravel()])
+
+    start = np.concatenate([turning @ RATES + h, np.eye(3).ravel()])
+    found = solve_ivp(slope, (0, 20), start, "DOP853", data["time"].values, rtol=1e-13, atol=1e-14).y.T
+    # that scipy's own steps leave
+    np.testing.assert_allclose(matrices(data).astype(float), found[:, 3:].reshape(-1, 3, 3), atol=5e-11)
+
+
+def test_a_rotor_along_the_axis_of_a_symmetric_body_nutates_as_in_closed_form() -> None:
+    """w_x + i w_y turns at ((C_b - A) w_z + h) / A, and w_z stays; the tensor that turns has the axial moment
+    C_b = C - J.
+    """
+    a, c, j, s, end = 2.0, 3.0, 0.5, 7.0, 100.0
+    data = loaded(
+        run_text(scene(Wheel([0, 0, 1], j, s), end=end, body=f"principal_moments = [{a}, {a}, {c}]"))
+    )
+    h = j * (s + RATES[2])
+    phase = ((c - j - a) * RATES[2] + h) / a * data["time"].values
+    across = (RATES[0] + 1j * RATES[1]) * np.exp(1j * phase)
+    exact_ones = np.array([across.real, across.imag, np.full(len(phase), RATES[2])]).T
+    np.testing.assert_allclose(data["angular_velocity"].values, exact_ones, rtol=0, atol=5e-13)
+    np.testing.assert_allclose(data["rotor_rate"].values[:, 0], s, rtol=1e-13)
+
+
+# --- limits and invariants ----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("still", [Wheel([0, 1, 0], 0.1, 0, fixed=True), Wheel([1, 1, 0], 0, 5, fixed=True)])
+def test_a_locked_rotor_is_part_of_the_body_bit_for_bit(still: Wheel) -> None:
+    run = run_text(scene(still, end=20))
+    alone = run_text(scene(end=20))
+    same_bits(loaded(run).drop_vars(["rotor", "rotor_rate"]), alone)
+    assert list(run.dataset["rotor"].values) == ["w0"]
+    assert set(run.dataset["rotor_rate"].values.ravel()) == {float(still.rate)}
+
+
+def test_a_free_gyrostat_keeps_energy_and_the_whole_momentum() -> None:
+    run = run_text(scene(FREE, end=20))
+    data, rows = loaded(run), run.summary["invariants"]
+    assert {name for name, row in rows.items() if not row["numerical"]} == {
+        "angular_momentum", "angular_momentum_norm", "energy",
+    }  # fmt: skip
+    w, s = data["angular_velocity"].values, data["rotor_rate"].values[:, 0]
+    a = np.array(FREE.axis) / np.linalg.norm(FREE.axis)
+    momentum = MOMENTS * w + FREE.moment * s[:, None] * a
+    turned = Rotation.from_matrix(matrices(data).astype(float)).apply(momentum)
+    np.testing.assert_allclose(data["angular_momentum"].values, turned, atol=1e-13)
+    np.testing.assert_allclose(turned, np.tile(turned[0], (len(turned), 1)), atol=1e-13)
+    energy = (MOMENTS * w**2).sum(axis=1) / 2 + FREE.moment * (s * (w @ a) + s**2 / 2)
+    np.testing.assert_allclose(data["energy"].values, energy, rtol=1e-13)
+    assert np.ptp((MOMENTS * w**2).sum(axis=1)) > 0.01  # which the body alone doesn't keep
+
+
+def test_a_motor_that_keeps_a_rate_works_and_leaves_the_energy_of_the_locked_body() -> None:
+    run = run_text(scene(FIXED, end=20))
+    data, rows = loaded(run), run.summary["invariants"]
+    assert {name for name, row in rows.items() if not row["numerical"]} == {
+        "angular_momentum", "angular_momentum_norm", "body_energy",
+    }  # fmt: skip
+    w = data["angular_velocity"].values
+    np.testing.assert_allclose(data["body_energy"].values, (MOMENTS * w**2).sum(axis=1) / 2, rtol=1e-14)
+    whole = data["body_energy"].values + FIXED.moment * FIXED.rate * (w[:, 1] + FIXED.rate / 2)
+    np.testing.assert_allclose(data["energy"].values, whole, rtol=1e-13)
+    assert np.ptp(data["energy"].values) > 0.01
+
+
+def test_energy_changes_by_the_work_of_the_motors() -> None:
+    data = loaded(run_text(scene(FREE, DRIVEN, FIXED, end=20, samples=2001, motors={1: MOTOR})))
+    w, s, t = data["angular_velocity"].values, data["rotor_rate"].values, data["time"].values
+    motor = 0.05 * np.sin(t) - 0.1 * w[:, 2] * matrices(data)[:, 0, 0].astype(float)
+    power = motor * s[:, 1]
+    steps = np.diff(t)[0] * (power[1:] + power[:-1]) / 2
+    work = np.concatenate([[0], np.cumsum(steps)]) + FIXED.moment * FIXED.rate * (w[:, 1] - w[0, 1])
+    # the trapezoidal rule's own error, h^2 / 12 times the change of the power's slope
+    np.testing.assert_allclose(data["work"].values, work, atol=2e-5)
+    kept = data["energy"].values - data["work"].values
+    np.testing.assert_allclose(kept, kept[0], rtol=1e-13)
+
+
+def test_on_a_circle_jacobis_constant_includes_the_rotors() -> None:
+    load = 'kind = "gravity_gradient"\ngravitational_parameter = 1\norbit = {semi_major_axis = 1}'
+    run = run_text(scene(FREE, FIXED, end=50, loads=load))
+    rows = run.summary["invariants"]
+    assert {"jacobi_constant", "energy_balance"} == {
+        name for name, row in rows.items() if not row["numerical"]
+    }
+    assert all(row["largest_drift"] <= row["bound"] for row in rows.values())
+
+
+def test_a_momentum_given_at_the_start_includes_the_rotors() -> None:
+    run = run_text(scene(FREE, FIXED, end=1, initial="angular_momentum = [1, 2, 3]"))
+    np.testing.assert_allclose(run.dataset["angular_momentum"].values[0], [1, 2, 3], rtol=1e-14)
+
+
+# --- stability ----------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("fixed", [True, False])
+@pytest.mark.parametrize("excess", [-0.5, -0.05, 0.05, 0.5])
+def test_a_wheel_along_the_intermediate_axis_steadies_a_spin_about_it(excess: float, fixed: bool) -> None:
+    """From the linearised equations of moments A < B < C and a spin w2, with L2 = B w2 + J s,
+
+        A w1' = (L2 - C w2) w3,    C w3' = (A w2 - L2) w1,
+
+    so that it is stable if and only if J s > (C - B) w2, or J s < -(B - A) w2 (Hughes 1986, section 6.3).
+    """
+    a, b, c, w2, tilt = 1.0, 2.0, 2.5, 1.0, 1e-8
+    momentum = (c - b) * w2 * (1 + excess)
+    wheel = Wheel([0, 1, 0], 0.1, momentum / 0.1, fixed=fixed)
+    body, initial = f"principal_moments = [{a}, {b}, {c}]", f"angular_velocity = [{tilt}, {w2}, 0]"
+    data = loaded(run_text(scene(wheel, end=30, samples=61, body=body, initial=initial)))
+    along = b * w2 + momentum
+    squared = (along - c * w2) * (a * w2 - along) / (a * c)
+    expected = tilt * np.cosh(np.sqrt(complex(squared)) * data["time"].values).real
+    # what is quadratic in the tilt changes w2, and with it the exponent
+    largest = np.abs(expected).max()
+    np.testing.assert_allclose(data["angular_velocity"].values[:, 0], expected, atol=1e-4 * largest)
+    assert (squared < 0) == (excess > 0)
+
+
+# --- whole workflows ----------------------------------------------------------------------------------------
+
+
+def test_members_of_a_sweep_are_their_single_runs(tmp_path: Path) -> None:
+    text = scene(FREE, DRIVEN, end=10, samples=5, motors={1: "-k*wz"}, more="[parameters]\nk = 0.1\n")
+    text += '[sweep]\nkeep = ["final"]\naxes."rotors[0].rate" = {values = [-3, 0, 2]}\n'
+    text += 'axes."rotors[0].moment" = {values = [0.1, 0.2]}\naxes."parameters.k" = {values = [0.1, -0.2]}\n'
+    swept = rigidsim.sweep(rigidsim.parse(text), out=tmp_path)
+    data = swept.dataset
+    assert all(engine.startswith("batch of") for engine in swept.summary["engines"])
+    for rate, moment, k in ((-3, 0.1, 0.1), (2, 0.2, -0.2)):
+        single = text.partition("[sweep]")[0]
+        changes = [f"rotors[0].rate={rate}", f"rotors[0].moment={moment}", f"parameters.k={k}"]
+        last = run_text(single, *changes).dataset["angular_velocity"].values[-1]
+        member = data["angular_velocity_final"].sel(rate=rate, moment=moment, k=k).values
+        np.testing.assert_allclose(member, last, rtol=0, atol=1e-13)
+
+
+def test_it_is_told() -> None:
+    made = rigidsim.plan(rigidsim.parse(scene(FREE, DRIVEN, FIXED, end=5, motors={1: MOTOR})))
+    free, driven, fixed = made.loads
+    assert re.match(r"rotor w0: 0.2 kg m\^2 about \(0.86.*free, 3 rad/s relative to the body", free)
+    assert "about the body's z axis" in driven
+    assert "driven by a motor of 0.05*sin(t)" in driven
+    assert "kept at -2 rad/s" in fixed
+    assert "momentum of rotor w1 about its axis, which its motor changes" in str(made.as_dict())
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        (["rotors[0].moment=3"], "more than the body's own about this axis, 1.2"),
+        (["rotors[0].moment=1.05"], "principal moments .* which no body has"),
+        (["rotors[0].moment=0"], "given 0; a positive moment is allowed"),
+        (["rotors[0].moment=-1"], "given -1; a positive moment is allowed"),
+        (["rotors[0].axis=[0, 0, 0]"], "a direction is needed"),
+        (["rotors[0].fixed=true", 'rotors[0].torque="1"'], "given beside fixed = true"),
+        (['rotors[0].torque="wq"'], "wq"),
+        (['rotors[0].torque="1 kg"'], "N m"),
+        (['rotors[0].name="a b"'], "letters, digits and underscores"),
+        (['rotors[0].rate="3 m"'], "rad/s"),
+        (["rotors[0].spin=3"], "spin"),
+        (['body={principal_moments = [0, 1, 1]}', "initial.angular_velocity=[0, 1, 0]"], "all three moments"),
+        (['integrator.formulation="canonical"'], "rotor w0 carries angular momentum beside the body"),
+        (['integrator.method="closed_form"'], "has no closed form"),
+    ],
+)  # fmt: skip
+def test_nonsense_is_refused(changes: list[str], message: str) -> None:
+    with pytest.raises(rigidsim.ConfigError, match=message):
+        run_text(scene(FREE, end=5), *changes)
+
+
+def test_names_are_different() -> None:
+    text = scene(FREE, FIXED, end=5).replace('"w1"', '"w0"')
+    with pytest.raises(rigidsim.ConfigError, match='two rotors are named "w0"'):
+        rigidsim.parse(text)
+
+
+def test_without_rotors_there_are_no_rates_of_them() -> None:
+    with pytest.raises(rigidsim.ConfigError, match=r"there are no \[\[rotors\]\]"):
+        run_text(scene(end=5), 'output.record=["rotor_rate"]')
