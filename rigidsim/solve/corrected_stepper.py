@@ -51,9 +51,7 @@ _NEAR = 3  # number of steps up to which they are sooner taken one by one than t
 
 
 class CorrectedStepper:
-    """Takes steps and applies effects when they are due, at most ``stride`` natural steps apart (which
-    affects results within rounding). With ``whole_times`` time is a single number at each stride's start.
-    """
+    """Takes steps and applies effects when they are due, at most ``stride`` natural steps apart."""
 
     def __init__(self, stepper: Stepper, effects: Sequence[Effect], *, stride: int = STRIDE) -> None:
         self.stepper, self.effects, self._longest_stride = stepper, tuple(effects), stride

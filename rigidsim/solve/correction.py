@@ -98,9 +98,7 @@ def damping_between(low: int, high: int, context: mpmath.MPContext) -> mpmath.mp
 def least_correction(
     gradients: list[list[Symbolic]], wanted: list[Symbolic], damping: Scalar
 ) -> list[Symbolic]:
-    """Least change of the state that removes r from the residuals, J^T (J J^T + damping)^-1 r; J has one row
-    for each residual, of order one.
-    """
+    """Least change of the state that removes residuals, J^T (J J^T + damping)^-1 r, with J of order one."""
     m = len(wanted)
     pairs = [[zip(gradients[a], gradients[b], strict=True) for b in range(m)] for a in range(m)]
     gram = [[hy.sum([x * y for x, y in pair]) for pair in row] for row in pairs]

@@ -37,10 +37,7 @@ class Driver:
         solver.begin(clock, self.buffer, self.progress, None if start is None else start.boundary)
 
     def position(self) -> Position:
-        """Where to continue after the samples that were handed over.
-
-        After the last sample this is the start of the step that holds it: a later end has samples in there.
-        """
+        """Where to continue: after the last sample, at the start of the step that holds it."""
         return Position(self.buffer.boundary or self.solver.boundary(), self.buffer.handed)
 
     def run(self) -> Progress:
@@ -96,9 +93,7 @@ class Driver:
             self.progress.integration_seconds += time.perf_counter() - started
 
     def _hand_over(self, *, patiently: bool = False) -> Status | None:
-        """Hand over what was found; a status if the receiver ended the run at one of the samples, or Ctrl-C
-        came while something that samples need was being compiled: those not taken are found again.
-        """
+        """Hand over what was found; a status if that ends the run, by the receiver or by Ctrl-C."""
         try:
             refused = self.buffer.hand_over(patiently=patiently)
         except KeyboardInterrupt as signal:

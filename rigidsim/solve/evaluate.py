@@ -82,10 +82,7 @@ class _PartnerChart:
 
 
 class Evaluator:
-    """Evaluates a system's outputs on blocks of states; ``initial`` are the initial values of the invariants'
-    components, in internal units, and ``code`` is one of the compiled functions, for provenance. Angles
-    between sparse samples are followed if that is ``countable``.
-    """
+    """Evaluates a system's outputs on blocks of states; angles are followed if they are ``countable``."""
 
     version: ClassVar[int] = 1
 

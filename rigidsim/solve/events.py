@@ -178,9 +178,7 @@ _WORTH_A_UNIT = 1  # bits above one; a smaller excess loosens nothing
 def of_order_one(
     system: System, expressions: Sequence[hy.expression], meant: Sequence[hy.expression]
 ) -> list[hy.expression]:
-    """Expressions scaled for the engine by powers of two; their zeros are unchanged, and ``meant`` are the
-    same without the small offsets that keep them off a zero.
-    """
+    """Expressions scaled by powers of two; ``meant`` are the same without what keeps them off a zero."""
     if not expressions:
         return []
     return [

@@ -56,9 +56,7 @@ class LyapunovSpectrum:
 
 @dataclass
 class Convergence:
-    """Progress of a spectrum: plain float64 arrays with everything needed to resume with the same bits. The
-    state is the system's with the orthogonalised tangent vectors; empty at the start.
-    """
+    """Progress of a spectrum, float64, to be resumed with the same bits; empty at the start."""
 
     number: int = 0
     state: np.ndarray = field(default_factory=lambda: np.zeros(0))

@@ -117,9 +117,7 @@ def prepare_scene(
     tolerance: float | None = None,
     along: Average | None = None,
 ) -> InitialValueProblem:
-    """Like ``prepare``, for a scene that differs from the experiment's own; ``along`` is the average, already
-    chosen, of a motion that this scene is a part of.
-    """
+    """Like ``prepare``, for another scene; ``along`` is the average of a motion that it is a part of."""
     loads = own_loads(loads)
     try:
         precision = precision_of(scene.config.integrator.precision)
@@ -216,9 +214,7 @@ def _check_tolerance(tolerance: mpmath.mpf, precision: Precision) -> None:
 
 
 def _refuse_spectrum(system: System) -> None:
-    """Refuse a Lyapunov spectrum where variational equations end unknown to it: where the motion switches
-    sides, and at the rows of tabulated orbits.
-    """
+    """Refuse a Lyapunov spectrum where variational equations end: at switches, and rows of tables."""
     found = system.plan.surfaces.found
     if not system.scene.config.output.lyapunov or (not found and system.pieces is None):
         return
@@ -257,9 +253,7 @@ def _refuse_non_finite_start(system: System, precision: Precision) -> None:
 
 
 def double_twin(prepared: InitialValueProblem) -> System:
-    """The same motion in double precision and, where an attitude is carried, in quaternions: for questions
-    about the motion itself, such as its stability.
-    """
+    """The same motion in double precision and, if possible, in quaternions, for questions about itself."""
     config, own = prepared.scene.config, prepared.system.formulation
     if own.twin is None:
         return prepared.system.rounded(precision_of("double").number)

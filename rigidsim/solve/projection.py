@@ -163,10 +163,7 @@ class Projection:
         row[2:] = np.concatenate(self._low.parts(state))
 
     def begin(self, state: np.ndarray, time: Scalar) -> None:
-        """Correct a state in place for the first time, and from now on.
-
-        The integral of the residuals so far, which moved the phase, is taken over the noted states.
-        """
+        """Correct for the first time: the residuals' integral so far is taken over the noted states."""
         chart, integrals = self._chart, self._sums[: len(self.names)]
         self.use(0)
         self._then[:] = first = self.residuals(self._low.array(self._system.initial))

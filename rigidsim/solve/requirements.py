@@ -25,9 +25,7 @@ class Requirement(Protocol):
     each: bool
 
     def meet(self, integrator: TaylorEngine) -> Scalar | None:
-        """Set it for the boundary where the integrator is; returns the time beyond which no step may go from
-        there, None for any.
-        """
+        """Set it where the integrator is; returns the time beyond which no step may go, None for any."""
 
 
 def requirement_of(system: System) -> Requirement | None:
@@ -68,9 +66,7 @@ class TableRows:
 
 
 class SecondNumber:
-    """The second number of the time, a parameter of equations in which something happens at a moment late in
-    the run, within a short while.
-    """
+    """The second number of the time, where something happens late in the run, within a short while."""
 
     each = True
 
@@ -96,9 +92,7 @@ def after_each_step(
 
 
 def propagation(system: System) -> Callable[[Any, Any, int], Any]:
-    """``propagate_until`` for engines, single or batch, of a system that needs no more than both numbers of
-    the time: a function of the engine, the time or times, and the most steps.
-    """
+    """``propagate_until`` of engines, single or batch, of a system without tables: to times, with most steps."""
     requirement = requirement_of(system)
 
     def propagate(integrator: Any, until: Any, most: int) -> Any:

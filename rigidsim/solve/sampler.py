@@ -201,9 +201,7 @@ class SampleBuffer:
         return None
 
     def _waiting_until(self, stop: int) -> tuple[SampleBlock, dict[int, StepBoundary]]:
-        """Take out the waiting samples before ``stop``, and for each piece in which they were found a
-        boundary before it, by the piece's first sample.
-        """
+        """Take out the waiting samples before ``stop``, and boundaries before each piece, by its first."""
         firsts = [block.first for block in self._blocks]
         pieces = bisect_left(firsts, stop)
         blocks, boundaries = self._blocks[:pieces], self._boundaries[:pieces]

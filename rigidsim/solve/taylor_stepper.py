@@ -64,9 +64,7 @@ class TaylorStepper(Stepper):
         self.begun = TaylorStepper.mark(self)
 
     def bound_first_step(self) -> None:
-        """Bound the first step of a motion whose series at the start have gaps where the engine looks, for
-        instance from rest. It must stand at its start.
-        """
+        """Bound the first step, from the start, of series with gaps where the engine looks."""
         if self.single_steps:  # which are seen to one by one
             return
         self._meet()
@@ -165,9 +163,7 @@ class TaylorStepper(Stepper):
         return bool(self._integrator.dtime[1] == 0)
 
     def to_whole_time(self) -> bool:
-        """Go to the high part of time, by a step of at most half its last bit in either direction; stays and
-        returns False if that takes too many natural steps.
-        """
+        """Go to the high part of time; stays and returns False if that takes too many natural steps."""
         engine = self._integrator
         time, state = engine.dtime, np.array(engine.state)
         if time[1] == 0:
@@ -246,9 +242,7 @@ class TaylorStepper(Stepper):
         return False
 
     def block(self, count: int) -> tuple[bool, Callable[[np.ndarray], np.ndarray]]:
-        """Take at most ``count`` steps with dense output, fewer at a limit of time: whether all went well,
-        and a function from times (n,) to states (n, states).
-        """
+        """As ``skip``, with dense output: a function from times (n,) to states (n, states)."""
         return self._propagate(self._meet(), count, c_output=True, write_tc=self.watcher is not None)
 
     def _propagate(self, until: Scalar | None, count: int, **options: bool) -> tuple[bool, Any]:

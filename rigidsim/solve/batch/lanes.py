@@ -57,9 +57,7 @@ class LaneResults:
 
 @dataclass(frozen=True)
 class BatchSystem:
-    """What a batch integrator is compiled from: equations and events (with directions) over heyoka's
-    variables and ``par``, and the number of parameters that both read.
-    """
+    """Equations and events (with directions) over heyoka's variables and ``par``, the parameters of both."""
 
     equations: Sequence[tuple[Any, Any]]
     events: Sequence[tuple[Any, int]]

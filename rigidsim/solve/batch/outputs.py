@@ -30,9 +30,7 @@ class BatchOutputs:
         self._growth = {r.first for r in self._system.recorded if r.name == GROWTH}
 
     def _compiled(self, expressions: list[Any], states: int) -> tuple[Any, list[int]]:
-        """A compiled function of states, and the indices of the states, and of the parameters after them,
-        that it takes.
-        """
+        """A compiled function of states, and the indices of the states and parameters that it takes."""
         variables = [*self._system.variables[:states], *self._traced.parameters.variables]
         names = set(hy.get_variables([hy.expression(x) for x in expressions]))
         read = [n for n, variable in enumerate(variables) if str(variable) in names] or [0]
@@ -42,9 +40,7 @@ class BatchOutputs:
 
     @cached_property
     def _parts(self) -> tuple[list[int], list[Any], list[Any]]:
-        """Indices of the outputs that depend on the motion alone, their expressions, and that of the
-        growth.
-        """
+        """Rows and expressions of the outputs of the motion alone, and the growth's expressions."""
         outputs = list(enumerate(self._system.outputs))
         of_motion = [(row, x) for row, x in outputs if row not in self._growth]
         growth = [x for row, x in outputs if row in self._growth]
@@ -87,9 +83,7 @@ class BatchOutputs:
         return [table[row] for row in range(len(table))]
 
     def named(self, found: Sequence[np.ndarray], numbers: Numbers, part: np.ndarray) -> tuple[Values, Values]:
-        """Outputs, each (samples, m), as recorded variables (samples, m, components), SI, and drifts by
-        invariant.
-        """
+        """Outputs, each (samples, m), as recorded variables (samples, m, components), SI, and drifts."""
         values = self._in_si(found, numbers, part)
         first = len(self._system.outputs) - len(self._system.invariants)
         drifts = {

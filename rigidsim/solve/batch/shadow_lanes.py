@@ -18,9 +18,7 @@ _LANES = 8
 
 
 class ShadowLanes:
-    """Batch integrator of the motion alone, without its tangent vectors and events, as wide as the one that
-    ran the members; tolerance None is for epsilon.
-    """
+    """Batch integrator of the motion alone, as wide as the members' or wider; no tolerance is epsilon."""
 
     def __init__(self, traced: TracedSystem, width: int, tolerance: float | None) -> None:
         self.tolerance, self._traced, moving = tolerance, traced, traced.moving
@@ -44,15 +42,11 @@ class ShadowLanes:
         return self._engine.longest(starts.states, self.read(starts), starts.begin)
 
     def at_samples(self, starts: Starts, times: np.ndarray, most: int) -> np.ndarray:
-        """States (samples, states, motions), nan from where a motion ended, at times (samples, motions), with
-        so many steps each at most.
-        """
+        """States (samples, states, motions) at times (samples, motions), nan from where a motion ended."""
         return self._engine.run(starts.states, self.read(starts), starts.begin, times, most).states
 
     def onward(self, steps: int, *given: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """As ``BatchEngine.onward``: states and times after so many steps, or at the ends, not finite if
-        lost; and the steps taken (n,).
-        """
+        """As ``BatchEngine.onward``; what is lost isn't finite, while its neighbours go on."""
         onward: Any = self._engine.onward
         found, times, taken = onward(*given, steps)
         lost = ~np.isfinite(found).all(axis=0)
@@ -80,9 +74,7 @@ class MemberCarrier:
     def advance(
         self, which: np.ndarray, states: np.ndarray, begin: np.ndarray, end: np.ndarray, steps: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """See ``EnsembleCarrier``. After as many steps lanes are at slightly different times, and the
-        equations bring them to one.
-        """
+        """See ``EnsembleCarrier``: lanes arrive at slightly different times, which the equations even out."""
         beside = begin.shape[1]
         found, times, taken = np.empty_like(states), np.empty_like(begin), np.empty_like(begin)
         for stride in np.unique(steps).tolist():

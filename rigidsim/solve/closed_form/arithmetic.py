@@ -132,9 +132,7 @@ class Motion:
     title: ClassVar[str] = "rotation"  # name of the motion, for plans and summaries
 
     def at(self, arithmetic: Arithmetic, time: Any) -> tuple[list[Any], list[Any]]:
-        """Rates along ``axes`` and a quaternion from ``axes`` to a frame fixed in space, at times after the
-        start (see ``Arithmetic`` for their type).
-        """
+        """Rates along ``axes``, and a quaternion from ``axes`` to a frame fixed in space, after the start."""
         raise NotImplementedError
 
 

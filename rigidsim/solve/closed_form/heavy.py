@@ -190,9 +190,7 @@ def _rising(cubic: _Cubic, constant: Any, strength: Any) -> Strand:
 
 
 def _falling(cubic: _Cubic, zero: Any, weight: Any, constant: Any, strength: Any) -> Strand:
-    """Strand with abs(f)^2 = weight (zero - u), arg(f)' = constant + strength / (2 A (zero - u)), zero in
-    [u2, u3].
-    """
+    """Strand with abs(f)^2 = weight (zero - u), arg(f)' = constant + strength / (2 A (zero - u))."""
     context, u1, u2, u3 = cubic.argument.lattice.context, cubic.u1, cubic.u2, cubic.u3
     zero = min(max(zero, u2), u3)
     gap = u3 - u2

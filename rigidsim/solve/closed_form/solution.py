@@ -139,9 +139,7 @@ class ClosedForm:
         return np.ldexp(np.stack(rates, axis=1), -self.scaling.time), np.stack(quaternion, axis=1)
 
     def exactly(self, seconds: mpmath.mpf, digits: int) -> tuple[Vector, Vector]:
-        """Angular velocity and quaternion at one time, in mpmath, correct in so many digits of the largest
-        rate.
-        """
+        """Angular velocity and quaternion in mpmath, correct in so many digits of the largest rate."""
         elapsed = mpmath.ldexp(seconds, -self.scaling.time)
         arithmetic = Digits(self._context(math.ceil(digits * math.log2(10)), _phase_bits(elapsed)))
         rates, quaternion = self._turned(arithmetic, arithmetic.number(seconds) * 2**-self.scaling.time)

@@ -57,9 +57,7 @@ def lattice(context: Any, m: Any, complement: Any) -> Lattice:
 
 
 def first_kind(context: Any, sine_squared: Any, cosine_squared: Any, delta_squared: Any) -> Any:
-    """F(phi, m) for phi in [0, pi/2] from sin^2, cos^2 and 1 - m sin^2, each given with all its digits
-    (Carlson; DLMF 19.25.5).
-    """
+    """F(phi, m) from sin^2, cos^2 and 1 - m sin^2, each with all its digits (Carlson; DLMF 19.25.5)."""
     if sine_squared == 0:
         return context.zero
     return context.sqrt(sine_squared) * context.elliprf(cosine_squared, delta_squared, 1)
@@ -189,9 +187,7 @@ class Argument:
         return self.speed / (2 * self.lattice.quarter) if self.lattice.periodic else self.speed
 
     def reduced(self, arithmetic: Arithmetic, time: Any) -> Pair:
-        """Number of half periods 2K elapsed, and the rest in units of 2K, within +-1/2 (on the separatrix
-        zero, and u itself).
-        """
+        """Half periods 2K elapsed, and the rest in units of 2K, +-1/2 (on the separatrix zero, and u)."""
         if self.lattice.periodic:
             start = self.start / (2 * self.lattice.quarter)
             return arithmetic.reduced(time, self.turn_rate, start)

@@ -23,9 +23,7 @@ STEPS_BETWEEN = 32
 
 
 class AngleWrapping(Effect):
-    """Counts the full turns removed from the angle states, whose unit is 2^unit rad; the context has more
-    digits than the precision.
-    """
+    """Counts the full turns removed from the angle states, whose unit is 2^unit rad."""
 
     def __init__(
         self, positions: tuple[int, ...], precision: Precision, context: mpmath.MPContext, unit: int = 0

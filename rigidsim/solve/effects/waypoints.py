@@ -78,9 +78,7 @@ class Waypoints(Effect):
 
 @dataclass
 class SampleTrail:
-    """Evenly spaced samples and the last one, by (index, time, state, chart), internal units; the choice
-    doesn't depend on the blocks in which they came.
-    """
+    """Evenly spaced samples (index, time, state, chart) and the last one, whatever blocks they came in."""
 
     version: ClassVar[int] = 1
 

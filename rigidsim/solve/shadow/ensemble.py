@@ -150,9 +150,7 @@ class ShadowEnsemble:
         self._last_steps = self._steps + 4 * steps + HOPELESS_STEPS
 
     def elsewhere(self, state: np.ndarray, start: float, end: float, steps: float) -> ShadowEnsemble:
-        """The ensemble of another part of the motion, which begins in another state (states,);
-        carried alike.
-        """
+        """The ensemble of another part of the motion, from another state (states,); carried alike."""
         other, begin = copy.copy(self), np.array([start])
         units, read = self._starts.rate_units, self._starts.parameters
         starts = Starts(state[:, None], begin, np.array([end]), np.array([steps]), units, read)
@@ -176,9 +174,7 @@ class ShadowEnsemble:
         go_on: Callable[[], bool] = lambda: True,
         lost: float = math.inf,
     ) -> Spread:
-        """Follow the motions to their ends, or to a time before, while ``go_on`` says so between stretches,
-        unless the attitude (or the rates) spreads so far that nothing more can be learnt.
-        """
+        """Follow the motions to their ends, or until a time, while ``go_on`` says so and not all is lost."""
         ends = np.minimum(self._starts.end, until)
         with np.errstate(all="ignore"):
             while True:
@@ -301,18 +297,14 @@ class ShadowEnsemble:
         return np.asarray(self._states[:, which, 1:] - self._states[:, which, :1])
 
     def _distances(self, which: np.ndarray, apart: np.ndarray) -> np.ndarray:
-        """Distance of the farthest perturbed motion (motions,), relative to the size of the respective
-        states.
-        """
+        """Distance of the farthest perturbed motion (motions,), relative to the states' size."""
         scaled = apart * self._inverse[:, which, None]
         squares = self._measures.groups @ (scaled * scaled).reshape(len(apart), -1)
         largest: np.ndarray = np.sqrt(squares.reshape(-1, *apart.shape[1:]).max(axis=(0, 2)))
         return largest
 
     def _weigh(self) -> None:
-        """Update the inverse sizes (states, motions) of the groups that states belong to; 0 for groups that
-        never moved, and for states that nothing feels.
-        """
+        """Update inverse sizes (states, motions) of states' groups; 0 for what nothing feels, or never moved."""
         groups = self._measures.groups
         sizes = groups.T @ (groups[:, :, None] * self._largest).max(axis=1)
         self._inverse = np.where(sizes > 0, 1 / np.maximum(sizes, 1e-150), 0.0)

@@ -123,9 +123,7 @@ class Measures:
 def padded_function(
     expressions: Sequence[Any], variables: Sequence[Any], **options: Any
 ) -> Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]:
-    """Compiled function of states (states, n), parameters (parameters, n) and times (n,); the bits of a
-    column don't depend on the others.
-    """
+    """Compiled function of states, parameters and times, whose columns don't feel each other."""
     compiled = compiled_function(expressions, variables, compact_mode=True, fp_type=float, **options)
     return lambda states, parameters, times: evaluate_rows(
         compiled, np.concatenate([states, parameters]).T, times=times

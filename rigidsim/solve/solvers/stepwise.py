@@ -106,9 +106,7 @@ class StepwiseSolver(Solver):
         return count
 
     def step_by_step(self, count: int, boundary: StepBoundary, enough: float = math.inf) -> bool:
-        """Take single steps up to the first that reaches a sample, and on as long as each reaches one and the
-        next is at most ``enough`` steps away.
-        """
+        """Take single steps to the first sample, and on while the next is at most ``enough`` steps away."""
         upcoming, tried = self.buffer.upcoming, 0
         for _ in range(count):
             if tried and float(upcoming) - float(self.stepper.time) < self.stepper.largest:

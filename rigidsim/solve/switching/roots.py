@@ -21,9 +21,7 @@ class SurfaceRoots(SwitchedEngines):
         return known or (root[0], root[0] * 0), known is not None
 
     def _first_root(self, begun: tuple[Scalar, Scalar], before: np.ndarray) -> Root | None:
-        """The first root at which the step just taken, from ``begun`` in two numbers and the state
-        ``before``, leaves its side; None if there is none.
-        """
+        """The first root where the step just taken leaves its side, from where it begun; None if none is."""
         engine = self._integrator
         end, after = engine.time, np.array(engine.state)
         states = [before, after]
@@ -70,9 +68,7 @@ class SurfaceRoots(SwitchedEngines):
         size: Scalar,
         moment: tuple[Scalar, Scalar] | None,
     ) -> Scalar:
-        """Repeat the step up to a root, closer to it, or to its moment if the surface's expression tells it
-        in two numbers; returns the step's size.
-        """
+        """Repeat the step up to a root, closer to it, or to its known moment; returns the step's size."""
         engine = self._integrator
         muted, self.log.muted = self.log.muted, True
         try:

@@ -53,9 +53,7 @@ class Look:
         return sum((abs(float(g) * float(f)) for g, f in pairs), abs(float(self.by_time[j])))
 
     def size(self, j: int, states: Sequence[np.ndarray], time: float) -> float:
-        """Size to which the argument's rounding is relative, for states of these sizes shortly before, and a
-        span of time to which its rounding is relative.
-        """
+        """Size to which the argument's rounding is relative, for states before and a span of time."""
         largest = [max(abs(float(x)) for x in row) for row in zip(*states, strict=True)]
         terms = (abs(float(g)) * x for g, x in zip(self.gradients[j], largest, strict=True))
         return sum(terms, abs(float(self.by_time[j]) * time))

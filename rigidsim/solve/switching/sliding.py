@@ -151,9 +151,7 @@ class Meeting:
         return None
 
     def _sign(self, i: int, m: int, others: Sequence[int]) -> int | str:
-        """Whether, in the field at rest, the side of surface i is that of m (1) or the opposite (-1); 0 if
-        there is no rest; a text if that can't be decided.
-        """
+        """Side of surface i at rest: that of m (1), the opposite (-1); 0 for no rest; a text if undecided."""
         fixed = dict.fromkeys(others, 1)
         looks: dict[tuple[int, ...], Look] = {
             (s, t): self.at({**fixed, i: s, m: t}, self.state, self.time)

@@ -39,9 +39,7 @@ _WIDTH = 2.0**8  # roundings of a time between two findings of the same crossing
 
 
 class SwitchingStepper(SurfaceRoots):
-    """Stepper of a system with surfaces, or with angles whose turns matter; it has begun on the sides to
-    which the motion leads.
-    """
+    """Stepper of a system with surfaces, or with angles whose turns matter; it begins where motion leads."""
 
     def __init__(
         self,
@@ -60,9 +58,7 @@ class SwitchingStepper(SurfaceRoots):
     # --- steps ----------------------------------------------------------------------------------------------
 
     def step(self) -> bool:
-        """Take one step with dense output, not past a surface; False if the state is no longer finite, or the
-        motion can't be continued (``failure`` then says why).
-        """
+        """Take one step, not past a surface; False if lost, or if it can't go on (``failure`` says why)."""
         return self._step(self._longest)
 
     def skip(self, count: int) -> bool:

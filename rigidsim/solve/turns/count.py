@@ -94,9 +94,7 @@ def is_sparse(system: System) -> bool:
 
 
 def doubtful_rows(jumps: np.ndarray, angles: np.ndarray, sequence: str) -> np.ndarray:
-    """Rows where angles (n + 1, 3) change, by jumps (n, 3) to the nearest, by nearly half a turn between
-    dense samples, near their pole but not within rounding.
-    """
+    """Rows where dense samples' angles (n + 1, 3) jump by nearly half a turn, near their pole."""
     middle = angles[:, 1]
     factor = np.abs(np.sin(middle) if is_proper(sequence) else np.cos(middle)) > _POLE
     return np.flatnonzero((np.abs(jumps).max(axis=1) > _DOUBTFUL) & factor[:-1] & factor[1:])

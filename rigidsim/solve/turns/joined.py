@@ -127,9 +127,7 @@ class JoinedAngles:
     def joined(
         self, known: Continuity, angles: np.ndarray, sizes: np.ndarray | None, samples: SampleBlock
     ) -> tuple[np.ndarray, Continuity]:
-        """Angles (n, angles) with their turns, and what the next block is joined to, from squared sizes of
-        those that have one, (their number, n).
-        """
+        """Angles (n, angles) with their turns, and what the next block is joined to."""
         squared = self._all_sizes(sizes, len(angles))
         lost = (squared < self._least) | ~np.isfinite(squared)
         if lost.any():
@@ -222,9 +220,7 @@ class JoinedAngles:
         return np.array(sorted(found), dtype=np.int64)
 
     def _nearest(self, known: Continuity, block: _DoubleSamples) -> np.ndarray:
-        """Full turns (n, angles) from row to row that make each angle nearest to the sample before, except
-        near a pole, where the motion is followed.
-        """
+        """Full turns (n, angles) from row to row, each the nearest, except near a pole."""
         before = block.angles[0] if known.last_angles is None else known.last_angles
         angles = np.vstack([before, block.angles])
         jumps = self._steps.jumps(angles)

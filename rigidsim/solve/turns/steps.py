@@ -104,9 +104,7 @@ class SteadyAngles:
         self._excursion = np.concatenate([[steady.excursion] * count for steady, count in known])
 
     def turns(self, before: Place, here: Place, sizes: np.ndarray) -> np.ndarray | None:
-        """Full turns (angles,) from one sample to a later one, of these sizes of sines and cosines; None if
-        an angle is too near its pole.
-        """
+        """Full turns (angles,) from one sample to a later one; None if an angle is too near its pole."""
         time = here.time - before.time
         left_open = self._uncertainty * math.ldexp(time, self._unit) + self._excursion
         if not (left_open < _OPEN * np.minimum(sizes, 1.0)).all():
