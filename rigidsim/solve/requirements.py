@@ -92,7 +92,7 @@ def after_each_step(
 
 
 def propagation(system: System) -> Callable[[Any, Any, int], Any]:
-    """``propagate_until`` of engines, single or batch, of a system without tables: to times, with most steps."""
+    """``propagate_until`` of single or batch engines of a system without tables: to times, by most steps."""
     requirement = requirement_of(system)
 
     def propagate(integrator: Any, until: Any, most: int) -> Any:

@@ -93,8 +93,7 @@ class SampleBuffer:
         self._receiver = receiver
         self._pacing = pacing
         self.handed = self.count = first
-        self._blocks: list[SampleBlock] = []
-        self._boundaries: list[StepBoundary] = []
+        self._pieces: list[tuple[SampleBlock, StepBoundary]] = []  # samples, and a step boundary before them
         self._most = _FEWEST_ROWS
         self._affordable: dict[str, int] = {}
         self._handed_at = time.perf_counter()
@@ -143,21 +142,19 @@ class SampleBuffer:
     def take(self, block: SampleBlock, boundary: StepBoundary) -> None:
         """Take the next samples, with a step boundary before them."""
         if len(block):
-            self._blocks.append(block)
-            self._boundaries.append(boundary)
+            self._pieces.append((block, boundary))
             self.count += len(block)
 
     def back_to(self, count: int) -> None:
         """Forget all samples found since there were ``count``."""
-        while self._blocks and self._blocks[-1].first >= count:
-            self._blocks.pop()
-            self._boundaries.pop()
+        while self._pieces and self._pieces[-1][0].first >= count:
+            self._pieces.pop()
         self.count = max(count, self.handed)
 
     @property
     def boundary(self) -> StepBoundary | None:
         """A step boundary before the first waiting sample; None if none waits."""
-        return self._boundaries[0] if self._boundaries else None
+        return self._pieces[0][1] if self._pieces else None
 
     @property
     def whole(self) -> bool:
@@ -188,13 +185,12 @@ class SampleBuffer:
             try:
                 self._receiver.take(block)
             except KeyboardInterrupt:  # while something that it needs was compiled: it took none of these
-                self._blocks.insert(0, whole.rows(start, handed))
-                self._boundaries.insert(0, _before(block.first, boundaries))
+                self._pieces.insert(0, (whole.rows(start, handed), _before(block.first, boundaries)))
                 raise
             self.handed += len(block)
             last = self._receiver.last_wanted
             if last is not None:
-                self._blocks, self._boundaries = [], []
+                self._pieces = []
                 self.count = self.handed = last + 1
                 return last, _before(last, boundaries)
         self.took("hand over", handed, time.perf_counter() - started)
@@ -202,16 +198,14 @@ class SampleBuffer:
 
     def _waiting_until(self, stop: int) -> tuple[SampleBlock, dict[int, StepBoundary]]:
         """Take out the waiting samples before ``stop``, and boundaries before each piece, by its first."""
-        firsts = [block.first for block in self._blocks]
-        pieces = bisect_left(firsts, stop)
-        blocks, boundaries = self._blocks[:pieces], self._boundaries[:pieces]
-        self._blocks, self._boundaries = self._blocks[pieces:], self._boundaries[pieces:]
-        cut = stop - blocks[-1].first
-        if cut < len(blocks[-1]):
-            self._blocks.insert(0, blocks[-1].rows(cut, len(blocks[-1])))
-            self._boundaries.insert(0, boundaries[-1])
-            blocks[-1] = blocks[-1].rows(0, cut)
-        return SampleBlock.joined(blocks), dict(zip(firsts, boundaries, strict=False))
+        cut = bisect_left(self._pieces, stop, key=lambda piece: piece[0].first)
+        pieces, self._pieces = self._pieces[:cut], self._pieces[cut:]
+        block, boundary = pieces[-1]
+        if (inside := stop - block.first) < len(block):
+            self._pieces.insert(0, (block.rows(inside, len(block)), boundary))
+            pieces[-1] = block.rows(0, inside), boundary
+        boundaries = {block.first: boundary for block, boundary in pieces}
+        return SampleBlock.joined([block for block, _ in pieces]), boundaries
 
     def took(self, work: str, rows: int, seconds: float) -> None:
         """Adapt how many samples may wait to what each kind of work gets done in the time of a chunk."""

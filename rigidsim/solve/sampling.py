@@ -69,7 +69,7 @@ class SampleClock:
         return self._seconds(first, stop, self._double)
 
     def parts(self, first: int, times: np.ndarray) -> list[np.ndarray]:
-        """Labels of samples from ``first`` on (s) and residuals, whose sum is the integration's time exactly."""
+        """Labels of samples from ``first`` on (s) and residuals, which sum exactly to the time."""
         exact = times / self._per_second
         if self._precision.bits == 53:
             return [exact]

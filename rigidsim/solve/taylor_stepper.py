@@ -1,9 +1,7 @@
 """heyoka's integrator stepping freely: natural steps only, dense output, no step ever shortened.
 
-Four ways to go on, which give the same bits and differ in cost alone (engine measurements in
-experiments/README.md): ``skip`` takes many steps at once and keeps no dense output; ``grid`` takes many and
-gives the states at times known beforehand, from a whole time on; ``block`` takes many and keeps their dense
-output (about a millisecond per call); ``step`` takes one and keeps it.
+Four ways to go on, which give the same bits and differ in cost alone
+(``rigidsim.solve.solvers.taylor.ways``).
 """
 
 from __future__ import annotations

@@ -80,13 +80,12 @@ def test_a_lane_that_is_lost_takes_nobody_with_it(monkeypatch: pytest.MonkeyPatc
     whole = run_members(sweep, range(MEMBERS), ["final"]).kept
     onward = BatchEngine.onward
 
-    def losing(engine: BatchEngine, states: np.ndarray, *rest: object) -> tuple[np.ndarray, np.ndarray]:
+    def losing(engine: BatchEngine, most: int, states: np.ndarray, *rest: np.ndarray) -> tuple:
         spoilt = states.copy()
         # by rates alone: the second member's are known from its start
         hit = np.abs(states[:3] - target[:, None]).max(axis=0) < 1e-6
         spoilt[:, hit] = np.nan
-        found = onward(engine, spoilt, *rest)  # type: ignore[arg-type]
-        return found
+        return onward(engine, most, spoilt, *rest)
 
     target = _first_rates(sweep, 1)
     monkeypatch.setattr(BatchEngine, "onward", losing)

@@ -169,26 +169,27 @@ class BatchEngine:
             sizes.append(np.abs(self._integrator.tc).max(axis=0))
         return np.concatenate(sizes, axis=1)[:, : len(start)]
 
-    def onward(
-        self,
-        states: np.ndarray,
-        parameters: np.ndarray,
-        begin: np.ndarray,
-        end: np.ndarray,
-        longest: np.ndarray,
-        most_steps: int,
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """States (states, n) and times (n,) of motions at most so many steps later, internal units."""
-        integrator, given = self._integrator, (states, parameters, begin, end, longest)
+    def onward(self, most_steps: int, *given: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """States (states, n) and times (n,) of motions at most so many steps later, not finite if lost, and
+        the steps taken (n,): from states, parameters, times, ends and bounds of steps, internal units.
+        """
+        integrator, count = self._integrator, given[0].shape[1]
         there, read, then, ends, bounds = (_grouped(x, self.width) for x in given)
-        taken = np.empty(then.shape)
+        steps = np.empty(then.shape)
         for group in range(len(there)):
             self._set(there[group], read[group], then[group])
             integrator.propagate_until(ends[group], max_steps=most_steps, max_delta_t=bounds[group])
             there[group], then[group] = integrator.state, integrator.time
-            taken[group] = [outcome[3] for outcome in integrator.propagate_res]
-        count = len(begin)
-        return np.concatenate(list(there), axis=1)[:, :count], then.ravel()[:count], taken.ravel()[:count]
+            steps[group] = [outcome[3] for outcome in integrator.propagate_res]
+        found, times = np.concatenate(list(there), axis=1)[:, :count], then.ravel()[:count]
+        taken = steps.ravel()[:count]
+        stopped = np.isin(
+            np.arange(count) // self.width, np.flatnonzero(~np.isfinite(there).all(axis=(1, 2)))
+        )
+        for lane in np.flatnonzero(stopped).tolist() if count > 1 else ():
+            only = [lane]  # those beside one that was lost go on alone
+            found[:, only], times[only], taken[only] = self.onward(most_steps, *(x[..., only] for x in given))
+        return found, times, taken
 
     def _set(self, states: np.ndarray, parameters: np.ndarray, begin: np.ndarray) -> None:
         self._log.clear()

@@ -26,7 +26,7 @@ class ShadowLanes:
         self._rights = [hy.expression(right) for _, right in traced.system.equations[:moving]]
         equations = list(zip(self._variables, traced.as_parameters(self._rights), strict=True))
         system = BatchSystem(equations, [], len(traced.in_equations), tolerance, traced.system.wide)
-        self._engine = BatchEngine(system, max(width, _LANES))
+        self.engine = BatchEngine(system, max(width, _LANES))
 
     @cached_property
     def slopes(self) -> Any:
@@ -39,25 +39,11 @@ class ShadowLanes:
 
     def longest(self, starts: Starts) -> np.ndarray:
         """Bounds of the steps of motions from their starts, (motions,)."""
-        return self._engine.longest(starts.states, self.read(starts), starts.begin)
+        return self.engine.longest(starts.states, self.read(starts), starts.begin)
 
     def at_samples(self, starts: Starts, times: np.ndarray, most: int) -> np.ndarray:
         """States (samples, states, motions) at times (samples, motions), nan from where a motion ended."""
-        return self._engine.run(starts.states, self.read(starts), starts.begin, times, most).states
-
-    def onward(self, steps: int, *given: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """As ``BatchEngine.onward``; what is lost isn't finite, while its neighbours go on."""
-        onward: Any = self._engine.onward
-        found, times, taken = onward(*given, steps)
-        lost = ~np.isfinite(found).all(axis=0)
-        for group in np.unique(np.flatnonzero(lost) // self._engine.width).tolist():
-            # heyoka stops all lanes if the state of one is lost
-            first = group * self._engine.width
-            for lane in range(first, min(first + self._engine.width, len(times))):
-                only: Any = slice(lane, lane + 1)
-                alone = onward(*(x[..., only] for x in given), steps)
-                found[:, only], times[only], taken[only] = alone
-        return found, times, taken
+        return self.engine.run(starts.states, self.read(starts), starts.begin, times, most).states
 
 
 class MemberCarrier:
@@ -80,7 +66,7 @@ class MemberCarrier:
         for stride in np.unique(steps).tolist():
             alike = np.flatnonzero(steps == stride)
             motions = which[alike]
-            there, then, gone = self._lanes.onward(
+            there, then, gone = self._lanes.engine.onward(
                 int(stride),
                 states[:, alike].reshape(len(states), -1),
                 np.repeat(self._read[:, motions], beside, axis=1),

@@ -304,7 +304,7 @@ class ShadowEnsemble:
         return largest
 
     def _weigh(self) -> None:
-        """Update inverse sizes (states, motions) of states' groups; 0 for what nothing feels, or never moved."""
+        """Update inverse sizes (states, motions) of groups; 0 for what nothing feels or never moved."""
         groups = self._measures.groups
         sizes = groups.T @ (groups[:, :, None] * self._largest).max(axis=1)
         self._inverse = np.where(sizes > 0, 1 / np.maximum(sizes, 1e-150), 0.0)

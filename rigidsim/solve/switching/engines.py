@@ -60,6 +60,13 @@ class SwitchedEngines(TaylorStepper):
         same = not quaternion or float(np.dot(given, quaternion)) >= 0
         self._quaternion = [x if same else -x for x in quaternion]
         self._dense = self._integrator
+        self.switches, self._unsettled = 0, ""
+        self._begin()
+        self.begun = self.mark()
+
+    def _begin(self) -> None:
+        """Find the sides at the start."""
+        raise NotImplementedError
 
     # --- memory ---------------------------------------------------------------------------------------------
 
@@ -217,24 +224,25 @@ class SwitchedEngines(TaylorStepper):
         """Arguments of the surfaces in a state of the latest step, likewise."""
         return self._probe.values(state, time, self._pars(*self._joined(state, time), low=low))[0]
 
-    def _joined(self, state: np.ndarray, time: Scalar) -> tuple[list[float], float]:
+    def _continued(
+        self, state: np.ndarray, time: Scalar
+    ) -> tuple[list[float], float, list[float], list[float]]:
+        """Turns and sign from the latest step on to a state, and the angles and the quaternion with them."""
         if not (self._angles or self._quaternion):
-            return [], 1.0
-        zeros = self._pars([0.0] * len(self._angles), 1.0)
-        _, plain, quaternion = self._probe.values(state, time, zeros)
+            return [], 1.0, [], []
+        _, plain, quaternion = self._probe.values(state, time, self._pars([0.0] * len(self._angles), 1.0))
         turns = [continued(b, a) for a, b in zip(plain, self._angles, strict=True)]
         same = not quaternion or float(np.dot(quaternion, self._quaternion)) >= 0
-        return turns, 1.0 if same else -1.0
+        sign = 1.0 if same else -1.0
+        angles = [a + 2 * np.pi * n for a, n in zip(plain, turns, strict=True)]
+        return turns, sign, angles, [sign * x for x in quaternion]
+
+    def _joined(self, state: np.ndarray, time: Scalar) -> tuple[list[float], float]:
+        return self._continued(state, time)[:2]
 
     def _follow(self) -> None:
         """Continue angles and quaternion to the end of the step just taken."""
-        if not (self._angles or self._quaternion):
-            return
-        turns, sign = self._joined(self.state, self.time)
-        zeros = self._pars([0.0] * len(self._angles), 1.0)
-        _, plain, quaternion = self._probe.values(self.state, self.time, zeros)
-        self._angles = [a + 2 * np.pi * n for a, n in zip(plain, turns, strict=True)]
-        self._quaternion = [sign * x for x in quaternion]
+        *_, self._angles, self._quaternion = self._continued(self.state, self.time)
 
     def _set(self, engine: TaylorEngine) -> None:
         """Set an engine's parameters at this boundary.

@@ -56,7 +56,7 @@ class Moments:
         return max(abs(float(time - moment)) for moment in self._from) + rounding
 
     def near(self, time: Scalar, modes: Sequence[int]) -> tuple[Scalar, Scalar] | None:
-        """The moment in two numbers next to one in one number; None if the state matters, or none is there."""
+        """The moment in two numbers next to one in one; None if the state matters or none is there."""
         found = self._exactly_near(time, modes)
         return None if found is None else in_two_numbers(found, self._precision.number, self._context)
 

@@ -41,20 +41,6 @@ _WIDTH = 2.0**8  # roundings of a time between two findings of the same crossing
 class SwitchingStepper(SurfaceRoots):
     """Stepper of a system with surfaces, or with angles whose turns matter; it begins where motion leads."""
 
-    def __init__(
-        self,
-        system: System,
-        precision: Precision,
-        tolerance: Scalar | None,
-        start: Scalar,
-        log: EventLog | None = None,
-    ) -> None:
-        super().__init__(system, precision, tolerance, start, log)
-        self.switches = 0
-        self._unsettled = ""
-        self._begin()
-        self.begun = self.mark()
-
     # --- steps ----------------------------------------------------------------------------------------------
 
     def step(self) -> bool:
@@ -311,6 +297,5 @@ def stepper_of(
     """The stepper of a system: a plain one, unless the system switches sides; tolerance None stands for the
     precision's epsilon, and without a log no events are looked for.
     """
-    if not system.switches:
-        return TaylorStepper(system, precision, tolerance, start, log)
-    return SwitchingStepper(system, precision, tolerance, start, log)
+    kind = SwitchingStepper if system.switches else TaylorStepper
+    return kind(system, precision, tolerance, start, log)

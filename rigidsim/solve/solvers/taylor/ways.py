@@ -1,19 +1,9 @@
 """The four ways through the samples, and the choice of the cheapest for the next chunk of steps.
 
 All give the same bits (``rigidsim.solve.taylor_stepper``), so that whatever is chosen here changes cost
-alone. Each earns its place. CPU seconds of a run without one way, over those with all four, by steps per
-sample (free asymmetric body, two shared cores, best of three):
-
-| | 1/16 | 1 | 16 | 100 | 2000 | 20000 |
-| --- | --- | --- | --- | --- | --- | --- |
-| double, no grids | 2.2 | 2.7 | 3.0 | 3.3 | 1.05 | 1.0 |
-| double, no skips | 1.0 | 0.9 | 1.0 | 1.0 | 1.0 | 5.0 |
-| double with events (no grids there), no blocks | 9.7 | 15 | 2.5 | 1.1 | 1.0 | 1.0 |
-| double with events, no skips | 0.9 | 1.0 | 1.0 | 1.5 | 3.1 | 3.5 |
-| double, projected, no grids | 3.3 | 7.7 | 9.4 | 9.3 | 1.0 | 1.0 |
-| double, Euler angles, no grids | 5.8 | 5.0 | 1.4 | 0.9 | 1.0 | 1.0 |
-| 80 bits, no grids | 1.4 | 1.5 | 1.6 | 1.5 | 1.0 | 1.0 |
-| 80 bits with events, no blocks | 9.2 | 10 | 1.4 | 0.9 | 1.1 | 1.0 |
+alone. Each earns its place: without grids runs with a sample every 16 steps take 1.4 to 9 times as long,
+without blocks those with events 1.4 to 2.5, and with a sample every step 10 to 15; without skips those with a
+sample every 20,000 steps 3.5 to 5 (CPU time of a free asymmetric body, double and 80 bits, two shared cores).
 
 Single steps are what remains between the others, and all that pays beyond 80 bits, where a step is dear.
 """
