@@ -124,7 +124,7 @@ def _view(points: Array, radii: Array, moments: Array) -> eyes.Eye:
     return eyes.eye_at(found)
 
 
-def _path(axes: Axes, view: eyes.Eye, points: Array, front: NDArray[np.bool_], **style: object) -> None:
+def _path(axes: Axes, view: eyes.Eye, points: Array, front: NDArray[np.bool_]) -> None:
     if signals.joined(points):
         eyes.line(axes, view, points, ~front, color=PINK, lw=1.1, alpha=0.35)
         eyes.line(axes, view, points, front, color=PINK, lw=1.9, zorder=5)

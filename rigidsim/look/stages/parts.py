@@ -24,6 +24,9 @@ ARROW_REACH = 1.6  # length of the longest arrow, in units of the body's reach
 AXIS_REACH = 1.15  # of the body axes
 CURVE_POINTS = 4000  # of a whole polhode or track
 NEAR = 0.35  # radii of a path between neighbours that are joined
+SCENE_ROWS = 20_000  # above which arrows and trails are thinned, if their motion allows it
+_STILL = 0.01  # of an arrow's length, by which it may move between rows that are drawn
+_SMOOTH = 0.2  # of a trail's radius, between its corners: some thirty a turn
 
 MOMENTUM: Color = (255, 196, 40)
 VELOCITY: Color = (90, 215, 235)
@@ -51,6 +54,11 @@ class Arrow:
     label_at: float = 1.07
     radius: float = 0.024
 
+    @cached_property
+    def stride(self) -> int:
+        """Stride between drawn rows."""
+        return _stride_of(self.vectors, _STILL)
+
 
 @dataclass(frozen=True)
 class Trail:
@@ -73,6 +81,18 @@ class Trail:
     def line(self) -> bool:
         """Whether neighbours are close enough to be joined."""
         return joined(self.points, NEAR)
+
+    @cached_property
+    def stride(self) -> int:
+        """Stride between the ends of its pieces; a cloud of points needs no more of them."""
+        if self.line:
+            return _stride_of(self.points - self.whole.mean(axis=0), _SMOOTH)
+        return -(-len(self.points) // SCENE_ROWS)
+
+    @property
+    def fades(self) -> bool:
+        """Whether it has a darker older part; a long trail of a fast motion is heavy enough without."""
+        return self.line and (self.stride > 1 or len(self.points) <= SCENE_ROWS)
 
 
 @dataclass(frozen=True)
@@ -195,6 +215,15 @@ class Picture:
     planes: list[Plane] = field(default_factory=list)
     leading: tuple[str, ...] = ()
     notes: list[str] = field(default_factory=list)
+
+
+def _stride_of(points: Array, share: float) -> int:
+    """Stride between drawn rows: several in a long run whose points move by at most a share of their size."""
+    if len(points) > SCENE_ROWS:
+        for stride in (16, 4):
+            if np.abs(points[stride:] - points[:-stride]).max() <= share * np.abs(points).max():
+                return stride
+    return 1
 
 
 def longest(vectors: Array) -> float:

@@ -12,7 +12,7 @@ from rigidsim.look.plots import Plot
 from rigidsim.look.stages.bodies import Subject, camera
 from rigidsim.look.stages.parts import Color, Plane, Stage
 from rigidsim.look.timeline import plotting
-from rigidsim.look.timeline.drawing import OLDER, fades, trail_path, trail_stride
+from rigidsim.look.timeline.drawing import OLDER, trail_path
 from rigidsim.look.timeline.drawn import Clock, DrawnRun
 
 SCREEN_SECONDS = 60.0  # the longest that playing a whole run may take
@@ -143,13 +143,11 @@ def space_view(stage: Stage, clock: Clock, *, narrow: bool, subject: Subject | N
     overrides: dict[Any, Any] = {}
     for trail in stage.trails:
         path = trail_path(stage, trail)
-        stride = trail_stride(trail)
-        fading = fades(trail, stride)
-        shown = round(RECENT * rows) if fading else rows
+        shown = round(RECENT * rows) if trail.fades else rows
         overrides[f"{path}/recent"] = rrb.VisibleTimeRanges(_window(clock, shown))
-        if fading:
+        if trail.fades:
             # A piece of the older part ends where its row is: it must not stand out over the bright one.
-            longest = max(rows, 2 * OLDER * stride)
+            longest = max(rows, 2 * OLDER * trail.stride)
             overrides[f"{path}/older"] = rrb.VisibleTimeRanges(_window(clock, longest))
     origin = f"/{stage.root}/{stage.looked_from}" if stage.looked_from else f"/{stage.root}"
     return rrb.Spatial3DView(

@@ -4,7 +4,7 @@ Meshes are given no normals: the viewer then shows their own colours from all si
 apart.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
@@ -19,9 +19,6 @@ from rigidsim.look.symbols import graticule, sharp_edges
 Columns = Iterable[rr.ComponentColumn]
 
 OLDER = 16  # rows in one piece of a trail's older part
-SCENE_ROWS = 20_000  # above which arrows and trails are thinned, if their motion allows it
-_STILL = 0.01  # of an arrow's length, by which it may move between rows that are drawn
-_SMOOTH = 0.2  # of a trail's radius, between its corners: some thirty a turn
 _EDGE: Color = (12, 14, 20)
 _AXIS_COLORS = [(235, 70, 60), (90, 200, 90), (80, 130, 250)]
 _FADED, _DIM = 0.5, 0.26  # of a trail's brightness: its older part, and the whole curve
@@ -175,36 +172,7 @@ def _dimmed(color: Color, part: float) -> tuple[int, int, int]:
     return red, green, blue
 
 
-def stride_of(points: Array, share: float) -> int:
-    """Stride between drawn rows: several in a long run whose points move by at most a share of their size."""
-    if len(points) > SCENE_ROWS:
-        for stride in (16, 4):
-            if np.abs(points[stride:] - points[:-stride]).max() <= share * np.abs(points).max():
-                return stride
-    return 1
-
-
-def trail_stride(trail: Trail) -> int:
-    """Stride between the ends of a trail's pieces; a cloud of points needs no more of them."""
-    if trail.line:
-        return stride_of(trail.points - trail.whole.mean(axis=0), _SMOOTH)
-    return -(-len(trail.points) // SCENE_ROWS)
-
-
-def fades(trail: Trail, stride: int) -> bool:
-    """Whether a trail has a darker older part; a long trail of a fast motion is heavy enough without."""
-    return trail.line and (stride > 1 or len(trail.points) <= SCENE_ROWS)
-
-
-def strides_of(stage: Stage) -> dict[str, int]:
-    """Strides between drawn rows for each arrow and each trail, by entity."""
-    found = {_arrow_path(stage, arrow): stride_of(arrow.vectors, _STILL) for arrow in stage.arrows}
-    return found | {trail_path(stage, trail): trail_stride(trail) for trail in stage.trails}
-
-
-def stage_columns(
-    stage: Stage, rows: slice, strides: Mapping[str, int]
-) -> Iterable[tuple[str, slice, Columns]]:
+def stage_columns(stage: Stage, rows: slice) -> Iterable[tuple[str, slice, Columns]]:
     """Entities of a stage with their rows (of the run) and columns, for the rows of one chunk."""
     root = f"/{stage.root}"
     # Translation and rotation in one call: apart, the viewer would see states that never were.
@@ -221,16 +189,14 @@ def stage_columns(
     for name, turning in stage.frames.items():
         yield f"{root}/{name}", rows, rr.Transform3D.columns(quaternion=turning[rows])
     for arrow in stage.arrows:
-        path = _arrow_path(stage, arrow)
-        picked = _every(rows, strides[path])
+        picked = _every(rows, arrow.stride)
         vectors = arrow.vectors[picked].astype(np.float32)
         columns = [*rr.Arrows3D.columns(vectors=vectors)]
         if arrow.label:
             columns += rr.Points3D.columns(positions=vectors * np.float32(arrow.label_at))
-        yield path, picked, columns
+        yield _arrow_path(stage, arrow), picked, columns
     for trail in stage.trails:
-        path = trail_path(stage, trail)
-        stride = strides[path]
+        path, stride = trail_path(stage, trail), trail.stride
         picked, older = _every(rows, stride), _every(rows, OLDER * stride)
         if trail.head:
             head = trail.points[rows].astype(np.float32)
@@ -241,7 +207,7 @@ def stage_columns(
             continue
         strips = _pieces(trail.points, picked, stride, 1)
         yield f"{path}/recent", picked, rr.LineStrips3D.columns(strips=strips)
-        if fades(trail, stride) and older.start < rows.stop:
+        if trail.fades and older.start < rows.stop:
             strips = _pieces(trail.points, older, stride, OLDER)
             yield f"{path}/older", older, rr.LineStrips3D.columns(strips=strips)
 

@@ -1,7 +1,7 @@
 """Everything drawn of one run, ready to be sent to a recording: clock, picture, plots, states and pages."""
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
@@ -80,8 +80,8 @@ def build_clock(seconds: NDArray[np.float64]) -> Clock:
 
 @dataclass(frozen=True)
 class DrawnRun:
-    """Everything drawn of one dataset: of its rows `steps`, with pages of markdown by name, the turns of the
-    body (0 if its rate isn't known), and strides of arrows and trails by the stage's root and their entity.
+    """Everything drawn of one dataset: of its rows `steps`, with pages of markdown by name, and the turns of
+    the body (0 if its rate isn't known).
     """
 
     picture: Picture
@@ -95,7 +95,6 @@ class DrawnRun:
     pages: dict[str, str]
     words: TimeWords
     turns: float
-    strides: dict[str, dict[str, int]] = field(default_factory=dict)
 
     @classmethod
     def of(
@@ -161,9 +160,7 @@ class DrawnRun:
         """Draw what changes, for some rows."""
         times = self._times(rows)
         for stage in self.picture.stages:
-            if stage.root not in self.strides:
-                self.strides[stage.root] = drawing.strides_of(stage)
-            for path, picked, columns in drawing.stage_columns(stage, rows, self.strides[stage.root]):
+            for path, picked, columns in drawing.stage_columns(stage, rows):
                 mine = times if picked == rows else self._times(picked)
                 recording.send_columns(path, indexes=mine, columns=columns)
         plotting.draw_plot_rows(recording, self.plots, times, rows)
