@@ -36,11 +36,17 @@ def _left(elapsed: float, fraction: float) -> str:
         return "0:00:00 left"
     if fraction <= 0 or elapsed < 0.3:
         return "-:--:-- left"
-    seconds = elapsed * (1 / fraction - 1)
+    return f"{clock_text(elapsed * (1 / fraction - 1))} left"
+
+
+def clock_text(seconds: float | None) -> str:
+    """A duration as h:mm:ss, a long one in days; dashes for one that isn't known."""
+    if seconds is None:
+        return "-:--:--"
     if seconds >= 360_000:
-        return f"{seconds / 86400:.3g} days left"
-    minutes, seconds = divmod(round(seconds), 60)
-    return f"{minutes // 60}:{minutes % 60:02d}:{seconds:02d} left"
+        return f"{seconds / 86400:.3g} days"
+    minutes, rest = divmod(round(seconds), 60)
+    return f"{minutes // 60}:{minutes % 60:02d}:{rest:02d}"
 
 
 def _rate(value: float) -> str:

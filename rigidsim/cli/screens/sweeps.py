@@ -4,13 +4,14 @@ import shlex
 import sys
 import time
 from pathlib import Path
-from typing import Any, Self
+from typing import Self
 
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn
 
 from rigidsim.cli.screens.page import Page, Styled
 from rigidsim.scene.sweeps.sweep import Sweep
+from rigidsim.session.progress import clock_text
 from rigidsim.store.sweeps.run import SavedSweep
 from rigidsim.workflows.sweeps.plan import SweepPlan
 from rigidsim.workflows.sweeps.sweep import SweepObserver
@@ -22,28 +23,19 @@ class SweepProgress(SweepObserver):
     """One bar, or a plain line every few seconds if none can be drawn."""
 
     def __init__(self) -> None:
-        self._bar: Progress | None = None
-        if sys.stderr.isatty():
-            self._bar = Progress(
-                TextColumn("[bold]{task.description}"),
-                BarColumn(bar_width=None),
-                TextColumn("{task.fields[said]}"),
-                console=Console(stderr=True),
-                transient=True,
-                expand=True,
-            )
-        self._task: Any = None
+        columns = (TextColumn("[bold]{task.description}"), BarColumn(None), TextColumn("{task.fields[said]}"))
+        hidden = not sys.stderr.isatty()
+        self._bar = Progress(
+            *columns, console=Console(stderr=True), transient=True, expand=True, disable=hidden
+        )
         self._name = ""
-        self._members = self._before = 0
-        self._begin = self._latest = time.perf_counter()
 
     def __enter__(self) -> Self:
-        if self._bar is not None:
-            self._bar.start()
+        self._bar.start()
         return self
 
     def __exit__(self, *_: object) -> None:
-        if self._bar is not None:
+        if not self._bar.disable:  # some versions of rich print an empty line then
             self._bar.stop()
 
     def checking(self, sweep: Sweep) -> None:
@@ -55,17 +47,15 @@ class SweepProgress(SweepObserver):
         self._begin = self._latest = time.perf_counter()
         there = f", {done:,} are there already" if done else ""
         self._say(f"running {members:,} members into {folder}{there}")
-        if self._bar is not None:
-            self._task = self._bar.add_task(self._name, total=members, completed=done, said="")
+        self._task = self._bar.add_task(self._name, total=members, completed=done, said="")
 
     def progressed(self, done: int) -> None:
         now = time.perf_counter()
         rate = (done - self._before) / max(now - self._begin, 1e-9)
         said = f"{done:,} of {self._members:,} members, {rate:.3g} a second, "
-        said += f"{_duration((self._members - done) / rate if rate else None)} left"
-        if self._bar is not None:
-            self._bar.update(self._task, completed=done, said=said)
-        elif now - self._latest >= _LINE_EVERY:
+        said += f"{clock_text((self._members - done) / rate if rate else None)} left"
+        self._bar.update(self._task, completed=done, said=said)
+        if self._bar.disable and now - self._latest >= _LINE_EVERY:
             self._latest = now
             self._say(said)
 
@@ -76,20 +66,10 @@ class SweepProgress(SweepObserver):
         self._say("nothing is left to do: all members were run before", always=True)
 
     def _say(self, text: str, *, always: bool = False) -> None:
-        if self._bar is None:
+        if self._bar.disable:
             print(f"{self._name}: {text}", file=sys.stderr, flush=True)
         elif always:
             self._bar.console.print(f"{self._name}: {text}", highlight=False, markup=False)
-
-
-def _duration(seconds: float | None) -> str:
-    """A duration as h:mm:ss."""
-    if seconds is None:
-        return "-:--:--"
-    if seconds >= 360_000:
-        return f"{seconds / 86400:.3g} days"
-    minutes, rest = divmod(round(seconds), 60)
-    return f"{minutes // 60}:{minutes % 60:02d}:{rest:02d}"
 
 
 _INTEGRATED = "momentum's direction (attitude in full models), of its integration alone"
@@ -108,7 +88,7 @@ def print_sweep(result: SavedSweep) -> None:
     if not result.finished:
         done = f"{told.tiles_done:,} of {told.tiles:,}" if told.tiles is not None else ""
         if told.members_per_second:
-            left = _duration(told.seconds_left)
+            left = clock_text(told.seconds_left)
             on.line("tiles", f"{done}; {told.members_per_second:.3g} members a second, {left} left")
         elif done:
             on.line("tiles", done)
@@ -153,7 +133,7 @@ def print_sweep_plan(made: SweepPlan) -> None:
     on.line("keep", ", ".join(made.keep))
     on.line("tiles", f"{made.tiles:,} of {made.tile:,} members")
     each = f"{predicted.seconds_per_member:.2g} s a member"
-    on.line("time", f"{_duration(predicted.total_seconds)} on one core, {each}")
+    on.line("time", f"{clock_text(predicted.total_seconds)} on one core, {each}")
     on.line("disk", f"about {predicted.dataset_bytes / 1e6:.3g} MB, and as much for the tiles")
     on.say("")
     on.say("one member:")
