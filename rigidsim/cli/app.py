@@ -180,7 +180,7 @@ def sweep(
     """
 
 
-@_command("saved_runs")
+@_command("sweep")
 def resume(
     run_path: options.RunPath,
     until: options.UntilOption = None,
@@ -196,7 +196,7 @@ def resume(
     """
 
 
-@_command("saved_runs")
+@_command("sweep")
 def verify(
     run_path: options.RunPath, members: options.MembersOption = 100, as_json: options.JsonOption = False
 ) -> None:

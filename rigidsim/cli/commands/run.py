@@ -4,14 +4,12 @@ import sys
 from pathlib import Path
 
 import rigidsim.workflows.run as workflow
-from rigidsim.cli.screens.page import answer
-from rigidsim.cli.screens.summary import print_summary
+from rigidsim.cli.screens.summary import print_run
 from rigidsim.errors import RigidsimError
 from rigidsim.scene.config import Experiment
 from rigidsim.scene.scene import build_scene
 from rigidsim.session import progress
 from rigidsim.session.understood import cautions_about, cautions_of
-from rigidsim.store.run import Run
 from rigidsim.workflows.read import load
 
 
@@ -27,12 +25,14 @@ def run(
         experiments.append(embedded(dataset, overrides=overrides or []))
     if scan and member is not None:
         raise RigidsimError("run: --member is one of a config's [sweep], --sweep makes another: give one")
-    if scan or member is not None:
+    if scan:
         from rigidsim.cli.commands import sweep as sweeps  # a room of its own
 
-        if scan:
-            return sweeps.run_scanned(experiments, scan, out, force=force, as_json=as_json)
-        experiments = [sweeps.single_member(experiment, member or 0) for experiment in experiments]
+        return sweeps.run_scanned(experiments, scan, out, force=force, as_json=as_json)
+    if member is not None:
+        from rigidsim.workflows.sweeps.members import single_member
+
+        experiments = [single_member(experiment, member) for experiment in experiments]
     if not experiments:
         raise RigidsimError("run: give a CONFIG, or --from a dataset; rigidsim run --help shows an example")
     worst = 0
@@ -53,12 +53,3 @@ def _warn(experiment: Experiment) -> None:
     acting = bool(config.loads or config.events) and config.sweep is None  # a sweep is refused later
     for caution in cautions_of(build_scene(experiment)) if acting else cautions_about(config):
         print(f"rigidsim: warning: {experiment.source}: {caution.text}", file=sys.stderr)
-
-
-def print_run(result: Run, as_json: bool) -> int:
-    """Print a run's summary; returns its exit code."""
-    answer(as_json, result.summary, print_summary, result.outcome, result.place)
-    code = result.outcome.exit_code
-    if code:
-        print(f"rigidsim: {result.outcome.message}", file=sys.stderr)
-    return code

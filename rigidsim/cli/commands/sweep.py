@@ -1,19 +1,22 @@
-"""``rigidsim sweep``: run every member of a config's ``[sweep]``; and what other commands do with sweeps."""
+"""Commands on what may be a sweep: ``sweep``, ``resume``, ``verify``; and what others do with sweeps."""
 
 from collections.abc import Sequence
 from pathlib import Path
 
+import rigidsim.workflows.resume as resuming
 import rigidsim.workflows.sweeps.sweep as workflow
+import rigidsim.workflows.verify as verifying
 from rigidsim.cli.screens.page import answer
+from rigidsim.cli.screens.summary import print_run, print_verdict
 from rigidsim.cli.screens.sweeps import SweepProgress, print_sweep
 from rigidsim.errors import RigidsimError
 from rigidsim.scene.config import Experiment
 from rigidsim.scene.sweeps.values import scanned
+from rigidsim.session import progress
+from rigidsim.store.sweeps.folder import is_sweep
 from rigidsim.store.sweeps.run import SavedSweep, open_sweep
 from rigidsim.workflows.read import load
-from rigidsim.workflows.sweeps.members import single_member
-
-__all__ = ["info", "resume", "run_scanned", "single_member", "sweep"]
+from rigidsim.workflows.sweeps.verify import verify_sweep
 
 
 def sweep(
@@ -46,11 +49,34 @@ def run_scanned(
     return worst
 
 
-def resume(path: Path, workers: int, as_json: bool) -> int:
-    """Go on with a sweep."""
+def resume(
+    run_path: Path, until: str | None, overrides: list[str] | None, workers: int, as_json: bool
+) -> int:
+    """Go on with a run or a sweep."""
+    if not is_sweep(run_path):
+        with progress.observer() as observer:
+            run = resuming.resume(run_path, until=until, overrides=overrides or [], observer=observer)
+        return print_run(run, as_json)
+    if until is not None or overrides:
+        raise RigidsimError(
+            "resume: --until and --set are for single runs; change the config of a sweep and give rigidsim "
+            "sweep CONFIG again, which computes only what is new"
+        )
     with SweepProgress() as watching:
-        result = workflow.resume_sweep(path, workers=workers, observer=watching)
+        result = workflow.resume_sweep(run_path, workers=workers, observer=watching)
     return _print(result, as_json)
+
+
+def verify(run_path: Path, members: int, as_json: bool) -> int:
+    """Integrate again and compare."""
+    if is_sweep(run_path):
+        verdict, what = verify_sweep(run_path, members=members), "member"
+    else:
+        with progress.observer() as observer:
+            verdict, what = verifying.verify(run_path, observer=observer), "sample"
+    told = verdict.as_dict()
+    answer(as_json, told, print_verdict, told, what)
+    return 0 if verdict.identical else 1
 
 
 def info(path: Path, as_json: bool) -> None:

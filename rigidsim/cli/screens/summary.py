@@ -9,11 +9,12 @@ from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
 
-from rigidsim.cli.screens.page import Page, Styled
+from rigidsim.cli.screens.page import Page, Styled, answer
 from rigidsim.cli.screens.words import advice_line, body_text, next_lines, start_text, time_text, verdict_line
 from rigidsim.errors import ConfigError
 from rigidsim.scene.choices import method_named, variables_named
 from rigidsim.scene.readable import YEAR, TimeWords, span_text
+from rigidsim.store.run import Run
 from rigidsim.store.summary import Brief, Summary
 from rigidsim.store.summary_parts import ENGINE, Accuracy, InvariantDrift, Modelling, TableErrors
 
@@ -56,6 +57,15 @@ def print_summary(summary: Brief, folder: str, out: Console | None = None, *, lo
     on.line("folder", folder)
     for number, command in enumerate(next_lines(summary.status, summary.exit_code, folder)):
         on.line("" if number else "next", command, "cyan")
+
+
+def print_run(result: Run, as_json: bool) -> int:
+    """Print a run's summary; returns its exit code."""
+    answer(as_json, result.summary, print_summary, result.outcome, result.place)
+    code = result.outcome.exit_code
+    if code:
+        print(f"rigidsim: {result.outcome.message}", file=sys.stderr)
+    return code
 
 
 def print_understood(told: Checked | RunPlan | Summary, loads: Sequence[str], on: Page) -> None:
