@@ -7,6 +7,7 @@ sharp colours; normals point outwards and are smooth where the solid is.
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import product
 from typing import Any, Self
 
 import numpy as np
@@ -113,23 +114,23 @@ def body_meshes(drawing: str | None) -> list[Mesh]:
     largest radius is a sixth of the reach. ``ValueError`` for JSON that is not such a list, or see
     `solid_mesh`.
     """
-    solids = [(entry, entry.get("dimensions", {}), _placement(entry)) for entry in _parse(drawing)]
-    extended = {
-        number: solid_mesh(entry["solid"], dimensions).moved(*place)
-        for number, (entry, dimensions, place) in enumerate(solids)
-        if entry["solid"] != POINT
-    }
+    solids = [(entry, *_placement(entry)) for entry in _parse(drawing)]
+    meshes = [
+        None if one["solid"] == POINT else solid_mesh(one["solid"], one.get("dimensions", {})).moved(*place)
+        for one, *place in solids
+    ]
     reach = max(
-        extended[number].reach() if number in extended else float(np.linalg.norm(shift))
-        for number, (_, _, (_, shift)) in enumerate(solids)
+        float(np.linalg.norm(shift)) if mesh is None else mesh.reach()
+        for mesh, (_, _, shift) in zip(meshes, solids, strict=True)
     )
     reach = reach or 1.0  # a single point at the reference point has no size of its own
-    for number, (_, dimensions, place) in enumerate(solids):
-        if number not in extended:
-            fraction = float(dimensions.get("mass_fraction", 1.0))
-            radius = reach * max(np.cbrt(np.clip(fraction, 0.0, 1.0)) / 6, 0.03)
-            extended[number] = ball(radius, radius, radius, segments=32, rings=16).moved(*place)
-    return [extended[number] for number in range(len(solids))]
+
+    def point(entry: dict[str, Any], turn: Array, shift: Array) -> Mesh:
+        fraction = float(entry.get("dimensions", {}).get("mass_fraction", 1.0))
+        radius = reach * max(np.cbrt(np.clip(fraction, 0.0, 1.0)) / 6, 0.03)
+        return ball(radius, radius, radius, segments=32, rings=16).moved(turn, shift)
+
+    return [mesh or point(*solid) for mesh, solid in zip(meshes, solids, strict=True)]
 
 
 def point_positions(drawing: str | None) -> Array:
@@ -182,22 +183,16 @@ def _soup(corners: Array, normals: Array, colors: NDArray[np.uint8]) -> Mesh:
 def _box(a: float, b: float, c: float) -> Mesh:
     corners, normals, colors = [], [], []
     half = np.array([a, b, c]) / 2
-    for axis in range(3):
-        u, v = (axis + 1) % 3, (axis + 2) % 3
-        for sign in (1, -1):
-            quad = np.zeros((4, 3))
-            quad[:, axis] = sign * half[axis]
-            quad[:, u] = half[u] * np.array([-1, 1, 1, -1])
-            quad[:, v] = half[v] * np.array([-1, -1, 1, 1])
-            if sign < 0:
-                quad = quad[::-1]
-            normal = np.zeros(3)
-            normal[axis] = sign
-            shade = np.array(_AXIS_COLORS[axis]) * (1.0 if sign > 0 else _DARKER)
-            for pick in ((0, 1, 2), (0, 2, 3)):
-                corners.append(quad[list(pick)])
-                normals.append(np.tile(normal, (3, 1)))
-                colors.append(shade.astype(np.uint8))
+    for axis, sign in product(range(3), (1, -1)):
+        across = [(axis + 1) % 3, (axis + 2) % 3]
+        quad = np.zeros((4, 3))
+        quad[:, axis] = sign * half[axis]
+        quad[:, across] = half[across] * np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)])
+        shade = np.array(_AXIS_COLORS[axis]) * (1.0 if sign > 0 else _DARKER)
+        for pick in ((0, 1, 2), (0, 2, 3)):
+            corners.append(quad[::sign][list(pick)])
+            normals.append(np.tile(sign * np.eye(3)[axis], (3, 1)))
+            colors.append(shade.astype(np.uint8))
     return _soup(np.array(corners), np.array(normals), np.array(colors))
 
 

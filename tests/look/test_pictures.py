@@ -18,7 +18,6 @@ pytest.importorskip("rerun")
 
 import rigidsim
 from rigidsim.look.film import HeadlessViewer, NoGraphics, vulkan_drivers
-from rigidsim.look.thinning import thin, thinned_indices
 from rigidsim.look.timeline import write_timeline
 from rigidsim.look.timeline.blueprint import build_blueprint
 from rigidsim.look.timeline.drawn import DrawnRun
@@ -90,8 +89,7 @@ def test_a_ready_scene_is_seen_whole(run: rigidsim.Run, tmp_path: Path) -> None:
 
 def _write_empty(dataset: rigidsim.Run, path: Path) -> None:
     """The same stage without body, arrows and trails."""
-    shown = thin(dataset, ROWS)
-    drawn = DrawnRun.of(dataset, shown, thinned_indices(dataset.sizes["time"], ROWS))
+    drawn = DrawnRun.of(dataset, ROWS)
     with recording_to(path, "empty", len(drawn.seconds), build_blueprint(drawn)) as recording:
         stages = [
             replace(stage, meshes=[], points=np.zeros((0, 3)), arrows=[], trails=[], axis_length=0.0)

@@ -125,12 +125,9 @@ def _lines(signal: SignalAnalysis, angle: bool, digits: int, *, narrow: bool) ->
     table = Table(box=SIMPLE_HEAD, pad_edge=False, show_edge=False)
     largest = float(signal.lines[0].amplitude)
     unit, symbol = angle_unit(largest) if angle else (1.0, signal.units)
-    table.add_column("period", justify="right", no_wrap=True)
-    table.add_column("rad/s", no_wrap=True)
-    if not narrow:
-        table.add_column("error", no_wrap=True)
-    table.add_column(f"amplitude{'' if symbol in ('', '1') else ', ' + symbol}", no_wrap=True)
-    table.add_column("phase, deg", justify="right", no_wrap=True)
+    amplitude = f"amplitude{'' if symbol in ('', '1') else ', ' + symbol}"
+    for name in ("period", "rad/s", *(() if narrow else ("error",)), amplitude, "phase, deg"):
+        table.add_column(name, justify="right" if name in ("period", "phase, deg") else "left", no_wrap=True)
     table.add_column("line", overflow="fold")
     for line in signal.lines:
         table.add_row(

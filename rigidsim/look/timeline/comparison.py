@@ -13,7 +13,6 @@ from rigidsim.look.page import legible
 from rigidsim.look.plots import Color, Plot, Series
 from rigidsim.look.signals import values
 from rigidsim.look.solids import Array
-from rigidsim.look.thinning import thin, thinned_indices
 from rigidsim.look.timeline.blueprint import build_comparison
 from rigidsim.look.timeline.drawn import Clock, DrawnRun, build_clock
 from rigidsim.look.timeline.writing import chunks, recording_to
@@ -34,20 +33,18 @@ def write_comparison(named: Sequence[tuple[str, xarray.Dataset]], path: Path, *,
     """
     if not 2 <= len(named) <= MOST:
         raise ValueError(f"given {len(named)} runs; 2 to {MOST} can be seen side by side")
-    shown = [(name, dataset, thin(dataset, rows)) for name, dataset in named]
-    seconds = [np.asarray(table["time"].values, dtype=np.float64) for _, _, table in shown]
-    clock = build_clock(np.unique(np.concatenate(seconds)))
-    drawn = []
-    for number, (name, dataset, table) in enumerate(shown):
-        steps = thinned_indices(dataset.sizes["time"], rows)
-        run = DrawnRun.of(dataset, table, steps, clock=_part(clock, seconds[number]))
-        drawn.append(_named(run, name, number))
-    apart = attitude_differences([(name, table) for name, _, table in shown])
+    runs = [(name, DrawnRun.of(dataset, rows)) for name, dataset in named]
+    clock = build_clock(np.unique(np.concatenate([run.seconds for _, run in runs])))
+    drawn = [
+        _named(replace(run, clock=_part(clock, run.seconds)), name, number)
+        for number, (name, run) in enumerate(runs)
+    ]
+    apart = attitude_differences([(name, run.rows) for name, run in runs])
     titles = [legible(name) for name, _ in named]
     blueprint = build_comparison(list(zip(titles, drawn, strict=True)), clock, apart)
     if apart is not None:
         drawn[0].plots.append(apart)
-    count, name = sum(map(len, seconds)), " and ".join(name for name, _ in named)
+    count, name = sum(len(run.steps) for run in drawn), " and ".join(name for name, _ in named)
     with recording_to(path, name, count, blueprint) as recording:
         for run in drawn:
             run.draw_static(recording, legend=run is drawn[0])

@@ -17,7 +17,7 @@ from rigidsim.look.stages.bodies import Subject
 from rigidsim.look.stages.parts import Picture, Plane
 from rigidsim.look.stages.registry import build_picture
 from rigidsim.look.states import States, charts_of, sections_of, states_of
-from rigidsim.look.thinning import thinned_indices
+from rigidsim.look.thinning import thin, thinned_indices
 from rigidsim.look.timeline import drawing, plotting
 from rigidsim.scene.readable import DAY, YEAR, TimeWords
 
@@ -80,10 +80,12 @@ def build_clock(seconds: NDArray[np.float64]) -> Clock:
 
 @dataclass(frozen=True)
 class DrawnRun:
-    """Everything drawn of one dataset: of its rows `steps`, with pages of markdown by name, and the turns of
-    the body (0 if its rate isn't known).
+    """Everything drawn of one dataset: of its `rows` in memory, numbered by `steps`, with pages of markdown
+    by name, and the turns of the body (0 if its rate isn't known).
     """
 
+    rows: xarray.Dataset
+    steps: NDArray[np.int64]
     picture: Picture
     subject: Subject
     plots: list[Plot]
@@ -91,48 +93,42 @@ class DrawnRun:
     states: list[States]
     clock: Clock
     seconds: Array
-    steps: NDArray[np.int64]
     pages: dict[str, str]
     words: TimeWords
     turns: float
 
     @classmethod
-    def of(
-        cls,
-        dataset: xarray.Dataset,
-        shown: xarray.Dataset,
-        steps: NDArray[np.int64],
-        clock: Clock | None = None,
-    ) -> Self:
-        """The drawing of a dataset from its rows that are in memory, on the clock that suits them."""
-        seconds = signals.seconds(shown)
+    def of(cls, dataset: xarray.Dataset, most: int) -> Self:
+        """The drawing of at most so many rows of a dataset, possibly lazy, on the clock that suits them."""
+        rows = thin(dataset, most).assign_attrs(dataset.attrs)
+        seconds = signals.seconds(rows)
         start, end = float(seconds[0]), float(seconds[-1])
-        clock = clock or build_clock(seconds)
-        told = shown.assign_attrs(dataset.attrs)
-        picture, subject = build_picture(told)
-        plots = plan_plots(told, picture.leading)
+        clock = build_clock(seconds)
+        picture, subject = build_picture(rows)
+        plots = plan_plots(rows, picture.leading)
         notes = list(picture.notes)
         if not clock.duration:
             notes.append(f"the run doesn't fit nanoseconds: its timeline is `{clock.name}`")
             series = Series("time_seconds", ["time"], [(170, 170, 175)], seconds[:, None])
             plots.append(Plot("time_seconds", "Time [s]", "more", [series]))
         pages = {
-            "Summary": summary_page(dataset, shown),
+            "Summary": summary_page(dataset, rows),
             "Picture": notes_page(picture.kind, notes),
             "Config": config_page(dataset),
         }
-        rates = signals.values(told, "angular_velocity")
+        rates = signals.values(rows, "angular_velocity")
         rate = signals.norms(rates) if rates is not None else np.empty(0)
         mean = float(np.nanmean(rate)) if np.isfinite(rate).any() else 0.0
         return cls(
+            rows=rows,
+            steps=thinned_indices(dataset.sizes["time"], most),
             picture=picture,
             subject=subject,
             plots=plots,
             planes=[*picture.planes, *sections_of(dataset)],
-            states=[*states_of(dataset, start, end), *charts_of(told)],
+            states=[*states_of(dataset, start, end), *charts_of(rows)],
             clock=clock,
             seconds=seconds,
-            steps=steps,
             pages={name: text for name, text in pages.items() if text},
             words=TimeWords.of(dataset.attrs, start, end),
             turns=mean * abs(end - start) / (2 * np.pi),

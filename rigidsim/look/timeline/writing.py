@@ -14,7 +14,6 @@ from rerun.error_utils import set_strict_mode, strict_mode
 
 from rigidsim.look.page import legible
 from rigidsim.look.signals import title_of
-from rigidsim.look.thinning import thin, thinned_indices
 from rigidsim.look.timeline.blueprint import build_blueprint
 from rigidsim.look.timeline.drawn import DrawnRun
 
@@ -38,9 +37,8 @@ def write_timeline(dataset: xarray.Dataset, path: Path, *, rows: int = 100_000) 
     RuntimeError: the environment variable RERUN switches recording off.
     OSError: the file can't be written, or there is no room for it.
     """
-    shown = thin(dataset, rows)
-    count = shown.sizes["time"]
-    run = DrawnRun.of(dataset, shown, thinned_indices(dataset.sizes["time"], rows))
+    run = DrawnRun.of(dataset, rows)
+    count = len(run.steps)
     with recording_to(path, title_of(dataset), count, build_blueprint(run)) as recording:
         run.draw_static(recording)
         for part in chunks(0, count):
@@ -98,12 +96,10 @@ class LiveRecording:
 
     def update(self, dataset: xarray.Dataset) -> None:
         """Send the new rows of all so far; everything where the scales have changed with them."""
-        if not dataset.sizes["time"]:
+        if dataset.sizes["time"] - 1 == self._last:  # nothing is new
             return
-        steps = thinned_indices(dataset.sizes["time"], LIVE_ROWS)
-        if steps[-1] == self._last:
-            return
-        run = DrawnRun.of(dataset, thin(dataset, LIVE_ROWS), steps)
+        run = DrawnRun.of(dataset, LIVE_ROWS)
+        steps = run.steps
         with strict():
             scales = _scales_of(run)
             if scales != self._scales:
