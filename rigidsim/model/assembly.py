@@ -38,8 +38,8 @@ def assemble_states(
     if flies:
         blocks.append(_flight_block(m, plan))
     if m.point_masses is not None:  # which feel the forces that the body exerts on them
-        m.point_masses.react([part for load in having(Reacting, m.loads) for part in load.reaction(m)])
-        blocks.append(m.point_masses.block())
+        pulls = [part for load in having(Reacting, m.loads) for part in load.reaction(m)]
+        blocks.append(m.point_masses.block(pulls))
     blocks += _load_blocks(m)
     if work_is_needed(m):
         why, unit = "work of the loads without a potential, to check the energy", [m.work_unit]

@@ -121,7 +121,11 @@ def written(text: str, overrides: Sequence[str], meant: dict[str, Any], source: 
 
 
 def _apply(table: dict[str, Any], assignment: str, where: str, read: Callable[[str], Any]) -> None:
-    key, value_text = _parts(assignment, where)
+    key, equals, value_text = (part.strip() for part in assignment.partition("="))
+    if not equals or not key or "\n" in assignment:
+        raise ConfigError(Problem(where, "write KEY=VALUE on one line, such as time.end=10"))
+    if _DEEP_KEY.search(assignment):
+        raise ConfigError(Problem(where, f"a key of more than {_DEEPEST_KEY} parts"))
     target, last = _found(table, key, where, new=bool(value_text))
     try:
         value = read(value_text)
@@ -158,15 +162,6 @@ def assignments(text: str, keys: Sequence[str]) -> list[str]:
         if name in document.get(table, {}):
             found.append(f"{key}={document[table][name].as_string()}")
     return found
-
-
-def _parts(assignment: str, where: str) -> tuple[str, str]:
-    key, equals, value_text = assignment.partition("=")
-    if not equals or not key.strip() or "\n" in assignment:
-        raise ConfigError(Problem(where, "write KEY=VALUE on one line, such as time.end=10"))
-    if _DEEP_KEY.search(assignment):
-        raise ConfigError(Problem(where, f"a key of more than {_DEEPEST_KEY} parts"))
-    return key.strip(), value_text.strip()
 
 
 _KEY_PART = re.compile(r"""\s*(?:"([^"\n]+)"|'([^'\n]+)'|([^\[\].\"']+))((?:\[\d{1,9}\])*)\s*(\.|$)""")

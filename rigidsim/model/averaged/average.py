@@ -62,6 +62,10 @@ class Average:
         """Whether it averages over the sources' orbits as well."""
         return self.level == ORBIT_AVERAGED
 
+    def tells(self, name: str) -> bool:
+        """Whether it can provide an observable, as far as the scene has it."""
+        return name in TOLD or (name == "resonant_angle" and self.resonance is not None)
+
     @property
     def longitude(self) -> Carried:
         """Which longitude along a tabulated orbit the average needs."""

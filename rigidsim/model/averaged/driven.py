@@ -254,7 +254,8 @@ def passing(scene: Scene, driven: Driven, sources: Sequence[Source]) -> Driven:
         spectra.append(body_spectrum(driven.motion_in_double(float(now[0]), float(now[1]))))
     apart, total = float(places[1] - places[0]), 0.0
     for n, spectrum in enumerate(spectra):
-        when = _when(scene, float(places[n]))
+        when = f", or end the run before {span_text(float(places[n]))}, when torques of the body alone bring "
+        when = when + "it there" if n else ""
         beside = spectra[n + 1] if n + 1 < len(spectra) else spectra[n - 1]
         try:
             refuse_frequencies(scene, spectrum, sources, (beside, apart))
@@ -271,12 +272,6 @@ def passing(scene: Scene, driven: Driven, sources: Sequence[Source]) -> Driven:
                 against = f"the rotation {how} a resonance with [[loads]] number {source.number}"
                 raise refused(scene.config.model.level, against, f'choose level = "full"{when}')
     return replace(driven, passed=total)
-
-
-def _when(scene: Scene, seconds: float) -> str:
-    if seconds == float(scene.start):
-        return ""
-    return f", or end the run before {span_text(seconds)}, when torques of the body alone bring it there"
 
 
 def _passed(before: BodySpectrum, after: BodySpectrum, source: Source, seconds: float) -> tuple[float, bool]:

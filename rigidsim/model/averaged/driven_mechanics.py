@@ -26,10 +26,6 @@ class DrivenMechanics(AveragedMechanics):
     """Mechanics of an average under torques that do work."""
 
     @property
-    def kept_by_average(self) -> str | None:
-        return None
-
-    @property
     def driven(self) -> Driven:
         """What drives the motion."""
         return self.carried(self.of.driven)

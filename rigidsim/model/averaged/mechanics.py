@@ -6,7 +6,7 @@ from typing import Any
 
 import heyoka as hy
 
-from rigidsim.model.averaged.average import DIRECTION, TOLD, Average
+from rigidsim.model.averaged.average import DIRECTION, Average
 from rigidsim.model.averaged.orbit_terms import (
     Ellipse,
     OrbitPlace,
@@ -49,10 +49,12 @@ class AveragedMechanics(Mechanics):
         return self.of.rate_bound
 
     def tells(self, name: str) -> bool:
-        return name in TOLD
+        return self.of.tells(name)
 
     @property
     def kept_by_average(self) -> str | None:
+        if self.of.driven is not None or self.of.resonance is not None:
+            return None
         return "averaged over the free rotation, a gravity gradient has no torque along the momentum"
 
     @property

@@ -34,7 +34,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Protocol, Self
+from typing import Any, Self
 
 import heyoka as hy
 import numpy as np
@@ -48,22 +48,6 @@ from rigidsim.scene.orbit_tables.pieces import AXIS
 from rigidsim.scene.orbits import KeplerOrbit
 
 _POINTS = 4096
-
-
-class Functions(Protocol):
-    """Elementary functions of numbers or of expressions."""
-
-    def cos(self, x: Any) -> Any:
-        """Cosine."""
-
-    def sin(self, x: Any) -> Any:
-        """Sine."""
-
-    def sqrt(self, x: Any) -> Any:
-        """Square root."""
-
-    def atan2(self, y: Any, x: Any) -> Any:
-        """Angle of the point (x, y)."""
 
 
 @dataclass(frozen=True)
@@ -129,10 +113,10 @@ def second_order(eccentricity: float) -> tuple[float, float]:
 
 
 def nutation(
-    functions: Functions, ellipse: Ellipse, place: OrbitPlace, size: Any, s: Vector, number: Any
+    functions: Any, ellipse: Ellipse, place: OrbitPlace, size: Any, s: Vector, number: Any
 ) -> Vector:
-    """Nutation k (J s) x s for a size k / (2 n) (1 - e^2)^(-3/2); ``number`` makes the ellipse's values
-    factors.
+    """Nutation k (J s) x s for a size k / (2 n) (1 - e^2)^(-3/2), by functions of heyoka or of mpmath;
+    ``number`` makes the ellipse's values factors.
     """
     e, root = ellipse.eccentricity, ellipse.root
     b = e / (1 + root)
@@ -175,7 +159,7 @@ def plane_vectors(
 
 
 def place_by_elements(
-    functions: Functions, elements: Mapping[str, Any], anomaly: Any, periapsis: Any
+    functions: Any, elements: Mapping[str, Any], anomaly: Any, periapsis: Any
 ) -> OrbitPlace:
     """The place of an eccentric anomaly, by elements q and p of ``rigidsim.scene.orbit_tables.pieces``."""
     q, p = elements["q"], elements["p"]

@@ -15,7 +15,6 @@ from typing import Any
 
 import heyoka as hy
 
-from rigidsim.model.averaged.average import TOLD
 from rigidsim.model.averaged.mechanics import AveragedMechanics, total
 from rigidsim.model.averaged.orbit_terms import Ellipse
 from rigidsim.model.averaged.resonance import Resonance
@@ -25,19 +24,11 @@ from rigidsim.scene.arithmetic import cross, dot, transpose
 
 SLOW = ["rw", "rx", "ry", "rz", "la", "lb", "excess"]
 """States: the quaternion of the axes a, b, c, and the momentum along them less p n C along c."""
-RESONANT_ANGLE = "resonant_angle"
 
 
 @dataclass(frozen=True)
 class ResonantMechanics(AveragedMechanics):
     """Mechanics of an average that keeps the resonant angle."""
-
-    def tells(self, name: str) -> bool:
-        return name in TOLD or name == RESONANT_ANGLE
-
-    @property
-    def kept_by_average(self) -> str | None:
-        return None
 
     @property
     def resonance(self) -> Resonance:

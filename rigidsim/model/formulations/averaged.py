@@ -10,10 +10,10 @@ import heyoka as hy
 
 from rigidsim.errors import ConfigError, Problem
 from rigidsim.model.averaged.applies import told_of_resonances
-from rigidsim.model.averaged.average import DIRECTION, TOLD, Average, average_of
+from rigidsim.model.averaged.average import DIRECTION, Average, average_of
 from rigidsim.model.averaged.driven_mechanics import AMPLITUDES, DrivenMechanics
 from rigidsim.model.averaged.mechanics import AveragedMechanics
-from rigidsim.model.averaged.resonant_mechanics import RESONANT_ANGLE, SLOW, ResonantMechanics
+from rigidsim.model.averaged.resonant_mechanics import SLOW, ResonantMechanics
 from rigidsim.model.formulations.formulation import Formulation, ModelPlan, Requirements
 from rigidsim.model.frames import refuse_without_plane
 from rigidsim.model.load import Load
@@ -145,9 +145,7 @@ def _refuse_untold(average: Average, record: Sequence[str] | None) -> None:
         if name in _OF_FIGURE and not average.figure:
             why = "the body tumbles, so that its figure axis points nowhere on average; record momentum_axis "
             why += "instead"
-        elif name == RESONANT_ANGLE and average.resonance is not None:
-            continue
-        elif name not in TOLD:
+        elif not average.tells(name):
             why = f'needs every rotation, which [model] level = "{average.level}" averages over'
         else:
             continue

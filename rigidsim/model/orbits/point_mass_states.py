@@ -6,6 +6,7 @@ in the units of length and speed of the scene's flight. Where the coupling is fu
 as well: what a load makes of the body's velocity is taken off theirs in proportion to the masses.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -19,6 +20,8 @@ from rigidsim.scene.arithmetic import Vector, cross, norm
 from rigidsim.scene.point_masses import PointMasses
 
 _AXES = "xyz"
+Pull = tuple[int, Any, list[Symbolic]]
+"""Acceleration of a mass (by index), speed over time: a number (mpf) times expressions."""
 
 
 class PointMassStates:
@@ -26,7 +29,6 @@ class PointMassStates:
 
     def __init__(self, masses: PointMasses, scaling: Scaling, context: Any, number: Rounder) -> None:
         self.masses, self._scaling, self._context, self._number = masses, scaling, context, number
-        self._pulls: list[tuple[int, Any, list[Symbolic]]] = []
 
     @cached_property
     def positions(self) -> list[list[Symbolic]]:
@@ -52,11 +54,7 @@ class PointMassStates:
         """Vector from mass i to mass j, internal units of length."""
         return [b - a for a, b in zip(self.positions[i], self.positions[j], strict=True)]
 
-    def react(self, pulls: list[tuple[int, Any, list[Symbolic]]]) -> None:
-        """Add accelerations of masses (by index): numbers (mpf) times expressions, in speed over time."""
-        self._pulls = pulls
-
-    def _accelerations(self) -> list[list[Symbolic]]:
+    def _accelerations(self, pulls: Sequence[Pull]) -> list[list[Symbolic]]:
         scaling, strengths = self._scaling, self.masses.strengths
         shift = scaling.time - scaling.speed - 2 * scaling.length
         terms: list[list[list[Symbolic]]] = [[[], [], []] for _ in self.masses.names]
@@ -66,19 +64,19 @@ class PointMassStates:
             for a, x in enumerate(place):
                 terms[i][a].append(others * (x * cubed))
                 terms[j][a].append(-own * (x * cubed))
-        for n, factor, pull in self._pulls:
+        for n, factor, pull in pulls:
             for a, x in enumerate(pull):
                 terms[n][a].append(x if factor == 1 else self._number(factor) * x)
         return [list(map(hy.sum, three)) for three in terms]
 
-    def block(self) -> StateBlock:
-        """One block with the states of all masses."""
+    def block(self, pulls: Sequence[Pull] = ()) -> StateBlock:
+        """One block with the states of all masses, which feel these pulls of the body's shape."""
         context, scaling, masses = self._context, self._scaling, self.masses
         ratio = self._number(context.ldexp(context.one, scaling.speed + scaling.time - scaling.length))
         names: list[str] = []
         derivatives: list[Symbolic] = []
         initial: list[Any] = []
-        accelerations = self._accelerations()
+        accelerations = self._accelerations(pulls)
         for n, name in enumerate(masses.names):
             names += [f"{name}_{x}" for x in _AXES] + [f"{name}_v{x}" for x in _AXES]
             derivatives += [ratio * v for v in self.velocities[n]] + accelerations[n]
@@ -86,7 +84,7 @@ class PointMassStates:
             initial += [context.ldexp(v, -scaling.speed) for v in masses.velocities[n]]
         exponents = ([scaling.length] * 3 + [scaling.speed] * 3) * len(masses.names)
         why = "[[bodies]]: point masses under mutual gravity"
-        if self._pulls:
+        if pulls:
             why += ", and that of the body's shape"
         return StateBlock(names, derivatives, initial, exponents=exponents, why=why)
 

@@ -14,6 +14,7 @@ the mean longitude advances at the rate of Kepler's third law, or of ``period``.
 from bisect import bisect_right
 from collections.abc import Callable, Mapping
 from functools import cached_property
+from operator import add, mul
 from typing import Any
 
 import numpy as np
@@ -66,44 +67,33 @@ class TabulatedOrbit:
 
     # --- rows -----------------------------------------------------------------------------------------------
 
-    def _column(self, name: str) -> Any:
-        """Values of a column, one constant, or None if there is neither."""
-        return self.table.columns.get(name, self._constants.get(name))
-
     def _regular(self) -> dict[str, Any]:
         """The regular elements: for each a list over the rows, or one constant."""
-        context, count = self.context, len(self.table.times)
-        zero = context.zero
+        context, columns, zero = self.context, self.table.columns, self.context.zero
+        given = {**self._constants, **columns}
 
         def pairs(size: Any, angle: Any) -> tuple[Any, Any]:
             if not isinstance(size, list) and size == 0:
                 return zero, zero
-            if not (isinstance(size, list) or isinstance(angle, list)):
-                return size * context.cos(angle), size * context.sin(angle)
-            sizes, angles = (x if isinstance(x, list) else [x] * count for x in (size, angle))
-            both = list(zip(sizes, angles, strict=True))
-            return [s * context.cos(w) for s, w in both], [s * context.sin(w) for s, w in both]
+            cosines, sines = (_by_row(f, angle) for f in (context.cos, context.sin))
+            return _by_row(mul, size, cosines), _by_row(mul, size, sines)
 
-        axis, e, tilt, node = (
-            self._column(name)
-            for name in ("semi_major_axis", "eccentricity", "inclination", "ascending_node")
-        )
-        e, tilt, node = (zero if x is None else x for x in (e, tilt, node))
-        periapsis = self._column("longitude_of_periapsis")
+        names = "eccentricity", "inclination", "ascending_node", "periapsis"
+        axis, (e, tilt, node, argument) = given["semi_major_axis"], (given.get(x, zero) for x in names)
+        periapsis = given.get("longitude_of_periapsis")
         if periapsis is None:
-            argument = self._column("periapsis")
-            periapsis = _sum(zero if argument is None else argument, node)
+            periapsis = _by_row(add, argument, node)
         self._longitude_of_periapsis = periapsis
-        half = [context.sin(x / 2) for x in tilt] if isinstance(tilt, list) else context.sin(tilt / 2)
+        half = _by_row(lambda x: context.sin(x / 2), tilt)
         self._check("semi_major_axis", axis, lambda x: x > 0, "a positive length")
         self._check("eccentricity", e, lambda x: 0 <= x < 1, "0 (a circle) to below 1")
         self._check("inclination", half, lambda x: 0 <= x < _LARGEST_TILT, "0 to 178 deg")
         k, h = pairs(e, periapsis)
         q, p = pairs(half, node)
         found = {AXIS: axis, "k": k, "h": h, "q": q, "p": p}
-        longitude = self._column("mean_longitude")
-        if "mean_anomaly" in self.table.columns:
-            longitude = _sum(self.table.columns["mean_anomaly"], periapsis)
+        longitude = given.get("mean_longitude")
+        if "mean_anomaly" in columns:
+            longitude = _by_row(add, columns["mean_anomaly"], periapsis)
         if isinstance(longitude, list):
             found[LONGITUDE] = self._unwrapped(longitude, axis)
         return found
@@ -117,8 +107,7 @@ class TabulatedOrbit:
     def _unwrapped(self, longitude: list[Any], axis: Any) -> list[Any]:
         """The mean longitude with the whole turns between rows that Kepler's law gives."""
         context, times = self.context, self.table.times
-        axes = axis if isinstance(axis, list) else [axis] * len(times)
-        rates, turn = [self.motion(a) for a in axes], 2 * context.pi
+        rates, turn = _by_row(lambda a, _: self.motion(a), axis, times), 2 * context.pi
         found = [longitude[0]]
         for i in range(1, len(times)):
             expected = (rates[i - 1] + rates[i]) / 2 * (times[i] - times[i - 1])
@@ -209,9 +198,8 @@ class TabulatedOrbit:
     @cached_property
     def largest_eccentricity(self) -> Any:
         """Largest eccentricity over the rows."""
-        count = max(len(self._each("k")), len(self._each("h")))
-        k, h = (x if len(x) == count else x * count for x in (self._each("k"), self._each("h")))
-        return max(self.context.sqrt(a * a + b * b) for a, b in zip(k, h, strict=True))
+        sizes = _by_row(lambda k, h: self.context.sqrt(k * k + h * h), self._rows["k"], self._rows["h"])
+        return max(sizes) if isinstance(sizes, list) else sizes
 
     @property
     def smallest_axis(self) -> Any:
@@ -278,9 +266,10 @@ class TabulatedOrbit:
         return interpolation_error(self.table.times, elements, self.moving)
 
 
-def _sum(one: Any, other: Any) -> Any:
-    if isinstance(one, list) and isinstance(other, list):
-        return [x + y for x, y in zip(one, other, strict=True)]
-    if isinstance(other, list):
-        one, other = other, one
-    return [x + other for x in one] if isinstance(one, list) else one + other
+def _by_row(function: Callable[..., Any], *values: Any) -> Any:
+    """A function of columns or constants, row by row; of constants alone a constant."""
+    count = next((len(x) for x in values if isinstance(x, list)), None)
+    if count is None:
+        return function(*values)
+    columns = (x if isinstance(x, list) else [x] * count for x in values)
+    return [function(*row) for row in zip(*columns, strict=True)]
