@@ -156,25 +156,15 @@ def _about_rates(table: Orbit, orbit: KeplerOrbit, strength: float, where: str) 
     for key in ("node_rate", "periapsis_rate"):
         rate = getattr(table, key)
         if rate.assumed and abs(float(rate)) > math.sqrt(squared):
-            value = _number(rate)
-            yield Caution(
-                WarningCode.ANGLE_WITHOUT_UNIT,
-                f"{where} orbit.{key}: given {value} without a unit, which is taken as rad/s, faster than "
-                f'the orbit itself; write its unit, such as "{value} deg/yr", or "{value} rad/s" if that is '
-                "meant",
-            )
+            yield _without_unit(f"{where} orbit.{key}", rate, "rad/s", "the orbit itself is slower", "deg/yr")
 
 
 def _familiar_axis(given: ExactNumber, where: str) -> Iterator[Caution]:
     """A semi-major axis without a unit that is a planet's or the Moon's in km."""
     for body in KNOWN:
         if body.distance and abs(1e3 * float(given) / body.distance - 1) < _AS_PUBLISHED:
-            value = _number(given)
-            yield Caution(
-                WarningCode.LENGTH_WITHOUT_UNIT,
-                f"{where}: given {value} without a unit, which is taken as m; the orbit of {body.called} has "
-                f'{body.distance / 1e3:.6g} km: write "{value} km" if that is meant, "{value} m" if not',
-            )
+            known = f"the orbit of {body.called} has {body.distance / 1e3:.6g} km"
+            yield _without_unit(where, given, "m", known, "km")
 
 
 def _about_period(

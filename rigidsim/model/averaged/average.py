@@ -212,9 +212,9 @@ def _left_out_at_start(
     scene: Scene, spectrum: BodySpectrum, sources: Sequence[Source], direction: Vector
 ) -> np.ndarray:
     """Part of the initial momentum that averaging over the rotation removes, kg m^2/s, space axes."""
-    space = frame_along(np.array([float(x) for x in direction]))
-    body = np.array([[float(x) for x in row] for row in attitude.rotation_matrix(scene.quaternion)])
-    principal = np.array([[float(x) for x in axis] for axis in spectrum.motion.axes]).T
+    space = frame_along(np.array(direction, dtype=float))
+    body = np.array(attitude.rotation_matrix(scene.quaternion), dtype=float)
+    principal = np.array(spectrum.motion.axes, dtype=float).T
     phases = spectrum.phases(space @ body @ principal)
     _, integral = spectrum.tensors(*phases)
     integral = space.T @ integral @ space

@@ -197,9 +197,9 @@ def _direction_removed(
     found = complex(parts @ np.exp(1j * wave.orders * amplitude))
     if found == 0:
         return np.zeros(3)
-    body = np.array([[float(x) for x in row] for row in attitude.rotation_matrix(scene.quaternion)])
+    body = np.array(attitude.rotation_matrix(scene.quaternion), dtype=float)
     size = norm(context, momentum)
-    principal = np.array([[float(x) for x in axis] for axis in polhodes.axes])
+    principal = np.array(polhodes.axes, dtype=float)
     along = np.array([float(x / size) for x in momentum])
     space = frame_along(body @ along)
     m = principal @ along
@@ -207,7 +207,7 @@ def _direction_removed(
     if polhodes.symmetric or math.hypot(m[0], m[1]) == 0:
         own = math.atan2(float(polhodes.root) * math.cos(amplitude), math.sin(amplitude))
     nodding = math.atan2(math.hypot(m[0], m[1]), m[2])
-    matrix = space @ body @ principal.T @ about_z(own).T @ about_x(nodding).T
+    matrix = space @ body @ principal.T @ _about(2, own).T @ _about(0, nodding).T
     precession = math.atan2(matrix[1, 0], matrix[0, 0])
     start = complex(
         _at(np.exp(1j * wave.phase).real, amplitude), _at(np.exp(1j * wave.phase).imag, amplitude)
@@ -216,16 +216,13 @@ def _direction_removed(
     return np.asarray(space.T @ np.array([found.real, found.imag, 0.0]))
 
 
-def about_z(angle: float) -> np.ndarray:
-    """Rotation matrix about the z axis."""
-    c, s = math.cos(angle), math.sin(angle)
-    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-
-
-def about_x(angle: float) -> np.ndarray:
-    """Rotation matrix about the x axis."""
-    c, s = math.cos(angle), math.sin(angle)
-    return np.array([[1.0, 0.0, 0.0], [0.0, c, -s], [0.0, s, c]])
+def _about(axis: int, angle: float) -> np.ndarray:
+    """Rotation matrix about an axis."""
+    found, i, j = np.eye(3), (axis + 1) % 3, (axis + 2) % 3
+    found[i, i] = found[j, j] = math.cos(angle)
+    found[j, i] = math.sin(angle)
+    found[i, j] = -found[j, i]
+    return found
 
 
 def frame_along(z: np.ndarray) -> np.ndarray:

@@ -179,16 +179,12 @@ class Resonance:
         unit = self.motion.moments[2] * self.orbit.mean_motion
         place = self.source.place(context, time)
         back = transpose(attitude.rotation_matrix(slow.quaternion))
-        along, across = (_doubles(apply(back, v)) for v in (place.pericentre, place.across))
-        momentum = _doubles([x / unit for x in self.whole(slow)])
+        along, across = (np.array(apply(back, v), dtype=float) for v in (place.pericentre, place.across))
+        momentum = np.array([x / unit for x in self.whole(slow)], dtype=float)
         sums = AnomalySums(np.array(self._ratios), *self._drive, self.multiple)
         anomaly = float(self.anomaly(time) % (2 * context.pi * sums.turns))
         added, turn = (sums.at(anomaly, x) for x in sums.removed(along, across, momentum))
         return [unit * context.mpf(float(x)) for x in added], [context.mpf(float(x)) for x in turn]
-
-
-def _doubles(vector: Sequence[Any]) -> np.ndarray:
-    return np.array([float(x) for x in vector])
 
 
 def _turned(context: Any, vector: Vector) -> Matrix:

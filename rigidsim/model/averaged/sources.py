@@ -149,7 +149,7 @@ class Source:
         c, s = float(at.cosine), float(at.sine)
         x, y = c - e, math.sqrt(1 - e * e) * s
         radius = math.hypot(x, y)
-        along, across = (np.array([float(v) for v in vector]) for vector in (at.pericentre, at.across))
+        along, across = (np.array(vector, dtype=float) for vector in (at.pericentre, at.across))
         direction = (x * along + y * across) / radius
         scale = float(self.strength_at(context, time) / self.strength)
         return np.outer(direction, direction) * scale / radius**3

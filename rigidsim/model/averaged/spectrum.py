@@ -107,7 +107,7 @@ def _tensor(parts: np.ndarray) -> np.ndarray:
 
 def body_spectrum(motion: FreeMotion) -> BodySpectrum:
     """The harmonics of a free motion."""
-    moments = np.array([float(x) for x in motion.moments])
+    moments = np.array(motion.moments, dtype=float)
     first, second, third = moments
     angle = 2 * np.pi * np.arange(_POINTS) / _POINTS
     g, length = float(motion.precession_rate), float(motion.momentum)

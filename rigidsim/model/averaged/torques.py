@@ -120,10 +120,10 @@ class DrivingTorques:
 
     def at(self, momentum: np.ndarray) -> np.ndarray:
         """Torque (3, n) along the principal axes for a momentum (3, n) along them, internal units."""
-        moments = np.array([float(x) for x in self._moments])[:, None]
-        torque = -np.array([float(x) for x in self._decay])[:, None] * momentum
+        moments = np.array(self._moments, dtype=float)[:, None]
+        torque = -np.array(self._decay, dtype=float)[:, None] * momentum
         if self.others:
-            axes = np.array([[float(x) for x in axis] for axis in self.polhodes.axes])
+            axes = np.array(self.polhodes.axes, dtype=float)
             rates = np.ascontiguousarray(axes.T @ (momentum / moments))
             torque = torque + self._evaluated(rates)
         return np.asarray(torque)
