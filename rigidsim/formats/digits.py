@@ -16,11 +16,8 @@ _EXACT = Context(prec=1400, Emax=10**6, Emin=-(10**6))
 
 
 def texts(parts: Sequence[np.ndarray], bits: int) -> list[str]:
-    """Numbers with as many digits as their precision needs; ``nan``, ``inf`` and ``-0.0`` unchanged.
-
-    Args:
-        parts: float64 arrays of the same shape (rows,), the nearest double first.
-        bits: bits of the significand; up to 53, the shortest text that gives the same double is used.
+    """Numbers, sums of (rows,) each, with as many digits as their bits need; ``nan``, ``inf`` and ``-0.0``
+    unchanged. For a single part it is the shortest text that gives the same double.
     """
     if len(parts) == 1:
         return [repr(value) for value in parts[0].tolist()]
@@ -73,11 +70,8 @@ def angle_unit_named(name: str) -> AngleUnit:
 
 
 def converted(parts: Sequence[np.ndarray], unit: AngleUnit, bits: int) -> list[np.ndarray]:
-    """Angles in rad converted to a unit, rounded once to the run's precision.
-
-    Args:
-        parts: float64 arrays of one shape, whose sum is the value.
-        bits: bits of the run's precision; up to 53, one part is worked out in 64 bits.
+    """Angles in rad, sums of arrays of one shape, converted to a unit, rounded once to so many bits; a single
+    part is worked out in 64 bits.
     """
     if unit.per_turn is None:
         return list(parts)

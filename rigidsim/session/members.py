@@ -67,12 +67,8 @@ class MemberResults:
 def status_variable(codes: np.ndarray) -> KeptVariable:
     """Outcomes of members as indices in ``OUTCOMES``, with their meanings."""
     meanings = " ".join(re.sub(r"\W+", "_", outcome) for outcome in OUTCOMES)
-    attributes = {
-        "long_name": "how the member ended",
-        "flag_values": list(range(len(OUTCOMES))),
-        "flag_meanings": meanings,
-    }
-    return KeptVariable((), codes, attributes)
+    flags = {"flag_values": list(range(len(OUTCOMES))), "flag_meanings": meanings}
+    return KeptVariable((), codes, {"long_name": "how the member ended", **flags})
 
 
 def warning_bits(codes: Iterable[str]) -> int:

@@ -22,12 +22,8 @@ class Soundness(Enum):
 
 @dataclass(frozen=True)
 class RunVerdict:
-    """Verdict on a run that ended.
-
-    Attributes:
-        share: largest drift of any invariant, or correction put back, over what rounding explains; None if
-            nothing was checked.
-        worst: the invariant with that drift; empty for none.
+    """Verdict on a run that ended. ``share``: largest drift of any invariant, or correction put back, over
+    what rounding explains, None if nothing was checked; ``worst``: the invariant with that drift.
     """
 
     soundness: Soundness

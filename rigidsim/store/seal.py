@@ -53,17 +53,6 @@ def refuse_special(path: Path) -> None:
         raise RunFolderError(f"{path}: is no file, but a folder, pipe or device; remove it")
 
 
-def read_seal(path: Path) -> str | None:
-    """The digest that a file claims for its content; None without a seal."""
-    with path.open("rb") as file:
-        size = file.seek(0, 2)
-        file.seek(max(0, size - _LENGTH))
-        tail = file.read()
-    if len(tail) != _LENGTH or not tail.startswith(_MARK) or not tail.endswith(b"\n"):
-        return None
-    return tail[len(_MARK) : -1].decode("ascii", "replace")
-
-
 def check_seal(path: Path) -> str:
     """The digest of a sealed file, verified against its content."""
     return check_whole(path)[0]
@@ -71,25 +60,27 @@ def check_seal(path: Path) -> str:
 
 def check_whole(path: Path) -> tuple[str, str]:
     """Like ``check_seal``, but also returns the digest of the file including its seal."""
+    torn = RunFolderError(f"{path}: is torn or foreign: its end holds no seal of rigidsim")
+    if not path.is_file():
+        raise torn
     try:
-        claimed = read_seal(path) if path.is_file() else None
-        if claimed is None:
-            raise RunFolderError(f"{path}: is torn or foreign: its end holds no seal of rigidsim")
-        running = hashlib.sha256()
-        left = path.stat().st_size - _LENGTH
         with path.open("rb") as file:
-            while left > 0:
-                piece = file.read(min(left, 1 << 20))
-                if not piece:
-                    break
+            left = max(0, file.seek(0, 2) - _LENGTH)
+            file.seek(left)
+            tail = file.read()
+            if len(tail) != _LENGTH or not (tail.startswith(_MARK) and tail.endswith(b"\n")):
+                raise torn
+            running = hashlib.sha256()
+            file.seek(0)
+            while left > 0 and (piece := file.read(min(left, 1 << 20))):
                 running.update(piece)
                 left -= len(piece)
-            found = running.hexdigest()
-            running.update(file.read(_LENGTH))
     except OSError as error:
         raise RunFolderError(f"{path}: can't be read: {error.strerror or error}") from None
-    if found != claimed:
+    claimed = tail[len(_MARK) : -1].decode("ascii", "replace")
+    if running.hexdigest() != claimed:
         raise RunFolderError(f"{path}: is damaged or was edited: its content isn't what its seal says")
+    running.update(tail)
     return claimed, running.hexdigest()
 
 

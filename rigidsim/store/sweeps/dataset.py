@@ -154,11 +154,7 @@ def boxes(
     members: Sequence[int], extra: int, numbers: int = _BOX_NUMBERS
 ) -> Iterator[tuple[tuple[int, ...], tuple[int, ...], range]]:
     """Cut consecutive members into boxes of their dimensions: first corner, shape, and the members' range.
-
-    Args:
-        members: number of members along each dimension.
-        extra: numbers per member.
-        numbers: largest count of numbers in a box, unless a single member has more.
+    Each has ``extra`` numbers; a box of more than one has at most ``numbers``.
     """
     most = max(1, numbers // max(1, extra))
     axis, within = len(members) - 1, 1

@@ -63,13 +63,8 @@ class SweepFolder(WorkFolder):
             return [""]  # that of no sweep
 
     def add(self, generation: Generation, *, exclusive: bool = False) -> Generation:
-        """Write a generation, whose tiles may then be computed.
-
-        Args:
-            exclusive: other processes may write the same one at the same time; the first one counts.
-
-        Returns:
-            The generation that is stored.
+        """Write a generation, whose tiles may then be computed, and return the one that is stored: with
+        ``exclusive`` other processes may write the same one at the same time, and the first counts.
         """
         self.tiles.mkdir(parents=True, exist_ok=True)
         path = self.generation_file(generation)

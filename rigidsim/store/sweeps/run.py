@@ -87,12 +87,7 @@ class SweepSummary(SummaryPart):
 
 @dataclass(frozen=True, repr=False)
 class SavedSweep:
-    """A sweep on disk, finished or not.
-
-    Attributes:
-        folder: its files.
-        outcome: contents of its summary; for an unfinished sweep, what its tiles tell.
-    """
+    """A sweep on disk, finished or not; of an unfinished one, ``outcome`` is what its tiles tell."""
 
     folder: SweepFolder
     outcome: SweepSummary
@@ -132,11 +127,7 @@ class SavedSweep:
         return open_dataset(self.folder.dataset)
 
     def refuse_damaged(self) -> None:
-        """Check the files of a complete sweep against their seals, which reads all of them.
-
-        Raises:
-            RunFolderError: the dataset or a tile is damaged or was edited.
-        """
+        """Check the files of a complete sweep against their seals, which reads all of them."""
         if self.folder.dataset.exists():
             self._refuse_damaged_dataset()
         for path in sorted(self.folder.tiles.glob("g*.h5")):

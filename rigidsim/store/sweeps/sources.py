@@ -156,12 +156,8 @@ class Described:
 
 @dataclass
 class Gathered:
-    """What the tiles hold, known before their numbers are read again.
-
-    Attributes:
-        times: sample times that all members share; None if they differ, or aren't kept.
-        reasons: why each failed member ended, by member.
-        made: how each tile was made, see ``Tile``.
+    """What the tiles hold, known before their numbers are read again: among it sample times that all members
+    share (None if they differ, or aren't kept), and by member why it failed.
     """
 
     variables: dict[str, Described] = field(default_factory=dict)

@@ -70,15 +70,9 @@ def ranges_of(members: np.ndarray) -> tuple[tuple[int, int], ...]:
 
 @dataclass(frozen=True)
 class Generation:
-    """A config together with the work that was to be done for it.
-
-    Attributes:
-        number: number of the generation, from 0.
-        config: the config's TOML text.
-        length: members per tile.
-        works: works in order; tiles are numbered through them.
-        apart: whether all members run one by one though some might share equations, as was found when the
-            sweep was begun; None if that wasn't asked.
+    """A config's text with the works that were to be done for it; tiles of ``length`` members are numbered
+    through them. ``apart``: whether all members run one by one though some might share equations, as was
+    found when the sweep was begun; None if that wasn't asked.
     """
 
     number: int
@@ -167,13 +161,8 @@ Kept = dict[str, KeptVariable]
 
 @dataclass(frozen=True)
 class Tile:
-    """Results of some members.
-
-    Attributes:
-        config_sha256: SHA-256 of the config that the members belong to.
-        members: indices of the members, (n,) int64.
-        reasons: by place in the tile, why members failed.
-        made: engines, versions, seconds, ...: everything that differs between repetitions.
+    """Results of some members of a config, whose indices are (n,) int64; by place in it, why they failed;
+    engines, versions, seconds, ...: everything that differs between repetitions.
     """
 
     config_sha256: str
