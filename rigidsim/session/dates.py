@@ -55,7 +55,8 @@ class Dates:
             return False
         if self.epoch.scale != "UTC":
             return True
-        known = parse_epoch("1972-01-01 UTC").julian_date(), parse_epoch(_last_day_of_utc()).julian_date()
+        last = date.fromordinal(leap_seconds()[2] - 1)
+        known = [parse_epoch(f"{day} UTC").julian_date() for day in ("1972-01-01", last)]
         zero = self.epoch.julian_date()
         return known[0] <= zero + ends[0] / DAY and zero + ends[1] / DAY < known[1]
 
@@ -157,10 +158,6 @@ class Dates:
         zero = self.epoch.julian_date()
         begins = [float((Epoch("UTC", days[k], 0).julian_date() - zero) * DAY) for k in later]
         return [(at, offsets[k] - offsets[k - 1]) for at, k in zip(begins, later, strict=True)]
-
-
-def _last_day_of_utc() -> str:
-    return f"{date.fromordinal(leap_seconds()[2] - 1)} UTC"
 
 
 def _line(base: Parts, step: Parts, index: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -100,7 +100,6 @@ class SampleStatistics:
         return arrays
 
     def restore(self, arrays: Mapping[str, np.ndarray]) -> None:
-        # older checkpoints hold no undefined samples
         largest, final = np.reshape(arrays.get("watched", ()), (2, len(self.invariants)))
         self.largest, self.final = self._by_name(largest), self._by_name(final)
         self.put_back = self._by_name(arrays.get("put_back", ()))
@@ -117,7 +116,7 @@ class SampleStatistics:
 
     def _by_name(self, values: Iterable[float]) -> dict[str, float]:
         """Values by invariant, without missing ones."""
-        pairs = zip(self.invariants, map(float, values), strict=False)  # older runs have none of some
+        pairs = zip(self.invariants, map(float, values), strict=True)
         return {name: value for name, value in pairs if not math.isnan(value)}
 
 

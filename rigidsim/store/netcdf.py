@@ -207,7 +207,7 @@ def reading(path: Path) -> Iterator[Any]:
     try:
         with h5py.File(path, "r") as file:
             yield file
-    except (OSError, KeyError, RuntimeError, ValueError) as error:
+    except (OSError, KeyError, RuntimeError, TypeError, ValueError) as error:
         raise RunFolderError(f"{path}: can't be read ({error})") from None
 
 
@@ -224,18 +224,15 @@ def check_version(version: Any, path: Path) -> None:
 
 def root_attributes(path: Path) -> dict[str, Any]:
     """Root attributes of a dataset or segment as Python values, and its ``rows``."""
-    try:
-        with h5py.File(path, "r") as file:
-            found = {
-                str(key): value.item()
-                if isinstance(value, np.generic | np.ndarray) and value.size == 1
-                else value
-                for key, value in file.attrs.items()
-                if not key.startswith("_")
-            }
-            return {**found, "rows": int(file["time"].shape[0]) if "time" in file else 0}
-    except (OSError, KeyError, AttributeError, IndexError, RuntimeError, ValueError) as error:
-        raise RunFolderError(f"{path}: can't be read as a dataset of rigidsim ({error})") from None
+    with reading(path) as file:
+        found = {
+            str(key): value.item()
+            if isinstance(value, np.generic | np.ndarray) and value.size == 1
+            else value
+            for key, value in file.attrs.items()
+            if not key.startswith("_")
+        }
+        return {**found, "rows": len(file["time"]) if "time" in file else 0}
 
 
 def read_group(path: Path, name: str) -> dict[str, np.ndarray]:

@@ -238,7 +238,7 @@ _ABSENT = object()
 
 
 def _differences(name: str, saved: Any, again: Any) -> Iterator[str]:
-    """Claims that differ; one that is missing in an older summary doesn't count."""
+    """Claims that differ; one that is missing in the summary doesn't count."""
     if isinstance(saved, Mapping) and isinstance(again, Mapping):
         for key in [*again, *(k for k in saved if k not in again)]:
             there, inner = saved.get(key, _ABSENT), f"{name}.{key}".lstrip(".")

@@ -23,22 +23,15 @@ _CHUNK_NUMBERS = 1 << 17
 _SAMPLES = "sample"
 
 RESERVED = {
-    *LABELS,
-    *("time", "sample", "member", "status", "steps", "warnings", "time_reached", "drift_bound"),
+    *(*LABELS, "time", "sample", "member", "status", "steps", "warnings", "time_reached", "drift_bound"),
     *(
         "attitude_error",
         "position_error",
         "modelling_error",
         "modelling_error_norm",
         "modelling_error_energy",
-        "failed",
-        "failed_member",
-        "failed_reason",
-        "lyapunov",
-        "megno",
-        "fli",
-        "line",
     ),
+    *("failed", "failed_member", "failed_reason", "lyapunov", "megno", "fli", "line"),
 }
 """Names that an axis can't have."""
 SUFFIXES = ("_final", "_min", "_max", "_mean", "_largest", "_time", "_times", "_count", "_first", "_lo")
