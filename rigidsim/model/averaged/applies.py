@@ -150,14 +150,6 @@ def told_of_resonances(sources: Sequence[Source]) -> str:
     return f"; resonances were looked for {', '.join(told)}" if told else ""
 
 
-def swing_of(spectrum: BodySpectrum, source: Source) -> float:
-    """Angle (rad) by which the terms removed by averaging over the rotation swing the momentum."""
-    sizes = np.where(spectrum.oscillating, np.abs(spectrum.harmonics), 0.0)
-    rates = np.where(spectrum.oscillating, np.abs(spectrum.frequencies), 1.0)
-    strongest = float(source.strength) * source.nearest
-    return strongest * float((sizes / rates).sum()) / float(spectrum.motion.momentum)
-
-
 def _refuse_resonance(
     scene: Scene, spectrum: BodySpectrum, source: Source, moving: tuple[BodySpectrum, float] | None
 ) -> Resonance | None:

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from rigidsim.model.averaged.applies import AXIAL, refuse_frequencies, refuse_scene, refused, swing_of
+from rigidsim.model.averaged.applies import AXIAL, refuse_frequencies, refuse_scene, refused
 from rigidsim.model.averaged.driven import Driven, driven_by, frame_along, passing
 from rigidsim.model.averaged.free_motion import FreeMotion, Separatrix, free_motion
 from rigidsim.model.averaged.orbit_terms import nutation
@@ -51,7 +51,6 @@ class Average:
     sources: Sequence[Source]
     start: Vector  # initial direction of the momentum, unit vector, space axes
     energy: Any
-    swing: float  # angle (rad) by which the terms removed by averaging over the rotation swing the momentum
     figure: int  # +1 or -1 if the figure axis or its opposite is circled and stays near the momentum, else 0
     resonance: Resonance | None = None
     slow: SlowStart | None = None
@@ -122,10 +121,6 @@ class Average:
         # as the momentum becomes smaller, it precesses faster
         return total if self.driven is None else total / self.driven.course.least
 
-    def tilt(self, context: Any) -> float:
-        """Largest angle between the momentum and the circled axis, rad."""
-        return float(self.motion.tilt(context))
-
 
 def average_of(
     scene: Scene, loads: Sequence[Load], scaling: Scaling, along: Average | None = None
@@ -154,14 +149,14 @@ def average_of(
         removed = _left_out_at_start(scene, spectrum, sources, unit(context, vector))
         vector = [x - context.mpf(float(y)) for x, y in zip(vector, removed, strict=True)]
         if alone:
-            return _driven(scene, alone, sources, spectrum, unit(context, vector), scaling, along)
+            return _driven(scene, alone, sources, unit(context, vector), scaling, along)
         motion = free_motion(context, body, momentum, norm(context, vector))
     except Separatrix:
         what = "the body turns about its intermediate axis, where its wobble takes forever and nothing "
         raise refused(table.level, what + "averages") from None
     start, energy = unit(context, vector), dot(momentum, scene.angular_velocity) / 2
-    swing, figure = sum(swing_of(spectrum, source) for source in sources), _figure(scene, motion)
-    found = Average(table.level, table.short_period, motion, sources, start, energy, swing, figure)
+    figure = _figure(scene, motion)
+    found = Average(table.level, table.short_period, motion, sources, start, energy, figure)
     if found.over_orbits:
         return replace(found, start=_mean_over_orbits(scene, found))
     return found
@@ -176,14 +171,13 @@ def _resonant(scene: Scene, resonance: Resonance, sources: Sequence[Source]) -> 
     start = unit(context, apply(attitude.rotation_matrix(slow.quaternion), momentum))
     energy = sum(x * x / i for x, i in zip(momentum, motion.moments, strict=True)) / 2
     figure = _figure(scene, motion)
-    return Average(level, False, motion, sources, start, energy, 0.0, figure, resonance, slow)
+    return Average(level, False, motion, sources, start, energy, figure, resonance, slow)
 
 
 def _driven(
     scene: Scene,
     alone: Sequence[Load],
     sources: Sequence[Source],
-    spectrum: BodySpectrum,
     direction: Vector,
     scaling: Scaling,
     along: Average | None,
@@ -196,9 +190,8 @@ def _driven(
     start = [x - context.mpf(float(y)) for x, y in zip(direction, driven.direction, strict=True)]
     motion = driven.motion(driven.axial, driven.transverse)
     energy = driven.polhodes.energy(driven.axial, driven.transverse)
-    swing = sum((swing_of(spectrum, source) for source in sources), driven.course.swing)
     figure, start = _figure(scene, motion) if driven.course.tilt <= AXIAL else 0, unit(context, start)
-    return Average(level, False, motion, sources, start, energy, swing, figure, driven=driven)
+    return Average(level, False, motion, sources, start, energy, figure, driven=driven)
 
 
 def _figure(scene: Scene, motion: FreeMotion) -> int:

@@ -133,7 +133,9 @@ def driven_by(scene: Scene, scaling: Scaling, loads: Sequence[Load], epsilon: fl
     motion = free_motion(context, scene.body, momentum)
     polhodes = Polhodes.of(context, motion)
     torques = DrivingTorques.of(scene, scaling, numbers, polhodes, loads)
-    _refuse_what_changes(scene, torques)
+    if varies := torques.varies:
+        varies += ", and only torques that are functions of the rates about the body axes are averaged"
+        raise refused(scene.config.model.level, varies)
     first, second, third = (dot(axis, momentum) for axis in polhodes.axes)
     across = context.sqrt((first / polhodes.root) ** 2 + second**2)
     axial = third * context.sqrt(1 + (1 - polhodes.ratio) * (second / third) ** 2) if third else third
@@ -162,17 +164,6 @@ def driven_by(scene: Scene, scaling: Scaling, loads: Sequence[Load], epsilon: fl
     titles = list(dict.fromkeys(load.title for load in loads))
     direction = _direction_removed(scene, polhodes, wave, momentum, amplitude)
     return Driven(titles, polhodes, torques, course, axial, across, amplitude, fineness, direction)
-
-
-def _refuse_what_changes(scene: Scene, torques: DrivingTorques) -> None:
-    against = None
-    if any(load.extra_states(torques.bare) is not None for load in torques.others):
-        against = "a load has states of its own"
-    elif torques.depends_on_time:
-        against = "a torque depends on time"
-    if against is not None:
-        against += ", and only torques that are functions of the rates about the body axes are averaged"
-        raise refused(scene.config.model.level, against)
 
 
 def _at(values: np.ndarray, angle: float) -> np.ndarray:

@@ -101,15 +101,13 @@ class DrivingTorques:
         )  # fmt: skip
 
     @property
-    def bare(self) -> Mechanics:
-        """The mechanics of a body that carries its rates alone, in double precision."""
-        return self._mechanics(float)
-
-    @property
-    def depends_on_time(self) -> bool:
-        """Whether a torque depends on time explicitly."""
-        clock = hy.make_vars(_CLOCK)
-        return any(_CLOCK in hy.get_variables(hy.subs(x, {hy.time: clock})) for x in self._along_axes(float))
+    def varies(self) -> str:
+        """Why they aren't functions of the rates alone; empty if they are."""
+        bare, clock = self._mechanics(float), hy.make_vars(_CLOCK)
+        if any(load.extra_states(bare) is not None for load in self.others):
+            return "a load has states of its own"
+        torque = (hy.subs(x, {hy.time: clock}) for x in self._along_axes(float))
+        return "a torque depends on time" if any(_CLOCK in hy.get_variables(x) for x in torque) else ""
 
     # --- in double precision --------------------------------------------------------------------------------
 

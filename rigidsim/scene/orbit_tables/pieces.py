@@ -258,12 +258,11 @@ class TabulatedOrbit:
     @cached_property
     def error(self) -> InterpolationError:
         """Interpolation errors, see ``interpolation_error``."""
-        count = len(self.table.times)
-        elements = {name: self._each(name) for name in (AXIS, *EXCENTRIC, *TILTED)}
-        elements = {name: rows if len(rows) == count else rows * count for name, rows in elements.items()}
+        names, times = (AXIS, *EXCENTRIC, *TILTED), self.table.times
+        elements = {name: _by_row(lambda x, _: x, self._rows[name], times) for name in names}
         if LONGITUDE in self.moving:
             elements[LONGITUDE] = self._rows[LONGITUDE]
-        return interpolation_error(self.table.times, elements, self.moving)
+        return interpolation_error(times, elements, self.moving)
 
 
 def _by_row(function: Callable[..., Any], *values: Any) -> Any:
