@@ -16,7 +16,7 @@ from rigidsim.scene.orbit_tables.elements import ElementTable, TableError, read_
 from rigidsim.scene.orbit_tables.pieces import TabulatedOrbit
 from rigidsim.scene.point_masses import ellipse_of
 from rigidsim.scene.registry import Surroundings
-from rigidsim.scene.tracing.exact import TracedExact
+from rigidsim.scene.tracing.arithmetic import TracedExact
 from rigidsim.scene.tracing.numbers import Traced, Untraceable
 from rigidsim.scene.validation_messages import nearest
 

@@ -88,7 +88,7 @@ class Expression:
 def _exact(operator: str, numbers: list[ExactNumber]) -> ExactNumber | None:
     """The exact result; None if it isn't a rational times a power of pi, or is too long."""
     if any(number.swept for number in numbers):
-        from rigidsim.scene.tracing.exact import exactly
+        from rigidsim.scene.tracing.arithmetic import exactly
 
         return exactly(operator, numbers)
     a, b = numbers[0], numbers[-1]

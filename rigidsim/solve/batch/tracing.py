@@ -19,8 +19,7 @@ from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.initial_values import check_start
 from rigidsim.scene.scene import Scene, build_scene
 from rigidsim.scene.toml_text import key_steps
-from rigidsim.scene.tracing.context import TracingContext
-from rigidsim.scene.tracing.exact import swept_number
+from rigidsim.scene.tracing.arithmetic import TracingContext, swept_number
 from rigidsim.scene.tracing.numbers import Graph, Traced, Untraceable
 from rigidsim.solve.precision import precision_of
 from rigidsim.solve.problem import InitialValueProblem, prepare
