@@ -37,7 +37,8 @@ def time_reached(prepared: InitialValueProblem, progress: Progress, log: EventLo
     clock = prepared.clock
     if progress.status is Status.EVENT and log.stop is not None:
         return clock.seconds(log.stop)
-    return clock.label(progress.next_sample - 1) if progress.next_sample else clock.seconds(clock.start)
+    done = progress.next_sample
+    return float(clock.labels(done - 1, done)[0]) if done else clock.seconds(clock.start)
 
 
 def closing_words(prepared: InitialValueProblem, progress: Progress, parts: Assembly) -> str:

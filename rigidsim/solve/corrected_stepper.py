@@ -1,10 +1,8 @@
 """Corrections of the state at fixed counts of natural steps, so that bits depend on no clock or sampling.
 
-A step is never clamped to a sample, but some corrections have to be made along the way: angles are brought
-back into one turn, and the engine's time, which is a sum of two numbers, is put back on a single one. They
-happen at fixed counts of natural steps: on whichever path a run goes through these counts, skipping,
-recording or resumed, it does the same there. A chart of Euler angles is changed at the first step boundary
-whose state asks for it, likewise. Each of them is an effect (``rigidsim.solve.effects``).
+A step is never clamped to a sample, but effects (``rigidsim.solve.effects``) are applied along the way, at
+counts that are the same whichever path a run takes through them, skipping, recording or resumed; or at the
+first step boundary whose state asks for it.
 """
 
 from __future__ import annotations

@@ -83,9 +83,8 @@ class Precision:
             part = float(mantissa & ((1 << _CHUNK_BITS) - 1))
             with np.errstate(over="ignore", under="ignore"):
                 scaled = float(np.ldexp(part, exponent))
-            if part and (scaled == 0.0 or np.isinf(scaled)):
-                raise OverflowError(f"{mpmath.nstr(value, 8)} is beyond the internal range")
-            with np.errstate(over="ignore", under="ignore"):
+                if part and (scaled == 0.0 or np.isinf(scaled)):
+                    raise OverflowError(f"{mpmath.nstr(value, 8)} is beyond the internal range")
                 total = total + self._scalar(scaled)
             mantissa >>= _CHUNK_BITS
             exponent += _CHUNK_BITS
@@ -181,19 +180,16 @@ def precision_of(name: str | int) -> Precision:
         return Precision("double", bits, float, cheap=True, compact=False)
     if name == "extended":
         if np.finfo(np.longdouble).nmant != 63:
-            raise ConfigError(
-                Problem(
-                    "[integrator] precision",
-                    'given "extended", but this machine has no 80-bit numbers; allowed here: single, '
-                    "double, quadruple, or a number of digits",
-                )
+            what = (
+                'given "extended", but this machine has no 80-bit numbers; allowed here: single, double, '
+                "quadruple, or a number of digits"
             )
+            raise ConfigError(Problem("[integrator] precision", what))
         return Precision("extended", bits, np.longdouble, cheap=True, compact=False)
     if name == "quadruple" and hasattr(hy, "real128"):
         return Precision("quadruple", bits, hy.real128, cheap=False, compact=True)
     if not hasattr(hy, "real"):
-        raise ConfigError(
-            Problem("[integrator] precision", f"given {name}, which this machine's heyoka lacks")
-        )
+        what = f"given {name}, which this machine's heyoka lacks"
+        raise ConfigError(Problem("[integrator] precision", what))
     title = name if isinstance(name, str) else f"{name} digits"
     return Precision(title, bits, hy.real, cheap=False, compact=True)

@@ -17,13 +17,13 @@ from rigidsim.model.load import Load, own_loads
 from rigidsim.model.model_plan import plan_model
 from rigidsim.model.projected_invariants import conserves, projected_invariants
 from rigidsim.model.system import System, build_system
+from rigidsim.model.two_part import in_two_parts
 from rigidsim.scene.choices import AUTO, FORMULATIONS
 from rigidsim.scene.config import Experiment
 from rigidsim.scene.initial_values import check_start
 from rigidsim.scene.scene import Scene, build_scene
 from rigidsim.solve.compiled import compiled_function
 from rigidsim.solve.precision import Precision, Scalar, precision_of
-from rigidsim.solve.projection import projected_system
 from rigidsim.solve.sampling import SampleClock
 from rigidsim.solve.solvers.algorithm import Algorithm, algorithm_of
 
@@ -140,7 +140,8 @@ def prepare_scene(
         algorithm = algorithm_of(scene, system, driven=bool(loads))
         late = False
         if scene.config.integrator.hold_invariants is True:
-            system = projected_system(system, precision)
+            parts = in_two_parts(precision.number, precision.exact, precision.bits, scene.context)
+            system = system.with_coefficients(parts)
         elif scene.config.integrator.hold_invariants and algorithm.method.has_steps:
             late = _is_worth_holding(system)
         clock = SampleClock(scene.samples, precision, system.scaling.time)
@@ -160,8 +161,7 @@ def prepare_scene(
             else f"the scene's numbers are too large, too small or too far apart ({error}): they and their "
             "products, such as the energy, may be between about 1e-300 and 1e300; check the units"
         )
-        problem = Problem("config", what)
-        raise ConfigError(problem, experiment.source) from None
+        raise ConfigError(Problem("config", what), experiment.source) from None
     return prepared
 
 
@@ -203,14 +203,12 @@ def _check_tolerance(tolerance: mpmath.mpf, precision: Precision) -> None:
     least = precision.epsilon**2
     if tolerance < least:
         given, shortest, epsilon = (mpmath.nstr(x, 3) for x in (tolerance, least, precision.epsilon))
-        raise ConfigError(
-            Problem(
-                "[integrator] tolerance",
-                f"given {given}, but {precision.name} precision rounds each number by about {epsilon}, so "
-                f'that tolerances below that gain nothing; {shortest} or more is allowed: choose "auto", or '
-                "a higher precision for more digits",
-            )
+        what = (
+            f"given {given}, but {precision.name} precision rounds each number by about {epsilon}, so that "
+            f'tolerances below that gain nothing; {shortest} or more is allowed: choose "auto", or a higher '
+            "precision for more digits"
         )
+        raise ConfigError(Problem("[integrator] tolerance", what))
 
 
 def _refuse_spectrum(system: System) -> None:
@@ -243,13 +241,11 @@ def _refuse_non_finite_start(system: System, precision: Precision) -> None:
     if lost and system.partner is not None:  # a chart's own singularity is no fault of a load
         _refuse_non_finite_start(system.partner, precision)
     elif lost:
-        raise ConfigError(
-            Problem(
-                "loads",
-                f"the derivatives of {', '.join(lost)} aren't finite at the start; start elsewhere, or give "
-                "the loads from Python finite torques and forces there",
-            )
+        what = (
+            f"the derivatives of {', '.join(lost)} aren't finite at the start; start elsewhere, or give "
+            "the loads from Python finite torques and forces there"
         )
+        raise ConfigError(Problem("loads", what))
 
 
 def double_twin(prepared: InitialValueProblem) -> System:

@@ -30,7 +30,6 @@ import numpy as np
 
 from rigidsim.model.projected_invariants import projected_invariants
 from rigidsim.model.system import System
-from rigidsim.model.two_part import in_two_parts
 from rigidsim.solve.compiled import CompiledFunction, compiled_function
 from rigidsim.solve.correction import correction, damping_between, freedoms_of, lacking_rates
 from rigidsim.solve.precision import Precision, Scalar, precision_of
@@ -95,12 +94,6 @@ def _norm(columns: Sequence[np.ndarray]) -> np.ndarray:
     for column in columns[1:]:
         total = total + column * column
     return np.asarray(np.sqrt(total))
-
-
-def projected_system(system: System, precision: Precision) -> System:
-    """The system to integrate if invariants are projected, with coefficients in two parts."""
-    number = in_two_parts(precision.number, precision.exact, precision.bits, system.scene.context)
-    return system.with_coefficients(number)
 
 
 class Projection:

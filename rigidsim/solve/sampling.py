@@ -55,10 +55,6 @@ class SampleClock:
         """One sample's time in internal units, a scalar of the precision."""
         return self.internal(index, index + 1)[0]
 
-    def label(self, index: int) -> float:
-        """One sample's time in seconds, as in the dataset's coordinate."""
-        return float(self.labels(index, index + 1)[0])
-
     def seconds(self, time: Scalar) -> float:
         """The double nearest to a time in internal units, s."""
         alone = np.array([time], dtype=self._precision.scalar)
@@ -123,22 +119,16 @@ class SampleClock:
 
     def _refuse_coinciding(self, samples: SampleTimes) -> None:
         """Refuse samples that coincide; spacing is resolved worst at the time of largest size."""
-        candidates = {0, max(0, self.count - 2)}
-        if samples.times is not None:
-            candidates = set(range(self.count - 1))
-        for i in candidates:
-            if i + 1 < self.count:
-                pair = self.internal(i, i + 2)
-                if not pair[0] < pair[1]:
-                    seconds = float(samples.last)
-                    raise ConfigError(
-                        Problem(
-                            "[time]",
-                            f"samples {i} and {i + 1} are closer together than {self._precision.name} "
-                            f"precision resolves near {seconds:g} s; sample less often, shift start, or "
-                            "choose a higher precision",
-                        )
-                    )
+        places = {0, max(0, self.count - 2)} if samples.times is None else range(self.count - 1)
+        for i in places:
+            pair = self.internal(i, min(i + 2, self.count))
+            if len(pair) == 2 and not pair[0] < pair[1]:
+                what = (
+                    f"samples {i} and {i + 1} are closer together than {self._precision.name} precision "
+                    f"resolves near {float(samples.last):g} s; sample less often, shift start, or choose a "
+                    "higher precision"
+                )
+                raise ConfigError(Problem("[time]", what))
 
 
 def _nearest(numerator: int, denominator: int, precision: Precision) -> Scalar:

@@ -38,17 +38,7 @@ def bound_of_sparse_series(coefficients: np.ndarray) -> float:
     From rest under a torque that grows with time, a quaternion's series have every third term only: the last
     two are zero, and the engine would take any step at all.
     """
-    return _bound([max(abs(float(x)) for x in column) for column in coefficients.T])
-
-
-def bounds_of_sparse_series(sizes: np.ndarray) -> np.ndarray:
-    """The same bounds for many motions side by side, (members,), from the largest coefficient of each term,
-    (order + 1, members); one by one: numpy's last bits may depend on the place in an array.
-    """
-    return np.array([_bound(sizes[:, member].tolist()) for member in range(sizes.shape[1])])
-
-
-def _bound(sizes: list[float]) -> float:
+    sizes = [max(abs(float(x)) for x in column) for column in coefficients.T]
     if not all(map(math.isfinite, sizes)):  # next to a pole of Euler angles: this chart is left
         return math.inf
     order, base = len(sizes) - 1, max(sizes[0], 1.0)  # the engine's errors are absolute below 1

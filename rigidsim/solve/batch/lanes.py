@@ -15,7 +15,7 @@ import numpy as np
 
 from rigidsim.solve.compiled import Kept
 from rigidsim.solve.events import DIRECTIONS
-from rigidsim.solve.step_bounds import bounds_of_sparse_series, longest_step
+from rigidsim.solve.step_bounds import bound_of_sparse_series, longest_step
 
 _GRID = 1 << 16
 """Samples at once; the step before the last of them is shortened, always at the same places."""
@@ -61,7 +61,6 @@ class BatchSystem:
 
     equations: Sequence[tuple[Any, Any]]
     events: Sequence[tuple[Any, int]]
-    parameters: int
     tolerance: float | None
     compact: bool
 
@@ -157,7 +156,8 @@ class BatchEngine:
         return self._bounds(self._series(initial, parameters, start))
 
     def _bounds(self, terms: np.ndarray) -> np.ndarray:
-        return np.minimum(bounds_of_sparse_series(terms), self._longest)
+        # one by one: numpy's last bits may depend on the place in an array
+        return np.array([min(bound_of_sparse_series(sizes[None]), self._longest) for sizes in terms.T])
 
     def _series(self, initial: np.ndarray, parameters: np.ndarray, start: np.ndarray) -> np.ndarray:
         """Largest coefficient of each term of members' series at their start, (terms, members)."""

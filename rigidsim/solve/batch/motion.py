@@ -98,7 +98,6 @@ class BatchMotion:
         described = BatchSystem(
             list(zip(system.variables[:states], rights, strict=True)),
             self._crossings.over_parameters() if with_events else [],
-            len(self._traced.in_equations) + (self._crossings.parameters if with_events else 0),
             None if tolerance is None else float(tolerance),
             system.wide,
         )

@@ -25,7 +25,7 @@ class ShadowLanes:
         self._variables = traced.system.variables[:moving]
         self._rights = [hy.expression(right) for _, right in traced.system.equations[:moving]]
         equations = list(zip(self._variables, traced.as_parameters(self._rights), strict=True))
-        system = BatchSystem(equations, [], len(traced.in_equations), tolerance, traced.system.wide)
+        system = BatchSystem(equations, [], tolerance, traced.system.wide)
         self.engine = BatchEngine(system, max(width, _LANES))
 
     @cached_property

@@ -77,25 +77,20 @@ class Theta:
     kind: int
     hyperbolic: bool
     per_turn: Any  # the variable z over the number of turns x / 2K, or over x itself on the separatrix
-    orders: tuple[int, ...]  # k_n
-    weights: tuple[tuple[Any, Any], ...]  # a_n, b_n; without the power of the nome where hyperbolic
-    logs: tuple[Any, ...]  # logarithm of that power
-    sizes: tuple[float, ...]  # binary logarithm of a bound of each term
-
-    def terms(self, bits: int) -> int:
-        """Number of terms above 2^-bits."""
-        return max(1, sum(size > -bits for size in self.sizes))
+    # k_n, a_n, b_n (where hyperbolic without the power of the nome, whose logarithm follows), and the binary
+    # logarithm of a bound of each term
+    terms: tuple[tuple[int, Any, Any, Any, float], ...]
 
     def at(self, arithmetic: Arithmetic, z: Any) -> Pair:
         """Value at z, times exp(-abs(z)) if hyperbolic."""
         number, real, imaginary = arithmetic.number, None, None
-        size = abs(z)
-        for n in range(self.terms(arithmetic.bits + 8)):
-            a, b = (number(x) for x in self.weights[n])
-            k = self.orders[n]
+        size, least = abs(z), -arithmetic.bits - 8
+        count = max(1, sum(bound > least for *_, bound in self.terms))
+        for k, a, b, log, _ in self.terms[:count]:
+            a, b = number(a), number(b)
             if self.hyperbolic:
-                grown = arithmetic.exp(number(self.logs[n]) + (k - 1) * size)
-                shrunk = arithmetic.exp(number(self.logs[n]) - (k + 1) * size)
+                grown = arithmetic.exp(number(log) + (k - 1) * size)
+                shrunk = arithmetic.exp(number(log) - (k + 1) * size)
                 even = (grown + shrunk) / 2
                 # sinh keeps its digits next to zero; exp(-k - 1) - exp(k - 1) would not
                 odd = arithmetic.sinh_scaled(k, z, grown, shrunk)
@@ -109,7 +104,7 @@ class Theta:
         """Value and derivative with respect to z in mpmath, complex, not scaled."""
         context = self.context
         total = derivative = context.mpc(0)
-        for k, (a, b), log in zip(self.orders, self.weights, self.logs, strict=True):
+        for k, a, b, log, _ in self.terms:
             if self.hyperbolic:
                 even, odd, sign = context.cosh(k * z), context.sinh(k * z), 1
                 a, b = a * context.exp(log), b * context.exp(log)
@@ -139,7 +134,7 @@ def theta(lattice: Lattice, kind: int, shift: Any, *, tau_factor: int = 1) -> Th
         log = context.log(nome) * tau_factor if nome else context.ninf
         per_turn, reach = context.pi, abs(shift)
     odd_orders = kind in (1, 2)
-    orders, weights, logs, sizes = [], [], [], []
+    terms: list[tuple[int, Any, Any, Any, float]] = []
     for n in range(10_000):
         k = 2 * n + 1 if odd_orders else 2 * n
         power = n * (n + 1) if odd_orders else n * n
@@ -153,13 +148,8 @@ def theta(lattice: Lattice, kind: int, shift: Any, *, tau_factor: int = 1) -> Th
         a, b = _weights(context, kind, k, shift, hyperbolic=hyperbolic)
         if not hyperbolic:
             a, b = a * context.exp(exponent), b * context.exp(exponent)
-        orders.append(k)
-        weights.append((scale * a, scale * b))
-        logs.append(exponent)
-        sizes.append(bits)
-    return Theta(
-        context, kind, hyperbolic, per_turn, tuple(orders), tuple(weights), tuple(logs), tuple(sizes)
-    )
+        terms.append((k, scale * a, scale * b, exponent, bits))
+    return Theta(context, kind, hyperbolic, per_turn, tuple(terms))
 
 
 def _weights(context: Any, kind: int, k: int, shift: Any, *, hyperbolic: bool) -> tuple[Any, Any]:

@@ -31,27 +31,20 @@ grow so much that a loosely followed motion soon becomes a different one.
 """
 _TIGHT_UNTIL = 50_000
 _OWN_UNTIL, OWN_FIRST = 5_000, 500
-"""Steps up to which the run's own integrator, called for each motion, costs less than code compiled for all;
-and the steps that it takes of longer motions, repeatedly as long as their errors grow exponentially, so that
-no code is compiled for a motion that is soon lost.
+"""Steps up to which the run's own integrator costs less than code compiled for all; and those that it takes
+of longer motions first, so that no code is compiled for a motion that is soon lost.
 """
 _UNROLLED_FROM, _LOOSELY_UNROLLED_FROM, _OPTIMISED_FROM = 3_000, 1_500, 300_000
 """Steps to be taken from which code pays that takes longer to compile and less time to run. Of 66 and 126
 terms of the equations' decomposition, four lanes, tolerance 1e-8: compact 42 and 48 ms, 10 and 22 us a step;
 unrolled 60 and 132 ms, 2.2 and 5.4 us; unrolled and optimised 315 and 860 ms, 1.3 and 3.2 us. An own
-integrator takes 18 and 48 us for four lanes; on a quieter machine 6.6 and 15, where unrolled code takes 45
-and 83 ms to compile and 1.5 and 2.3 us a step. At 1e-6 half of that. Of these times 6 to 19 ms are no code
-generation: a batch that was compiled before takes so long to make.
+integrator takes 18 and 48 us for four lanes. At 1e-6 half of that.
 """
 _UNEVEN, _FEW_STEPS, _FEW_OF_ALL = 2.5, 8, 2048
-"""Ratio of longest to shortest step up to which steps count as alike; and a number of steps so small that it
-doesn't matter, or such a part of all.
-"""
+"""Ratio of longest to shortest step of those that count as alike; and numbers of steps that don't matter."""
 _EIGHTY_BITS = int(np.finfo(np.longdouble).nmant) == 63
 _LEAST_TOLERANCE, _LEAST_WIDE_TOLERANCE = 1e-11, 1e-15
-"""Least tolerances whose step errors still stand out from rounding in double precision and in 80 bits; errors
-of smaller ones are taken in proportion.
-"""
+"""Least tolerances whose step errors stand out from rounding; errors of smaller ones are in proportion."""
 _ONE_ORDER = math.exp(2.0)
 """Typical gain of one more order, which is the tolerance's own step from order to order (Jorba & Zou 2005);
 the factor by which proportions can be wrong.

@@ -60,7 +60,7 @@ class SwitchedEngines(TaylorStepper):
         same = not quaternion or float(np.dot(given, quaternion)) >= 0
         self._quaternion = [x if same else -x for x in quaternion]
         self._dense = self._integrator
-        self.switches, self._unsettled = 0, ""
+        self._unsettled = ""
         self._begin()
         self.begun = self.mark()
 

@@ -63,12 +63,9 @@ class Moments:
     def left_out(self, time: tuple[Scalar, Scalar], modes: Sequence[int]) -> float:
         """How far two numbers are from the moment next to them; 0 if it isn't known."""
         found = self._exactly_near(time[0], modes)
-        context = self._context
-        return (
-            0.0
-            if found is None
-            else abs(float(found - exactly(time[0], context) - exactly(time[1], context)))
-        )
+        if found is None:
+            return 0.0
+        return abs(float(found - exactly(time[0], self._context) - exactly(time[1], self._context)))
 
     def hidden(self, begin: Scalar, end: Scalar, modes: Sequence[int]) -> Scalar | None:
         """The middle of something between two times, where the argument isn't on the motion's side: it may be

@@ -53,12 +53,8 @@ class SurfaceRoots(SwitchedEngines):
 
     def _hidden(self, begin: Scalar, end: Scalar) -> list[Root]:
         """Roots within the step that its polynomials may have missed."""
-        found = []
-        for j, moments in enumerate(self._probe.moments):
-            middle = moments.hidden(begin, end, self._modes)
-            if middle is not None:
-                found.append((middle, j, -self._modes[j]))
-        return found
+        middles = [moments.hidden(begin, end, self._modes) for moments in self._probe.moments]
+        return [(middle, j, -self._modes[j]) for j, middle in enumerate(middles) if middle is not None]
 
     def _again(
         self,

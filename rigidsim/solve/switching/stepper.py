@@ -164,7 +164,6 @@ class SwitchingStepper(SurfaceRoots):
         """Continue from a surface (``again``: as the step began); False if that is impossible."""
         _, j, side = root
         self._fresh = True
-        self.switches += 1
         now = float(self.time)
         if now - self._since > self._window:
             self._since, self._count = now, 0
