@@ -58,6 +58,20 @@ def symmetric(scene: Scene) -> list[str]:
     return [f"= {(c - a) / a * float(scene.angular_velocity[2]):.1f} rad/s"]
 
 
+def all_in_the_wheel(scene: Scene) -> float:
+    """Rate of the wheel (rpm) with the body's momentum."""
+    (wheel,) = scene.tabled["rotors"]
+    momentum = float(scene.body.principal_moments[2] * scene.angular_velocity[2])
+    return momentum / wheel.pictured()["moment"] * 30 / math.pi
+
+
+def steadying_rate(scene: Scene) -> float:
+    """(C - B) w over the wheel's moment, rad/s."""
+    (wheel,) = scene.tabled["rotors"]
+    _, b, c = (float(x) for x in scene.body.principal_moments)
+    return (c - b) * float(scene.angular_velocity[1]) / wheel.pictured()["moment"]
+
+
 STATED: dict[str, Callable[[Scene], list[str]]] = {
     "earth_free_nutation": lambda s: [f"{nutation(s):.3f} sidereal", f"{nutation(s) / SOLAR:.2f} mean solar"],
     "earth_free_nutation_axes": lambda s: [f"{nutation(s):.1f} sid", f"{nutation(s) / SOLAR:.1f} mean solar"],
@@ -66,6 +80,8 @@ STATED: dict[str, Callable[[Scene], list[str]]] = {
     "heavy_top_regular_precession": regular,
     "heavy_top_sleeping_stable": threshold,
     "heavy_top_sleeping_unstable": falling,
+    "dual_spin_turn": lambda s: [f"{all_in_the_wheel(s):.0f} rpm"],
+    "intermediate_axis_with_wheel": lambda s: [f"or {steadying_rate(s):.0f} rad/s"],
     "intermediate_axis": lambda s: [", ".join(f"{float(m):g}" for m in s.body.principal_moments)],
     "tumbling_planet": lambda s: [f"{float(s.body.principal_moments[2]):.0e} kg m^2".replace("+", "")],
 }

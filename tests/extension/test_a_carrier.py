@@ -197,6 +197,19 @@ def test_a_killed_run_resumes_bit_for_bit(tmp_path: Path) -> None:
     same_bits(run_text(given, estimate=True), done)
 
 
+@pytest.mark.optimised
+def test_a_killed_run_with_rotors_of_the_config_resumes_bit_for_bit(tmp_path: Path) -> None:
+    rotors = '[[rotors]]\nname = "free"\naxis = [1, 2, 3]\nmoment = 0.1\nrate = 5\n'
+    rotors += (
+        '[[rotors]]\nname = "driven"\naxis = [0, 0, 1]\nmoment = 0.1\ntorque = "min(wx, 0.1) - rate_free/9"\n'
+    )
+    given = text("", time="end = 6\nsamples = 25") + rotors
+    done = rigidsim.resume(killed("test_a_carrier", given, tmp_path))
+    assert done.summary["cost"]["sessions"] == 2
+    same_bits(run_text(given, estimate=True), done)
+    assert rigidsim.verify(done.folder.path).identical
+
+
 def test_a_wheel_of_states_of_its_own_trades_momentum_with_the_body() -> None:
     """The motor's torque is an inner one: the whole momentum stays, and the energy grows by its work."""
     experiment = rigidsim.parse(text("", time="end = 10\nsamples = 41"))

@@ -259,6 +259,133 @@ def test_a_wheel_along_the_intermediate_axis_steadies_a_spin_about_it(excess: fl
     assert (squared < 0) == (excess > 0)
 
 
+def damped(
+    inertia: list[float], spin: float, wheel: Wheel, tilt: float, end: float
+) -> tuple[Any, float, float]:
+    """A body that spins about z with a wheel along it and a ring damper along x, a rotor with friction.
+
+    Returns the dataset, the real part of the nutation's eigenvalue by the linearised equations
+
+        (A - Jd) w1' = (B n - L3) w2 - torque,    B w2' = L3 w1 - n ((A - Jd) w1 + h),    h' = torque,
+
+    with torque = -c (h / Jd - w1), n = w3 and L3 = C n + J s; and the rate of the nutation as seen from the
+    body, L3 / A - n.
+    """
+    a, b, c = inertia
+    ring, friction = 0.02, 0.02
+    text = scene(
+        wheel, Wheel([1, 0, 0], ring), end=end, samples=401, motors={1: f"-{friction}*rate_w1"},
+        body=f"principal_moments = {inertia}", initial=f"angular_velocity = [{tilt}, 0, {spin}]",
+    )  # fmt: skip
+    along = c * spin + float(wheel.moment) * float(wheel.rate)
+    light = a - ring
+    torque = np.array([friction, 0, -friction / ring])  # of w1, w2, h
+    matrix = np.array(
+        [
+            (np.array([0, b * spin - along, 0]) - torque) / light,
+            np.array([along - spin * light, 0, -spin]) / b,
+            torque,
+        ]
+    )
+    values = np.linalg.eigvals(matrix)
+    return loaded(run_text(text)), float(values[np.argmax(np.abs(values.imag))].real), along / a - spin
+
+
+@pytest.mark.parametrize("where", ["in the platform", "in the rotor", "in the rotor of a flat one"])
+def test_a_dual_spin_satellite_is_stable_as_likins_found(where: str) -> None:
+    """An energy sink damps the nutation where its rate, seen from the part with the sink, is positive, and
+    amplifies it where it is negative: L3 / A - n (Likins, J. Spacecraft Rockets 4, 1638, 1967; by its numbers
+    the sign is that of C_r / A - 1 for a sink in the rotor beside a platform at rest). A satellite as slender
+    as this one is stable with its damper in the slow platform alone.
+    """
+    if where == "in the platform":  # which is the body; its rotor has half of the axial moment
+        inertia, spin, wheel = [2.0, 2.0, 1.0], 0.02, Wheel([0, 0, 1], 0.5, 10)
+    elif where == "in the rotor":  # which is the body, with a platform at rest in space
+        inertia, spin, wheel = [2.0, 2.0, 1.0], 10.0, Wheel([0, 0, 1], 0.5, -10)
+    else:
+        inertia, spin, wheel = [0.7, 0.7, 1.0], 10.0, Wheel([0, 0, 1], 0.1, -10)
+    tilt = 1e-5
+    data, growth, nutation = damped(inertia, spin, wheel, tilt, end=40)
+    assert (growth < 0) == (nutation > 0) == (where != "in the rotor")
+    across = np.hypot(*(data["angular_velocity"].values[:, i] for i in (0, 1)))
+    quiet = np.log(across[100:].reshape(-1, 43).max(axis=1))  # over whole nutations
+    times = data["time"].values[100:].reshape(-1, 43).mean(axis=1)
+    # to what a maximum over samples leaves of an oscillation that isn't quite circular
+    np.testing.assert_allclose(np.polyfit(times, quiet, 1)[0], growth, rtol=0.02)
+
+
+def test_a_slender_satellite_with_a_damper_ends_in_a_flat_spin_as_explorer_1_did() -> None:
+    """The momentum stays, and the energy falls to the least that it allows, L^2 / 2 C about the axis of the
+    largest moment C (Bracewell & Garriott, Nature 182, 760, 1958).
+    """
+    body, initial = "principal_moments = [2.0, 2.1, 0.4]", "angular_velocity = [0.05, 0, 5]"
+    ring = Wheel([1, 0, 0], 0.05)
+    text = scene(ring, end=2500, samples=101, motors={0: "-0.1*rate_w0"}, body=body, initial=initial)
+    run = run_text(text)
+    data, rows = loaded(run), run.summary["invariants"]
+    momentum = np.linalg.norm([2.0 * 0.05, 0, 0.4 * 5])
+    np.testing.assert_allclose(data["angular_momentum_norm"].values, momentum, rtol=1e-13)
+    assert data["energy"].values[-1] == pytest.approx(momentum**2 / (2 * 2.1), rel=1e-12)
+    np.testing.assert_allclose(
+        np.abs(data["angular_velocity"].values[-1]), [0, momentum / 2.1, 0], rtol=0, atol=1e-9
+    )
+    assert np.all(np.diff(data["energy"].values) < 1e-14)
+    assert rows["energy_balance"]["largest_drift"] <= rows["energy_balance"]["bound"]
+
+
+def test_a_motor_that_saturates_switches_on_a_surface() -> None:
+    """Against scipy, which stops where the law has its kinks."""
+    limit, gain = 0.01, 0.05
+    text = scene(Wheel([0, 0, 1], 0.3), end=60, motors={0: f"min(max(-{gain}*wx, -{limit}), {limit})"})
+    data = loaded(run_text(text))
+    turning = np.diag(MOMENTS) - 0.3 * np.diag([0, 0, 1])
+
+    def slope(_: float, state: np.ndarray) -> np.ndarray:
+        w, h = state[:3], np.array([0, 0, state[3]])
+        motor = np.clip(-gain * w[0], -limit, limit)
+        turned = np.cross(turning @ w + h, w) - np.array([0, 0, motor])
+        return np.append(np.linalg.solve(turning, turned), motor)
+
+    state, time, found = np.append(RATES, 0.3 * RATES[2]), 0.0, []
+    kinks = [lambda t, y, k=k: gain * y[0] - k * limit for k in (-1, 1)]
+    for kink in kinks:
+        kink.terminal = True  # type: ignore[attr-defined]
+    wanted = data["time"].values
+    while time < wanted[-1]:
+        part = solve_ivp(
+            slope,
+            (time, wanted[-1]),
+            state,
+            "DOP853",
+            rtol=1e-13,
+            atol=1e-14,
+            events=kinks,
+            dense_output=True,
+        )
+        inside = (wanted >= time) & (wanted <= part.t[-1])
+        found += [(t, part.sol(t)) for t in wanted[inside]]
+        state, time = part.y[:, -1], part.t[-1]
+        if time < wanted[-1]:  # on past the kink
+            more = solve_ivp(slope, (time, time + 1e-6), state, "DOP853", rtol=1e-13, atol=1e-14)
+            state, time = more.y[:, -1], time + 1e-6
+    there = dict(found)
+    rates = np.array([there[t][:3] for t in wanted if t in there])
+    assert len(rates) == len(wanted)
+    # dense output of scipy
+    np.testing.assert_allclose(data["angular_velocity"].values, rates, rtol=0, atol=1e-9)
+
+
+def test_events_and_loads_read_the_rates_of_rotors() -> None:
+    text = scene(
+        FREE, DRIVEN, end=30, motors={1: MOTOR},
+        loads='kind = "torque"\ncomponents = ["0.01*rate_w0", "0", "-0.01*rate_w1*qw*qx"]',
+        more='[[events]]\nname = "slow"\nexpression = "rate_w1 + 3.9"\n',
+    )  # fmt: skip
+    data = run_text(text).dataset
+    assert data.sizes["slow"] > 0
+    np.testing.assert_allclose(data["slow_rotor_rate"].values[:, 1], -3.9, rtol=1e-12)
+
+
 # --- whole workflows ----------------------------------------------------------------------------------------
 
 
