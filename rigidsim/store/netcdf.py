@@ -31,10 +31,6 @@ Block = Mapping[str, Sequence[np.ndarray]]
 """Float64 parts by variable name, each of shape (rows, components)."""
 
 
-Created = Mapping[str, h5py.Dataset]
-"""Variables in a file under construction, by the names of their parts."""
-
-
 class NetcdfFile:
     """A netCDF-4 file under construction, in a new, empty HDF5 file; see ``writing``."""
 
@@ -45,10 +41,6 @@ class NetcdfFile:
         """Declare a dimension, possibly again; size 0 makes it unlimited, since netCDF has no empty ones."""
         if name not in self._labelled.dimensions:
             self._labelled.dimensions[name] = size
-
-    def has(self, name: str) -> bool:
-        """Whether a variable of this name was created."""
-        return name in self._labelled.variables
 
     def variable(
         self,
@@ -74,6 +66,11 @@ class NetcdfFile:
         self.dimension(dim, len(texts))
         kind = h5py.string_dtype()
         self._created(name, (dim,), kind, attributes)[...] = np.array(texts, dtype=kind)
+
+    def labels(self, dim: str, labels: Sequence[str]) -> None:
+        """Write a dimension's labels, unless they are there."""
+        if dim not in self._labelled.variables:
+            self.texts(dim, dim, labels, {"long_name": dim.replace("_", " ")})
 
     def _created(
         self, name: str, dims: Sequence[str], dtype: Any, attributes: Mapping[str, Any], **how: Any
@@ -166,12 +163,12 @@ def declare(
     attributes: Mapping[str, Any],
     *,
     compressed: bool,
-) -> Created:
-    """Create dimensions, coordinates, variables and attributes."""
+) -> dict[str, h5py.Dataset]:
+    """Create dimensions, coordinates, attributes, and the variables returned, by the names of their parts."""
     file.attributes(attributes)
     file.dimension("time", rows)
     for dim, labels in used_labels(variables).items():
-        file.texts(dim, dim, labels, {"long_name": dim.replace("_", " ")})
+        file.labels(dim, labels)
     chunk, gzip = ((min(CHUNK_ROWS, rows),), GZIP_LEVEL) if compressed and rows else (None, None)
     return {
         name: file.variable(

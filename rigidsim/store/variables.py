@@ -93,12 +93,7 @@ def parts_in(dataset: "xarray.Dataset", name: str) -> list[str]:
 
 def time_variable(parts: int) -> Variable:
     """The time coordinate; ``units = "s"`` keeps readers from turning it into dates."""
-    return Variable(
-        "time",
-        (),
-        {"units": "s", "long_name": "time of the scene"},
-        parts,
-    )
+    return Variable("time", (), {"units": "s", "long_name": "time of the scene"}, parts)
 
 
 @dataclass(frozen=True)

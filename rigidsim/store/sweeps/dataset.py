@@ -115,8 +115,7 @@ def _declared(
         dims = [samples if dim == _SAMPLES else dim for dim in described.variable.dims]
         for dim, size in zip(dims, described.extra, strict=True):
             if dim in LABELS:
-                if not file.has(dim):
-                    file.texts(dim, dim, LABELS[dim], {"long_name": dim.replace("_", " ")})
+                file.labels(dim, LABELS[dim])
             else:
                 file.dimension(dim, size)
         attributes = {k: v for k, v in described.variable.attributes.items() if v is not None}

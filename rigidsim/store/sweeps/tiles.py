@@ -8,17 +8,19 @@ import hashlib
 import io
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import h5py
 import numpy as np
+from pydantic import Field, TypeAdapter, ValidationError
 
 from rigidsim.errors import FORCE, RunFolderError
 from rigidsim.store.netcdf import writing
 from rigidsim.store.seal import check_seal, refuse_special, sealed
+from rigidsim.store.summary_parts import first_of
 
 _FORMAT = 1
 ALWAYS = "always"
@@ -77,7 +79,7 @@ class Generation:
 
     number: int
     config: str
-    length: int
+    length: Annotated[int, Field(ge=1)]
     works: tuple[Work, ...]
     apart: bool | None = None
 
@@ -116,29 +118,20 @@ class Generation:
 
     def as_text(self) -> str:
         """JSON text for ``gNNN.json``."""
-        works = [{"keep": list(work.keep), "ranges": [list(r) for r in work.ranges]} for work in self.works]
-        content = {
-            "format": 1, "config": self.config, "length": self.length, "apart": self.apart, "works": works,
-        }  # fmt: skip
-        return json.dumps(content) + "\n"
+        return json.dumps({"format": _FORMAT, **asdict(self)}) + "\n"
 
     @classmethod
     def read(cls, path: Path, number: int) -> "Generation":
         """Read a ``gNNN.json``; RunFolderError if it is damaged."""
         try:
             content = json.loads(path.read_text(encoding="utf-8"))
-            works = tuple(
-                Work(tuple(map(str, w["keep"])), tuple((int(a), int(b)) for a, b in w["ranges"]))
-                for w in content["works"]
-            )
-            length = int(content["length"])
-            if content["format"] != 1 or length < 1:
+            if content["format"] != _FORMAT:
                 raise ValueError("another format")
-            apart = content.get("apart")
-            return cls(number, str(content["config"]), length, works, None if apart is None else bool(apart))
+            return TypeAdapter(cls).validate_python({**content, "number": number})
         except (OSError, ValueError, KeyError, TypeError) as error:
+            why = first_of(error) if isinstance(error, ValidationError) else error
             raise RunFolderError(
-                f"{path}: is damaged or of another version ({error}); a finished sweep does without tiles/, "
+                f"{path}: is damaged or of another version ({why}); a finished sweep does without tiles/, "
                 f"{FORCE} runs another one again"
             ) from None
 
