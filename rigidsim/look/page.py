@@ -6,7 +6,7 @@ import numpy as np
 import xarray
 
 from rigidsim.look.plots import pretty_unit
-from rigidsim.look.signals import drifts, in_words, is_averaged, read_config, title_of
+from rigidsim.look.signals import by_role, in_words, is_averaged, read_config, title_of
 from rigidsim.scene.readable import TimeWords
 
 
@@ -88,7 +88,7 @@ def largest_drift(variable: xarray.DataArray) -> float:
 
 def _invariants(thinned: xarray.Dataset) -> list[tuple[str, ...]]:
     rows: list[tuple[str, ...]] = []
-    for base, drift in drifts(thinned).items():
+    for base, drift in by_role(thinned, "drift_of").items():
         initial = ""
         if base in thinned:
             value = np.asarray(thinned[base].values[0]).ravel()

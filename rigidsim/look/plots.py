@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import xarray
 
-from rigidsim.look.signals import drift_of, in_words, is_averaged, put_back_of
+from rigidsim.look.signals import in_words, is_averaged
 from rigidsim.look.solids import Array, Color
 from rigidsim.scene.readable import angle_unit, si_scale
 
@@ -91,12 +91,12 @@ def plan_plots(dataset: xarray.Dataset, leading: Sequence[str] = ()) -> list[Plo
     present = [str(v.name) for v in variables]
     first = [name for name in leading if name in present] or [name for name in _USUAL if name in present]
     first = first[:MOST_LEADING]
-    floor = drift_floor([_columns(v) for v in variables if drift_of(v)])
+    floor = drift_floor([_columns(v) for v in variables if "drift_of" in v.attrs])
     for variable in variables:
         name = str(variable.name)
         unit = str(variable.attrs.get("units", ""))
         factor, shown_unit = _reading(variable, unit)
-        if drift_of(variable) or put_back_of(variable):
+        if {"drift_of", "put_back_of"} & set(variable.attrs):
             key, title, place = "drift", "Drift of invariants, log10", "drift"
         elif variable.ndim > 1 or name in first:
             # The name, not the long name: it is short, and what the user meets in the dataset.
@@ -223,7 +223,7 @@ def _series(variable: xarray.DataArray, position: int, floor: float) -> Series:
     name = str(variable.name)
     values = _columns(variable)
     count = values.shape[1]
-    drifting, projected = drift_of(variable), put_back_of(variable)
+    drifting, projected = (variable.attrs.get(role) for role in ("drift_of", "put_back_of"))
     if drifting or projected:  # the latter: what the drift would have been
         labels = [in_words(drifting) if drifting else f"{in_words(str(projected))} put back"]
         values = np.log10(np.maximum(np.abs(values), floor))

@@ -32,29 +32,9 @@ def title_of(dataset: xarray.Dataset) -> str:
     return str(dataset.attrs.get("title") or read_config(dataset).get("name") or "rigid body")
 
 
-def is_residual(variable: xarray.DataArray) -> bool:
-    """Whether a variable only holds the digits of another that don't fit its float64."""
-    return "residual_of" in variable.attrs
-
-
-def drift_of(variable: xarray.DataArray) -> str | None:
-    """The invariant whose relative drift a variable is; None for any other variable."""
-    return variable.attrs.get("drift_of")
-
-
-def put_back_of(variable: xarray.DataArray) -> str | None:
-    """The projected invariant whose corrections put back a variable holds; None for any other variable."""
-    return variable.attrs.get("put_back_of")
-
-
-def drifts(dataset: xarray.Dataset) -> dict[str, xarray.DataArray]:
-    """The drifts of a dataset by the name of their invariant."""
-    return {name: v for v in dataset.data_vars.values() if (name := drift_of(v))}
-
-
-def put_backs(dataset: xarray.Dataset) -> dict[str, xarray.DataArray]:
-    """Corrections put back into projected invariants, by their name."""
-    return {name: v for v in dataset.data_vars.values() if (name := put_back_of(v))}
+def by_role(dataset: xarray.Dataset, role: str) -> dict[str, xarray.DataArray]:
+    """Drifts ("drift_of") or corrections put back ("put_back_of"), by the name of their invariant."""
+    return {name: v for v in dataset.data_vars.values() if (name := v.attrs.get(role))}
 
 
 def in_words(name: str) -> str:

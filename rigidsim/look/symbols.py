@@ -88,21 +88,21 @@ def coasts() -> list[Array]:
     return [np.array([pair.split(",") for pair in ring.split()], dtype=np.float64) / 10 for ring in rings]
 
 
-def land_map(width: int = WIDTH) -> NDArray[np.bool_]:
-    """Whether the middles of pixels (width / 2, width) are land: from the north pole down, east from 0."""
+def land_map() -> NDArray[np.bool_]:
+    """Whether the middles of pixels (WIDTH / 2, WIDTH) are land: from the north pole down, east from 0."""
     rings = coasts()
     first = np.concatenate(rings)
     second = np.concatenate([np.roll(ring, -1, axis=0) for ring in rings])
-    height = width // 2
-    land = np.zeros((height, width), dtype=bool)
+    height = WIDTH // 2
+    land = np.zeros((height, WIDTH), dtype=bool)
     for row, latitude in enumerate(90 - (np.arange(height) + 0.5) * 180 / height):
         crossed = (first[:, 1] > latitude) != (second[:, 1] > latitude)
         a, b = first[crossed], second[crossed]
         east = a[:, 0] + (latitude - a[:, 1]) / (b[:, 1] - a[:, 1]) * (b[:, 0] - a[:, 0])
         # A point is inside if an odd number of coasts lies to its west, counted on the unrolled map.
-        pixel = np.ceil(east / 360 * width - 0.5).astype(np.int64)
-        turns, pixel = np.divmod(pixel, width)
-        crossings = np.bincount(pixel, minlength=width)
+        pixel = np.ceil(east / 360 * WIDTH - 0.5).astype(np.int64)
+        turns, pixel = np.divmod(pixel, WIDTH)
+        crossings = np.bincount(pixel, minlength=WIDTH)
         land[row] = (np.cumsum(crossings) + turns.sum()) % 2 == 1
     return land
 

@@ -4,8 +4,6 @@ import numpy as np
 import xarray
 from numpy.typing import NDArray
 
-from rigidsim.look.signals import is_residual
-
 ROWS_AT_ONCE = 1 << 21
 
 
@@ -21,27 +19,22 @@ def thinned_indices(count: int, rows: int) -> NDArray[np.int64]:
     return indices if indices[-1] == count - 1 else np.append(indices, count - 1)
 
 
-def thin(dataset: xarray.Dataset, rows: int, at_once: int = ROWS_AT_ONCE) -> xarray.Dataset:
+def thin(dataset: xarray.Dataset, rows: int) -> xarray.Dataset:
     """The rows of `thinned_indices`, in memory, of variables along time; residuals are left out.
 
-    They are read from `at_once` rows of the file at a time: memory goes with `rows`, not with the length of
-    the run. ``ValueError`` without a `time` dimension or coordinate, or see `thinned_indices`.
+    They are read from `ROWS_AT_ONCE` rows of the file at a time: memory goes with `rows`, not with the run's
+    length. ``ValueError`` without a `time` dimension or coordinate, or see `thinned_indices`.
     """
     if "time" not in dataset.dims or "time" not in dataset.coords:
         raise ValueError("the dataset has no time coordinate: nothing to show along time")
     count = dataset.sizes["time"]
     thinned_indices(count, rows)  # refuses what can't be
-    wanted = dataset[
-        [
-            str(name)
-            for name, variable in dataset.data_vars.items()
-            if "time" in variable.dims and variable.dtype.kind in "fiub" and not is_residual(variable)
-        ]
-    ]
+    along = {str(n): v for n, v in dataset.data_vars.items() if "time" in v.dims and v.dtype.kind in "fiub"}
+    wanted = dataset[[name for name, variable in along.items() if "residual_of" not in variable.attrs]]
     stride = _stride(count, rows)
     # A slice is a strided read in HDF5; a list of indices would be read index by index. Each read makes some
     # kilobytes of notes for every chunk that it touches, hence pieces.
-    piece = stride * max(1, at_once // stride)
+    piece = stride * max(1, ROWS_AT_ONCE // stride)
     slices = [slice(first, min(first + piece, count), stride) for first in range(0, count, piece)]
     if (count - 1) % stride:
         slices.append(slice(count - 1, count))

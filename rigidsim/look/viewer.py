@@ -31,13 +31,6 @@ class NoDisplay(RuntimeError):
     """Raised if there is no screen for a window."""
 
 
-NO_DISPLAY = (
-    "there is no display here (neither DISPLAY nor WAYLAND_DISPLAY is set); --web serves the viewer to a "
-    "browser on this machine (on another one through a tunnel: ssh -L 9090:127.0.0.1:9090 "
-    "-L 9876:127.0.0.1:9876 HOST), and --png, --gif or --mp4 FILE draw without one"
-)
-
-
 def open_viewer(path: Path, *, web: bool = False) -> int:
     """Open a recording (`.rrd`) in the viewer, or with `web` serve it on 127.0.0.1 only and print the
     address, and wait until it is closed; returns its exit code, 130 after Ctrl-C. No usage statistics are
@@ -99,7 +92,11 @@ def _running(
     it would leave a folder for its catalogue.
     """
     if not web and not has_display():
-        raise NoDisplay(NO_DISPLAY)
+        raise NoDisplay(
+            "there is no display here (neither DISPLAY nor WAYLAND_DISPLAY is set); --web serves the viewer to "
+            "a browser on this machine (on another one through a tunnel: ssh -L 9090:127.0.0.1:9090 "
+            "-L 9876:127.0.0.1:9876 HOST), and --png, --gif or --mp4 FILE draw without one"
+        )
     command = [str(viewer_binary()), *recording, "--bind", LOOPBACK]
     environment = os.environ | QUIET
     if web:  # only errors are reported

@@ -6,8 +6,6 @@ import textwrap
 from collections.abc import Sequence
 from typing import Any
 
-from rich.console import Console
-
 from rigidsim.cli.screens.page import Page, Styled
 from rigidsim.cli.screens.summary import from_step, print_understood
 from rigidsim.scene.choices import method_named
@@ -20,9 +18,9 @@ _DIGITS = 6
 _NUMBER = re.compile(r"(?<![\w.])\d+(?:\.\d*)?(?:e[+-]?\d+)?(?![\w.])")
 
 
-def print_plan(plan: RunPlan, out: Console | None = None) -> None:
+def print_plan(plan: RunPlan) -> None:
     """Print the result of ``rigidsim plan``."""
-    on = Page(out)
+    on = Page()
     on.say((plan.name, "bold"), f"  {plan.state_count} states, {plan.formulation}")
     print_understood(plan, plan.loads, on)
     for surface in plan.switching:

@@ -17,15 +17,6 @@ panels (``panel.Panel``: what it finds in a dataset, and how that is drawn).
 """
 
 from rigidsim.look.figure_names import FIGURES, OVERVIEW
-from rigidsim.look.figures.catalogue import (
-    SUFFIXES,
-    available,
-    check_name,
-    figure,
-    figure_format,
-    save_figure,
-)
+from rigidsim.look.figures.catalogue import available, check_name, figure, figure_format, save_figure
 
-__all__ = [
-    "FIGURES", "OVERVIEW", "SUFFIXES", "available", "check_name", "figure", "figure_format", "save_figure",
-]  # fmt: skip
+__all__ = ["FIGURES", "OVERVIEW", "available", "check_name", "figure", "figure_format", "save_figure"]

@@ -79,19 +79,19 @@ def figure(dataset: xarray.Dataset, what: str = OVERVIEW) -> Figure:
     ValueError: no such figure, none for this dataset, or a dataset without samples.
     """
     check_name(what)
-    rows = shown_rows(dataset).rows
+    shown = shown_rows(dataset)
     if what == OVERVIEW:
-        curves, planes = _leading(rows)
-        return compose(dataset, (*curves, drift), planes, facts=True)
+        curves, planes = _leading(shown.rows)
+        return compose(shown, (*curves, drift), planes, facts=True)
     if what == SPECTRUM:
         raise ValueError("figure 'spectrum': is drawn of an analysis: rigidsim.analyse(run).figure()")
     kind = KINDS[what]
-    if not kind.shows(rows):
+    if not kind.shows(shown.rows):
         raise ValueError(
             f"figure {what!r}: needs {kind.needs}, which this run hasn't; "
             f"it has {', '.join(available(dataset))}"
         )
-    return compose(dataset, kind.curves, kind.planes)
+    return compose(shown, kind.curves, kind.planes)
 
 
 def check_name(what: str) -> None:

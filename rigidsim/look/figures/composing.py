@@ -14,7 +14,7 @@ from rigidsim.look.figures import timelines
 from rigidsim.look.figures.panel import Panel
 from rigidsim.look.figures.style import GREY, INK, STYLE, blank
 from rigidsim.look.page import largest_drift
-from rigidsim.look.signals import drifts, is_averaged, read_config
+from rigidsim.look.signals import by_role, is_averaged, read_config
 from rigidsim.look.thinning import thin
 from rigidsim.scene.readable import unit_for
 
@@ -39,16 +39,16 @@ class Shown:
     complete: bool
 
 
-def shown_rows(dataset: xarray.Dataset, most: int = ROWS, read: int = FULL_READ) -> Shown:
-    """Read at most so many rows from a dataset, possibly lazy, and all drifts of up to ``read`` samples."""
-    rows = thin(dataset, most).assign_attrs(dataset.attrs)
+def shown_rows(dataset: xarray.Dataset) -> Shown:
+    """Read the rows that a figure draws of a dataset, possibly lazy, and all drifts of one not too long."""
+    rows = thin(dataset, ROWS).assign_attrs(dataset.attrs)
     # A figure of few points shouldn't understate the drifts, unless reading them all takes long.
-    complete = dataset.sizes["time"] <= max(read, rows.sizes["time"])
+    complete = dataset.sizes["time"] <= max(FULL_READ, rows.sizes["time"])
     whole = dataset if complete else rows
-    largest = {name: largest_drift(drift) for name, drift in drifts(whole).items()}
+    largest = {name: largest_drift(drift) for name, drift in by_role(whole, "drift_of").items()}
     start = rows
     if dataset.sizes["time"] > rows.sizes["time"]:
-        start = thin(dataset.isel(time=slice(0, most)), most).assign_attrs(dataset.attrs)
+        start = thin(dataset.isel(time=slice(0, ROWS)), ROWS).assign_attrs(dataset.attrs)
     return Shown(rows, start, largest, complete)
 
 
@@ -73,16 +73,11 @@ def beginning(axes: Axes, shown: Shown) -> float:
 
 
 def compose(
-    dataset: xarray.Dataset,
-    curves: Sequence[Panel] = (),
-    planes: Sequence[Panel] = (),
-    *,
-    facts: bool = False,
+    shown: Shown, curves: Sequence[Panel] = (), planes: Sequence[Panel] = (), *, facts: bool = False
 ) -> Figure:
-    """A page of those panels for which the dataset has data: curves over a common time axis, planes beside
+    """A page of those panels for which there is data: curves over a common time axis, planes beside
     them or side by side, and below these a table of what was run and what was conserved, if wanted.
     """
-    shown = shown_rows(dataset)
     curves = [panel for panel in curves if panel.shows(shown.rows)]
     planes = [panel for panel in planes if panel.shows(shown.rows)]
     table = facts_of(shown) if facts else []

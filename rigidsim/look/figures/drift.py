@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from rigidsim.look import signals
 from rigidsim.look.figures.panel import clock, panel
 from rigidsim.look.figures.style import GREY, PALETTE, key, note
-from rigidsim.look.signals import drifts, put_backs
+from rigidsim.look.signals import by_role
 from rigidsim.look.solids import Array
 
 TYPICAL, MOST = 0.5, 50.0
@@ -34,11 +34,11 @@ def law(dataset: xarray.Dataset) -> Array | None:
     return tolerance * np.sqrt(np.maximum(steps * (seconds - seconds[0]) / span, 1.0))
 
 
-@panel(lambda dataset: drifts(dataset) or None)
+@panel(lambda dataset: by_role(dataset, "drift_of") or None)
 def drift(axes: Axes, dataset: xarray.Dataset, found: dict[str, xarray.DataArray]) -> None:
     """Magnitudes of all relative drifts on a logarithmic axis, over the band that rounding explains."""
     time = clock(dataset)[0]
-    projected = put_backs(dataset)
+    projected = by_role(dataset, "put_back_of")
     curves: list[Array] = []
     still: list[str] = []
     for (name, variable), hue in zip(found.items(), cycle(PALETTE), strict=False):

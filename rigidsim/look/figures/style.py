@@ -31,6 +31,7 @@ _OVER_TIME = 0.8  # radii of the whole between neighbours that are joined: some 
 _KEY_ROW = 12.4  # height of a row of a key, points
 _KEY_LETTER, _TITLE_LETTER = 4.9, 6.1  # mean widths of a letter, points
 _LATER = "lighter: later"
+_MARGIN = 0.08  # of a square panel
 _HEADING = (0.34, 0.26)  # inches of the page's two heading lines
 
 STYLE: dict[str, Any] = {
@@ -194,7 +195,7 @@ def _first_turns(points: Array) -> tuple[int, str]:
     return rows, "first turn" if count == 1 else f"first {count} turns"
 
 
-def square(axes: Axes, x: Array, y: Array, *, margin: float = 0.08) -> None:
+def square(axes: Axes, x: Array, y: Array) -> None:
     """Equal scales on both axes, about all finite points (x, y)."""
     ends = []
     for values in (x, y):
@@ -203,8 +204,7 @@ def square(axes: Axes, x: Array, y: Array, *, margin: float = 0.08) -> None:
     reach = max(high - low for low, high in ends) / 2
     middle = [(low + high) / 2 for low, high in ends]
     size = max(map(abs, middle), default=0.0)
-    reach = max(reach, 1e-12 * size) or 1.0
-    reach *= 1 + 2 * margin
+    reach = (max(reach, 1e-12 * size) or 1.0) * (1 + 2 * _MARGIN)
     axes.set_xlim(middle[0] - reach, middle[0] + reach)
     axes.set_ylim(middle[1] - reach, middle[1] + reach)
     axes.set_aspect("equal", adjustable="box")

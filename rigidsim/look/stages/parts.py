@@ -255,10 +255,10 @@ def quaternion_of(matrices: Array) -> Array:
     return np.asarray(found * np.cumprod(np.append(1.0, flips))[:, None])
 
 
-def circle(radius: float, normal: Array, center: Array | None = None, count: int = 121) -> Array:
-    """Points (count, 3) of a circle about an axis."""
+def circle(radius: float, normal: Array, center: Array | None = None) -> Array:
+    """Points (121, 3) of a circle about an axis."""
     first, second = across(normal / np.linalg.norm(normal))
-    angle = np.linspace(0, 2 * np.pi, count)[:, None]
+    angle = np.linspace(0, 2 * np.pi, 121)[:, None]
     ring = radius * (np.cos(angle) * first + np.sin(angle) * second)
     return np.asarray(ring if center is None else ring + center)
 
