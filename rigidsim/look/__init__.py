@@ -10,9 +10,8 @@ Two folders load what draws, and are imported only where a picture is drawn: `ti
 | `figure_names` | their names, without any import |
 | `stages` | stages by kind of scene, as numbers; a package of its own |
 | `plots`, `page`, `states` | variables to plots; the summary page; lanes of events, and sections |
-| `signals` | what a dataset tells of itself, and what pictures show, recorded or worked out |
+| `signals` | a bounded number of rows of a dataset, and what they tell and show, recorded or worked out |
 | `surroundings` | what stands around the body, from the dataset's attributes |
 | `solids`, `symbols` | meshes of bodies; toy tops, globes with their continents, edges |
-| `thinning` | a bounded number of rows of any dataset |
 | `viewer`, `film` | the viewer, also of a run that goes on; pictures and films of a timeline |
 """

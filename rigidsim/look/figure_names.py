@@ -1,10 +1,7 @@
 """Names of all figures with one line on what each shows, for help texts and messages, without any import."""
 
-OVERVIEW = "overview"
-"""The page that suits the scene."""
-
-SPECTRUM = "spectrum"
-"""Figure of a run's analysis: ``rigidsim.look.figures.spectrum``."""
+OVERVIEW = "overview"  # the page that suits the scene
+SPECTRUM = "spectrum"  # of a run's analysis
 
 FIGURES: dict[str, str] = {
     OVERVIEW: "the page that suits the scene: its leading figures, drifts and a table (the default)",

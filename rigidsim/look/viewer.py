@@ -93,8 +93,8 @@ def _running(
     """
     if not web and not has_display():
         raise NoDisplay(
-            "there is no display here (neither DISPLAY nor WAYLAND_DISPLAY is set); --web serves the viewer to "
-            "a browser on this machine (on another one through a tunnel: ssh -L 9090:127.0.0.1:9090 "
+            "there is no display here (neither DISPLAY nor WAYLAND_DISPLAY is set); --web serves the viewer "
+            "to a browser on this machine (on another one through a tunnel: ssh -L 9090:127.0.0.1:9090 "
             "-L 9876:127.0.0.1:9876 HOST), and --png, --gif or --mp4 FILE draw without one"
         )
     command = [str(viewer_binary()), *recording, "--bind", LOOPBACK]

@@ -12,7 +12,7 @@ import xarray
 pytest.importorskip("rerun")
 
 import rigidsim
-from rigidsim.look.thinning import thin
+from rigidsim.look.signals import thin
 from rigidsim.look.timeline import write_timeline
 from rigidsim.look.timeline.writing import CHUNK
 from rigidsim.store.variables import parts_in

@@ -28,11 +28,7 @@ def path_about(axes: Axes, path: Array, across: str, up: str, *, center: bool = 
     axes.set(xlabel=across, ylabel=up)
 
 
-def _near_axis(dataset: xarray.Dataset) -> Array | None:
-    return signals.polar_motion(dataset) if signals.near_axis(dataset) else None
-
-
-@panel(_near_axis)
+@panel(lambda dataset: signals.polar_motion(dataset) if signals.near_axis(dataset) else None)
 def polar_motion(axes: Axes, dataset: xarray.Dataset, plane: Array) -> None:
     """The spin axis seen from the figure axis, m1 to the right and m2 up, and its period."""
     scale, unit = angle_scale(plane)

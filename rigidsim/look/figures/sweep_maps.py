@@ -71,14 +71,9 @@ def save_sweep_figure(dataset: xarray.Dataset, path: Any, what: str | None, *, f
 
 
 def sweep_figure(dataset: xarray.Dataset, what: str | None = None) -> Figure:
-    """A sweep's page: one variable over its axes.
-
-    Args:
-        what: name of the variable, with ``[INDEX]`` for one component; by default the first indicator, else
-            the first time of an event, else the first quantity that was kept.
-
-    Raises:
-        ValueError: no such variable; names those there are.
+    """A sweep's page: one variable over its axes, by its name, with ``[INDEX]`` for one component; by default
+    the first indicator, else the first time of an event, else the first quantity kept.
+    ``ValueError`` names the variables there are where there is none of that name.
     """
     names = drawable(dataset)
     name, bracket, index = (what or names[0]).partition("[")
@@ -200,9 +195,8 @@ def _map(dataset: xarray.Dataset, cut: xarray.DataArray, dims: list[str], said: 
 
 
 def _colours(values: Array) -> tuple[dict[str, Any], str]:
-    """Scale of a map's colours, logarithmic if the values span decades, and the ends beyond which some lie.
-
-    Of many, a hundredth of the values at the ends doesn't take the colours from all others.
+    """Scale of a map's colours, logarithmic if values span decades, and the ends beyond which some lie: of
+    many, a hundredth of the values at the ends doesn't take the colours from all others.
     """
     finite = values[np.isfinite(values)]
     if not len(finite):

@@ -281,9 +281,8 @@ def _tilt(dataset: xarray.Dataset) -> tuple[Array, str] | None:
     direction = signals.pole(dataset, "figure") if signals.is_top(dataset) else None
     if direction is None:
         return None
-    return signals.angle_between(direction, signals.vertical(dataset)), (
-        "Tilt of the figure axis against the vertical"
-    )
+    angle = signals.angle_between(direction, signals.vertical(dataset))
+    return angle, "Tilt of the figure axis against the vertical"
 
 
 @panel(_tilt, begins=True)

@@ -7,11 +7,10 @@ import numpy as np
 import xarray
 from matplotlib import rc_context
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from rigidsim.look.figures.style import STYLE
+from rigidsim.look.figures.style import STYLE, ShownFigure
 from rigidsim.scene.choices import method_named
 from rigidsim.scene.readable import span_text
 
@@ -25,8 +24,7 @@ _FRONT = "#1b2733"
 def save_work_precision(dataset: xarray.Dataset, path: Path) -> Path:
     """Draw a tradeoff dataset as a page (PNG): the plot, and a key to its numbered points."""
     with rc_context(STYLE):  # type: ignore[arg-type]
-        figure = Figure(figsize=(12, 6.4), layout="constrained")
-        FigureCanvasAgg(figure)
+        figure = ShownFigure(figsize=(12, 6.4), layout="constrained")
         left, right = figure.subplots(1, 2, width_ratios=(1.55, 1))
         draw_points(left, dataset)
         _key(right, dataset)

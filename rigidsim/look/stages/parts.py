@@ -11,9 +11,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from rigidsim.look.signals import across, finite_rows, joined, norms
+from rigidsim.look.signals import across, finite_rows, joined, norms, thinned_indices
 from rigidsim.look.solids import Array, Color, Mesh
-from rigidsim.look.thinning import thinned_indices
 
 SPACE, BODY, CENTRE = "", "body", "centre"
 """Where a part is attached: to space, to the body, or to its reference point. Frames add names of their

@@ -9,7 +9,7 @@ import rerun.blueprint as rrb
 from rerun.blueprint.components import LinkAxis
 
 from rigidsim.look.plots import Plot
-from rigidsim.look.stages.bodies import Subject, camera
+from rigidsim.look.stages.bodies import camera
 from rigidsim.look.stages.parts import Color, Plane, Stage
 from rigidsim.look.timeline import plotting
 from rigidsim.look.timeline.drawing import OLDER, trail_path
@@ -27,9 +27,7 @@ def build_blueprint(run: DrawnRun, *, following: bool = False) -> rrb.Blueprint:
     """The layout for a run, which opens at its start and plays, or stays at the end of one that goes on."""
     stages, planes, clock = run.picture.stages, run.planes, run.clock
     narrow = len(stages) > 1
-    spaces: list[rrb.View | rrb.Container] = [
-        space_view(stage, clock, narrow=narrow, subject=run.subject) for stage in stages
-    ]
+    spaces: list[rrb.View | rrb.Container] = [space_view(stage, run, narrow=narrow) for stage in stages]
     beside = [tabs([plane_view(plane) for plane in planes])] if planes else []
     shares = [3.0] * len(spaces) + [1.6] * len(beside)
     scene = spaces[0] if len(shares) == 1 else rrb.Horizontal(*spaces, *beside, column_shares=shares)
@@ -56,7 +54,7 @@ def build_comparison(
     the distances between their attitudes, if known.
     """
     runs = [run for _, run in named]
-    eyes = [space_view(run.picture.stages[0], run.clock, narrow=True, subject=run.subject) for run in runs]
+    eyes = [space_view(run.picture.stages[0], run, narrow=True) for run in runs]
     half = -(-len(eyes) // 2)
     scene = (
         rrb.Horizontal(*eyes)
@@ -100,14 +98,13 @@ def left_side(
     scene: rrb.View | rrb.Container, legend: Sequence[tuple[str, Color]], pages: Mapping[str, str]
 ) -> rrb.Container:
     """The scene above its legend and the text pages, by their entities."""
-    height = 30.0 + 24.0 * plotting.legend_lines(legend)
+    lines = -(-(1 + len(legend)) // plotting.LEGEND_COLUMNS)  # with the clock
+    height = 30.0 + 24.0 * lines
     key = rrb.Spatial2DView(
         origin="/legend",
         name="What is shown",
         background=_DARK,
-        visual_bounds=rrb.VisualBounds2D(
-            x_range=(0.0, 30.0), y_range=(0.0, plotting.LEGEND_LINE * plotting.legend_lines(legend))
-        ),
+        visual_bounds=rrb.VisualBounds2D(x_range=(0.0, 30.0), y_range=(0.0, plotting.LEGEND_LINE * lines)),
     )
     texts: list[rrb.View] = [
         rrb.TextDocumentView(origin=f"/{entity}", name=name) for entity, name in pages.items()
@@ -135,20 +132,19 @@ def time_panel(clock: Clock, turns: float, *, following: bool) -> rrb.TimePanel:
     )
 
 
-def space_view(stage: Stage, clock: Clock, *, narrow: bool, subject: Subject | None) -> rrb.Spatial3DView:
-    """A view of one stage."""
-    eye = camera(stage, narrow=narrow, subject=subject)
-    count = len(clock.ticks)
-    rows = max(min(TRAIL_ROWS, count // 5), 2)
+def space_view(stage: Stage, run: DrawnRun, *, narrow: bool) -> rrb.Spatial3DView:
+    """A view of one stage of a run."""
+    eye = camera(stage, narrow=narrow, subject=run.subject)
+    rows = max(min(TRAIL_ROWS, len(run.steps) // 5), 2)
     overrides: dict[Any, Any] = {}
     for trail in stage.trails:
         path = trail_path(stage, trail)
         shown = round(RECENT * rows) if trail.fades else rows
-        overrides[f"{path}/recent"] = rrb.VisibleTimeRanges(_window(clock, shown))
+        overrides[f"{path}/recent"] = rrb.VisibleTimeRanges(_window(run.clock, shown))
         if trail.fades:
             # A piece of the older part ends where its row is: it must not stand out over the bright one.
             longest = max(rows, 2 * OLDER * trail.stride)
-            overrides[f"{path}/older"] = rrb.VisibleTimeRanges(_window(clock, longest))
+            overrides[f"{path}/older"] = rrb.VisibleTimeRanges(_window(run.clock, longest))
     origin = f"/{stage.root}/{stage.looked_from}" if stage.looked_from else f"/{stage.root}"
     return rrb.Spatial3DView(
         origin=origin,
@@ -180,7 +176,7 @@ def plane_view(plane: Plane) -> rrb.Spatial2DView:
     """A view of one plane figure."""
     size = 1.35 * plotting.plane_reach(plane)
     return rrb.Spatial2DView(
-        origin=plotting.plane_path(plane),
+        origin=f"/planes/{plane.key}",
         name=plane.title,
         background=_DARK,
         visual_bounds=rrb.VisualBounds2D(x_range=(-size, size), y_range=(-size, size)),

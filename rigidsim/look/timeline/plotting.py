@@ -27,11 +27,6 @@ def plot_path(plot: Plot, name: str) -> str:
     return folder + rr.escape_entity_path_part(name)
 
 
-def plane_path(plane: Plane) -> str:
-    """Entity of a plane figure."""
-    return f"/planes/{plane.key}"
-
-
 def draw_plot_styles(recording: rr.RecordingStream, plots: Sequence[Plot]) -> None:
     """Names and colours of the curves."""
     for plot in plots:
@@ -102,7 +97,7 @@ def draw_planes(recording: rr.RecordingStream, planes: Sequence[Plane]) -> None:
     angle = np.linspace(0, 2 * np.pi, 121)
     for plane in planes:
 
-        def log(name: str, part: rr.AsComponents, path: str = plane_path(plane)) -> None:
+        def log(name: str, part: rr.AsComponents, path: str = f"/planes/{plane.key}") -> None:
             recording.log(f"{path}/{name}", part, static=True)
 
         points = flipped(plane.points)
@@ -145,7 +140,7 @@ def draw_plane_rows(
         if plane.moves:
             places = flipped(plane.points[rows]).astype(np.float32)
             columns = rr.Points2D.columns(positions=places)
-            recording.send_columns(f"{plane_path(plane)}/now", indexes=times, columns=columns)
+            recording.send_columns(f"/planes/{plane.key}/now", indexes=times, columns=columns)
 
 
 def plane_reach(plane: Plane) -> float:
@@ -169,11 +164,6 @@ def legend_of(stages: Sequence[Stage]) -> list[tuple[str, Color]]:
             if part.words:
                 found.setdefault(part.words, part.color)
     return list(found.items())
-
-
-def legend_lines(entries: Sequence[tuple[str, Color]]) -> int:
-    """Number of lines of the legend on the screen, including the clock's."""
-    return -(-(1 + len(entries)) // LEGEND_COLUMNS)
 
 
 def draw_legend(
