@@ -1,4 +1,4 @@
-"""``rigidsim info``: the summary of a run or a sweep, without what runs need."""
+"""``rigidsim info``: the summary of a run or a sweep."""
 
 from pathlib import Path
 

@@ -1,8 +1,6 @@
 """Commands on the results of a run or a sweep: ``analyse``, ``export``, ``plot``, ``view``."""
 
 import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 import rigidsim.workflows.analyse as analysing
@@ -50,8 +48,11 @@ def plot(run_path: Path, what: list[str] | None, out: Path | None) -> None:
     swept = is_sweep(run_path)
     saved = open_sweep(run_path) if swept else open_run(run_path)
     wanted = list(dict.fromkeys(what or []))
-    if not swept:
-        _check_names(wanted)
+    try:
+        for name in () if swept else (one for one in wanted if one != ALL):
+            check_name(name)
+    except ValueError as error:
+        raise RigidsimError(f"--what: {error}, {ALL}") from None
     several = len(wanted) > 1 or ALL in wanted
     if several and out is not None and not out.is_dir():
         raise RigidsimError(f"{out}: several figures need a folder that is there; give one as --out, or none")
@@ -62,7 +63,7 @@ def plot(run_path: Path, what: list[str] | None, out: Path | None) -> None:
             own = "" if name == OVERVIEW else "_" + name.replace("[", "_").replace("]", "")
             folder = saved.folder.path if out is None else out
             target = folder / f"figure{own}.png" if several or out is None else out
-            with _told(target, swept):
+            try:
                 kind = figure_format(target)
                 with atomic.replacing(target) as new:
                     if isinstance(saved, SavedSweep):
@@ -71,28 +72,12 @@ def plot(run_path: Path, what: list[str] | None, out: Path | None) -> None:
                         save_spectrum(analysing.analyse(saved).dataset, new, file_format=kind)
                     else:
                         save_figure(dataset, new, name, file_format=kind)
+            except ValueError as error:
+                raise RigidsimError(f"plot: {error}" if swept else str(error)) from None
+            except OSError as error:
+                why = error.strerror or error
+                raise RigidsimError(f"{target}: can't be written: {why}; choose another --out") from None
             print(target)
-
-
-def _check_names(wanted: list[str]) -> None:
-    try:
-        for name in wanted:
-            if name != ALL:
-                check_name(name)
-    except ValueError as error:
-        raise RigidsimError(f"--what: {error}, {ALL}") from None
-
-
-@contextmanager
-def _told(target: Path, swept: bool) -> Iterator[None]:
-    """Make a figure's errors those of the command."""
-    try:
-        yield
-    except ValueError as error:
-        raise RigidsimError(f"plot: {error}" if swept else str(error)) from None
-    except OSError as error:
-        why = error.strerror or error
-        raise RigidsimError(f"{target}: can't be written: {why}; choose another --out") from None
 
 
 def view(

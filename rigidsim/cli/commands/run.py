@@ -6,7 +6,6 @@ from pathlib import Path
 import rigidsim.workflows.run as workflow
 from rigidsim.cli.screens.summary import print_run
 from rigidsim.errors import RigidsimError
-from rigidsim.scene.config import Experiment
 from rigidsim.scene.scene import build_scene
 from rigidsim.session import progress
 from rigidsim.session.understood import cautions_about, cautions_of
@@ -37,7 +36,11 @@ def run(
         raise RigidsimError("run: give a CONFIG, or --from a dataset; rigidsim run --help shows an example")
     worst = 0
     for experiment in experiments:
-        _warn(experiment)
+        # what may mean something else is said before time is spent on it; a sweep is refused later
+        config = experiment.config
+        acting = bool(config.loads or config.events) and config.sweep is None
+        for caution in cautions_of(build_scene(experiment)) if acting else cautions_about(config):
+            print(f"rigidsim: warning: {experiment.source}: {caution.text}", file=sys.stderr)
         with progress.observer() as observer:
             result = workflow.run(experiment, out=out, force=force, observer=observer)
         code = print_run(result, as_json)
@@ -45,11 +48,3 @@ def run(
         if code == 130:
             break
     return worst
-
-
-def _warn(experiment: Experiment) -> None:
-    """Say what in a config may mean something else, before time is spent on it."""
-    config = experiment.config
-    acting = bool(config.loads or config.events) and config.sweep is None  # a sweep is refused later
-    for caution in cautions_of(build_scene(experiment)) if acting else cautions_about(config):
-        print(f"rigidsim: warning: {experiment.source}: {caution.text}", file=sys.stderr)

@@ -140,12 +140,11 @@ def circulation(time: Array, plane: Array) -> float | None:
 
 @dataclass(frozen=True)
 class FittedEllipse:
-    """``forward exp(i w t) + backward exp(-i w t)`` about the time origin `start`; `rate` is w > 0, rad/s."""
+    """``forward exp(i w t) + backward exp(-i w t)`` from the first sample on; `rate` is w > 0, rad/s."""
 
     forward: complex
     backward: complex
     rate: float
-    start: float
 
     @property
     def semi_axes(self) -> tuple[float, float]:
@@ -184,4 +183,4 @@ def leading_ellipse(time: Array, plane: Array) -> FittedEllipse | None:
     wave = np.exp(1j * rate * (time - time[0]))
     basis = np.stack([wave, wave.conj(), np.ones_like(wave), middle, middle**2], axis=1)
     found, *_ = np.linalg.lstsq(basis, z, rcond=None)
-    return FittedEllipse(complex(found[0]), complex(found[1]), float(rate), float(time[0]))
+    return FittedEllipse(complex(found[0]), complex(found[1]), float(rate))

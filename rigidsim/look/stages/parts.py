@@ -15,9 +15,7 @@ from rigidsim.look.signals import across, finite_rows, joined, norms, thinned_in
 from rigidsim.look.solids import Array, Color, Mesh
 
 SPACE, BODY, CENTRE = "", "body", "centre"
-"""Where a part is attached: to space, to the body, or to its reference point. Frames add names of their
-own.
-"""
+"""Where a part is attached: to space, to the body, to its reference point, or to a frame by its name."""
 
 ARROW_REACH = 1.6  # length of the longest arrow, in units of the body's reach
 AXIS_REACH = 1.15  # of the body axes
