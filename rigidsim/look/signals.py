@@ -275,7 +275,8 @@ def orientation(dataset: xarray.Dataset, axis: str) -> tuple[Array, Array] | Non
         if axis not in names:
             return None
         obliquity, node = values(dataset, "obliquity"), values(dataset, "node_longitude")
-        assert obliquity is not None and node is not None
+        assert obliquity is not None
+        assert node is not None
         found = obliquity[:, names.index(axis)], node[:, names.index(axis)]
         return found if np.isfinite(found[0]).any() else None  # an average over a tumbling has no figure axis
     directions = pole(dataset, axis)
