@@ -12,6 +12,8 @@ from fractions import Fraction
 from functools import cache
 from typing import Any
 
+import mpmath
+
 from rigidsim.scene import units
 from rigidsim.scene.validation_messages import shown
 
@@ -79,8 +81,6 @@ class ExactNumber:
 @cache
 def _for_doubles() -> Any:
     """Context in which numbers are rounded to doubles; making one takes longer than reading a config."""
-    import mpmath
-
     context = mpmath.MPContext()
     context.prec = 120
     return context
