@@ -17,8 +17,7 @@ from rigidsim.solve.compiled import TaylorEngine, compiled_engine, interruptible
 from rigidsim.solve.events import EventLog, engine_events
 from rigidsim.solve.precision import Precision, Scalar
 from rigidsim.solve.requirements import after_each_step, requirement_of
-from rigidsim.solve.step_bounds import bound_of_sparse_series, longest_step
-from rigidsim.solve.stepper import Mark, Stepper
+from rigidsim.solve.stepper import Mark, Stepper, bound_of_sparse_series, longest_step
 
 _ARRIVED = hy.taylor_outcome.time_limit
 _LOST = hy.taylor_outcome.err_nf_state

@@ -17,8 +17,8 @@ import numpy as np
 from rigidsim.accuracy.estimates import margins
 from rigidsim.accuracy.estimates.course import UNCERTAIN, plain_perturbations
 from rigidsim.solve.batch.family import Family, Numbers
+from rigidsim.solve.batch.motion import MemberCarrier, ShadowLanes
 from rigidsim.solve.batch.run import BatchBlock
-from rigidsim.solve.batch.shadow_lanes import MemberCarrier, ShadowLanes
 from rigidsim.solve.shadow.ensemble import ShadowEnsemble
 from rigidsim.solve.shadow.measures import Measures, Spread, Starts
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from rigidsim.solve.compiled import Kept
 from rigidsim.solve.events import DIRECTIONS
-from rigidsim.solve.step_bounds import bound_of_sparse_series, longest_step
+from rigidsim.solve.stepper import bound_of_sparse_series, longest_step
 
 _GRID = 1 << 16
 """Samples at once; the step before the last of them is shortened, always at the same places."""

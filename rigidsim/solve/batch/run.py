@@ -10,7 +10,7 @@ import numpy as np
 
 from rigidsim.solve.batch.family import Family, Numbers
 from rigidsim.solve.batch.lanes import LaneResults, recommended_width
-from rigidsim.solve.batch.motion import BatchMotion, EventExpressions
+from rigidsim.solve.batch.motion import BatchMotion
 from rigidsim.solve.batch.outputs import BatchOutputs, Values
 from rigidsim.solve.precision import precision_of
 from rigidsim.solve.sampling import SampleClock
@@ -64,8 +64,7 @@ class BatchRun:
         self._system = family.traced.system
         self._precision = precision_of("double")
         self._clocks: dict[int, SampleClock] = {}
-        self._crossings = EventExpressions(family.traced)
-        self._motion = BatchMotion(family.traced, self._crossings, self.width)
+        self._motion = BatchMotion(family.traced, self.width)
         self._outputs = BatchOutputs(family.traced)
 
     def compile(self) -> None:
@@ -91,11 +90,8 @@ class BatchRun:
         units = numbers.whole_numbers(self._system.scaling.time)[part]
         start, times = self._times(units)
         moving = initial[: self._traced.moving]
-        parameters = np.concatenate(
-            [swept[self._traced.in_equations], self._crossings.values(moving, swept, start, times[-1])]
-        )
         most = self._most_steps(start, times)
-        lanes, along = self._motion.run(initial, parameters, start, times, most)
+        lanes, along = self._motion.run(initial, swept, start, times, most)
         begun = self._outputs.begun(moving, swept, start)
         values_of = self._outputs.at(lanes.states, swept, times, begun, along)
         values, drifts = self._outputs.named(values_of, numbers, part)

@@ -16,8 +16,7 @@ import numpy as np
 from rigidsim.model.system import System
 from rigidsim.solve.events import EventLog
 from rigidsim.solve.precision import Precision, Scalar
-from rigidsim.solve.step_bounds import bound_of_sparse_series
-from rigidsim.solve.stepper import Stepper
+from rigidsim.solve.stepper import Stepper, bound_of_sparse_series
 from rigidsim.solve.switching.engines import Root
 from rigidsim.solve.switching.moments import between
 from rigidsim.solve.switching.roots import SurfaceRoots
