@@ -65,6 +65,7 @@ class Scene:
         axes, epoch: what the space axes and time 0 are, if the config says so or a load implies it.
         figure: the body's figure axis, see ``[frame] figure_axis``.
         bodies: point masses besides the body; None if there are none.
+        found_start: how an equilibrium was found that it starts from; None for any other start.
         reference: unit normal (space axes) of the plane that obliquity and longitudes count from; None for
             a source's own, moving plane.
     """
@@ -94,6 +95,7 @@ class Scene:
     bodies: PointMasses | None = None
     given_loads: tuple[SceneLoad, ...] = ()
     tabled: Mapping[str, tuple[SceneLoad, ...]] = field(default_factory=dict)
+    found_start: Any = None
 
     @property
     def free_flight(self) -> bool:
@@ -208,6 +210,7 @@ def _with_start(scene: Scene, start: starts.InitialRotation) -> Scene:
         quaternion=start.quaternion,
         angular_velocity=rates,
         euler_angles=start.euler_angles,
+        found_start=start.found,
     )
 
 

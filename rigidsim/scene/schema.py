@@ -57,6 +57,7 @@ _ABOUT_NAME = (
     "1 to 100 letters, digits, dots, underscores and hyphens, not dots alone, since it names the run folder"
 )
 _ABOUT_LOADS = "loads that act on the body, each of a kind; without any the body rotates freely"
+EQUILIBRIUM_NAMES = ("relative", "cassini_1", "cassini_2", "cassini_3", "cassini_4")
 
 
 class Initial(ConfigTable):
@@ -92,6 +93,10 @@ class Initial(ConfigTable):
     """
     spin_period: Second | None = Field(None, examples=["25 h"])
     """time of a turn about the figure axis, instead of angular_velocity; negative: the other way round"""
+    equilibrium: Annotated[str, OneOf(EQUILIBRIUM_NAMES)] | None = None
+    """start in an equilibrium, which is found: relative (at rest in the frame of a circular orbit; the stable
+    one, or the one nearest to an attitude that is given), or a Cassini state of an orbit whose node moves
+    """
     position: Triple[Metre] | None = Field(None, examples=[["7000 km", 0, 0]])
     """position of the centre of mass, in space axes; with it or velocity the body flies freely"""
     velocity: Triple[Speed] | None = Field(None, examples=[[0, "7.5 km/s", 0]])

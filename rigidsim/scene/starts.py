@@ -1,8 +1,8 @@
-"""Starts: the ways in which ``[initial]`` gives an attitude and rates, one entry each.
+"""Starts: the ways in which ``[initial]`` gives an attitude, rates, or both, one entry each.
 
 A way has the key that chooses it, and the keys that it takes beside. One way gives the attitude (by default
-the body axes are along the space axes) and one the rates. Ways that need mechanics, such as the plane of an
-orbit, are registered by the rooms above.
+the body axes are along the space axes) and one the rates; an equilibrium, which is found, gives both. Ways
+that need mechanics, such as the plane of an orbit, are registered by the rooms above.
 
 An attitude from the pole of the body's equator is R = R3(node) R1(tilt) R3(turn) F^T, with the figure's
 equator and pole as columns of F: the equator rises through the plane at the node, its pole is tilted from the
@@ -54,11 +54,13 @@ class InitialRotation:
         quaternion: unit quaternion, body to space.
         angular_velocity: body axes, rad/s; None from a way that gives the attitude alone.
         euler_angles: as given, rad; None if given otherwise.
+        found: how an equilibrium was found, for who tells it; None for a start that was given.
     """
 
     quaternion: Vector
     angular_velocity: Vector | None = None
     euler_angles: Vector | None = None
+    found: Any = None
 
 
 @dataclass(frozen=True)
@@ -88,13 +90,16 @@ class StartForm:
 
 ATTITUDES: dict[str, StartForm] = {}
 RATES: dict[str, StartForm] = {}
+EQUILIBRIA: dict[str, StartForm] = {}
+"""By name instead of key: what may stand beside are ways to give attitude or rates."""
 _BESIDE = ("prime_meridian", "node_longitude")  # which give nothing alone
 
 
-def register_start(ways: dict[str, StartForm], way: StartForm) -> None:
-    """Register a way in ``ATTITUDES`` or ``RATES``; ``ValueError`` if its key is taken."""
-    if ways.setdefault(way.key, way) is not way:
-        raise ValueError(f"a start by {way.key} is registered already")
+def register_start(ways: dict[str, StartForm], way: StartForm, name: str = "") -> None:
+    """Register a way in ``ATTITUDES``, ``RATES`` or ``EQUILIBRIA``; ``ValueError`` if the name is taken."""
+    known = ways.setdefault(name or way.key, way)
+    if known.resolve is not way.resolve:
+        raise ValueError(f"a start by {name or way.key} is registered already")
 
 
 def refusal(key: str, text: str) -> ConfigError:
@@ -108,9 +113,18 @@ def check_ways(table: Initial, context: Any) -> None:
         _chosen(table, ATTITUDES, "attitude"),
         _chosen(table, RATES, "start of the rates"),
     )
-    if rates_way is None:
-        raise refusal("angular_velocity", f"missing; exactly one of {_either(RATES)} is needed")
-    beside = {key for way in (attitude_way,) if way for key in (*way.needed, *way.allowed)}
+    equilibrium = None
+    if table.equilibrium is not None:
+        equilibrium = EQUILIBRIA[table.equilibrium]
+        for way in (attitude_way, rates_way):
+            if way is not None and way.key not in equilibrium.allowed:
+                what = f'given beside equilibrium = "{table.equilibrium}", which finds it; remove one of them'
+                raise refusal(way.key, what)
+    elif rates_way is None:
+        raise refusal(
+            "angular_velocity", f"missing; exactly one of {_either(RATES)} and equilibrium is needed"
+        )
+    beside = {key for way in (attitude_way, equilibrium) if way for key in (*way.needed, *way.allowed)}
     for key in _BESIDE:
         if getattr(table, key) is not None and key not in beside:
             takers = [way.key for way in ATTITUDES.values() if key in (*way.needed, *way.allowed)]
@@ -147,12 +161,16 @@ def start_of(scene: Any, with_start: Callable[[Any, InitialRotation], Any]) -> I
     table, context = scene.config.initial, scene.context
     way, rates = _chosen(table, ATTITUDES, ""), _chosen(table, RATES, "")
     start = way.resolve(scene) if way else InitialRotation([context.one] + [context.zero] * 3)
-    assert rates is not None
-    velocity = rates.resolve(with_start(scene, start))
+    if table.equilibrium is not None:
+        start = EQUILIBRIA[table.equilibrium].resolve(with_start(scene, start))
+        key, velocity = "equilibrium", start.angular_velocity
+    else:
+        assert rates is not None
+        key, velocity = rates.key, rates.resolve(with_start(scene, start))
     if along_massless(scene.body, velocity):
         what = "has a spin about the axis that has no moment of inertia, where a spin means nothing; "
-        raise refusal(rates.key, what + "make that component zero")
-    return InitialRotation(start.quaternion, velocity, start.euler_angles)
+        raise refusal(key, what + "make that component zero")
+    return InitialRotation(start.quaternion, velocity, start.euler_angles, start.found)
 
 
 def along_massless(body: RigidBody, vector: Vector) -> bool:

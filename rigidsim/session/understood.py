@@ -45,6 +45,7 @@ def start_of(scene: Scene) -> Start:
         angular_velocity=_three(scene.angular_velocity),
         position=None if scene.position is None else _three(scene.position),
         velocity=None if scene.velocity is None else _three(scene.velocity),
+        equilibrium=scene.found_start,
     )
 
 

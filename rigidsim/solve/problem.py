@@ -128,6 +128,9 @@ def prepare_scene(
         if given is not None:
             _check_tolerance(given, precision)
         check_start(scene)
+        if loads and scene.found_start is not None:
+            what = "given beside loads from Python, which have no part in finding it; give attitude and rates"
+            raise ConfigError(Problem("[initial] equilibrium", what))
         if scene.config.model.level == AUTO:
             what = 'given "auto", which run and plan settle by [integrator] accuracy_axis; choose a level'
             raise ConfigError(Problem("[model] level", what))

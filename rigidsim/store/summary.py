@@ -50,10 +50,30 @@ class UnderstoodBody(SummaryPart):
     center_of_mass: Three | None = None
 
 
+class FoundStart(SummaryPart):
+    """An equilibrium that a motion starts from.
+
+    Attributes:
+        name: as in the config.
+        described: which one it is, and where.
+        how: how it was found, and to what order it is one.
+        exponents: eigenvalues of the linearised equations about it, 1/s, as (real, imaginary) with the
+            imaginary part positive or zero, the slowest first.
+        stable: whether none of them grows.
+    """
+
+    name: Text
+    described: Text
+    how: Text
+    exponents: tuple[tuple[FiniteNumber, FiniteNumber], ...]
+    stable: StrictBool
+
+
 class Start(SummaryPart):
     """The state that a motion starts from.
 
     Attributes:
+        equilibrium: as it was found; None for a start that was given.
         quaternion: w x y z, body to space.
         angular_velocity: body axes, rad/s.
         position, velocity: of the centre of mass, space axes, m and m/s; None unless it moves freely.
@@ -65,6 +85,7 @@ class Start(SummaryPart):
     angular_velocity: Three
     position: Three | None = None
     velocity: Three | None = None
+    equilibrium: FoundStart | None = None
 
 
 class Span(SummaryPart):

@@ -6,7 +6,8 @@ from typing import Any
 
 import rigidsim.model.loads
 import rigidsim.model.partial_invariants
-import rigidsim.model.starts  # noqa: F401  (each enters what it defines into a registry of rigidsim.scene)
+import rigidsim.model.starts
+import rigidsim.solve.equilibria  # noqa: F401  (each enters what it defines into a registry of rigidsim.scene)
 from rigidsim.errors import ConfigError, Problem
 from rigidsim.scene.config import Experiment, load, parse
 from rigidsim.scene.schema import config_model

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from rigidsim.scene.readable import epoch_of, instant_text, number_text, span_text, unit_of
 from rigidsim.session.verdict import Soundness, verdict_on
 from rigidsim.solve.status import Status
-from rigidsim.store.summary import Span, Start, Summary, UnderstoodBody
+from rigidsim.store.summary import FoundStart, Span, Start, Summary, UnderstoodBody
 from rigidsim.store.summary_parts import Advice, AdviceCode
 
 _DIGITS = 6
@@ -46,7 +46,20 @@ def start_text(start: Start) -> str:
         size, unit = (1000.0, "km") if max(map(abs, start.position)) >= _FAR else (1.0, "m")
         place = _numbers([x / size for x in start.position])
         lines.append(f"position {place} {unit}, velocity {_numbers(start.velocity)} m/s in space axes")
+    if start.equilibrium is not None:
+        lines += _equilibrium(start.equilibrium)
     return "\n".join(lines)
+
+
+def _equilibrium(found: FoundStart) -> Iterator[str]:
+    yield found.described
+    yield f"found {found.how}"
+    grows = [real for real, _ in found.exponents if real > 0]
+    turns = [2 * math.pi / imaginary for real, imaginary in found.exponents if real <= 0 and imaginary > 0]
+    if turns:
+        yield f"librations about it: {', '.join(span_text(period, _FEWER) for period in turns)}"
+    if grows:
+        yield f"small displacements grow e-fold in {span_text(1 / max(grows), _FEWER)}"
 
 
 def time_text(time: Span) -> str:

@@ -1,0 +1,42 @@
+"""Which equilibria there are, each found once in a process for one config and precision."""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
+from rigidsim.scene.scene import Scene
+from rigidsim.scene.starts import ATTITUDES, EQUILIBRIA, InitialRotation, StartForm, register_start
+from rigidsim.scene.tracing.context import TracingContext
+from rigidsim.scene.tracing.numbers import Untraceable
+from rigidsim.solve.equilibria.cassini import cassini_state
+from rigidsim.solve.equilibria.relative import relative_equilibrium
+
+_KEPT = 64
+_BESIDE = frozenset(
+    {"name", "description", "output", "limits", "sweep", "events"}
+)  # what no equilibrium depends on
+_known: OrderedDict[Any, InitialRotation] = OrderedDict()
+
+
+def _once(find: Callable[[Scene], InitialRotation], scene: Scene) -> InitialRotation:
+    if isinstance(scene.context, TracingContext):
+        raise Untraceable("an equilibrium that is found")
+    tables = {name: table for name, table in scene.config if name not in _BESIDE}
+    key = scene.context.prec, repr(tables)
+    if key not in _known:
+        _known[key] = find(scene)
+        while len(_known) > _KEPT:
+            _known.popitem(last=False)
+    return _known[key]
+
+
+def _enter(name: str, find: Callable[[Scene], InitialRotation], allowed: tuple[str, ...]) -> None:
+    register_start(EQUILIBRIA, StartForm("equilibrium", partial(_once, find), allowed=allowed), name)
+
+
+_enter("relative", relative_equilibrium, (*ATTITUDES, "prime_meridian", "node_longitude"))
+for _number in (1, 2, 3, 4):
+    _enter(f"cassini_{_number}", partial(cassini_state, number=_number), ("spin_period",))

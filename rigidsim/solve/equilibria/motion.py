@@ -1,0 +1,172 @@
+"""A scene's motion from any attitude and rates, in arithmetic of any width: what equilibria are found with.
+
+The equations are those of a run, with the attitude in space axes. They are compiled once for each width and
+evaluated or integrated from where the caller says; what surrounds the rotation (orbits) begins where the
+scene has it. Numbers go in and out as mpf.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import heyoka as hy
+import numpy as np
+
+from rigidsim.model.formulations.quaternion import Quaternion
+from rigidsim.model.mechanics import Mechanics
+from rigidsim.model.model_plan import plan_model
+from rigidsim.model.state_blocks import BODY
+from rigidsim.model.system import System
+from rigidsim.scene import attitude
+from rigidsim.scene.arithmetic import Matrix, Vector, multiply, norm, working_bits
+from rigidsim.scene.choices import DEFAULT_METHOD
+from rigidsim.scene.scene import Scene
+from rigidsim.scene.starts import InitialRotation
+from rigidsim.solve.compiled import compiled_engine, compiled_function
+from rigidsim.solve.precision import Precision, precision_of
+from rigidsim.store.summary import FoundStart
+
+_SPARE_BITS = 48
+"""Bits beyond the run's own: what a nearly singular Jacobian loses, and some to round once."""
+_STEPS = 200_000
+
+
+class Lost(Exception):
+    """The motion ends before the time that was asked for."""
+
+
+@dataclass(frozen=True)
+class Pose:
+    """Rotation matrix, body to space axes, and angular velocity (body axes, rad/s); mpf."""
+
+    matrix: Matrix
+    rates: Vector
+
+    def moved(self, context: Any, turn: Vector, change: Vector) -> Pose:
+        """The pose turned by a rotation vector (body axes) and with other rates."""
+        rates = [w + x for w, x in zip(self.rates, change, strict=True)]
+        return Pose(multiply(self.matrix, turned(context, turn)), rates)
+
+    def start(self, context: Any, bits: int, found: FoundStart) -> InitialRotation:
+        """The start that it is, known to so many bits: what is smaller is the rounding of a zero."""
+        quaternion = attitude.quaternion_from_matrix(context, self.matrix)
+        size, least = norm(context, self.rates), context.ldexp(1, 16 - bits)
+        plain = [x if abs(x) > least else context.zero for x in quaternion]
+        rates = [w if abs(w) > least * size else context.zero for w in self.rates]
+        return InitialRotation(attitude.unit_quaternion(context, plain), rates, found=found)
+
+
+def turned(context: Any, vector: Vector) -> Matrix:
+    """Rotation matrix (mpf) of a rotation vector."""
+    angle = context.sqrt(sum(x * x for x in vector))
+    half = context.sin(angle / 2) / angle if angle else context.mpf(0.5)
+    return attitude.rotation_matrix([context.cos(angle / 2), *(half * x for x in vector)])
+
+
+def widths(scene: Scene) -> list[Precision]:
+    """Arithmetics in which an equilibrium is found one after the other, the last beyond the run's own."""
+    bits = working_bits(scene.config.integrator.precision) + _SPARE_BITS
+    found = [precision_of("double"), precision_of("quadruple")]
+    if bits > found[-1].bits:
+        found.append(Precision(f"{bits} bits", bits, hy.real, cheap=False, compact=True))
+    return found
+
+
+class Motion:
+    """The motion of a scene in one arithmetic."""
+
+    def __init__(self, scene: Scene, precision: Precision) -> None:
+        config = scene.config
+        integrator = {"formulation": "quaternion", "method": DEFAULT_METHOD, "hold_invariants": False}
+        tables = {
+            "integrator": config.integrator.model_copy(update=integrator),
+            "output": config.output.model_copy(update={"record": ["quaternion"], "lyapunov": False}),
+            "model": config.model.model_copy(update={"level": "full", "short_period": False}),
+            "events": [],
+        }
+        scene = replace(scene, config=config.model_copy(update=tables), events=())
+        self.context, self.precision = scene.context, precision
+        self._system = System(replace(plan_model(scene), formulation=Quaternion()), precision.number)
+
+    @property
+    def mechanics(self) -> Mechanics:
+        """What the equations are written in."""
+        return self._system.mechanics
+
+    @property
+    def others(self) -> list[str]:
+        """Names of states beside those of the rotation."""
+        own = (*BODY.rates, *BODY.quaternion)
+        return [name for name in self._system.states if name not in own]
+
+    @property
+    def plain(self) -> bool:
+        """Whether nothing happens between steps."""
+        return not self._system.stepwise and not self._system.clocked
+
+    @cached_property
+    def _places(self) -> list[int]:
+        return [self._system.states.index(name) for name in (*BODY.quaternion, *BODY.rates)]
+
+    @cached_property
+    def _exponents(self) -> list[int]:
+        return [self._system.state_exponents[place] for place in self._places[4:]]
+
+    def _state(self, pose: Pose) -> np.ndarray:
+        context, values = self.context, list(self._system.initial)
+        quaternion = attitude.quaternion_from_matrix(context, pose.matrix)
+        scaled = [context.ldexp(w, -e) for w, e in zip(pose.rates, self._exponents, strict=True)]
+        for place, value in zip(self._places, [*quaternion, *scaled], strict=True):
+            values[place] = value
+        return self.precision.array(values)
+
+    def _exact(self, values: Iterable[Any]) -> Vector:
+        return [self.context.make_mpf(self.precision.exact(x)._mpf_) for x in values]
+
+    @property
+    def _start(self) -> Any:
+        return self.context.ldexp(self._system.scene.start, -self._system.scaling.time)
+
+    @cached_property
+    def _slopes(self) -> Callable[..., Any]:
+        system = self._system
+        expressions = [right for _, right in system.equations]
+        return compiled_function(expressions, system.variables, compact_mode=True, **self.precision.options)
+
+    def acceleration(self, pose: Pose) -> tuple[Vector, dict[str, Any]]:
+        """Derivatives at the start: of the rates (body axes, rad/s^2), and by name of other states, in
+        internal units.
+        """
+        time, names = self._system.scaling.time, self._system.states
+        options = {}
+        if getattr(self._slopes, "is_time_dependent", False):
+            options["time"] = self.precision.number(self._start)
+        slopes = self._exact(np.asarray(self._slopes(self._state(pose), **options)))
+        rates = [
+            self.context.ldexp(slopes[place], e - time)
+            for place, e in zip(self._places[4:], self._exponents, strict=True)
+        ]
+        return rates, {name: slopes[names.index(name)] for name in self.others}
+
+    @cached_property
+    def _engine(self) -> Any:
+        options = dict(self.precision.options, time=self.precision.number(self._start))
+        initial = self.precision.array(self._system.initial)
+        return compiled_engine(self._system.equations, initial, compact_mode=True, **options)
+
+    def after(self, pose: Pose, seconds: Any) -> Pose:
+        """The pose so many seconds (mpf) after the start. Raises ``Lost``."""
+        engine, context = self._engine, self.context
+        engine.time = self.precision.number(self._start)
+        engine.state[:] = self._state(pose)
+        until = self._start + context.ldexp(seconds, -self._system.scaling.time)
+        outcome, *_ = engine.propagate_until(self.precision.number(until), max_steps=_STEPS)
+        if outcome != hy.taylor_outcome.time_limit:
+            raise Lost
+        state = self._exact([engine.state[place] for place in self._places])
+        rates = [context.ldexp(w, e) for w, e in zip(state[4:], self._exponents, strict=True)]
+        quaternion = attitude.unit_quaternion(context, state[:4])
+        return Pose(attitude.rotation_matrix(quaternion), rates)

@@ -1,0 +1,323 @@
+"""Relative equilibria and Cassini states: closed forms, and independent equations that come back."""
+
+from __future__ import annotations
+
+import mpmath
+import numpy as np
+import pytest
+import xarray
+from scipy.integrate import solve_ivp
+
+import rigidsim
+from rigidsim import ConfigError
+from rigidsim.scene.scene import Scene, build_scene
+from rigidsim.store.variables import parts_in
+from tests.support import run_text
+
+YEAR = 31557600.0
+CONFIG = """
+name = "start"
+[body]
+{body}
+[initial]
+equilibrium = "{name}"
+{start}
+[[loads]]
+kind = "gravity_gradient"
+gravitational_parameter = {strength}
+[loads.orbit]
+{orbit}
+{more}
+[time]
+end = {end}
+samples = {samples}
+[output]
+record = ["quaternion", "angular_velocity"]
+"""
+MOON = {
+    "body": 'preset = "moon"',
+    "name": "cassini_2",
+    "strength": "3.986004418e14",
+    "orbit": 'semi_major_axis = "384400 km"\ninclination = "5.145 deg"\nperiod = "27.2122 day"\n'
+    'node_rate = "-19.34 deg/yr"',
+}
+SATELLITE = {
+    "body": "principal_moments = [900, 1000, 400]",
+    "name": "relative",
+    "strength": "3.986004418e14",
+    "orbit": "semi_major_axis = 6.9e6\ninclination = 0.9\nascending_node = 0.3\nmean_anomaly = 0.4",
+}
+RATE = np.sqrt(3.986004418e14 / 6.9e6**3)
+
+
+def config(given: dict[str, str], **changes: str) -> str:
+    usual = {"start": "", "more": "", "end": "1", "samples": "2"}
+    return CONFIG.format(**(usual | given | changes))
+
+
+def scene_of(given: dict[str, str], *overrides: str, **changes: str) -> Scene:
+    return build_scene(rigidsim.parse(config(given, **changes), overrides=overrides))
+
+
+def matrix_of(q: np.ndarray) -> np.ndarray:
+    """Rotation matrix, body to space, of a quaternion."""
+    w, v = q[0], q[1:]
+    cross = np.array([[0, -v[2], v[1]], [v[2], 0, -v[0]], [-v[1], v[0], 0]], dtype=q.dtype)
+    return np.eye(3, dtype=q.dtype) + 2 * w * cross + 2 * cross @ cross
+
+
+# --- relative equilibria ------------------------------------------------------------------------------------
+
+
+def test_the_stable_attitude_has_the_frequencies_of_debra_and_delp() -> None:
+    """Roll and yaw: roots of s^4 + n^2 (1 + 3 sx + sx sz) s^2 + 4 n^4 sx sz; pitch n sqrt(3 (Ix - Iz)/Iy)."""
+    found = scene_of(SATELLITE).found_start
+    sx, sz = (1000 - 400) / 900, (1000 - 900) / 400
+    roots = np.roots([1, 1 + 3 * sx + sx * sz, 4 * sx * sz])
+    expected = RATE * np.sort([np.sqrt(3 * (900 - 400) / 1000), *np.sqrt(-roots.real)])
+    np.testing.assert_allclose([i for _, i in found.exponents], expected, rtol=1e-13)
+    assert found.stable
+
+
+def linear(moments: np.ndarray, frame: np.ndarray) -> np.ndarray:
+    """Linearised attitude (body axes, n = 1) about axes along source, forward, normal (columns of frame)."""
+    inertia, source, normal = np.diag(moments), frame[:, 0], frame[:, 2]
+
+    def slope(x: np.ndarray) -> np.ndarray:
+        turn, w = x[:3], normal + x[3:]
+        c = source - np.cross(turn, source)
+        return np.linalg.solve(inertia, 3 * np.cross(c, inertia @ c) - np.cross(w, inertia @ w))
+
+    columns = []
+    for k in range(6):
+        step = 1e-6 * np.eye(6)[k]
+        v = np.eye(6)[k]
+        turning = v[3:] + np.cross(v[:3], normal)
+        columns.append([*turning, *(slope(step) - slope(-step)) / 2e-6])
+    return np.array(columns).T
+
+
+@pytest.mark.parametrize("turn", [(0.3, 0.2, 0.1), (1.5, 1.4, 0.1), (0.1, 1.6, 3.0), (2.0, 0.4, 1.2)])
+def test_the_attitude_nearest_to_the_given_one_and_its_exponents(turn: tuple[float, ...]) -> None:
+    """All axes along source, forward or normal, less than a right angle away; exponents as of numpy."""
+    scene = scene_of(SATELLITE, start=f"euler_angles = {list(turn)}")
+    q = np.array([float(x) for x in scene.quaternion])
+    frame = np.array([float(x) for x in scene.angular_velocity]) / RATE
+    assert sorted(np.abs(frame)) == pytest.approx([0, 0, 1], abs=1e-15)
+    anomaly, tilt, node = 0.4, 0.9, 0.3
+    plain = scene_of(SATELLITE, start=f"euler_angles = [{node}, {tilt}, {anomaly}]")
+    orbit = matrix_of(np.array([float(x) for x in plain.quaternion]))
+    relative = matrix_of(q).T @ orbit  # body axes of the orbit's frame, up to the plain one's own choice
+    assert np.sort(np.abs(relative).ravel()) == pytest.approx([0] * 6 + [1] * 3, abs=1e-15)
+    values = np.linalg.eigvals(linear(np.array([900.0, 1000.0, 400.0]), _frame(q)))
+    expected = RATE * np.sort_complex(values[values.imag >= -1e-9])
+    found = scene.found_start
+    assert found.stable == bool(np.all(np.abs(values.real) < 1e-6))
+    assert np.sort([r for r, _ in found.exponents]) == pytest.approx(np.sort(expected.real), abs=1e-8 * RATE)
+
+
+def _frame(q: np.ndarray) -> np.ndarray:
+    """Source, forward and normal (columns) in body axes, by the orbit's elements of the satellite."""
+    c, s = np.cos, np.sin
+    node, tilt, anomaly = 0.3, 0.9, 0.4
+    source = np.array([
+        c(node) * c(anomaly) - s(node) * c(tilt) * s(anomaly),
+        s(node) * c(anomaly) + c(node) * c(tilt) * s(anomaly),
+        s(tilt) * s(anomaly),
+    ])  # fmt: skip
+    normal = np.array([s(tilt) * s(node), -s(tilt) * c(node), c(tilt)])
+    return matrix_of(q).T @ np.array([source, np.cross(normal, source), normal]).T
+
+
+def test_a_constant_torque_leans_it_by_the_closed_form() -> None:
+    """A torque T about the normal (body y): sin 2 th = 2 T / (3 n^2 (Ix - Iz)) to 50 digits; and it stays."""
+    torque = '\n[[loads]]\nkind = "torque"\nframe = "body"\ncomponents = ["0", "2e-4", "0"]'
+    changes = {"more": torque, "end": "2e4", "samples": "3"}
+    scene = scene_of(SATELLITE, "integrator.precision=50", **changes)
+    with mpmath.workdps(60):
+        n2 = mpmath.mpf("3.986004418e14") / mpmath.mpf("6.9e6") ** 3
+        lean = mpmath.asin(2 * mpmath.mpf("2e-4") / (3 * n2 * (900 - 400))) / 2
+        q = [mpmath.make_mpf(x._mpf_) for x in scene.quaternion]
+        p = [mpmath.make_mpf(x._mpf_) for x in scene_of(SATELLITE, "integrator.precision=50").quaternion]
+        half = abs(sum(a * b for a, b in zip(p, q, strict=True)))
+        assert abs(2 * mpmath.acos(half) - abs(lean)) < mpmath.mpf(10) ** -50
+    data = run_text(config(SATELLITE, **changes)).dataset
+    still = data["angular_velocity"].values
+    np.testing.assert_allclose(still, still[:1].repeat(3, axis=0), rtol=0, atol=1e-14 * RATE * 50)
+
+
+# --- Cassini states -----------------------------------------------------------------------------------------
+
+
+def exact(dataset: xarray.Dataset, row: int) -> list[mpmath.mpf]:
+    parts = [dataset[part].values[row] for part in parts_in(dataset, "quaternion")]
+    return [mpmath.fsum(map(float, values)) for values in zip(*parts, strict=True)]
+
+
+@pytest.mark.parametrize(("precision", "close"), [("double", 1e-13), ("50", 1e-46)])
+def test_the_moon_comes_back_after_each_revolution(precision: str, close: float) -> None:
+    """In the frame that turns with the node, after 1, 2, ... 8 draconic months: no free libration at all."""
+    text = config(MOON, end='"217.6976 day"', samples="9")
+    data = run_text(text, f"integrator.precision={precision}").dataset
+    with mpmath.workdps(70):
+        first = exact(data, 0)
+        for row in range(1, 9):
+            half = -mpmath.mpf("19.34") * mpmath.pi / 180 / YEAR * row * mpmath.mpf("27.2122") * 86400 / 2
+            c, s = mpmath.cos(half), mpmath.sin(half)
+            w, x, y, z = first
+            turned = [c * w - s * z, c * x - s * y, c * y + s * x, c * z + s * w]
+            now = exact(data, row)
+            sign = mpmath.sign(sum(a * b for a, b in zip(turned, now, strict=True)))
+            away = mpmath.norm([a - sign * b for a, b in zip(turned, now, strict=True)])
+            assert away < close
+
+
+def test_the_moons_state_is_the_observed_one_with_its_librations() -> None:
+    """1.543 deg to the ecliptic (Williams et al. 2014), on a circle and on the Moon's own ellipse: 2 %.
+
+    Free librations of 2.9, 24 and 75 years (Rambaux & Williams 2011, Celest. Mech. Dyn. Astr. 109, 85).
+    """
+    found = scene_of(MOON).found_start
+    periods = [2 * np.pi / i / YEAR for _, i in found.exponents]
+    assert periods == pytest.approx([74.6, 24.16, 2.89], rel=0.02)
+    assert found.stable
+    assert "6.68" in found.described
+    assert "1.53" in found.described
+    ellipse = MOON["orbit"].replace("27.2122", "27.554550") + "\neccentricity = 0.0549\n"
+    ellipse += 'periapsis = 1.0\nperiapsis_rate = "60.03 deg/yr"'
+    scene = scene_of(MOON, orbit=ellipse)
+    pole = matrix_of(np.array([float(x) for x in scene.quaternion]))[:, 2]
+    assert np.degrees(np.arccos(pole[2])) == pytest.approx(1.543, rel=0.03)
+
+
+def test_mercurys_state_in_three_turns_to_two_revolutions() -> None:
+    """2.04(8) arcmin from the orbit's normal (Margot et al. 2012), whose moments the preset has."""
+    orbit = 'semi_major_axis = "57909050 km"\neccentricity = 0.20563\ninclination = "8.58 deg"\n'
+    orbit += 'period = "87.969257 day"\nnode_rate = "-1.1e-3 deg/yr"'
+    given = {
+        "body": 'preset = "mercury"',
+        "name": "cassini_1",
+        "strength": "1.32712440018e20",
+        "orbit": orbit,
+    }
+    scene = scene_of(given, start='spin_period = "58.646 day"')
+    pole = matrix_of(np.array([float(x) for x in scene.quaternion]))[:, 2]
+    tilt = np.radians(8.58)
+    normal = np.array([0.0, -np.sin(tilt), np.cos(tilt)])
+    assert 60 * np.degrees(np.arcsin(np.linalg.norm(np.cross(pole, normal)))) == pytest.approx(2.04, rel=0.04)
+    assert "3:2" in scene.found_start.described
+
+
+PLANET = {
+    "body": "principal_moments = [0.997, 0.997, 1]",
+    "strength": "1",
+    "orbit": "semi_major_axis = 1\ninclination = 0.35\nnode_rate = {rate}\nascending_node = 0.7",
+    "start": "spin_period = 0.3",
+}
+
+
+@pytest.mark.parametrize("number", [1, 2, 3, 4])
+def test_a_planet_of_two_equal_moments_has_colombos_states(number: int) -> None:
+    """cos th sin th 3 n^2 (C - A)/(2 C w) + g sin(th - I) = 0 (Colombo 1966), to first order in the averages;
+    and each revolution brings the pole back in the node's frame to the last digit.
+    """
+    rate = -1e-5
+    given = PLANET | {"name": f"cassini_{number}", "orbit": PLANET["orbit"].format(rate=rate)}
+    spin = 2 * np.pi / 0.3
+    angles = np.linspace(-np.pi, np.pi, 400_001)
+    torque = 1.5 * 0.003 / spin
+    values = torque * np.cos(angles) * np.sin(angles) + rate * np.sin(angles - 0.35)
+    roots = angles[:-1][np.sign(values[:-1]) != np.sign(values[1:])]
+    assert len(roots) == 4
+    state_3, state_4, state_1, state_2 = roots
+    expected = {1: state_1, 2: state_2, 3: state_3, 4: state_4}[number]
+    data = run_text(config(given, end=str(20 * np.pi), samples="11")).dataset
+    poles = np.array([matrix_of(q)[:, 2] for q in data["quaternion"].values])
+    turned = (poles[:, 0] + 1j * poles[:, 1]) * np.exp(-1j * (0.7 + rate * data["time"].values))
+    np.testing.assert_allclose(turned, turned[0], rtol=0, atol=2e-13)
+    lean = np.arctan2(-turned[0].imag, poles[0, 2]) - (0.35 - expected)
+    assert abs((lean + np.pi) % (2 * np.pi) - np.pi) < 2e-3
+    stable = scene_of(given).found_start.stable
+    assert stable == (number != 4)
+
+
+def test_independent_equations_come_back_and_grow_alike() -> None:
+    """Angular momentum and rotation matrix in space axes, by scipy: the Moon's return and librations."""
+    scene = scene_of(MOON)
+    moments = np.array([float(x) for x in scene.body.principal_moments])
+    moments = moments / moments[2]
+    orbit = scene.loads[0].orbit  # type: ignore[attr-defined]
+    n, g, tilt = float(orbit.mean_motion), float(orbit.node_rate), float(orbit.inclination)
+    strength = 3 * 3.986004418e14 / 384400e3**3 / n**2
+    g /= n
+
+    def slope(t: float, y: np.ndarray) -> np.ndarray:
+        momentum, r = y[:3], y[3:].reshape(3, 3)
+        c, s = np.cos(g * t), np.sin(g * t)
+        x, across = np.cos(t), np.sin(t)
+        u = [c * x - s * np.cos(tilt) * across, s * x + c * np.cos(tilt) * across, np.sin(tilt) * across]
+        inertia = r @ np.diag(moments) @ r.T
+        w = np.linalg.solve(inertia, momentum)
+        spin = np.array([[0, -w[2], w[1]], [w[2], 0, -w[0]], [-w[1], w[0], 0]])
+        return np.concatenate([strength * np.cross(u, inertia @ u), (spin @ r).ravel()])
+
+    r = matrix_of(np.array([float(x) for x in scene.quaternion]))
+    momentum = r @ (moments * np.array([float(x) for x in scene.angular_velocity])) / n
+    back = np.array(
+        [
+            [np.cos(g * 2 * np.pi), np.sin(g * 2 * np.pi), 0],
+            [-np.sin(g * 2 * np.pi), np.cos(g * 2 * np.pi), 0],
+            [0, 0, 1],
+        ]
+    )
+
+    def after(x: np.ndarray) -> np.ndarray:
+        """What a start apart by a rotation vector and momentum (space axes) becomes, in the node's frame."""
+        cross = np.array([[0, -x[2], x[1]], [x[2], 0, -x[0]], [-x[1], x[0], 0]])
+        small = np.eye(3) + cross + cross @ cross / 2
+        y = np.concatenate([momentum + x[3:], (small @ r).ravel()])
+        end = solve_ivp(slope, (0, 2 * np.pi), y, "DOP853", rtol=1e-13, atol=1e-15).y[:, -1]
+        turn = back @ end[3:].reshape(3, 3) @ r.T
+        vector = np.array([turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]]) / 2
+        return np.concatenate([vector, back @ end[:3] - momentum])
+
+    np.testing.assert_allclose(after(np.zeros(6)), 0, atol=3e-12)
+    step = 1e-4
+    columns = [(after(step * e) - after(-step * e)) / (2 * step) for e in np.eye(6)]
+    values = np.log(np.linalg.eigvals(np.array(columns).T)) / (2 * np.pi) * n
+    expected = np.sort(values.imag[values.imag > 0])
+    np.testing.assert_allclose([i for _, i in scene.found_start.exponents], expected, rtol=2e-4)
+
+
+@pytest.mark.parametrize(
+    ("given", "changes", "where", "what"),
+    [
+        (SATELLITE, {"start": "angular_velocity = [0, 0, 1]"}, "angular_velocity", "beside equilibrium"),
+        (SATELLITE, {"start": "spin_period = 10"}, "spin_period", "given beside equilibrium"),
+        (SATELLITE, {"orbit": "semi_major_axis = 7e6\neccentricity = 0.1"}, "equilibrium", "eccentricity is"),
+        (SATELLITE, {"orbit": MOON["orbit"]}, "equilibrium", 'choose "cassini_1"'),
+        (SATELLITE, {"more": '\n[[loads]]\nkind = "torque"\ncomponents = ["1e-4*sin(t)", "0", "0"]'},
+         "equilibrium", "changes relative to the turning frame"),
+        (SATELLITE, {"more": '\n[[loads]]\nkind = "torque"\ncomponents = ["9", "9", "9"]'},
+         "equilibrium", "none was found"),
+        (SATELLITE, {"name": "cassini_5"}, "equilibrium", 'did you mean "cassini_'),
+        (SATELLITE, {"name": "cassini_1"}, "equilibrium", "node is at rest"),
+        (MOON, {"name": "cassini_1"}, "equilibrium", "there are cassini_2 (6.6"),
+        (MOON, {"start": "quaternion = [1, 0, 0, 0]"}, "quaternion", "given beside equilibrium"),
+        (MOON, {"start": 'spin_period = "20 day"'}, "spin_period", "turns to a revolution"),
+        (MOON, {"start": 'spin_period = "-27 day"'}, "spin_period", "given a negative time"),
+        (MOON, {"body": "principal_moments = [1, 1, 1.01]"}, "spin_period", "missing"),
+        (MOON, {"body": "principal_moments = [1, 1.5, 1.5]"}, "equilibrium", "no axis has the largest"),
+        (MOON, {"orbit": MOON["orbit"].replace("5.145", "0")}, "equilibrium", "isn't inclined"),
+        (MOON, {"more": '\n[[loads]]\nkind = "viscous_torque"\ncoefficients = [1, 1, 1]'},
+         "equilibrium", "nothing else"),
+    ],
+)  # fmt: skip
+def test_equilibria_that_a_scene_has_not_are_refused(
+    given: dict[str, str], changes: dict[str, str], where: str, what: str
+) -> None:
+    with pytest.raises(ConfigError) as refused:
+        scene_of(given, **changes)
+    (problem,) = refused.value.problems
+    assert problem.where == f"[initial] {where}"
+    assert what in problem.what
