@@ -2,7 +2,7 @@
 
 import math
 import shlex
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 from rigidsim.scene.readable import epoch_of, instant_text, number_text, span_text, unit_of
 from rigidsim.session.verdict import Soundness, verdict_on
@@ -51,7 +51,7 @@ def start_text(start: Start) -> str:
     return "\n".join(lines)
 
 
-def _equilibrium(found: FoundStart) -> Iterator[str]:
+def _equilibrium(found: FoundStart) -> Iterable[str]:
     yield found.described
     yield f"found {found.how}"
     grows = [real for real, _ in found.exponents if real > 0]

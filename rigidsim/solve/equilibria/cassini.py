@@ -23,9 +23,9 @@ from rigidsim.scene.scene import Scene
 from rigidsim.scene.starts import InitialRotation, refusal
 from rigidsim.solve.equilibria.colombo import AveragedState, Colombo, doubles
 from rigidsim.solve.equilibria.exponents import exponents_of
-from rigidsim.solve.equilibria.motion import Lost, Motion, Pose, turned, widths
+from rigidsim.solve.equilibria.motion import Lost, Pose, PoseMotion, turned, widths
 from rigidsim.solve.equilibria.newton import NotFound, jacobian, settled
-from rigidsim.solve.equilibria.search import Search, search_for
+from rigidsim.solve.equilibria.search import SoughtReturn, search_for
 from rigidsim.solve.precision import Precision
 from rigidsim.store.summary import FoundStart
 
@@ -79,7 +79,7 @@ def _node(orbit: KeplerOrbit, time: Any) -> Any:
     return orbit.ascending_node + orbit.node_rate * time
 
 
-def _averaged(search: Search, number: int, name: str) -> AveragedState:
+def _averaged(search: SoughtReturn, number: int, name: str) -> AveragedState:
     scene, orbit = search.scene, search.orbit
     (source,) = (s for load in loads_of(scene) if (s := gradient_source_of(load)) is not None)
     least, middle, most = sorted(doubles(scene.body.principal_moments))
@@ -95,7 +95,7 @@ def _averaged(search: Search, number: int, name: str) -> AveragedState:
     raise refusal("equilibrium", what + "the angle from the orbit's normal")
 
 
-def _begin(search: Search, state: AveragedState) -> Pose:
+def _begin(search: SoughtReturn, state: AveragedState) -> Pose:
     """The averaged state at the scene's start."""
     scene, orbit = search.scene, search.orbit
     context, time = scene.context, scene.start
@@ -118,7 +118,7 @@ def _begin(search: Search, state: AveragedState) -> Pose:
 # --- what comes back ----------------------------------------------------------------------------------------
 
 
-def _return(search: Search, pose: Pose, name: str) -> tuple[Pose, Matrix, Precision]:
+def _return(search: SoughtReturn, pose: Pose, name: str) -> tuple[Pose, Matrix, Precision]:
     """The pose that comes back, the map over T about it, and the arithmetic in which it was found."""
     scene, context = search.scene, search.scene.context
     levels = widths(scene)
@@ -130,9 +130,9 @@ def _return(search: Search, pose: Pose, name: str) -> tuple[Pose, Matrix, Precis
     back = turned(context, [context.zero, context.zero, -search.orbit.node_rate * search.period])
     known: list[Matrix] = []
     for level, precision in enumerate(levels):
-        motion = Motion(scene, precision)
+        motion = PoseMotion(scene, precision)
 
-        def residual(at: Pose, motion: Motion = motion) -> Vector:
+        def residual(at: Pose, motion: PoseMotion = motion) -> Vector:
             after = motion.after(at, search.period)
             inside = multiply(multiply(transpose(at.matrix), back), after.matrix)
             if search.turns is None:

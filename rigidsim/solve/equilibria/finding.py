@@ -9,7 +9,7 @@ from typing import Any
 
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.starts import ATTITUDES, EQUILIBRIA, InitialRotation, StartForm, register_start
-from rigidsim.scene.tracing.context import TracingContext
+from rigidsim.scene.tracing.arithmetic import TracingContext
 from rigidsim.scene.tracing.numbers import Untraceable
 from rigidsim.solve.equilibria.cassini import cassini_state
 from rigidsim.solve.equilibria.relative import relative_equilibrium

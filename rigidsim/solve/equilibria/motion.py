@@ -75,7 +75,7 @@ def widths(scene: Scene) -> list[Precision]:
     return found
 
 
-class Motion:
+class PoseMotion:
     """The motion of a scene in one arithmetic."""
 
     def __init__(self, scene: Scene, precision: Precision) -> None:

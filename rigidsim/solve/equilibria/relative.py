@@ -28,7 +28,7 @@ from rigidsim.scene.orbits import KeplerOrbit
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.starts import ATTITUDES, InitialRotation, refusal
 from rigidsim.solve.equilibria.exponents import exponents_of
-from rigidsim.solve.equilibria.motion import Motion, Pose, widths
+from rigidsim.solve.equilibria.motion import Pose, PoseMotion, widths
 from rigidsim.solve.equilibria.newton import NotFound, jacobian, settled
 from rigidsim.store.summary import FoundStart
 
@@ -46,7 +46,7 @@ def relative_equilibrium(scene: Scene) -> InitialRotation:
     """
     context, orbit = scene.context, _orbit(scene)
     motion = widths(scene)[-1]
-    here = Motion(scene, motion)
+    here = PoseMotion(scene, motion)
     if not here.plain:
         what = 'given "relative", but a load has a kink or jump, or happens at a moment; give the attitude'
         raise refusal(_KEY, f"{what} and rates themselves")
@@ -159,11 +159,11 @@ def _angle(context: Any, a: Matrix, b: Matrix) -> Any:
     return 2 * context.atan2(norm(context, vector), abs(w))
 
 
-def _refuse_passing(scene: Scene, precision: Any, orbit: KeplerOrbit, found: Pose, here: Motion) -> None:
+def _refuse_passing(scene: Scene, precision: Any, orbit: KeplerOrbit, found: Pose, here: PoseMotion) -> None:
     """Refuse loads that don't rest in the turning frame, and states beside the rotation that do not."""
     context, n = scene.context, orbit.mean_motion
     seconds = 2 * context.pi / n * context.mpf(_LATER)
-    later = Motion(replace(scene, start=scene.start + seconds, end=scene.end + seconds), precision)
+    later = PoseMotion(replace(scene, start=scene.start + seconds, end=scene.end + seconds), precision)
     turn = multiply(
         transpose(_frame(orbit, context, scene.start + seconds)), _frame(orbit, context, scene.start)
     )
@@ -182,12 +182,12 @@ def _refuse_passing(scene: Scene, precision: Any, orbit: KeplerOrbit, found: Pos
             raise refusal(_KEY, what)
 
 
-def _own_states(load: Any, motion: Motion) -> list[str]:
+def _own_states(load: Any, motion: PoseMotion) -> list[str]:
     block = load.extra_states(motion.mechanics)
     return [] if block is None else list(block.names)
 
 
-def _linear(context: Any, motion: Motion, at: Pose, bits: int) -> Matrix:
+def _linear(context: Any, motion: PoseMotion, at: Pose, bits: int) -> Matrix:
     """Matrix of the linearised equations in (turn, change of rates), 1/s."""
 
     def slopes(x: Vector) -> Vector:

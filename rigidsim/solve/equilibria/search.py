@@ -17,7 +17,7 @@ _MOST_APSIDAL_TURNS = 12
 
 
 @dataclass(frozen=True)
-class Search:
+class SoughtReturn:
     """What is sought: a pose that comes back.
 
     Attributes:
@@ -38,7 +38,7 @@ class Search:
     rate: Any
     revolutions: int
     how: str
-    slow: Search | None = None
+    slow: SoughtReturn | None = None
 
     @property
     def period(self) -> Any:
@@ -69,7 +69,7 @@ def _source(scene: Scene, given: str) -> tuple[Load, KeplerOrbit, Any]:
     return load, orbit, source.gravitational_parameter / orbit.semi_major_axis**3
 
 
-def search_for(scene: Scene, name: str) -> Search:
+def search_for(scene: Scene, name: str) -> SoughtReturn:
     """What is sought in a scene for the state of a name; ``ConfigError`` if it can't have any."""
     given, context, body = f'given "{name}", but ', scene.context, scene.body
     load, orbit, strength = _source(scene, given)
@@ -135,17 +135,19 @@ def _refuse_between(
     raise refusal("spin_period", what + "average over the rotation")
 
 
-def _on(scene: Scene, load: Load, orbit: KeplerOrbit, axes: Matrix, turns: Any | None, spin: Any) -> Search:
+def _on(
+    scene: Scene, load: Load, orbit: KeplerOrbit, axes: Matrix, turns: Any | None, spin: Any
+) -> SoughtReturn:
     """The search on the scene's orbit, or on the nearest one on which something comes back."""
     context, rest = scene.context, orbit.mean_motion + orbit.periapsis_rate
     once = 1 if turns is None or turns == int(turns) else 2
     full = "by Newton's method on the full equations: it comes back after "
     how = full + ("a revolution" if once == 1 else "two revolutions")
 
-    def on(other: KeplerOrbit, revolutions: int, how: str, slow: Search | None = None) -> Search:
+    def on(other: KeplerOrbit, revolutions: int, how: str, slow: SoughtReturn | None = None) -> SoughtReturn:
         rate = spin if turns is None else turns * other.mean_motion + other.periapsis_rate
         moved = scene if other is orbit else _with_orbit(scene, load, other)
-        return Search(moved, other, axes, turns, rate, revolutions, how, slow)
+        return SoughtReturn(moved, other, axes, turns, rate, revolutions, how, slow)
 
     if orbit.periapsis_rate == 0:
         return on(orbit, once, how)
