@@ -118,9 +118,7 @@ class CorrectedStepper:
         return StepBoundary(mark, tuple(effect.unpack(arrays) for effect in self.effects))
 
     def arrive(self, boundary: StepBoundary, moment: Scalar) -> StepBoundary:
-        """Go back to a boundary before a moment, and on by the same steps to the first boundary at or past
-        it, without corrections there; returns the boundary before that.
-        """
+        """Go back, and on to the first boundary at or past a moment; returns the boundary before that."""
         most = self.stepper.steps - boundary.mark.steps  # within which it lies, where they reach it
         self.back_to(boundary)
         while most > _NEAR:

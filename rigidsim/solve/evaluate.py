@@ -48,20 +48,16 @@ class _PartnerChart:
         self.sizes = compiled(sizes) if sizes else None
 
     def values(
-        self,
-        states: np.ndarray,
-        times: np.ndarray,
-        reference: np.ndarray,
-        initial: np.ndarray,
-        wrapping: AngleWrapping,
+        self, block: SampleBlock, initial: np.ndarray, wrapping: AngleWrapping
     ) -> tuple[np.ndarray, np.ndarray | None]:
         """All outputs (outputs, n), and the recorded angles of the requested sequence (n, 3), if any."""
+        states, times = block.states, block.times
         if self._angles is None:
             return evaluate_rows(self._outputs, states, initial if len(initial) else None, times), None
         plain = states[:, self._positions].astype(np.float64)
         lifted = [
             self._lift(before, tuple(angles))
-            for before, angles in zip(reference.tolist(), plain.tolist(), strict=True)
+            for before, angles in zip(block.reference.tolist(), plain.tolist(), strict=True)
         ]
         near = np.array([angles for angles, *_ in lifted])
         either = {x: self._precision.number(mpmath.mpf(x)) for x in (1.0, -1.0)}
@@ -156,13 +152,7 @@ class Evaluator:
         in_partner = block.chart != 0
         angles: np.ndarray | None = None
         if self._system.partner is not None and in_partner.any():
-            there, angles = self._partner.values(
-                block.states[in_partner],
-                block.times[in_partner],
-                block.reference[in_partner],
-                self.initial,
-                self._wrapping,
-            )
+            there, angles = self._partner.values(block.only(in_partner), self.initial, self._wrapping)
             values[:, in_partner] = there
         result: RecordedParts = {}
         turned = self._turned(values, block) if self._angles else None

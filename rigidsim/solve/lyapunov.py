@@ -87,10 +87,7 @@ def lyapunov_spectrum(
     go_on: Callable[[Convergence], bool],
     done: Convergence | None = None,
 ) -> LyapunovSpectrum | None:
-    """Integrate the variational equations over a run, as long as ``go_on``, called at each orthogonalisation,
-    is true; None if it was ended early, the tangent vectors stopped being finite, or steps became so small
-    that an interval takes millions.
-    """
+    """Integrate the variational equations, while ``go_on`` says so; None if ended early or lost."""
     moving = motion_states(system)
     states, count = len(system.states), len(moving)
     initial = [float(x) for x in system.initial] + list(np.eye(count).ravel())

@@ -36,10 +36,7 @@ def requirement_of(system: System) -> Requirement | None:
 
 
 class TableRows:
-    """Parameters and some states of the equations, reset at the rows of a table, at which steps end.
-
-    Many steps at once give the bits of single ones, since the target of each is the next row.
-    """
+    """Parameters and states reset at the rows of a table, where steps end: any number gives the same bits."""
 
     each = False
 

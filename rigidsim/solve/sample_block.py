@@ -52,9 +52,7 @@ class SampleBlock:
         put_back: np.ndarray = _NOTHING,
         reference: np.ndarray | None = None,
     ) -> SampleBlock:
-        """Samples between which turns, chart and corrections (not copied) don't change, nor the reference
-        angles unless they are given, one row for each.
-        """
+        """Samples with the same turns, chart and corrections, and reference angles if none are given."""
         n = len(times)
         turns = np.array([angles.turns], dtype=np.int64)
         if reference is None:
@@ -81,6 +79,10 @@ class SampleBlock:
         if start == 0 and stop >= len(self):
             return self
         return SampleBlock(self.first + start, *(column[start:stop] for column in self._columns))
+
+    def only(self, which: np.ndarray) -> SampleBlock:
+        """Some of the samples, by a mask."""
+        return SampleBlock(self.first, *(column[which] for column in self._columns))
 
     @staticmethod
     def joined(blocks: Sequence[SampleBlock]) -> SampleBlock:

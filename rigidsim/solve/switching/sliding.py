@@ -46,9 +46,7 @@ class Sliding:
 def sliding(
     system: System, along: Sequence[int], held: Mapping[int, tuple[int, int]] | None = None
 ) -> Sliding:
-    """Equations of a system along the surfaces of these numbers; ``held`` are others kept to: the surface
-    whose side each has, and 1 for the same or -1 for the opposite.
-    """
+    """Equations along surfaces; ``held`` others have the side of a surface, or its opposite (-1)."""
     fields = {name: right for name, (_, right) in zip(system.states, system.equations, strict=True)}
     if held:
         tied = {hy.par[i]: float(sign) * hy.par[m] for i, (m, sign) in held.items()}

@@ -74,9 +74,7 @@ def angles_to_join(system: System) -> list[Recorded]:
 
 
 def angle_rate(system: System, angles: Sequence[Recorded]) -> float:
-    """Bound (rad/s) of each component of the body's rate against the frame from which the angles count: space
-    for Euler angles, possibly one that turns with an orbit for others.
-    """
+    """Bound (rad/s) of each rate against the frame of the angles, which may turn with an orbit."""
     moving = any(r.name != "euler_angles" for r in angles)
     if not system.formulation.resolves_rotation:
         # the plane may move, but nothing is told of the place on an orbit

@@ -84,10 +84,7 @@ class WayFinder:
         self._even = False
 
     def choose(self, following: int, upcoming: Scalar) -> tuple[SampleWay, int]:
-        """How to continue, and for how many steps at most.
-
-        The last sample is only ever skipped to, since what a grid goes past it would be taken once more.
-        """
+        """How to continue, and for how many steps at most; the last sample is only ever skipped to."""
         corrected, stepper, ways = self._corrected, self._stepper, self.numbers
         # steps of a tumbling body vary a lot: predict with the longest recent one, which fades slowly
         self.longest = size = max(stepper.largest, ways.fading * self.longest)
