@@ -5,13 +5,16 @@ and at others like it: turned by the rotations of a tetrahedron, with rates, pos
 The mean torque over these states is taken to act for good, its impulse adding up; the rest is taken as a
 spring or a swing, which does the work of one turn at most. The estimate is rounded to powers of
 two, and never enters the equations.
+
+What a carrier's drive exerts depends on its own momentum: friction ends, a wheel comes up to its rate. Its
+states are followed over the run by their mean slopes, so that the lasting impulse is what they take up.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from itertools import product
+from itertools import pairwise, product
 
 import heyoka as hy
 import numpy as np
@@ -27,7 +30,7 @@ from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.names import state_names
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.scaling import Drive, choose_scaling, scaled_numbers
-from rigidsim.model.state_blocks import BODY
+from rigidsim.model.state_blocks import BODY, StateBlock
 from rigidsim.scene import attitude as numeric
 from rigidsim.scene.arithmetic import apply, transpose
 from rigidsim.scene.expressions.tree import names_used
@@ -51,6 +54,8 @@ _CYCLE = 8.0  # over the rate of change: impulse of half a period, and a margin
 _NOISE = 4.0  # standard deviations of a mean over the times
 _AROUND = 2.0 ** -np.arange(0, 48, 0.25)  # in units of the run's length, around what is narrow in time
 _MOST_PULSES = 16
+_CELLS = 64  # of the run, in which carriers' momenta are followed
+_HALVINGS = 8
 _NEWTON = 40  # iterations, each of which halves the distance to a double zero
 _CLOCK = "t_of_drive"
 
@@ -61,7 +66,8 @@ def estimate_drive(scene: Scene, loads: Sequence[Load], requirements: Requiremen
         return None
     m = probe(scene, requirements, loads)
     torque = [term for load in loads for term in torque_terms(load, m)]
-    torque += [term for carrier in having(Carrier, loads) for term in carrier.exerted_torque(m)]
+    carriers = having(Carrier, loads)
+    inner = [term for carrier in carriers for term in carrier.exerted_torque(m)]
     force = [term for load in loads for term in force_terms(load, m)] if m.velocity is not None else []
     names, start = start_of(m, loads)
     narrow = [u for load in having(Narrow, loads) for u in load.narrow(m)]
@@ -70,7 +76,8 @@ def estimate_drive(scene: Scene, loads: Sequence[Load], requirements: Requiremen
     samples = _Samples(m, names, start, narrow)
     context, scaling = scene.context, m.scaling
     inverse = np.array([[float(x) for x in row] for row in m.numbers.inverse_inertia])
-    turned = samples.evaluate(torque)
+    lasting_only = samples.evaluate(torque)
+    turned = samples.evaluate([*torque, *inner]) if inner else lasting_only
     pushed = samples.evaluate(force)
     rates = samples.of(m.rates)
     power = (turned.values * rates).sum(axis=0)
@@ -79,12 +86,16 @@ def estimate_drive(scene: Scene, loads: Sequence[Load], requirements: Requiremen
     if np.any(power != 0) and power.max() <= 0:  # damping only removes energy
         return Drive(context.zero, context.zero)
     heaviest = float(np.linalg.norm(inverse, 2))
-    by_space = np.einsum("aij,jta->ita", samples.matrices, turned.values)
+    by_space = np.einsum("aij,jta->ita", samples.matrices, lasting_only.values)
     lasting = 0.0
-    for values, frame in ((turned.values, np.eye(3)), (by_space, samples.matrices[0].T)):
+    for values, frame in ((lasting_only.values, np.eye(3)), (by_space, samples.matrices[0].T)):
         impulse = frame @ samples.impulse(values)
         lasting = max(lasting, float(np.einsum("it,ij,jt->t", impulse, inverse, impulse).max()) / 2)
-    peak = turned.peak(without_mean=lasting > 0)
+    peak = turned.peak(without_mean=lasting > 0 or bool(inner))
+    blocks = [block for x in carriers if (block := x.extra_states(m)) is not None]  # type: ignore[attr-defined]
+    if blocks:
+        taken = samples.taken_up(blocks, [term for x in carriers for term in x.carried_momentum(m)])
+        lasting += float(np.einsum("ti,ij,tj->t", taken, inverse, taken).max()) / 2
     swing = min(_TURN * peak, heaviest * min(turned.most, _CYCLE * peak * turned.period) ** 2 / 2)
     energy = lasting + swing
     speed = 0.0
@@ -201,6 +212,49 @@ class _Samples:
         fastest = float(np.linalg.norm(changes, axis=0).max())
         most = float(np.trapezoid(size.max(axis=1), self._times))
         return _Sampled(values, most, float(size.max()) / fastest if fastest > 0 else np.inf)
+
+    def taken_up(self, blocks: Sequence[StateBlock], momentum: Sequence[Term]) -> np.ndarray:
+        """What carriers' momenta, as terms, have taken up by the ends of cells of the run, (cells, 3), if
+        each of their states follows the mean of its slope over the others; zero where that is only noise.
+        """
+        rows = [self._names.index(name) for block in blocks for name in block.names]
+        slopes = self._compiled([x for block in blocks for x in block.derivatives])
+        carried = self._compiled([hy.expression(x) for _, x in momentum])
+        vectors = np.array([[float(x) for x in vector] for vector, _ in momentum])
+        edges = np.linspace(0, len(self._times) - 1, _CELLS + 1).astype(int)
+        start = self._states[rows, :1]
+
+        def holding(values: np.ndarray) -> np.ndarray:
+            states = self._states.copy()
+            states[rows] = values
+            return states
+
+        def changes(times: np.ndarray, values: np.ndarray) -> list[np.ndarray]:
+            """By the mean slopes with the states at these values, and by their root mean squares."""
+            given = slopes(times, holding(values))
+            sizes = given.mean(axis=2), np.sqrt((given**2).mean(axis=2))
+            return [np.trapezoid(x, times, axis=1)[:, None] for x in sizes]
+
+        now, tossed, found = start.copy(), np.zeros_like(start), []
+        before = carried(self._times[:1], holding(start)).mean(axis=(1, 2))
+        for first, last in pairwise(edges):
+            times = self._times[first : last + 1]
+            change, _ = changes(times, now)
+            share = np.ones_like(change)
+            # a slope that falls as the state grows ends where the change is that of the slope there
+            if np.any((changes(times, now + change)[0] - change) * change < 0):
+                low = np.zeros_like(share)
+                high = share.copy()
+                for _ in range(_HALVINGS):
+                    share = (low + high) / 2
+                    short = (changes(times, now + share * change)[0] - share * change) * change > 0
+                    low, high = np.where(short, share, low), np.where(short, high, share)
+            now = now + share * change
+            tossed = tossed + changes(times, now)[1]
+            known = np.where(np.abs(now - start) > _LASTING * tossed, now, start)
+            after = carried(self._times[last : last + 1], holding(known)).mean(axis=(1, 2))
+            found.append((after - before) @ vectors)
+        return np.array(found)
 
     def impulse(self, values: np.ndarray) -> np.ndarray:
         """Running integral of a vector's mean over the states, shape (3, times); zero if it is only noise."""
