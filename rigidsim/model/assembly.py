@@ -11,6 +11,7 @@ from rigidsim.model.formulations.formulation import Formulation, ModelPlan
 from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.observables.mechanical import WORK
 from rigidsim.model.observables.observable import work_is_needed
+from rigidsim.model.own_states import own_blocks, refuse_taken_names
 from rigidsim.model.scaling import Rounder
 from rigidsim.model.state_blocks import BODY, StateBlock, joined
 from rigidsim.model.step_limiter import pace_block
@@ -41,6 +42,7 @@ def assemble_states(
         pulls = [part for load in having(Reacting, m.loads) for part in load.reaction(m)]
         blocks.append(m.point_masses.block(pulls))
     blocks += _load_blocks(m)
+    blocks += own_blocks(m)
     if work_is_needed(m):
         why, unit = "work of the loads without a potential, to check the energy", [m.work_unit]
         blocks.append(
@@ -49,6 +51,7 @@ def assemble_states(
     blocks += pace_block(m, joined(blocks))
     if GROWTH in (requirements.record or ()):
         blocks.append(tangent_block(m, blocks))
+    refuse_taken_names(m.scene, blocks)
     return m, blocks
 
 

@@ -135,6 +135,7 @@ def start_of(m: Mechanics, loads: Sequence[Load]) -> tuple[list[str], np.ndarray
     if scene.position is not None and scene.velocity is not None:
         values |= zip(BODY.position, [context.ldexp(x, -scaling.length) for x in scene.position], strict=True)
         values |= zip(BODY.velocity, [context.ldexp(v, -scaling.speed) for v in scene.velocity], strict=True)
+    values |= {x.name: context.ldexp(x.initial, -scaling.own.get(x.name, 0)) for x in scene.states}
     for load in loads:
         extra = load.extra_states(m)
         if extra is not None:

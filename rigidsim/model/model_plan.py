@@ -13,6 +13,7 @@ import heyoka as hy
 import numpy as np
 
 from rigidsim.errors import ConfigError, Problem
+from rigidsim.model.assembly import assemble_states
 from rigidsim.model.averaged.average import Average
 from rigidsim.model.capabilities import GradientAlone, Reacting, orbit_of, table_of
 from rigidsim.model.carriers import Carrier
@@ -33,12 +34,14 @@ from rigidsim.model.load_estimate import estimate_drive, probe, start_of
 from rigidsim.model.loads.uniform_gravity import UniformGravity
 from rigidsim.model.observables.observable import NEEDS
 from rigidsim.model.orbits.prescribed import places_of
+from rigidsim.model.own_states import first_units, sizes_along, units_along
 from rigidsim.model.scaling import Scaling, amplitude_of, choose_scaling, scaled_numbers
 from rigidsim.model.state_blocks import BODY
 from rigidsim.scene.choices import AUTO, variables_named
+from rigidsim.scene.expressions.tree import states_read
 from rigidsim.scene.registry import OBSERVABLES
 from rigidsim.scene.scene import Scene
-from rigidsim.scene.surfaces import surfaces_of
+from rigidsim.scene.surfaces import Surfaces, surfaces_of
 from rigidsim.scene.transitions import happens_at_a_moment
 
 _SAME_BODY = 1e-3  # relative difference of gravitational parameters below which two sources are taken as one
@@ -93,9 +96,30 @@ def plan_model(
     tags = {orbit: tag for orbit, tag in reversed(orbits) if orbit is not None}  # the first load's tag
     clocked = formulation.resolves_rotation and not tables and happens_at_a_moment(scene)
     numbers = scaled_numbers(scene, scaling)
-    return ModelPlan(
+    plan = ModelPlan(
         scene, loads, formulation, requirements, scaling, numbers, tags, surfaces, tables, clocked
     )
+    if scene.states and not scaling.own:
+        plan = replace(plan, scaling=replace(scaling, own=_own_units(plan, like)))
+    return plan
+
+
+def _own_units(plan: ModelPlan, like: ModelPlan | None) -> dict[str, int]:
+    """Binary exponents of the units of states of one's own, from the sizes that they reach."""
+    scene, scaling = plan.scene, plan.scaling
+    if like is not None:
+        own = like.scaling.own.items()
+        return units_along(scene, {name: scene.context.ldexp(1, unit) for name, unit in own})
+    units = first_units(scene, scaling.time)
+    if plan.wide or plan.tables:  # too long to be tried, or with steps that have to end at rows
+        return units
+    formulation = Quaternion() if plan.requirements.attitude else Rates()
+    tried = replace(
+        plan, scaling=replace(scaling, own=units), formulation=formulation, surfaces=Surfaces(), clocked=False
+    )
+    begin, end = (float(scene.context.ldexp(t, -scaling.time)) for t in (scene.start, scene.end))
+    _, blocks = assemble_states(tried, formulation, float)
+    return units_along(scene, sizes_along(scene, units, blocks, begin, end))
 
 
 # --- which states -------------------------------------------------------------------------------------------
@@ -128,9 +152,11 @@ def _choose_requirements(scene: Scene, loads: Sequence[Load]) -> Requirements:
     _check_recordable(scene, asked, record)
     refuse_without_plane(scene, loads)
     readers = {need: [load.title for load in loads if need in load.reads] for need in ("attitude", "flight")}
-    for event in scene.events:
-        for need in event.states & set(readers):
-            readers[need].append(f"event {event.name}")
+    others = [(f"event {event.name}", event.states) for event in scene.events]
+    others += [(f"state {state.name}", states_read(state.derivative)) for state in scene.states]
+    for who, states in others:
+        for need in states & set(readers):
+            readers[need].append(who)
     if readers["attitude"] and not keeps_attitude:
         what = f'given "{asked}", but {readers["attitude"][0]} reads the attitude; choose "auto"'
         raise ConfigError(Problem("[integrator] formulation", what))
@@ -159,6 +185,10 @@ def _choose_requirements(scene: Scene, loads: Sequence[Load]) -> Requirements:
         why["flight"] = reason
     else:
         left_out.append(("position and velocity", "neither recorded nor read by a load"))
+    carried = [state.name for state in scene.states]
+    unread = [table.name for table in scene.config.states if table.name not in carried]
+    if unread:
+        left_out.append((", ".join(unread), "neither recorded nor read by anything that is carried"))
     return Requirements("attitude" in why, "vertical" in why, "flight" in why, record, why, left_out)
 
 
@@ -190,12 +220,13 @@ def _flight(scene: Scene, record: list[str] | None, readers: list[str]) -> str |
 
 def _takes(scene: Scene, name: str, states: str) -> bool:
     """Whether recording an observable requires these states."""
-    return any(NEEDS[need].states(scene) == states for need in OBSERVABLES[name].needs)
+    needs = OBSERVABLES[name].needs if name in OBSERVABLES else ()  # states of one's own are asked elsewhere
+    return any(NEEDS[need].states(scene) == states for need in needs)
 
 
 def _check_recordable(scene: Scene, formulation: str, record: list[str] | None) -> None:
     for name in record or ():
-        for need in OBSERVABLES[name].needs:
+        for need in OBSERVABLES[name].needs if name in OBSERVABLES else ():
             why = NEEDS[need].missing(scene, formulation)
             if why is not None:
                 raise ConfigError(Problem("[output] record", f'given "{name}": {why}'))

@@ -58,8 +58,11 @@ class BodyNames(NameProvider):
 
     def names(self, config: Config) -> Iterable[Readable]:
         """Those of a flight only where the body has one."""
-        flies = config.initial.position is not None or config.initial.velocity is not None
-        return (x for x in BODY_NAMES.values() if flies or "flight" not in x.states)
+        return (x for x in BODY_NAMES.values() if _flies(config) or "flight" not in x.states)
+
+    def elsewhere(self, config: Config) -> str:
+        """Those of a flight."""
+        return "" if _flies(config) else self.brings
 
     def at_start(self, scene: Scene) -> Mapping[str, Any]:
         """As the scene says."""
@@ -118,6 +121,10 @@ class BodyNames(NameProvider):
             found |= zip(POSITION_NAMES, lengths, strict=True)
             found |= zip(VELOCITY_NAMES, [in_si(m, v, scaling.speed) for v in m.velocity], strict=True)
         return found
+
+
+def _flies(config: Config) -> bool:
+    return config.initial.position is not None or config.initial.velocity is not None
 
 
 PROVIDERS.insert(0, BodyNames())  # the first, whoever else is loaded before

@@ -13,6 +13,7 @@ from rigidsim.errors import ConfigError, Problem
 from rigidsim.model.euler_poles import Poles
 from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.observables import Steady
+from rigidsim.model.own_states import own_observables
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.scaling import Rounder
 from rigidsim.scene.registry import OBSERVABLES
@@ -61,7 +62,7 @@ def recorded_variables(m: Mechanics, record: Sequence[str] | None) -> tuple[list
     """The variables of the dataset, and all their components; what a scene lacks is refused."""
     recorded: list[Recorded] = []
     outputs: list[Symbolic] = []
-    for observable in OBSERVABLES.values():
+    for observable in [*OBSERVABLES.values(), *own_observables(m)]:
         wanted = observable.by_default(m) if record is None else observable.name in record
         if not wanted:
             continue

@@ -8,8 +8,8 @@ Every coefficient is worked out in the scene's arithmetic (mpmath with guard bit
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from typing import Any, Protocol, runtime_checkable
 
 import heyoka as hy
@@ -40,6 +40,7 @@ class Scaling:
     length: int = 0
     speed: int = 0
     drive: Drive | None = None  # the estimate used for loads of unknown size
+    own: Mapping[str, int] = field(default_factory=dict)  # of states of one's own
 
     @property
     def momentum(self) -> int:

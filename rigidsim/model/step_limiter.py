@@ -27,6 +27,7 @@ from rigidsim.model.euler_poles import components_of_factor, starts_in_pole
 from rigidsim.model.heyoka_expressions import to_heyoka
 from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.names import state_names
+from rigidsim.model.own_states import narrow_arguments, radicands
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.state_blocks import StateBlock
 from rigidsim.scene.expressions.names import EULER_NAMES
@@ -41,6 +42,7 @@ def pace_block(m: Mechanics, before: StateBlock) -> list[StateBlock]:
     """The state that keeps steps from passing over a pulse or a switch in ``before``; none without."""
     watched = _arguments(m)
     rooted = [(load.title, v) for load in m.loads if isinstance(load, Rooted) for v in load.roots(m)]
+    rooted += radicands(m)
     if not (watched or rooted):
         return []
     derivatives = dict(zip(before.names, before.derivatives, strict=True))
@@ -55,6 +57,7 @@ def pace_block(m: Mechanics, before: StateBlock) -> list[StateBlock]:
 def _arguments(m: Mechanics) -> list[tuple[str, Symbolic]]:
     """(description, argument) of what is narrow in loads and events; dimensionless."""
     found = [(load.title, u) for load in m.loads if isinstance(load, Narrow) for u in load.narrow(m)]
+    found += narrow_arguments(m)
     angles = frozenset(EULER_NAMES)
     for event in m.scene.events:
         names = state_names(m, event.reads, clocked=False)

@@ -140,7 +140,7 @@ def validated(table: dict[str, Any], source: str) -> Config:
         problems.append(Problem("config", f"it is empty; {NEW}"))
     model = config_model() if "loads" in table else Config  # kinds of loads take time to import
     try:
-        config = model.model_validate(table)
+        config = model.model_validate(table, context=table)
     except ValidationError as error:
         named = {problem.where for problem in problems}
         found = messages.config_error(model, error, {*NAME_OR_VECTOR, *LOAD_KINDS}).problems

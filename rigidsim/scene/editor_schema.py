@@ -28,7 +28,11 @@ def editor_schema(model: type[Config] | None = None) -> dict[str, Any]:
         and ``examples`` as a user would write them.
     """
     made = (model or config_model()).model_json_schema()
-    return {"$schema": DRAFT, **_table(made), "title": "rigidsim config"}
+    # a config's own states can be recorded, too, and a schema can't know their names
+    items = made["$defs"]["Output"]["properties"]["record"]["anyOf"][0]["items"]
+    strictly = {"properties": {"record": {"items": items["anyOf"][0]}}}
+    without = {"if": {"not": {"required": ["states"]}}, "then": {"properties": {"output": strictly}}}
+    return {"$schema": DRAFT, **_table(made), **without, "title": "rigidsim config"}
 
 
 def _table(node: Mapping[str, Any]) -> dict[str, Any]:

@@ -171,22 +171,29 @@ Four = Annotated[list[T], Field(min_length=4, max_length=4), _exactly(4)]
 
 @dataclass(frozen=True, eq=False)
 class OneOf:
-    """Annotation of a text that is one of some names, which may be registered later; ``more`` come first."""
+    """Annotation of a text that is one of some names, which may be registered later; ``more`` come first, and
+    last the names in a list of tables of the config, ``of_scene``.
+    """
 
     names: Iterable[str]
     more: tuple[str, ...] = ()
+    of_scene: str = ""
 
-    def _known(self, value: Any) -> str:
-        allowed = [*self.more, *self.names]
+    def _known(self, value: Any, info: Any) -> str:
+        tables = (info.context or {}).get(self.of_scene, []) if self.of_scene else []
+        own = [x.get("name") for x in tables if isinstance(x, dict)] if isinstance(tables, list) else []
+        allowed = [*self.more, *self.names, *(name for name in own if isinstance(name, str))]
         if isinstance(value, str) and value in allowed:
             return value
         near = nearest(value if isinstance(value, str) else shown(value), allowed)
         raise refuse(f"given {shown(value)}{near}; allowed: {', '.join(allowed)}")
 
     def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> Any:
-        return core_schema.no_info_plain_validator_function(self._known)
+        return core_schema.with_info_plain_validator_function(self._known)
 
     def __get_pydantic_json_schema__(self, schema: Any, handler: Any) -> dict[str, Any]:
+        if self.of_scene:
+            return {"anyOf": [{"enum": [*self.more, *self.names]}, {"type": "string"}]}
         return {"type": "string", "enum": [*self.more, *self.names]}
 
 

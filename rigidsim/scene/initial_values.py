@@ -64,7 +64,7 @@ def _check_branch(scene: Scene) -> list[Problem]:
 
 def _check_singular(scene: Scene, values: dict[str, Any]) -> list[Problem]:
     """Refuse loads that read Euler angles where these are singular at the start and have no derivatives."""
-    formulas = [formula for load in scene.loads for formula in load.formulas()]
+    formulas = scene.acting_formulas()
     reading = [(where, names_used(e) & set(EULER_NAMES)) for where, e in formulas]
     if not any(names for _, names in reading):
         return []

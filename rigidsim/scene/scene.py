@@ -17,6 +17,7 @@ from rigidsim.scene.expressions.names import Names, names_of
 from rigidsim.scene.expressions.parser import parse_expression
 from rigidsim.scene.expressions.tree import Expression, ExpressionError, names_used, states_read
 from rigidsim.scene.frame import Figure, figure_of, reference_normal
+from rigidsim.scene.own_states import OwnState, carried_states, resolve_states
 from rigidsim.scene.point_masses import PointMasses, resolve_point_masses
 from rigidsim.scene.registry import LOAD_KINDS, TABLES, SceneLoad, Surroundings
 from rigidsim.scene.rotors import refuse_odd_rotors, turning_inertia
@@ -58,6 +59,7 @@ class Scene:
         loads: the others, without those that are always zero.
         given_loads: all of ``[[loads]]``, in their order.
         tabled: all of loads with tables of their own, such as rotors, by the table's name.
+        states: those of one's own that are carried.
         events: crossings that are recorded, or end the run.
         turning_inertia: tensor of what turns with the body: ``body.inertia``, the one of the mass
             distribution, less the moments about their axes of what turns on bearings.
@@ -96,6 +98,7 @@ class Scene:
     given_loads: tuple[SceneLoad, ...] = ()
     tabled: Mapping[str, tuple[SceneLoad, ...]] = field(default_factory=dict)
     found_start: Any = None
+    states: tuple[OwnState, ...] = ()
 
     @property
     def free_flight(self) -> bool:
@@ -112,10 +115,15 @@ class Scene:
         return [self.body.mass * x for x in self.body.center_of_mass]
 
     def formulas(self) -> list[tuple[str, Expression]]:
-        """Expressions of loads and events, with their places in the config."""
-        found = [formula for load in self.loads for formula in load.formulas()]
+        """All expressions, with their places in the config."""
         events = enumerate(self.events, start=1)
-        return found + [(f"[[events]] number {n} expression", event.expression) for n, event in events]
+        found = [(f"[[events]] number {n} expression", event.expression) for n, event in events]
+        return self.acting_formulas() + found
+
+    def acting_formulas(self) -> list[tuple[str, Expression]]:
+        """Those in the equations of motion: of loads and of own states."""
+        found = [formula for load in self.loads for formula in load.formulas()]
+        return found + [(state.where, state.derivative) for state in self.states]
 
 
 def build_scene(experiment: Experiment, context: Any = None) -> Scene:
@@ -167,6 +175,11 @@ def build_scene(experiment: Experiment, context: Any = None) -> Scene:
             off_center = any(x != 0 for x in body.center_of_mass)
             if position is not None or off_center:
                 raise _fail("body", "mass", "missing; uniform_gravity needs it")
+        loads = tuple(load for load in resolved if load.acts() and load.uniform_field is None)
+        events = _resolve_events(config.events, config.parameters, names)
+        states = resolve_states(config.states, config.parameters, names, context)
+        readers = [(load.described, formula) for load in loads for _, formula in load.formulas()]
+        readers += [(f"event {event.name}", event.expression) for event in events]
         scene = Scene(
             name=config.name,
             description=config.description,
@@ -180,8 +193,8 @@ def build_scene(experiment: Experiment, context: Any = None) -> Scene:
             position=position,
             velocity=velocity,
             gravity=gravity,
-            loads=tuple(load for load in resolved if load.acts() and load.uniform_field is None),
-            events=_resolve_events(config.events, config.parameters, names),
+            loads=loads,
+            events=events,
             start=start,
             end=end,
             samples=samples,
@@ -193,6 +206,7 @@ def build_scene(experiment: Experiment, context: Any = None) -> Scene:
             bodies=masses,
             given_loads=tuple(given),
             tabled=tabled,
+            states=carried_states(states, readers, config.output.record),
         )
         return _with_start(scene, starts.start_of(scene, _with_start))
     except ConfigError as error:

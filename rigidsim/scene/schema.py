@@ -46,6 +46,7 @@ from rigidsim.scene.fields import (
 )
 from rigidsim.scene.frame import Frame
 from rigidsim.scene.integrator_table import Integrator
+from rigidsim.scene.own_states import OwnStateTable
 from rigidsim.scene.point_masses import PointMassBody
 from rigidsim.scene.registry import LOAD_KINDS, OBSERVABLES, LoadFields
 from rigidsim.scene.rotors import RotorTable
@@ -125,7 +126,7 @@ class Model(ConfigTable):
 class Output(ConfigTable):
     """``[output]``: what is kept and how it is shown."""
 
-    record: EachOnce[Annotated[str, OneOf(OBSERVABLES)]] | None = Field(
+    record: EachOnce[Annotated[str, OneOf(OBSERVABLES, of_scene="states")]] | None = Field(
         None, examples=[["quaternion", "obliquity"]]
     )
     """names of the variables to record; by default those that suit the scene (drifts of invariants are always
@@ -215,6 +216,8 @@ class Config(ConfigTable):
     """point masses under mutual gravity, integrated with the body"""
     rotors: list[RotorTable] = Field(default_factory=list, max_length=64)
     """wheels in the body, free, driven or at fixed rates"""
+    states: list[OwnStateTable] = Field(default_factory=list, max_length=64)
+    """states of one's own (controllers, filters, slosh, fuel), by their derivatives"""
     events: list[EventTable] = Field(default_factory=list)
     """events: zero crossings of an expression of time and the state"""
     frame: Frame = Field(default_factory=Frame.model_construct)
@@ -236,13 +239,15 @@ class Config(ConfigTable):
     )
     """texts of tables that loads refer to; the text of files beside the config is copied here"""
 
-    @field_validator("events", "bodies", "rotors")
+    @field_validator("events", "bodies", "rotors", "states")
     @classmethod
     def _different(cls, value: list[Any], info: ValidationInfo) -> list[Any]:
         names = [table.name for table in value]
         for name in names:
             if names.count(name) > 1:
                 raise refuse(f'two {info.field_name} are named "{name}"; give each a name of its own')
+            if info.field_name == "states" and name in OBSERVABLES:
+                raise refuse(f'a state is named "{name}", as a variable that can be recorded; rename it')
         return value
 
     @field_validator("parameters")

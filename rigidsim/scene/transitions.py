@@ -146,20 +146,22 @@ def _bound(expression: Expression, *, signed: bool = False) -> float:
 
 
 def happens_at_a_moment(scene: Scene) -> bool:
-    """Whether a load switches at a time, or changes late and within a short while."""
-    for load in scene.loads:
-        for _, expression in load.formulas():
-            if any(_within(line, scene) for line in _of_switches(expression, scene.context)):
-                return True
-            if any(_late(part, scene) for part in narrow_parts(expression)):
-                return True
+    """Whether a load or a state switches at a time, or changes late and within a short while."""
+    for _, expression in scene.acting_formulas():
+        if any(_within(line, scene) for line in _of_switches(expression, scene.context)):
+            return True
+        if any(_late(part, scene) for part in narrow_parts(expression)):
+            return True
     return False
 
 
 def acts_at_moments_alone(scene: Scene) -> bool:
     """Whether loads depend on time by distances from moments alone, which no rounding of time disturbs."""
-    for load in scene.loads:
-        formulas = list(load.formulas())
+    each = [list(load.formulas()) for load in scene.loads]
+    each += [
+        [(state.where, state.derivative)] for state in scene.states if "t" in names_used(state.derivative)
+    ]
+    for formulas in each:
         lines = [line for _, expression in formulas for line in lines_in(expression, scene.context)]
         if not formulas or any(line.offset == 0 for line in lines):
             return False

@@ -175,8 +175,13 @@ def event_variables(
 
 def refuse_taken_names(prepared: InitialValueProblem) -> None:
     """Refuse a run whose dataset would use one name twice."""
-    taken = {name for variable in dataset_variables(prepared) for name in variable.part_names()}
-    taken |= {*LABELS, *OF_THE_RUN, *LYAPUNOV_NAMES, "checkpoint", "events"}
+    names = [name for variable in dataset_variables(prepared) for name in variable.part_names()]
+    reserved = {*LABELS, *OF_THE_RUN, *LYAPUNOV_NAMES, "checkpoint", "events"}
+    for number, table in enumerate(prepared.scene.config.states, start=1):
+        if names.count(table.name) > 1 or table.name in reserved:
+            what = f'given "{table.name}", a name that the dataset uses already; rename it'
+            raise ConfigError(Problem(f"[[states]] number {number} name", what), prepared.experiment.source)
+    taken = {*names, *reserved}
     dates, variables = dates_of(prepared), recorded_variables(prepared)
     if dates is not None:
         variables += dates.variables

@@ -116,25 +116,23 @@ def _why_it_broke(prepared: InitialValueProblem, time: float) -> str:
     if not issubclass(precision.scalar, float | np.floating):
         return ""
     most = np.finfo(precision.scalar).maxexp
-    for load in scene.loads:
-        for where, expression in load.formulas():
-            large = _beyond(expression, time, most, context)
-            if large:
-                return (
-                    f'; "{large}" ({where}) exceeds the range of {precision.name} precision there '
-                    f"(2^{most}): write it with functions that stay small, such as 1 - tanh(u)^2 in place of "
-                    "1/cosh(u)^2, or choose a higher precision"
-                )
+    for where, expression in scene.acting_formulas():
+        large = _beyond(expression, time, most, context)
+        if large:
+            return (
+                f'; "{large}" ({where}) exceeds the range of {precision.name} precision there '
+                f"(2^{most}): write it with functions that stay small, such as 1 - tanh(u)^2 in place of "
+                "1/cosh(u)^2, or choose a higher precision"
+            )
     return ""
 
 
 def _parts(scene: Scene) -> Iterator[tuple[str, Expression]]:
-    for load in scene.loads:
-        for where, expression in load.formulas():
-            kinks = (node.operands[0] for node in operations(expression) if node.operator == "sign")
-            for part in (*narrow_parts(expression), *(Expression(expression.text, u) for u in kinks)):
-                if names_used(part) == {"t"}:
-                    yield where, Expression(expression.text[slice(*part.root.span)], part.root)
+    for where, expression in scene.acting_formulas():
+        kinks = (node.operands[0] for node in operations(expression) if node.operator == "sign")
+        for part in (*narrow_parts(expression), *(Expression(expression.text, u) for u in kinks)):
+            if names_used(part) == {"t"}:
+                yield where, Expression(expression.text[slice(*part.root.span)], part.root)
 
 
 def _width(part: Expression, moment: Any, context: Any) -> Any | None:

@@ -63,10 +63,11 @@ def span_of(scene: Scene) -> Span:
 
 
 def told_loads(prepared: InitialValueProblem) -> tuple[str, ...]:
-    """The loads in a reader's terms, one sentence for each."""
+    """The loads and states of one's own in a reader's terms, one sentence for each."""
     plan = prepared.system.plan
     locked = [x for found in plan.scene.tabled.values() for x in found if not x.acts()]
-    return tuple(load.told(plan.scene) for load in [*plan.loads, *locked] if isinstance(load, Load))
+    told = [load.told(plan.scene) for load in [*plan.loads, *locked] if isinstance(load, Load)]
+    return tuple(told + [state.told for state in plan.scene.states])
 
 
 def time_words(scene: Scene) -> TimeWords:

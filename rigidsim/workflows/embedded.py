@@ -29,7 +29,8 @@ def as_begun(experiment: Experiment, saved: Path) -> Experiment:
     output, recorded = experiment.config.output, read_attributes(saved).recorded
     if output.record is not None or not recorded:
         return experiment
-    names = [name for name in recorded.split() if name in OBSERVABLES]
+    known = {*OBSERVABLES, *(table.name for table in experiment.config.states)}
+    names = [name for name in recorded.split() if name in known]
     config = experiment.config.model_copy(update={"output": output.model_copy(update={"record": names})})
     return replace(experiment, config=config)
 

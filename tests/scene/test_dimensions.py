@@ -113,8 +113,8 @@ def test_what_fits_is_taken(text: str, unit: str | None) -> None:
         ("2 s^k", None, "column 4: a number with a unit stands in parentheses"),
         ("2 t", None, '("t" is no unit here, but a name of this scene)'),  # no tonne
         ("2 m", None, '("m" is no unit here, but a name of this scene)'),
-        ("5 N*m", None, 'column 1: "m" is a parameter here, and a unit as well'),
-        ("5 s*T", None, '"T" is a parameter here, and a unit as well; write the unit without "*"'),
+        ("5 N*m", None, 'column 1: "m" is a name of this scene, and a unit as well'),
+        ("5 s*T", None, '"T" is a name of this scene, and a unit as well; write the unit without "*"'),
         ("90*deg", None, 'unknown name "deg"; a unit stands behind a number, as in 2 deg'),
         ("90deg", None, 'a unit stands apart, as in "90 deg"'),
         ("0.1 Nm", None, 'no unit is called "Nm"'),

@@ -84,6 +84,8 @@ def refuse_scene(scene: Scene, loads: Sequence[Load]) -> None:
         against = "[integrator] accuracy is the attitude's, which needs every rotation"
     elif config.events:
         against = "[[events]] read the full state: remove them"
+    elif scene.states:
+        against = "[[states]] go with every rotation: remove them"
     elif config.output.lyapunov:
         against = "[output] lyapunov is of the full motion: set it to false"
     elif scene.bodies is not None and scene.bodies.full:

@@ -107,9 +107,14 @@ def of_function(name: str, arguments: Sequence[Measure]) -> Measure:
     return Measure((), any(argument.written for argument in arguments))
 
 
-def check_unit(measure: Measure, needed: str) -> None:
-    """Check that a value can have the required dimension; ``DimensionError`` otherwise."""
-    if measure.written and measure.powers is not None and measure.powers != units.powers(needed):
+def check_unit(measure: Measure, needed: str, *, read_too: bool = False) -> None:
+    """Check that a value can have the required dimension; ``DimensionError`` otherwise.
+
+    Args:
+        read_too: also if its dimension is only that of what it reads.
+    """
+    known = measure.written or (read_too and bool(measure.powers))
+    if known and measure.powers is not None and measure.powers != units.powers(needed):
         raise DimensionError(f'the expression is {measure}, where "{needed}" is needed')
 
 
@@ -118,8 +123,8 @@ def end_of_unit(text: str, position: int, names: Collection[str], parameters: Co
 
     Args:
         names: names of the state and of time, which are never units: t is no tonne.
-        parameters: these are units only within a text that can't be meant otherwise, as ``m`` in "9.81 m/s^2"
-            and in "0.1 N m", since products have their sign.
+        parameters: these and other names of the scene are units only within a text that can't be meant
+            otherwise, as ``m`` in "9.81 m/s^2" and in "0.1 N m", since products have their sign.
 
     Raises:
         DimensionError: the text is ambiguous, like "5 N*m" if m is a parameter.
@@ -132,7 +137,7 @@ def end_of_unit(text: str, position: int, names: Collection[str], parameters: Co
             break
         if join and name in parameters:
             raise DimensionError(
-                f'"{name}" is a parameter here, and a unit as well; write the unit without "{join}", or '
+                f'"{name}" is a name of this scene, and a unit as well; write the unit without "{join}", or '
                 "parentheses around the number with its unit"
             )
         end, certain = match.end(), certain or name not in parameters

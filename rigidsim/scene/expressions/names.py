@@ -60,7 +60,7 @@ class NameProvider:
     """A family of names in expressions.
 
     Attributes:
-        brings: its names and what brings them, for the message about an unknown name in a scene without.
+        brings: its names and what brings them, for the message about an unknown name in a scene without any.
     """
 
     brings = ""
@@ -68,6 +68,10 @@ class NameProvider:
     def names(self, config: Any) -> Iterable[Readable]:
         """The names that scenes of this config have, in the order in which messages list them."""
         raise NotImplementedError
+
+    def elsewhere(self, config: Any) -> str:
+        """What would bring further names; empty if scenes of this config have them all."""
+        return "" if list(self.names(config)) else self.brings
 
     def at_start(self, scene: Any) -> Mapping[str, Any]:
         """Their values at the start of a scene (mpf, SI)."""
@@ -128,10 +132,8 @@ def names_of(config: Any) -> Names:
     known: dict[str, Readable] = {}
     elsewhere = []
     for provider in PROVIDERS:
-        given = list(provider.names(config))
-        if provider.brings and not given:
-            elsewhere.append(provider.brings)
-        for readable in given:
+        elsewhere.append(provider.elsewhere(config))
+        for readable in provider.names(config):
             if readable.name in known:
                 what = f'two things are called "{readable.name}" in expressions; rename one'
                 raise ConfigError(Problem("names", what))
@@ -140,7 +142,7 @@ def names_of(config: Any) -> Names:
         if name in config.parameters:
             what = f'given the name "{name}", which expressions of this scene use already; rename it'
             raise ConfigError(Problem(f"[parameters] {name}", what))
-    return Names(known, tuple(elsewhere))
+    return Names(known, tuple(filter(None, elsewhere)))
 
 
 # --- time and the body's own --------------------------------------------------------------------------------

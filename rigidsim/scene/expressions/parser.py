@@ -26,7 +26,7 @@ from rigidsim.scene.arithmetic import context_for
 from rigidsim.scene.exact import ExactNumber, parse_number, with_unit
 from rigidsim.scene.expressions import dimensions
 from rigidsim.scene.expressions.dimensions import ANY, DimensionError, Measure, end_of_unit
-from rigidsim.scene.expressions.names import Readable
+from rigidsim.scene.expressions.names import BODY_NAMES, Readable
 from rigidsim.scene.expressions.piecewise import power, written_out
 from rigidsim.scene.expressions.tree import (
     FUNCTIONS,
@@ -92,16 +92,17 @@ def parse_expression(
     parameters: Mapping[str, ExactNumber] | None = None,
     jumps: bool = True,
     unit: str | None = None,
+    read_too: bool = False,
 ) -> Expression:
     """Parse an expression.
 
     Args:
         text: one line of at most ``LONGEST_TEXT`` characters (which bounds the tree as well).
-        names: those of time and the state that are allowed here, by preference as ``Names``, whose messages
-            say what would bring others.
+        names: those of time and the state that are allowed here; ``Names`` say what would bring others.
         parameters: named constants, which enter as exact numbers.
         jumps: whether piecewise constant functions are allowed.
         unit: SI unit of the value; None for any.
+        read_too: whether it is checked where no unit is written, too: against the units of what is read.
 
     Raises:
         ExpressionError: with what was given, what is allowed, and a caret under the place. Constant parts
@@ -120,11 +121,11 @@ def parse_expression(
     whole = _Parser(text, names, parameters, jumps).all()
     expression = Expression(text, whole.node)
     constant_value(expression, _CHECKING)
-    if unit is not None:
-        try:
-            dimensions.check_unit(whole.measure, unit)
-        except DimensionError as error:
-            raise ExpressionError(str(error)) from None
+    try:
+        if unit is not None:
+            dimensions.check_unit(whole.measure, unit, read_too=read_too)
+    except DimensionError as error:
+        raise ExpressionError(str(error)) from None
     return expression
 
 
@@ -136,6 +137,7 @@ class _Parser:
     ) -> None:
         self.text, self.names, self.parameters, self.jumps = text, names, parameters, jumps
         self.constants = {**parameters, "pi": ExactNumber(Fraction(1), 1)}
+        self.others = {*parameters, *names} - set(BODY_NAMES)
         self.known = [*names, *self.constants, "e"]
         self.depth = self.start = self.end = 0
         self.kind = self.token = ""
@@ -275,8 +277,7 @@ class _Parser:
             return _Parsed(Name(name, span, readable), dimensions.of_name(readable))
         if name in self.constants:
             number = self.constants[name]
-            value = number.alone
-            return _Parsed(Constant(value, span), dimensions.of_number(number))
+            return _Parsed(Constant(number.alone, span), dimensions.of_number(number))
         if name == "e":
             return _Parsed(Operation("exp", (Constant(ONE, span),), span))
         near = nearest(name, self.known) or nearest(name.lower(), self.known)
@@ -291,7 +292,7 @@ class _Parser:
         except ValueError as error:
             self.fail(str(error))
         self.advance()
-        end = self.measured(start, lambda: end_of_unit(self.text, self.end, self.names, self.parameters))
+        end = self.measured(start, lambda: end_of_unit(self.text, self.end, BODY_NAMES, self.others))
         unit = self.text[self.start : end]
         if self.kind != "name" or not unit:
             return _Parsed(Constant(value, (start, self.end)))
@@ -301,8 +302,7 @@ class _Parser:
             self.fail(str(error), start)
         self.token, self.kind = unit, "unit"
         self.advance()
-        value = number.alone
-        return _Parsed(Constant(value, (start, self.end)), dimensions.of_unit(unit), bare=True)
+        return _Parsed(Constant(number.alone, (start, self.end)), dimensions.of_unit(unit), bare=True)
 
     def call(self, name: str, start: int) -> _Parsed:
         if name in self.known:

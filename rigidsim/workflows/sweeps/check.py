@@ -128,8 +128,13 @@ def _tried(sweep: Sweep, most: int) -> Iterator[int]:
 
 
 def _refuse_names(sweep: Sweep) -> None:
-    taken = RESERVED | set(OBSERVABLES)
+    states = [table.name for table in sweep.base.config.states]
+    taken = RESERVED | {*OBSERVABLES, *states}
     problems = []
+    for number, name in enumerate(states, start=1):
+        if name in RESERVED or name.endswith(SUFFIXES):
+            what = f'given "{name}", a name that the dataset of a sweep needs itself; rename it'
+            problems.append(Problem(f"[[states]] number {number} name", what))
     for axis in sweep.axes:
         if axis.name in taken or axis.name.endswith(SUFFIXES) or axis.name.endswith("_drift"):
             what = f'is named "{axis.name}", a name that the dataset needs itself; give it another name'

@@ -41,9 +41,11 @@ def killed(extension: str, text: str, out: Path) -> Path:
     """The folder of a run that was killed on its way.
 
     Args:
-        extension: module of this folder that the process imports, as a user's script would.
+        extension: module of ``extension``, or of this folder, that the process imports, as a user's script
+            would.
     """
-    places = [str(Path(__file__).parent), str(Path(__file__).parents[1]), str(Path(__file__).parents[2])]
+    here = Path(__file__).parent
+    places = [str(here / "extension"), str(here), str(here.parent)]
     code = _CODE.format(places=places, extension=extension, text=text, out=str(out))
     process = subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True)
     assert process.stdout is not None
