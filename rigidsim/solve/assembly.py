@@ -1,7 +1,5 @@
 """Assembly of what solves a prepared scene: stepper, effects, evaluation."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, replace
 

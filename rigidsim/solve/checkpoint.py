@@ -4,8 +4,6 @@ Its numbers are plain arrays, exact in every bit: reading them back runs no code
 2^exponent times a sum of float64 parts. Arrays without elements aren't saved.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import ClassVar, Protocol
 

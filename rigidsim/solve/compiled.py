@@ -5,8 +5,6 @@ disk (``HEYOKA_CACHE_DIR``), in a cache that is kept small here. Even from heyok
 function takes some 10 ms to assemble, which is more than many runs take.
 """
 
-from __future__ import annotations
-
 import copy
 import pickle
 import threading

@@ -5,8 +5,6 @@ counts that are the same whichever path a run takes through them, skipping, reco
 first step boundary whose state asks for it.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

@@ -2,8 +2,6 @@
 latest one, and of what the integrated equations lack (``rigidsim.solve.projection``).
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The driver, which takes a motion from its present state to its last sample, whatever solves it."""
 
-from __future__ import annotations
-
 import time
 
 from rigidsim.solve.corrected_stepper import Position, StepBoundary

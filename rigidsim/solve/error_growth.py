@@ -5,8 +5,6 @@ change of frequency does. Near an unstable axis, or in chaos, they grow exponent
 summary that knew only the law would promise digits that aren't there.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Evaluation of recorded variables from states at sample times, compiled and in the run's own precision."""
 
-from __future__ import annotations
-
 import copy
 import math
 from collections.abc import Callable, Mapping

@@ -16,8 +16,6 @@ another order than those of many, and a member's bits would depend on who is bes
 period make the value good to a few per cent; to tell order from chaos one an orbit will do.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -9,8 +9,6 @@
 | N digits | MPFR | ceil(N log2 10) + 2 | 2^(1 - bits) |
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol, TypeAlias

@@ -20,8 +20,6 @@ itself, by a damping as large as the effect of the residuals' own rounding there
 exactly where it began is left alone: what is zero for good stays zero.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

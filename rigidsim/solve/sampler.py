@@ -1,7 +1,5 @@
 """What goes between a driver and its run: progress, checks, how much at once, and the buffer of samples."""
 
-from __future__ import annotations
-
 import time
 from bisect import bisect_left
 from collections.abc import Callable

@@ -5,8 +5,6 @@ significand, one division of two exact numbers is the nearest number to it, and 
 operations of arrays; elsewhere, and beyond 80 bits, each is a division of long integers.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 

@@ -1,7 +1,5 @@
 """The statuses with which a run can end, each with its message for the user."""
 
-from __future__ import annotations
-
 from enum import Enum
 
 

@@ -2,8 +2,6 @@
 which the engine, which uses the last two terms of a series, can't tell.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass

@@ -4,8 +4,6 @@ A lane's bits depend neither on its neighbours nor on its place, but on the numb
 recorded. If a state is no longer finite, heyoka stops all lanes at once: each is repeated by itself.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any

@@ -4,8 +4,6 @@ As in a single run an event's expression is given a unit in which it is of order
 that the motion begins at (``rigidsim.solve.events``). Both depend on the member, so that they are parameters.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from functools import cached_property
 from typing import Any

@@ -1,7 +1,5 @@
 """Evaluation of what is recorded for many members at once, by functions compiled once."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from functools import cached_property
 from typing import Any

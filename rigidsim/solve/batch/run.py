@@ -1,7 +1,5 @@
 """Members of a family from their start to their last sample, with everything that is recorded of them."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass

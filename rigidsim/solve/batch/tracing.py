@@ -1,7 +1,5 @@
 """Tracing a system with its swept numbers as parameters, once for all members that share its equations."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property

@@ -4,8 +4,6 @@ Formulas are written once, for either. What differs is how a phase is reduced: i
 and time are pairs hi + lo, so that turns are counted to some 30 digits and nothing is lost at 1e8 radians.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any, ClassVar
 

@@ -13,8 +13,6 @@ period, theta_4(v - i omega | q^2), whose zeros stay away from the line of motio
 2007, J. Comput. Phys. 225, 145: precession and spin one by one, which jump where L passes close to axis 3).
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

@@ -11,8 +11,6 @@ so that each is a quotient of theta functions times exp(i kappa t) (Klein; Lawde
 Applications, chapter 5), with no integral of the third kind left, and nothing singular on the vertical.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from typing import Any
 

@@ -4,8 +4,6 @@ The cost of a state doesn't depend on its time, and nor does its accuracy: frequ
 times the scene's digits and turns are counted exactly, so that a run is right to rounding at any horizon.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import Any, ClassVar

@@ -4,8 +4,6 @@ Angles that grow without bound loosen heyoka's step control, which is relative t
 so they are brought back into (-pi, pi] every few steps, and the turns are counted.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from typing import Any

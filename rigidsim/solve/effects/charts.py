@@ -13,8 +13,6 @@ end. In the singularity itself, where the outer angles' sum or difference is all
 keeps the value it had.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from typing import Any

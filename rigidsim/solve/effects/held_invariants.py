@@ -1,7 +1,5 @@
 """When invariants are projected onto their initial values (``rigidsim.solve.projection``)."""
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Mapping
 from typing import Any

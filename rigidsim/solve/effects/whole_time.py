@@ -4,8 +4,6 @@ That time is a single number at each stride's start is what lets whole strides b
 grid output, which starts at such a time only. The move back to it is a step of some 1e-16 of the time.
 """
 
-from __future__ import annotations
-
 from rigidsim.solve.effects.effect import Effect
 from rigidsim.solve.stepper import Stepper
 

@@ -1,7 +1,5 @@
 """What carries a motion and the perturbed ones beside it, and the error that a loose tolerance causes."""
 
-from __future__ import annotations
-
 import copy
 import math
 from collections.abc import Callable, Iterator

@@ -1,7 +1,5 @@
 """Interface of a solver, which takes a motion along and finds its samples."""
 
-from __future__ import annotations
-
 from rigidsim.solve.corrected_stepper import StepBoundary
 from rigidsim.solve.precision import Scalar
 from rigidsim.solve.sampler import Progress, SampleBuffer

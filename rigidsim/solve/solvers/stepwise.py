@@ -1,7 +1,5 @@
 """A solver that takes natural steps and finds the samples within them: single ones, whatever takes them."""
 
-from __future__ import annotations
-
 import math
 import time
 from collections.abc import Callable

@@ -6,8 +6,6 @@ slides along (``rigidsim.solve.switching.sliding``). On several surfaces at once
 crossing and sliding is tried, and the one that agrees with its own field is taken.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

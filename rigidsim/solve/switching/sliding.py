@@ -16,8 +16,6 @@ is below 1. Zero lies in the convex hull of the four fields then, and being in i
 has to be parallel.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import permutations

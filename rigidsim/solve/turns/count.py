@@ -17,8 +17,6 @@ Euler angles and their momenta have singularities, near which a run changes its 
 needs neither: a twin in quaternions carries the same motion, and its states are functions of the run's.
 """
 
-from __future__ import annotations
-
 import math
 import time as clock_time
 from collections.abc import Callable, Sequence

@@ -5,8 +5,6 @@ Near a pole both outer Euler angles swing by up to half a turn at once, in oppos
 once those of a are chosen; chosen one by one, they may add up to a turn that nobody made.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

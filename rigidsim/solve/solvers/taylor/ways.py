@@ -8,8 +8,6 @@ sample every 20,000 steps 3.5 to 5 (CPU time of a free asymmetric body, double a
 Single steps are what remains between the others, and all that pays beyond 80 bits, where a step is dear.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from enum import Enum
