@@ -149,6 +149,8 @@ def scenes(count: int, seed: int) -> Iterator[Scene]:
 def compared(scene: Scene, this: Version, other: Version, stop: random.Random) -> tuple[str, str]:
     """What came of the runs in one go, and of the one that was resumed, in a word each."""
     mine, theirs = this.run(scene, None), other.run(scene, None)
+    if theirs["status"] == "refused" != mine["status"]:
+        return "new", ""
     if mine["bits"] != theirs["bits"] or mine["status"] != theirs["status"]:
         return f"differs: {mine['status']} and {theirs['status']}", ""
     if mine["steps"] < 2:
@@ -178,10 +180,10 @@ def main() -> int:
         counted = runs.setdefault(scene.kind, Counter())
         counted[whole.split(":")[0]] += 1
         counted[f"resumed {resumed.split(':')[0]}"] += bool(resumed)
-        if whole not in ("same", "refused") or resumed not in ("", "same"):
+        if whole not in ("same", "refused", "new") or resumed not in ("", "same"):
             wrong += 1
             print(f"{scene.name}: {whole}; resumed: {resumed}", flush=True)
-    columns = ("same", "differs", "refused", "resumed same", "resumed differs", "resumed refused")
+    columns = ("same", "differs", "refused", "new", "resumed same", "resumed differs", "resumed refused")
     print(f"| scenes | {' | '.join(columns)} |\n|{' --- |' * (len(columns) + 1)}")
     for kind, counted in (*runs.items(), ("all", sum(runs.values(), Counter()))):
         print(f"| {kind} | {' | '.join(str(counted[column]) for column in columns)} |")

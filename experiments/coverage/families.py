@@ -225,6 +225,38 @@ def _ephemeris(draw: Draw) -> None:
         )
 
 
+def _gyrostat(draw: Draw) -> None:
+    """One to three rotors, free, at a fixed rate or driven, with momenta of a hundredth to thirty of the
+    body's; a third of them on an orbit.
+    """
+    moments, size = draw.moments(), draw.mass * draw.length**2
+    draw.body(moments, turned=draw.sometimes(0.3))
+    draw.start(draw.direction() * draw.between(0.1, 2))
+    for k in range(int(draw.random.integers(1, 4))):
+        moment = float(0.025 * min(moments) * draw.between(0.02, 1)) * size
+        rate = draw.decades(-2, 1.5) * size / draw.time / moment * (1 if draw.sometimes(0.5) else -1)
+        axis = [float(x) for x in draw.direction()]
+        draw.more += ["[[rotors]]", f'name = "w{k}"', f"axis = {axis}", f"moment = {moment!r}"]
+        draw.more.append(f"rate = {rate!r}")
+        kind = draw.random.choice(["free", "fixed", "driven"])
+        if kind == "fixed":
+            draw.more.append("fixed = true")
+        if kind == "driven":
+            limit = size / draw.time**2 * draw.decades(-3, -1.3)
+            draw.parameters += [f"k{k} = {limit!r}", f"n{k} = {draw.between(0.1, 2) / draw.time!r}"]
+            law = draw.random.choice(
+                [f"sin(n{k}*t)", f"-wx/n{k}", "qx*qw", f"-rate_w{k}/{abs(rate)!r}", f"tanh((wz-wx)/n{k})"]
+            )
+            draw.more.append(f'torque = "k{k}*({law})"')
+    if draw.sometimes(0.3):
+        axis_of_orbit, motion = 1e3 * draw.length, draw.between(0.05, 0.4) / draw.time
+        draw.load(
+            "gravity_gradient",
+            f"gravitational_parameter = {motion**2 * axis_of_orbit**3!r}",
+            f"orbit = {{semi_major_axis = {axis_of_orbit!r}, eccentricity = 0.1}}",
+        )
+
+
 FAMILIES: dict[str, Family] = {
     "central gravity": Family(KINDS["central gravity"], (1.0, 3.0)),
     "eccentric orbit": Family(_eccentric, (1.3, 3.5)),
@@ -248,6 +280,7 @@ FAMILIES: dict[str, Family] = {
     HYPERBOLIC: Family(hyperbolic_average, (0.18, 0.9), averaged=True),
     "late switch": Family(switch, (2.0, 4.0), finish=put_late),
     "late spike": Family(spike, (2.0, 4.0), finish=put_late),
+    "gyrostat": Family(_gyrostat, (1.0, 3.0)),
     "long ephemeris": Family(_ephemeris, (1.5, 2.7), epochs=(1950, 2100)),
 }
 """By the name under which the table shows them."""
@@ -269,7 +302,7 @@ def coverage_scene(number: int, seed: int = 1) -> CoverageScene:
     if family.epochs is not None:
         span.append(f'epoch = "{draw.random.integers(*family.epochs)}-01-01T12:00:00 TDB"')
     formulation = str(draw.random.choice(_FORMULATIONS))
-    if name == "long, regular" and formulation == "canonical":
+    if name in ("long, regular", "gyrostat") and formulation == "canonical":
         formulation = "quaternion"
     integrator = [f'formulation = "{formulation}"']
     kind = draw.random.random()

@@ -16,6 +16,7 @@ from rigidsim.errors import ConfigError, Problem, either
 from rigidsim.model.load import Load, own_loads
 from rigidsim.model.model_plan import plan_model
 from rigidsim.model.projected_invariants import conserves, projected_invariants
+from rigidsim.model.scaling import gyroscopic_rate
 from rigidsim.model.system import System, build_system
 from rigidsim.model.two_part import in_two_parts
 from rigidsim.scene.choices import AUTO, FORMULATIONS
@@ -142,10 +143,11 @@ def prepare_scene(
             _refuse_non_finite_start(system, precision)
         algorithm = algorithm_of(scene, system, driven=bool(loads))
         late = False
-        if scene.config.integrator.hold_invariants is True:
+        holds = scene.config.integrator.hold_invariants is True
+        if holds or gyroscopic_rate(scene) > _NUTATES * system.rate_bound:
             parts = in_two_parts(precision.number, precision.exact, precision.bits, scene.context)
             system = system.with_coefficients(parts)
-        elif scene.config.integrator.hold_invariants and algorithm.method.has_steps:
+        if not holds and scene.config.integrator.hold_invariants and algorithm.method.has_steps:
             late = _is_worth_holding(system)
         clock = SampleClock(scene.samples, precision, system.scaling.time)
         prepared = InitialValueProblem(
@@ -166,6 +168,12 @@ def prepare_scene(
         )
         raise ConfigError(Problem("config", what), experiment.source) from None
     return prepared
+
+
+_NUTATES = 4
+"""Times the body's own rate from which on the nutation by its wheels is so fast that rounded coefficients, by
+which the rates drift by eps a radian of it, show beside what steps round.
+"""
 
 
 def _is_worth_holding(system: System) -> bool:
