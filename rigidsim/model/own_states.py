@@ -88,7 +88,7 @@ def own_observables(m: Kinematics) -> Iterator[Observable]:
     for state in m.scene.states:
         unit = m.scaling.own.get(state.name, 0)
         yield Observable(
-            state.name, (), state.unit, f"{state.name}, a state of [[states]]",
+            state.name, (), state.unit or "1", f"{state.name}, a state of [[states]]",
             partial(_variable, state.name), partial(_exponent, unit), attributes=_marked,
         )  # fmt: skip
 

@@ -32,8 +32,10 @@ class OwnStateTable(ConfigTable):
     """its name in expressions, and of its variable in the dataset"""
     initial: AnyQuantity = ZERO
     """value at the start, SI or with its unit"""
-    unit: StrictStr = Field("1", examples=["rad", "N m s"])
-    """its SI unit, which labels the dataset and is checked where it is read and in its derivative"""
+    unit: StrictStr | None = Field(None, examples=["rad", "N m s"])
+    """its SI unit, "1" for a number: labels the dataset, and is checked in its derivative and where it
+    is read
+    """
     derivative: Formula = Field(examples=["wz", "(2*k*qz - torque)/(2 s)"])
     """its rate of change in SI: an expression of t, the state, [[states]] and [parameters]"""
 
@@ -46,7 +48,9 @@ class OwnStateTable(ConfigTable):
 
     @field_validator("unit")
     @classmethod
-    def _in_si(cls, value: str) -> str:
+    def _in_si(cls, value: str | None) -> str | None:
+        if value is None:
+            return None
         if value in _NUMBER:
             return "1"
         try:
@@ -65,7 +69,7 @@ class OwnState:
     """A state of one's own that is carried; ``why`` says by whom it is needed."""
 
     name: str
-    unit: str  # SI; "1" for a number
+    unit: str | None  # SI; "1" for a number, None if it isn't known
     initial: Any  # mpf
     derivative: Expression  # SI
     where: str  # its derivative's place in the config
@@ -74,7 +78,7 @@ class OwnState:
     @property
     def told(self) -> str:
         """What it is, in a reader's terms."""
-        start = f"{float(self.initial):.4g}" + ("" if self.unit == "1" else f" {self.unit}")
+        start = f"{float(self.initial):.4g}" + ("" if self.unit in (None, "1") else f" {self.unit}")
         return f'state {self.name}: from {start}, changes by "{self.derivative.text}"'
 
 
@@ -90,7 +94,7 @@ def resolve_states(
     for number, table in enumerate(tables, start=1):
         where = f"[[states]] number {number} derivative"
         _check_initial(table, number)
-        rate = "s^-1" if table.unit == "1" else f"{table.unit}/s"
+        rate = None if table.unit is None else "s^-1" if table.unit == "1" else f"{table.unit}/s"
         try:
             derivative = parse_expression(
                 table.derivative, names, parameters=parameters, unit=rate, read_too=True
@@ -137,7 +141,7 @@ def _others(state: OwnState) -> list[str]:
 def _check_initial(table: OwnStateTable, number: int) -> None:
     """Refuse an initial value with a unit of another dimension."""
     given = table.initial
-    if not isinstance(given, Quantity):
+    if not isinstance(given, Quantity) or table.unit is None:
         return
     wanted = () if table.unit == "1" else units.powers(table.unit)
     if units.powers(given.unit) != wanted:

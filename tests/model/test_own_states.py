@@ -285,3 +285,8 @@ def test_what_can_t_carry_them_says_so() -> None:
     gradient = 'kind = "gravity_gradient"\ngravitational_parameter = 1\norbit = {semi_major_axis = 10}'
     with pytest.raises(ConfigError, match="go with every rotation"):
         run_text(config(loads=gradient, more=FILTER), 'model.level="spin_averaged"')
+
+
+def test_pictures_show_them() -> None:
+    run = run_text(config(more=FILTER + PENDULUM, time="end = 10\nsamples = 101", **SPIN))
+    assert [axes.get_ylabel() for axes in run.plot("states").axes] == ["value [rad/s]", "value [deg]"]

@@ -62,6 +62,7 @@ KINDS: dict[str, Kind] = {
     "path": Kind("position recorded", (), [poles.path]),
     "rates": Kind(_TURNS, [timelines.rates]),
     "attitude": Kind(_ATTITUDE, [timelines.attitude, timelines.wobble]),
+    "states": Kind("states of one's own ([[states]]) recorded", timelines.OWN_STATES),
     "drift": Kind("invariants", [drift]),
 }
 
@@ -82,6 +83,7 @@ def figure(dataset: xarray.Dataset, what: str = OVERVIEW) -> Figure:
     shown = shown_rows(dataset)
     if what == OVERVIEW:
         curves, planes = _leading(shown.rows)
+        curves = [*curves, *timelines.OWN_STATES]
         return compose(shown, (*curves, drift), planes, facts=True)
     if what == SPECTRUM:
         raise ValueError("figure 'spectrum': is drawn of an analysis: rigidsim.analyse(run).figure()")

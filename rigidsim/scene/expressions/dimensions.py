@@ -75,6 +75,8 @@ ANY = Measure(None)
 
 def of_name(readable: Readable) -> Measure:
     """Dimension of what a name stands for."""
+    if readable.unit is None:
+        return ANY
     if not readable.unit:
         return NUMBER
     return Measure(_SI.get(readable.unit) or units.powers(readable.unit))

@@ -40,7 +40,7 @@ class Readable:
     """What a name in an expression stands for.
 
     Attributes:
-        unit: its SI unit; empty for numbers and angles.
+        unit: its SI unit; empty for numbers and angles, None if it isn't known.
         states: those without which it has no value, carried by need: "attitude", "flight", or the name of a
             state of one's own.
         bound: of its absolute value.
@@ -49,7 +49,7 @@ class Readable:
     """
 
     name: str
-    unit: str = ""
+    unit: str | None = ""
     states: frozenset[str] = frozenset()
     bound: float = float("inf")
     changes_sign: bool = False
