@@ -24,7 +24,7 @@ from rigidsim.scene.starts import InitialRotation, refusal
 from rigidsim.solve.equilibria.colombo import AveragedState, Colombo, doubles
 from rigidsim.solve.equilibria.exponents import exponents_of
 from rigidsim.solve.equilibria.motion import Lost, Pose, PoseMotion, turned, widths
-from rigidsim.solve.equilibria.newton import NotFound, jacobian, settled
+from rigidsim.solve.equilibria.newton import Newton, NotFound
 from rigidsim.solve.equilibria.search import SoughtReturn, search_for
 from rigidsim.solve.precision import Precision
 from rigidsim.store.summary import FoundStart
@@ -128,7 +128,7 @@ def _return(search: SoughtReturn, pose: Pose, name: str) -> tuple[Pose, Matrix, 
     basis = [a, b] if search.turns is None else [a, b, c]
     count = len(basis)
     back = turned(context, [context.zero, context.zero, -search.orbit.node_rate * search.period])
-    known: list[Matrix] = []
+    known: Matrix = []
     for level, precision in enumerate(levels):
         motion = PoseMotion(scene, precision)
 
@@ -155,24 +155,17 @@ def _return(search: SoughtReturn, pose: Pose, name: str) -> tuple[Pose, Matrix, 
                 change = [x - y + dot(inside, c) * z for x, y, z in zip(change, inside, c, strict=True)]
             return at.moved(context, turn, change)
 
-        def slope_at(at: Pose, precision: Precision = precision, residual: Any = residual) -> Matrix:
-            return jacobian(context, lambda step: residual(moved(at, step)), 2 * count, precision.bits)
-
-        def held(at: Pose) -> Matrix:
-            return known[-1]
-
+        newton = Newton(context, precision.bits, residual, moved, 2 * count)
         try:
-            if level == 1:  # good to more digits than there are to gain but by some steps
-                known.append(slope_at(pose))
-            pose = settled(context, residual, moved, pose, precision.bits, held if level else slope_at)
-            if level == 0:
-                known.append(slope_at(pose))
+            if level < 2:  # in more digits two thirds of quadruple precision's are enough
+                known = newton.slope(pose)
+            pose = newton.settled(pose, known)
         except (NotFound, Lost, ZeroDivisionError):
             what = (
                 f'given "{name}", but near the averaged state no motion comes back; give attitude and rates'
             )
             raise refusal("equilibrium", what) from None
-    linear = [[x + (i == j) for j, x in enumerate(row)] for i, row in enumerate(known[-1])]
+    linear = [[x + (i == j) for j, x in enumerate(row)] for i, row in enumerate(known)]
     return pose, linear, levels[-1]
 
 

@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
 
 from rigidsim.scene.arithmetic import Matrix, Vector, norm
 
 Function = Callable[[Vector], Vector]
-_DEGENERATE = 1e-9
-"""Singular value, relative to the largest, below which a direction is left alone: it leads from one of many
-equilibria to the next.
-"""
 _HALVINGS, _ROUNDS = 8, 40
+_PATIENCE = 4  # rounds without gain
+_CLOSE = 1e-6
+"""Residual up to which a whole step may make it larger: where some directions count far less than others, it
+leads on all the same.
+"""
+_POOR = 0.1
+"""Part of a residual that a step with a good Jacobian doesn't leave."""
 
 
 class NotFound(Exception):
@@ -31,50 +35,80 @@ def jacobian(context: Any, function: Function, count: int, bits: int) -> Matrix:
     return [list(row) for row in zip(*columns, strict=True)]
 
 
-def shortest(context: Any, matrix: Matrix, values: Vector) -> Vector:
-    """The shortest x with matrix x = -values, as far as there is one (Moore and Penrose)."""
+def shortest(context: Any, matrix: Matrix, values: Vector, bits: int) -> Vector:
+    """The shortest x with matrix x = -values, as far as there is one (Moore and Penrose).
+
+    Directions whose singular value, relative to the largest, is below half of so many bits are left alone:
+    they lead from one of many equilibria to the next.
+    """
     count = len(matrix[0])
     a = context.matrix(matrix)
     sizes, vectors = context.eigsy(a.T * a)
     right = a.T * context.matrix(values)
-    largest = max(sizes[k] for k in range(count))
+    least = max(sizes[k] for k in range(count)) * context.ldexp(1, -bits)
     found = [context.zero] * count
     for k in range(count):
-        if sizes[k] > largest * context.mpf(_DEGENERATE) ** 2:
+        if sizes[k] > least:
             part = sum(vectors[i, k] * right[i] for i in range(count)) / sizes[k]
             found = [x - part * vectors[i, k] for i, x in enumerate(found)]
     return found
 
 
-def settled(
-    context: Any, residual: Callable[[Any], Vector], moved: Callable[[Any, Vector], Any], at: Any,
-    bits: int, slope: Callable[[Any], Matrix],
-) -> Any:  # fmt: skip
-    """Follow Newton steps from a point until they get no smaller: a zero of the residual, as far as its
-    arithmetic of so many bits tells.
+@dataclass(frozen=True)
+class Newton:
+    """Newton's method for a residual of so many bits, which keeps its Jacobian while steps gain by it.
 
-    Args:
+    Attributes:
+        residual: of a point.
         moved: the point that a step leads to.
-        slope: the Jacobian at a point, or near it.
-
-    Raises:
-        NotFound: a step can't make the residual smaller while it is still large.
+        unknowns: their number.
     """
-    here = residual(at)
-    size = norm(context, here)
-    for _ in range(_ROUNDS):
-        step = shortest(context, slope(at), here)
-        for halving in range(_HALVINGS if size > context.ldexp(1, -bits // 2) else 1):
-            new = moved(at, [x / 2**halving for x in step])
-            there = residual(new)
-            if norm(context, there) < size:
+
+    context: Any
+    bits: int
+    residual: Callable[[Any], Vector]
+    moved: Callable[[Any, Vector], Any]
+    unknowns: int
+
+    def slope(self, at: Any) -> Matrix:
+        """Jacobian at a point."""
+        return jacobian(
+            self.context, lambda step: self.residual(self.moved(at, step)), self.unknowns, self.bits
+        )
+
+    def settled(self, at: Any, known: Matrix | None = None) -> Any:
+        """Follow steps from a point until they gain no more: a zero, as far as the residual's bits tell.
+
+        Args:
+            known: the Jacobian near the point, if it is known.
+
+        Raises:
+            NotFound: no step makes the residual smaller while it is still large.
+        """
+        context, fresh = self.context, known is None
+        near, noise = context.ldexp(1, -self.bits // 2), context.ldexp(1, 16 - self.bits)
+        slope = self.slope(at) if known is None else known
+        here = self.residual(at)
+        size = norm(context, here)
+        best, worse = (size, at), 0
+        for _ in range(_ROUNDS):
+            step = shortest(context, slope, here, self.bits)
+            for halving in range(_HALVINGS):
+                new = self.moved(at, [x / 2**halving for x in step])
+                there = self.residual(new)
+                if norm(context, there) < max(size, _CLOSE):
+                    break
+            else:
                 break
-        else:
-            break
-        before, size = size, norm(context, there)
-        at, here = new, there
-        if size == 0 or (size > before / 2 and size < context.ldexp(1, -bits // 2)):
-            break
-    if size > context.ldexp(1, -bits // 2):
-        raise NotFound
-    return at
+            gained = norm(context, there) / size
+            at, here, size = new, there, norm(context, there)
+            worse = 0 if size < best[0] else worse + 1
+            best = min(best, (size, at), key=lambda pair: pair[0])
+            if size <= noise or worse >= _PATIENCE or (worse and fresh and best[0] < near):
+                break
+            fresh = bool(gained > _POOR)
+            if fresh:
+                slope = self.slope(at)
+        if best[0] > near:
+            raise NotFound
+        return best[1]

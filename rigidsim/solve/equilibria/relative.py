@@ -29,7 +29,7 @@ from rigidsim.scene.scene import Scene
 from rigidsim.scene.starts import ATTITUDES, InitialRotation, refusal
 from rigidsim.solve.equilibria.exponents import exponents_of
 from rigidsim.solve.equilibria.motion import Pose, PoseMotion, widths
-from rigidsim.solve.equilibria.newton import NotFound, jacobian, settled
+from rigidsim.solve.equilibria.newton import Newton, NotFound, jacobian
 from rigidsim.store.summary import FoundStart
 
 _KEY = "equilibrium"
@@ -63,11 +63,8 @@ def relative_equilibrium(scene: Scene) -> InitialRotation:
     def moved(at: Pose, turn: Vector) -> Pose:
         return pose(at.moved(context, turn, [context.zero] * 3).matrix)
 
-    def slope(at: Pose) -> Matrix:
-        return jacobian(context, lambda turn: residual(moved(at, turn)), 3, motion.bits)
-
     try:
-        found = settled(context, residual, moved, pose(begun), motion.bits, slope)
+        found = Newton(context, motion.bits, residual, moved, 3).settled(pose(begun))
     except NotFound:
         what = 'given "relative", but none was found near that attitude; give another one to begin at'
         raise refusal(_KEY, what) from None
