@@ -146,6 +146,33 @@ def test_a_constant_torque_leans_it_by_the_closed_form() -> None:
     np.testing.assert_allclose(still, still[:1].repeat(3, axis=0), rtol=0, atol=1e-14 * RATE * 50)
 
 
+def test_rotors_of_both_kinds_lean_it_where_independent_torques_balance() -> None:
+    """(I w + sum of J s a) x w = 3 n^2 (I c) x c at the start, by numpy; and the body rests for a day."""
+    rotors = """
+[[rotors]]
+name = "kept"
+axis = [1, 0.2, 0.1]
+moment = 0.1
+rate = 0.3
+fixed = true
+[[rotors]]
+name = "free"
+axis = [0, 0.2, 1]
+moment = 0.1
+rate = 0.5
+"""
+    run = run_text(
+        config(SATELLITE, more=rotors, end="86400", samples="5").replace('["quat', '["nadir", "quat')
+    )
+    w, c = run.dataset["angular_velocity"].values, run.dataset["nadir"].values
+    inertia, a, b = np.diag([900.0, 1000.0, 400.0]), np.array([1, 0.2, 0.1]), np.array([0, 0.2, 1])
+    momentum = inertia @ w[0] + 0.03 * a / np.linalg.norm(a) + 0.05 * b / np.linalg.norm(b)
+    torque = np.cross(momentum, w[0]) + 3 * RATE**2 * np.cross(c[0], inertia @ c[0])
+    np.testing.assert_allclose(torque, 0, atol=1e-15 * 1000 * RATE**2)
+    np.testing.assert_allclose(w, w[:1].repeat(5, axis=0), rtol=0, atol=1e-12 * RATE)
+    np.testing.assert_allclose(c, c[:1].repeat(5, axis=0), rtol=0, atol=1e-12)
+
+
 # --- Cassini states -----------------------------------------------------------------------------------------
 
 

@@ -76,9 +76,9 @@ def widths(scene: Scene) -> list[Precision]:
 
 
 class PoseMotion:
-    """The motion of a scene in one arithmetic."""
+    """The motion of a scene in one arithmetic; what else is in it, such as rotors, begins beside a pose."""
 
-    def __init__(self, scene: Scene, precision: Precision) -> None:
+    def __init__(self, scene: Scene, precision: Precision, pose: Pose | None = None) -> None:
         config = scene.config
         integrator = {"formulation": "quaternion", "method": DEFAULT_METHOD, "hold_invariants": False}
         tables = {
@@ -88,6 +88,9 @@ class PoseMotion:
             "events": [],
         }
         scene = replace(scene, config=config.model_copy(update=tables), events=())
+        if pose is not None:
+            quaternion = attitude.quaternion_from_matrix(scene.context, pose.matrix)
+            scene = replace(scene, quaternion=quaternion, angular_velocity=pose.rates)
         self.context, self.precision = scene.context, precision
         self._system = System(replace(plan_model(scene), formulation=Quaternion()), precision.number)
 

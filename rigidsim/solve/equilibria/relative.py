@@ -33,7 +33,9 @@ from rigidsim.solve.equilibria.newton import Newton, NotFound, jacobian
 from rigidsim.store.summary import FoundStart
 
 _KEY = "equilibrium"
-_FAR = 0.5  # rad from the attitude that Newton's method begins at
+_ROUNDS = 40
+_AT = 1e-9  # rad from one of the 24 attitudes
+_FAR = 1.0  # rad from the attitude that Newton's method begins at
 _LATER = "0.3819660112501051"  # of a revolution, at which loads that rest in the frame are the same
 _NAMES = ("the axis of least moment", "the middle axis", "the axis of largest moment")
 
@@ -45,11 +47,7 @@ def relative_equilibrium(scene: Scene) -> InitialRotation:
         ConfigError: the scene has none, or none was found.
     """
     context, orbit = scene.context, _orbit(scene)
-    motion = widths(scene)[-1]
-    here = PoseMotion(scene, motion)
-    if not here.plain:
-        what = 'given "relative", but a load has a kink or jump, or happens at a moment; give the attitude'
-        raise refusal(_KEY, f"{what} and rates themselves")
+    precision = widths(scene)[-1]
     frame = _frame(orbit, context, scene.start)
     rates = [orbit.mean_motion * x for x in frame[2]]
     begun, order = _nearest(scene, frame)
@@ -63,11 +61,20 @@ def relative_equilibrium(scene: Scene) -> InitialRotation:
     def moved(at: Pose, turn: Vector) -> Pose:
         return pose(at.moved(context, turn, [context.zero] * 3).matrix)
 
-    try:
-        found = Newton(context, motion.bits, residual, moved, 3).settled(pose(begun))
-    except NotFound:
-        what = 'given "relative", but none was found near that attitude; give another one to begin at'
-        raise refusal(_KEY, what) from None
+    found, size = pose(begun), context.inf
+    for _ in range(_ROUNDS):  # momenta of rotors in the equations depend on the rates that they begin with
+        here, before = PoseMotion(scene, precision, found), size
+        if not here.plain:
+            what = 'given "relative", but a load has a kink or jump, or happens at a moment; give attitude '
+            raise refusal(_KEY, f"{what}and rates themselves")
+        size = norm(context, residual(found))
+        if size <= context.ldexp(1, 24 - precision.bits) or size >= before:
+            break
+        try:
+            found = Newton(context, precision.bits, residual, moved, 3).settled(found)
+        except NotFound:
+            what = 'given "relative", but none was found near that attitude; give another one to begin at'
+            raise refusal(_KEY, what) from None
     away = _angle(context, begun, found.matrix)
     if away > _FAR:
         degrees = context.nstr(context.degrees(away), 3)
@@ -75,8 +82,8 @@ def relative_equilibrium(scene: Scene) -> InitialRotation:
             f'given "relative", but the nearest one is {degrees} deg from where the gradient alone has one: '
         )
         raise refusal(_KEY, f"{what}the other loads are too strong; give attitude and rates themselves")
-    _refuse_passing(scene, motion, orbit, found, here)
-    matrix = _linear(context, here, found, motion.bits)
+    _refuse_passing(scene, precision, orbit, found, here)
+    matrix = _linear(context, here, found, precision.bits)
     exponents, stable = exponents_of(context, matrix, orbit.mean_motion)
     told = FoundStart(
         name="relative",
@@ -85,7 +92,7 @@ def relative_equilibrium(scene: Scene) -> InitialRotation:
         exponents=exponents,
         stable=stable,
     )
-    return found.start(context, motion.bits, told)
+    return found.start(context, precision.bits, told)
 
 
 def _orbit(scene: Scene) -> KeplerOrbit:
@@ -160,7 +167,7 @@ def _refuse_passing(scene: Scene, precision: Any, orbit: KeplerOrbit, found: Pos
     """Refuse loads that don't rest in the turning frame, and states beside the rotation that do not."""
     context, n = scene.context, orbit.mean_motion
     seconds = 2 * context.pi / n * context.mpf(_LATER)
-    later = PoseMotion(replace(scene, start=scene.start + seconds, end=scene.end + seconds), precision)
+    later = PoseMotion(replace(scene, start=scene.start + seconds, end=scene.end + seconds), precision, found)
     turn = multiply(
         transpose(_frame(orbit, context, scene.start + seconds)), _frame(orbit, context, scene.start)
     )
@@ -203,16 +210,16 @@ def _linear(context: Any, motion: PoseMotion, at: Pose, bits: int) -> Matrix:
 
 def _described(order: tuple[int, ...], stable: bool, away: Any) -> str:
     first, _, last = (_NAMES[k] for k in order)
-    lagrange = order == (0, 1, 2)
-    why = "least dynamic potential" if lagrange else "by gyroscopic torques alone"
-    near = "" if away < 1e-9 else f"{float(away) * 57.29577951308232:.4g} deg from "
-    said = f"stable ({why})" if stable else "unstable"
+    said = "stable" if stable else "unstable"
+    if stable and away < _AT:
+        said += " (least dynamic potential)" if order == (0, 1, 2) else " (by gyroscopic torques alone)"
+    near = "" if away < _AT else f"{float(away) * 57.29577951308232:.4g} deg from "
     return (
         f"relative equilibrium, {near}{first} towards the source and {last} along the orbit's normal: {said}"
     )
 
 
 def _how(away: Any) -> str:
-    if away < 1e-9:
+    if away < _AT:
         return "as one of the gradient's 24 attitudes, an exact solution of the full equations"
     return "by Newton's method on the full equations, of which it is an exact solution"
