@@ -15,7 +15,7 @@ from rigidsim.model.load import Load, Term, force_terms, torque_terms
 from rigidsim.model.rotations import Symbolic, apply
 from rigidsim.model.scaling import Rounder, ScaledNumbers, Scaling, exponent
 from rigidsim.model.state_blocks import BODY, AttitudeStates
-from rigidsim.scene.arithmetic import Vector, across
+from rigidsim.scene.arithmetic import Vector, across, parallel
 from rigidsim.scene.arithmetic import apply as multiply
 from rigidsim.scene.scene import Scene
 
@@ -251,9 +251,10 @@ class Mechanics(Kinematics):
 
     @property
     def keeps_axial(self) -> bool:
-        """Whether the angular momentum along the symmetry axis is conserved."""
-        axis = self.symmetry_direction
-        if axis is None or self.carriers:
+        """Whether the angular momentum along the symmetry axis is conserved; what is carried is along it."""
+        axis, context = self.symmetry_direction, self.scene.context
+        carried = momentum_terms(self.carriers, self)
+        if axis is None or not all(parallel(context, vector, axis) for vector, _ in carried):
             return False
         return all(
             load.keeps_axial(self, axis) if isinstance(load, KeepsAxial) else self._spares(terms, axis)

@@ -161,6 +161,19 @@ def test_a_rotor_along_the_axis_of_a_symmetric_body_nutates_as_in_closed_form() 
     exact_ones = np.array([across.real, across.imag, np.full(len(phase), RATES[2])]).T
     np.testing.assert_allclose(data["angular_velocity"].values, exact_ones, rtol=0, atol=5e-13)
     np.testing.assert_allclose(data["rotor_rate"].values[:, 0], s, rtol=1e-13)
+    axial = c * RATES[2] + j * s
+    np.testing.assert_allclose(data["angular_momentum_axial"].values, axial, rtol=1e-13)
+
+
+@pytest.mark.parametrize(("axis", "kept"), [([0, 0, 1], True), ([0, 0.1, 1], False)])
+def test_a_heavy_gyrostat_keeps_what_lagranges_top_does(axis: list[float], kept: bool) -> None:
+    body = "principal_moments = [2, 2, 1]\nmass = 1\ncenter_of_mass = [0, 0, 0.2]"
+    wheel, load = Wheel(axis, 0.3, 5, fixed=True), 'kind = "uniform_gravity"'
+    rows = run_text(scene(wheel, Wheel(axis, 0.1, 5), end=20, body=body, loads=load)).summary["invariants"]
+    found = {name for name, row in rows.items() if not row["numerical"]}
+    assert found - {"angular_momentum_axial"} == {"body_energy", "angular_momentum_vertical"}
+    assert ("angular_momentum_axial" in found) == kept
+    assert all(row["largest_drift"] <= row["bound"] for row in rows.values())
 
 
 # --- limits and invariants ----------------------------------------------------------------------------------
@@ -396,6 +409,7 @@ def test_members_of_a_sweep_are_their_single_runs(tmp_path: Path) -> None:
     swept = rigidsim.sweep(rigidsim.parse(text), out=tmp_path)
     data = swept.dataset
     assert all(engine.startswith("batch of") for engine in swept.summary["engines"])
+    assert list(data["rotor"].values) == ["w0", "w1"]
     for rate, moment, k in ((-3, 0.1, 0.1), (2, 0.2, -0.2)):
         single = text.partition("[sweep]")[0]
         changes = [f"rotors[0].rate={rate}", f"rotors[0].moment={moment}", f"parameters.k={k}"]

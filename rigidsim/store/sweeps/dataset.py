@@ -103,6 +103,7 @@ def _declared(
     file: NetcdfFile, sweep: Sweep, found: Gathered, beside: str
 ) -> dict[str, tuple[Any, Described]]:
     created = {}
+    labelled = LABELS | {"rotor": [rotor.name for rotor in sweep.base.config.rotors]}
     samples = _SAMPLES
     if found.times is not None:
         samples = "time"
@@ -114,8 +115,8 @@ def _declared(
             continue
         dims = [samples if dim == _SAMPLES else dim for dim in described.variable.dims]
         for dim, size in zip(dims, described.extra, strict=True):
-            if dim in LABELS:
-                file.labels(dim, LABELS[dim])
+            if dim in labelled:
+                file.labels(dim, labelled[dim])
             else:
                 file.dimension(dim, size)
         attributes = {k: v for k, v in described.variable.attributes.items() if v is not None}
