@@ -11,9 +11,9 @@ from rigidsim.scene.starts import (
     ATTITUDES,
     InitialRotation,
     StartForm,
+    beyond,
     from_equator,
     meridian,
-    refusal,
     register_start,
     upright,
 )
@@ -26,8 +26,7 @@ def _from_obliquity(scene: Scene) -> InitialRotation:
     assert table.node_longitude is not None
     tilt, node = table.obliquity.at(context), table.node_longitude.at(context)
     if not 0 <= tilt <= context.pi * (1 + negligible(context)):
-        degrees = context.nstr(context.degrees(tilt), 8)
-        raise refusal("obliquity", f"given {degrees} deg; 0 to 180 deg is allowed")
+        raise beyond("obliquity", "", context, tilt, "0 to 180 deg")
     normal = initial_normal(scene, loads_of(scene))
     length = norm(context, normal)
     columns = transpose(plane_axes(context, [x / length for x in normal]))

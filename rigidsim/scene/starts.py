@@ -107,6 +107,12 @@ def refusal(key: str, text: str) -> ConfigError:
     return ConfigError(Problem(f"[initial] {key}", text))
 
 
+def beyond(key: str, what: str, context: Any, angle: Any, allowed: str) -> ConfigError:
+    """The error for an angle (rad) beyond its range."""
+    degrees = f"{what}{context.nstr(context.degrees(angle), 8)} deg"
+    return refusal(key, f'given {degrees}; {allowed} is allowed, and degrees have their unit: "23.44 deg"')
+
+
 def check_ways(table: Initial, context: Any) -> None:
     """Refuse what contradicts itself before anything is worked out."""
     attitude_way, rates_way = (
@@ -223,8 +229,7 @@ def _from_pole(scene: Begun) -> InitialRotation:
     ascension, declination = (x.at(context) for x in table.pole)
     quarter = context.pi / 2
     if abs(declination) > quarter * (1 + negligible(context)):
-        degrees = context.nstr(context.degrees(declination), 8)
-        raise refusal("pole", f"given a declination of {degrees} deg; -90 to 90 deg is allowed")
+        raise beyond("pole", "a declination of ", context, declination, "-90 to 90 deg")
     turn = meridian(scene)
     plain = upright(scene, ascension + quarter, quarter - declination, turn)
     return InitialRotation(attitude.product(to_space, plain))

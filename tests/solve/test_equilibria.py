@@ -217,6 +217,40 @@ def test_the_moons_state_is_the_observed_one_with_its_librations() -> None:
     assert np.degrees(np.arccos(pole[2])) == pytest.approx(1.543, rel=0.03)
 
 
+@pytest.mark.slow(10)
+def test_an_ellipse_with_turning_apsides_leaves_hardly_any_free_libration() -> None:
+    """Pole and longitude over 300 years at the free periods, by a Hann window: far below what is forced."""
+    ellipse = MOON["orbit"].replace("27.2122", "27.554550") + "\neccentricity = 0.0549\n"
+    ellipse += 'periapsis = 1.0\nperiapsis_rate = "60.03 deg/yr"'
+    run = run_text(config(MOON, orbit=ellipse, end='"300 yr"', samples="30001"))
+    found = run.summary["start"]["equilibrium"]
+    assert "159 revolutions" in found["how"]
+    assert found["stable"]
+    years = run.dataset["time"].values / YEAR
+    matrices = [matrix_of(q) for q in run.dataset["quaternion"].values]
+    pole = np.array([m[0, 2] + 1j * m[1, 2] for m in matrices]) * np.exp(1j * np.radians(19.34) * years)
+    longitude = np.unwrap([np.arctan2(m[1, 0], m[0, 0]) for m in matrices])
+    longitude -= np.polyval(np.polyfit(years, longitude, 1), years)
+    window = np.hanning(len(years)) ** 2
+
+    def amplitude(signal: np.ndarray, period: float) -> float:
+        wave = window * np.exp(-2j * np.pi * years / period)
+        return float(abs((wave * (signal - signal.mean())).sum() / window.sum()) * 206264.8)
+
+    slow, fast = (2 * np.pi / found["exponents"][k][1] / YEAR for k in (1, 2))
+    assert max(amplitude(pole, slow), amplitude(pole, -slow)) < 0.3
+    assert amplitude(longitude, fast) < 0.3
+    assert amplitude(longitude, 180 / 60.03) > 20  # forced by the apsides, with half their period
+
+
+def test_plan_and_summary_tell_the_same_of_the_state() -> None:
+    text = config(MOON)
+    told = rigidsim.plan(rigidsim.parse(text), pilot_seconds=0.01).start.equilibrium
+    assert told is not None
+    assert told.as_dict() == run_text(text).summary["start"]["equilibrium"]
+    assert told.name == "cassini_2"
+
+
 def test_mercurys_state_in_three_turns_to_two_revolutions() -> None:
     """2.04(8) arcmin from the orbit's normal (Margot et al. 2012), whose moments the preset has."""
     orbit = 'semi_major_axis = "57909050 km"\neccentricity = 0.20563\ninclination = "8.58 deg"\n'
@@ -327,6 +361,7 @@ def test_independent_equations_come_back_and_grow_alike() -> None:
          "equilibrium", "changes relative to the turning frame"),
         (SATELLITE, {"more": '\n[[loads]]\nkind = "torque"\ncomponents = ["9", "9", "9"]'},
          "equilibrium", "none was found"),
+        (SATELLITE, {"body": "principal_moments = [1, 1, 1]"}, "equilibrium", "rests in any attitude"),
         (SATELLITE, {"name": "cassini_5"}, "equilibrium", 'did you mean "cassini_'),
         (SATELLITE, {"name": "cassini_1"}, "equilibrium", "node is at rest"),
         (MOON, {"name": "cassini_1"}, "equilibrium", "there are cassini_2 (6.6"),

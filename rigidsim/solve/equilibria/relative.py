@@ -23,7 +23,17 @@ from typing import Any
 from rigidsim.model.capabilities import corotating_orbit_of, orbit_of
 from rigidsim.model.load import loads_of
 from rigidsim.scene import attitude
-from rigidsim.scene.arithmetic import Matrix, Vector, apply, cross, multiply, norm, parallel, transpose
+from rigidsim.scene.arithmetic import (
+    Matrix,
+    Vector,
+    apply,
+    cross,
+    multiply,
+    negligible,
+    norm,
+    parallel,
+    transpose,
+)
 from rigidsim.scene.orbits import KeplerOrbit
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.starts import ATTITUDES, InitialRotation, refusal
@@ -103,6 +113,10 @@ def _orbit(scene: Scene) -> KeplerOrbit:
         what = "no load has a source on an orbit (gravity_gradient with orbit)"
         if scene.free_flight:
             what = "the body flies on an orbit of its own, and this is for a prescribed one"
+        raise refusal(_KEY, f"{given}{what}; give the attitude and rates themselves")
+    moments = scene.body.principal_moments
+    if max(moments) - min(moments) <= max(moments) * negligible(scene.context):
+        what = "a body whose moments are all the same rests in any attitude, or in none"
         raise refusal(_KEY, f"{given}{what}; give the attitude and rates themselves")
     first = orbits[0]
     if not first.circular:
