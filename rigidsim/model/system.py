@@ -79,6 +79,11 @@ class System:
             other.__dict__["partner"] = other.__dict__["partner"].with_coefficients(coefficients)
         return other
 
+    @property
+    def in_two_parts(self) -> bool:
+        """Whether coefficients of the equations have digits that the working precision can't hold."""
+        return self._coefficients is not None
+
     @cached_property
     def partner(self) -> System | None:
         """The same system in the chart that a run changes to near the singularity; None without a chart.

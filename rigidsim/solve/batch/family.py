@@ -46,7 +46,8 @@ class Alone(Enum):
     MOMENT = "something happens so late, within so short a while, that steps need the time in two numbers"
     BODIES = "point masses move beside the body"
     LYAPUNOV = "the Lyapunov spectrum has an integrator of its own"
-    KEY = "what is swept is not a number of the body, the start, a load or a parameter"
+    NUTATION = "wheels make it nutate so fast that coefficients take two numbers each"
+    KEY = "what is swept is not a number of the body, the start, a load, a rotor or a parameter"
     UNTRACEABLE = "the equations depend on what is swept in a way that can't be told beforehand"
     FAMILIES = "too few members share a system of equations"
     AVERAGED = "averages over the rotation are worked out for each body by itself"
@@ -83,6 +84,8 @@ def _reason_of_system(traced: TracedSystem) -> Alone | None:
         return Alone.TABLE
     if system.clocked:
         return Alone.MOMENT
+    if traced.prepared.system.in_two_parts:
+        return Alone.NUTATION
     if system.scene.bodies is not None:
         return Alone.BODIES
     # angles in so large a unit are never wrapped here: what follows from them is joined
