@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from rigidsim.accuracy.error_law import CLOSED_FORM
 from rigidsim.accuracy.estimates.course import UNCERTAIN
 from rigidsim.accuracy.estimates.estimate import Estimate, estimate_errors, label_rounding
-from rigidsim.accuracy.models.modelling import ModellingError, measure_modelling
+from rigidsim.accuracy.models.modelling import measure_modelling
 from rigidsim.accuracy.models.side_by_side import Unmeasured
 from rigidsim.errors import ConfigError
 from rigidsim.model.capabilities import gradient_source_of
@@ -24,7 +24,7 @@ from rigidsim.solve.problem import InitialValueProblem, prepare
 from rigidsim.solve.sampler import Progress
 from rigidsim.solve.stepper import OwnErrors
 from rigidsim.solve.taylor_stepper import TaylorStepper
-from rigidsim.store.summary_parts import Advice, AdviceCode, Caution, WarningCode
+from rigidsim.store.summary_parts import Advice, AdviceCode, Caution, Modelling, WarningCode
 
 NEAR_SINGULAR = 1e-3
 """Singular factor below which Euler angles lose digits near their singularity."""
@@ -41,7 +41,7 @@ class Diagnostics:
     progress: Progress
     statistics: SampleStatistics
     estimate: Estimate | None = None
-    modelling: ModellingError | None = None
+    modelling: Modelling | None = None
     unmeasured: Unmeasured | None = None
     cheaper: Advice | None = None
 
@@ -89,7 +89,7 @@ class Diagnostics:
     def modelled(self, trail: SampleTrail | None, go_on: Callable[[], bool] = lambda: True) -> "Diagnostics":
         """The diagnostics with the error of a reduced model; arguments as for ``estimated``."""
         try:
-            return replace(self, modelling=measure_modelling(self.prepared, trail, go_on))
+            return replace(self, modelling=measure_modelling(self.prepared, trail, go_on).modelling)
         except Unmeasured as why:
             return replace(self, unmeasured=why)
 
@@ -179,7 +179,7 @@ class Diagnostics:
             )
         if found is None:
             return
-        worst, most = found.worst, UNCERTAIN
+        worst, most = found.worst or 0.0, UNCERTAIN
         if asked is not None:  # of the axes, by whatever cause
             most = float(asked)
             worst += (self.estimate.attitude or 0.0) if self.estimate is not None else 0.0
@@ -305,7 +305,6 @@ def cheaper_model(found: Diagnostics, limits: AdviceLimits, go_on: Callable[[], 
             return None
         if error.worst <= limits.apart:
             assert estimate is not None
-            share = error.windows[0].reduced_steps / error.windows[0].steps
             code, now = AdviceCode.AVERAGED.value, estimate.leading
-            return Advice(code=code, now=now, then=error.worst, level=level, share=share)
+            return Advice(code=code, now=now, then=error.worst, level=level, share=error.share)
     return None

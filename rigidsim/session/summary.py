@@ -5,6 +5,7 @@ import sys
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from rigidsim.accuracy.models.modelling import modelling_of
 from rigidsim.model.capabilities import table_of
 from rigidsim.session.dataset import unused_variables
 from rigidsim.session.diagnostics import Diagnostics, advice_on
@@ -25,7 +26,6 @@ from rigidsim.store.summary_parts import (
     InvariantDrift,
     Lyapunov,
     Modelling,
-    ModellingWindow,
     TableErrors,
     UnmeasuredCode,
 )
@@ -153,49 +153,15 @@ def _tables(found: Diagnostics) -> dict[str, TableErrors]:
 
 
 def _modelling(found: Diagnostics) -> Modelling | None:
-    average = found.prepared.system.formulation.average
-    if average is None:
-        return None
-    known, output = found.modelling, found.prepared.scene.config.output
-    asked = found.prepared.scene.config.integrator.accuracy_axis
-    known_before: dict[str, Any] = {
-        "level": average.level,
-        "short_period": average.short_period,
-        "resonance": "" if average.resonance is None else average.resonance.name,
-        "requested": None if asked is None else float(asked),
-    }
-    if known is None:
-        code, why = UnmeasuredCode.NOT_ENDED, "the run has not reached its end"
-        if not output.estimate:
-            code, why = UnmeasuredCode.NOT_ASKED, "[output] estimate = false"
-        elif found.unmeasured is not None:
-            code, why = found.unmeasured.code, str(found.unmeasured)
-        return Modelling(**known_before, how=f"not measured: {why}", unmeasured=code.value)
-    return Modelling(
-        **known_before,
-        momentum_axis=known.momentum,
-        figure_axis=known.figure,
-        angular_momentum_norm=known.changes.get("angular_momentum_norm"),
-        energy=known.changes.get("energy"),
-        growth=known.growth,
-        oscillation=known.oscillation,
-        whole=known.whole,
-        how=known.how,
-        cpu_seconds=known.cpu_seconds,
-        windows=tuple(
-            ModellingWindow(
-                start=window.start,
-                end=window.end,
-                steps=window.steps,
-                momentum_axis=window.momentum,
-                figure_axis=window.figure,
-                growth_along=window.growth[0],
-                growth_across=window.growth[1],
-                doubt=window.doubt,
-            )
-            for window in known.windows
-        ),
-    )
+    prepared = found.prepared
+    if found.modelling is not None or prepared.system.formulation.average is None:
+        return found.modelling
+    code, why = UnmeasuredCode.NOT_ENDED, "the run has not reached its end"
+    if not prepared.scene.config.output.estimate:
+        code, why = UnmeasuredCode.NOT_ASKED, "[output] estimate = false"
+    elif found.unmeasured is not None:
+        code, why = found.unmeasured.code, str(found.unmeasured)
+    return modelling_of(prepared, how=f"not measured: {why}", unmeasured=code.value)
 
 
 def _lyapunov(found: Diagnostics, spectrum: LyapunovSpectrum | None) -> Lyapunov | None:

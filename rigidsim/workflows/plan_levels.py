@@ -69,7 +69,7 @@ def compared_levels(
         else:
             with suppress(Unmeasured):
                 measured = measure_modelling(prepared)
-                row |= {"error_rad": measured.worst, "modelling_seconds": measured.cpu_seconds_of_run}
+                row |= {"error_rad": measured.worst, "modelling_seconds": measured.seconds_of_run}
         why = known.why_not if known is not None else "" if level == asked else "another level is cheaper"
         found.append(LevelCost(**row, why_not=why if choice or level == asked else "not asked for"))
     return found

@@ -65,7 +65,7 @@ def choose_level(
             continue
         kept = found.worst <= asked
         why_not = "" if kept else "more than asked for"
-        considered.append(Considered(level, found.worst, why_not, found.cpu_seconds_of_run))
+        considered.append(Considered(level, found.worst, why_not, found.seconds_of_run))
         if kept:
             return LevelChoice(other, level, considered)
     considered.append(Considered(FULL, 0.0, ""))

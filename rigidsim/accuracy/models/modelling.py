@@ -9,8 +9,8 @@ integration itself are another matter (``rigidsim.accuracy.estimates.estimate``)
 
 import math
 import time
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -29,6 +29,7 @@ from rigidsim.model.averaged.average import Average
 from rigidsim.model.averaged.free_motion import FreeMotion
 from rigidsim.solve.effects.waypoints import SampleTrail
 from rigidsim.solve.problem import InitialValueProblem
+from rigidsim.store.summary_parts import Modelling
 
 _ORBITS = 8  # of the slowest source, from which a growth is told from what goes round with it
 _FEWEST_ORBITS = 2
@@ -45,44 +46,37 @@ _TURN = 2 * math.pi
 
 
 @dataclass(frozen=True)
-class ModellingError:
-    """Error of a reduced model.
-
-    Attributes:
-        momentum, figure: errors of the recorded directions until the end of the run, rad; at most pi.
-        growth: mean growth of the momentum's direction error until the end, rad/s.
-        oscillation: part that doesn't grow, rad: what isn't added back to the momentum's direction.
-        whole: whether the full model was followed to the end.
-        how: description of the measurement.
-        cpu_seconds: CPU time of the measurement, s.
-        changes: relative errors until the end of quantities that change: ``SIZE`` and ``ENERGY``.
+class Measured:
+    """The error of an averaged model, as summaries keep it, and what was seen over the beginning: the CPU time,
+    s, that measuring takes after a run, and the averaged model's steps over those of the full one.
     """
 
-    level: str
-    momentum: float
-    figure: float | None
-    growth: float
-    oscillation: float
-    whole: bool
-    how: str
-    cpu_seconds: float
-    windows: Sequence[Window] = field(default_factory=list)
-    changes: Mapping[str, float] = field(default_factory=dict)
-
-    @property
-    def cpu_seconds_of_run(self) -> float:
-        """CPU time, s, that the measurement takes after a run, from one over its beginning alone."""
-        return self.cpu_seconds if self.whole else self.cpu_seconds * _WINDOWS / len(self.windows)
+    modelling: Modelling
+    seconds_of_run: float
+    share: float
 
     @property
     def worst(self) -> float:
         """The larger error of both directions, rad."""
-        return max(self.momentum, self.figure or 0.0)
+        return self.modelling.worst or 0.0
+
+
+def modelling_of(prepared: InitialValueProblem, **found: Any) -> Modelling:
+    """What a summary says of the model of a run whose rotation is averaged, with what was ``found`` of it."""
+    average, asked = prepared.system.formulation.average, prepared.scene.config.integrator.accuracy_axis
+    assert average is not None
+    return Modelling(
+        level=average.level,
+        short_period=average.short_period,
+        resonance="" if average.resonance is None else average.resonance.name,
+        requested=None if asked is None else float(asked),
+        **found,
+    )
 
 
 def measure_modelling(
     prepared: InitialValueProblem, trail: SampleTrail | None = None, go_on: Callable[[], bool] = lambda: True
-) -> ModellingError:
+) -> Measured:
     """Measure the modelling error of a run, from some of its samples; without them over its beginning alone.
     Raises ``Unmeasured`` if ``go_on`` ended it, or one of the models can't be followed.
     """
@@ -102,26 +96,40 @@ def measure_modelling(
     for at, direction, length in places:
         until = end if whole else at + length
         windows.append(side_by_side(prepared, average, at, until, direction, go_on))
+    span, grown = end - begin, 0.0
     if whole:
         (window,) = windows
-        return ModellingError(
-            average.level,
-            min(_SPARE_OF_WHOLE * window.recorded, math.pi),
-            None
-            if window.recorded_figure is None
-            else min(_SPARE_OF_WHOLE * window.recorded_figure, math.pi),
-            math.hypot(*window.growth),
-            window.recorded,
-            True,
-            "every rotation was resolved beside the run to its end",
-            time.process_time() - started,
-            windows,
-            {name: _SPARE_OF_WHOLE * change.largest for name, change in window.changes.items()},
-        )
-    motions = [motion_at(average, states, exponent) for _, states, _ in places]
-    steady = average.resonance is not None or not average.sources
-    carried = None if steady else carrying(prepared, average, go_on)
-    return _extrapolated(prepared, average, windows, motions, end - begin, started, carried)
+        oscillation, figure = window.recorded, window.recorded_figure
+        changes = {name: _SPARE_OF_WHOLE * change.largest for name, change in window.changes.items()}
+        growth = math.hypot(window.kept.growth_along, window.kept.growth_across)
+        how = "every rotation was resolved beside the run to its end"
+    else:
+        motions = [motion_at(average, states, exponent) for _, states, _ in places]
+        steady = average.resonance is not None or not average.sources
+        carried = None if steady else carrying(prepared, average, go_on)
+        grown, oscillation = _extrapolated(prepared, average, windows, motions, span, carried)
+        figure = max(w.recorded_figure or 0.0 for w in windows) if average.figure else None
+        changes, growth = _changed(average, windows, span), grown / span
+        share = sum(w.kept.end - w.kept.start for w in windows) / span
+        steps = sum(w.kept.steps for w in windows)
+        how = f"every rotation was resolved beside the run in {len(windows)} windows ({100 * share:.2g} % of "
+        how += f"it, {steps:,} steps), and the growth found there carried to its end"
+    seconds = time.process_time() - started
+    found = modelling_of(
+        prepared,
+        momentum_axis=min(_SPARE * grown + _SPARE_OF_WHOLE * oscillation, math.pi),
+        figure_axis=None if figure is None else min(_SPARE * grown + _SPARE_OF_WHOLE * figure, math.pi),
+        angular_momentum_norm=changes.get(SIZE),
+        energy=changes.get(ENERGY),
+        growth=growth,
+        oscillation=oscillation,
+        whole=whole,
+        how=how,
+        cpu_seconds=seconds,
+        windows=tuple(w.kept for w in windows),
+    )
+    of_run = seconds if whole else seconds * _WINDOWS / len(windows)
+    return Measured(found, of_run, windows[0].reduced_steps / windows[0].kept.steps)
 
 
 def _length(average: Average, motion: FreeMotion) -> float:
@@ -181,15 +189,14 @@ def _extrapolated(
     windows: list[Window],
     motions: Sequence[FreeMotion],
     span: float,
-    started: float,
     carried: Carrying | None,
-) -> ModellingError:
-    """Error at the end from that in windows."""
-    rates = np.array([w.growth for w in windows])
-    doubt = max(w.doubt for w in windows)
+) -> tuple[float, float]:
+    """How far the momentum's direction is off at the end, from its growth in windows, and its oscillation."""
+    rates = np.array([(w.kept.growth_along, w.kept.growth_across) for w in windows])
+    doubt = max(w.kept.doubt for w in windows)
     mean = np.abs(rates.mean(axis=0)) + (rates.max(axis=0) - rates.min(axis=0)) / 2
     along, across = (float(x) + doubt for x in mean)
-    changes, faster = _changed(average, windows, span), 0.0
+    faster = 0.0
     if average.driven is not None and average.sources:
         # lasting errors of size and energy change the rate of precession; what oscillates doesn't
         kept = [
@@ -209,28 +216,7 @@ def _extrapolated(
     oscillation = max(w.recorded for w in windows)
     if average.driven is not None:  # which may be larger between the windows
         oscillation = max(oscillation, average.driven.course.swing) + average.driven.scatter
-    growth = grown / span
-    momentum = _SPARE * grown + _SPARE_OF_WHOLE * oscillation
-    figure = None
-    if average.figure:
-        figure = _SPARE * grown + _SPARE_OF_WHOLE * max(w.recorded_figure or 0.0 for w in windows)
-        figure = min(figure, math.pi)
-    share = sum(w.end - w.start for w in windows) / span
-    steps = sum(w.steps for w in windows)
-    how = f"every rotation was resolved beside the run in {len(windows)} windows ({100 * share:.2g} % of it, "
-    how += f"{steps:,} steps), and the growth found there carried to its end"
-    return ModellingError(
-        average.level,
-        min(momentum, math.pi),
-        figure,
-        growth,
-        oscillation,
-        False,
-        how,
-        time.process_time() - started,
-        windows,
-        changes,
-    )
+    return grown, oscillation
 
 
 def _changed(average: Average, windows: Sequence[Window], span: float) -> dict[str, float]:

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Any
 
@@ -23,7 +23,7 @@ from rigidsim.solve.assembly import assemble, sampler
 from rigidsim.solve.problem import InitialValueProblem, prepare_scene
 from rigidsim.solve.sampler import Progress
 from rigidsim.solve.status import Status
-from rigidsim.store.summary_parts import UnmeasuredCode
+from rigidsim.store.summary_parts import ModellingWindow, UnmeasuredCode
 
 _FEWEST_SAMPLES, _MOST_SAMPLES = 2000, 16_000
 _SAMPLES_PER_ROTATION = 2
@@ -60,28 +60,16 @@ class Change:
 
 @dataclass(frozen=True)
 class Window:
-    """A window over which both models ran side by side.
-
-    Attributes:
-        momentum, figure: largest distance between the directions of the angular momentum and of the figure
-            axis, with what averaging removed added back, rad; None if the body tumbles.
-        recorded, recorded_figure: the same for the directions as the run records them.
-        growth: growth of the momenta's distance, along and across the precession, rad/s.
-        doubt: difference of growth between the window's parts, rad/s.
-        changes: for a motion whose energy and momentum change, how far these are from the full model's.
+    """What a summary keeps of a window over which both models ran side by side; the largest distances of the
+    directions as the run records them, rad (None if the body tumbles); the averaged model's steps; and of a
+    motion whose energy and momentum change how far these are from the full model's.
     """
 
-    start: float
-    end: float
-    steps: int
-    momentum: float
-    figure: float | None
+    kept: ModellingWindow
     recorded: float
     recorded_figure: float | None
-    growth: tuple[float, float]
-    doubt: float
     reduced_steps: int
-    changes: Mapping[str, Change] = field(default_factory=dict)
+    changes: Mapping[str, Change]
 
 
 def rotation_rates(motion: FreeMotion) -> list[float]:
@@ -132,17 +120,19 @@ def side_by_side(
         momentum, *figure = (float(np.linalg.norm(true[x] - model[x], axis=1).max()) for x in names)
         return momentum, figure[0] if figure else None
 
-    return Window(
-        begin,
-        end,
-        steps,
-        *distances(reduced),
-        *distances(plain),
-        (float(growth[0]), float(growth[1])),
-        doubt,
-        reduced_steps,
-        _changes(times, true, reduced) if driven else {},
+    momentum, figure = distances(reduced)
+    kept = ModellingWindow(
+        start=begin,
+        end=end,
+        steps=steps,
+        momentum_axis=momentum,
+        figure_axis=figure,
+        growth_along=float(growth[0]),
+        growth_across=float(growth[1]),
+        doubt=doubt,
     )
+    changes = _changes(times, true, reduced) if driven else {}
+    return Window(kept, *distances(plain), reduced_steps, changes)
 
 
 def _changes(
