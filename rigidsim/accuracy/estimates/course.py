@@ -3,6 +3,7 @@ integrator or code compiled for it, how its motions are perturbed, and what was 
 """
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -37,8 +38,7 @@ UNCERTAIN = 1e-2
 class Course:
     """A run whose errors are to be followed, in internal units: the stepper, or copies of its engine, carry
     the ensemble if good enough; ``nearest`` is the smallest singular factor of its chart, 1 for charts that
-    are changed; ``uneven`` its longest step over its shortest; ``lost`` the errors in epsilons past which
-    nothing is learnt.
+    are changed; ``uneven`` its longest step over its shortest; ``go_on`` ends the following when False.
     """
 
     prepared: InitialValueProblem
@@ -49,7 +49,12 @@ class Course:
     stepper: TaylorStepper | None
     nearest: float
     uneven: float
-    lost: float
+    go_on: Callable[[], bool]
+
+    @property
+    def lost(self) -> float:
+        """The errors in epsilons past which nothing is learnt."""
+        return math.pi / float(self.prepared.precision.epsilon)
 
     def at(self, share: float) -> float:
         """The time at a share of the run."""

@@ -100,9 +100,8 @@ def estimate_errors(
             law = stable_law(prepared.law_tolerance, steps, float(system.rate_bound), duration)
             law = math.hypot(law, CLOSED_FORM * epsilon)  # of what it is held against
             return _by_comparison(prepared, form, trail, law, duration)
-    lost = math.pi / epsilon
-    course = Course(prepared, start, end, steps, waypoints, stepper, nearest, uneven, lost)
-    found = follow(course, go_on)
+    course = Course(prepared, start, end, steps, waypoints, stepper, nearest, uneven, go_on)
+    found = follow(course)
     if not go_on():
         return None
     return _conclusion(course, found)

@@ -8,7 +8,6 @@ to time. The run's average over the rotation and the orbits carries errors alike
 """
 
 import math
-from collections.abc import Callable
 
 import numpy as np
 
@@ -41,27 +40,27 @@ quarters: (e^x - 1) / (e^(x/4) - 1) = 4^2.5.
 _SMALL = 1e-100  # rad/s: errors that stay small however they grow
 
 
-def follow(course: Course, go_on: Callable[[], bool]) -> Followed:
+def follow(course: Course) -> Followed:
     """Follow a run's shadow ensemble."""
     with borrowed(course.stepper):
-        return _follow_as_needed(course, go_on)
+        return _follow_as_needed(course)
 
 
-def _follow_as_needed(course: Course, go_on: Callable[[], bool]) -> Followed:
+def _follow_as_needed(course: Course) -> Followed:
     part = min(1.0, _affordable(course) / max(course.steps, 1))
     if part < 1 and not _waypoints(course, part):
         part = max(part, min(1.0, margins.ALL_STEPS / course.steps))
-    if part < 1 and _power_of_slow_motion(course, go_on) > margins.MOST_POWER:
+    if part < 1 and _power_of_slow_motion(course) > margins.MOST_POWER:
         part = 1.0
-    found, tight = _follow_loosely(course, part, go_on)
-    if found.windows and found.spread.whole[0] and not course.same_states and go_on():
+    found, tight = _follow_loosely(course, part)
+    if found.windows and found.spread.whole[0] and not course.same_states and course.go_on():
         # what sets in between windows, or shows in none: quaternions follow it, which lose less than momenta
-        twin = _follow_loosely(course, _affordable_by_twin(course), go_on)
+        twin = _follow_loosely(course, _affordable_by_twin(course))
         spread = twin[0].spread
         if course.suspicious(spread, course.start, margins.MOST_POWER):
             found, tight = twin
-    if not tight and go_on() and _drifted(course, found.spread):
-        found, *_ = _follow(course, 1.0, TIGHT, go_on)
+    if not tight and course.go_on() and _drifted(course, found.spread):
+        found, *_ = _follow(course, 1.0, TIGHT)
     return found
 
 
@@ -75,19 +74,19 @@ def _drifted(course: Course, spread: Spread) -> bool:
     return course.suspicious(spread, course.start, margins.MOST_POWER)
 
 
-def _follow_loosely(course: Course, part: float, go_on: Callable[[], bool]) -> tuple[Followed, bool]:
+def _follow_loosely(course: Course, part: float) -> tuple[Followed, bool]:
     """As ``_follow``, as loosely as the motion bears: code of a lower order takes less time to compile and to
     run. What isn't the run's motion any more, or can't be held against it and shows growth, is followed anew.
     """
     if not _can_be_checked(course, part):
-        return _follow(course, part, TOLERANCE, go_on)[:2]
-    found, tight, astray = _follow(course, part, LOOSE, go_on)
+        return _follow(course, part, TOLERANCE)[:2]
+    found, tight, astray = _follow(course, part, LOOSE)
     if not course.same_states:
         astray = not tight and course.suspicious(found.spread, course.start, margins.MOST_POWER)
-    if astray and go_on():
+    if astray and course.go_on():
         by_itself = course.own is not None and not course.loose and course.steps < margins.MOST_ANEW
         tightly = by_itself or _drifted(course, found.spread)
-        found, tight, _ = _follow(course, part, TIGHT if tightly else TOLERANCE, go_on)
+        found, tight, _ = _follow(course, part, TIGHT if tightly else TOLERANCE)
     return found, tight
 
 
@@ -128,9 +127,7 @@ def _affordable_by_twin(course: Course) -> float:
     return min(1.0, _of_double(course, margins.SHARE * course.steps) / course.steps)
 
 
-def _follow(
-    course: Course, part: float, tolerance: float, go_on: Callable[[], bool]
-) -> tuple[Followed, bool, bool]:
+def _follow(course: Course, part: float, tolerance: float) -> tuple[Followed, bool, bool]:
     """Follow a part of a run, and all of it where that is called for; whether it was followed tightly, and
     whether it was given up since the motion, followed loosely, isn't the run's any more.
     """
@@ -141,7 +138,7 @@ def _follow(
     spread = ensemble.spread
 
     def go_to(share: float) -> bool:
-        ensemble.follow(course.at(share), go_on, course.lost)
+        ensemble.follow(course.at(share), course.go_on, course.lost)
         return not ensemble.all_lost(course.lost)
 
     # what takes long to compile only where all isn't lost soon
@@ -149,12 +146,17 @@ def _follow(
     own = ensemble.carrier if isinstance(ensemble.carrier, OwnCarrier) else None
     if own is not None and course.same_states and first * steps > own.until:
         going = go_to(soon)
-        while going and soon * steps < own.until / 2 and go_on() and course.suspicious(spread, start, power):
+        while (
+            going
+            and soon * steps < own.until / 2
+            and course.go_on()
+            and course.suspicious(spread, start, power)
+        ):
             soon += OWN_FIRST / steps
             going = go_to(soon)
         if going:
             _prepare(ensemble, steps * (first - soon))
-    on_course = _stay_on_course(course, ensemble, first, go_on)
+    on_course = _stay_on_course(course, ensemble, first)
     if on_course:
         go_to(first)
     seen: list[Spread] = []
@@ -162,13 +164,13 @@ def _follow(
         wary = margins.WARY_POWER if steps < margins.WARY_STEPS else power
         whole = course.suspicious(spread, start, wary)
         if not whole and waypoints:
-            seen = _windows(course, ensemble, waypoints, part - first, go_on)
+            seen = _windows(course, ensemble, waypoints, part - first)
             beginnings = zip(seen, waypoints, strict=False)
             whole = any(course.suspicious(s, waypoint.time, power) for s, waypoint in beginnings)
         for stage in (margins.STAGE / steps, 1.0) if whole else ():
             if first < stage <= 1 and not ensemble.all_lost(course.lost):
                 _prepare(ensemble, steps * (stage - first))
-                on_course = on_course and _stay_on_course(course, ensemble, stage, go_on)
+                on_course = on_course and _stay_on_course(course, ensemble, stage)
                 if on_course:
                     go_to(stage)
                     first = stage
@@ -182,9 +184,7 @@ def _follow(
     return Followed(spread, first, len(seen), part - first, more), tight, False
 
 
-def _stay_on_course(
-    course: Course, ensemble: ShadowEnsemble, share: float, go_on: Callable[[], bool]
-) -> bool:
+def _stay_on_course(course: Course, ensemble: ShadowEnsemble, share: float) -> bool:
     """Follow a run loosely past its waypoints until a share of it; False as soon as it is another motion."""
     loosely = isinstance(ensemble.carrier, BatchCarrier) and ensemble.carrier.tolerance == LOOSE
     if course.waypoints is None or not (loosely and course.same_states):
@@ -193,7 +193,7 @@ def _stay_on_course(
     for waypoint in reversed(there[:: -margins.LOOKS]):
         if waypoint.time <= ensemble.time[0]:
             continue
-        spread = ensemble.follow(waypoint.time, go_on, course.lost)
+        spread = ensemble.follow(waypoint.time, course.go_on, course.lost)
         if not spread.whole[0] or ensemble.time[0] < waypoint.time:
             break  # lost, or stopped
         grown = margins.SAFETY * float(course.leading(spread).max(initial=0.0))
@@ -220,11 +220,7 @@ def _waypoints(course: Course, part: float) -> list[Waypoint]:
 
 
 def _windows(
-    course: Course,
-    ensemble: ShadowEnsemble,
-    waypoints: list[Waypoint],
-    share: float,
-    go_on: Callable[[], bool],
+    course: Course, ensemble: ShadowEnsemble, waypoints: list[Waypoint], share: float
 ) -> list[Spread]:
     """Errors that begin in each window; together the windows cover a share of the run."""
     length = share * (course.end - course.start) / len(waypoints)
@@ -232,7 +228,7 @@ def _windows(
     for waypoint in waypoints:
         until = min(waypoint.time + length, course.end)
         window = ensemble.elsewhere(waypoint.state, waypoint.time, until, steps)
-        seen.append(window.follow(until, go_on))
+        seen.append(window.follow(until, course.go_on))
         if not seen[-1].whole[0]:
             break
     return seen
@@ -251,7 +247,7 @@ def _more(beginning: Spread, until: float, windows: list[Spread], least: float) 
     return found
 
 
-def _power_of_slow_motion(course: Course, go_on: Callable[[], bool]) -> float:
+def _power_of_slow_motion(course: Course) -> float:
     """Power of time with which the run's slow motion makes errors of the axis grow over the last three
     quarters of the run, if they are made all the time; 0 where they can't grow exponentially, or there is no
     average over the orbits to tell.
@@ -259,7 +255,7 @@ def _power_of_slow_motion(course: Course, go_on: Callable[[], bool]) -> float:
     if course.prepared.system.stepwise or _most_folds(course) < _LEAST_FOLDS:
         return 0.0
     try:
-        found = carrying(course.prepared, None, go_on)
+        found = carrying(course.prepared, None, course.go_on)
     except (ConfigError, Unmeasured):
         return 0.0
     times = found.seconds * np.arange(1, len(found.maps) + 1)

@@ -47,8 +47,8 @@ _TURN = 2 * math.pi
 
 @dataclass(frozen=True)
 class Measured:
-    """The error of an averaged model, as summaries keep it, and what was seen over the beginning: the CPU time,
-    s, that measuring takes after a run, and the averaged model's steps over those of the full one.
+    """The error of an averaged model, as summaries keep it, and what was seen over the beginning: the CPU
+    time, s, that measuring takes after a run, and the averaged model's steps over those of the full one.
     """
 
     modelling: Modelling
@@ -129,7 +129,7 @@ def measure_modelling(
         windows=tuple(w.kept for w in windows),
     )
     of_run = seconds if whole else seconds * _WINDOWS / len(windows)
-    return Measured(found, of_run, windows[0].reduced_steps / windows[0].kept.steps)
+    return Measured(found, of_run, windows[0].reduced_steps / max(windows[0].kept.steps, 1))
 
 
 def _length(average: Average, motion: FreeMotion) -> float:
