@@ -14,8 +14,8 @@ from rigidsim.solve.problem import prepare
 from rigidsim.store.summary import Span, Start, UnderstoodBody
 from rigidsim.store.summary_parts import Caution
 from rigidsim.workflows.read import load
-from rigidsim.workflows.sweeps.check import QUICK, check_sweep
 from rigidsim.workflows.sweeps.members import recording
+from rigidsim.workflows.sweeps.plan import QUICK, check_sweep
 
 
 @dataclass(frozen=True)

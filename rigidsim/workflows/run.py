@@ -3,11 +3,12 @@
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, overload
+from typing import Any, TypeVar, overload
 
+from rigidsim.accuracy.certificate import certify, verdict
 from rigidsim.accuracy.choice import Choice, chosen
 from rigidsim.accuracy.models.level import choose_level
-from rigidsim.accuracy.setting import Setting, leaves_choice, wanted
+from rigidsim.accuracy.setting import Setting, asked_of_attitude, leaves_choice, wanted
 from rigidsim.errors import ConfigError
 from rigidsim.model.load import Load
 from rigidsim.scene.choices import AUTO, FULL
@@ -17,11 +18,14 @@ from rigidsim.session.progress import watched
 from rigidsim.session.session import Observer, Session, Tuning
 from rigidsim.session.storage import refuse_too_large, refuse_too_large_for_memory
 from rigidsim.solve.problem import InitialValueProblem, prepare
+from rigidsim.solve.status import Status
 from rigidsim.store.folder import RunFolder
 from rigidsim.store.run import MemoryRun, Run, SavedRun
-from rigidsim.store.summary_parts import WarningCode
-from rigidsim.workflows.certify import certified
+from rigidsim.store.summary import Summary
+from rigidsim.store.summary_parts import Caution, WarningCode
 from rigidsim.workflows.read import Experiment, Given, as_experiment
+
+AnyRun = TypeVar("AnyRun", bound=Run)
 
 
 @overload
@@ -127,10 +131,7 @@ def _run(
         prepared = prepare(setting, loads=loads)
         refuse_taken_names(prepared)
         with _place(prepared, out, setting.text, force=force or beyond is not None) as folder:
-            result = execute(session, prepared, folder)
-            kept = True
-            if wanted(setting) is not None:
-                result, kept = certified(result, setting, choice, session, loads)
+            result, kept = certified(execute(session, prepared, folder), setting, choice, session, loads)
         if kept or choice is None:
             return result
         beyond = choice.setting
@@ -151,3 +152,55 @@ def _place(
     with folder.locked():
         folder.begin(config, force=force)
         yield folder
+
+
+def certified(
+    result: AnyRun,
+    experiment: Experiment,
+    choice: Choice | None,
+    session: Session,
+    loads: Sequence[Load] = (),
+) -> tuple[AnyRun, bool]:
+    """Certify a finished run, if its config asks for an accuracy: the certificate is put into its summary."""
+    integrator, summary = experiment.config.integrator, result.outcome
+    accuracy, length = wanted(experiment), integrator.accuracy_position
+    complete = result.status in (Status.FINISHED.value, Status.EVENT.value)
+    if accuracy is None or not complete or not isinstance(summary, Summary):
+        return result, True
+    session.observer.phase("certify")
+    key, requested = asked_of_attitude(experiment) or ("accuracy", None)
+    place = None if length is None else float(length)
+    with result.dataset as dataset:
+        found = certify(
+            dataset,
+            experiment,
+            accuracy=accuracy,
+            accuracy_position=place,
+            loads=loads,
+            known=None if choice is None else choice.known,
+            told=session.observer.trying,
+        )
+    known: dict[str, Any] = {"requested": requested}
+    if place is not None:
+        known["requested_position"] = place
+    doubt: str | None = "too little was recorded to certify the accuracy asked for"
+    if found is not None:
+        doubt = verdict(found, requested, place, key=key)
+        known |= found.as_dict()
+    if choice is not None:
+        known |= {"chosen": choice.setting.title, "chosen_why": choice.why, "forecast": choice.forecast}
+    cautions = summary.cautions
+    if doubt is None:  # a certified error needs no estimate
+        cautions = [c for c in cautions if c.code is not WarningCode.ATTITUDE_UNCERTAIN]
+    else:
+        cautions.append(Caution(WarningCode.NOT_CERTIFIED, doubt))
+    session.phases.next("certify")
+    phases, effort = session.phases, session.effort
+    cost = summary.cost.having(
+        seconds=dict(phases.wall),
+        cpu_by_phase=dict(phases.cpu),
+        cpu_seconds=effort.cpu,
+        wall_seconds=effort.wall,
+    )
+    summary = summary.warned(cautions).having(accuracy=summary.accuracy.having(**known), cost=cost)
+    return result.concluded(summary), doubt is None

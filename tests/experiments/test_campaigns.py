@@ -209,7 +209,7 @@ def lying(monkeypatch: pytest.MonkeyPatch) -> None:
         assert found is not None
         return Certificate(found.error / 100, found.end, found.how, found.times)
 
-    monkeypatch.setattr("rigidsim.workflows.certify.certify", small)
+    monkeypatch.setattr("rigidsim.workflows.run.certify", small)
 
 
 @pytest.mark.slow

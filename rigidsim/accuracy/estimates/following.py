@@ -55,7 +55,8 @@ def _follow_as_needed(course: Course) -> Followed:
     found, tight = _follow_loosely(course, part)
     if found.windows and found.spread.whole[0] and not course.same_states and course.go_on():
         # what sets in between windows, or shows in none: quaternions follow it, which lose less than momenta
-        twin = _follow_loosely(course, _affordable_by_twin(course))
+        affordable = _of_double(course, margins.SHARE * course.steps)
+        twin = _follow_loosely(course, min(1.0, affordable / course.steps))
         spread = twin[0].spread
         if course.suspicious(spread, course.start, margins.MOST_POWER):
             found, tight = twin
@@ -120,11 +121,6 @@ def _of_double(course: Course, budget: float) -> float:
     least = margins.PASSING_STEPS if passes else margins.ALL_STEPS
     more = 1.0 if course.same_states else margins.CHARTS
     return more * max(least, (budget - margins.UNROLLING) / margins.LANE)
-
-
-def _affordable_by_twin(course: Course) -> float:
-    """The part of a run in double precision that its twin in quaternions may follow."""
-    return min(1.0, _of_double(course, margins.SHARE * course.steps) / course.steps)
 
 
 def _follow(course: Course, part: float, tolerance: float) -> tuple[Followed, bool, bool]:

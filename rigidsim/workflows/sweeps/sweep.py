@@ -20,10 +20,9 @@ from rigidsim.store.sweeps.tiles import Generation
 from rigidsim.store.variables import SCHEMA_VERSION
 from rigidsim.workflows.read import Given, as_experiment
 from rigidsim.workflows.sweeps.batch import why_alone
-from rigidsim.workflows.sweeps.check import check_sweep
 from rigidsim.workflows.sweeps.cluster import Cluster
 from rigidsim.workflows.sweeps.members import batches_of, recording, sweep_of
-from rigidsim.workflows.sweeps.plan import refuse_untold_tiles, tile_length
+from rigidsim.workflows.sweeps.plan import check_sweep, refuse_untold_tiles, tile_length
 from rigidsim.workflows.sweeps.summary import summary_of
 from rigidsim.workflows.sweeps.ways import Way, Workers
 
