@@ -21,10 +21,10 @@ from rigidsim.workflows.sweeps.members import batches_of, first_possible, markab
 _ALL = 200
 """Up to this many members are all worked out, with their equations where numbers alone don't decide. Of more,
 all are looked at by their numbers alone if these decide, and some are worked out: the corners and values of
-each axis, ``_OF_AN_AXIS`` of them, or ``_FEW`` where the numbers of each member were accepted.
+each axis, ``_OF_AN_AXIS`` of them, or ``_FEWER`` where the numbers of each member were accepted.
 """
 _OF_AN_AXIS = 400
-_FEW = 25
+_FEWER = 25
 _MOST_CORNERS = 64
 _MOST_TOLD = 10
 _AT_ONCE = 4096
@@ -65,7 +65,7 @@ def check_sweep(sweep: Sweep, *, every: bool = True, each: Each = map) -> Initia
     if sweep.table.impossible == "mark":
         return first
     given = _shares(sweep, each) if every else []  # others begin with them at once
-    problems = _worked_out(sweep, _FEW)
+    problems = _worked_out(sweep, _FEWER)
     if not problems:
         refused, accepted = _refused_or_accepted(given)
         if accepted < sweep.count and sweep.count > _ALL:
@@ -75,7 +75,7 @@ def check_sweep(sweep: Sweep, *, every: bool = True, each: Each = map) -> Initia
             told = [sweep.blamed(member, errors[member]) for member in refused if member in errors]
             problems = [problem for error in told for problem in error.problems]
         if not problems and accepted < sweep.count <= _ALL and every:
-            problems = _worked_out(sweep, _FEW, equations=True)
+            problems = _worked_out(sweep, _FEWER, equations=True)
     if len(problems) >= _MOST_TOLD:
         problems.append(Problem("[sweep]", "there may be more members of this kind; these came first"))
     if problems:
