@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -140,8 +141,8 @@ def test_a_motion_that_is_followed_loosely_is_held_against_the_run(monkeypatch: 
     steps = sampler(prepared, parts, Unread()).run().steps
     passed = parts.steps().effect(Waypoints)
     elsewhere = Waypoints()
-    for n, point in enumerate(passed.between(0, steps)):
-        elsewhere.note(n, point.steps, point.time, 1.1 * point.state, point.chart)
+    kept, spacing = passed.memory
+    elsewhere.memory = {n: replace(point, state=1.1 * point.state) for n, point in kept.items()}, spacing
     found = {}
     for name, points in (("run", passed), ("elsewhere", elsewhere), ("unknown", None)):
         made.clear()
@@ -192,13 +193,23 @@ def test_an_instability_that_sets_in_after_half_of_a_long_run_is_seen() -> None:
     assert "attitude_uncertain" in run.summary["warning_codes"]
 
 
+PUSH = 'kind = "torque"\ncomponents = ["0", "0", "1e-4"]'
+"""Leaves no closed form, and amplifies no errors."""
+
+
+def test_a_run_whose_every_step_is_followed_says_so() -> None:
+    text = scene("[1, 2, 2.5]", "[0.5, 0.25, 1]", "100", PUSH)
+    run = run_text(text)
+    accuracy, true = run.summary["accuracy"], true_error(run, text)
+    assert accuracy["examined_share"] == 1
+    assert accuracy["estimated_how"].endswith(", over the run")
+    assert true <= COVERED * accuracy["estimated_attitude_error"] <= COVERED * HONEST * true
+
+
 @pytest.mark.slow
 def test_what_part_of_a_long_run_was_examined_is_said() -> None:
-    """A slow push leaves no closed form, and nothing amplifies errors; windows show that they are made ever
-    faster, as the body spins up.
-    """
-    push = 'kind = "torque"\ncomponents = ["0", "0", "1e-4"]'
-    text = scene("[1, 2, 2.5]", "[0.5, 0.25, 1]", "12000", push)
+    """Windows show that errors are made ever faster, as the body spins up."""
+    text = scene("[1, 2, 2.5]", "[0.5, 0.25, 1]", "12000", PUSH)
     run = run_text(text)
     accuracy = run.summary["accuracy"]
     assert 0 < accuracy["examined_share"] < 0.5
