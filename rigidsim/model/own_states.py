@@ -33,6 +33,8 @@ _MARGIN = 1.0625
 """Over the largest value seen, so that one that tends to a power of two keeps its unit."""
 _TRIAL_STEPS = 300
 _TRIAL_TOLERANCE = 1e-6
+_MOST_GROWTH = 100  # bits
+_STALLED = 0.01  # of the time of a trial in the second half of its steps: near a pole they tell nothing
 _GROWS = 1.5  # from the first half of a trial to the second: as much again for each half that follows
 
 
@@ -139,16 +141,21 @@ def first_units(scene: Scene, time: int) -> dict[str, int]:
 
 
 def units_along(scene: Scene, sizes: Mapping[str, Any]) -> dict[str, int]:
-    """Exponents by sizes (mpf, SI), and by initial values."""
-    context, states = scene.context, scene.states
-    return {x.name: exponent(context, context.maximum([abs(x.initial), sizes[x.name]])) for x in states}
+    """Exponents by sizes (mpf, SI), and by initial values, which keep their digits in single precision."""
+    context, found = scene.context, {}
+    for state in scene.states:
+        start = abs(state.initial)
+        unit = exponent(context, context.maximum([start, sizes[state.name]]))
+        found[state.name] = unit if start == 0 else min(unit, exponent(context, start) + _MOST_GROWTH)
+    return found
 
 
 def sizes_along(
     scene: Scene, units: Mapping[str, int], blocks: Iterable[StateBlock], begin: float, end: float
 ) -> dict[str, Any]:
     """About the largest values (mpf, SI) that the states reach, by a rough integration of the equations in
-    double precision: those that still grow at its end are taken to go on as they did.
+    double precision: those that still grow at its end are taken to go on as they did, and those of a motion
+    that breaks down on the way to have their first ones.
 
     Args:
         begin, end: of the run, internal units.
@@ -171,6 +178,9 @@ def sizes_along(
         if engine.time >= end:
             break
     moments, sizes = np.array(times), np.array(values)
+    slow = moments[-1] - moments[len(moments) // 2] < _STALLED * (moments[-1] - moments[0])
+    if moments[-1] < end and (slow or outcome == hy.taylor_outcome.err_nf_state):
+        return {name: scene.context.ldexp(1, unit) for name, unit in units.items()}
     early = moments <= (moments[0] + moments[-1]) / 2
     first, last = sizes[early].max(axis=0), sizes.max(axis=0)
     halves = 2 * (end - moments[-1]) / max(moments[-1] - moments[0], 1e-300)

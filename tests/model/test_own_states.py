@@ -290,3 +290,14 @@ def test_what_can_t_carry_them_says_so() -> None:
 def test_pictures_show_them() -> None:
     run = run_text(config(more=FILTER + PENDULUM, time="end = 10\nsamples = 101", **SPIN))
     assert [axes.get_ylabel() for axes in run.plot("states").axes] == ["value [rad/s]", "value [deg]"]
+
+
+def test_a_state_with_a_pole_ends_the_run_there() -> None:
+    """a' = a^2 from 1: a = 1 / (1 - t). Its unit isn't that of the pole, where steps would pass over it."""
+    run = run_text(config(more=state("a", "a^2", 1), time="end = 3\nsamples = 61"))
+    assert run.status == "stopped: non-finite state"
+    data = loaded(run)
+    t = data["time"].values
+    assert 0.9 < t[-1] < 1.01
+    before = t < 0.99
+    np.testing.assert_allclose(data["a"].values[before], 1 / (1 - t[before]), rtol=1e-12)
