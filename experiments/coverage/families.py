@@ -257,6 +257,39 @@ def _gyrostat(draw: Draw) -> None:
         )
 
 
+def _laws(draw: Draw) -> None:
+    """States of one's own in the torque: filters, slosh, an integral behind limits, a phase that grows, an
+    oscillator of its own.
+    """
+    draw.body(draw.moments(), turned=draw.sometimes(0.3))
+    draw.start(draw.direction() * draw.between(0.1, 2))
+    size = draw.mass * draw.length**2 / draw.time**2
+    draw.parameters += [
+        f"k = {size * draw.decades(-2.5, -0.7)!r}",
+        f"n = {draw.decades(-1, 0.7) / draw.time!r}",
+        f"most = {size * draw.decades(-2, -0.5)!r}",
+    ]
+    start, place = draw.between(-0.3, 0.3), int(draw.random.integers(5))
+    torque, states = [
+        ('["-k*a/n", "0.3*k*a/n", "0"]', [("a", "n*(wx - a)", 0.0), ("b", "n*(a - b)", 0.0)]),
+        ('["k*a", "0", "0.2*k*b"]', [("a", "b*n", start), ("b", "-n*a - 0.05*n*b + 0.1*wy", 0.0)]),
+        (
+            '["max(-most, min(most, -k*(2*qw*qx + wx/n + 0.1*a)))", "-0.1*k*wy/n", "0"]',
+            [("a", "2*n*qw*qx", 0.0)],
+        ),
+        ('["k*sin(a)", "0", "0.5*k*cos(a/3)"]', [("a", "n + wx^2/n", start)]),
+        ('["k*a", "0.3*k*b*qx*qw", "0"]', [("a", "n*b", 1.0), ("b", "n*((1 - a^2)*b - a)", start)]),
+    ][place]
+    draw.load("torque", f"components = {torque}")
+    for name, derivative, initial in states:
+        draw.more += [
+            "[[states]]",
+            f'name = "{name}"',
+            f'derivative = "{derivative}"',
+            f"initial = {initial!r}",
+        ]
+
+
 FAMILIES: dict[str, Family] = {
     "central gravity": Family(KINDS["central gravity"], (1.0, 3.0)),
     "eccentric orbit": Family(_eccentric, (1.3, 3.5)),
@@ -281,6 +314,7 @@ FAMILIES: dict[str, Family] = {
     "late switch": Family(switch, (2.0, 4.0), finish=put_late),
     "late spike": Family(spike, (2.0, 4.0), finish=put_late),
     "gyrostat": Family(_gyrostat, (1.0, 3.0)),
+    "states and laws": Family(_laws, (1.0, 3.0)),
     "long ephemeris": Family(_ephemeris, (1.5, 2.7), epochs=(1950, 2100)),
 }
 """By the name under which the table shows them."""
@@ -302,7 +336,7 @@ def coverage_scene(number: int, seed: int = 1) -> CoverageScene:
     if family.epochs is not None:
         span.append(f'epoch = "{draw.random.integers(*family.epochs)}-01-01T12:00:00 TDB"')
     formulation = str(draw.random.choice(_FORMULATIONS))
-    if name in ("long, regular", "gyrostat") and formulation == "canonical":
+    if name in ("long, regular", "gyrostat", "states and laws") and formulation == "canonical":
         formulation = "quaternion"
     integrator = [f'formulation = "{formulation}"']
     kind = draw.random.random()
