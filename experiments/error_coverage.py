@@ -145,6 +145,9 @@ def broken_promises(judged: Sequence[Judged]) -> list[str]:
     alarms = [one.number for one in judged if one.gone and one.true < FALSE_ALARM]
     if alarms:
         problems.append(f"digits said to be gone where less than {FALSE_ALARM} rad is true: {alarms}")
+    drifting = [one.number for one in judged if one.drifting]
+    if drifting:
+        problems.append(f"claimed as invariants that drift even with more digits: {drifting}")
     broken = [one.number for one in judged if one.ended in ("broken", "no truth")]
     if broken:
         problems.append(f"broken: {broken}")

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from experiments.coverage import carried
 from experiments.coverage.hyperbolic import HYPERBOLIC, hyperbolic_average
 from experiments.coverage.moments import put_late, spike, switch
 from experiments.random_scenes import KINDS, Draw
@@ -29,6 +30,7 @@ class Family:
         averaged: whether it is an averaged model, which has its own states and settings.
         finish: writes what depends on the end of the run, s.
         epochs: years between which the run's is drawn; None without one.
+        canonical: whether canonical variables take part.
     """
 
     draw: Callable[[Draw], None]
@@ -36,6 +38,7 @@ class Family:
     averaged: bool = False
     finish: Callable[[Draw, float], None] | None = None
     epochs: tuple[int, int] | None = None
+    canonical: bool = True
 
 
 @dataclass(frozen=True)
@@ -225,71 +228,6 @@ def _ephemeris(draw: Draw) -> None:
         )
 
 
-def _gyrostat(draw: Draw) -> None:
-    """One to three rotors, free, at a fixed rate or driven, with momenta of a hundredth to thirty of the
-    body's; a third of them on an orbit.
-    """
-    moments, size = draw.moments(), draw.mass * draw.length**2
-    draw.body(moments, turned=draw.sometimes(0.3))
-    draw.start(draw.direction() * draw.between(0.1, 2))
-    for k in range(int(draw.random.integers(1, 4))):
-        moment = float(0.025 * min(moments) * draw.between(0.02, 1)) * size
-        rate = draw.decades(-2, 1.5) * size / draw.time / moment * (1 if draw.sometimes(0.5) else -1)
-        axis = [float(x) for x in draw.direction()]
-        draw.more += ["[[rotors]]", f'name = "w{k}"', f"axis = {axis}", f"moment = {moment!r}"]
-        draw.more.append(f"rate = {rate!r}")
-        kind = draw.random.choice(["free", "fixed", "driven"])
-        if kind == "fixed":
-            draw.more.append("fixed = true")
-        if kind == "driven":
-            limit = size / draw.time**2 * draw.decades(-3, -1.3)
-            draw.parameters += [f"k{k} = {limit!r}", f"n{k} = {draw.between(0.1, 2) / draw.time!r}"]
-            law = draw.random.choice(
-                [f"sin(n{k}*t)", f"-wx/n{k}", "qx*qw", f"-rate_w{k}/{abs(rate)!r}", f"tanh((wz-wx)/n{k})"]
-            )
-            draw.more.append(f'torque = "k{k}*({law})"')
-    if draw.sometimes(0.3):
-        axis_of_orbit, motion = 1e3 * draw.length, draw.between(0.05, 0.4) / draw.time
-        draw.load(
-            "gravity_gradient",
-            f"gravitational_parameter = {motion**2 * axis_of_orbit**3!r}",
-            f"orbit = {{semi_major_axis = {axis_of_orbit!r}, eccentricity = 0.1}}",
-        )
-
-
-def _laws(draw: Draw) -> None:
-    """States of one's own in the torque: filters, slosh, an integral behind limits, a phase that grows, an
-    oscillator of its own.
-    """
-    draw.body(draw.moments(), turned=draw.sometimes(0.3))
-    draw.start(draw.direction() * draw.between(0.1, 2))
-    size = draw.mass * draw.length**2 / draw.time**2
-    draw.parameters += [
-        f"k = {size * draw.decades(-2.5, -0.7)!r}",
-        f"n = {draw.decades(-1, 0.7) / draw.time!r}",
-        f"most = {size * draw.decades(-2, -0.5)!r}",
-    ]
-    start, place = draw.between(-0.3, 0.3), int(draw.random.integers(5))
-    torque, states = [
-        ('["-k*a/n", "0.3*k*a/n", "0"]', [("a", "n*(wx - a)", 0.0), ("b", "n*(a - b)", 0.0)]),
-        ('["k*a", "0", "0.2*k*b"]', [("a", "b*n", start), ("b", "-n*a - 0.05*n*b + 0.1*wy", 0.0)]),
-        (
-            '["max(-most, min(most, -k*(2*qw*qx + wx/n + 0.1*a)))", "-0.1*k*wy/n", "0"]',
-            [("a", "2*n*qw*qx", 0.0)],
-        ),
-        ('["k*sin(a)", "0", "0.5*k*cos(a/3)"]', [("a", "n + wx^2/n", start)]),
-        ('["k*a", "0.3*k*b*qx*qw", "0"]', [("a", "n*b", 1.0), ("b", "n*((1 - a^2)*b - a)", start)]),
-    ][place]
-    draw.load("torque", f"components = {torque}")
-    for name, derivative, initial in states:
-        draw.more += [
-            "[[states]]",
-            f'name = "{name}"',
-            f'derivative = "{derivative}"',
-            f"initial = {initial!r}",
-        ]
-
-
 FAMILIES: dict[str, Family] = {
     "central gravity": Family(KINDS["central gravity"], (1.0, 3.0)),
     "eccentric orbit": Family(_eccentric, (1.3, 3.5)),
@@ -299,7 +237,7 @@ FAMILIES: dict[str, Family] = {
     "close pass": Family(_close_pass, (0.3, 1.7)),
     "several attractors": Family(_attractors, (0.3, 1.7)),
     "pushed flight": Family(_pushed_flight, (1.0, 3.0)),
-    "long, regular": Family(_long_regular, (3.0, 5.0)),
+    "long, regular": Family(_long_regular, (3.0, 5.0), canonical=False),
     "free body": Family(KINDS["asymmetric"], (1.0, 4.3)),
     "free, near separatrix": Family(KINDS["near separatrix"], (1.0, 3.5)),
     "heavy symmetric top": Family(KINDS["heavy symmetric top"], (1.0, 3.7)),
@@ -313,9 +251,14 @@ FAMILIES: dict[str, Family] = {
     HYPERBOLIC: Family(hyperbolic_average, (0.18, 0.9), averaged=True),
     "late switch": Family(switch, (2.0, 4.0), finish=put_late),
     "late spike": Family(spike, (2.0, 4.0), finish=put_late),
-    "gyrostat": Family(_gyrostat, (1.0, 3.0)),
-    "states and laws": Family(_laws, (1.0, 3.0)),
+    "gyrostat": Family(carried.gyrostat, (1.0, 3.0), canonical=False),
+    "states and laws": Family(carried.laws, (1.0, 3.0), canonical=False),
     "long ephemeris": Family(_ephemeris, (1.5, 2.7), epochs=(1950, 2100)),
+    "heavy gyrostat": Family(carried.heavy_gyrostat, (1.0, 2.7), canonical=False),
+    "gyrostat in flight": Family(carried.gyrostat_in_flight, (1.0, 2.7), canonical=False),
+    "controller": Family(carried.controller, (1.0, 2.5), canonical=False),
+    "filter": Family(carried.lagging, (1.0, 3.0), canonical=False),
+    "slosh": Family(carried.slosh, (1.0, 3.0), canonical=False),
 }
 """By the name under which the table shows them."""
 
@@ -336,7 +279,7 @@ def coverage_scene(number: int, seed: int = 1) -> CoverageScene:
     if family.epochs is not None:
         span.append(f'epoch = "{draw.random.integers(*family.epochs)}-01-01T12:00:00 TDB"')
     formulation = str(draw.random.choice(_FORMULATIONS))
-    if name in ("long, regular", "gyrostat", "states and laws") and formulation == "canonical":
+    if formulation == "canonical" and not family.canonical:
         formulation = "quaternion"
     integrator = [f'formulation = "{formulation}"']
     kind = draw.random.random()

@@ -41,6 +41,7 @@ class Judged:
         true, announced: largest attitude error at the samples, the end among them, rad.
         true_place, announced_place: of the position, m; nan where there is none.
         warned: codes of the warnings but "digits are gone"; ``gone``: that one.
+        drifting: invariants that are none: those of the better solution that drift beyond their bound.
         estimate_seconds, run_seconds: CPU, of the estimate and the integration.
     """
 
@@ -56,6 +57,7 @@ class Judged:
     announced_place: float = math.nan
     gone: bool = False
     warned: str = ""
+    drifting: str = ""
     estimate_seconds: float = 0.0
     run_seconds: float = 0.0
     cpu_seconds: float = 0.0
@@ -64,6 +66,7 @@ class Judged:
     def line(self) -> str:
         """As the campaign goes."""
         place, more = "", [self.warned] if self.warned else []
+        more += [f"no invariant: {self.drifting}"] * bool(self.drifting)
         if not math.isnan(self.true_place):
             place = f", place {self.true_place:.1e}/{self.announced_place:.1e}"
         ratio = self.true / max(self.announced, 1e-300)
@@ -123,7 +126,7 @@ def judge(scene: CoverageScene) -> Judged:
     estimated = time.process_time() - before
     assert found.estimate is not None
     codes = [c.code for c in found.cautions()]
-    truth = _truth(scene, asked, prepared)
+    truth, drifting = _truth(scene, asked, prepared)
     if truth is None:
         return replace(begin, ended="no truth", cpu_seconds=time.process_time() - started)
     announced = found.estimate.attitude
@@ -140,6 +143,7 @@ def judge(scene: CoverageScene) -> Judged:
         warned=" ".join(
             sorted({c.value for c in codes if c not in GONE and c is not WarningCode.NOT_JOINED})
         ),
+        drifting=" ".join(drifting),
         estimate_seconds=estimated,
         cpu_seconds=time.process_time() - started,
     )
@@ -167,18 +171,18 @@ def gone_through(
 
 def _truth(
     scene: CoverageScene, asked: list[str], prepared: InitialValueProblem
-) -> dict[str, Vectors] | None:
+) -> tuple[dict[str, Vectors] | None, list[str]]:
     """The samples by a better solution: exact where a kink leaves no other, or where integrations might share
-    what is wrong; else with more digits.
+    what is wrong; else with more digits, with the names of the invariants that drift there.
     """
     if scene.family in ("kink", "late switch", "late spike"):
         last = prepared.scene.samples.last
         times = [last * n / (SAMPLES - 1) for n in range(SAMPLES)]
         with mpmath.workdps(moments.DIGITS):  # else times are rounded to doubles
             if scene.family == "kink":
-                return {"quaternion": [kinked_attitude(prepared, mpmath.mpf(time)) for time in times]}
+                return {"quaternion": [kinked_attitude(prepared, mpmath.mpf(time)) for time in times]}, []
             angles = [moments.turned(prepared, scene.text, mpmath.mpf(time)) for time in times]
-            return {"quaternion": [turned_attitude(prepared, 2, angle) for angle in angles]}
+            return {"quaternion": [turned_attitude(prepared, 2, angle) for angle in angles]}, []
     precision = _TRUTH[prepared.precision.name]
     if precision == "extended" and "tolerance" in scene.text:
         precision = "double" if prepared.effective_tolerance > 1e-10 else "extended"
@@ -193,12 +197,13 @@ def _truth(
         found = replace(found, precision=replace(found.precision, compact=True))
         seen, progress, *_ = gone_through(found, 2 * MOST_STEPS)
     except ConfigError:
-        return None
+        return None, []
     if progress.status is not Status.FINISHED:
-        return None
-    return {
-        name: seen.exact(name) for name in asked[0].split("=")[1].strip("[]").replace('"', "").split(", ")
-    }
+        return None, []
+    bound = float(found.drift_bound(progress.steps))
+    drifting = [name for name, drift in seen.statistics.largest.items() if not drift <= bound]
+    names = asked[0].split("=")[1].strip("[]").replace('"', "").split(", ")
+    return {name: seen.exact(name) for name in names}, drifting
 
 
 def kinked_attitude(prepared: InitialValueProblem, end: mpmath.mpf) -> list[mpmath.mpf]:

@@ -1,0 +1,194 @@
+"""Random scenes with rotors and states of one's own: gyrostats, controllers, filters, slosh."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from experiments.random_scenes import Draw
+
+
+def rotors(draw: Draw, moments: Sequence[float]) -> None:
+    """One to three, free, at a fixed rate or driven, with momenta of a hundredth to thirty of the body's."""
+    size = draw.mass * draw.length**2
+    for k in range(int(draw.random.integers(1, 4))):
+        moment = float(0.025 * min(moments) * draw.between(0.02, 1)) * size
+        rate = draw.decades(-2, 1.5) * size / draw.time / moment * (1 if draw.sometimes(0.5) else -1)
+        axis = [float(x) for x in draw.direction()]
+        draw.more += ["[[rotors]]", f'name = "w{k}"', f"axis = {axis}", f"moment = {moment!r}"]
+        draw.more.append(f"rate = {rate!r}")
+        kind = draw.random.choice(["free", "fixed", "driven"])
+        if kind == "fixed":
+            draw.more.append("fixed = true")
+        if kind == "driven":
+            limit = size / draw.time**2 * draw.decades(-3, -1.3)
+            draw.parameters += [f"k{k} = {limit!r}", f"n{k} = {draw.between(0.1, 2) / draw.time!r}"]
+            law = draw.random.choice(
+                [f"sin(n{k}*t)", f"-wx/n{k}", "qx*qw", f"-rate_w{k}/{abs(rate)!r}", f"tanh((wz-wx)/n{k})"]
+            )
+            draw.more.append(f'torque = "k{k}*({law})"')
+
+
+def gyrostat(draw: Draw) -> None:
+    """A third of them on an orbit."""
+    moments = draw.moments()
+    draw.body(moments, turned=draw.sometimes(0.3))
+    draw.start(draw.direction() * draw.between(0.1, 2))
+    rotors(draw, moments)
+    if draw.sometimes(0.3):
+        axis_of_orbit, motion = 1e3 * draw.length, draw.between(0.05, 0.4) / draw.time
+        draw.load(
+            "gravity_gradient",
+            f"gravitational_parameter = {motion**2 * axis_of_orbit**3!r}",
+            f"orbit = {{semi_major_axis = {axis_of_orbit!r}, eccentricity = 0.1}}",
+        )
+
+
+def heavy_gyrostat(draw: Draw) -> None:
+    """A top with wheels; in a third of them the body and its first wheel are symmetric about one axis."""
+    moments = draw.moments()
+    if draw.sometimes(0.3):
+        moments[1] = moments[0] = max(moments[0], 0.6 * moments[2])
+        draw.body(moments, [0, 0, draw.between(0.2, 1)])
+    else:
+        draw.body(moments, draw.direction() * draw.between(0.2, 1))
+    draw.start(draw.direction() * draw.between(0.5, 3))
+    draw.gravity(draw.decades(-2, 0))
+    rotors(draw, moments)
+
+
+def gyrostat_in_flight(draw: Draw) -> None:
+    """Six degrees of freedom about an attractor."""
+    moments = draw.moments()
+    draw.body(moments)
+    distance, motion = draw.decades(1.5, 3), draw.between(0.05, 0.4)
+    speed, tilt = motion * distance * draw.between(0.9, 1.1), draw.between(0, 3)
+    draw.start(
+        draw.direction() * draw.between(0.1, 2),
+        position=[distance, 0, 0],
+        velocity=[0, speed * math.cos(tilt), speed * math.sin(tilt)],
+    )
+    strength = motion**2 * distance**3 * draw.length**3 / draw.time**2
+    draw.load("central_gravity", f"gravitational_parameter = {strength!r}")
+    rotors(draw, moments)
+
+
+def _state(draw: Draw, name: str, derivative: str, initial: float = 0.0) -> None:
+    draw.more += ["[[states]]", f'name = "{name}"', f'derivative = "{derivative}"', f"initial = {initial!r}"]
+
+
+def controller(draw: Draw) -> None:
+    """A law of attitude, rate and integral, by torques or by wheels, with limits in half of them, against a
+    steady or slowly changing disturbance.
+    """
+    moments = draw.moments()
+    size = draw.mass * draw.length**2
+    draw.body(moments)
+    draw.start(draw.direction() * draw.decades(-3, 0))
+    torque = size / draw.time**2
+    stiffness = draw.decades(-2, 0)
+    draw.parameters += [
+        f"k = {torque * stiffness!r}",
+        f"d = {torque * draw.time * math.sqrt(stiffness) * draw.between(0.05, 2)!r}",
+        f"i = {torque / draw.time * stiffness * draw.between(0.001, 0.1)!r}",
+        f"most = {torque * stiffness * draw.between(0.05, 0.5)!r}",
+        f"p = {torque * stiffness * draw.decades(-3, -1.5)!r}",
+        f"n = {draw.between(0.05, 1) / draw.time!r}",
+    ]
+    limited, wheels = draw.sometimes(0.5), draw.sometimes(0.5)
+    laws = []
+    for axis in "xyz":
+        law = f"2*k*qw*q{axis} + d*w{axis} + i*sum_{axis}"
+        laws.append(f"max(-most, min(most, {law}))" if limited else law)
+        _state(draw, f"sum_{axis}", f"2*qw*q{axis}")
+    if wheels:
+        moment = 0.02 * float(min(moments)) * size
+        for k, (axis, law) in enumerate(zip("xyz", laws, strict=True)):
+            unit = [float(j == k) for j in range(3)]
+            draw.more += ["[[rotors]]", f'name = "w{axis}r"', f"axis = {unit}", f"moment = {moment!r}"]
+            draw.more += [f'torque = "{law}"', f"rate = {draw.between(-10, 10) / draw.time!r}"]
+    else:
+        draw.load("torque", f"components = {[f'-({law})' for law in laws]}".replace("'", '"'))
+    draw.load(
+        "torque", 'components = ["p", "p*sin(n*t)", "-p/3"]', f'frame = "{"body" if limited else "space"}"'
+    )
+
+
+def lagging(draw: Draw) -> None:
+    """Filtered rates, an actuator that lags behind its command, an oscillator, a count of angle."""
+    draw.body(draw.moments(), turned=draw.sometimes(0.3))
+    draw.start(draw.direction() * draw.between(0.2, 2))
+    torque = draw.mass * draw.length**2 / draw.time**2
+    draw.parameters += [
+        f"k = {torque * draw.time * draw.decades(-3, -1)!r}",
+        f"lag = {draw.time * draw.decades(-1, 1)!r}",
+        f"n = {draw.between(0.3, 3) / draw.time!r}",
+        f"p = {torque * draw.decades(-3, -1)!r}",
+    ]
+    _state(draw, "seen", "(wx - seen)/lag", draw.between(-1, 1) / draw.time)
+    _state(draw, "push", "(p*sin(n*t) - push)/lag")
+    _state(draw, "angle", "wz")
+    components = ["-k*seen", "push", "0"]
+    if draw.sometimes(0.5):
+        _state(draw, "one", "n*two", draw.decades(-3, 3))
+        _state(draw, "two", "-n*one")
+        components[2] = "p*sin(angle + one)"
+    draw.load("torque", f"components = {components}".replace("'", '"'))
+
+
+def slosh(draw: Draw) -> None:
+    """One or two damped pendulums that swing against the body, or a wheel on a spring; a quarter of them on
+    an orbit.
+    """
+    moments = draw.moments()
+    draw.body(moments)
+    draw.start(draw.direction() * draw.between(0.2, 2))
+    size = draw.mass * draw.length**2
+    components = ["0", "0", "0"]
+    for k in range(int(draw.random.integers(1, 3))):
+        axis = "xyz"[k]
+        draw.parameters += [
+            f"j{k} = {0.1 * size * float(min(moments)) * draw.decades(-2, 0)!r}",
+            f"n{k} = {draw.decades(-1, 0.7) / draw.time!r}",
+            f"c{k} = {draw.decades(-3, -0.5) / draw.time!r}",
+        ]
+        _state(draw, f"slosh{k}", f"swing{k} - w{axis}", draw.between(-0.1, 0.1))
+        back = f"n{k}^2*sin(slosh{k})" if draw.sometimes(0.5) else f"n{k}^2*slosh{k}"
+        _state(draw, f"swing{k}", f"-{back} - c{k}*(swing{k} - w{axis})", draw.between(-0.1, 0.1) / draw.time)
+        components[k] = f"j{k}*({back} + c{k}*(swing{k} - w{axis}))"
+    draw.load("torque", f"components = {components}".replace("'", '"'))
+    if draw.sometimes(0.25):
+        axis_of_orbit, motion = 1e3 * draw.length, draw.between(0.05, 0.4) / draw.time
+        draw.load(
+            "gravity_gradient",
+            f"gravitational_parameter = {motion**2 * axis_of_orbit**3!r}",
+            f"orbit = {{semi_major_axis = {axis_of_orbit!r}, eccentricity = 0.1}}",
+        )
+
+
+def laws(draw: Draw) -> None:
+    """States of one's own in the torque: filters, slosh, an integral behind limits, a phase that grows, an
+    oscillator of its own.
+    """
+    draw.body(draw.moments(), turned=draw.sometimes(0.3))
+    draw.start(draw.direction() * draw.between(0.1, 2))
+    size = draw.mass * draw.length**2 / draw.time**2
+    draw.parameters += [
+        f"k = {size * draw.decades(-2.5, -0.7)!r}",
+        f"n = {draw.decades(-1, 0.7) / draw.time!r}",
+        f"most = {size * draw.decades(-2, -0.5)!r}",
+    ]
+    start, place = draw.between(-0.3, 0.3), int(draw.random.integers(5))
+    torque, states = [
+        ('["-k*a/n", "0.3*k*a/n", "0"]', [("a", "n*(wx - a)", 0.0), ("b", "n*(a - b)", 0.0)]),
+        ('["k*a", "0", "0.2*k*b"]', [("a", "b*n", start), ("b", "-n*a - 0.05*n*b + 0.1*wy", 0.0)]),
+        (
+            '["max(-most, min(most, -k*(2*qw*qx + wx/n + 0.1*a)))", "-0.1*k*wy/n", "0"]',
+            [("a", "2*n*qw*qx", 0.0)],
+        ),
+        ('["k*sin(a)", "0", "0.5*k*cos(a/3)"]', [("a", "n + wx^2/n", start)]),
+        ('["k*a", "0.3*k*b*qx*qw", "0"]', [("a", "n*b", 1.0), ("b", "n*((1 - a^2)*b - a)", start)]),
+    ][place]
+    draw.load("torque", f"components = {torque}")
+    for name, derivative, initial in states:
+        _state(draw, name, derivative, initial)
