@@ -17,18 +17,28 @@ from typing import Any
 from rigidsim.model.capabilities import gradient_source_of
 from rigidsim.model.load import loads_of
 from rigidsim.scene import attitude
-from rigidsim.scene.arithmetic import Matrix, Vector, apply, cross, dot, multiply, norm, transpose
+from rigidsim.scene.arithmetic import (
+    Matrix,
+    Vector,
+    apply,
+    cross,
+    dot,
+    multiply,
+    norm,
+    transpose,
+    working_bits,
+)
 from rigidsim.scene.orbits import KeplerOrbit
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.starts import InitialRotation, refusal
 from rigidsim.solve.equilibria.colombo import AveragedState, Colombo, doubles
-from rigidsim.solve.equilibria.exponents import exponents_of
 from rigidsim.solve.equilibria.motion import Lost, Pose, PoseMotion, turned, widths
-from rigidsim.solve.equilibria.newton import Newton, NotFound
+from rigidsim.solve.equilibria.newton import Newton, NotFound, exponents_of
 from rigidsim.solve.equilibria.search import SoughtReturn, search_for
-from rigidsim.solve.precision import Precision
 from rigidsim.store.summary import FoundStart
 
+_SWIFT = 60  # turns from one return to the next
+_DOUBLE = 53  # bits
 _NEAR = 0.1  # rad of obliquity from the averaged state
 
 
@@ -42,11 +52,16 @@ def cassini_state(scene: Scene, number: int) -> InitialRotation:
     search = search_for(scene, name)
     state = _averaged(search, number, name)
     pose = _begin(search, state)
-    found, linear, precision = _return(search, pose, name)
+    found, linear, bits, sure = _return(search, pose, name)
     period = search.period
     if search.slow is not None:
-        linear, period = _return(search.slow, _begin(search.slow, state), name)[1], search.slow.period
-    exponents, stable = exponents_of(context, linear, 2 * context.pi / period, period)
+        _, linear, _, sure = _return(search.slow, _begin(search.slow, state), name)
+        period = search.slow.period
+    nutation = None
+    if search.turns is None:
+        moments = search.scene.body.principal_moments
+        nutation = max(moments) / min(moments) * search.rate * period
+    exponents, stable = exponents_of(context, linear, sure / period, period, nutation)
     pole = apply(found.matrix, search.axes[2])
     normal = replace(search.orbit, ascending_node=_node(search.orbit, scene.start)).normal(context)
     tilt, lean = (context.atan2(norm(context, cross(pole, v)), dot(pole, v)) for v in (normal, [0, 0, 1]))
@@ -65,11 +80,11 @@ def cassini_state(scene: Scene, number: int) -> InitialRotation:
     told = FoundStart(
         name=name,
         described=f"Cassini state {number}, {step}: figure axis {where}; {words}",
-        how=search.how,
+        how=search.how + (" (in double precision)" if bits <= _DOUBLE else ""),
         exponents=exponents,
         stable=stable,
     )
-    return found.start(context, precision.bits, told)
+    return found.start(context, bits, told)
 
 
 # --- where it begins ----------------------------------------------------------------------------------------
@@ -118,17 +133,25 @@ def _begin(search: SoughtReturn, state: AveragedState) -> Pose:
 # --- what comes back ----------------------------------------------------------------------------------------
 
 
-def _return(search: SoughtReturn, pose: Pose, name: str) -> tuple[Pose, Matrix, Precision]:
-    """The pose that comes back, the map over T about it, and the arithmetic in which it was found."""
+def _return(search: SoughtReturn, pose: Pose, name: str) -> tuple[Pose, Matrix, int, Any]:
+    """The pose that comes back, the map over T about it, the bits to which the pose is known, and the map's
+    uncertainty.
+    """
     scene, context = search.scene, search.scene.context
     levels = widths(scene)
-    if search.revolutions > 2:  # on an orbit that isn't quite the scene's
-        levels = levels[:1]
+    rounds = search.period * search.rate / (2 * context.pi)
+    lost = 4 + int(context.ceil(context.log(max(rounds, 1), 2)))  # bits, to rounding along the way
+    swift = rounds > _SWIFT
+    if search.revolutions > 2 or (
+        swift and working_bits(scene.config.integrator.precision) <= levels[0].bits
+    ):
+        levels = levels[:1]  # on an orbit that isn't quite the scene's, or where more digits take minutes
     a, b, c = search.axes
     basis = [a, b] if search.turns is None else [a, b, c]
     count = len(basis)
     back = turned(context, [context.zero, context.zero, -search.orbit.node_rate * search.period])
     known: Matrix = []
+    sure = context.zero
     for level, precision in enumerate(levels):
         motion = PoseMotion(scene, precision)
 
@@ -155,10 +178,11 @@ def _return(search: SoughtReturn, pose: Pose, name: str) -> tuple[Pose, Matrix, 
                 change = [x - y + dot(inside, c) * z for x, y, z in zip(change, inside, c, strict=True)]
             return at.moved(context, turn, change)
 
-        newton = Newton(context, precision.bits, residual, moved, 2 * count)
+        newton = Newton(context, precision.bits - lost, residual, moved, 2 * count)
         try:
-            if level < 2:  # in more digits two thirds of quadruple precision's are enough
+            if level < (1 if swift else 2):  # in more digits those of a narrower one's are enough
                 known = newton.slope(pose)
+                sure = newton.uncertainty
             pose = newton.settled(pose, known)
         except (NotFound, Lost, ZeroDivisionError):
             what = (
@@ -166,7 +190,7 @@ def _return(search: SoughtReturn, pose: Pose, name: str) -> tuple[Pose, Matrix, 
             )
             raise refusal("equilibrium", what) from None
     linear = [[x + (i == j) for j, x in enumerate(row)] for i, row in enumerate(known)]
-    return pose, linear, levels[-1]
+    return pose, linear, levels[-1].bits, sure
 
 
 # --- in words -----------------------------------------------------------------------------------------------

@@ -51,9 +51,9 @@ class Pose:
         return Pose(multiply(self.matrix, turned(context, turn)), rates)
 
     def start(self, context: Any, bits: int, found: FoundStart) -> InitialRotation:
-        """The start that it is, known to so many bits: what is smaller is the rounding of a zero."""
+        """The start that it is, found in so many bits: what is smaller is the rounding of a zero."""
         quaternion = attitude.quaternion_from_matrix(context, self.matrix)
-        size, least = norm(context, self.rates), context.ldexp(1, 16 - bits)
+        size, least = norm(context, self.rates), context.ldexp(1, 8 - bits)
         plain = [x if abs(x) > least else context.zero for x in quaternion]
         rates = [w if abs(w) > least * size else context.zero for w in self.rates]
         return InitialRotation(attitude.unit_quaternion(context, plain), rates, found=found)

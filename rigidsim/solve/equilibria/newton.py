@@ -1,4 +1,6 @@
-"""Newton's method in mpf with central differences, for few unknowns that may be degenerate."""
+"""Newton's method in mpf with central differences, for few unknowns that may be degenerate, and exponents by
+which motions near a zero go on.
+"""
 
 from __future__ import annotations
 
@@ -10,6 +12,7 @@ from rigidsim.scene.arithmetic import Matrix, Vector, norm
 
 Function = Callable[[Vector], Vector]
 _HALVINGS, _ROUNDS = 8, 40
+_STILL = 1e-9
 _PATIENCE = 4  # rounds without gain
 _CLOSE = 1e-6
 """Residual up to which a whole step may make it larger: where some directions count far less than others, it
@@ -70,6 +73,11 @@ class Newton:
     moved: Callable[[Any, Vector], Any]
     unknowns: int
 
+    @property
+    def uncertainty(self) -> Any:
+        """Of eigenvalues of a Jacobian whose elements are about 1, at a point that is nearly the zero."""
+        return max(self.context.ldexp(16, -(2 * self.bits // 3)), self.context.mpf(_STILL))
+
     def slope(self, at: Any) -> Matrix:
         """Jacobian at a point."""
         return jacobian(
@@ -112,3 +120,32 @@ class Newton:
         if best[0] > near:
             raise NotFound
         return best[1]
+
+
+# --- what becomes of small displacements ------------------------------------------------------------------
+
+
+def exponents_of(
+    context: Any, matrix: Matrix, still: Any, period: Any | None = None, nutation: Any | None = None
+) -> tuple[tuple[tuple[float, float], ...], bool]:
+    """Exponents (1/s) of a linear system's matrix, or of its map over a period (s), as of ``FoundStart``, and
+    whether none grows.
+
+    Args:
+        still: uncertainty of the exponents, 1/s, below which a part of one is zero.
+        nutation: angle (rad) of a fast nutation over the period, many turns of it, which is left out.
+    """
+    values, _ = context.eig(context.matrix(matrix))
+    values = list(values)
+    for sign in (1, -1) if nutation is not None else ():
+        turned = context.expj(sign * nutation)
+        values.remove(min(values, key=lambda value: abs(value - turned)))
+    if period is not None:
+        values = [context.log(value) / period for value in values]
+    found = []
+    for value in values:
+        real, imaginary = (context.zero if abs(x) <= still else x for x in (value.real, value.imag))
+        if imaginary >= 0:
+            found.append((float(real), float(imaginary)))
+    found.sort(key=lambda pair: (pair[1], pair[0]))
+    return tuple(found), all(real <= 0 for real, _ in found)

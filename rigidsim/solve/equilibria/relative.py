@@ -37,13 +37,14 @@ from rigidsim.scene.arithmetic import (
 from rigidsim.scene.orbits import KeplerOrbit
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.starts import ATTITUDES, InitialRotation, refusal
-from rigidsim.solve.equilibria.exponents import exponents_of
 from rigidsim.solve.equilibria.motion import Pose, PoseMotion, widths
-from rigidsim.solve.equilibria.newton import Newton, NotFound, jacobian
+from rigidsim.solve.equilibria.newton import Newton, NotFound, exponents_of, jacobian
 from rigidsim.store.summary import FoundStart
 
 _KEY = "equilibrium"
 _ROUNDS = 40
+_STILL = 1e-9
+"""Part of the orbit's rate below which a part of an exponent is zero: equal ones lose half of theirs."""
 _AT = 1e-9  # rad from one of the 24 attitudes
 _FAR = 1.0  # rad from the attitude that Newton's method begins at
 _LATER = "0.3819660112501051"  # of a revolution, at which loads that rest in the frame are the same
@@ -94,7 +95,7 @@ def relative_equilibrium(scene: Scene) -> InitialRotation:
         raise refusal(_KEY, f"{what}the other loads are too strong; give attitude and rates themselves")
     _refuse_passing(scene, precision, orbit, found, here)
     matrix = _linear(context, here, found, precision.bits)
-    exponents, stable = exponents_of(context, matrix, orbit.mean_motion)
+    exponents, stable = exponents_of(context, matrix, orbit.mean_motion * context.mpf(_STILL))
     told = FoundStart(
         name="relative",
         described=_described(order, stable, away),

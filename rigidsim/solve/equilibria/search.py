@@ -97,10 +97,33 @@ def search_for(scene: Scene, name: str) -> SoughtReturn:
             what = f'missing; "{name}" of a body with two equal moments can turn at any rate: give it'
             raise refusal("spin_period", what)
         return _on(scene, load, orbit, axes, None, spin)
-    turns = context.one if spin is None else context.nint(2 * spin / orbit.mean_motion) / 2
-    if spin is not None:
-        _refuse_between(scene, orbit, strength, (least, middle, most), spin, turns)
-    return _on(scene, load, orbit, axes, turns, None)
+    if spin is None:
+        return _on(scene, load, orbit, axes, context.one, None)
+    turns = context.nint(2 * spin / orbit.mean_motion) / 2
+    width = context.sqrt(3 * strength * (middle - least) / most)
+    away = abs(spin - turns * orbit.mean_motion - orbit.periapsis_rate - orbit.node_rate)
+    if turns > 0 and away <= width:
+        return _on(scene, load, orbit, axes, turns, None)
+    mean = (least + middle) / 2
+    round_body = _with_moments(scene, [most if k == order[2] else mean for k in range(3)])
+    axes = _axes(round_body, order, symmetric=True)
+    found = _on(round_body, load, orbit, axes, None, spin)
+    part = context.nstr((middle - least) / most, 2)
+    how = f"{found.how}, of a body with the mean of both smaller moments, since its rotation isn't in step "
+    how += f"with the orbit (within {context.nstr(width / spin, 2)} of the rate): to order {part}"
+    return replace(found, how=how)
+
+
+def _with_moments(scene: Scene, moments: list[Any]) -> Scene:
+    """The scene with other moments about the body's principal axes."""
+    axes = scene.body.principal_axes
+    tensors = (
+        [[sum(m * a[i] * a[j] for m, a in zip(given, axes, strict=True)) for j in range(3)] for i in range(3)]
+        for given in (moments, [1 / m for m in moments])
+    )
+    inertia, inverse = tensors
+    body = replace(scene.body, inertia=inertia, principal_moments=moments)
+    return replace(scene, body=body, turning_inertia=inertia, inverse_inertia=inverse)
 
 
 def _axes(scene: Scene, order: list[int], *, symmetric: bool) -> Matrix:
@@ -113,26 +136,6 @@ def _axes(scene: Scene, order: list[int], *, symmetric: bool) -> Matrix:
     if symmetric and abs(dot(c, figure.pole)) > 1 - 1e-12:
         a = list(figure.first)
     return [a, cross(c, a), c]
-
-
-def _refuse_between(
-    scene: Scene, orbit: KeplerOrbit, strength: Any, moments: tuple[Any, Any, Any], spin: Any, turns: Any
-) -> None:
-    """Refuse a rate of a triaxial body that isn't in step with its orbit."""
-    context, n = scene.context, orbit.mean_motion
-    width = context.sqrt(3 * strength * (moments[1] - moments[0]) / moments[2])
-    away = abs(spin - turns * n - orbit.periapsis_rate - orbit.node_rate)
-    if turns > 0 and away <= width:
-        return
-    ratio = context.nstr(spin / n, 6)
-    what = (
-        f"given {ratio} turns to a revolution of the source, for a body with three different moments, which "
-    )
-    what += "keeps a Cassini state in step alone: near a whole or half-odd number of turns (within "
-    what += (
-        f"{context.nstr(width / n, 2)}); choose such a period, or make the two smaller moments equal, their "
-    )
-    raise refusal("spin_period", what + "average over the rotation")
 
 
 def _on(
