@@ -137,8 +137,8 @@ def exponents_of(
     """
     values, _ = context.eig(context.matrix(matrix))
     values = list(values)
-    for sign in (1, -1) if nutation is not None else ():
-        turned = context.expj(sign * nutation)
+    for angle in () if nutation is None else (nutation, -nutation):
+        turned = context.expj(angle)
         values.remove(min(values, key=lambda value: abs(value - turned)))
     if period is not None:
         values = [context.log(value) / period for value in values]
