@@ -42,6 +42,7 @@ from rigidsim.scene.expressions.tree import (
     Operation,
     constant_value,
     operation,
+    placed_at,
 )
 from rigidsim.scene.validation_messages import nearest
 
@@ -274,7 +275,12 @@ class _Parser:
         span = (start, self.end)
         if name in self.names:
             readable = self.names[name]
-            return _Parsed(Name(name, span, readable), dimensions.of_name(readable))
+            node: Node = Name(readable.name, span, readable)
+            if readable.jumps and not self.jumps:
+                self.fail(f'"{name}" jumps, and a jump crosses zero nowhere; {readable.jumps}', start)
+            if readable.formula:
+                node = placed_at(parse_expression(readable.formula, readable.parts), span)
+            return _Parsed(node, dimensions.of_name(readable))
         if name in self.constants:
             number = self.constants[name]
             return _Parsed(Constant(number.alone, span), dimensions.of_number(number))

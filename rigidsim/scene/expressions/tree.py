@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from typing import Any
 
@@ -166,6 +166,16 @@ def nodes(expression: Expression) -> Iterator[Node]:
 def operations(expression: Expression) -> Iterator[Operation]:
     """Every operation, outer ones before inner ones."""
     return (node for node in nodes(expression) if isinstance(node, Operation))
+
+
+def placed_at(expression: Expression, span: tuple[int, int]) -> Node:
+    """The tree of an expression, all of which stands at one place of another text."""
+    return fold(  # type: ignore[no-any-return]
+        expression,
+        lambda node, operands: (
+            replace(node, span=span, operands=tuple(operands)) if operands else replace(node, span=span)
+        ),
+    )
 
 
 def names_used(expression: Expression) -> frozenset[str]:
