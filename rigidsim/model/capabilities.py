@@ -66,7 +66,7 @@ class Sourced(Protocol):
 
 
 @dataclass(frozen=True)
-class Place:
+class SourcePlace:
     """Place of a source as seen from the body: unit vector towards it, space axes; its distance in m is
     ``unit`` (mpf) over ``inverse``.
     """
@@ -80,9 +80,31 @@ class Place:
 class Placed(Protocol):
     """The place of its source is known, as expressions, and at the start (mpf, m, space axes)."""
 
-    def source_place(self, m: Kinematics) -> Place: ...
+    def source_place(self, m: Kinematics) -> SourcePlace: ...
 
     def source_at_start(self, scene: Scene) -> Vector: ...
+
+
+@runtime_checkable
+class Magnetic(Protocol):
+    """Its magnetic field where the body is: T, body axes, and at the start (mpf, T, space axes)."""
+
+    def flux_density(self, m: Kinematics) -> list[Symbolic]: ...
+
+    def flux_density_at_start(self, scene: Scene) -> Vector: ...
+
+    def same_field(self, other: object) -> bool: ...
+
+
+@runtime_checkable
+class FlownAbout(Placed, Protocol):
+    """A body in flight moves about its source: velocity as seen from there, space axes, in units of speed,
+    and at the start (mpf, m/s).
+    """
+
+    def motion(self, m: Kinematics) -> list[Symbolic]: ...
+
+    def motion_at_start(self, scene: Scene) -> Vector: ...
 
 
 @runtime_checkable

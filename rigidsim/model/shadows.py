@@ -26,7 +26,7 @@ from typing import Any
 import heyoka as hy
 
 from rigidsim.model.kinematics import Kinematics
-from rigidsim.model.sources import Source, read_in, sources_of
+from rigidsim.model.sources import SeenSource, read_in, sources_of
 from rigidsim.model.two_part import rounded
 from rigidsim.scene.arithmetic import GUARD_BITS, norm
 from rigidsim.scene.expressions.names import NameProvider, Readable, provides
@@ -45,8 +45,8 @@ _PARTS = {True: ("inner", "outer", "partly", "full"), False: ("outer", "full")}
 class _Pair:
     """A named source, and another one with a radius, which may cover it."""
 
-    source: Source
-    other: Source
+    source: SeenSource
+    other: SeenSource
 
     @property
     def parts(self) -> dict[str, str]:
@@ -86,7 +86,8 @@ class Shadows(NameProvider):
 
     def at_start(self, scene: Scene) -> Mapping[str, Any]:
         """Of those that are read."""
-        found, read, context = {}, read_in(scene), scene.context
+        found: dict[str, Any] = {}
+        read, context = read_in(scene), scene.context
         for pair in _pairs(scene.config):
             if not read & set(pair.parts.values()):
                 continue
@@ -95,7 +96,7 @@ class Shadows(NameProvider):
             units = [[x / r for x in place] for place, r in zip(places, far, strict=True)]
             size = pair.source.radius(context) / far[0] if pair.source.extended else None
             before = far[1] < far[0]
-            values = _Numbers(context).parts(units, size, pair.other.radius(context) / far[1], before)
+            values = _ShareInNumbers(context).parts(units, size, pair.other.radius(context) / far[1], before)
             found |= {name: values[part] for part, name in pair.parts.items()}
         return found
 
@@ -108,17 +109,18 @@ class Shadows(NameProvider):
 
     def expressions(self, m: Kinematics, names: Collection[str]) -> Mapping[str, Any]:
         """See ``NameProvider``."""
-        found, context = {}, m.scene.context
+        found: dict[str, Any] = {}
+        context = m.scene.context
         for pair in _pairs(m.scene.config):
             if not set(names) & set(pair.parts.values()):
                 continue
             here, there = (x.of(m.scene).source_place(m) for x in (pair.source, pair.other))
-            sizes = [
+            size, other = (
                 _number(m, x.radius(context) / place.unit) * place.inverse if x.extended else None
                 for x, place in ((pair.source, here), (pair.other, there))
-            ]
+            )
             before = hy.gt(_number(m, here.unit / there.unit) * there.inverse, here.inverse)
-            values = _Expressions(m).parts([here.direction, there.direction], *sizes, before)
+            values = _ShareInExpressions(m).parts([here.direction, there.direction], size, other, before)
             found |= {name: values[part] for part, name in pair.parts.items()}
         return found
 
@@ -130,7 +132,7 @@ def _pairs(config: Config) -> Iterator[_Pair]:
         yield from (_Pair(source, other) for other in others if source.name)
 
 
-class _Functions:
+class _Share:
     """The share in arithmetic that is either mpf's or heyoka's."""
 
     sin: Any
@@ -197,7 +199,7 @@ class _Functions:
         return area * self.number(1 / self._context.pi) / (a * a)
 
 
-class _Numbers(_Functions):
+class _ShareInNumbers(_Share):
     def __init__(self, context: Any) -> None:
         super().__init__(context)
         self.sin, self.asin, self.sqrt, self.atan2 = context.sin, context.asin, context.sqrt, context.atan2
@@ -212,7 +214,7 @@ class _Numbers(_Functions):
         return all(x > 0 for x in values)
 
 
-class _Expressions(_Functions):
+class _ShareInExpressions(_Share):
     sin, asin, sqrt, atan2 = map(staticmethod, (hy.sin, hy.asin, hy.sqrt, hy.atan2))
 
     def __init__(self, m: Kinematics) -> None:

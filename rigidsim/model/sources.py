@@ -30,7 +30,7 @@ _AXES = "xyz"
 
 
 @dataclass(frozen=True)
-class Source:
+class SeenSource:
     """A load whose source is at a known place.
 
     Attributes:
@@ -64,13 +64,13 @@ class Source:
         return load
 
 
-def sources_of(config: Config) -> list[Source]:
+def sources_of(config: Config) -> list[SeenSource]:
     """All loads of a config whose sources are at known places."""
     flies, found = free_flight(config), []
     for number, fields in enumerate(config.loads):
         states = fields.placed_by(free_flight=flies)
         if states is not None:
-            found.append(Source(number, fields, states | {PLACES}))
+            found.append(SeenSource(number, fields, states | {PLACES}))
     return found
 
 
@@ -104,7 +104,8 @@ class SourceNames(NameProvider):
 
     def at_start(self, scene: Scene) -> Mapping[str, Any]:
         """Of those that are read: the series of an ephemeris takes a while."""
-        found, read = {}, read_in(scene)
+        found: dict[str, Any] = {}
+        read = read_in(scene)
         for source in _named(scene.config):
             directions, far = _names(source)
             if read & {*directions, far}:
@@ -118,7 +119,7 @@ class SourceNames(NameProvider):
         self, scene: Scene, start: Mapping[str, Any], generator: random.Random
     ) -> Mapping[str, Any]:
         """Any directions, and distances about as large as at the start."""
-        found = {}
+        found: dict[str, Any] = {}
         for source in _named(scene.config):
             directions, far = _names(source)
             if far in start:
@@ -142,9 +143,9 @@ class SourceNames(NameProvider):
         return found
 
 
-def _named(config: Config) -> Iterator[Source]:
+def _named(config: Config) -> Iterator[SeenSource]:
     return (source for source in sources_of(config) if source.name)
 
 
-def _names(source: Source) -> tuple[list[str], str]:
+def _names(source: SeenSource) -> tuple[list[str], str]:
     return [f"u{axis}_{source.name}" for axis in _AXES], f"r_{source.name}"

@@ -12,7 +12,7 @@ import heyoka as hy
 from pydantic import Field
 
 from rigidsim.errors import ConfigError, Problem
-from rigidsim.model.capabilities import Place
+from rigidsim.model.capabilities import SourcePlace
 from rigidsim.model.gradient import GradientSource, gradient_terms, tidal_range
 from rigidsim.model.kinematics import Kinematics, quadratic_form
 from rigidsim.model.load import Load, Term
@@ -150,10 +150,10 @@ class GravityGradient(GradientSource, Load):
             return m.attitude.orbital.direction
         return m.seen(self.seen(m)[0])
 
-    def source_place(self, m: Kinematics) -> Place:
+    def source_place(self, m: Kinematics) -> SourcePlace:
         direction, inverse = self.seen(m)
         inverse = hy.expression(1.0) if inverse is None else inverse
-        return Place(direction, inverse, self.distance(m.scene.context))
+        return SourcePlace(direction, inverse, self.distance(m.scene.context))
 
     def source_at_start(self, scene: Scene) -> Vector:
         return self.place(scene)

@@ -170,12 +170,14 @@ def operations(expression: Expression) -> Iterator[Operation]:
 
 def placed_at(expression: Expression, span: tuple[int, int]) -> Node:
     """The tree of an expression, all of which stands at one place of another text."""
-    return fold(  # type: ignore[no-any-return]
-        expression,
-        lambda node, operands: (
-            replace(node, span=span, operands=tuple(operands)) if operands else replace(node, span=span)
-        ),
-    )
+
+    def combine(node: Node, operands: list[Any]) -> Node:
+        if isinstance(node, Operation):
+            return Operation(node.operator, tuple(operands), span)
+        return replace(node, span=span)
+
+    found: Node = fold(expression, combine)
+    return found
 
 
 def names_used(expression: Expression) -> frozenset[str]:
