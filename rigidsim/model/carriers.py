@@ -23,6 +23,7 @@ from typing import Any, Protocol, runtime_checkable
 
 import heyoka as hy
 
+from rigidsim.model.capabilities import Reshaping
 from rigidsim.model.kinematics import Kinematics
 from rigidsim.model.load import Load, Term
 from rigidsim.model.rotations import Symbolic
@@ -62,9 +63,13 @@ class Lending(Protocol):
 
 
 def carried_beside(loads: Iterable[Load]) -> str:
-    """Why momentum is carried by more than the body, for what can't do with that; empty if it isn't."""
-    found = next((load.title for load in loads if isinstance(load, Carrier)), "")
-    return f"{found} carries angular momentum beside the body" if found else ""
+    """Why more turns than a body of constant moments, for what can't do with that; empty if it doesn't."""
+    found = next((load for load in loads if isinstance(load, Carrier)), None)
+    if found is None:
+        return ""
+    if isinstance(found, Reshaping):
+        return f"{found.title} vary"
+    return f"{found.title} carries angular momentum beside the body"
 
 
 def lends(carrier: object) -> bool:

@@ -15,17 +15,15 @@ from typing import Any
 
 import heyoka as hy
 
-from rigidsim.model.kinematics import Kinematics, seconds
+from rigidsim.model.kinematics import Kinematics, inertia_times, seconds
 from rigidsim.model.load import Term
 from rigidsim.model.orbits.point_mass_states import PointMassPair
 from rigidsim.model.rotations import Symbolic, transpose
 from rigidsim.scene.arithmetic import Vector, cross, norm, unit_vectors
 from rigidsim.scene.epochs import Epoch
-from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.orbit_tables.pieces import TabulatedOrbit
 from rigidsim.scene.orbits import KeplerOrbit
 from rigidsim.scene.scene import Scene
-from rigidsim.scene.tracing.numbers import plain
 
 _THRESHOLD = 1e-6
 _DAY = 86400.0
@@ -70,6 +68,11 @@ def gradient_terms(
     strength (mpf) becomes one coefficient with the moments, the factor is an expression.
     """
     units, columns = unit_vectors(m.scene.context), transpose(m.numbers.inertia)
+    if m.shape is not None:
+        turned = cross(direction, inertia_times(m, direction))
+        scaled = [[3 * strength * x for x in unit] for unit in units]
+        parts = turned if factor is None else [factor * x for x in turned]
+        return list(zip(scaled, parts, strict=True))
     terms: list[Term] = []
     for a in range(3):
         for j in range(a, 3):
@@ -123,22 +126,3 @@ class GradientSource:
         place = m.orbit(self.orbit) if self.orbit is not None else m.table(m.carried(self.table))
         circular = self.orbit is not None and self.orbit.circular
         return place.direction, None if circular else place.inverse_distance
-
-    def place(self, scene: Scene) -> Vector:
-        """Place at the start (mpf, m, space axes) of a source other than a point mass; that of a series in
-        double precision.
-        """
-        context = scene.context
-        if self.orbit is not None:
-            return self.orbit.place(context, scene.start)
-        if self.table is not None:
-            return self.table.place(scene.start)
-        if self.ephemeris is not None:
-            since = 0.0 if self.epoch is None else float(ExactNumber(self.epoch.since_j2000()))
-            series = source_position(self.ephemeris, hy.time)
-            function = hy.cfunc([*series.direction, series.inverse_distance], [], compact_mode=True)
-            *direction, inverse = function([], time=float(plain(scene.start)) + since)
-            far = self.distance(context) / context.mpf(inverse)
-            return [far * context.mpf(x) for x in direction]
-        assert self.position is not None
-        return self.position

@@ -68,9 +68,74 @@ class Inertia:
                 row += [number(x) * expression] if x != 0 else []
         if (change := self.change()) is not None:
             for row, changes in zip(right, change, strict=True):
-                row += [-(x * w) for x, w in zip(changes, rates, strict=True)]
+                row += [-(x * w) for x, w in zip(changes, rates, strict=True) if not absent(x)]
         turning = self.solved([hy.sum(row) for row in right])
         return [x if u == 1 else number(1 / u) * x for x, u in zip(turning, units, strict=True)]
+
+
+@dataclass(frozen=True)
+class MassDistribution:
+    """One that changes: its tensor and dI/dt along the motion, body axes, internal units.
+
+    Both are symmetric; an element that is zero for good is the number 0.
+    """
+
+    matrix: SymbolicMatrix
+    change: SymbolicMatrix
+
+
+@dataclass(frozen=True)
+class VaryingInertia(Inertia):
+    """That of a ``MassDistribution`` less a constant part, of what turns on bearings."""
+
+    matrix: SymbolicMatrix
+    rates: SymbolicMatrix
+    number: Rounder
+
+    @classmethod
+    def of(cls, shape: MassDistribution, numbers: ScaledNumbers, number: Rounder) -> VaryingInertia:
+        """That of what turns with the body."""
+        less = [
+            [x - y for x, y in zip(*rows, strict=True)]
+            for rows in zip(numbers.inertia, numbers.turning_inertia, strict=True)
+        ]
+        matrix = [
+            [x - number(y) if y != 0 else x for x, y in zip(*rows, strict=True)]
+            for rows in zip(shape.matrix, less, strict=True)
+        ]
+        return cls(matrix, shape.change, number)
+
+    def times(self, vector: list[Symbolic]) -> list[Symbolic]:
+        """See ``Inertia``."""
+        return product(self.matrix, vector)
+
+    def solved(self, vector: list[Symbolic]) -> list[Symbolic]:
+        """See ``Inertia``: by the adjugate, unless the tensor is diagonal."""
+        if all(absent(self.matrix[i][j]) for i in range(3) for j in range(3) if i != j):
+            return [x / self.matrix[i][i] for i, x in enumerate(vector)]
+        (a, f, e), (_, b, d), (_, _, c) = self.matrix
+        adjugate = [
+            [b * c - d * d, d * e - c * f, d * f - b * e],
+            [d * e - c * f, a * c - e * e, e * f - a * d],
+            [d * f - b * e, e * f - a * d, a * b - f * f],
+        ]
+        volume = hy.sum([hy.expression(x * y) for x, y in zip(self.matrix[0], adjugate[0], strict=True)])
+        return [x / volume for x in product(adjugate, vector)]
+
+    def change(self) -> SymbolicMatrix | None:
+        """See ``Inertia``."""
+        return self.rates
+
+
+def absent(element: Any) -> bool:
+    """Whether an element of a symbolic tensor is zero for good."""
+    return isinstance(element, int | float) and element == 0
+
+
+def product(matrix: SymbolicMatrix, vector: list[Symbolic]) -> list[Symbolic]:
+    """M v without the elements that are zero for good."""
+    rows = [[x * v for x, v in zip(row, vector, strict=True) if not absent(x)] for row in matrix]
+    return [hy.sum(row) if row else hy.expression(0.0) for row in rows]
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ from typing import Any, TypeVar
 
 import heyoka as hy
 
-from rigidsim.model.inertia import ConstantInertia, Inertia
+from rigidsim.model.inertia import ConstantInertia, Inertia, MassDistribution, VaryingInertia, absent, product
 from rigidsim.model.orbits.point_mass_states import PointMassStates
 from rigidsim.model.orbits.prescribed import OrbitStates, TablePlace, orbit_states, table_states
 from rigidsim.model.rotations import Symbolic, SymbolicMatrix, apply, length, transpose
@@ -49,6 +49,7 @@ class Kinematics:
     tables: Mapping[TabulatedOrbit, TablePlace] = field(default_factory=dict)
     clocked: bool = False
     body: RotatingBody = BODY
+    shape: MassDistribution | None = None  # of a body in which mass moves
     _orbits: dict[KeplerOrbit | TabulatedOrbit, OrbitStates] = field(
         default_factory=dict, init=False, repr=False
     )
@@ -69,6 +70,8 @@ class Kinematics:
     @cached_property
     def inertia(self) -> Inertia:
         """Tensor of what turns with the body, by which torques change the rates."""
+        if self.shape is not None:
+            return VaryingInertia.of(self.shape, self.numbers, self.number)
         return ConstantInertia.of(self.numbers, self.number, self.scene.context)
 
     @cached_property
@@ -120,19 +123,25 @@ class Kinematics:
     @cached_property
     def symmetry_direction(self) -> Vector | None:
         """Unit axis (mpf, body axes) of the tensor's symmetry; None without one, or where a sphere has none
-        marked by a load.
+        marked by a load. Moments that vary are equal where their expressions are.
         """
         context, body = self.scene.context, self.scene.body
         moments, axes = body.principal_moments, body.principal_axes
         tiny = context.maximum(moments) * negligible(context)
-        if all(abs(moments[i] - moments[0]) <= tiny for i in (1, 2)):  # a sphere
+
+        def equal(i: int, j: int) -> bool:
+            if self.shape is not None:
+                return bool(self.shape.matrix[i][i] == self.shape.matrix[j][j])
+            return bool(abs(moments[i] - moments[j]) <= tiny)
+
+        if equal(0, 1) and equal(0, 2):  # a sphere
             if self.marked is None:
                 return None
             length = context.sqrt(dot(self.marked, self.marked))
             return [a / length for a in self.marked]
         for i in range(3):
             j, k = (i + 1) % 3, (i + 2) % 3
-            if abs(moments[j] - moments[k]) <= tiny:
+            if equal(j, k):
                 return axes[i]
         return None
 
@@ -185,6 +194,10 @@ def seconds(m: Kinematics, since: Epoch | None = None) -> Symbolic:
 def quadratic_form(m: Kinematics, direction: list[Symbolic]) -> Symbolic:
     """c . I c for a direction c in body axes, internal units of inertia."""
     rows = []
+    if m.shape is not None:
+        for given, c in zip(m.shape.matrix, direction, strict=True):
+            rows += [x * (c * d) for x, d in zip(given, direction, strict=True) if not absent(x)]
+        return hy.sum(rows)
     for row, c in zip(m.numbers.inertia, direction, strict=True):
         rows += [m.number(x) * (c * d) for x, d in zip(row, direction, strict=True) if x != 0]
     return hy.sum(rows)
@@ -192,6 +205,8 @@ def quadratic_form(m: Kinematics, direction: list[Symbolic]) -> Symbolic:
 
 def inertia_times(m: Kinematics, direction: list[Symbolic]) -> list[Symbolic]:
     """I c for a direction c in body axes, internal units of inertia."""
+    if m.shape is not None:
+        return product(m.shape.matrix, direction)
     inertia = m.numbers.inertia
     return [
         hy.sum([m.number(x) * d for x, d in zip(row, direction, strict=True) if x != 0]) for row in inertia

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
 import heyoka as hy
 
-from rigidsim.model.capabilities import KeepsAxial, having, linear_potential_of
+from rigidsim.model.capabilities import KeepsAxial, Reshaping, having, linear_potential_of
 from rigidsim.model.carriers import Carrier, inner_torque, lends, momentum_terms
 from rigidsim.model.kinematics import Kinematics
-from rigidsim.model.load import Load, Term, force_terms, torque_terms
+from rigidsim.model.load import Load, Term, force_terms, loads_of, torque_terms
 from rigidsim.model.rotations import Symbolic, apply
 from rigidsim.model.scaling import Rounder, ScaledNumbers, Scaling, exponent
 from rigidsim.model.state_blocks import BODY, AttitudeStates
@@ -46,7 +46,9 @@ class Mechanics(Kinematics):
             up = numbers.vertical_of(attitude.matrix, number)
         position = list(hy.make_vars(*BODY.position)) if flies else None
         velocity = list(hy.make_vars(*BODY.velocity)) if flies else None
-        return cls(scene, scaling, numbers, rates, attitude, up, position, velocity, number, **more)
+        made = cls(scene, scaling, numbers, rates, attitude, up, position, velocity, number, **more)
+        reshaping = having(Reshaping, loads_of(scene))
+        return replace(made, shape=reshaping[0].shape(made)) if reshaping else made
 
     @property
     def turning_rate(self) -> Any | None:

@@ -13,7 +13,7 @@ from rigidsim.errors import ConfigError, Problem
 from rigidsim.model.euler_poles import Poles
 from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.observables import Steady
-from rigidsim.model.own_states import own_observables
+from rigidsim.model.observables.own_states import own_observables
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.scaling import Rounder
 from rigidsim.scene.registry import OBSERVABLES

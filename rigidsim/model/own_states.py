@@ -8,21 +8,20 @@ estimated by following the motion roughly, for some hundred steps at most.
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterable, Iterator, Mapping
-from functools import partial
+from collections.abc import Collection, Iterable, Mapping
 from typing import Any
 
 import heyoka as hy
 import numpy as np
 
 from rigidsim.errors import ConfigError, Problem
+from rigidsim.model.heyoka_expressions import to_heyoka
 from rigidsim.model.kinematics import Kinematics
-from rigidsim.model.names import in_si, written
-from rigidsim.model.observables.observable import Observable
+from rigidsim.model.names import in_si, state_names
 from rigidsim.model.scaling import exponent
 from rigidsim.model.state_blocks import StateBlock
 from rigidsim.scene.expressions.names import NameProvider, Readable, provides
-from rigidsim.scene.expressions.tree import evaluate
+from rigidsim.scene.expressions.tree import Expression, evaluate, names_used
 from rigidsim.scene.initial_values import start_values
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.schema import Config
@@ -63,7 +62,7 @@ def own_blocks(m: Kinematics) -> list[StateBlock]:
     context, blocks = m.scene.context, []
     for state in m.scene.states:
         unit = m.scaling.own.get(state.name, 0)
-        (rate,) = written(m, [state.derivative])
+        (rate,) = _heyoka(m, [state.derivative])
         ratio = context.ldexp(context.one, m.scaling.time - unit)
         rate = hy.expression(rate) if ratio == 1 else m.number(ratio) * rate
         start = context.ldexp(state.initial, -unit)
@@ -84,41 +83,25 @@ def refuse_taken_names(scene: Scene, blocks: Iterable[StateBlock]) -> None:
             raise ConfigError(Problem(f"[[states]] number {number} name", what))
 
 
-def own_observables(m: Kinematics) -> Iterator[Observable]:
-    """The recorded variable of each state of one's own, which default records have."""
-    for state in m.scene.states:
-        unit = m.scaling.own.get(state.name, 0)
-        yield Observable(
-            state.name, (), state.unit or "1", f"{state.name}, a state of [[states]]",
-            partial(_variable, state.name), partial(_exponent, unit), attributes=_marked,
-        )  # fmt: skip
-
-
-def _variable(name: str, _: Kinematics) -> list[Any]:
-    return [hy.make_vars(name)]
-
-
-def _exponent(unit: int, _: Kinematics) -> list[int]:
-    return [unit]
-
-
-def _marked(_: Kinematics) -> Mapping[str, str]:
-    return {"given_by": "[[states]]"}
-
-
 def narrow_arguments(m: Kinematics) -> list[tuple[str, Any]]:
     """(description, argument) of what is narrow in derivatives, as ``capabilities.Narrow`` has of loads."""
     return [
         (f"state {state.name}", u)
         for state in m.scene.states
-        for u in written(m, narrow_parts(state.derivative))
+        for u in _heyoka(m, narrow_parts(state.derivative))
     ]
 
 
 def radicands(m: Kinematics) -> list[tuple[str, Any]]:
     """(description, radicand) of roots in derivatives, as ``capabilities.Rooted`` has of loads."""
     states = m.scene.states
-    return [(f"state {state.name}", u) for state in states for u in written(m, root_parts(state.derivative))]
+    return [(f"state {state.name}", u) for state in states for u in _heyoka(m, root_parts(state.derivative))]
+
+
+def _heyoka(m: Kinematics, expressions: Iterable[Expression]) -> list[Any]:
+    return [
+        to_heyoka(x, state_names(m, names_used(x)), m.number, m.scene.context, m.sides) for x in expressions
+    ]
 
 
 # --- units --------------------------------------------------------------------------------------------------

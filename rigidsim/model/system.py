@@ -10,6 +10,7 @@ from typing import Any
 import heyoka as hy
 
 from rigidsim.model.assembly import assemble_states
+from rigidsim.model.capabilities import Ending, having
 from rigidsim.model.formulations.formulation import Formulation, ModelPlan
 from rigidsim.model.heyoka_expressions import carries_sign, plain_angles, to_heyoka
 from rigidsim.model.mechanics import Mechanics
@@ -34,6 +35,7 @@ class Crossing:
     expression: Symbolic
     direction: int  # -1, 0 (any) or 1
     stop: bool
+    impossible: str = ""  # why the motion can't go on past it; empty for events of the config
 
 
 class System:
@@ -218,13 +220,21 @@ class System:
 
     @cached_property
     def crossings(self) -> list[Crossing]:
-        """Events to be located along the motion; the time that they read is a single number."""
+        """Events to be located along the motion, and then what ends it because no body can go on; the time
+        that events read is a single number.
+        """
         m, found = self.mechanics, []
         for event in self.scene.events:
             names = state_names(m, event.reads, clocked=False)
             expression = to_heyoka(event.expression, names, m.number, m.scene.context, m.sides)
             found.append(Crossing(event.name, expression, _DIRECTIONS[event.direction], event.stop))
-        return found
+        endings = [found for load in having(Ending, m.loads) for found in load.endings(m)]
+        return found + [Crossing("", x, _DIRECTIONS["down"], stop=True, impossible=why) for why, x in endings]
+
+    @property
+    def events(self) -> list[Crossing]:
+        """Those of ``crossings`` that are events of the config."""
+        return self.crossings[: len(self.scene.events)]
 
     # --- what changes at given times, or is switched --------------------------------------------------------
 

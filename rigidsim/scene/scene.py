@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, TypeVar
 
@@ -17,9 +17,10 @@ from rigidsim.scene.expressions.names import Names, names_of
 from rigidsim.scene.expressions.parser import parse_expression
 from rigidsim.scene.expressions.tree import Expression, ExpressionError, names_used, states_read
 from rigidsim.scene.frame import Figure, figure_of, reference_normal
+from rigidsim.scene.moving_moments import moments_at_start
 from rigidsim.scene.own_states import OwnState, carried_states, resolve_states
 from rigidsim.scene.point_masses import PointMasses, resolve_point_masses
-from rigidsim.scene.registry import LOAD_KINDS, TABLES, SceneLoad, Surroundings
+from rigidsim.scene.registry import LOAD_KINDS, OF_BODY, TABLES, SceneLoad, Surroundings
 from rigidsim.scene.rotors import refuse_odd_rotors, turning_inertia
 from rigidsim.scene.sample_times import SampleTimes, sample_times
 
@@ -146,7 +147,7 @@ def build_scene(experiment: Experiment, context: Any = None) -> Scene:
             problems.extend(error.problems)
             return None
 
-    body = attempt(build_body, config.body, context, config.integrator.euler_sequence)
+    body = attempt(_body_at_start, config, context)
     attempt(starts.check_ways, config.initial, context)
     times = attempt(sample_times, config.time, context)
     attempt(_check_limits, config.limits)
@@ -163,7 +164,9 @@ def build_scene(experiment: Experiment, context: Any = None) -> Scene:
         given, tabled = _resolve_loads(
             config, body, context, masses, names, free_flight=free_flight, span=(start, end)
         )
-        resolved = [*given, *(load for found in tabled.values() for load in found)]
+        around = Surroundings(0, context, config.parameters, body.center_of_mass, free_flight, names=names)
+        brought = [kind.resolve(config, around) for kind in OF_BODY.values() if kind.brought_by(config)]
+        resolved = [*given, *(load for found in tabled.values() for load in found), *brought]
         bearings = [load.bearing for load in resolved if load.bearing is not None]
         inverse = inverse_inertia(context, body)
         turning = turning_inertia(context, body, bearings) if bearings else (body.inertia, inverse)
@@ -180,10 +183,6 @@ def build_scene(experiment: Experiment, context: Any = None) -> Scene:
         states = resolve_states(config.states, config.parameters, names, context)
         readers = [(load.described, formula) for load in loads for _, formula in load.formulas()]
         readers += [(f"event {event.name}", event.expression) for event in events]
-        carried = carried_states(states, readers, config.output.record)
-        formulas = [formula for _, formula in readers] + [state.derivative for state in carried]
-        read = frozenset[str]().union(*map(names_used, formulas))
-        loads = tuple(load for load in resolved if _is_among(load, loads) or load.read_by(read))
         scene = Scene(
             name=config.name,
             description=config.description,
@@ -210,15 +209,16 @@ def build_scene(experiment: Experiment, context: Any = None) -> Scene:
             bodies=masses,
             given_loads=tuple(given),
             tabled=tabled,
-            states=carried,
+            states=carried_states(states, readers, config.output.record),
         )
         return _with_start(scene, starts.start_of(scene, _with_start))
     except ConfigError as error:
         raise error.at(experiment.source) from None
 
 
-def _is_among(load: SceneLoad, loads: Iterable[SceneLoad]) -> bool:
-    return any(load is x for x in loads)
+def _body_at_start(config: schema.Config, context: Any) -> RigidBody:
+    moments = moments_at_start(config, context, config.time.start.at(context))
+    return build_body(config.body, context, config.integrator.euler_sequence, moments)
 
 
 def _fail(table: str, key: str, text: str) -> ConfigError:

@@ -142,7 +142,7 @@ def event_variables(
     variables, dates = recorded_variables(prepared), dates_of(prepared)
     if dates is not None:
         variables[1:1] = dates.variables
-    for index, crossing in enumerate(prepared.system.crossings):
+    for index, crossing in enumerate(prepared.system.events):
         found = log.occurrences(index, last)
         values: RecordedParts = {}
         times = prepared.clock.internal(0, 0)
@@ -185,7 +185,7 @@ def refuse_taken_names(prepared: InitialValueProblem) -> None:
     dates, variables = dates_of(prepared), recorded_variables(prepared)
     if dates is not None:
         variables += dates.variables
-    for crossing in prepared.system.crossings:
+    for crossing in prepared.system.events:
         names = [f"{crossing.name}_{name}" for variable in variables for name in variable.part_names()]
         double = next((name for name in (crossing.name, *names) if name in taken), None)
         if double is not None:
@@ -202,7 +202,7 @@ def refuse_taken_names(prepared: InitialValueProblem) -> None:
 def event_times(prepared: InitialValueProblem, log: EventLog, last: float) -> dict[str, EventTimes]:
     """First and last times of each event that was found."""
     clock, times = prepared.clock, {}
-    for index, crossing in enumerate(prepared.system.crossings):
+    for index, crossing in enumerate(prepared.system.events):
         found = [clock.seconds(event.time) for event in log.occurrences(index, last)]
         if found:
             early = tuple(found[: EventTimes.EARLY])

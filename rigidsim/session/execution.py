@@ -171,7 +171,7 @@ class _ActiveRun:
         """The summary without the digests of files that are still to be written."""
         prepared, progress, log = self.prepared, self.progress, self.parts.log
         self.session.phases.engine(progress.integration_seconds)
-        crossings = enumerate(prepared.system.crossings)
+        crossings = enumerate(prepared.system.events)
         return summarise(
             found,
             spectrum,

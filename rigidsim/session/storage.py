@@ -68,7 +68,7 @@ def refuse_too_large(prepared: InitialValueProblem, place: Path) -> None:
     """Refuse a run that can only end at its last sample and would fill the disk."""
     limits = prepared.scene.config.limits
     guarded = (limits.wall_time, limits.max_steps, limits.max_drift) != (None, None, None)
-    if guarded or any(crossing.stop for crossing in prepared.system.crossings):
+    if guarded or any(event.stop for event in prepared.system.events):
         return
     problem = storage(prepared, place).problem
     if problem is not None:

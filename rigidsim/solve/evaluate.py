@@ -90,7 +90,9 @@ class Evaluator:
         components = [x for invariant in system.invariants for x in invariant.expressions]
         self._invariants = self._compile(components)
         initial = precision.array(system.initial)
-        self.initial = evaluate_rows(self._invariants, initial[None, :])[:, 0] if components else initial[:0]
+        start = precision.array([system.scene.context.ldexp(system.scene.start, -system.scaling.time)])
+        begun = evaluate_rows(self._invariants, initial[None, :], times=start) if components else None
+        self.initial = initial[:0] if begun is None else begun[:, 0]
         self._parameters = len(components)
         self.code = self._invariants
         self._angles = JoinedAngles(system, self._compile, wrapping, precision=precision, countable=countable)

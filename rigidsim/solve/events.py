@@ -48,6 +48,7 @@ class EventLog:
     """All crossings so far, in order of time."""
 
     stops: list[bool] = field(default_factory=list)
+    impossible: list[str] = field(default_factory=list)  # why none can go on past each; empty if it can
     angles: Callable[[], AngleState] = AngleState
     found: list[FoundEvent] = field(default_factory=list)
     stop: Scalar | None = None  # time of the first crossing that ends the run, or None
@@ -69,6 +70,17 @@ class EventLog:
         if self.stops[index] and self.stop is None:
             self.stop = time
 
+    @property
+    def ending(self) -> FoundEvent | None:
+        """The crossing that ends the run."""
+        return next((f for f in self.found if self.stops[f.index]), None)
+
+    @property
+    def why_impossible(self) -> str:
+        """Why the motion can't go on past the crossing that ends the run; empty if that is an event."""
+        ending = self.ending
+        return "" if ending is None or not self.impossible else self.impossible[ending.index]
+
     def occurrences(self, index: int, last: float) -> list[FoundEvent]:
         """The crossings of one event up to a time, internal units."""
         return [f for f in self.found if f.index == index and float(f.time) <= last]
@@ -86,7 +98,8 @@ class EventLog:
         self._find_stop()
 
     def _find_stop(self) -> None:
-        self.stop = next((f.time for f in self.found if self.stops[f.index]), None)
+        ending = self.ending
+        self.stop = None if ending is None else ending.time
 
 
 def samples_at(found: Sequence[FoundEvent], precision: Precision) -> SampleBlock:

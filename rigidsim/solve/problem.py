@@ -144,6 +144,9 @@ def prepare_scene(
         algorithm = algorithm_of(scene, system, driven=bool(loads))
         late = False
         holds = scene.config.integrator.hold_invariants is True
+        if holds and system.mechanics.shape is not None:
+            what = "given true, but principal_moments vary, which corrections don't know; leave it out"
+            raise ConfigError(Problem("[integrator] hold_invariants", what))
         if holds or gyroscopic_rate(scene) > _NUTATES * system.rate_bound:
             parts = in_two_parts(precision.number, precision.exact, precision.bits, scene.context)
             system = system.with_coefficients(parts)
@@ -180,7 +183,7 @@ def _is_worth_holding(system: System) -> bool:
     """Whether "auto" projects: not if nothing physical is conserved, nor if steps end on surfaces."""
     if not system.formulation.resolves_rotation:  # whose norm is no invariant that its rate would depend on
         return False
-    if system.switches:
+    if system.switches or system.mechanics.shape is not None:
         return False
     return conserves(system)
 

@@ -16,6 +16,7 @@ class Status(Enum):
     NON_FINITE = "stopped: non-finite state"
     COLLAPSED = "stopped: step size collapsed"
     UNRESOLVED = "stopped: switching unresolved"
+    IMPOSSIBLE = "stopped: impossible body"
 
     @property
     def message(self) -> str:
@@ -35,7 +36,7 @@ class Status(Enum):
         return self in (Status.FINISHED, Status.EVENT, *_BROKEN)
 
 
-_BROKEN = (Status.NON_FINITE, Status.COLLAPSED, Status.UNRESOLVED)
+_BROKEN = (Status.NON_FINITE, Status.COLLAPSED, Status.UNRESOLVED, Status.IMPOSSIBLE)
 _MESSAGES = {
     Status.RUNNING: "the run is under way, or was killed",
     Status.FINISHED: "the run reached its last sample",
@@ -47,4 +48,5 @@ _MESSAGES = {
     Status.NON_FINITE: "the state stopped being finite; the samples before it are kept",
     Status.COLLAPSED: "the steps became too small to ever arrive; the samples so far are kept",
     Status.UNRESOLVED: "the motion can't be continued past a switching surface; the samples so far are kept",
+    Status.IMPOSSIBLE: "no body can go on like this; the samples so far are kept",
 }

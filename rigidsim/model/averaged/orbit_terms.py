@@ -70,7 +70,7 @@ class OrbitPlace:
 
 @dataclass(frozen=True)
 class Ellipse:
-    """Shape (e, e^2, sqrt(1 - e^2), whether e is known to be 0) and mean motion; numbers (mpf) or
+    """MassDistribution (e, e^2, sqrt(1 - e^2), whether e is known to be 0) and mean motion; numbers (mpf) or
     expressions.
     """
 

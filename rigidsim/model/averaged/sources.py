@@ -92,7 +92,7 @@ class Source:
         return self.strength if axis == 1 else self.strength / axis**3
 
     def ellipse(self, context: Any, time: Any) -> Ellipse:
-        """Shape and mean motion of the source's orbit at a time, numbers (mpf)."""
+        """MassDistribution and mean motion of the source's orbit at a time, numbers (mpf)."""
         if self.of.table is not None:
             found = self.of.table.at(time)
             square = found["k"] ** 2 + found["h"] ** 2

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from rigidsim.model import flight_names, shadows  # noqa: F401  (names in expressions)
 from rigidsim.model.kinematics import seconds
 from rigidsim.model.load import Load, Term
 from rigidsim.model.loads import (  # noqa: F401  (each enters its kind; a new load is one line more here)
@@ -10,6 +9,8 @@ from rigidsim.model.loads import (  # noqa: F401  (each enters its kind; a new l
     central_gravity,
     gravity_gradient,
     magnetic_dipole,
+    mass_loss,
+    moved_mass,
     rotor,
     uniform_gravity,
     viscous_torque,

@@ -50,7 +50,8 @@ def momentum_scale(m: Mechanics) -> tuple[Any, str]:
     if initial == 0 and swing == 0:
         return context.one, "1 kg m^2/s (the body is at rest)"
     if initial >= swing:
-        return initial, "initial norm of the angular momentum" + (", of each carrier" if m.carriers else "")
+        several = any(x.carried_momentum(m) for x in m.carriers)
+        return initial, "initial norm of the angular momentum" + (", of each carrier" if several else "")
     return swing, "angular momentum that the loads can build up"
 
 

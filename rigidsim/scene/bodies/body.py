@@ -66,8 +66,15 @@ class RigidBody:
     drawing: list[dict[str, Any]] = field(default_factory=list)
 
 
-def build_body(table: body_table.Body, context: Any, sequence: str = "zxz") -> RigidBody:
-    """Work out the body of ``[body]``; ``sequence`` is of Euler angles for parts that name none."""
+def build_body(
+    table: body_table.Body, context: Any, sequence: str = "zxz", moments: Vector | None = None
+) -> RigidBody:
+    """Work out the body of ``[body]``.
+
+    Args:
+        sequence: of Euler angles for parts that name none.
+        moments: principal moments at the start, if some are expressions (mpf).
+    """
     given = [name for name in SOURCES if getattr(table, name) is not None]
     if len(given) != 1:
         found = " and ".join(given) if given else "no source of inertia"
@@ -76,7 +83,7 @@ def build_body(table: body_table.Body, context: Any, sequence: str = "zxz") -> R
     if source != "shape":
         refuse_dimensions(table, (), "which only a shape has", "")
     if source in ("principal_moments", "inertia_tensor", "preset"):
-        return _from_tensor(table, source, context)
+        return _from_tensor(table, source, context, moments)
     if table.center_of_mass is not None:
         what = f"it follows from {source}; remove it, and say with reference what the body turns about"
         raise refusal("center_of_mass", what)
@@ -85,7 +92,9 @@ def build_body(table: body_table.Body, context: Any, sequence: str = "zxz") -> R
     return _from_pieces(table, source, context, sequence)
 
 
-def _from_tensor(table: body_table.Body, source: str, context: Any) -> RigidBody:
+def _from_tensor(
+    table: body_table.Body, source: str, context: Any, moments: Vector | None = None
+) -> RigidBody:
     if table.reference is not None:
         what = f"only shape, points and parts take it; {source} is taken about the point that the body turns "
         raise refusal("reference", what + "about already: remove it")
@@ -105,7 +114,8 @@ def _from_tensor(table: body_table.Body, source: str, context: Any) -> RigidBody
         drawing = [{**drawn("ellipsoid", {"semi_axes": axes}, center), "name": str(table.preset)}]
     elif source == "principal_moments":
         assert table.principal_moments is not None
-        inertia = diagonal([x.at(context) for x in table.principal_moments])
+        numbers = [x for x in table.principal_moments if isinstance(x, ExactNumber)]
+        inertia = diagonal(moments or [x.at(context) for x in numbers])
     else:
         assert table.inertia_tensor is not None
         _check_symmetric(table.inertia_tensor)

@@ -19,6 +19,7 @@ from rigidsim.scene.fields import (
     Kilogram,
     Metre,
     Moment,
+    MomentOrFormula,
     OneOf,
     Triple,
     name_or_vector,
@@ -106,8 +107,12 @@ Reference = Annotated[
 class Body(Solid):
     """``[body]``: exactly one source of inertia, and what loads need beside it."""
 
-    principal_moments: Triple[Moment] | None = Field(None, examples=[[1, 2, 2.5]])
-    """principal moments of inertia about the body axes x, y, z"""
+    principal_moments: Triple[MomentOrFormula] | None = Field(
+        None, examples=[[1, 2, 2.5], [1, 2, "2 + 0.1*sin(t)"]]
+    )
+    """principal moments of inertia about the body axes x, y, z; each may be an expression of t, [[states]]
+    and [parameters] where mass moves in the body
+    """
     inertia_tensor: Triple[Triple[Moment]] | None = Field(
         None, examples=[[[2, -0.1, 0], [-0.1, 3, 0], [0, 0, 4]]]
     )

@@ -42,6 +42,7 @@ class Alone(Enum):
     CHART = "Euler angles may have to change their sequence on the way"
     ANGLES = "full turns of recorded angles are counted along the motion"
     SWITCHING = "the equations change along the motion"
+    MOVED_MASS = "the body changes in ways that may end its motion"
     TABLE = "an orbit goes by a table"
     MOMENT = "something happens so late, within so short a while, that steps need the time in two numbers"
     BODIES = "point masses move beside the body"
@@ -80,6 +81,8 @@ def _reason_of_system(traced: TracedSystem) -> Alone | None:
         return Alone.EFFECT
     if system.switches:
         return Alone.SWITCHING
+    if len(system.crossings) > len(system.events):
+        return Alone.MOVED_MASS
     if system.pieces is not None:
         return Alone.TABLE
     if system.clocked:

@@ -110,6 +110,9 @@ def algorithm_of(scene: Scene, system: System, *, driven: bool) -> Algorithm:
     kind = ALGORITHMS[name]
     try:
         found = kind.of(scene, system, driven=driven)
+        if system.crossings and not scene.events and not kind.finds_events:
+            what = "which takes no steps in which it could be found that no body can go on"
+            raise Unsuitable(f'{what} ({system.crossings[0].impossible}); choose method = "taylor"')
         if scene.events and not kind.finds_events:
             takes = "steps in which no" if kind.method.has_steps else "no steps in which"
             instead = 'remove [[events]], or choose method = "taylor"'

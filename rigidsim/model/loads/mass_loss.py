@@ -1,0 +1,187 @@
+"""Mass that leaves the body, as through a nozzle, and takes its angular momentum along: jet damping.
+
+Mass that leaves at a point rho from the centre of mass, at the rate mu kg/s, with a velocity relative to the
+body that gives no torque by itself, takes off the angular momentum mu rho x (w x rho) that it has because the
+body turns (Thomson, Introduction to Space Dynamics, 1961, section 8.3). About the centre of mass
+
+    I w' = (I w) x w - I' w - mu <rho x (w x rho)> + N.
+
+The mean is taken over the exit. For a round one of radius a, whose axis n points from the centre of mass to
+its middle,
+
+    <rho x (w x rho)> = (l^2 + a^2/4) (w - n (n . w)) + (a^2/2) n (n . w),    l = |rho|
+
+(Eke and Wang, J. Appl. Mech. 62, 1995). I' is that of principal_moments, which say how the body's own
+mass distribution changes: nothing here changes them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+from typing import Literal
+
+from pydantic import Field
+
+from rigidsim.errors import ConfigError, Problem
+from rigidsim.model.heyoka_expressions import to_heyoka
+from rigidsim.model.kinematics import Kinematics
+from rigidsim.model.load import Load, Term
+from rigidsim.model.load_words import value_text
+from rigidsim.model.names import state_names
+from rigidsim.model.rotations import Symbolic
+from rigidsim.scene.arithmetic import Matrix, Vector, norm
+from rigidsim.scene.exact import ZERO
+from rigidsim.scene.expressions.parser import parse_expression
+from rigidsim.scene.expressions.tree import (
+    Constant,
+    Expression,
+    ExpressionError,
+    constant_value,
+    evaluate,
+    names_used,
+    states_read,
+)
+from rigidsim.scene.fields import Formula, Metre, Triple
+from rigidsim.scene.initial_values import start_values
+from rigidsim.scene.registry import LoadFields, Surroundings, register_load
+from rigidsim.scene.scene import Scene
+from rigidsim.scene.tracing.numbers import plain
+from rigidsim.scene.transitions import narrow_parts, root_parts
+
+_ROUNDING = 2.0**-16
+"""Part of the rate at the start by which it may be negative: by rounding, where it ends."""
+
+
+class MassLossFields(LoadFields):
+    """Mass that leaves the body and takes its angular momentum along (jet damping)."""
+
+    kind: Literal["mass_loss"]
+    rate: Formula = Field(
+        description="mass that leaves per time, kg/s, at least 0: an expression of t, the state, [[states]] "
+        "and [parameters], or a number",
+        examples=["0.5", "2*exp(-t/10)"],
+    )
+    exit_point: Triple[Metre] = Field(
+        description="middle of the exit, in body axes from the reference point", examples=[[0, 0, -2]]
+    )
+    exit_radius: Metre = Field(
+        default=ZERO,
+        description="radius of a round exit, whose axis points from the centre of mass to its middle",
+        examples=[0.3],
+    )
+
+
+@register_load
+@dataclass(frozen=True)
+class MassLoss(Load):
+    """The torque -mu G w of mass that leaves at the rate mu, kg/s; G is <rho^2 - rho rho^T>, m^2 (mpf)."""
+
+    rate: Expression
+    geometry: Matrix
+    arm: Vector  # from the centre of mass to the middle of the exit, body axes, m (mpf)
+    number: int  # place in the config, for messages
+
+    Fields = MassLossFields
+    title = "mass_loss"
+    described = "mass that leaves"
+
+    @classmethod
+    def resolve(cls, fields: MassLossFields, around: Surroundings) -> MassLoss:
+        context = around.context
+        try:
+            rate = parse_expression(fields.rate, around.names, parameters=around.parameters, unit="kg/s")
+        except ExpressionError as error:
+            raise around.fault("rate", str(error)) from None
+        constant = constant_value(rate, context)
+        if constant is not None and constant < 0:
+            given = context.nstr(plain(constant), 6)
+            raise around.fault("rate", f"given {given} kg/s; mass leaves at a rate of at least 0")
+        if fields.exit_radius.sign < 0:
+            what = f"given {float(fields.exit_radius):g} m; a radius of at least 0 is allowed"
+            raise around.fault("exit_radius", what)
+        point = [x.at(context) for x in fields.exit_point]
+        arm = [x - c for x, c in zip(point, around.center_of_mass, strict=True)]
+        radius, length = fields.exit_radius.at(context), norm(context, arm)
+        if radius != 0 and length == 0:
+            what = "given the centre of mass, from which the axis of a round exit points to its middle; "
+            raise around.fault("exit_point", what + "give a point beside it, or leave out exit_radius")
+        geometry = []
+        for i, x in enumerate(arm):
+            row = [-x * y for y in arm]
+            row[i] = row[i] + length**2
+            if radius != 0:  # a^2/4 (1 + n n^T)
+                row = [g + radius**2 / 4 * x * y / length**2 for g, y in zip(row, arm, strict=True)]
+                row[i] = row[i] + radius**2 / 4
+            geometry.append(row)
+        return cls(rate, geometry, arm, around.number)
+
+    def check(self, number: int, position: Vector | None) -> None:
+        """Refused in flight, where the mass is constant."""
+        if position is not None:
+            what = "given for a body with a position or velocity, whose flight is that of a constant mass; "
+            raise self._fault(what + "leave out [initial] position and velocity")
+
+    def _fault(self, what: str) -> ConfigError:
+        return ConfigError(Problem(f"[[loads]] number {self.number + 1} mass_loss", what))
+
+    def acts(self) -> bool:
+        root = self.rate.root
+        vanishes = isinstance(root, Constant) and root.value.sign == 0
+        return not vanishes and any(x != 0 for row in self.geometry for x in row)
+
+    @property
+    def reads(self) -> frozenset[str]:  # type: ignore[override]
+        return states_read(self.rate)
+
+    def formulas(self) -> Iterator[tuple[str, Expression]]:
+        yield f"[[loads]] number {self.number + 1} rate", self.rate
+
+    def narrow(self, m: Kinematics) -> list[Symbolic]:
+        return self._parts(m, narrow_parts)
+
+    def roots(self, m: Kinematics) -> list[Symbolic]:
+        return self._parts(m, root_parts)
+
+    def _parts(self, m: Kinematics, of: Callable[[Expression], Iterable[Expression]]) -> list[Symbolic]:
+        parts = {part.root: part for part in of(self.rate)}
+        return [self._heyoka(m, part) for part in parts.values()]
+
+    def _heyoka(self, m: Kinematics, expression: Expression) -> Symbolic:
+        variables = state_names(m, names_used(expression))
+        return to_heyoka(expression, variables, m.number, m.scene.context, m.sides)
+
+    def torque(self, m: Kinematics) -> list[Term]:
+        """Refused beside a weight, whose torque is that of a constant mass."""
+        context, scaling = m.scene.context, m.scaling
+        if m.scene.torque_arm is not None:
+            what = (
+                "given beside uniform_gravity on a body that is held off its centre of mass, whose weight is "
+            )
+            raise self._fault(what + "that of a constant mass; hold it at its centre of mass")
+        rate, terms = self._heyoka(m, self.rate), []
+        for column, (state, unit) in enumerate(zip(m.rate_states, m.numbers.rate_units, strict=True)):
+            size = context.ldexp(unit, -scaling.time - scaling.energy)
+            vector = [-size * row[column] for row in self.geometry]
+            if any(x != 0 for x in vector):
+                terms.append((vector, rate * state))
+        return terms
+
+    def endings(self, m: Kinematics) -> list[tuple[str, Symbolic]]:
+        """The rate over that at the start, or 1 kg/s if that is zero, less a rounding."""
+        if not names_used(self.rate):
+            return []
+        begun = evaluate(self.rate, start_values(m.scene), m.scene.context)
+        if begun < 0:
+            given = m.scene.context.nstr(begun, 6)
+            raise self._fault(
+                f"given a rate of {given} kg/s at the start; mass leaves at a rate of at least 0"
+            )
+        share = m.number(1 / begun if begun else m.scene.context.one) * self._heyoka(m, self.rate)
+        return [(f"the rate of [[loads]] number {self.number + 1} mass_loss is negative", share + _ROUNDING)]
+
+    def told(self, scene: Scene) -> str:
+        rate = evaluate(self.rate, start_values(scene), scene.context)
+        away = value_text(plain(norm(scene.context, self.arm)), "m")
+        given = value_text(plain(rate), "kg/s")
+        return f"mass_loss: {given} at the start ({self.rate.text}), {away} from the centre of mass"

@@ -1,0 +1,216 @@
+"""Mass that moves within the body: principal moments as expressions of time and states of one's own.
+
+What moves does so symmetrically: it carries no momentum of its own relative to the body axes, and leaves the
+centre of mass where it is. With I(t) in the body axes
+
+    L = I w,    I w' = (I w) x w - I' w + N,    T = w . I w / 2,    T' = w . N - w . I' w / 2
+
+(Hughes, Spacecraft Attitude Dynamics, 1986, section 3.5). I' is the derivative along the motion: that by t
+plus those by own states times their derivatives. What moves the masses does the work -w . I' w / 2; energy of
+their motion relative to the body isn't counted. In a field, potential energy changes by dV/dI : I', too.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, replace
+from typing import Any
+
+import heyoka as hy
+
+from rigidsim.model.heyoka_expressions import to_heyoka
+from rigidsim.model.inertia import MassDistribution, absent
+from rigidsim.model.kinematics import Kinematics
+from rigidsim.model.load import Load, Term, loads_of
+from rigidsim.model.names import state_names
+from rigidsim.model.own_states import own_blocks
+from rigidsim.model.rotations import Symbolic
+from rigidsim.scene.arithmetic import Vector
+from rigidsim.scene.exact import ExactNumber
+from rigidsim.scene.expressions.tree import Expression, ExpressionError, evaluate, names_used, states_read
+from rigidsim.scene.moving_moments import WHERE, formulas_of, least_part, varies
+from rigidsim.scene.registry import Surroundings, register_of_body
+from rigidsim.scene.scene import Scene
+from rigidsim.scene.schema import Config
+from rigidsim.scene.transitions import narrow_parts, root_parts
+
+_CLOCK = "t_of_moments"
+_ELEMENTS = ("moment_x", "moment_y", "moment_z")
+_SLACK, _SLACK_SINGLE = 2.0**-40, 2.0**-16
+"""Part of their sum by which the moments of a flat body may break I1 + I2 >= I3, beside rounding."""
+_TIMES = 512  # of a run's span, at which functions of time alone are looked at
+
+
+@register_of_body("principal_moments")
+@dataclass(frozen=True)
+class MovedMass(Load):
+    """The mass that moves; ``moments`` are numbers (mpf) or expressions, kg m^2."""
+
+    moments: tuple[Any | Expression, ...]
+
+    title = "principal_moments"
+    described = "mass that moves in the body"
+    conservative = True  # the work of what moves it is told by ``supplied_power``
+
+    @classmethod
+    def brought_by(cls, config: Config) -> bool:
+        given = config.body.principal_moments or []
+        return not all(isinstance(x, ExactNumber) for x in given)
+
+    @classmethod
+    def resolve(cls, fields: Config, around: Surroundings) -> MovedMass:
+        context = around.context
+        found: list[Any] = []
+        for given in formulas_of(fields, around.names):
+            if isinstance(given, ExactNumber):
+                found.append(given.at(context))
+            else:
+                found.append(given if varies(given, context) else evaluate(given, {}, context))
+        return cls(tuple(found))
+
+    @property
+    def formulae(self) -> list[tuple[int, Expression]]:
+        """The moments that vary, each with its axis."""
+        return [(axis, x) for axis, x in enumerate(self.moments) if isinstance(x, Expression)]
+
+    def acts(self) -> bool:
+        """Not if all of them are constant."""
+        return bool(self.formulae)
+
+    @property
+    def reads(self) -> frozenset[str]:  # type: ignore[override]
+        return frozenset().union(*(states_read(x) for _, x in self.formulae))
+
+    def formulas(self) -> Iterator[tuple[str, Expression]]:
+        for axis, expression in self.formulae:
+            yield f"{WHERE}[{axis}]", expression
+
+    def narrow(self, m: Kinematics) -> list[Symbolic]:
+        return self._parts(m, narrow_parts)
+
+    def roots(self, m: Kinematics) -> list[Symbolic]:
+        return self._parts(m, root_parts)
+
+    def _parts(self, m: Kinematics, of: Callable[[Expression], Iterable[Expression]]) -> list[Symbolic]:
+        parts = {part.root: part for _, x in self.formulae for part in of(x)}
+        return [self._heyoka(m, part) for part in parts.values()]
+
+    def _heyoka(self, m: Kinematics, expression: Expression) -> Symbolic:
+        variables = state_names(m, names_used(expression))
+        return to_heyoka(expression, variables, m.number, m.scene.context, m.sides)
+
+    # --- the tensor -----------------------------------------------------------------------------------------
+
+    def shape(self, m: Kinematics) -> MassDistribution:
+        """The tensor of the time, and its derivative along the motion, internal units."""
+        context = m.scene.context
+        unit = m.number(context.ldexp(context.one, -m.scaling.inertia))
+        slopes = {
+            name: slope
+            for block in own_blocks(m)
+            for name, slope in zip(block.names, block.derivatives, strict=True)
+        }
+        moments: list[Any] = []
+        changes: list[Any] = []
+        for given in self.moments:
+            if isinstance(given, Expression):
+                moments.append(unit * self._heyoka(m, given))
+                changes.append(_along_motion(moments[-1], slopes))
+            else:
+                moments.append(hy.expression(m.number(context.ldexp(given, -m.scaling.inertia))))
+                changes.append(0.0)
+        return MassDistribution(_diagonal(moments), _diagonal(changes))
+
+    def endings(self, m: Kinematics) -> list[tuple[str, Symbolic]]:
+        """I1 + I2 - I3 and its like, and each moment, which are above zero for every body."""
+        single = m.scene.config.integrator.precision == "single"
+        slack, least = _SLACK_SINGLE if single else _SLACK, least_part("single" if single else "")
+        assert m.shape is not None
+        moments = [m.shape.matrix[i][i] for i in range(3)]
+        total = hy.sum(moments)
+        found = []
+        for axis, name in enumerate("xyz"):
+            others = [x for i, x in enumerate(moments) if i != axis]
+            margin = hy.sum([*others, -moments[axis], slack * total])
+            found.append((f"the moment about {name} exceeds the sum of the other two", margin))
+        for axis, _ in self.formulae:
+            margin = moments[axis] - least * total
+            found.append((f"the moment about {'xyz'[axis]} falls below {least:.1g} of their sum", margin))
+        return found
+
+    # --- as a carrier of momentum: none of its own, but work ------------------------------------------------
+
+    def carried_momentum(self, m: Kinematics) -> list[Term]:
+        return []
+
+    def carried_energy(self, m: Kinematics) -> Symbolic | None:
+        return None
+
+    def exerted_torque(self, m: Kinematics) -> list[Term]:
+        return []
+
+    def carried_at_start(self, scene: Scene) -> tuple[Vector, Any]:
+        return [scene.context.zero] * 3, scene.context.zero
+
+    def supplied_power(self, m: Kinematics) -> Symbolic | None:
+        """-w . I' w / 2, and what potential energies change by."""
+        assert m.shape is not None
+        changes = [m.shape.change[i][i] for i in range(3)]
+        terms = [-0.5 * (x * (w * w)) for x, w in zip(changes, m.rates, strict=True) if not absent(x)]
+        places = hy.make_vars(*_ELEMENTS)
+        apart = replace(m, shape=MassDistribution(_diagonal(list(places)), _diagonal([0.0] * 3)))
+        for load in loads_of(m.scene):
+            potential = load.potential(apart) if load.conservative and load is not self else None
+            if potential is None:
+                continue
+            known = set(hy.get_variables(hy.expression(potential)))
+            for place, name, change in zip(places, _ELEMENTS, changes, strict=True):
+                if name in known and not absent(change):
+                    terms.append(hy.diff(potential, place) * change)  # linear in the moments
+        return hy.sum(terms)
+
+    # --- sizes ----------------------------------------------------------------------------------------------
+
+    def amplitude(self, scene: Scene) -> Any | None:
+        """By how much energy of rotation grows as moments that depend on time alone shrink, L being kept."""
+        context = scene.context
+        least = context.one
+        for axis, expression in self.formulae:
+            begun = scene.body.principal_moments[axis]
+            for n in range(_TIMES + 1) if names_used(expression) == {"t"} else ():
+                then = scene.start + (scene.end - scene.start) * n / _TIMES
+                try:
+                    share = evaluate(expression, {"t": then}, context) / begun
+                except ExpressionError:
+                    continue
+                least = context.minimum([least, share]) if share > 0 else least
+        energies = zip(scene.body.principal_moments, scene.angular_velocity, strict=True)
+        energy = sum((moment * rate**2 / 2 for moment, rate in energies), context.zero)
+        return energy * (1 / context.maximum([least, context.mpf(2) ** -10]) - 1)
+
+    # --- what readers are told ------------------------------------------------------------------------------
+
+    def told(self, scene: Scene) -> str:
+        texts = ", ".join(f'"{x.text}" about {"xyz"[axis]}' for axis, x in self.formulae)
+        return (
+            f"principal_moments: mass moves in the body, {texts}; at the start "
+            + ", ".join(scene.context.nstr(x, 6) for x in scene.body.principal_moments)
+            + " kg m^2"
+        )
+
+
+def _diagonal(elements: list[Any]) -> list[list[Any]]:
+    return [[elements[i] if i == j else 0.0 for j in range(3)] for i in range(3)]
+
+
+def _along_motion(expression: Symbolic, slopes: dict[str, Symbolic]) -> Symbolic:
+    """Derivative of an expression of time and states along the motion, per internal unit of time."""
+    clock = hy.make_vars(_CLOCK)
+    shown = hy.subs(expression, {hy.time: clock})
+    terms = []
+    for name in hy.get_variables(shown):
+        if name == _CLOCK:
+            terms.append(hy.diff(shown, clock))
+        elif name in slopes:  # others stand for numbers
+            terms.append(hy.diff(shown, hy.make_vars(name)) * slopes[name])
+    return hy.subs(hy.sum(terms), {clock: hy.time}) if terms else hy.expression(0.0)

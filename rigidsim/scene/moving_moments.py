@@ -1,0 +1,99 @@
+"""``[body] principal_moments`` as expressions: mass that is moved inside the body.
+
+They are functions of time, [[states]] and [parameters]. The body of the scene is the one at the start.
+"""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+from rigidsim.errors import ConfigError, Problem
+from rigidsim.scene.arithmetic import Vector
+from rigidsim.scene.exact import ExactNumber
+from rigidsim.scene.expressions.names import Names, names_of
+from rigidsim.scene.expressions.parser import parse_expression
+from rigidsim.scene.expressions.tree import (
+    Expression,
+    ExpressionError,
+    constant_value,
+    evaluate,
+    names_used,
+)
+from rigidsim.scene.schema import Config
+
+WHERE = "[body] principal_moments"
+LEAST = 1e-9
+"""Least part of their sum that a moment which varies may become: 1/I has a pole at zero."""
+_LEAST_SINGLE = 2e-4
+_JUMPS = re.compile(r"\b(sign|step|pulse|wrap)\s*\(")
+
+
+def least_part(precision: str | int) -> float:
+    """``LEAST`` in a precision that can tell it."""
+    return _LEAST_SINGLE if precision == "single" else LEAST
+
+
+def formulas_of(config: Config, names: Names | None = None) -> list[Expression | ExactNumber]:
+    """The three moments as numbers, or parsed where the config has expressions; empty if none is one.
+
+    Raises:
+        ConfigError: an expression that can't be read, jumps, or reads what moments can't.
+    """
+    given = config.body.principal_moments
+    if given is None or all(isinstance(x, ExactNumber) for x in given):
+        return []
+    names = names_of(config) if names is None else names
+    allowed = {"t", *(state.name for state in config.states)}
+    found: list[Expression | ExactNumber] = []
+    for axis, text in enumerate(given):
+        if isinstance(text, ExactNumber):
+            found.append(text)
+            continue
+        where = f"{WHERE}[{axis}]"
+        try:
+            formula = parse_expression(text, names, parameters=config.parameters, unit="kg m^2")
+        except ExpressionError as error:
+            said = f'given "{text}", which is neither a number nor an expression that can be read: {error}'
+            raise ConfigError(Problem(where, said)) from None
+        if others := sorted(names_used(formula) - allowed):
+            what = f'given "{text}", which reads {", ".join(others)}; moments may read t, [[states]] and '
+            raise ConfigError(Problem(where, what + "[parameters]: let a state of [[states]] follow it"))
+        if _JUMPS.search(text):
+            what = f'given "{text}", which jumps: mass takes time to move; make the change smooth with '
+            raise ConfigError(Problem(where, what + "tanh, or let a state of [[states]] follow it"))
+        found.append(formula)
+    return found
+
+
+def moments_at_start(config: Config, context: Any, start: Any) -> Vector | None:
+    """The three moments at the start (mpf, kg m^2); None if all are plain numbers.
+
+    Raises:
+        ConfigError: as ``formulas_of``, or one has no finite value there, or is too small to vary.
+    """
+    found = formulas_of(config)
+    if not found:
+        return None
+    values = {"t": start, **{state.name: state.initial.at(context) for state in config.states}}
+    moments = []
+    for axis, formula in enumerate(found):
+        try:
+            given = isinstance(formula, ExactNumber)
+            moments.append(formula.at(context) if given else evaluate(formula, values, context))  # type: ignore
+        except ExpressionError as error:
+            raise ConfigError(Problem(f"{WHERE}[{axis}]", f"no finite value at the start: {error}")) from None
+    if any(varies(formula, context) for formula in found):
+        least = least_part(config.integrator.precision)
+        small = next((i for i in range(3) if 0 <= moments[i] <= least * sum(moments)), None)
+        if small is not None:
+            what = f"given {context.nstr(moments[small], 6)} kg m^2 at the start, beside moments that vary; "
+            raise ConfigError(
+                Problem(f"{WHERE}[{small}]", what + f"each has to be more than {least:.1g} of their sum")
+            )
+    return moments
+
+
+def varies(formula: Expression | ExactNumber, context: Any) -> bool:
+    """Whether a moment is no constant."""
+    return not isinstance(formula, ExactNumber) and constant_value(formula, context) is None
