@@ -256,7 +256,7 @@ def view(
     """
 
 
-_EACH_FIGURE = "\n".join(f"{name:14}{told}" for name, told in FIGURES.items())
+_EACH_FIGURE = "\n".join(f"{name:17}{told}" for name, told in FIGURES.items())
 
 
 @_command("results", f"\n\n\b\nFigures:\n{_EACH_FIGURE}")

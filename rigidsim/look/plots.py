@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import xarray
 
-from rigidsim.look.signals import in_words, is_averaged
+from rigidsim.look.signals import in_words, is_averaged, is_own_state
 from rigidsim.look.solids import Array, Color
 from rigidsim.scene.readable import angle_unit, si_scale
 
@@ -98,6 +98,8 @@ def plan_plots(dataset: xarray.Dataset, leading: Sequence[str] = ()) -> list[Plo
         factor, shown_unit = _reading(variable, unit)
         if {"drift_of", "put_back_of"} & set(variable.attrs):
             key, title, place = "drift", "Drift of invariants, log10", "drift"
+        elif is_own_state(variable):
+            key, title, place = f"own {shown_unit}", _with_unit("states of one's own", shown_unit), "leading"
         elif variable.ndim > 1 or name in first:
             # The name, not the long name: it is short, and what the user meets in the dataset.
             key, place = name, "leading" if name in first else "more"

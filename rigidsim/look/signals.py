@@ -15,6 +15,7 @@ import xarray
 from numpy.typing import NDArray
 
 from rigidsim.look.solids import Array, rotation_matrix
+from rigidsim.look.surroundings import has_rotors
 
 ROWS_AT_ONCE = 1 << 21
 
@@ -79,6 +80,11 @@ def title_of(dataset: xarray.Dataset) -> str:
 def by_role(dataset: xarray.Dataset, role: str) -> dict[str, xarray.DataArray]:
     """Drifts ("drift_of") or corrections put back ("put_back_of"), by the name of their invariant."""
     return {name: v for v in dataset.data_vars.values() if (name := v.attrs.get(role))}
+
+
+def is_own_state(variable: xarray.DataArray) -> bool:
+    """Whether a variable is a state of ``[[states]]``."""
+    return variable.attrs.get("given_by") == "[[states]]"
 
 
 def in_words(name: str) -> str:
@@ -221,7 +227,7 @@ def figure_index(found: Array) -> int:
 def energy_and_momentum(dataset: xarray.Dataset) -> tuple[Array, float, float] | None:
     """Moments, twice the energy and the squared momentum of a free body; None where these aren't constant."""
     found, rates = moments(dataset), principal_rates(dataset)
-    if found is None or rates is None:
+    if found is None or rates is None or has_rotors(dataset):
         return None
     rates = finite_rows(rates)
     twice, square = rates**2 @ found, rates**2 @ found**2

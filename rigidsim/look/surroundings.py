@@ -41,6 +41,11 @@ def told(dataset: xarray.Dataset, what: str) -> list[dict[str, Any]]:
     return [one for one in listed if isinstance(one, dict) and one.get("what") == what]
 
 
+def has_rotors(dataset: xarray.Dataset) -> bool:
+    """Whether rotors in the body carry momentum of their own: those kept at rest don't."""
+    return any(one["drive"] != "fixed" or one["rate"] for one in told(dataset, "rotor"))
+
+
 def gravity(dataset: xarray.Dataset) -> Array | None:
     """Acceleration (3,) of a uniform field, m/s^2, space axes; None if there is none."""
     for one in told(dataset, "gravity"):

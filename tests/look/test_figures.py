@@ -309,7 +309,7 @@ def test_unknown_and_impossible_figures_are_refused_with_those_there_are(symmetr
     with pytest.raises(ValueError, match=r"rigidsim\.analyse\(run\)\.figure"):
         figures.figure(symmetric_top(), "spectrum")
     rates = symmetric_top()[["angular_velocity"]].assign_attrs(symmetric_top().attrs)
-    assert figures.available(rates) == ["overview", "polhode", "rates"]
+    assert figures.available(rates) == ["overview", "polhode", "momentum_sphere", "rates"]
 
 
 @pytest.mark.slow

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 
 from rigidsim.look import signals
 from rigidsim.look.figure_names import FIGURES, OVERVIEW, SPECTRUM
-from rigidsim.look.figures import poles, polhode, timelines
+from rigidsim.look.figures import gyrostat, poles, polhode, timelines
 from rigidsim.look.figures.composing import compose, shown_rows
 from rigidsim.look.figures.drift import drift
 from rigidsim.look.figures.panel import Panel
@@ -58,6 +58,13 @@ KINDS: dict[str, Kind] = {
         [poles.tip],
     ),
     "polhode": Kind(_TURNS, (), [polhode.polhode, polhode.poinsot]),
+    "momentum_sphere": Kind(
+        "angular_velocity, and rates of rotors, recorded, and a momentum whose size stays",
+        (),
+        [gyrostat.momentum_sphere, gyrostat.momentum_sphere_at_end],
+    ),
+    "rotors": Kind("rotors whose rates were recorded", [gyrostat.tilts, gyrostat.rotor_rates]),
+    "own_states": Kind("states of [[states]] recorded", timelines.own_states),
     "herpolhode": Kind("an attitude and a momentum that stays put", (), [polhode.herpolhode]),
     "path": Kind("position recorded", (), [poles.path]),
     "rates": Kind(_TURNS, [timelines.rates]),
@@ -127,7 +134,14 @@ def figure_format(path: Path) -> str:
 
 
 def _leading(rows: xarray.Dataset) -> tuple[Sequence[Panel], Sequence[Panel]]:
-    """Curves and planes of the page that suits a scene."""
+    """Curves and planes of the page that suits a scene, with rates of rotors and states of one's own."""
+    found = gyrostat.leading(rows, timelines.rates)
+    curves, planes = found or _of_body(rows)
+    wheels = [] if found else [gyrostat.rotor_rates]
+    return [*curves, *wheels, *timelines.own_states], planes
+
+
+def _of_body(rows: xarray.Dataset) -> tuple[Sequence[Panel], Sequence[Panel]]:
     moving = [poles.path] if poles.path.shows(rows) else []
     attitude = [timelines.rates, timelines.attitude]
     tilting = [timelines.obliquity, timelines.longitude]

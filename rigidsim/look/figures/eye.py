@@ -15,7 +15,8 @@ from matplotlib.patheffects import withStroke
 from numpy.typing import NDArray
 
 from rigidsim.look.figures.panel import number
-from rigidsim.look.figures.style import PALE, X, Y, Z
+from rigidsim.look.figures.style import PALE, PINK, X, Y, Z
+from rigidsim.look.signals import joined
 from rigidsim.look.solids import Array
 
 Mask = NDArray[np.bool_]
@@ -97,6 +98,20 @@ def line(axes: Axes, eye: Eye, points: Array, keep: Mask | None = None, **style:
     """A curve (rows, 3), of which only the rows to keep are drawn."""
     shown = points if keep is None else np.where(keep[:, None], points, np.nan)
     axes.plot(*eye.flat(shown).T, **style)
+
+
+def path(axes: Axes, eye: Eye, points: Array, front: Mask) -> None:
+    """The path (rows, 3) of a run, pale where it isn't in front, with its start."""
+    if joined(points):
+        line(axes, eye, points, ~front, color=PINK, lw=1.1, alpha=0.35)
+        line(axes, eye, points, front, color=PINK, lw=1.9, zorder=5)
+    else:
+        dots = {"ls": "none", "marker": ".", "ms": 2.2, "mew": 0.0, "color": PINK}
+        line(axes, eye, points, ~front, alpha=0.3, **dots)
+        line(axes, eye, points, front, zorder=5, **dots)
+    # The start is marked: of a rotation about a principal axis the polhode is but a point.
+    (x, y) = eye.flat(points[0])
+    axes.plot(x, y, "o", color=PINK, ms=4.0, alpha=1.0 if front[0] else 0.35, zorder=6)
 
 
 def spoke(axes: Axes, eye: Eye, start: Array, stop: Array, text: str, color: str, reach: float) -> Array:

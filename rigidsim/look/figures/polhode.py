@@ -12,7 +12,6 @@ import xarray
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
-from numpy.typing import NDArray
 
 from rigidsim.look import signals
 from rigidsim.look.figures import eye as eyes
@@ -96,7 +95,7 @@ def polhode(axes: Axes, dataset: xarray.Dataset, rates: Array) -> None:
             eyes.line(axes, view, ring, beyond, color="#c0843a", lw=0.7, zorder=3)
         entries.append(Patch(color=MOMENTUM_SURFACE, label="L²"))
         title = "Polhode: the surfaces of energy and momentum"
-    _path(axes, view, points, eyes.visible(points, view, energy))
+    eyes.path(axes, view, points, eyes.visible(points, view, energy))
     size = float(np.abs(covered).max())
     for k, name in enumerate(names):
         way = np.eye(3)[k] if view.toward[k] >= 0 else -np.eye(3)[k]
@@ -124,19 +123,6 @@ def _view(points: Array, radii: Array, moments: Array) -> eyes.Eye:
     return eyes.eye_at(found)
 
 
-def _path(axes: Axes, view: eyes.Eye, points: Array, front: NDArray[np.bool_]) -> None:
-    if signals.joined(points):
-        eyes.line(axes, view, points, ~front, color=PINK, lw=1.1, alpha=0.35)
-        eyes.line(axes, view, points, front, color=PINK, lw=1.9, zorder=5)
-    else:
-        dots = {"ls": "none", "marker": ".", "ms": 2.2, "mew": 0.0, "color": PINK}
-        eyes.line(axes, view, points, ~front, alpha=0.3, **dots)
-        eyes.line(axes, view, points, front, zorder=5, **dots)
-    # The start is marked: of a rotation about a principal axis the polhode is but a point.
-    (x, y) = view.flat(points[0])
-    axes.plot(x, y, "o", color=PINK, ms=4.0, alpha=1.0 if front[0] else 0.35, zorder=6)
-
-
 def _bare(axes: Axes, rates: Array, names: list[str]) -> None:
     """Draw the path without surfaces, between three axes with the ranges that it covers."""
     scale, unit = si_scale(rates, "rad/s")
@@ -144,7 +130,7 @@ def _bare(axes: Axes, rates: Array, names: list[str]) -> None:
     reach = float((np.nanmax(points, axis=0) - np.nanmin(points, axis=0)).max())
     size = float(np.nanmax(np.abs(points)))
     view = eyes.eye_at(np.array([0.74, 0.52, 0.43]))
-    _path(axes, view, points, np.ones(len(points), dtype=bool))
+    eyes.path(axes, view, points, np.ones(len(points), dtype=bool))
     eyes.draw_box(axes, view, points, names, reach if reach > 1e-6 * size else size or 1.0, floors=range(3))
     titled(axes, f"Path of ω in body axes [{unit}]")
 
@@ -208,7 +194,7 @@ def poinsot(axes: Axes, dataset: xarray.Dataset, found: tuple[Array, Array, Arra
     covered = eyes.draw_ellipsoid(axes, own, radii, ENERGY_SURFACE)
     for one in eyes.sections(radii):
         eyes.line(axes, own, one, eyes.visible(one, own, radii), color=_RING, lw=0.7, zorder=3)
-    _path(axes, own, points, eyes.visible(points, own, radii))
+    eyes.path(axes, own, points, eyes.visible(points, own, radii))
     place = view.flat(np.array([0.0, 0.0, 1.25 * depth]))
     axes.plot(*np.stack([np.zeros(2), view.flat(tip)]).T, color=PINK, lw=1.3, zorder=5)
     axes.plot(*np.stack([np.zeros(2), place]).T, color=GREY, lw=1.1, ls=(0, (4, 2)), zorder=5)

@@ -9,9 +9,10 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
+import xarray
 from numpy.typing import NDArray
 
-from rigidsim.look.signals import across, finite_rows, joined, norms, thinned_indices
+from rigidsim.look.signals import across, finite_rows, joined, norms, seconds, thinned_indices, values
 from rigidsim.look.solids import Array, Color, Mesh
 
 SPACE, BODY, CENTRE = "", "body", "centre"
@@ -22,6 +23,8 @@ AXIS_REACH = 1.15  # of the body axes
 CURVE_POINTS = 4000  # of a whole polhode or track
 NEAR = 0.35  # radii of a path between neighbours that are joined
 SCENE_ROWS = 20_000  # above which arrows and trails are thinned, if their motion allows it
+_LEAST_SECONDS, _MOST_SECONDS = 10.0, 60.0  # that playing a whole run takes
+_TURN_SECONDS = 3.0  # per turn of the body, when the run has few enough turns for it
 _STILL = 0.01  # of an arrow's length, by which it may move between rows that are drawn
 _SMOOTH = 0.2  # of a trail's radius, between its corners: some thirty a turn
 
@@ -221,6 +224,15 @@ def _stride_of(points: Array, share: float) -> int:
             if np.abs(points[stride:] - points[:-stride]).max() <= share * np.abs(points).max():
                 return stride
     return 1
+
+
+def screen_seconds(dataset: xarray.Dataset) -> float:
+    """Seconds on the screen in which a run is played: some for each turn of its body, as far as known."""
+    rates = values(dataset, "angular_velocity")
+    turns = 0.0
+    if rates is not None and np.isfinite(rates).any():
+        turns = float(np.nanmean(norms(rates)) * np.ptp(seconds(dataset))) / (2 * np.pi)
+    return min(max(_TURN_SECONDS * turns, _LEAST_SECONDS), _MOST_SECONDS)
 
 
 def longest(vectors: Array) -> float:

@@ -14,6 +14,8 @@ from rigidsim.look import signals
 from rigidsim.look.stages import orbits, parts, planet, precession, top
 from rigidsim.look.stages.bodies import Subject, column, source_arrows, vectors_of, with_track
 from rigidsim.look.stages.parts import BODY, Array, Arrow, Camera, Line, Picture, Shell, Spot, Stage, Vector
+from rigidsim.look.stages.wheels import with_wheels
+from rigidsim.look.surroundings import has_rotors
 
 ENERGY: tuple[int, int, int] = (120, 150, 200)
 _LEADING = ("angular_velocity", "polar_motion", "nutation_angle")
@@ -122,13 +124,14 @@ def build_picture(dataset: xarray.Dataset) -> tuple[Picture, Subject]:
     subject = Subject.of(dataset)
     pictures = (kind(dataset, subject) for kind in KINDS)
     found = next((picture for picture in pictures if picture is not None), None) or _any(dataset, subject)
+    found = with_wheels(dataset, subject, found)
     found.notes.insert(0, f"lengths are in units of the body's reach: 1 unit = {subject.reach:.6g} m")
     return found, subject
 
 
 def _any(dataset: xarray.Dataset, subject: Subject) -> Picture:
     """Any scene: the body with its momentum and angular velocity, and its track if it moves far."""
-    arrows, trails, notes = vectors_of(dataset, subject)
+    arrows, trails, notes = vectors_of(dataset, subject, paths=not has_rotors(dataset))
     if subject.attitude is None:
         notes.append("no attitude was recorded: the body is shown in its own axes and doesn't turn")
     else:

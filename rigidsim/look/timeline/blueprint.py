@@ -15,8 +15,6 @@ from rigidsim.look.timeline import plotting
 from rigidsim.look.timeline.drawing import OLDER, trail_path
 from rigidsim.look.timeline.drawn import Clock, DrawnRun
 
-SCREEN_SECONDS = 60.0  # the longest that playing a whole run may take
-TURN_SECONDS = 3.0  # per turn of the body, when the run has few enough turns for it
 TRAIL_ROWS = 1500  # at most in a sliding trail, and never more than a fifth of the run
 RECENT = 0.3  # of a sliding trail: its bright part
 PIXELS = 800.0  # about the height of the page
@@ -44,7 +42,7 @@ def build_blueprint(run: DrawnRun, *, following: bool = False) -> rrb.Blueprint:
     if run.states:
         right.append(rrb.StateTimelineView(origin="/states", name="Events"))
         heights.append(1.2)
-    return page_of(left, right, time_panel(clock, run.turns, following=following), heights)
+    return page_of(left, right, time_panel(clock, run.screen_seconds, following=following), heights)
 
 
 def build_comparison(
@@ -76,7 +74,7 @@ def build_comparison(
         plotting.legend_of(runs[0].picture.stages),
         {page.lower(): name for name, run in named for page in run.pages},
     )
-    return page_of(left, views, time_panel(clock, max(run.turns for run in runs), following=False))
+    return page_of(left, views, time_panel(clock, max(run.screen_seconds for run in runs), following=False))
 
 
 def page_of(
@@ -117,10 +115,9 @@ def tabs(views: Sequence[rrb.View]) -> rrb.View | rrb.Container:
     return views[0] if len(views) == 1 else rrb.Tabs(*views, active_tab=0)
 
 
-def time_panel(clock: Clock, turns: float, *, following: bool) -> rrb.TimePanel:
-    """The time panel: at the start, playing, at a speed that shows the motion."""
+def time_panel(clock: Clock, screen: float, *, following: bool) -> rrb.TimePanel:
+    """The time panel: at the start, playing, the whole run in so many seconds."""
     span = float(abs(clock.ticks[-1] - clock.ticks[0])) or 1.0
-    screen = min(max(TURN_SECONDS * turns, 10.0), SCREEN_SECONDS)
     return rrb.TimePanel(
         state="collapsed",
         timeline=clock.name,

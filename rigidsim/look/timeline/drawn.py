@@ -15,7 +15,7 @@ from rigidsim.look.plots import Plot, Series, plan_plots
 from rigidsim.look.signals import thin, thinned_indices
 from rigidsim.look.solids import Array
 from rigidsim.look.stages.bodies import Subject
-from rigidsim.look.stages.parts import Picture, Plane
+from rigidsim.look.stages.parts import Picture, Plane, screen_seconds
 from rigidsim.look.stages.registry import build_picture
 from rigidsim.look.states import States, charts_of, sections_of, states_of
 from rigidsim.look.timeline import drawing, plotting
@@ -81,7 +81,7 @@ def build_clock(seconds: NDArray[np.float64]) -> Clock:
 @dataclass(frozen=True)
 class DrawnRun:
     """Everything drawn of one dataset: of its `rows` in memory, numbered by `steps`, with pages of markdown
-    by name, and the turns of the body (0 if its rate isn't known).
+    by name, and the seconds on the screen in which it is played.
     """
 
     rows: xarray.Dataset
@@ -95,7 +95,7 @@ class DrawnRun:
     seconds: Array
     pages: dict[str, str]
     words: TimeWords
-    turns: float
+    screen_seconds: float
 
     @classmethod
     def of(cls, dataset: xarray.Dataset, most: int) -> Self:
@@ -116,9 +116,6 @@ class DrawnRun:
             "Picture": notes_page(picture.kind, notes),
             "Config": config_page(dataset),
         }
-        rates = signals.values(rows, "angular_velocity")
-        rate = signals.norms(rates) if rates is not None else np.empty(0)
-        mean = float(np.nanmean(rate)) if np.isfinite(rate).any() else 0.0
         return cls(
             rows=rows,
             steps=thinned_indices(dataset.sizes["time"], most),
@@ -131,7 +128,7 @@ class DrawnRun:
             seconds=seconds,
             pages={name: text for name, text in pages.items() if text},
             words=TimeWords.of(dataset.attrs, start, end),
-            turns=mean * abs(end - start) / (2 * np.pi),
+            screen_seconds=screen_seconds(rows),
         )
 
     def draw_static(self, recording: rr.RecordingStream, *, legend: bool = True) -> None:

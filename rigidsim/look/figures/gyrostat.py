@@ -1,0 +1,166 @@
+"""Bodies with rotors: the sphere of their momentum, with its equilibria, and their rotors over time.
+
+In body axes the momentum moves on a sphere, along levels of the energy if no motor works. Of a body without
+rotors they are the polhodes; rotors move equilibria, and let them merge.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import xarray
+from matplotlib.axes import Axes
+from matplotlib.lines import Line2D
+
+from rigidsim.look import gyrostats, signals
+from rigidsim.look.figures import eye as eyes
+from rigidsim.look.figures.panel import Find, Panel, number, panel
+from rigidsim.look.figures.style import GREY, INK, PALETTE, PINK, X, Y, key
+from rigidsim.look.figures.timelines import angles_over_time, lines
+from rigidsim.look.gyrostats import Gyrostat
+from rigidsim.look.solids import Array
+from rigidsim.look.surroundings import has_rotors
+from rigidsim.scene.readable import si_scale
+
+_GROUND, _LEVEL = "#dfe7f1", "#7f97b8"
+_LEVELS, _FINE = 12, 401  # levels, at equal shares of the sphere; points of the grid that they are found on
+_ONES = np.ones(3)
+_KINDS = ((-1, "o", Y, "stable"), (1, "X", X, "unstable"), (0, "D", GREY, "at the threshold"))
+
+
+@dataclass(frozen=True)
+class Sphere:
+    """The momentum's directions (rows, 3), and the gyrostat whose levels are drawn, with a title."""
+
+    directions: Array
+    gyrostat: Gyrostat
+    title: str
+
+
+def _sphere(row: int) -> Find:
+    """That with the levels at the first row, or at the last if motors have changed them."""
+
+    def find(dataset: xarray.Dataset) -> Sphere | None:
+        driven = any(rotor.drive == "driven" for rotor in gyrostats.rotors(dataset))
+        path, gyrostat = gyrostats.path(dataset), None
+        if row == 0 or driven:
+            gyrostat = Gyrostat.of(dataset, row)
+        if path is None or gyrostat is None:
+            return None
+        title = "Momentum sphere in body axes: levels of energy"
+        if driven:
+            title = f"Momentum sphere: levels of energy if motors stopped at the {'end' if row else 'start'}"
+        return Sphere(path / signals.norms(path)[:, None], gyrostat, title)
+
+    return find
+
+
+def _draw(axes: Axes, dataset: xarray.Dataset, found: Sphere) -> None:
+    """Levels of the energy, separatrices, equilibria, and the path of the run."""
+    gyrostat, view = found.gyrostat, _view(dataset, found.directions)
+    covered = eyes.draw_ellipsoid(axes, view, _ONES, _GROUND)
+    grid = np.linspace(-1, 1, _FINE)
+    right, up = np.meshgrid(grid, grid)
+    depth = np.sqrt(np.maximum(1 - right**2 - up**2, 0.0))
+    points = right[..., None] * view.right + up[..., None] * view.up + depth[..., None] * view.toward
+    inside = right**2 + up**2 < 1
+    energy = np.where(inside, gyrostat.energy(points), np.nan)
+    both = np.concatenate([gyrostat.energy(points)[inside], gyrostat.energy(-points)[inside]])
+    weights = np.tile(1 / np.maximum(depth[inside], 1e-3), 2)  # of a pixel on the sphere
+    if np.ptp(both) > 1e-9 * np.abs(both).max():
+        order = np.argsort(both)
+        shares = np.cumsum(weights[order]) / weights.sum()
+        levels = np.interp((np.arange(_LEVELS) + 0.5) / _LEVELS, shares, both[order])
+        axes.contour(right, up, energy, np.unique(levels), colors=_LEVEL, linewidths=0.6, zorder=2)
+    entries = [Line2D([], [], color=PINK, lw=1.9, label=f"L = {number(gyrostat.size, 3)} kg m²/s")]
+    for curve in gyrostat.separatrices():
+        front = eyes.visible(curve, view, _ONES)
+        eyes.line(axes, view, curve, ~front, color=INK, lw=0.7, alpha=0.2, zorder=2.5)
+        eyes.line(axes, view, curve, front, color=INK, lw=1.3, zorder=3)
+        entries[1:] = [Line2D([], [], color=INK, lw=1.3, label="separatrix")]
+    eyes.path(axes, view, found.directions, eyes.visible(found.directions, view, _ONES))
+    for square, marker, color, label in _KINDS:
+        style: dict[str, Any] = {"marker": marker, "mfc": color, "mec": "white", "ms": 8.0, "ls": "none"}
+        kind = [one.direction for one in gyrostat.equilibria if np.sign(one.square) == square]
+        for direction in kind:
+            alpha, height = (1.0, 4.0) if direction @ view.toward > 0 else (0.3, 1.5)
+            axes.plot(*view.flat(direction), **style, alpha=alpha, zorder=height)
+        if kind:
+            entries.append(Line2D([], [], **style, label=label))
+    for k, name in enumerate("xyz"):
+        front = view.toward[k] >= 0
+        way = np.eye(3)[k] if front else -np.eye(3)[k]
+        text = f"{'' if front else '−'}$L_{name}$"
+        place = eyes.spoke(axes, view, way, 1.16 * way, text, eyes.COLORS[k], 1.0)
+        covered = np.vstack([covered, place])
+    eyes.frame(axes, covered, aside=0.12, above=0.12)
+    key(axes, found.title, handles=entries)
+
+
+def _view(dataset: xarray.Dataset, directions: Array) -> eyes.Eye:
+    """A view of most equilibria, at the start and the end, of the path, and of positive axes."""
+    spheres = [Gyrostat.of(dataset, row) for row in (0, -1)]
+    marked = [one for sphere in spheres if sphere is not None for one in sphere.equilibria]
+    best, found = -np.inf, np.array([0.74, 0.52, 0.43])
+    for azimuth in np.deg2rad(np.arange(7.5, 360.0, 15.0)):
+        for height in np.deg2rad((-25.0, 18.0, 28.0, 38.0)):
+            flat = np.cos(height)
+            toward = np.array([flat * np.cos(azimuth), flat * np.sin(azimuth), np.sin(height)])
+            seen = np.clip(directions @ toward, -0.3, 0.7)
+            quality = 4 * float(np.nanmean(seen) + np.clip(directions[0] @ toward, -0.3, 0.6))
+            for one in marked:
+                quality += (1.5 if one.unstable else 1.0) * float(np.clip(one.direction @ toward, -0.2, 0.5))
+            quality += 0.2 * float(toward.sum()) - float(np.abs(toward).max() > 0.9)
+            if quality > best:
+                best, found = quality, toward
+    return eyes.eye_at(found)
+
+
+momentum_sphere, momentum_sphere_at_end = (Panel(_sphere(row), _draw) for row in (0, -1))
+
+
+def _tilts(dataset: xarray.Dataset) -> dict[str, Array] | None:
+    """Angles (rows,), rad, of the rotors' axes from the momentum."""
+    whole = gyrostats.momentum(dataset)
+    if whole is None:
+        return None
+    found = {rotor.name: signals.angle_between(whole, rotor.axis) for rotor in gyrostats.rotors(dataset)}
+    return found or None
+
+
+@panel(_tilts, begins=True)
+def tilts(axes: Axes, dataset: xarray.Dataset, angles: dict[str, Array]) -> None:
+    """Angles of the rotors' axes from the angular momentum."""
+    labels: list[str | None] = [*angles]
+    title = "Axes of the rotors, from the angular momentum"
+    if len(angles) == 1:
+        title, labels = f"Axis of rotor {labels[0]}, from the angular momentum", [None]
+    angles_over_time(axes, dataset, np.stack([*angles.values()], axis=1), title, hues=PALETTE, labels=labels)
+
+
+def _varying(dataset: xarray.Dataset) -> dict[str, Array] | None:
+    found = gyrostats.rotors(dataset)
+    return {rotor.name: rotor.rate for rotor in found} if any(rotor.varies for rotor in found) else None
+
+
+@panel(_varying, begins=True)
+def rotor_rates(axes: Axes, dataset: xarray.Dataset, rates: dict[str, Array]) -> None:
+    """Rates of the rotors relative to the body, if one changes."""
+    table = np.stack([*rates.values()], axis=1)
+    scale, unit = si_scale(table, "rad/s")
+    lines(axes, dataset, table / scale, [*rates], PALETTE)
+    key(axes, "Rates of the rotors, relative to the body")
+    axes.set_ylabel(f"rate [{unit}]")
+
+
+def leading(dataset: xarray.Dataset, rates: Panel) -> tuple[Sequence[Panel], Sequence[Panel]] | None:
+    """Curves, with `rates` of the body among them, and planes of the page of a body with rotors whose
+    momentum stays; None for others. What motors do takes the whole run.
+    """
+    if not has_rotors(dataset) or not momentum_sphere.shows(dataset):
+        return None
+    curves = [tilts, rotor_rates, rates]
+    if any(rotor.drive == "driven" for rotor in gyrostats.rotors(dataset)):
+        curves = [replace(curve, begins=False) for curve in curves]
+    return curves, [momentum_sphere, momentum_sphere_at_end]

@@ -1,0 +1,161 @@
+"""Rotors on a body's stage: discs with a mark that turn about their axes, and whose momentum is whose.
+
+A disc is drawn where its axis leaves the body, so that it is seen. Its radius is as of a disc of the body's
+density: moments of inertia go with the fifth power of size. It turns by the integral of its rate relative to
+the body; if that were too fast for a screen it would seem to stand or to go backwards, and is drawn slower by
+one factor for the whole run, which the legend tells: a wheel that spins up is seen to spin up.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import xarray
+
+from rigidsim.look import gyrostats, signals
+from rigidsim.look.gyrostats import Rotor
+from rigidsim.look.solids import Mesh, solid_mesh
+from rigidsim.look.stages import parts
+from rigidsim.look.stages.bodies import Subject
+from rigidsim.look.stages.parts import BODY, Array, Arrow, Color, Line, Picture, Solid, Spot, Stage, Trail
+
+OF_BODY: Color = (235, 140, 80)
+OF_WHEELS: Color = (150, 205, 110)
+_MARK, _METAL, _DARK = (255, 226, 120), (158, 164, 176), (104, 110, 124)
+_MARKED = 0.5  # rad to either side
+_FLATNESS, _GAP = 0.3, 0.06  # of a disc's radius: its thickness; of the body's reach: to what is below
+_SMALLEST, _LARGEST, _USUAL = 0.12, 0.55, 0.3  # radii over the body's reach
+_PICTURES = 30.0  # a second on the screen that are surely drawn
+_TOO_FAST, _SLOWED = 1 / 3, 1 / 12  # turns from one picture to the next: from which on, and then
+_LEADING = "rotor_rate"
+
+
+@dataclass(frozen=True)
+class _Disc:
+    """Where a disc is: its middle along the axis, and its radius, in units of the body's reach."""
+
+    rotor: Rotor
+    middle: float
+    radius: float
+
+    @property
+    def top(self) -> float:
+        """Where it ends on the axis."""
+        return self.middle + self.radius * _FLATNESS / 2
+
+
+def with_wheels(dataset: xarray.Dataset, subject: Subject, picture: Picture) -> Picture:
+    """The picture with the dataset's rotors on its body, if it has some and the body is drawn to scale."""
+    found = gyrostats.rotors(dataset)
+    stage = picture.stages[0]
+    if not found or stage.unit != subject.reach or not stage.meshes:
+        return picture
+    frames, solids, spots, lines, notes = {}, [], [], [], []
+    for disc in _placed(dataset, subject, found):
+        rotor, name = disc.rotor, f"rotor_{disc.rotor.name}"
+        slower = slowing(dataset, rotor)
+        frames[f"{BODY}/{name}"] = parts.viewer_quaternion(_turning(dataset, rotor, slower))
+        solids.append(Solid("disc", _mesh(disc), f"{BODY}/{name}"))
+        beside = disc.middle * rotor.axis + 1.2 * disc.radius * signals.across(rotor.axis)[0]
+        spots.append(Spot(f"{name}/label", rotor.name, _MARK, beside, BODY))
+        words = f"rotor {rotor.name}" + (f", drawn turning {slower:g} times slower" if slower > 1 else "")
+        ends = np.outer([0.0, disc.top], rotor.axis)
+        lines.append(Line(f"{name}/axle", _MARK, ends, BODY, 2.0, 0.7, words))
+        notes.append(
+            f"{words}: on its axis, outside of the body; of the size of a disc of the body's density"
+        )
+    arrows, trails, told = _momenta(dataset, stage, found)
+    changed = replace(
+        stage,
+        frames={**stage.frames, **frames},
+        solids=[*stage.solids, *solids],
+        spots=[*stage.spots, *spots],
+        lines=[*stage.lines, *lines],
+        arrows=[*stage.arrows, *arrows],
+        trails=[*stage.trails, *trails],
+    )
+    vary = any(rotor.varies for rotor in found)
+    first, *rest = picture.leading or ("",)
+    leading = (first, _LEADING, *rest) if vary else picture.leading
+    return replace(
+        picture, stages=[changed, *picture.stages[1:]], leading=leading, notes=[*picture.notes, *notes, *told]
+    )
+
+
+def slowing(dataset: xarray.Dataset, rotor: Rotor) -> float:
+    """How many times slower than it is a rotor is drawn: 1, or 2, 5, 10, 20, 50 and so on."""
+    seconds = signals.seconds(dataset)
+    if len(seconds) < 2:
+        return 1.0
+    picture = np.ptp(seconds) / (parts.screen_seconds(dataset) * _PICTURES)
+    steps = np.maximum(np.abs(np.diff(seconds)), picture)
+    most = float(np.nanmax(np.abs(rotor.rate[1:]) * steps, initial=0.0)) / (2 * np.pi)
+    if most <= _TOO_FAST:
+        return 1.0
+    needed = most / _SLOWED
+    decade = 10.0 ** np.floor(np.log10(needed))
+    return float(next(factor * decade for factor in (1, 2, 5, 10) if factor * decade >= needed))
+
+
+def _turning(dataset: xarray.Dataset, rotor: Rotor, slower: float) -> Array:
+    """Quaternions (rows, 4) w x y z by which it has turned in the body."""
+    rate, steps = np.nan_to_num(rotor.rate) / slower, np.diff(signals.seconds(dataset))
+    angle = np.append(0.0, np.cumsum((rate[1:] + rate[:-1]) / 2 * steps))
+    return np.column_stack([np.cos(angle / 2), np.sin(angle / 2)[:, None] * rotor.axis])
+
+
+def _placed(dataset: xarray.Dataset, subject: Subject, found: list[Rotor]) -> list[_Disc]:
+    """Discs where their axes leave the body, one above the other if they share an axis."""
+    corners, inertia = np.concatenate([mesh.vertices for mesh in subject.meshes]), gyrostats.tensor(dataset)
+    placed: list[_Disc] = []
+    for rotor in found:
+        along = corners @ rotor.axis
+        across = float(np.linalg.norm(corners - np.outer(along, rotor.axis), axis=1).max())
+        whole = 0.0 if inertia is None else float(rotor.axis @ inertia @ rotor.axis)
+        share = (rotor.moment / whole) ** 0.2 if whole > 0 else _USUAL
+        radius = float(np.clip(share * across, _SMALLEST, _LARGEST))
+        below = [disc.top for disc in placed if disc.rotor.axis @ rotor.axis > 0.9]
+        middle = max([float(along.max()), *below]) + _GAP + radius * _FLATNESS / 2
+        placed.append(_Disc(rotor, middle, radius))
+    return placed
+
+
+def _mesh(disc: _Disc) -> Mesh:
+    """The disc at its place, in body axes, one sector of it bright."""
+    size = {"radius": [disc.radius], "height": [disc.radius * _FLATNESS]}
+    mesh = solid_mesh("cylinder", size)
+    middles = mesh.vertices[mesh.triangles].mean(axis=1)
+    marked = np.abs(np.arctan2(middles[:, 1], middles[:, 0])) < _MARKED
+    rim = np.abs(mesh.normals[mesh.triangles[:, 0], 2]) < 0.5
+    colors = np.where(rim[:, None], _DARK, _METAL)
+    colors = np.where(marked[:, None], _MARK, colors)
+    worn = np.empty_like(mesh.colors)
+    worn[mesh.triangles] = colors[:, None].astype(np.uint8)
+    first, second = signals.across(disc.rotor.axis)
+    turn = np.column_stack([first, second, disc.rotor.axis])
+    return replace(mesh, colors=worn).moved(turn, disc.middle * disc.rotor.axis)
+
+
+def _momenta(
+    dataset: xarray.Dataset, stage: Stage, found: list[Rotor]
+) -> tuple[list[Arrow], list[Trail], list[str]]:
+    """The body's and the rotors' shares of the momentum, and its path, if the whole is on the stage."""
+    whole = gyrostats.momentum(dataset)
+    if whole is None or all(arrow.name != "angular_momentum" for arrow in stage.arrows):
+        return [], [], []
+    inner = np.asarray(sum(rotor.inner for rotor in found))
+    factor = parts.ARROW_REACH / parts.longest(whole)
+    of_body, of_wheels, moving = (
+        "L of the body, rotors locked",
+        "L of the rotors relative to it",
+        "L's path in the body",
+    )
+    arrows = [
+        Arrow("body_momentum", "body", OF_BODY, (whole - inner) * factor, True, of_body, 0.8, 0.018),
+        Arrow("rotor_momentum", "rotors", OF_WHEELS, inner * factor, True, of_wheels, 1.0, 0.018),
+    ]
+    trail = Trail("momentum_path", parts.POLHODE, whole * factor, in_body=True, words=moving)
+    notes = [
+        f"{of_body} (orange), and {of_wheels} (green): to the scale of L, which they add up to",
+        f"{moving} (pink): on a sphere, if no torque from outside changes L",
+    ]
+    return arrows, [trail], notes

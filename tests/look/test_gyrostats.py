@@ -1,0 +1,246 @@
+"""Bodies with rotors: equilibria and separatrices on the momentum's sphere, figures, wheels that turn."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray
+
+pytest.importorskip("matplotlib")
+pytest.importorskip("rerun")
+
+import rigidsim
+from rigidsim.look import figures, gyrostats
+from rigidsim.look.gyrostats import Gyrostat
+from rigidsim.look.solids import rotation_matrix
+from rigidsim.look.stages.registry import build_picture
+from rigidsim.look.timeline import write_timeline
+
+Read = Callable[[Path, str], dict[str, np.ndarray]]
+
+TWO_ROTORS = """
+name = "two"
+[body]
+principal_moments = [1, 2, 2.5]
+[initial]
+angular_velocity = [0.3, 1, -0.2]
+[[rotors]]
+name = "free"
+axis = [1, 0, 1]
+moment = 0.1
+rate = 300
+[[rotors]]
+name = "kept"
+axis = [0, 1, 0]
+moment = 0.2
+rate = 2
+fixed = true
+[time]
+end = 20
+samples = 401
+"""
+DRIVEN = """
+name = "driven"
+[body]
+principal_moments = [50, 90, 110]
+[initial]
+angular_velocity = [0.001, 0, 0.6]
+[[rotors]]
+name = "wheel"
+axis = [1, 0, 0]
+moment = 0.1
+torque = "0.5*step(60 - t)"
+[[states]]
+name = "heat"
+unit = "J"
+derivative = "0.5*rate_wheel*step(60 - t)"
+[time]
+end = 120
+samples = 481
+"""
+
+
+@pytest.fixture(scope="module")
+def two() -> xarray.Dataset:
+    return rigidsim.run(rigidsim.parse(TWO_ROTORS), out=None).dataset.load()
+
+
+@pytest.fixture(scope="module")
+def driven() -> xarray.Dataset:
+    return rigidsim.run(rigidsim.parse(DRIVEN), out=None).dataset.load()
+
+
+def linearised(gyrostat: Gyrostat, direction: np.ndarray) -> np.ndarray:
+    """Eigenvalues of K w' = (K w + h) x w about a spin that stays, w' = 0."""
+    tensor, inner = gyrostat.tensor, gyrostat.inner
+    rate = np.linalg.solve(tensor, gyrostat.size * direction - inner)
+
+    def cross(v: np.ndarray) -> np.ndarray:
+        return np.array([[0, -v[2], v[1]], [v[2], 0, -v[0]], [-v[1], v[0], 0]])
+
+    matrix = np.linalg.solve(tensor, cross(tensor @ rate + inner) - cross(rate) @ tensor)
+    return np.linalg.eigvals(matrix)
+
+
+def random_gyrostat(generator: np.random.Generator) -> Gyrostat:
+    turn = np.linalg.qr(generator.normal(size=(3, 3)))[0]
+    tensor = turn @ np.diag(generator.uniform(1, 2, 3)) @ turn.T
+    inner = generator.normal(size=3) * 10 ** generator.uniform(-2, 0.5)
+    if generator.random() < 0.3:  # along a principal axis
+        inner = turn[:, generator.integers(3)] * generator.normal() * 0.5
+    return Gyrostat(tensor, inner, 1.3)
+
+
+def test_equilibria_are_all_there_are_with_the_exponents_of_the_linearised_equations() -> None:
+    generator, counts = np.random.default_rng(28), set()
+    for _ in range(100):
+        gyrostat = random_gyrostat(generator)
+        found = gyrostat.equilibria
+        counts.add(len(found))
+        # index of a field on the sphere (Poincaré, Hopf): two more extrema than saddles
+        assert sum(-1 if one.unstable else 1 for one in found) == 2
+        for one in found:
+            rate = gyrostat.rates(one.direction)
+            assert np.linalg.norm(np.cross(one.direction, rate)) < 1e-8
+            squares = linearised(gyrostat, one.direction) ** 2
+            largest = squares[np.abs(squares).argmax()]
+            assert one.square == pytest.approx(largest.real, rel=1e-5, abs=1e-9)
+    assert counts == {2, 4, 6}
+
+
+@pytest.mark.parametrize(("rate", "stable"), [(4.5, False), (5.5, True), (-9.5, False), (-10.5, True)])
+def test_a_wheel_steadies_the_middle_axis_beyond_its_threshold(rate: float, stable: bool) -> None:
+    """J s > (C - B) w or J s < -(B - A) w (Hughes 1986): with 0.1 kg m^2 and 1 rad/s at 5 and -10 rad/s."""
+    gyrostat = Gyrostat(np.diag([1, 2, 2.5]), np.array([0, 0.1 * rate, 0]), abs(2 + 0.1 * rate))
+    spin = np.array([0, np.sign(2 + 0.1 * rate), 0])
+    (one,) = [one for one in gyrostat.equilibria if np.linalg.norm(one.direction - spin) < 1e-9]
+    assert one.unstable is not stable
+
+
+def test_of_equal_moments_isolated_equilibria_alone_are_told() -> None:
+    ring = Gyrostat(np.diag([2.0, 2.0, 3.0]), np.zeros(3), 1.0)
+    assert [abs(one.direction[2]) for one in ring.equilibria] == [1, 1]
+    beside = Gyrostat(np.diag([2.0, 2.0, 3.0]), np.array([0.1, 0.2, 0]), 1.0)  # along both equal axes
+    across = np.array([2, -1, 0]) / np.sqrt(5)
+    assert len(beside.equilibria) in (2, 4)
+    assert all(abs(one.direction @ across) < 1e-9 for one in beside.equilibria)
+    ball = Gyrostat(np.eye(3), np.zeros(3), 1.0)
+    assert ball.equilibria == ball.separatrices() == []
+
+
+def test_separatrices_of_a_body_alone_are_those_of_poinsot() -> None:
+    moments = np.array([1.0, 2.0, 2.5])
+    body = Gyrostat(np.diag(moments), np.zeros(3), 3.0)
+    curves = body.separatrices()
+    assert len(curves) == 4
+    for curve in curves:
+        x, _, z = (curve / moments).T  # along the planes w_a sqrt(A (B - A)) = ± w_c sqrt(C (C - B))
+        across = np.abs(x) * np.sqrt(1.0 * 1.0) - np.abs(z) * np.sqrt(2.5 * 0.5)
+        assert np.abs(across).max() < 1e-9
+        np.testing.assert_allclose(np.abs(curve[[0, -1]]), [[0, 1, 0], [0, 1, 0]], atol=1e-12)
+
+
+def test_separatrices_keep_to_the_level_of_an_unstable_spin_and_end_there() -> None:
+    generator = np.random.default_rng(5)
+    for _ in range(5):
+        gyrostat = random_gyrostat(generator)
+        saddles = [one.direction for one in gyrostat.equilibria if one.unstable]
+        curves = gyrostat.separatrices()
+        assert len(curves) == 2 * len(saddles)
+        for curve in curves:
+            level, spread = gyrostat.energy(curve[0]), np.ptp(gyrostat.energy(np.eye(3)))
+            assert np.abs(gyrostat.energy(curve) - level).max() < 1e-8 * spread
+            np.testing.assert_allclose(np.linalg.norm(curve, axis=1), 1, rtol=1e-12)
+            assert np.linalg.norm(np.diff(curve, axis=0), axis=1).max() < 0.02
+            for end in (curve[0], curve[-1]):
+                assert min(np.linalg.norm(end - saddle) for saddle in saddles) < 1e-12
+
+
+def test_the_path_of_a_run_keeps_to_the_sphere_and_to_a_level(two: xarray.Dataset) -> None:
+    path = gyrostats.path(two)
+    assert path is not None
+    in_space = np.einsum("tij,tj->ti", rotation_matrix(two["quaternion"].values), path)
+    np.testing.assert_allclose(in_space, two["angular_momentum"].values, rtol=0, atol=1e-12 * 30)
+    gyrostat = Gyrostat.of(two, 0)
+    assert gyrostat is not None
+    energy = gyrostat.energy(path / gyrostat.size)
+    np.testing.assert_allclose(energy, energy[0], rtol=1e-12)
+
+
+def test_under_a_torque_from_outside_there_is_no_sphere() -> None:
+    text = TWO_ROTORS + '[[loads]]\nkind = "torque"\ncomponents = ["0.1", "0", "0"]\n'
+    dataset = rigidsim.run(rigidsim.parse(text), out=None).dataset.load()
+    assert gyrostats.path(dataset) is None
+    assert {"rotors", "rates"} < set(figures.available(dataset)) - {"momentum_sphere"}
+
+
+def test_the_page_is_about_the_rotors(two: xarray.Dataset, driven: xarray.Dataset) -> None:
+    def titles(dataset: xarray.Dataset) -> list[str]:
+        page = figures.figure(dataset)
+        return [" ".join((axes.get_title("left") or axes.get_title()).split()) for axes in page.axes]
+
+    sphere = "Momentum sphere in body axes: levels of energy"
+    assert titles(two)[:2] == [
+        "Axes of the rotors, from the angular momentum",
+        "Rates of the rotors, relative to the body",
+    ]
+    assert sphere in titles(two)
+    assert [title for title in titles(driven) if "sphere" in title or "own" in title] == [
+        "States of one's own",
+        "Momentum sphere: levels of energy if motors stopped at the start",
+        "Momentum sphere: levels of energy if motors stopped at the end",
+    ]
+    own = figures.figure(driven, "own_states").axes[0]
+    assert own.get_ylabel() == "state [J]"
+    np.testing.assert_array_equal(own.get_lines()[0].get_ydata(), driven["heat"].values)
+    (rates,) = [axes for axes in figures.figure(two, "rotors").axes if "Rates" in axes.get_title("left")]
+    assert [line.get_label() for line in rates.get_lines()] == ["free", "kept"]
+    (sphere_axes,) = figures.figure(two, "momentum_sphere").axes
+    drawn = [text.get_text() for text in sphere_axes.get_legend().get_texts()]
+    assert drawn[0].startswith("L = ")
+    assert "stable" in drawn
+
+
+def test_rotors_are_in_the_recording_and_turn_by_their_rates(
+    two: xarray.Dataset, driven: xarray.Dataset, read_back: Read, tmp_path: Path
+) -> None:
+    write_timeline(driven, tmp_path / "driven.rrd")
+    turned = read_back(tmp_path / "driven.rrd", "/scene/body/rotor_wheel")["Transform3D:quaternion"]
+    # spun up by 0.5 N m for a minute, to some 300 rad/s: 12 turns a sample, drawn 200 times slower
+    picture = build_picture(driven)[0]
+    (axle,) = [line for line in picture.stages[0].lines if line.words]
+    assert axle.words == "rotor wheel, drawn turning 200 times slower"
+    assert picture.leading[:2] == ("angular_velocity", "rotor_rate")
+    time = driven["time"].values
+    own = 0.5 / 0.1 * np.where(time < 60, time**2 / 2, 1800 + 60 * (time - 60))
+    body = np.append(
+        0,
+        np.cumsum(np.diff(time) * (lambda w: (w[1:] + w[:-1]) / 2)(driven["angular_velocity"].values[:, 0])),
+    )
+    start = 0.001 * time  # at rest relative to a body that turns
+    half = (own + start - body) / 200 / 2
+    np.testing.assert_allclose(turned[:, 3], np.cos(half), atol=2e-4)
+    np.testing.assert_allclose(turned[:, 0], np.sin(half), atol=2e-4)
+
+    write_timeline(two, tmp_path / "two.rrd")
+    slow = read_back(tmp_path / "two.rrd", "/scene/body/rotor_kept")["Transform3D:quaternion"]
+    np.testing.assert_allclose(slow[:, 1], np.sin(two["time"].values), atol=1e-6)  # 2 rad/s, as it is
+    shares = [
+        read_back(tmp_path / "two.rrd", f"/scene/{name}")["Arrows3D:vectors"]
+        for name in ("body/body_momentum", "body/rotor_momentum", "centre/angular_momentum")
+    ]
+    matrix = rotation_matrix(two["quaternion"].values)
+    np.testing.assert_allclose(np.einsum("tij,tj->ti", matrix, shares[0] + shares[1]), shares[2], atol=2e-6)
+
+
+def test_a_body_with_rotors_has_neither_polhode_surfaces_nor_poinsots_construction(tmp_path: Path) -> None:
+    still = TWO_ROTORS.replace("[0.3, 1, -0.2]", "[0, 1, 0]").replace("rate = 300", "rate = 0")
+    dataset = rigidsim.run(rigidsim.parse(still), out=None).dataset.load()  # of constant w . I w, too
+    picture = build_picture(dataset)[0]
+    assert [stage.root for stage in picture.stages] == ["scene"]
+    at_rest = still.replace("rate = 2", "rate = 0").replace('name = "free"', 'name = "free"\nfixed = true')
+    dataset = rigidsim.run(rigidsim.parse(at_rest), out=None).dataset.load()
+    assert [stage.root for stage in build_picture(dataset)[0].stages] == ["scene", "poinsot"]
