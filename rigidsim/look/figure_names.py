@@ -14,7 +14,6 @@ FIGURES: dict[str, str] = {
     "polhode": "polhode on the surfaces of energy and momentum, separatrix, Poinsot's rolling",
     "momentum_sphere": "the momentum's sphere in the body, levels of energy, stable and unstable spins",
     "rotors": "rates of the rotors, and their axes from the angular momentum, over time",
-    "own_states": "states of one's own over time",
     "herpolhode": "path of the angular velocity on the invariable plane",
     "path": "path of the centre of mass",
     "rates": "angular velocity over time",

@@ -99,7 +99,7 @@ def plan_plots(dataset: xarray.Dataset, leading: Sequence[str] = ()) -> list[Plo
         if {"drift_of", "put_back_of"} & set(variable.attrs):
             key, title, place = "drift", "Drift of invariants, log10", "drift"
         elif is_own_state(variable):
-            key, title, place = f"own {shown_unit}", _with_unit("states of one's own", shown_unit), "leading"
+            key, title, place = f"own {shown_unit}", _with_unit("own states", shown_unit), "leading"
         elif variable.ndim > 1 or name in first:
             # The name, not the long name: it is short, and what the user meets in the dataset.
             key, place = name, "leading" if name in first else "more"

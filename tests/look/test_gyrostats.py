@@ -188,13 +188,13 @@ def test_the_page_is_about_the_rotors(two: xarray.Dataset, driven: xarray.Datase
         "Rates of the rotors, relative to the body",
     ]
     assert sphere in titles(two)
-    assert [title for title in titles(driven) if "sphere" in title or "own" in title] == [
-        "States of one's own",
+    assert [title for title in titles(driven) if "sphere" in title or "Own" in title] == [
+        "Own state heat",
         "Momentum sphere: levels of energy if motors stopped at the start",
         "Momentum sphere: levels of energy if motors stopped at the end",
     ]
-    own = figures.figure(driven, "own_states").axes[0]
-    assert own.get_ylabel() == "state [J]"
+    own = figures.figure(driven, "states").axes[0]
+    assert own.get_ylabel() == "value [J]"
     np.testing.assert_array_equal(own.get_lines()[0].get_ydata(), driven["heat"].values)
     (rates,) = [axes for axes in figures.figure(two, "rotors").axes if "Rates" in axes.get_title("left")]
     assert [line.get_label() for line in rates.get_lines()] == ["free", "kept"]

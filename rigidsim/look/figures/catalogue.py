@@ -64,7 +64,6 @@ KINDS: dict[str, Kind] = {
         [gyrostat.momentum_sphere, gyrostat.momentum_sphere_at_end],
     ),
     "rotors": Kind("rotors whose rates were recorded", [gyrostat.tilts, gyrostat.rotor_rates]),
-    "own_states": Kind("states of [[states]] recorded", timelines.own_states),
     "herpolhode": Kind("an attitude and a momentum that stays put", (), [polhode.herpolhode]),
     "path": Kind("position recorded", (), [poles.path]),
     "rates": Kind(_TURNS, [timelines.rates]),
@@ -90,7 +89,6 @@ def figure(dataset: xarray.Dataset, what: str = OVERVIEW) -> Figure:
     shown = shown_rows(dataset)
     if what == OVERVIEW:
         curves, planes = _leading(shown.rows)
-        curves = [*curves, *timelines.OWN_STATES]
         return compose(shown, (*curves, drift), planes, facts=True)
     if what == SPECTRUM:
         raise ValueError("figure 'spectrum': is drawn of an analysis: rigidsim.analyse(run).figure()")
@@ -138,7 +136,7 @@ def _leading(rows: xarray.Dataset) -> tuple[Sequence[Panel], Sequence[Panel]]:
     found = gyrostat.leading(rows, timelines.rates)
     curves, planes = found or _of_body(rows)
     wheels = [] if found else [gyrostat.rotor_rates]
-    return [*curves, *wheels, *timelines.own_states], planes
+    return [*curves, *wheels, *timelines.OWN_STATES], planes
 
 
 def _of_body(rows: xarray.Dataset) -> tuple[Sequence[Panel], Sequence[Panel]]:

@@ -9,9 +9,8 @@ from matplotlib.axes import Axes
 
 from rigidsim.look import signals
 from rigidsim.look.figures.fits import secular
-from rigidsim.look.figures.panel import Find, Panel, angle_scale, angle_text, clock, number, panel, recorded
+from rigidsim.look.figures.panel import angle_scale, angle_text, clock, number, panel, recorded
 from rigidsim.look.figures.style import BLUE, GREY, ORANGE, PALETTE, VIOLET, X, Y, Z, curve, key
-from rigidsim.look.plots import pretty_unit
 from rigidsim.look.solids import Array
 from rigidsim.scene.readable import DAY, named_unit, si_scale, span_text, unit_for
 
@@ -22,7 +21,6 @@ _QUICK = np.deg2rad(1.0)  # a day, from which a node's motion is told in the axi
 _LEGIBLE = 0.01  # of an angle, from which the ticks along its swing need four digits at most
 _AS_FAR = 0.7  # of the whole swing: what a straight line must leave of it to be of no help
 _TURNS = 720.0  # degrees, from which the mean growth of an angle is taken off
-_MOST_UNITS = 4  # of states of one's own that are drawn
 _STEEP = 1.5  # rad of pitch, near which roll and yaw are ill-defined
 
 
@@ -312,7 +310,7 @@ def _own_states(place: int) -> Callable[[xarray.Dataset], tuple[Array, list[str]
     """Those states of ``[[states]]``, (rows, n), that have the unit in some place, with their names."""
 
     def find(dataset: xarray.Dataset) -> tuple[Array, list[str], str] | None:
-        own = [v for v in dataset.data_vars.values() if v.attrs.get("given_by") == "[[states]]"]
+        own = [v for v in dataset.data_vars.values() if signals.is_own_state(v)]
         units = list(dict.fromkeys(str(v.attrs.get("units", "1")) for v in own))
         if place >= len(units):
             return None
@@ -343,32 +341,3 @@ def wobble(axes: Axes, dataset: xarray.Dataset, angle: Array) -> None:
     """Angle between the figure axis and the momentum."""
     title = "Nutation angle: the figure axis from the momentum"
     angles_over_time(axes, dataset, angle[:, None], title, hues=(GREY,))
-
-
-def _own(number: int) -> Find:
-    """States of one's own that share a unit, the first, second... of units by order of appearance."""
-
-    def find(dataset: xarray.Dataset) -> dict[str, Array] | None:
-        units: dict[str, dict[str, Array]] = {}
-        for name in map(str, dataset.data_vars):
-            table = signals.values(dataset, name) if signals.is_own_state(dataset[name]) else None
-            if table is not None:
-                units.setdefault(str(dataset[name].attrs["units"]), {})[name] = table
-        return list(units.values())[number] if number < len(units) else None
-
-    return find
-
-
-def _draw_own(axes: Axes, dataset: xarray.Dataset, states: dict[str, Array]) -> None:
-    table, unit = np.stack([*states.values()], axis=1), str(dataset[next(iter(states))].attrs["units"])
-    title = "States of one's own"
-    if unit == "rad":
-        angles_over_time(axes, dataset, table, title, hues=PALETTE, labels=[*states], word="state")
-        return
-    lines(axes, dataset, table, [*states], PALETTE)
-    key(axes, title)
-    axes.set_ylabel("state" + (f" [{pretty_unit(unit)}]" if unit != "1" else ""))
-
-
-own_states = tuple(Panel(_own(number), _draw_own, begins=True) for number in range(_MOST_UNITS))
-"""Panels of states of one's own: one for each unit."""
