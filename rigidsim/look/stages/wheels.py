@@ -12,7 +12,7 @@ import numpy as np
 import xarray
 
 from rigidsim.look import gyrostats, signals
-from rigidsim.look.gyrostats import Rotor
+from rigidsim.look.gyrostats import RecordedRotor
 from rigidsim.look.solids import Mesh, solid_mesh
 from rigidsim.look.stages import parts
 from rigidsim.look.stages.bodies import Subject
@@ -33,7 +33,7 @@ _LEADING = "rotor_rate"
 class _Disc:
     """Where a disc is: its middle along the axis, and its radius, in units of the body's reach."""
 
-    rotor: Rotor
+    rotor: RecordedRotor
     middle: float
     radius: float
 
@@ -81,7 +81,7 @@ def with_wheels(dataset: xarray.Dataset, subject: Subject, picture: Picture) -> 
     )
 
 
-def slowing(dataset: xarray.Dataset, rotor: Rotor) -> float:
+def slowing(dataset: xarray.Dataset, rotor: RecordedRotor) -> float:
     """How many times slower than it is a rotor is drawn: 1, or 2, 5, 10, 20, 50 and so on."""
     seconds = signals.seconds(dataset)
     if len(seconds) < 2:
@@ -96,7 +96,7 @@ def slowing(dataset: xarray.Dataset, rotor: Rotor) -> float:
     return float(next(factor * decade for factor in (1, 2, 5, 10) if factor * decade >= needed))
 
 
-def _turning(dataset: xarray.Dataset, rotor: Rotor, slower: float) -> Array:
+def _turning(dataset: xarray.Dataset, rotor: RecordedRotor, slower: float) -> Array:
     """Quaternions (rows, 4) w x y z by which it has turned in the body."""
     rate, steps = np.nan_to_num(rotor.rate) / slower, np.diff(signals.seconds(dataset))
     angle = np.append(0.0, np.cumsum((rate[1:] + rate[:-1]) / 2 * steps))
