@@ -30,7 +30,7 @@ _STEP, _STEPS = 0.01, 4000  # along a separatrix, rad; at most
 
 
 @dataclass(frozen=True)
-class Rotor:
+class RecordedRotor:
     """A rotor: unit axis (3,), body axes; moment about it, kg m^2; "free", "driven" or "fixed"; its rate
     (rows,) relative to the body, rad/s.
     """
@@ -52,7 +52,7 @@ class Rotor:
         return self.moment * self.rate[:, None] * self.axis
 
 
-def rotors(dataset: xarray.Dataset) -> list[Rotor]:
+def rotors(dataset: xarray.Dataset) -> list[RecordedRotor]:
     """The rotors of a dataset whose rates were recorded, or are fixed."""
     recorded = signals.values(dataset, "rotor_rate")
     named = {} if recorded is None else dict(zip(dataset["rotor"].values.tolist(), recorded.T, strict=True))
@@ -62,7 +62,9 @@ def rotors(dataset: xarray.Dataset) -> list[Rotor]:
         if rate is None and one["drive"] == "fixed":
             rate = np.full(dataset.sizes["time"], float(one["rate"]))
         if rate is not None:
-            found.append(Rotor(one["name"], np.array(one["axis"]), float(one["moment"]), one["drive"], rate))
+            found.append(
+                RecordedRotor(one["name"], np.array(one["axis"]), float(one["moment"]), one["drive"], rate)
+            )
     return found
 
 

@@ -103,7 +103,7 @@ def _turning(dataset: xarray.Dataset, rotor: RecordedRotor, slower: float) -> Ar
     return np.column_stack([np.cos(angle / 2), np.sin(angle / 2)[:, None] * rotor.axis])
 
 
-def _placed(dataset: xarray.Dataset, subject: Subject, found: list[Rotor]) -> list[_Disc]:
+def _placed(dataset: xarray.Dataset, subject: Subject, found: list[RecordedRotor]) -> list[_Disc]:
     """Discs where their axes leave the body, one above the other if they share an axis."""
     corners, inertia = np.concatenate([mesh.vertices for mesh in subject.meshes]), gyrostats.tensor(dataset)
     placed: list[_Disc] = []
@@ -136,7 +136,7 @@ def _mesh(disc: _Disc) -> Mesh:
 
 
 def _momenta(
-    dataset: xarray.Dataset, stage: Stage, found: list[Rotor]
+    dataset: xarray.Dataset, stage: Stage, found: list[RecordedRotor]
 ) -> tuple[list[Arrow], list[Trail], list[str]]:
     """The body's and the rotors' shares of the momentum, and its path, if the whole is on the stage."""
     whole = gyrostats.momentum(dataset)
