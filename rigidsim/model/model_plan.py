@@ -251,6 +251,7 @@ def refuse_odd_loads(scene: Scene, requirements: Requirements, loads: Sequence[L
         others = [x for x in carriers if x is not load]
         m = probe(scene, requirements, [load])
         terms = [*torque_terms(load, m), *(force_terms(load, m) if m.velocity is not None else [])]
+        terms += load.exerted_torque(m) if isinstance(load, Carrier) else []
         if not terms:
             continue
         names, start = start_of(m, [load, *others])
@@ -308,7 +309,7 @@ def _flown_about(load: Load) -> bool:
 
 def _oddness(load: Load, quaternion: np.ndarray, here: float, there: float) -> Problem:
     number = getattr(load, "number", None)
-    where = "loads" if number is None else f"[[loads]] number {number + 1}"
+    where = "loads" if number is None else f"[[{load.stands_in}]] number {number + 1}"
     shown = ", ".join(f"{x:.3g}" for x in quaternion)
     return Problem(
         where,

@@ -450,6 +450,7 @@ def test_it_is_told() -> None:
         (["rotors[0].fixed=true", 'rotors[0].torque="1"'], "given beside fixed = true"),
         (['rotors[0].torque="wq"'], "wq"),
         (['rotors[0].torque="1 kg"'], "N m"),
+        (['rotors[0].torque="0.1*qx"'], r"\[\[rotors\]\] number 1: a driven rotor depends on the sign"),
         (['rotors[0].name="a b"'], "letters, digits and underscores"),
         (['rotors[0].rate="3 m"'], "rad/s"),
         (["rotors[0].spin=3"], "spin"),

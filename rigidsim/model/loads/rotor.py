@@ -62,6 +62,7 @@ class Rotor(Load):
     fixed: bool
     number: int  # place in the config, for messages
 
+    stands_in = "rotors"
     conservative = True  # all that isn't is told by ``supplied_power``
 
     @classmethod
@@ -83,7 +84,9 @@ class Rotor(Load):
     def title(self) -> str:  # type: ignore[override]
         return f"rotor {self.name}"
 
-    described = "a rotor"
+    @property
+    def described(self) -> str:  # type: ignore[override]
+        return "a rotor" if self.motor is None else "a driven rotor"
 
     @property
     def bearing(self) -> Bearing | None:  # type: ignore[override]
