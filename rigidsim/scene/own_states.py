@@ -30,7 +30,7 @@ class OwnStateTable(ConfigTable):
 
     name: VariableName = Field(examples=["integral"])
     """its name in expressions, and of its variable in the dataset"""
-    initial: AnyQuantity = ZERO
+    initial: AnyQuantity = Field(ZERO, json_schema_extra={"x-unit-key": "unit"})
     """value at the start, SI or with its unit"""
     unit: StrictStr | None = Field(None, examples=["rad", "N m s"])
     """its SI unit, "1" for a number: labels the dataset, and is checked in its derivative and where it

@@ -250,6 +250,7 @@ def test_members_of_a_sweep_are_the_runs_one_by_one(tmp_path: Path) -> None:
     axes = 'axes."states[1].initial" = {values = [-0.1, 3]}\naxes."parameters.g" = {values = [64, 256]}\n'
     swept = rigidsim.parse(base + '[sweep]\nmode = "zip"\nkeep = ["final"]\n' + axes)
     with rigidsim.sweep(swept, out=tmp_path).dataset as members:
+        assert members["initial"].attrs["units"] == "rad"
         for i, (start, gain) in enumerate([(-0.1, 64), (3, 256)]):
             one = loaded(run_text(base, f"states[1].initial={start}", f"parameters.g={gain}"))
             for name in ("quaternion", "slosh", "lagged"):  # rounding of steps that differ

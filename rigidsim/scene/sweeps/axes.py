@@ -111,6 +111,7 @@ def unit_and_length(key: str, tables: Mapping[str, Any]) -> tuple[str, int]:
     schema = _json_schema(config_model())
     nodes: list[Mapping[str, Any]] = [schema]
     value: Any = tables
+    table: Any = None
     for step in key_steps(key, "axes"):
         found: list[Mapping[str, Any]] = []
         for node in _alternatives(nodes, schema, value):
@@ -122,12 +123,14 @@ def unit_and_length(key: str, tables: Mapping[str, Any]) -> tuple[str, int]:
                 found.append(node["additionalProperties"])
         if not found and isinstance(step, str):
             _refuse_unknown(step, nodes, schema, value)
-        nodes = found
+        nodes, table = found, value
         try:
             value = value[step]
         except (TypeError, LookupError):
             value = None
-    return _unit(nodes, schema), _length(nodes, schema)
+    beside = [table.get(node.get("x-unit-key")) for node in nodes if isinstance(table, Mapping)]
+    unit = next((unit for unit in beside if isinstance(unit, str)), None)  # written beside the number
+    return unit or _unit(nodes, schema), _length(nodes, schema)
 
 
 def refuse_unsettable(key: str, tables: dict[str, Any]) -> None:
