@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import mpmath
 import numpy as np
 import pytest
@@ -136,6 +138,29 @@ def test_the_meridian_counts_turns_and_retrograde_ones_backwards() -> None:
         dataset = run_text(text, "time.end=100 day", f"time.samples={samples}").dataset
         meridian = dataset["prime_meridian"].values
         assert np.degrees(meridian[-1]) == pytest.approx(10 - 360 * 2400 / 25, abs=1e-8)
+
+
+SWEEP = """
+[sweep]
+keep = ["final"]
+axes."initial.pole[1]" = {linspace = [-1, 1, 5]}
+axes."initial.spin_period" = {linspace = [-3, 4, 4]}
+"""
+
+
+def test_swept_poles_and_periods_are_single_runs_side_by_side(tmp_path: Path) -> None:
+    """Batches work the start out for all members at once, to the rounding of each alone."""
+    start = 'pole = [0.3, 0.8]\nprime_meridian = "10 deg"\nspin_period = "25 h"'
+    text = config(start, 'axes = "ecliptic J2000"\nfigure_axis = "y"', '"double"')
+    record = 'output.record=["quaternion", "angular_velocity"]'
+    members = rigidsim.sweep(rigidsim.parse(text + SWEEP, overrides=[record]), out=tmp_path).dataset
+    for member in ({"pole_1": 1, "spin_period": 0}, {"pole_1": 3, "spin_period": 3}):
+        chosen = members.isel(member)
+        pole, period = float(chosen["pole_1"]), float(chosen["spin_period"])
+        keys = [f"initial.pole[1]={pole!r}", f"initial.spin_period={period!r}"]
+        alone = run_text(text, record, *keys).dataset
+        for name in ("quaternion", "angular_velocity"):
+            np.testing.assert_allclose(chosen[f"{name}_final"], alone[name].values[-1], rtol=0, atol=4e-16)
 
 
 @pytest.mark.parametrize(

@@ -199,6 +199,19 @@ def test_the_moon_comes_back_after_each_revolution(precision: str, close: float)
             assert away < close
 
 
+@pytest.mark.parametrize("given", [MOON, SATELLITE], ids=["cassini", "relative"])
+def test_a_later_start_is_where_an_earlier_one_leads(given: dict[str, str]) -> None:
+    """What comes back, or rests, is the same motion whenever it begins."""
+    later = "1e8" if given is MOON else "1e5"
+    end = run_text(config(given, end=later)).dataset
+    scene = scene_of(given, f"time.start={later}", end=str(2 * float(later)))
+    q = np.array([float(x) for x in scene.quaternion])
+    reached = end["quaternion"].values[-1]
+    np.testing.assert_allclose(np.sign(q @ reached) * q, reached, atol=1e-11)
+    rates = [float(x) for x in scene.angular_velocity]
+    np.testing.assert_allclose(rates, end["angular_velocity"].values[-1], atol=1e-11 * np.linalg.norm(rates))
+
+
 def test_the_moons_state_is_the_observed_one_with_its_librations() -> None:
     """1.543 deg to the ecliptic (Williams et al. 2014), on a circle and on the Moon's own ellipse: 2 %.
 
