@@ -15,9 +15,8 @@ from rigidsim.solve.equilibria.cassini import cassini_state
 from rigidsim.solve.equilibria.relative import relative_equilibrium
 
 _KEPT = 64
-_BESIDE = frozenset(
-    {"name", "description", "output", "limits", "sweep", "events"}
-)  # what no equilibrium depends on
+_BESIDE = ("name", "description", "integrator", "model", "output", "limits", "sweep", "events")
+"""Tables on which no equilibrium depends; the precision is the context's."""
 _known: OrderedDict[Any, InitialRotation] = OrderedDict()
 
 
@@ -30,7 +29,11 @@ def _once(find: Callable[[Scene], InitialRotation], scene: Scene) -> InitialRota
         _known[key] = find(scene)
         while len(_known) > _KEPT:
             _known.popitem(last=False)
-    return _known[key]
+    found, own = _known[key], scene.context.make_mpf
+    quaternion, rates = (
+        [own(x._mpf_) for x in vector] for vector in (found.quaternion, found.angular_velocity or ())
+    )
+    return InitialRotation(quaternion, rates, found=found.found)
 
 
 def _enter(name: str, find: Callable[[Scene], InitialRotation], allowed: tuple[str, ...]) -> None:
