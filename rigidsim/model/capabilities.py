@@ -10,6 +10,7 @@ A load has a capability if it has its members; there is nothing to inherit or re
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import dataclass
 from typing import Any, Protocol, TypeVar, runtime_checkable
 
 from rigidsim.model.gradient import GradientSource
@@ -63,6 +64,48 @@ class Sourced(Protocol):
     has_source: bool
 
     def source_direction(self, m: Kinematics) -> list[Symbolic] | None: ...
+
+
+@dataclass(frozen=True)
+class SourcePlace:
+    """Place of a source as seen from the body: unit vector towards it, space axes; its distance in m is
+    ``unit`` (mpf) over ``inverse``.
+    """
+
+    direction: list[Symbolic]
+    inverse: Symbolic
+    unit: Any
+
+
+@runtime_checkable
+class Placed(Protocol):
+    """The place of its source is known, as expressions, and at the start (mpf, m, space axes)."""
+
+    def source_place(self, m: Kinematics) -> SourcePlace: ...
+
+    def source_at_start(self, scene: Scene) -> Vector: ...
+
+
+@runtime_checkable
+class Magnetic(Protocol):
+    """Its magnetic field where the body is: T, body axes, and at the start (mpf, T, space axes)."""
+
+    def flux_density(self, m: Kinematics) -> list[Symbolic]: ...
+
+    def flux_density_at_start(self, scene: Scene) -> Vector: ...
+
+    def same_field(self, other: object) -> bool: ...
+
+
+@runtime_checkable
+class FlownAbout(Placed, Protocol):
+    """A body in flight moves about its source: velocity as seen from there, space axes, in units of speed,
+    and at the start (mpf, m/s).
+    """
+
+    def motion(self, m: Kinematics) -> list[Symbolic]: ...
+
+    def motion_at_start(self, scene: Scene) -> Vector: ...
 
 
 @runtime_checkable

@@ -21,9 +21,11 @@ from rigidsim.model.orbits.point_mass_states import PointMassPair
 from rigidsim.model.rotations import Symbolic, transpose
 from rigidsim.scene.arithmetic import Vector, cross, norm, unit_vectors
 from rigidsim.scene.epochs import Epoch
+from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.orbit_tables.pieces import TabulatedOrbit
 from rigidsim.scene.orbits import KeplerOrbit
 from rigidsim.scene.scene import Scene
+from rigidsim.scene.tracing.numbers import plain
 
 _THRESHOLD = 1e-6
 _DAY = 86400.0
@@ -126,3 +128,22 @@ class GradientSource:
         place = m.orbit(self.orbit) if self.orbit is not None else m.table(m.carried(self.table))
         circular = self.orbit is not None and self.orbit.circular
         return place.direction, None if circular else place.inverse_distance
+
+    def place(self, scene: Scene) -> Vector:
+        """Place at the start (mpf, m, space axes) of a source other than a point mass; that of a series in
+        double precision.
+        """
+        context = scene.context
+        if self.orbit is not None:
+            return self.orbit.place(context, scene.start)
+        if self.table is not None:
+            return self.table.place(scene.start)
+        if self.ephemeris is not None:
+            since = 0.0 if self.epoch is None else float(ExactNumber(self.epoch.since_j2000()))
+            series = source_position(self.ephemeris, hy.time)
+            function = hy.cfunc([*series.direction, series.inverse_distance], [], compact_mode=True)
+            *direction, inverse = function([], time=float(plain(scene.start)) + since)
+            far = self.distance(context) / context.mpf(inverse)
+            return [far * context.mpf(x) for x in direction]
+        assert self.position is not None
+        return self.position

@@ -19,13 +19,13 @@ from itertools import pairwise, product
 import heyoka as hy
 import numpy as np
 
-from rigidsim.model.capabilities import Narrow, having
+from rigidsim.model.capabilities import Narrow, having, orbit_of, table_of
 from rigidsim.model.carriers import Carrier
 from rigidsim.model.formulations.formulation import Requirements
 from rigidsim.model.formulations.quaternion import quaternion_states
 from rigidsim.model.heyoka_expressions import to_heyoka
 from rigidsim.model.kinematics import in_common_unit
-from rigidsim.model.load import Load, Term, force_terms, torque_terms
+from rigidsim.model.load import Load, Term, force_terms, loads_of, torque_terms
 from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.names import state_names
 from rigidsim.model.rotations import Symbolic
@@ -34,6 +34,7 @@ from rigidsim.model.state_blocks import BODY, StateBlock
 from rigidsim.scene import attitude as numeric
 from rigidsim.scene.arithmetic import apply, transpose
 from rigidsim.scene.expressions.tree import names_used
+from rigidsim.scene.orbits import KeplerOrbit
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.surfaces import surfaces_of
 
@@ -118,7 +119,14 @@ def probe(scene: Scene, requirements: Requirements, loads: Sequence[Load]) -> Me
     return Mechanics.built(
         scene, scaling, numbers, states, attitude, float,
         vertical=requirements.vertical, flies=requirements.flight, loads=list(loads),
+        orbit_tags=orbit_tags(scene),
     )  # fmt: skip
+
+
+def orbit_tags(scene: Scene) -> dict[KeplerOrbit, str]:
+    """Suffixes of the states of each orbit: the number of the first load on it."""
+    orbits = [(orbit_of(load), str(number)) for number, load in enumerate(loads_of(scene), start=1)]
+    return {orbit: tag for orbit, tag in reversed(orbits) if orbit is not None}
 
 
 def start_of(m: Mechanics, loads: Sequence[Load]) -> tuple[list[str], np.ndarray]:
@@ -135,6 +143,12 @@ def start_of(m: Mechanics, loads: Sequence[Load]) -> tuple[list[str], np.ndarray
     if scene.position is not None and scene.velocity is not None:
         values |= zip(BODY.position, [context.ldexp(x, -scaling.length) for x in scene.position], strict=True)
         values |= zip(BODY.velocity, [context.ldexp(v, -scaling.speed) for v in scene.velocity], strict=True)
+    for orbit in {x: None for load in scene.loads if (x := orbit_of(load) or table_of(load)) is not None}:
+        block = (m.orbit(orbit) if isinstance(orbit, KeplerOrbit) else m.table(orbit)).block
+        values |= zip(block.names, block.initial, strict=True)
+    if m.point_masses is not None:
+        block = m.point_masses.block()
+        values |= zip(block.names, block.initial, strict=True)
     values |= {x.name: context.ldexp(x.initial, -scaling.own.get(x.name, 0)) for x in scene.states}
     for load in loads:
         extra = load.extra_states(m)

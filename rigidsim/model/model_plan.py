@@ -15,7 +15,7 @@ import numpy as np
 from rigidsim.errors import ConfigError, Problem
 from rigidsim.model.assembly import assemble_states
 from rigidsim.model.averaged.average import Average
-from rigidsim.model.capabilities import GradientAlone, Reacting, orbit_of, table_of
+from rigidsim.model.capabilities import GradientAlone, Reacting, table_of
 from rigidsim.model.carriers import Carrier
 from rigidsim.model.formulations.averaged import Averaged
 from rigidsim.model.formulations.formulation import (
@@ -30,7 +30,7 @@ from rigidsim.model.formulations.quaternion import Quaternion
 from rigidsim.model.formulations.rates import Rates
 from rigidsim.model.frames import refuse_without_plane
 from rigidsim.model.load import Load, force_terms, loads_of, torque_terms
-from rigidsim.model.load_estimate import estimate_drive, probe, start_of
+from rigidsim.model.load_estimate import estimate_drive, orbit_tags, probe, start_of
 from rigidsim.model.loads.uniform_gravity import UniformGravity
 from rigidsim.model.observables.observable import NEEDS
 from rigidsim.model.orbits.prescribed import places_of
@@ -92,8 +92,7 @@ def plan_model(
             "steps can't end at both; make the change smooth with tanh, or give the orbit by elements"
         )
         raise ConfigError(Problem("[[loads]] orbit.table", what))
-    orbits = [(orbit_of(load), str(number)) for number, load in enumerate(loads_of(scene), start=1)]
-    tags = {orbit: tag for orbit, tag in reversed(orbits) if orbit is not None}  # the first load's tag
+    tags = orbit_tags(scene)
     clocked = formulation.resolves_rotation and not tables and happens_at_a_moment(scene)
     numbers = scaled_numbers(scene, scaling)
     plan = ModelPlan(

@@ -11,7 +11,7 @@ from typing import Any
 
 import heyoka as hy
 
-from rigidsim.model.heyoka_expressions import carries_sign, plain_angles
+from rigidsim.model.heyoka_expressions import carries_sign, plain_angles, to_heyoka
 from rigidsim.model.kinematics import Kinematics
 from rigidsim.model.rotations import Symbolic, quaternion_from_matrix
 from rigidsim.model.two_part import TwoPartTime
@@ -27,6 +27,7 @@ from rigidsim.scene.expressions.names import (
     NameProvider,
     Readable,
 )
+from rigidsim.scene.expressions.tree import Expression, names_used
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.schema import Config
 
@@ -43,6 +44,13 @@ def state_names(m: Kinematics, names: Collection[str], *, clocked: bool = True) 
         context = m.scene.context
         found["t"] = TwoPartTime(context.ldexp(context.one, m.scaling.time), hy.par[place])
     return {name: found[name] for name in names}
+
+
+def written(m: Kinematics, expressions: Iterable[Expression]) -> list[Symbolic]:
+    """A user's expressions in heyoka's terms, SI."""
+    return [
+        to_heyoka(x, state_names(m, names_used(x)), m.number, m.scene.context, m.sides) for x in expressions
+    ]
 
 
 def in_si(m: Kinematics, expression: Symbolic, exponent: int) -> Symbolic:

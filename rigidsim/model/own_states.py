@@ -15,13 +15,12 @@ import heyoka as hy
 import numpy as np
 
 from rigidsim.errors import ConfigError, Problem
-from rigidsim.model.heyoka_expressions import to_heyoka
 from rigidsim.model.kinematics import Kinematics
-from rigidsim.model.names import in_si, state_names
+from rigidsim.model.names import in_si, written
 from rigidsim.model.scaling import exponent
 from rigidsim.model.state_blocks import StateBlock
 from rigidsim.scene.expressions.names import NameProvider, Readable, provides
-from rigidsim.scene.expressions.tree import Expression, evaluate, names_used
+from rigidsim.scene.expressions.tree import evaluate
 from rigidsim.scene.initial_values import start_values
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.schema import Config
@@ -62,7 +61,7 @@ def own_blocks(m: Kinematics) -> list[StateBlock]:
     context, blocks = m.scene.context, []
     for state in m.scene.states:
         unit = m.scaling.own.get(state.name, 0)
-        (rate,) = _heyoka(m, [state.derivative])
+        (rate,) = written(m, [state.derivative])
         ratio = context.ldexp(context.one, m.scaling.time - unit)
         rate = hy.expression(rate) if ratio == 1 else m.number(ratio) * rate
         start = context.ldexp(state.initial, -unit)
@@ -88,20 +87,14 @@ def narrow_arguments(m: Kinematics) -> list[tuple[str, Any]]:
     return [
         (f"state {state.name}", u)
         for state in m.scene.states
-        for u in _heyoka(m, narrow_parts(state.derivative))
+        for u in written(m, narrow_parts(state.derivative))
     ]
 
 
 def radicands(m: Kinematics) -> list[tuple[str, Any]]:
     """(description, radicand) of roots in derivatives, as ``capabilities.Rooted`` has of loads."""
     states = m.scene.states
-    return [(f"state {state.name}", u) for state in states for u in _heyoka(m, root_parts(state.derivative))]
-
-
-def _heyoka(m: Kinematics, expressions: Iterable[Expression]) -> list[Any]:
-    return [
-        to_heyoka(x, state_names(m, names_used(x)), m.number, m.scene.context, m.sides) for x in expressions
-    ]
+    return [(f"state {state.name}", u) for state in states for u in written(m, root_parts(state.derivative))]
 
 
 # --- units --------------------------------------------------------------------------------------------------

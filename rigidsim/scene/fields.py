@@ -179,6 +179,22 @@ Formula = Annotated[
 """An expression as it is written, or a number."""
 
 
+@dataclass(frozen=True)
+class NumberOrFormula(InUnit):
+    """Annotation of a number in an SI unit, or of the text of an expression."""
+
+    def _parse(self, value: Any) -> Any:
+        try:
+            return super()._parse(value)
+        except ValueError:
+            if isinstance(value, str):
+                return value
+            raise
+
+    def __get_pydantic_json_schema__(self, schema: Any, handler: Any) -> dict[str, Any]:
+        return {"anyOf": [{"type": "string"}, {"type": "number"}], "x-unit": self.unit}
+
+
 def _exactly(count: int) -> BeforeValidator:
     def validate(value: Any) -> Any:
         if not isinstance(value, list):

@@ -102,6 +102,25 @@ class KeplerOrbit:
         across = context.sin(tilt)
         return [across * context.sin(node), -across * context.cos(node), context.cos(tilt)]
 
+    def place(self, context: Any, time: Any) -> list[Any]:
+        """Place of the attracting body at a time, m, space axes."""
+        e, anomaly = self.eccentricity, self.eccentric_anomaly(context, time)
+        x = self.semi_major_axis * (context.cos(anomaly) - e)
+        y = self.semi_major_axis * context.sqrt(1 - e * e) * context.sin(anomaly)
+        z = context.zero
+        turns = (
+            (self.periapsis + self.periapsis_rate * time, 3),
+            (self.inclination, 1),
+            (self.ascending_node + self.node_rate * time, 3),
+        )
+        for angle, axis in turns:
+            c, s = context.cos(angle), context.sin(angle)
+            if axis == 3:
+                x, y = c * x - s * y, s * x + c * y
+            else:
+                y, z = c * y - s * z, s * y + c * z
+        return [x, y, z]
+
     @property
     def pericentre(self) -> Any:
         """Least distance, m."""

@@ -10,18 +10,49 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any, ClassVar, Protocol
 
+from pydantic import Field, field_validator
+
 from rigidsim.errors import ConfigError, Problem
 from rigidsim.scene.arithmetic import Vector
 from rigidsim.scene.epochs import Epoch
 from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.expressions.names import Names
 from rigidsim.scene.expressions.tree import Expression
-from rigidsim.scene.fields import ConfigTable
+from rigidsim.scene.fields import ConfigTable, Metre, VariableName, refuse
 from rigidsim.scene.point_masses import PointMasses
 
 
 class LoadFields(ConfigTable):
     """Base of the keys that one kind of load takes; each adds ``kind: Literal["name"]``."""
+
+    name: VariableName | None = Field(None, examples=["sun"])
+    """name of the load; expressions then read ux_NAME uy_NAME uz_NAME r_NAME shadow_NAME of its source"""
+
+    def placed_by(self, *, free_flight: bool) -> frozenset[str] | None:
+        """States of the body (``Readable.states``) that the place of its source as seen from there depends
+        on; None if there is no source at a known place.
+        """
+        return None
+
+
+class SourceFields(LoadFields):
+    """Keys of a load whose source is a body at a known place."""
+
+    radius: Metre | None = Field(None, examples=["6378.137 km"])
+    """radius of the source, for shadow_NAME and altitude in expressions; the load itself takes a point"""
+
+    def placed_by(self, *, free_flight: bool) -> frozenset[str] | None:
+        """Those of a flight, if its source is a body that moves by itself."""
+        orbit = getattr(self, "orbit", None)
+        relative = free_flight and orbit is not None and orbit.body is not None
+        return frozenset({"flight"} if relative else ())
+
+    @field_validator("radius")
+    @classmethod
+    def _positive(cls, value: ExactNumber | None) -> ExactNumber | None:
+        if value is not None and value.sign <= 0:
+            raise refuse(f"given {float(value):g}; a positive length is allowed")
+        return value
 
 
 @dataclass(frozen=True)
@@ -112,6 +143,10 @@ class SceneLoad:
     def acts(self) -> bool:
         """False for a load that is always zero."""
         return True
+
+    def read_by(self, names: frozenset[str]) -> bool:
+        """Whether one that is always zero is carried all the same, for what expressions read of it."""
+        return False
 
     def check(self, number: int, position: Vector | None) -> None:
         """Refuse the load if this scene can't have it.

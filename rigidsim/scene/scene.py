@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, TypeVar
 
@@ -183,6 +183,10 @@ def build_scene(experiment: Experiment, context: Any = None) -> Scene:
         states = resolve_states(config.states, config.parameters, names, context)
         readers = [(load.described, formula) for load in loads for _, formula in load.formulas()]
         readers += [(f"event {event.name}", event.expression) for event in events]
+        carried = carried_states(states, readers, config.output.record)
+        formulas = [formula for _, formula in readers] + [state.derivative for state in carried]
+        read = frozenset[str]().union(*map(names_used, formulas))
+        loads = tuple(load for load in resolved if _is_among(load, loads) or load.read_by(read))
         scene = Scene(
             name=config.name,
             description=config.description,
@@ -209,7 +213,7 @@ def build_scene(experiment: Experiment, context: Any = None) -> Scene:
             bodies=masses,
             given_loads=tuple(given),
             tabled=tabled,
-            states=carried_states(states, readers, config.output.record),
+            states=carried,
         )
         return _with_start(scene, starts.start_of(scene, _with_start))
     except ConfigError as error:
@@ -219,6 +223,10 @@ def build_scene(experiment: Experiment, context: Any = None) -> Scene:
 def _body_at_start(config: schema.Config, context: Any) -> RigidBody:
     moments = moments_at_start(config, context, config.time.start.at(context))
     return build_body(config.body, context, config.integrator.euler_sequence, moments)
+
+
+def _is_among(load: SceneLoad, loads: Iterable[SceneLoad]) -> bool:
+    return any(load is x for x in loads)
 
 
 def _fail(table: str, key: str, text: str) -> ConfigError:

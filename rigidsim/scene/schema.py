@@ -239,11 +239,11 @@ class Config(ConfigTable):
     )
     """texts of tables that loads refer to; the text of files beside the config is copied here"""
 
-    @field_validator("events", "bodies", "rotors", "states")
+    @field_validator("loads", "events", "bodies", "rotors", "states")
     @classmethod
     def _different(cls, value: list[Any], info: ValidationInfo) -> list[Any]:
         names = [table.name for table in value]
-        for name in names:
+        for name in filter(None, names):
             if names.count(name) > 1:
                 raise refuse(f'two {info.field_name} are named "{name}"; give each a name of its own')
             if info.field_name == "states" and name in OBSERVABLES:

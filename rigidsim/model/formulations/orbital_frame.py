@@ -28,6 +28,8 @@ from rigidsim.model.state_blocks import AttitudeStates, OrbitalFrame, StateBlock
 from rigidsim.model.two_part import as_factor
 from rigidsim.scene import attitude
 from rigidsim.scene.choices import DEFAULT_FORMULATION, FORMULATIONS
+from rigidsim.scene.expressions.names import PLACES
+from rigidsim.scene.expressions.tree import states_read
 from rigidsim.scene.orbits import KeplerOrbit
 from rigidsim.scene.scene import Scene
 
@@ -47,7 +49,7 @@ class OrbitalQuaternion(Formulation):
         only one that reads the attitude; None elsewhere.
         """
         readers = [load for load in loads if {"attitude", "vertical"} & load.reads]
-        if scene.torque_arm is not None or len(readers) != 1:
+        if scene.torque_arm is not None or len(readers) != 1 or _reads_places(scene):
             return None
         orbit = corotating_orbit_of(readers[0])
         return None if orbit is None else cls(orbit)
@@ -83,6 +85,11 @@ class OrbitalQuaternion(Formulation):
             orbital=OrbitalFrame(direction=relative[0], normal=relative[2], states=states),
             chord=2.0,
         )
+
+
+def _reads_places(scene: Scene) -> bool:
+    """Whether an expression takes the orbit as it is in space."""
+    return any(PLACES in states_read(expression) for _, expression in scene.formulas())
 
 
 def _in_space(

@@ -18,15 +18,15 @@ from rigidsim.model.plausibility import about_start, about_strength, attracting
 from rigidsim.model.rotations import Symbolic
 from rigidsim.scene.arithmetic import Vector, cross, norm, unit_vectors
 from rigidsim.scene.exact import ZERO
-from rigidsim.scene.fields import GravitationalParameter, Metre, Triple
+from rigidsim.scene.fields import GravitationalParameter, Metre, Rate, Triple
 from rigidsim.scene.orbits import Orbit, attracting_body
 from rigidsim.scene.point_masses import closest
-from rigidsim.scene.registry import LoadFields, Surroundings, register_load
+from rigidsim.scene.registry import SourceFields, Surroundings, register_load
 from rigidsim.scene.scene import Scene
 from rigidsim.store.summary_parts import Caution
 
 
-class CentralGravityFields(LoadFields):
+class CentralGravityFields(SourceFields):
     """A point that attracts a freely flying body: force and torque to second degree."""
 
     kind: Literal["central_gravity"]
@@ -44,6 +44,15 @@ class CentralGravityFields(LoadFields):
         description="position of the attracting point, space axes",
         json_schema_extra={"default": [0, 0, 0]},
     )
+
+    atmosphere_rate: Triple[Rate] | None = Field(
+        default=None,
+        description="angular velocity of its atmosphere, space axes, for vrx vry vrz in expressions",
+        examples=[[0, 0, "7.292115e-5 rad/s"]],
+    )
+
+    def placed_by(self, *, free_flight: bool) -> frozenset[str] | None:
+        return frozenset({"flight"})
 
 
 @register_load
@@ -104,6 +113,15 @@ class CentralGravity(PointAttraction):
 
     def potential(self, m: Kinematics) -> Symbolic | None:
         return -self.as_point(m) - self.second_degree(m)
+
+    def source_at_start(self, scene: Scene) -> Vector:
+        return [a - x for x, a in zip(scene.position or [], self.position, strict=True)]
+
+    def motion(self, m: Kinematics) -> list[Symbolic]:
+        return list(m.carried(m.velocity))
+
+    def motion_at_start(self, scene: Scene) -> Vector:
+        return scene.velocity or []
 
     # --- estimates, from the Kepler orbit through the initial state --------------------------------------
 

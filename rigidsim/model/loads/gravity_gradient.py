@@ -8,9 +8,11 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, Literal
 
+import heyoka as hy
 from pydantic import Field
 
 from rigidsim.errors import ConfigError, Problem
+from rigidsim.model.capabilities import SourcePlace
 from rigidsim.model.gradient import GradientSource, gradient_terms, tidal_range
 from rigidsim.model.kinematics import Kinematics, quadratic_form
 from rigidsim.model.load import Load, Term
@@ -26,12 +28,12 @@ from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.fields import GravitationalParameter, Metre, Triple
 from rigidsim.scene.frame import ECLIPTIC
 from rigidsim.scene.orbits import KeplerOrbit, Orbit, attracting_body, resolve_orbit, resolve_tabulated_orbit
-from rigidsim.scene.registry import LoadFields, Surroundings, register_load
+from rigidsim.scene.registry import SourceFields, Surroundings, register_load
 from rigidsim.scene.scene import Scene
 from rigidsim.store.summary_parts import Caution
 
 
-class GravityGradientFields(LoadFields):
+class GravityGradientFields(SourceFields):
     """Torque of a distant attracting body, to second degree (MacCullagh's formula)."""
 
     kind: Literal["gravity_gradient"]
@@ -147,6 +149,14 @@ class GravityGradient(GradientSource, Load):
         if m.attitude is not None and m.attitude.orbital is not None:
             return m.attitude.orbital.direction
         return m.seen(self.seen(m)[0])
+
+    def source_place(self, m: Kinematics) -> SourcePlace:
+        direction, inverse = self.seen(m)
+        inverse = hy.expression(1.0) if inverse is None else inverse
+        return SourcePlace(direction, inverse, self.distance(m.scene.context))
+
+    def source_at_start(self, scene: Scene) -> Vector:
+        return self.place(scene)
 
     def strength(self, m: Kinematics) -> tuple[Any, Symbolic | None]:
         """G M / R^3 in internal units: at a constant distance (mpf), and the factor by which it varies."""

@@ -2,65 +2,38 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import Annotated, Any, Literal
+from functools import partial
+from typing import Any
 
 import heyoka as hy
-from pydantic import Field
 
 from rigidsim.errors import ConfigError, Problem
-from rigidsim.model.capabilities import Attracting, having
+from rigidsim.model.capabilities import Attracting, SourcePlace, having
 from rigidsim.model.kinematics import Kinematics
 from rigidsim.model.load import Load, Term, loads_of
 from rigidsim.model.load_words import length_text, orbit_text, value_text
 from rigidsim.model.loads.central_gravity import CentralGravity
+from rigidsim.model.loads.magnetic_keys import MagneticDipoleFields, numbers, refuse_contradictions
+from rigidsim.model.magnetic_names import FIELD_NAMES
+from rigidsim.model.names import written
 from rigidsim.model.plausibility import about_orbit, implied_strength
 from rigidsim.model.rotations import Symbolic
-from rigidsim.scene.arithmetic import Vector, across, cross, norm, unit_vectors
+from rigidsim.model.two_part import rounded
+from rigidsim.scene.arithmetic import Vector, across, cross, diagonal, dot, norm, unit_vectors
 from rigidsim.scene.exact import ExactNumber
-from rigidsim.scene.fields import GravitationalParameter, InUnit, Metre, Triple
-from rigidsim.scene.orbits import KeplerOrbit, Orbit, resolve_orbit
-from rigidsim.scene.registry import LoadFields, Surroundings, register_load
+from rigidsim.scene.expressions.parser import parse_expression
+from rigidsim.scene.expressions.tree import Constant, Expression, ExpressionError, evaluate, states_read
+from rigidsim.scene.initial_values import start_values
+from rigidsim.scene.orbits import KeplerOrbit, resolve_orbit
+from rigidsim.scene.registry import Surroundings, register_load
 from rigidsim.scene.scene import Scene
+from rigidsim.scene.transitions import narrow_parts, root_parts
 from rigidsim.store.summary_parts import Caution
 
 _FIELD_CONSTANT = "1e-7"
 """mu_0 / 4 pi, T m/A: CODATA 2022 has 0.99999999987(16) times this, measured since the SI of 2019."""
-
-MagneticMoment = Annotated[ExactNumber, InUnit("A m^2")]
-FluxDensity = Annotated[ExactNumber, InUnit("T")]
-
-
-class MagneticDipoleFields(LoadFields):
-    """Torque m x B on a dipole of the body, in a uniform ``field`` (space axes), or in the field of a centred
-    dipole ``source_moment`` (space axes) around which the body moves on ``orbit``, or in flight as it flies.
-    """
-
-    kind: Literal["magnetic_dipole"]
-    moment: Triple[MagneticMoment] = Field(
-        description="magnetic moment of the body, body axes", examples=[["0 A m^2", "0 A m^2", "0.5 A m^2"]]
-    )
-    field: Triple[FluxDensity] | None = Field(
-        default=None, description="uniform flux density, space axes", examples=[["30 uT", 0, 0]]
-    )
-    orbit: Orbit | None = Field(
-        default=None,
-        description="orbit of the source as seen from the body, instead of field; needs source_moment; not "
-        "for a body with a position of its own, where which the field is taken",
-    )
-    source_moment: Triple[MagneticMoment] | None = Field(
-        default=None, description="magnetic moment of the source, space axes", examples=[[0, 0, -7.7e22]]
-    )
-    position: Triple[Metre] | None = Field(
-        default=None,
-        description="place of the source, space axes, for a body with a position of its own; by default the "
-        "point of its central_gravity",
-        examples=[[0, 0, 0]],
-    )
-    gravitational_parameter: GravitationalParameter | None = Field(
-        default=None, description="G M of the source, from which the orbit's period follows"
-    )
 
 
 @register_load
@@ -76,6 +49,7 @@ class MagneticDipole(Load):
     source: Vector  # the field itself (T), or M (A m^2) of a dipole; space axes
     orbit: KeplerOrbit | None = None  # of the source seen from the body (which only reverses c)
     place: Vector | None = None  # None if it doesn't fly about a dipole
+    name: str = ""
     Fields = MagneticDipoleFields
     title = "magnetic_dipole"
     described = "a magnetic dipole"
@@ -83,27 +57,37 @@ class MagneticDipole(Load):
     @classmethod
     def resolve(cls, fields: MagneticDipoleFields, around: Surroundings) -> MagneticDipole:
         flies = around.free_flight and fields.source_moment is not None
-        _refuse_contradictions(fields, around)
+        refuse_contradictions(fields, around)
         strength = fields.gravitational_parameter
         if strength is not None and (fields.orbit is None or strength.sign <= 0):
             allowed = "with orbit only" if fields.orbit is None else "as a positive number only"
             raise around.fault("gravitational_parameter", f"given {float(strength):g}; allowed {allowed}")
-        moment = _numbers(fields.moment, around)
+        made: Callable[..., MagneticDipole] = partial(cls, name=fields.name or "")
+        if any(isinstance(x, str) for x in fields.moment):
+            moment, law = [around.context.zero] * 3, _law(fields.moment, around)
+            made = partial(SteeredDipole, name=fields.name or "", law=law, number=around.number)
+        else:
+            moment = numbers(fields.moment, around)
         if flies:
-            place = [] if fields.position is None else _numbers(fields.position, around)
-            return cls(moment, _numbers(fields.source_moment or [], around), place=place)
+            place = [] if fields.position is None else numbers(fields.position, around)
+            return made(moment, numbers(fields.source_moment or [], around), place=place)
         if fields.orbit is None:
-            return cls(moment, _numbers(fields.field or [], around))
+            return made(moment, numbers(fields.field or [], around))
         motion = None if strength is None else strength.at(around.context)
         for key in ("body", "table"):
             if getattr(fields.orbit, key) is not None:
                 what = "given for a magnetic_dipole, which takes elements alone; gravity_gradient takes a "
                 raise around.fault(f"orbit.{key}", what + key)
         orbit = resolve_orbit(fields.orbit, motion, around)
-        return cls(moment, _numbers(fields.source_moment or [], around), orbit)
+        return made(moment, numbers(fields.source_moment or [], around), orbit)
 
     def acts(self) -> bool:
         return any(x != 0 for x in self.moment) and any(x != 0 for x in self.source)
+
+    def read_by(self, names: frozenset[str]) -> bool:
+        """On an orbit, whose states it brings: its field, or names of its source."""
+        own = f"_{self.name} " if self.name else " no name "
+        return self.orbit is not None and any(x in FIELD_NAMES or own in f"{x} " for x in names)
 
     def check(self, number: int, position: Vector | None) -> None:
         if self.place and self.place == position:
@@ -112,6 +96,8 @@ class MagneticDipole(Load):
 
     @property
     def reads(self) -> frozenset[str]:  # type: ignore[override]
+        if not self.acts():
+            return frozenset()
         return frozenset({"attitude"} if self.place is None else {"attitude", "flight"})
 
     @property
@@ -122,7 +108,7 @@ class MagneticDipole(Load):
     @property
     def conservative(self) -> bool:  # type: ignore[override]
         """Whether the field is uniform: along a flight its torque does work without a force."""
-        return self.uniform
+        return self.uniform or not self.acts()
 
     @property
     def has_source(self) -> bool:
@@ -130,6 +116,40 @@ class MagneticDipole(Load):
 
     def source_direction(self, m: Kinematics) -> list[Symbolic] | None:
         return None if self.orbit is None else m.seen(m.orbit(self.orbit).direction)
+
+    # --- its field, and where it is from --------------------------------------------------------------------
+
+    def source_place(self, m: Kinematics) -> SourcePlace:
+        if self.orbit is not None:
+            orbit = m.orbit(self.orbit)
+            return SourcePlace(orbit.direction, orbit.inverse_distance, self.orbit.semi_major_axis)
+        outward, inverse = m.seen_from(self._centre(m.scene))
+        unit = m.scene.context.ldexp(m.scene.context.one, m.scaling.length)
+        return SourcePlace([-x for x in outward], inverse, unit)
+
+    def source_at_start(self, scene: Scene) -> Vector:
+        if self.orbit is not None:
+            return self.orbit.place(scene.context, scene.start)
+        return [a - x for x, a in zip(scene.position or [], self._centre(scene), strict=True)]
+
+    def flux_density(self, m: Kinematics) -> list[Symbolic]:
+        if all(x == 0 for x in self.source):
+            return [hy.expression(0.0)] * 3
+        size = rounded(m.number(self._size(m.scene)))
+        return [size * x for x in self._field(m)]
+
+    def flux_density_at_start(self, scene: Scene) -> Vector:
+        if self.uniform:
+            return self.source
+        place, context = self.source_at_start(scene), scene.context
+        far = norm(context, place)
+        along, size = dot(self.source, place) / far, context.mpf(_FIELD_CONSTANT) / far**3
+        return [size * (3 * along * x / far - e) for e, x in zip(self.source, place, strict=True)]
+
+    def same_field(self, other: object) -> bool:
+        """Whether another load gives the same field once more."""
+        own = self.source, self.orbit, self.place
+        return isinstance(other, MagneticDipole) and own == (other.source, other.orbit, other.place)
 
     def _size(self, scene: Scene) -> Any:
         """Size of the field, T; of a dipole's, over its equator at the semi-major axis or at the start."""
@@ -183,6 +203,8 @@ class MagneticDipole(Load):
         return [m.scene.context.ldexp(x * size, exponent) for x in self.moment]
 
     def torque(self, m: Kinematics) -> list[Term]:
+        if not self.acts():
+            return []
         moment, axes = self._moment(m), unit_vectors(m.scene.context)
         return [(cross(moment, axis), b) for axis, b in zip(axes, self._field(m), strict=True)]
 
@@ -192,6 +214,8 @@ class MagneticDipole(Load):
         return self.uniform and across(context, self.moment, axis) and across(context, self.source, normal)
 
     def potential(self, m: Kinematics) -> Symbolic | None:
+        if not self.acts():
+            return None
         pairs = zip(self._moment(m), self._field(m), strict=True)
         return -hy.sum([m.number(x) * b for x, b in pairs if x != 0])
 
@@ -214,8 +238,7 @@ class MagneticDipole(Load):
         return scene.context.zero if self.orbit is None else self.orbit.fastest_rate(scene.context)
 
     def told(self, scene: Scene) -> str:
-        moment = f"magnetic dipole of {value_text(norm(scene.context, self.moment), 'A m^2')}"
-        largest = f"torque up to {value_text(self.amplitude(scene) / 2, 'N m')}"
+        moment, largest = self._words(scene)
         if self.uniform:
             field = value_text(norm(scene.context, self.source), "T")
             return f"{moment} in a uniform field of {field}: {largest}"
@@ -226,32 +249,77 @@ class MagneticDipole(Load):
             where = orbit_text(self.orbit, implied_strength(self.orbit))
         return f"{moment} in the field of a dipole of {source}, {where}; {largest}"
 
+    def _words(self, scene: Scene) -> tuple[str, str]:
+        """What the moment is, and what it does."""
+        moment = f"magnetic dipole of {value_text(norm(scene.context, self.moment), 'A m^2')}"
+        return moment, f"torque up to {value_text(self.amplitude(scene) / 2, 'N m')}"
+
     def cautions(self, fields: MagneticDipoleFields, where: str, scene: Scene) -> Iterator[Caution]:
         if self.orbit is not None and fields.orbit is not None:
             yield from about_orbit(fields.orbit, self.orbit, fields.gravitational_parameter, where, scene)
 
 
-def _numbers(values: list[ExactNumber], around: Surroundings) -> Vector:
-    return [x.at(around.context) for x in values]
+@dataclass(frozen=True)
+class SteeredDipole(MagneticDipole):
+    """A moment given by expressions, as by a law of magnetorquers."""
+
+    law: tuple[Expression, ...] = ()  # its components, A m^2, body axes
+    number: int = 0  # place in the config, for messages
+    described = "a magnetic dipole given by expressions"
+    conservative = False
+
+    def acts(self) -> bool:
+        return any(x != 0 for x in self.source)
+
+    def read_by(self, names: frozenset[str]) -> bool:
+        return False
+
+    @property
+    def reads(self) -> frozenset[str]:  # type: ignore[override]
+        return super().reads.union(*map(states_read, self.law))
+
+    def formulas(self) -> Iterator[tuple[str, Expression]]:
+        for i, component in enumerate(self.law):
+            yield f"[[loads]] number {self.number + 1} moment[{i}]", component
+
+    def torque(self, m: Kinematics) -> list[Term]:
+        size = m.scene.context.ldexp(self._size(m.scene), -m.scaling.energy)
+        return list(zip(diagonal([size] * 3), cross(written(m, self.law), self._field(m)), strict=True))
+
+    def potential(self, m: Kinematics) -> Symbolic | None:
+        return None
+
+    def linear_potential(self, scene: Scene) -> tuple[Vector, Vector] | None:
+        return None
+
+    def keeps_plane(self, scene: Scene, axis: Vector, normal: Vector) -> bool:
+        return False
+
+    def narrow(self, m: Kinematics) -> list[Symbolic]:
+        return written(m, (part for component in self.law for part in narrow_parts(component)))
+
+    def roots(self, m: Kinematics) -> list[Symbolic]:
+        return written(m, (part for component in self.law for part in root_parts(component)))
+
+    def amplitude(self, scene: Scene) -> Any | None:
+        return None
+
+    def _words(self, scene: Scene) -> tuple[str, str]:
+        values, context = start_values(scene), scene.context
+        size = norm(context, [evaluate(component, values, context) for component in self.law])
+        shown = ", ".join(component.text for component in self.law)
+        return f"magnetic dipole of [{shown}] A m^2", f"{value_text(size, 'A m^2')} at the start"
 
 
-def _refuse_contradictions(fields: MagneticDipoleFields, around: Surroundings) -> None:
-    """Require one field: uniform, of a dipole along an orbit, or in flight of a dipole where the body is."""
-    host = around.bodies is not None and around.bodies.host is not None
-    if fields.orbit is not None and (around.free_flight or host):
-        why = "is one of [[bodies]]; a uniform field is allowed"
-        if around.free_flight:
-            why = "has a position of its own, where the field is taken: remove orbit and "
-            why += "gravitational_parameter, and keep source_moment"
-        raise around.fault("orbit", f"given for a body that {why}")
-    other = fields.source_moment if around.free_flight else fields.orbit
-    if (fields.field is None) == (other is None):
-        given = "neither field nor" if fields.field is None else "both field and"
-        name, why = ("source_moment", " for a body with a position") if around.free_flight else ("orbit", "")
-        raise around.fault("field", f"given {given} {name}; exactly one of them is needed{why}")
-    if not around.free_flight and (fields.source_moment is None) != (fields.orbit is None):
-        what = "missing; it is needed with orbit" if fields.orbit else "given without orbit; remove it"
-        raise around.fault("source_moment", what)
-    if fields.position is not None and not (around.free_flight and fields.source_moment is not None):
-        what = "given; allowed with source_moment, for a body with [initial] position and velocity"
-        raise around.fault("position", what)
+def _law(given: list[Any], around: Surroundings) -> tuple[Expression, ...]:
+    """Components of a moment, of which some are expressions."""
+    found = []
+    for i, x in enumerate(given):
+        if isinstance(x, ExactNumber):
+            found.append(Expression("", Constant(x, (0, 0))))
+            continue
+        try:
+            found.append(parse_expression(x, around.names, parameters=around.parameters, unit="A m^2"))
+        except ExpressionError as error:
+            raise around.fault(f"moment[{i}]", str(error)) from None
+    return tuple(found)

@@ -15,6 +15,7 @@ from typing import Any, ClassVar
 import heyoka as hy
 
 from rigidsim.errors import ConfigError, Problem
+from rigidsim.model.capabilities import SourcePlace
 from rigidsim.model.gradient import GradientSource, gradient_terms, tidal_range
 from rigidsim.model.kinematics import Kinematics, inertia_times, quadratic_form
 from rigidsim.model.load import Load, Term
@@ -43,6 +44,11 @@ class PointAttraction(Load):
     def seen(self, m: Kinematics) -> tuple[list[Symbolic], Symbolic]:
         """Unit direction from the point to the body, space axes, and 1/r (1/length)."""
         raise NotImplementedError
+
+    def source_place(self, m: Kinematics) -> SourcePlace:
+        outward, inverse = self.seen(m)
+        context = m.scene.context
+        return SourcePlace([-x for x in outward], inverse, context.ldexp(context.one, m.scaling.length))
 
     def source_direction(self, m: Kinematics) -> list[Symbolic]:
         return [-x for x in self._seen_from_body(m)[0]]
@@ -196,6 +202,12 @@ class MovingSource(PointAttraction):
         there = masses.positions[n], masses.velocities[n]
         place, moving = ([x - a for x, a in zip(*pair, strict=True)] for pair in zip(own, there, strict=True))
         return place, moving
+
+    def source_at_start(self, scene: Scene) -> Vector:
+        return [-x for x in self.start(scene)[0]]
+
+    def motion_at_start(self, scene: Scene) -> Vector:
+        return self.start(scene)[1]
 
     def amplitude(self, scene: Scene) -> Any:
         return tidal_range(scene, self.strength, self.encounter(scene)[0])

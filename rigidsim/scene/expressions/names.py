@@ -32,6 +32,9 @@ from typing import Any, TypeVar
 
 from rigidsim.errors import ConfigError, Problem
 
+PLACES = "places of sources"
+"""In ``Readable.states``: carried with a load, and known to no average over the rotation."""
+
 P = TypeVar("P", bound="type[NameProvider]")
 
 
@@ -46,6 +49,8 @@ class Readable:
         bound: of its absolute value.
         changes_sign: with the quaternion's sign, which means nothing.
         turns: whether it is an angle that is continued over full turns.
+        jumps: what to do about it, if it isn't continuous: no event can read it then.
+        formula: what it is written out as, in terms of ``parts``, if it has kinks or jumps of its own.
     """
 
     name: str
@@ -54,6 +59,9 @@ class Readable:
     bound: float = float("inf")
     changes_sign: bool = False
     turns: bool = False
+    jumps: str = ""
+    formula: str = ""
+    parts: Mapping[str, Readable] = field(default_factory=dict, compare=False)
 
 
 class NameProvider:

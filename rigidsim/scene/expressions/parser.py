@@ -19,7 +19,7 @@ import unicodedata
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any, NoReturn, TypeVar
+from typing import Any, NoReturn
 
 from rigidsim.scene import units
 from rigidsim.scene.arithmetic import context_for
@@ -42,10 +42,10 @@ from rigidsim.scene.expressions.tree import (
     Operation,
     constant_value,
     operation,
+    placed_at,
 )
 from rigidsim.scene.validation_messages import nearest
 
-T = TypeVar("T")
 LONGEST_TEXT = 2000
 DEEPEST_NESTING = 64
 MOST_NODES = 5000
@@ -176,7 +176,7 @@ class _Parser:
     def at(self, *signs: str) -> bool:
         return self.kind == "sign" and self.token in signs
 
-    def measured(self, position: int, of: Callable[[], T]) -> T:
+    def measured(self, position: int, of: Callable[[], Any]) -> Any:
         """Result of a dimension check; an error is given its place in the text."""
         try:
             return of()
@@ -274,9 +274,11 @@ class _Parser:
         span = (start, self.end)
         if name in self.names:
             readable = self.names[name]
-            return _Parsed(Name(name, span, readable), dimensions.of_name(readable))
-        if name in self.constants:
-            number = self.constants[name]
+            if readable.jumps and not self.jumps:
+                self.fail(f'"{name}" jumps, and a jump crosses zero nowhere; {readable.jumps}', start)
+            written = readable.formula and placed_at(parse_expression(readable.formula, readable.parts), span)
+            return _Parsed(written or Name(readable.name, span, readable), dimensions.of_name(readable))
+        if (number := self.constants.get(name)) is not None:
             return _Parsed(Constant(number.alone, span), dimensions.of_number(number))
         if name == "e":
             return _Parsed(Operation("exp", (Constant(ONE, span),), span))
@@ -316,8 +318,7 @@ class _Parser:
         if not self.at("("):
             self.fail(f'the function "{name}" has its arguments in parentheses; {usage}', start)
         arguments = self.arguments(_FUNCTIONS[name], f'"{name}" takes {_FUNCTIONS[name]}; {usage}')
-        measures = [argument.measure for argument in arguments]
-        measure = self.measured(start, lambda: dimensions.of_function(name, measures))
+        measure = self.measured(start, lambda: dimensions.of_function(name, [x.measure for x in arguments]))
         nodes = [argument.node for argument in arguments]
         return _Parsed(self.bounded(written_out(name, nodes, (start, self.end)), start), measure)
 

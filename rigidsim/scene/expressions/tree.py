@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from typing import Any
 
@@ -166,6 +166,18 @@ def nodes(expression: Expression) -> Iterator[Node]:
 def operations(expression: Expression) -> Iterator[Operation]:
     """Every operation, outer ones before inner ones."""
     return (node for node in nodes(expression) if isinstance(node, Operation))
+
+
+def placed_at(expression: Expression, span: tuple[int, int]) -> Node:
+    """The tree of an expression, all of which stands at one place of another text."""
+
+    def combine(node: Node, operands: list[Any]) -> Node:
+        if isinstance(node, Operation):
+            return Operation(node.operator, tuple(operands), span)
+        return replace(node, span=span)
+
+    found: Node = fold(expression, combine)
+    return found
 
 
 def names_used(expression: Expression) -> frozenset[str]:
