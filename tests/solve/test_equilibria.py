@@ -400,6 +400,8 @@ def test_independent_equations_come_back_and_grow_alike() -> None:
         (SATELLITE, {"more": '\n[[loads]]\nkind = "torque"\ncomponents = ["9", "9", "9"]'},
          "equilibrium", "none was found"),
         (SATELLITE, {"body": "principal_moments = [1, 1, 1]"}, "equilibrium", "rests in any attitude"),
+        (SATELLITE, {"more": '\n[[states]]\nname = "sum"\nderivative = "wy"\n[[loads]]\nkind = "torque"\n'
+         'components = ["1e-9*sum", "0", "0"]'}, "equilibrium", "the state sum changes in it"),
         (SATELLITE, {"name": "cassini_5"}, "equilibrium", 'did you mean "cassini_'),
         (SATELLITE, {"name": "cassini_1"}, "equilibrium", "node is at rest"),
         (MOON, {"name": "cassini_1"}, "equilibrium", "there are cassini_2 (6.6"),

@@ -55,11 +55,14 @@ def _equilibrium(found: FoundStart) -> Iterable[str]:
     yield found.described
     yield f"found {found.how}"
     grows = [real for real, _ in found.exponents if real > 0]
+    fades = [-real for real, _ in found.exponents if real < 0]
     turns = [2 * math.pi / imaginary for real, imaginary in found.exponents if real <= 0 and imaginary > 0]
     if turns:
         yield f"librations about it: {', '.join(span_text(period, _FEWER) for period in turns)}"
     if grows:
         yield f"small displacements grow e-fold in {span_text(1 / max(grows), _FEWER)}"
+    elif fades:
+        yield f"the fastest fade e-fold in {span_text(1 / max(fades), _FEWER)}"
 
 
 def time_text(time: Span) -> str:

@@ -10,15 +10,17 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import chain
 from typing import Any
 
 import heyoka as hy
 import numpy as np
 
 from rigidsim.model.formulations.quaternion import Quaternion
-from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.model_plan import plan_model
+from rigidsim.model.observables.mechanical import WORK
 from rigidsim.model.state_blocks import BODY
+from rigidsim.model.step_limiter import PACE
 from rigidsim.model.system import System
 from rigidsim.scene import attitude
 from rigidsim.scene.arithmetic import Matrix, Vector, multiply, norm, working_bits
@@ -95,15 +97,11 @@ class PoseMotion:
         self._system = System(replace(plan_model(scene), formulation=Quaternion()), precision.number)
 
     @property
-    def mechanics(self) -> Mechanics:
-        """What the equations are written in."""
-        return self._system.mechanics
-
-    @property
     def others(self) -> list[str]:
-        """Names of states beside those of the rotation."""
-        own = (*BODY.rates, *BODY.quaternion)
-        return [name for name in self._system.states if name not in own]
+        """Names of states beside those of the rotation that its equations read: of rotors and one's own."""
+        orbits = [self._system.mechanics.orbit_block(orbit).names for orbit in self._system.plan.orbit_tags]
+        known = {*BODY.rates, *BODY.quaternion, WORK, PACE, *chain.from_iterable(orbits)}
+        return [name for name in self._system.states if name not in known]
 
     @property
     def plain(self) -> bool:

@@ -193,17 +193,10 @@ def _refuse_passing(scene: Scene, precision: Any, orbit: KeplerOrbit, found: Pos
         raise refusal(
             _KEY, f"{what} fixed in space): nothing rests there; give the attitude and rates themselves"
         )
-    carried = [name for load in loads_of(scene) if (block := _own_states(load, later)) for name in block]
-    slopes = here.acceleration(found)[1]
-    for name in carried:
-        if abs(slopes[name]) > context.mpf(10) ** -12:
+    for name, slope in here.acceleration(found)[1].items():
+        if abs(slope) > context.mpf(10) ** -12:
             what = f'given "relative", but the state {name} changes in it; start it where it rests'
             raise refusal(_KEY, what)
-
-
-def _own_states(load: Any, motion: PoseMotion) -> list[str]:
-    block = load.extra_states(motion.mechanics)
-    return [] if block is None else list(block.names)
 
 
 def _linear(context: Any, motion: PoseMotion, at: Pose, bits: int) -> Matrix:
