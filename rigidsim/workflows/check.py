@@ -1,9 +1,7 @@
 """Validation only: whether a config could be run, and how it was understood."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from rigidsim.accuracy.models.level import fully
 from rigidsim.errors import ConfigError, Problem
@@ -11,43 +9,27 @@ from rigidsim.scene.sweeps.sweep import Sweep
 from rigidsim.session.dataset import refuse_taken_names
 from rigidsim.session.understood import body_of, cautions_of, span_of, start_of, told_loads
 from rigidsim.solve.problem import prepare
-from rigidsim.store.summary import Span, Start, UnderstoodBody
-from rigidsim.store.summary_parts import Caution
+from rigidsim.store.summary import Span, Start, UnderstoodBody, as_fields
+from rigidsim.store.summary_parts import SummaryPart
 from rigidsim.workflows.read import load
 from rigidsim.workflows.sweeps.members import recording
 from rigidsim.workflows.sweeps.plan import QUICK, check_sweep
 
 
-@dataclass(frozen=True)
-class Checked:
-    """Result of a check: problems, cautions, and how a config that can be run was understood."""
+class Checked(SummaryPart):
+    """Result of a check: problems, warnings, and how a config that can be run was understood; ``as_dict``
+    gives what ``--json`` prints.
+    """
 
     source: str
-    problems: tuple[Problem, ...] = ()
-    cautions: tuple[Caution, ...] = ()
-    body: UnderstoodBody | None = None
-    start: Start | None = None
-    time: Span | None = None
-    loads: tuple[str, ...] = ()
-
-    @property
-    def valid(self) -> bool:
-        """Whether the config can be run."""
-        return not self.problems
-
-    def as_dict(self) -> dict[str, Any]:
-        """Values for JSON."""
-        return {
-            "source": self.source,
-            "valid": self.valid,
-            "problems": [{"where": problem.where, "what": problem.what} for problem in self.problems],
-            "warnings": [caution.text for caution in self.cautions],
-            "warning_codes": [caution.code.value for caution in self.cautions],
-            "body": None if self.body is None else self.body.as_dict(),
-            "start": None if self.start is None else self.start.as_dict(),
-            "time": None if self.time is None else self.time.as_dict(),
-            "loads": list(self.loads),
-        }
+    valid: bool
+    problems: list[Problem]
+    warnings: list[str]
+    warning_codes: list[str]
+    body: UnderstoodBody | None
+    start: Start | None
+    time: Span | None
+    loads: list[str]
 
 
 def check(path: str | Path, *, overrides: Sequence[str] = ()) -> Checked:
@@ -65,8 +47,17 @@ def check(path: str | Path, *, overrides: Sequence[str] = ()) -> Checked:
             found = recording(Sweep.of(experiment))
             prepared = check_sweep(found, every=found.count <= QUICK)
     except ConfigError as error:
-        return Checked(error.source or str(path), problems=tuple(error.problems))
+        unknown = dict.fromkeys(("body", "start", "time"))
+        given = error.source or str(path)
+        return Checked(source=given, valid=False, problems=error.problems, **as_fields([]), **unknown, loads=[])
     scene = prepared.scene
-    cautions = tuple(cautions_of(scene))
-    parts = body_of(scene), start_of(scene), span_of(scene)
-    return Checked(str(path), (), cautions, *parts, told_loads(prepared))
+    return Checked(
+        source=str(path),
+        valid=True,
+        problems=[],
+        **as_fields(cautions_of(scene)),
+        body=body_of(scene),
+        start=start_of(scene),
+        time=span_of(scene),
+        loads=list(told_loads(prepared)),
+    )

@@ -106,12 +106,6 @@ def _delaunay(scene: Scene) -> list[Known]:
     return [Known(name, context.mpf(rate) * unit, 0.0, source, error) for name, rate in _DELAUNAY.items()]
 
 
-def _body_vectors(scene: Scene, vector: Vector) -> Vector:
-    """A space-axes vector resolved along the principal axes at the start."""
-    body = apply(transpose(rotation_matrix(scene.quaternion)), vector)
-    return [dot(axis, body) for axis in scene.body.principal_axes]
-
-
 def _librations(scene: Scene, orbit: Any) -> list[Known]:
     """Small oscillations about the equilibrium in a circular orbit near which the body starts; none
     elsewhere.
@@ -119,9 +113,13 @@ def _librations(scene: Scene, orbit: Any) -> list[Known]:
     context = scene.context
     if not (orbit.circular and orbit.fixed_plane) or scene.free_flight:
         return []
-    normal, radial = _orbit_axes(context, orbit)
+    normal, radial = orbit.normal(context), _towards_source(context, orbit)
     rates = [dot(axis, scene.angular_velocity) for axis in scene.body.principal_axes]
-    along_normal, along_radius = _body_vectors(scene, normal), _body_vectors(scene, radial)
+    inwards = transpose(rotation_matrix(scene.quaternion))
+    along_normal, along_radius = (
+        [dot(axis, apply(inwards, vector)) for axis in scene.body.principal_axes]
+        for vector in (normal, radial)
+    )
     y = max(range(3), key=lambda i: abs(along_normal[i]))
     z = max((i for i in range(3) if i != y), key=lambda i: abs(along_radius[i]))
     x = 3 - y - z
@@ -149,18 +147,15 @@ def _librations(scene: Scene, orbit: Any) -> list[Known]:
     return found
 
 
-def _orbit_axes(context: Any, orbit: Any) -> tuple[Vector, Vector]:
-    """Orbit normal, and direction of the source at time zero, space axes."""
-    node, tilt = orbit.ascending_node, orbit.inclination
-    along = orbit.periapsis + orbit.mean_anomaly
+def _towards_source(context: Any, orbit: Any) -> Vector:
+    """Direction of the source on a circular orbit at time zero, space axes."""
+    node, tilt, along = orbit.ascending_node, orbit.inclination, orbit.periapsis + orbit.mean_anomaly
     c, s = context.cos, context.sin
-    normal = [s(node) * s(tilt), -c(node) * s(tilt), c(tilt)]
-    radial = [
+    return [
         c(node) * c(along) - s(node) * s(along) * c(tilt),
         s(node) * c(along) + c(node) * s(along) * c(tilt),
         s(along) * s(tilt),
     ]
-    return normal, radial
 
 
 def _of_spin(scene: Scene) -> list[Known]:

@@ -2,7 +2,7 @@
 
 import tempfile
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -59,20 +59,11 @@ class Verdict:
 
     def as_dict(self) -> dict[str, Any]:
         """Values for JSON."""
-        found = None
-        if self.difference is not None:
-            d = self.difference
-            found = {"variable": d.variable, "sample": d.sample, "saved": d.saved, "again": d.again,
-                     "size": d.size}  # fmt: skip
-        return {
-            "path": self.path,
-            "identical": self.identical,
-            "problems": self.problems,
-            "first_difference": found,
-            "differing_variables": self.differing,
-            "environment": self.environment,
-            "samples": self.samples,
-        }
+        first = self.difference
+        told = asdict(self) | {"first_difference": first and asdict(first) | {"size": first.size}}
+        told["differing_variables"] = told.pop("differing")
+        del told["difference"]
+        return told
 
 
 def verify(path: str | Path, *, observer: Observer | None = None) -> Verdict:

@@ -242,8 +242,8 @@ def print_checked(found: Checked) -> None:
     on = Page()
     on.say((found.source, "bold"), "  ", ("valid", "bold green"))
     print_understood(found, found.loads, on)
-    for caution in found.cautions:
-        on.line("warning", caution.text, "bold red")
+    for text in found.warnings:
+        on.line("warning", text, "bold red")
 
 
 def print_verdict(verdict: dict[str, Any], what: str = "sample") -> None:
