@@ -56,11 +56,6 @@ class Certificate:
     times: int
     place: float | None = None
 
-    def keeps(self, accuracy: float, accuracy_position: float | None) -> bool:
-        """Whether both errors are within the requested accuracies."""
-        within = accuracy_position is None or (self.place is not None and self.place <= accuracy_position)
-        return self.error <= accuracy and within
-
     def as_dict(self) -> dict[str, float | str | int]:
         """Values for the summary."""
         return {
@@ -103,7 +98,7 @@ def certify(
         if best is None or found.error < best.error:
             best = found
         settled = compared.largest - compared.own > accuracy and compared.largest < INCOMPARABLE
-        if best.keeps(accuracy, accuracy_position) or settled:
+        if verdict(best, accuracy, accuracy_position) is None or settled:
             break
     return best
 

@@ -2,8 +2,9 @@
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
-from rigidsim.accuracy.models.level import fully
+from rigidsim.accuracy.choice import fully
 from rigidsim.errors import ConfigError, Problem
 from rigidsim.scene.sweeps.sweep import Sweep
 from rigidsim.session.dataset import refuse_taken_names
@@ -47,9 +48,11 @@ def check(path: str | Path, *, overrides: Sequence[str] = ()) -> Checked:
             found = recording(Sweep.of(experiment))
             prepared = check_sweep(found, every=found.count <= QUICK)
     except ConfigError as error:
-        unknown = dict.fromkeys(("body", "start", "time"))
+        unknown: dict[str, Any] = dict.fromkeys(("body", "start", "time"))
         given = error.source or str(path)
-        return Checked(source=given, valid=False, problems=error.problems, **as_fields([]), **unknown, loads=[])
+        return Checked(
+            source=given, valid=False, problems=error.problems, **as_fields([]), **unknown, loads=[]
+        )
     scene = prepared.scene
     return Checked(
         source=str(path),

@@ -9,14 +9,13 @@ from typing import Any
 import numpy as np
 
 from rigidsim.accuracy.braking import forecast_pace
-from rigidsim.accuracy.choice import chosen
+from rigidsim.accuracy.choice import choose_level, chosen
 from rigidsim.accuracy.error_law import (
     attitude_error,
     closed_form_if_any,
     held_error,
     motion_growth,
 )
-from rigidsim.accuracy.models.level import choose_level
 from rigidsim.model.equation_text import equation_texts
 from rigidsim.model.load import Load
 from rigidsim.session.dataset import dataset_variables, refuse_taken_names, unused_variables

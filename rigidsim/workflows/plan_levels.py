@@ -6,7 +6,7 @@ from contextlib import suppress
 from typing import Any
 
 from rigidsim.accuracy.braking import forecast_pace
-from rigidsim.accuracy.models.level import CHEAPEST_FIRST, LevelChoice
+from rigidsim.accuracy.choice import CHEAPEST_FIRST, LevelChoice
 from rigidsim.accuracy.models.modelling import measure_modelling
 from rigidsim.accuracy.models.side_by_side import Unmeasured
 from rigidsim.accuracy.motion import Pilot, run_pilot

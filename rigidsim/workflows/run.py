@@ -6,8 +6,7 @@ from pathlib import Path
 from typing import Any, TypeVar, overload
 
 from rigidsim.accuracy.certificate import certify, verdict
-from rigidsim.accuracy.choice import Choice, chosen
-from rigidsim.accuracy.models.level import choose_level
+from rigidsim.accuracy.choice import Choice, choose_level, chosen
 from rigidsim.accuracy.setting import Setting, asked_of_attitude, leaves_choice, wanted
 from rigidsim.errors import ConfigError
 from rigidsim.model.load import Load

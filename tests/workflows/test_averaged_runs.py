@@ -10,7 +10,7 @@ from support import config, run_text
 
 import rigidsim
 from rigidsim import ConfigError
-from rigidsim.accuracy.models.level import choose_level
+from rigidsim.accuracy.choice import choose_level
 from rigidsim.session.session import AdviceLimits, Tuning
 
 FLATTENING, SPIN, ECCENTRICITY = 0.02, 60.0, 0.2

@@ -100,14 +100,9 @@ class Course:
 
 @dataclass(frozen=True)
 class Followed:
-    """Result of following an ensemble.
-
-    Attributes:
-        share: share of the run's time over which it was carried from its start, possibly until no digit is
-            left.
-        windows, in_windows: windows examined beyond that, and the part of the run they cover.
-        more: how much more errors grow in these than in as much of the beginning, root mean square, by
-            quantity; 1 if they don't.
+    """Result of following an ensemble: over which share of the run's time from its start, possibly until no
+    digit is left; windows beyond that, the part of the run they cover, and how much ``more`` errors grow in
+    these than in as much of the beginning, root mean square, by quantity; 1 if they don't.
     """
 
     spread: Spread

@@ -24,39 +24,29 @@ from rigidsim.solve.effects.waypoints import SampleTrail, Waypoints
 from rigidsim.solve.precision import Precision, precision_of
 from rigidsim.solve.problem import InitialValueProblem, double_twin
 from rigidsim.solve.shadow.measures import Spread
+from rigidsim.solve.stepper import OwnErrors
 from rigidsim.solve.taylor_stepper import TaylorStepper
 
 _VECTORS = {"rates": ("wx", "wy", "wz"), "position": ("x", "y", "z"), "velocity": ("vx", "vy", "vz")}
 
 
 @dataclass(frozen=True)
-class Estimate:
-    """Largest errors of a run until its end.
+class Estimate(OwnErrors):
+    """Largest errors of a run until its end; of the attitude at most pi.
 
     Attributes:
-        attitude: rad, at most pi; None without an attitude.
-        rates: error of the angular velocity, relative to its size.
-        position, velocity: m and m/s; None if the body has no position.
-        amplification: ratio of the attitude's error (or the rates') to the law of stable motions; 1 for
-            these.
+        amplification: ratio of the leading error to the law of stable motions; 1 for these.
         growth_rate: rate of exponential growth, 1/s; 0 if there is none.
-        predictable_seconds: time after the start at which digits are gone; None if errors don't
-            grow exponentially.
+        predictable_seconds: time after the start at which digits are gone; None if growth isn't exponential.
         seconds, share: how far the ensemble was followed from the start, in s and as a part of the run.
-        how: description of the method.
         closed_form: whether the scene has one, against which the run was held.
     """
 
-    attitude: float | None
-    rates: float
-    position: float | None
-    velocity: float | None
     amplification: float = 1.0
     growth_rate: float = 0.0
     predictable_seconds: float | None = None
     seconds: float = 0.0
     share: float = 1.0
-    how: str = ""
     closed_form: bool = False
 
     @property
@@ -113,9 +103,9 @@ def _everywhere(prepared: InitialValueProblem, error: float, how: str) -> Estima
     return Estimate(
         error if prepared.system.requirements.attitude else None,
         error,
+        how,
         error * _size(prepared.scene.position) if flight else None,
         error * _size(prepared.scene.velocity) if flight else None,
-        how=how,
     )
 
 
@@ -230,9 +220,7 @@ def _conclusion(course: Course, followed: Followed) -> Estimate:
     times = spread.along("time") - start
     if not len(times):
         unknown = 0.0 if spread.whole[0] else math.pi
-        return Estimate(
-            unknown if carried else None, unknown, None, None, how="the motion could not be followed"
-        )
+        return Estimate(unknown if carried else None, unknown, "the motion could not be followed")
     errors = level * margins.SAFETY * course.leading(spread)
     longer = max((end - start) / times[-1], 1.0)
 

@@ -1,1 +1,1 @@
-"""Errors of averaged models, and the choice of a model that is good enough."""
+"""Errors of averaged models."""
