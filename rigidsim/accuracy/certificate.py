@@ -77,14 +77,8 @@ def certify(
     known: KnownMotion | None = None,
     told: Told | None = None,
 ) -> Certificate | None:
-    """Compare a finished run with an independent solution.
-
-    Args:
-        accuracy: requested accuracy, rad, which decides how good the reference must be.
-        accuracy_position: requested accuracy, m; None if the path need not be compared.
-
-    Returns:
-        None if the run recorded too little to be compared.
+    """Compare a finished run with an independent solution, as good as the accuracies asked for need (rad; m,
+    None if the path need not be compared); None if the run recorded too little to be compared.
     """
     if dataset.sizes["time"] == 0:
         return None

@@ -1,5 +1,5 @@
-"""Choice of the cheapest setting that keeps the attitude as accurate as ``[integrator] accuracy`` asks, and of
-the most averaged model whose measured error is within ``accuracy_axis``.
+"""Choice of the cheapest setting that keeps the attitude as accurate as ``[integrator] accuracy`` asks, and
+of the most averaged model whose measured error is within ``accuracy_axis``.
 
 Settings are tried over the motion's beginning, which is the whole of a short run, against a better one
 (``rigidsim.accuracy.forecast``); what wasn't tried follows from what was: errors of rounding are in
@@ -77,17 +77,10 @@ def chosen(
     beyond: Setting | None = None,
     told: Told | None = None,
 ) -> tuple[Experiment, Choice | None]:
-    """The experiment with the settings that its ``accuracy`` asks for written into it, and the choice.
-
-    Keys that the config gives stay as they are; where it gives precision, tolerance and method, nothing is
-    chosen and the run is only certified. The text has what was chosen in its keys, so that it means the
-    same run again.
-
-    Args:
-        beyond: a setting that was run and missed the accuracy; only more costly ones are considered.
-
-    Raises:
-        ConfigError: no setting reaches the accuracy; says what can be reached.
+    """The experiment with the settings that its ``accuracy`` asks for written into its text, so that it means
+    the same run again, and the choice: beyond one that was run and missed the accuracy only more costly ones
+    are considered. Keys that the config gives stay; where these are precision, tolerance and method, the run
+    is only certified. Raises ``ConfigError``, with what can be reached.
     """
     integrator = experiment.config.integrator
     accuracy = wanted(experiment)

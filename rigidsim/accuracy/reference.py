@@ -178,12 +178,9 @@ def errors_of_best(best: Setting, distances: Mapping[Setting, np.ndarray]) -> np
     Those in the same variables have begun with the same rounded values, and take the same steps until
     invariants are first projected: such a distance alone was up to six times (13 once) too small.
 
-    Args:
-        distances: (samples,) rad, from each of ``equals_of``, at least one.
-
-    They aren't scaled by the errors per step, as in ``own_error``: a series keeps its tolerance by orders of
-    magnitude, so that rounding can dominate in both (near a separatrix, in quadruple precision and at 1e-30,
-    scaled errors were 70 times too small, held against 70 digits).
+    They (at least one) aren't scaled by the errors per step, as in ``own_error``: a series keeps its
+    tolerance by orders of magnitude, so that rounding can dominate in both (near a separatrix, in quadruple
+    precision and at 1e-30, scaled errors were 70 times too small, held against 70 digits).
     """
     independent = best.precision in _SECOND or any(s.formulation != best.formulation for s in distances)
     largest = np.max(list(distances.values()), axis=0) * (1.0 if independent else _SAME_VARIABLES)

@@ -111,16 +111,9 @@ def try_setting(
     compact: bool = False,
     repeating: bool = False,
 ) -> Trial:
-    """Integrate an experiment's motion under a setting.
-
-    Args:
-        experiment: gives the scene; its own ``[integrator]`` is replaced by the setting.
-        told: receives the title and the trial's progress (0 to 1), some tens of times per second.
-        compact: compile in a tenth of the time to code that takes up to twice as long per step in double
-            precision, and as long in the others; rounding differs.
-
-    Raises:
-        ConfigError: the scene can't be integrated with it (no closed form, nothing to project, ...).
+    """Integrate an experiment's motion under a setting, which replaces its ``[integrator]``. Compact code
+    compiles in a tenth of the time and takes up to twice as long per step in double precision, as long in the
+    others; rounding differs. Raises ``ConfigError`` if the scene can't be integrated so.
     """
     scene = trial_scene(experiment, setting, times, repeating=repeating)
     samples, early = scene.samples, 0

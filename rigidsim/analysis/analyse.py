@@ -51,19 +51,8 @@ def analyse_dataset(
     order: int | None = None,
     attitude_error: float | None = None,
 ) -> Analysis:
-    """Secular rates and lines of a dataset's signals.
-
-    Args:
-        dataset: dataset with equidistant ``time``; residuals ``_lo``, ``_lo2`` are taken into account.
-        variables: names of variables or of their signals; see ``signals_of``.
-        lines: largest number of lines per signal.
-        floor: lines below this share of a signal's strongest are left out.
-        known: frequencies for labels; those with a tolerance are replaced by the strongest line near them.
-        order: order of the Hann window; chosen by the lines' distances by default.
-        attitude_error: attitude error of the run at its end, rad, if known.
-
-    Raises:
-        RigidsimError: samples aren't equidistant, too few or not finite, or there is no such variable.
+    """Secular rates and lines of a dataset's signals; arguments and errors as of
+    ``rigidsim.workflows.analyse.analyse``. Residuals ``_lo``, ``_lo2`` are taken into account.
     """
     if not 1 <= lines <= 500:
         raise RigidsimError(f"given lines = {lines}; 1 to 500 are allowed")

@@ -33,14 +33,10 @@ _HIGHEST_ORDER = 10
 
 @dataclass(frozen=True)
 class Decomposition:
-    """Components of a signal; complex lines of real signals come with their mirror images.
-
-    Attributes:
-        sum: polynomial, and lines (of a real signal those of positive frequency: twice their real part).
-        frequency_errors, amplitude_errors, polynomial_errors: one standard deviation each, from the remainder
-            next to the line: turns per sample, and the signal's unit.
-        left, level: rms of the remainder; median size of its windowed spectrum, below which lines aren't
-        seen. close, exhausted: as of ``result.SignalAnalysis``, in turns per sample.
+    """Components of a signal: polynomial, and lines (of a real signal those of positive frequency: twice
+    their real part). Errors are one standard deviation, from the remainder next to the line, in turns per
+    sample and the signal's unit; ``level`` is the median size of the remainder's windowed spectrum; the rest
+    is as of ``result.SignalAnalysis``, in turns per sample.
     """
 
     sum: Sum

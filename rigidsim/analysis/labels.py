@@ -26,16 +26,11 @@ _RIVALS = 2  # orders more that another combination may have and still make a la
 
 @dataclass(frozen=True)
 class Known:
-    """A frequency known for a scene.
+    """A frequency known for a scene, rad/s, whose sign counts. The strongest line within its relative
+    tolerance takes its place; 0 if the value is exact, or was measured with an error, rad/s.
 
-    Attributes:
-        name: one word.
-        value: rad/s, mpf or float; the sign counts.
-        tolerance: relative; 0 if the value is exact. The strongest line within it takes its place.
-        source: origin of the value.
-        error: one standard deviation of a value that was measured, rad/s.
-        where: "body" or "space" where only signals in body axes, or only those in space, can have it: how far
-            a symmetric body has turned about its axis is to be seen in body axes alone.
+    ``where`` is "body" or "space" if only signals in body axes, or only those in space, can have it: how far
+    a symmetric body has turned about its axis is to be seen in body axes alone.
     """
 
     name: str
@@ -48,13 +43,9 @@ class Known:
 
 @dataclass(frozen=True)
 class Label:
-    """The label of a line.
-
-    Attributes:
-        multipliers: multipliers of the known frequencies; empty if nothing fits.
-        text: such as ``2 orbit - node``; "" if nothing fits.
-        folds: whole turns per sample that were added to the observed frequency.
-        doubtful: other combinations that fit as well; a folded line is then not unfolded.
+    """The label of a line, such as ``2 orbit - node``, empty if nothing fits: multipliers of the known
+    frequencies; whole turns per sample that were added to the observed frequency; other combinations that
+    fit as well, in which case a folded line is not unfolded.
     """
 
     multipliers: tuple[int, ...] = ()
@@ -104,15 +95,10 @@ def label(
     blend: float = 0.0,
     resolution: float = math.inf,
 ) -> Label:
-    """Find the combination that a line represents.
+    """Find the combination that a line represents, observed within +-nyquist, rad/s.
 
-    Args:
-        frequency, error: rad/s, as observed: within +-nyquist.
-        real: whether the signal is real, so that a line can't be told from its mirror image.
-        in_body: whether the signal is in body axes.
-        blend: rad/s, far less than a bin: where nothing fits within the error, combinations that near do:
-            a line can have absorbed others that are too close to be told apart.
-        resolution: a bin, rad/s: a line whose error is about as large gets no label.
+    Where nothing fits within the error, combinations within ``blend``, far less than a bin, do: a line can
+    have absorbed others that are too close to be told apart. One whose error is about a bin gets no label.
     """
     if _SIGMAS * error > resolution:
         return Label()

@@ -68,11 +68,7 @@ class EquidistantTimes:
 
 
 def clock_of(dataset: xarray.Dataset) -> EquidistantTimes:
-    """The times of a dataset.
-
-    Raises:
-        RigidsimError: times are missing, too few, or not equidistant.
-    """
+    """The times of a dataset. Raises ``RigidsimError`` if they are missing, too few, or not equidistant."""
     if "time" not in dataset.coords or dataset["time"].dims != ("time",):
         raise RigidsimError("the dataset has no coordinate time along a dimension time; analyse needs one")
     count = dataset.sizes["time"]
@@ -150,11 +146,7 @@ class Signal:
     components: tuple[dict[str, Any], ...]
 
     def samples(self, clock: EquidistantTimes) -> SignalSamples:
-        """All samples of the signal.
-
-        Raises:
-            RigidsimError: some samples aren't finite, or all are equal.
-        """
+        """All samples of the signal. Raises ``RigidsimError`` if some aren't finite."""
         names = parts_in(self.dataset, self.variable)
         parts = []
         for name in names:
@@ -179,14 +171,8 @@ class Signal:
 
 
 def signals_of(dataset: xarray.Dataset, chosen: Sequence[str] = ()) -> list[Signal]:
-    """The signals of a dataset.
-
-    Args:
-        chosen: names of variables (all their signals) or of signals; where empty, those of ``FIRST`` that the
-            dataset has, of axes the figure axis, else the angular velocity, else every variable.
-
-    Raises:
-        RigidsimError: a name is unknown.
+    """The signals of a dataset, by names of variables (all their signals) or of signals; by default those of
+    ``FIRST`` that it has, of axes the figure axis, else the angular velocity, else every variable.
     """
     offered = [signal for name in _variables(dataset) for signal in _signals(dataset, name)]
     if not offered:

@@ -34,11 +34,7 @@ class Checked(SummaryPart):
 
 
 def check(path: str | Path, *, overrides: Sequence[str] = ()) -> Checked:
-    """Validate a config as far as ``run`` would before its first step, and write nothing.
-
-    Args:
-        overrides: ``KEY=VALUE`` texts, as for ``rigidsim.load``.
-    """
+    """Validate a config as far as ``run`` would before its first step, and write nothing."""
     try:
         experiment = load(path, overrides=overrides)
         if experiment.config.sweep is None:

@@ -89,13 +89,11 @@ class Predicted(SummaryPart):
 
     Attributes:
         pace: mean length of the first steps over that of all; None if torques change it unpredictably.
-        building_seconds, choosing_seconds, modelling_seconds: CPU time of compiling, of choosing settings,
-            and of the full model beside an averaged one.
+        modelling_seconds: CPU time of the full model beside an averaged one.
         free_bytes: free space on the disk; infinite if unknown.
-        attitude_error_rad: None without an attitude, or if the method tells its own errors.
-        held: whether that is with projected invariants.
-        amplification: factor by which the motion amplifies rounding errors by the end.
-        growth_seconds: span over which their growth was followed.
+        attitude_error_rad: None without an attitude, or if the method tells its own errors; ``held``: whether
+            it is with projected invariants.
+        amplification, growth_seconds: of rounding errors by the end; span over which that was followed.
     """
 
     steps: float

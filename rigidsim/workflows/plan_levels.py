@@ -24,13 +24,9 @@ _LARGEST_CHUNK = 1024  # steps: at this length a call's overhead is negligible
 
 
 class LevelCost(SummaryPart):
-    """What a level of ``[model]`` would cost, and leave out.
-
-    Attributes:
-        error_rad: modelling error of axes, forecast from the beginning; None if none is known.
-        steps, cpu_seconds: of the integration, from a short pilot; None if there is no such average.
-        modelling_seconds: CPU time of measuring that error after a run.
-        why_not: why it isn't chosen; empty for the one that is.
+    """What a level of ``[model]`` would cost, from a short pilot, and leave out: the modelling error of axes,
+    forecast from the beginning, and the CPU time of measuring it after a run; why it isn't chosen, empty for
+    the one that is. None where something isn't known, or there is no such average.
     """
 
     level: str

@@ -89,19 +89,9 @@ def tradeoff(
     force: bool = False,
     told: Callable[[str], None] = lambda _: None,
 ) -> Tradeoff:
-    """Measure an experiment's settings; save dataset and figure.
-
-    Args:
-        out: folder in which ``NAME_tradeoff`` is made; None saves nothing.
-        budget: approximate time limit, s.
-        repeats: number of fresh processes in which speeds are measured.
-        full: measure every tolerance in every formulation and precision.
-        force: replace an earlier measurement.
-        told: called with a description of each stage.
-
-    Raises:
-        ConfigError: the config can't be run.
-        RunFolderError: there is an earlier measurement, or the folder can't be written.
+    """Measure an experiment's settings, of a ``full`` measurement every tolerance in every formulation and
+    precision, in about ``budget`` seconds, speeds in ``repeats`` fresh processes; save dataset and figure in
+    ``out/NAME_tradeoff`` unless that is None. Raises ``ConfigError`` and ``RunFolderError``.
     """
     folder = None
     if out is not None:

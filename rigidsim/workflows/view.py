@@ -52,12 +52,8 @@ def _members(paths: Sequence[Path], members: Sequence[int]) -> list[tuple[str, R
 
 
 def show(named: Sequence[tuple[str, Run]], *, web: bool = False) -> int:
-    """Open runs in the viewer, side by side if there are several, and wait until it is closed.
-
-    A single run that another process is working on is followed: the picture grows with what is saved.
-
-    Returns:
-        The viewer's exit code; 130 after Ctrl-C.
+    """Open runs in the viewer, side by side if there are several, and wait until it is closed; returns its
+    exit code, 130 after Ctrl-C. A single run that another process works on is followed as it is saved.
     """
     first = named[0][1]
     try:

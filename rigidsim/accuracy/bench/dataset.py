@@ -72,6 +72,7 @@ def dataset_of(measured: Measurement) -> xarray.Dataset:
     ) -> tuple[Sequence[str], ArrayLike, dict[str, str]]:
         return (dims, values, {"units": units, "long_name": long_name})
 
+    tolerances = [r.setting.step_tolerance if r.setting.has_steps else math.nan for r in rows]
     relative = "relative to the default setting, per simulated second"
     data = xarray.Dataset(
         {
@@ -107,7 +108,7 @@ def dataset_of(measured: Measurement) -> xarray.Dataset:
             "precision": variable(
                 words([precision_title(r.setting.precision) for r in rows]), "1", "arithmetic"
             ),
-            "tolerance": variable([_tolerance(r.setting) for r in rows], "1", "of the step control"),
+            "tolerance": variable(tolerances, "1", "of the step control"),
             "formulation": variable(words([r.setting.formulation for r in rows]), "1", "of the attitude"),
             "held": variable(
                 np.array([r.setting.hold_invariants for r in rows], dtype=np.int8), "1", "invariants put back"
@@ -137,10 +138,6 @@ def dataset_of(measured: Measurement) -> xarray.Dataset:
         front.astype(np.int8), "1", "no other setting is both cheaper and more accurate"
     )
     return data
-
-
-def _tolerance(setting: Setting) -> float:
-    return setting.step_tolerance if setting.has_steps else math.nan
 
 
 def trusted_error(dataset: xarray.Dataset) -> np.ndarray:

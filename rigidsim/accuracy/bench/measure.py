@@ -1,12 +1,10 @@
 """Measuring the speed and accuracy of a scene's settings.
 
-Every setting integrates the scene's own motion, attitude included, and is held against a reference whose
-own error is known (``rigidsim.accuracy.reference``): the closed form to 50 digits where there is one, else
-the best that a higher precision can do. Speeds are taken over several fresh processes, in turn
-(``rigidsim.accuracy.bench.worker``).
-
-A time budget bounds it all: long motions are measured over their beginning, quadruple precision over less
-of it, and what doesn't fit is listed as left out. Nothing is extrapolated.
+Every setting integrates the scene's own motion, attitude included, and is held against a reference whose own
+error is known: the closed form to 50 digits where there is one, else the best that a higher precision can do.
+Speeds are taken over several fresh processes, in turn. A time budget bounds it all: long motions are measured
+over their beginning, quadruple precision over less of it, and what doesn't fit is listed as left out. Nothing
+is extrapolated.
 """
 
 import math
@@ -139,14 +137,8 @@ def measure(
     settings: Sequence[Setting] | None = None,
     told: Callable[[str], None] = lambda _: None,
 ) -> Measurement:
-    """Measure the settings of a scene.
-
-    Args:
-        reference: "best", or "extended" to use that setting if nothing better is possible in time.
-
-    Raises:
-        ConfigError: the config can't be run.
-        RigidsimError: the budget is too small for anything.
+    """Measure the settings of a scene, against the best reference, or an "extended" one if nothing better is
+    possible in time. Raises ``ConfigError``, and ``RigidsimError`` if the budget is too small for anything.
     """
     if not budget >= _LEAST_BUDGET:
         raise RigidsimError(

@@ -69,14 +69,9 @@ class Carrying:
 def carrying(
     prepared: InitialValueProblem, average: Average | None, go_on: Callable[[], bool] = lambda: True
 ) -> Carrying:
-    """Tangent maps of a run's averaged motion, from its start to its end.
-
-    Args:
-        average: the run's own; None for a run of the full model, whose average over the orbits is taken.
-
-    Raises:
-        ConfigError: a run of the full model has no average over the orbits.
-        Unmeasured: ``go_on`` ended it, or the motion can't be followed.
+    """Tangent maps of a run's averaged motion, from its start to its end; of a run of the full model (None),
+    of its average over the orbits. Raises ``ConfigError`` where there is none, and ``Unmeasured`` if
+    ``go_on`` ended it, or the motion can't be followed.
     """
     problem = _problem(prepared, average)
     system = problem.system

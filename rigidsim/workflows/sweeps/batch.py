@@ -86,14 +86,7 @@ class _FamilyRun:
 
 
 class BatchTiles:
-    """Families of a sweep, traced and compiled once per process.
-
-    Args:
-        hidden: variables recorded only for indicators.
-
-    Attributes:
-        axes: values of the sweep's axes.
-    """
+    """Families of a sweep, traced and compiled once per process; some variables are only for indicators."""
 
     def __init__(self, sweep: Sweep, hidden: Sequence[str]) -> None:
         self._sweep = sweep

@@ -28,24 +28,16 @@ _TELL_SECONDS = 0.2
 
 
 class Cluster(Way):
-    """A Dask scheduler's workers, which have nothing to do for a sweep before its first tile.
-
-    Args:
-        address: address of the scheduler, such as ``tcp://10.0.0.1:8786``.
-        patience: seconds within which it must answer.
-        alone: seconds without any worker after which to give up.
+    """Workers of a Dask scheduler (``tcp://10.0.0.1:8786``), which must answer within ``patience`` seconds
+    and may be without workers for ``alone`` seconds; they have nothing to do for a sweep before its first
+    tile.
     """
 
     def __init__(self, address: str, patience: float = 20.0, alone: float = 120.0) -> None:
         self._address, self._patience, self._alone = address, patience, alone
 
     def images(self, generation: Generation, tiles: Sequence[int]) -> Iterator[tuple[int, bytes]]:
-        """See ``Way``.
-
-        Raises:
-            RigidsimError: Dask isn't installed, or no scheduler answers.
-            StoppedError: workers die repeatedly at the same tile, or the scheduler disappeared.
-        """
+        """See ``Way``; StoppedError if workers die repeatedly at the same tile, or the scheduler is gone."""
         distributed = _distributed()
         try:
             client = distributed.Client(self._address, timeout=self._patience, set_as_default=False)

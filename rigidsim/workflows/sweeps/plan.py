@@ -48,15 +48,10 @@ _ESTIMATED = 2.5  # cost ratio of a batch member with estimated errors to one wi
 
 
 def check_sweep(sweep: Sweep, *, every: bool = True, each: Each = map) -> InitialValueProblem:
-    """Refuse a sweep with a member that can't be run; returns the first that can, prepared.
-
-    Args:
-        every: check each member's numbers even if there are more than ``_ALL``: a second per million
-            members of a product, most of a minute where each has values of its own.
-        each: like ``map``; may have others look at shares of the members meanwhile.
-
-    Raises:
-        ConfigError: names members and keys.
+    """Refuse a sweep with a member that can't be run, by ``ConfigError`` with members and keys; returns the
+    first that can, prepared. To check the numbers of more than ``_ALL`` takes a second per million members of
+    a product, most of a minute where each has values of its own; ``each`` may, like ``map``, have others look
+    at shares of them meanwhile.
     """
     _refuse_names(sweep)
     _refuse_what_none_has(sweep)
@@ -261,11 +256,8 @@ class PredictedSweep(SummaryPart):
 
 
 class SweepPlan(SummaryPart):
-    """What a sweep would run, and what it would cost; ``as_dict`` gives what ``--json`` prints.
-
-    Attributes:
-        tile, tiles: members of a tile, and the number of tiles.
-        member: plan of the first member that can be run.
+    """What a sweep would run, in tiles of so many members, the plan of the first that can be run, and what
+    all would cost; ``as_dict`` gives what ``--json`` prints.
     """
 
     kind: str = "sweep"
@@ -285,11 +277,7 @@ class SweepPlan(SummaryPart):
 
 
 def plan_sweep(sweep: Sweep) -> SweepPlan:
-    """Explain and predict a sweep; integrates for about half a second and writes nothing.
-
-    Raises:
-        ConfigError: a member can't be run.
-    """
+    """Explain and predict a sweep; integrates for about half a second and writes nothing."""
     sweep = recording(sweep)
     first = check_sweep(sweep, every=sweep.count <= QUICK)
     made = plan(sweep.experiment_of(first_possible(sweep)))

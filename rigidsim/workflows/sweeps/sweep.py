@@ -101,11 +101,7 @@ def resume_sweep(
     scheduler: str | None = None,
     observer: SweepObserver | None = None,
 ) -> SavedSweep:
-    """Complete a sweep that was interrupted or killed.
-
-    Raises:
-        RunFolderError: there is no sweep, or it can't be written.
-    """
+    """Complete a sweep that was interrupted or killed."""
     folder = open_sweep(path).folder
     generations = folder.generations()
     if not generations:

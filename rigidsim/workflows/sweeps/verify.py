@@ -24,20 +24,9 @@ _HELD = 64e6  # bytes of a variable that are read at once; larger ones are read 
 def verify_sweep(
     path: str | Path, *, members: int = MEMBERS, seed: int | None = None, together: int | None = None
 ) -> Verdict:
-    """Run some members of a sweep again, in other company than before, and compare everything that was kept.
-
-    Args:
-        path: folder of a finished sweep.
-        members: number of members, at most all of them.
-        seed: seed of the draw; different each time by default.
-        together: members run at once; all by default. No bit depends on it.
-
-    Returns:
-        See ``verify``; its samples are members here.
-
-    Raises:
-        ConfigError: fewer than one member is asked for.
-        RunFolderError: there is no sweep, it isn't finished, or its files are damaged.
+    """Run some members of a finished sweep again, in other company than before, and compare everything that
+    was kept; the verdict's samples are members. They are drawn anew each time unless a seed is given; how
+    many run ``together`` changes no bit. Raises ``ConfigError``, and ``RunFolderError`` as ``verify`` does.
     """
     if members < 1:
         raise ConfigError(Problem("--members", f"given {members}; one or more are allowed"))

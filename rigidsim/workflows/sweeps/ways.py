@@ -53,11 +53,8 @@ class Way:
         return map(function, tasks)
 
     def images(self, generation: Generation, tiles: Sequence[int]) -> Iterator[tuple[int, bytes]]:
-        """Numbers and sealed files of tiles, in any order, within the context of ``ready_for``.
-
-        Raises:
-            KeyboardInterrupt: the work was interrupted.
-            RigidsimError: no more tiles can be computed.
+        """Numbers and sealed files of tiles, in any order, within the context of ``ready_for``; RigidsimError
+        if no more can be computed.
         """
         for tile in tiles:
             yield tile, tile_image(*task(generation, tile))
