@@ -6,6 +6,7 @@ moments give the mean pace.
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -18,6 +19,7 @@ from rigidsim.model.averaged.driven import Driven, driven_by
 from rigidsim.model.averaged.free_motion import Separatrix
 from rigidsim.model.averaged.torques import reads_rates_alone
 from rigidsim.model.capabilities import gradient_source_of
+from rigidsim.model.load import Load
 from rigidsim.solve.precision import precision_of
 from rigidsim.solve.problem import InitialValueProblem, double_twin
 from rigidsim.solve.switching.stepper import stepper_of
@@ -29,23 +31,22 @@ _STEPS = 256  # at each, of dozens of rotations
 _RATES = ("wx", "wy", "wz")
 
 
-def is_braked(prepared: InitialValueProblem) -> bool:
-    """Whether torques that are functions of the rates change a full motion's rotation lastingly."""
-    plan = prepared.system.plan
-    alone = [load for load in plan.loads if gradient_source_of(load) is None]
-    full = plan.formulation.resolves_rotation
-    return full and bool(alone) and all(reads_rates_alone(load) for load in alone)
-
-
-def mean_pace(prepared: InitialValueProblem) -> float | None:
-    """Mean number of steps per second over the whole run, relative to that at its start; None if the course
-    of its average isn't known until the end.
+def forecast_pace(prepared: InitialValueProblem, pilot: Pilot) -> float | None:
+    """Mean number of steps per second over the whole run, relative to that at its start, which torques change
+    that are functions of the rates: 1 for motions without any, and where the pilot saw the end; None if the
+    course of its average isn't known until the end.
     """
+    clock, plan = prepared.clock, prepared.system.plan
+    whole = float(clock.at(clock.count - 1)) - float(clock.start)
+    alone = [load for load in plan.loads if gradient_source_of(load) is None]
+    braked = plan.formulation.resolves_rotation and alone and all(map(reads_rates_alone, alone))
+    if not prepared.has_steps or pilot.taken * pilot.step >= whole or not braked:
+        return 1.0
     moments, system = prepared.scene.body.principal_moments, prepared.system
     stepwise = bool(system.plan.surfaces.found) or system.stepwise
     if stepwise or prepared.scene.free_flight or max(moments) == min(moments):
         return None
-    course = _driven(prepared)
+    course = _driven(prepared, alone)
     twin = double_twin(compactly(prepared))
     if course is None or not all(name in twin.states for name in _RATES):
         return None
@@ -71,21 +72,10 @@ def mean_pace(prepared: InitialValueProblem) -> float | None:
     return found if math.isfinite(found) else None
 
 
-def forecast_pace(prepared: InitialValueProblem, pilot: Pilot) -> float | None:
-    """``mean_pace`` where it is wanted: 1 for motions that aren't braked, and where the pilot saw the end."""
-    clock = prepared.clock
-    whole = float(clock.at(clock.count - 1)) - float(clock.start)
-    if not prepared.has_steps or pilot.taken * pilot.step >= whole or not is_braked(prepared):
-        return 1.0
-    return mean_pace(prepared)
-
-
-def _driven(prepared: InitialValueProblem) -> Driven | None:
-    scene, plan = prepared.scene, prepared.system.plan
-    alone = [load for load in plan.loads if gradient_source_of(load) is None]
+def _driven(prepared: InitialValueProblem, alone: Sequence[Load]) -> Driven | None:
     scaling = replace(prepared.system.scaling, rates=(0, 0, 0))
     try:
-        return driven_by(scene, scaling, alone, float(precision_of("double").epsilon))
+        return driven_by(prepared.scene, scaling, alone, float(precision_of("double").epsilon))
     except (ConfigError, Separatrix):
         return None
 

@@ -1,5 +1,4 @@
-"""References against which solutions are held, and their own errors: one policy for choices, certificates,
-and the bench.
+"""References against which solutions are held: one policy for choices, certificates, and the bench.
 
 A reference never shares the arithmetic of what it judges. It is the closed form with more digits, or an
 integration with more digits, or, where both would take too long, an equal in other variables. All solutions
@@ -8,44 +7,20 @@ difference from another as their errors per step are, but for scatter.
 """
 
 import math
-from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from enum import Enum
-
-import numpy as np
 
 from rigidsim.accuracy.motion import KnownMotion
 from rigidsim.accuracy.setting import Setting, epsilon
 from rigidsim.scene.arithmetic import working_bits
 from rigidsim.scene.choices import DEFAULT_FORMULATION, variables_named
 
-INCOMPARABLE = 0.5
-"""Difference (rad) past which all digits are gone."""
 LEAST_DIGITS = 50
 """Least digits of a multi-precision reference: 16 beyond quadruple precision."""
 _SPARE_DIGITS = 20  # of a reference for digits, beyond theirs
-_SECOND: dict[str | int, float] = {"quadruple": 1e-30, LEAST_DIGITS: 1e-44}
-"""Tolerances of the second best of a precision: a thousand epsilons or more, so that it is another solution;
-in extended and double precision "auto" without projected invariants is.
-"""
-_SAME_VARIABLES = 10.0
-"""Ratio of the common error of solutions in the same variables to their distance."""
-
-
-# With these no certificate of 200 random scenes was exceeded by the true error, and 199 of these runs were
-# certified as they asked (``experiments/accuracy_certificates.py``).
-TIMES, WIDE_TIMES = 4096, 129
-"""Largest number of times compared; the latter for a closed form, which takes milliseconds per sample."""
 _EXTENDED_STEPS, _WIDE_STEPS = 1e5, 1e5
 """Steps past which extended precision (a second) isn't the first choice, quadruple (a minute) isn't used."""
-SAFETY, PICKED_SAFETY, PEER_SAFETY = 1.25, 2.0, 5.0
-"""Factors on the largest difference: if all samples were compared; if only the fastest of each stretch, since
-errors along the motion are largest where it is fastest; if the reference is no better than the run.
-"""
-AS_BAD = 3.0
-"""Error of a reference no better than the run, over the difference."""
 _CLEARLY = 0.01  # error of a reference with many digits, over the accuracy or the run's errors per step
-_MUCH_BETTER = 1e-2  # ratio of errors per step to the run's below which a reference's own hardly matter
 
 
 def scatter_of(setting: Setting, steps: float) -> float:
@@ -78,9 +53,6 @@ class Reference:
         if self.kind is ReferenceKind.PEER:
             return f"against {self.setting.title}, which is independent but no more accurate"
         return f"against {self.setting.title}"
-
-
-# --- which references there are --------------------------------------------------------------------------
 
 
 def references(setting: Setting, motion: KnownMotion, accuracy: float) -> list[Reference]:
@@ -146,79 +118,3 @@ def _only_as_good(reference: Setting, setting: Setting, motion: KnownMotion, acc
 def exact_to(precision: str | int, method: str) -> Reference:
     """The closed form in a precision, or to so many digits."""
     return Reference(Setting(precision, method=method), ReferenceKind.CLOSED_FORM)
-
-
-def best_and_second(precision: str | int) -> tuple[Setting, Setting]:
-    """The best setting of a precision, and the second best, from which the error of the best is known."""
-    return Setting(precision, hold_invariants=True), Setting(precision, _SECOND.get(precision))
-
-
-def equals_of(best: Setting, there: Iterable[Setting]) -> list[Setting]:
-    """Solutions as good as a precision's best, or nearly so: in extended and double precision also those with
-    rotation-matrix states, which round other initial values and coefficients.
-    """
-    second = _SECOND.get(best.precision)
-    peers = (variables_named(best.formulation).checked_by,) if second is None else ()
-    return [
-        other
-        for other in there
-        if other != best
-        and (other.precision, other.method, other.tolerance) == (best.precision, best.method, second)
-        and other.formulation in (best.formulation, *peers)
-    ]
-
-
-# --- how wrong they are ----------------------------------------------------------------------------------
-
-
-def errors_of_best(best: Setting, distances: Mapping[Setting, np.ndarray]) -> np.ndarray:
-    """Errors (samples,), rad, of the best solution of a precision: its largest distance so far from equally
-    good ones.
-
-    Those in the same variables have begun with the same rounded values, and take the same steps until
-    invariants are first projected: such a distance alone was up to six times (13 once) too small.
-
-    They (at least one) aren't scaled by the errors per step, as in ``own_error``: a series keeps its
-    tolerance by orders of magnitude, so that rounding can dominate in both (near a separatrix, in quadruple
-    precision and at 1e-30, scaled errors were 70 times too small, held against 70 digits).
-    """
-    independent = best.precision in _SECOND or any(s.formulation != best.formulation for s in distances)
-    largest = np.max(list(distances.values()), axis=0) * (1.0 if independent else _SAME_VARIABLES)
-    return np.maximum(np.maximum.accumulate(largest), epsilon(best.precision))
-
-
-def closed_form_error(digits: int) -> float:
-    """Error of a closed form to so many digits, rad: two of them are left to rounding."""
-    return 10.0 ** (2 - digits)
-
-
-def own_error(
-    reference: Reference,
-    setting: Setting,
-    difference: float,
-    motion: KnownMotion,
-    distance: Callable[[Setting], float],
-) -> float:
-    """Bound of a reference's own error, rad. A pilot may not have seen how strongly the motion amplifies
-    errors; differences have, as the reference's largest distance from another setting's solution (inf without
-    one).
-    """
-    if reference.kind is ReferenceKind.CLOSED_FORM:
-        return 0.0  # dozens of digits more than the run
-    own = reference.setting
-    level = own.level * scatter_of(own, motion.steps)
-    estimate = math.inf
-    if setting.has_steps:
-        estimate = difference * min(AS_BAD, level / setting.level)
-        if own.bits <= setting.bits:  # rounded coefficients and initial values are the same in both
-            return max(estimate, motion.rounding(own.precision))
-        if level <= _MUCH_BETTER * setting.level:
-            return estimate
-    for precision in ("double", "extended"):
-        probe = Setting(precision)
-        if own.level > _MUCH_BETTER * probe.level:
-            break
-        found = distance(probe)
-        if found < INCOMPARABLE:
-            return min(estimate, max(found, probe.level) * level / probe.level)
-    return min(estimate, motion.error(level))

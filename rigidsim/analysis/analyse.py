@@ -64,13 +64,11 @@ def analyse_dataset(
         raise RigidsimError(f"given a window of order {order}; 1 to 20 are allowed")
     clock = clock_of(dataset)
     raws = [_raw(signal, clock, lines, floor, order) for signal in signals_of(dataset, variables)]
-    measured = {
-        raw.signal.name: [
-            (f, e, raw.factor * abs(complex(a)))
-            for f, e, a in zip(raw.frequencies, raw.errors, raw.found.sum.amplitudes, strict=True)
-        ]
-        for raw in raws
-    }
+    sizes = [[raw.factor * abs(complex(a)) for a in raw.found.sum.amplitudes] for raw in raws]
+    measured = [
+        list(zip(raw.frequencies, raw.errors, size, strict=True))
+        for raw, size in zip(raws, sizes, strict=True)
+    ]
     names = _with_precession(known, raws, clock)
     names = settled([k for k in names if float(k.value) != 0], measured)
     return Analysis(

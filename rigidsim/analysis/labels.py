@@ -6,7 +6,7 @@ nearly as simple.
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any
@@ -166,7 +166,7 @@ def _same(one: NDArray[np.int64], other: NDArray[np.int64], real: bool) -> bool:
     return bool(np.array_equal(one, other) or (real and np.array_equal(one, -other)))
 
 
-def settled(known: Sequence[Known], lines: Mapping[str, Sequence[tuple[Any, float, float]]]) -> list[Known]:
+def settled(known: Sequence[Known], signals: Sequence[Sequence[tuple[Any, float, float]]]) -> list[Known]:
     """Roughly known frequencies, replaced by the strongest line near them, or left out.
 
     Of each signal's lines are given frequency (rad/s), its error, and amplitude.
@@ -179,7 +179,7 @@ def settled(known: Sequence[Known], lines: Mapping[str, Sequence[tuple[Any, floa
             continue
         near = [
             (amplitude / largest, frequency, error)
-            for signal in lines.values()
+            for signal in signals
             if (largest := max((a for _, _, a in signal), default=0.0))
             for frequency, error, amplitude in signal
             if abs(abs(float(frequency)) - abs(value)) <= one.tolerance * abs(value)

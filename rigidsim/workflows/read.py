@@ -1,6 +1,9 @@
-"""Reading experiments once all kinds of loads and all observables are registered."""
+"""Reading experiments, those that a run's file embeds among them, once all kinds of loads and all observables
+are registered.
+"""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -8,10 +11,13 @@ import rigidsim.model.loads
 import rigidsim.model.partial_invariants
 import rigidsim.model.starts
 import rigidsim.solve.equilibria  # noqa: F401  (each enters what it defines into a registry of rigidsim.scene)
-from rigidsim.errors import ConfigError, Problem
+from rigidsim.errors import ConfigError, Problem, RunFolderError
 from rigidsim.scene.config import Experiment, load, parse
+from rigidsim.scene.registry import OBSERVABLES
 from rigidsim.scene.schema import config_model
 from rigidsim.scene.validation_messages import shown
+from rigidsim.store.netcdf import check_version, root_attributes
+from rigidsim.store.provenance import read_attributes
 
 __all__ = ["Experiment", "Given", "as_experiment", "config_model", "load", "parse"]
 
@@ -29,3 +35,38 @@ def as_experiment(given: Given, changes: Mapping[str, Any] | None = None) -> Exp
     if not isinstance(given, Experiment):
         return load(given, overrides=changes or {})
     return given.replace(changes) if changes else given
+
+
+def embedded(dataset: Path, *, overrides: Sequence[str] = ()) -> Experiment:
+    """The experiment that a dataset was made from, with the defaults that were in force when the run began;
+    ``overrides`` as in ``rigidsim.load``.
+    """
+    found = root_attributes(dataset)
+    check_version(found.get("schema_version"), dataset)
+    text, given, settings = (found.get(name) for name in ("config", "config_given", "config_set"))
+    if not (isinstance(text, str) and isinstance(given, str) and isinstance(settings, str)):
+        raise RunFolderError(f"{dataset}: embeds no config; it is no dataset of rigidsim")
+    experiment = parse(text, source=f"{dataset} (embedded config)", overrides=overrides)
+    return replace(experiment, given=given, settings=(*settings.splitlines(), *experiment.settings))
+
+
+def as_begun(experiment: Experiment, saved: Path) -> Experiment:
+    """The experiment with what its begun run records made explicit where the config leaves it open; the text
+    stays as it is.
+    """
+    output, recorded = experiment.config.output, read_attributes(saved).recorded
+    if output.record is not None or not recorded:
+        return experiment
+    known = {*OBSERVABLES, *(table.name for table in experiment.config.states)}
+    names = [name for name in recorded.split() if name in known]
+    config = experiment.config.model_copy(update={"output": output.model_copy(update={"record": names})})
+    return replace(experiment, config=config)
+
+
+def text_difference(one: str, other: str) -> str:
+    """The first line in which two texts differ, in words."""
+    first, second = one.splitlines(), other.splitlines()
+    for number, (a, b) in enumerate(zip(first, second, strict=False), start=1):
+        if a != b:
+            return f'line {number} is "{a.strip()[:60]}", it was "{b.strip()[:60]}"'
+    return f"{len(first)} lines, it had {len(second)}"

@@ -30,7 +30,7 @@ from rigidsim.store.seal import check_seal
 from rigidsim.store.segments import Chain, read_chain
 from rigidsim.store.summary import Summary
 from rigidsim.store.summary_parts import Caution, WarningCode
-from rigidsim.workflows.embedded import as_begun, embedded, text_difference
+from rigidsim.workflows.read import as_begun, embedded, text_difference
 from rigidsim.workflows.run import certified
 
 _ROWS_AT_ONCE = 65536

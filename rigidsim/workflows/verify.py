@@ -22,7 +22,7 @@ from rigidsim.store.run import Run, open_run
 from rigidsim.store.seal import check_seal
 from rigidsim.store.summary import Brief, Summary
 from rigidsim.store.summary_parts import Claim
-from rigidsim.workflows.embedded import as_begun, embedded, text_difference
+from rigidsim.workflows.read import as_begun, embedded, text_difference
 from rigidsim.workflows.run import run
 
 _ROWS_AT_ONCE = 65536
@@ -184,13 +184,23 @@ def _compare(saved: Path, again: Path) -> tuple[list[str], Difference | None, in
 def _first_difference(name: str, one: xarray.DataArray, other: xarray.DataArray) -> Difference | None:
     for first in range(0, one.shape[0] if one.ndim else 1, _ROWS_AT_ONCE):
         rows: Any = slice(first, first + _ROWS_AT_ONCE) if one.ndim else ()
-        a, b = (np.asarray(of[rows].values, dtype="<f8") for of in (one, other))
-        unequal = (a.view(np.int64) != b.view(np.int64)).reshape(max(len(a), 1) if a.ndim else 1, -1)
-        if unequal.any():
-            row, column = (int(i) for i in np.argwhere(unequal)[0])
-            x, y = a.reshape(len(unequal), -1)[row, column], b.reshape(len(unequal), -1)[row, column]
-            return Difference(name, first + row, float(x), float(y))
+        unequal = first_unequal(
+            *(np.atleast_1d(np.asarray(of[rows].values, dtype="<f8")) for of in (one, other))
+        )
+        if unequal is not None:
+            row, saved, again = unequal
+            return Difference(name, first + row, saved, again)
     return None
+
+
+def first_unequal(one: np.ndarray, other: np.ndarray) -> tuple[int, float, float] | None:
+    """The first row in which any bit of two arrays (rows, ...) of eight bytes differs, and both numbers."""
+    a, b = (np.ascontiguousarray(x).reshape(len(x), -1) for x in (one, other))
+    unequal = np.argwhere(a.view(np.int64) != b.view(np.int64))
+    if not len(unequal):
+        return None
+    row, column = unequal[0].tolist()
+    return row, float(a[row, column]), float(b[row, column])
 
 
 def _summary_problems(saved: Brief, again: Brief, folder: RunFolder) -> list[str]:

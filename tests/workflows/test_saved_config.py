@@ -9,7 +9,7 @@ from support import IMPATIENT, config, loaded
 
 import rigidsim
 from rigidsim import RunFolderError
-from rigidsim.workflows.embedded import embedded
+from rigidsim.workflows.read import embedded
 
 TEXT = config(time="end = 10 # long\nevery = 0.5", more="# the end", name="cut")
 SETTINGS = ["time.end=60", " integrator.tolerance=1.0000000000000000000000001e-15 "]

@@ -19,7 +19,7 @@ from support import CONFIGS, cases
 import rigidsim
 from rigidsim import RunFolderError
 from rigidsim.store import seal
-from rigidsim.workflows.embedded import embedded
+from rigidsim.workflows.read import embedded
 
 pytestmark = pytest.mark.optimised  # what is edited mustn't be zero
 

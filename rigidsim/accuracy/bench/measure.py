@@ -179,9 +179,6 @@ def _references(experiment: Experiment, tasks: Sequence[Task], deadline: float) 
     return found
 
 
-# --- attitudes -------------------------------------------------------------------------------------------
-
-
 def _explore(experiment: Experiment, plan: Plan, rows: list[Row], budget: float, deadline: float) -> None:
     """Fill in attitudes, drifts and counts."""
     tasks = []
@@ -204,9 +201,6 @@ def _explore(experiment: Experiment, plan: Plan, rows: list[Row], budget: float,
             f"tradeoff: the default setting ({DEFAULT.title}), which costs are relative to, could not be "
             f"measured: {rows[0].problem}"
         )
-
-
-# --- speeds ----------------------------------------------------------------------------------------------
 
 
 def _time(

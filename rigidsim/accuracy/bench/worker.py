@@ -63,9 +63,6 @@ class Answer:
     index: int = 0
 
 
-# --- in the process that measures ------------------------------------------------------------------------
-
-
 def _attitudes(experiment: Experiment, task: Task) -> Answer:
     """Integrate over the task's times."""
     started = time.process_time()
@@ -135,9 +132,6 @@ def work() -> None:
         except (OverflowError, ZeroDivisionError, ValueError) as error:
             found = Answer(problem=f"{type(error).__name__}: {error}")
         answers.send(found)
-
-
-# --- in the process that asks ----------------------------------------------------------------------------
 
 
 def ask(

@@ -9,7 +9,7 @@ from rigidsim.errors import RigidsimError
 from rigidsim.scene.scene import build_scene
 from rigidsim.session import progress
 from rigidsim.session.understood import cautions_about, cautions_of
-from rigidsim.workflows.read import load
+from rigidsim.workflows.read import embedded, load
 
 
 def run(
@@ -19,8 +19,6 @@ def run(
     """Read every config before any of them is run; the exit code is that of the first that didn't finish."""
     experiments = [load(path, overrides=overrides or []) for path in configs or []]
     if dataset is not None:
-        from rigidsim.workflows.embedded import embedded  # with the reader of datasets
-
         experiments.append(embedded(dataset, overrides=overrides or []))
     if scan and member is not None:
         raise RigidsimError("run: --member is one of a config's [sweep], --sweep makes another: give one")

@@ -14,7 +14,7 @@ from rigidsim.store import provenance
 from rigidsim.store.sweeps.run import SavedSweep, open_sweep
 from rigidsim.store.sweeps.tiles import Kept
 from rigidsim.workflows.sweeps.members import run_members, sweep_of
-from rigidsim.workflows.verify import Difference, Verdict
+from rigidsim.workflows.verify import Difference, Verdict, first_unequal
 
 MEMBERS = 100
 """Number of members that are run again by default."""
@@ -82,13 +82,9 @@ def _differences(
             continue
         there = _saved(dataset, name, sweep, members, held)
         there = there[(slice(None), *(slice(0, size) for size in here.shape[1:]))].astype(here.dtype)
-        rows = (len(members), -1)
-        one, other = (np.ascontiguousarray(x).view(np.int64).reshape(rows) for x in (there, here))
-        unequal = one != other
-        if unequal.any():
-            place, column = (int(i) for i in np.argwhere(unequal)[0])
-            mine, theirs = (float(x.reshape(rows)[place, column]) for x in (there, here))
-            found.append((name, place, mine, theirs))
+        unequal = first_unequal(there, here)
+        if unequal is not None:
+            found.append((name, *unequal))
     return found
 
 
