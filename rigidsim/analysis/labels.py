@@ -141,7 +141,8 @@ def label(
             n
             for n, c in zip(found, cost, strict=True)
             if n != best
-            and not _same(vectors[n], vectors[best], real)
+            and not np.array_equal(vectors[n], vectors[best])
+            and not (real and np.array_equal(vectors[n], -vectors[best]))
             and (c <= cost[0] + _RIVALS if turns[n] != turns[best] else c == cost[0] and not blended)
         ]
         others = tuple(named(vectors[n].tolist(), known) for n in rivals[:4])
@@ -160,10 +161,6 @@ def reversed_label(name: Label, known: Sequence[Known]) -> Label:
     """The label of a real line's mirror image."""
     multipliers = tuple(-m for m in name.multipliers)
     return Label(multipliers, named(multipliers, known), -name.folds, name.doubtful)
-
-
-def _same(one: NDArray[np.int64], other: NDArray[np.int64], real: bool) -> bool:
-    return bool(np.array_equal(one, other) or (real and np.array_equal(one, -other)))
 
 
 def settled(known: Sequence[Known], signals: Sequence[Sequence[tuple[Any, float, float]]]) -> list[Known]:

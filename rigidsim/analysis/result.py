@@ -68,15 +68,11 @@ class SignalAnalysis:
     """One signal: a secular part and lines, the largest first.
 
     Attributes:
-        value, value_error: secular part in the middle of the samples, and its error; None without one.
-        rate, rate_error: rate of the secular part per s, and its error; None without one.
-        order: order of the Hann window.
-        left: rms of the remainder.
-        level: lines below it aren't seen.
+        value, rate: secular part in the middle of the samples, and its rate per s; None without one.
+        order, spectrum: order of the Hann window; frequencies (rad/s) and sizes, for a picture.
+        left, level: rms of the remainder; amplitude below which lines aren't seen.
         close: frequencies (rad/s) where something is left that is too close to a line to be told apart.
         exhausted: whether there are more lines than were asked for.
-        notes: remarks that a reader needs.
-        spectrum: frequencies (rad/s) and sizes, for a picture.
     """
 
     name: str
@@ -99,13 +95,8 @@ class SignalAnalysis:
 
 @dataclass(frozen=True)
 class Analysis:
-    """All signals that were analysed.
-
-    Attributes:
-        known: frequencies that labels are made of, in the order of multipliers.
-        spacing, length, start: those of the samples, s.
-        attitude_error: attitude error of the run at its end, rad, if known.
-        title: title of the dataset.
+    """All signals that were analysed; start, spacing and length of the samples, s; the known frequencies, in
+    the order of multipliers; the run's attitude error at its end, rad, if known.
     """
 
     signals: tuple[SignalAnalysis, ...]

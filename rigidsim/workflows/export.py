@@ -33,27 +33,17 @@ def export(
     block_numbers: int = BLOCK_NUMBERS,
 ) -> list[Path]:
     """Write a run, finished or partial, or the members of a finished sweep in another format, block by block
-    so that memory stays small.
+    so that memory stays small; returns the files written, the table along time, or of the members, first.
 
     Args:
-        saved: from ``open_run`` or ``open_sweep``.
         file_format: one of ``rigidsim.formats.FORMATS``; csv, parquet or zarr of a sweep.
         out: the file (for zarr the folder); ``NAME.FORMAT`` in the working folder by default. In csv and
             parquet, events and Lyapunov estimates go to files of their own beside it, ``NAME.flip.csv``; of a
             sweep the file has a row per member, and whole series, occurrences of an event and spectral lines
             go to long tables beside it: ``NAME.time.csv``, ``NAME.flip_occurrence.csv``, ``NAME.line.csv``.
-        force: replace existing files.
         naming: epoch, axes and names that the run's config leaves open, for aem and oem; empty for sweeps.
-        angle_unit: unit of angles, one of ``rigidsim.scene.readable.ANGLE_UNITS``; rad by
-            default. For csv, parquet and zarr.
+        angle_unit: one of ``rigidsim.scene.readable.ANGLE_UNITS``; rad by default. For csv, parquet and zarr.
         block_numbers: numbers of a sweep held in memory at once; no digit depends on it.
-
-    Returns:
-        The files written; the table along time, or of the members, first.
-
-    Raises:
-        RigidsimError: unknown format or unit, a missing package, or data that the format can't hold.
-        RunFolderError: the run is damaged or empty, or the sweep isn't finished.
     """
     found = format_named(file_format)
     unit = None if angle_unit is None else angle_unit_named(angle_unit)

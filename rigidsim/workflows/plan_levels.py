@@ -49,15 +49,17 @@ def compared_levels(
     looked_at = {row.level: row for row in choice.considered} if choice else {}
     found = []
     for level in (*CHEAPEST_FIRST, FULL):
-        row: dict[str, Any] = {"level": level, "error_rad": None, "steps": None, "cpu_seconds": None}
-        row["modelling_seconds"] = None
+        unknown = dict.fromkeys(("error_rad", "steps", "cpu_seconds", "modelling_seconds"))
+        row: dict[str, Any] = {"level": level, **unknown}
         known = looked_at.get(level)
         try:
             prepared = prepare(experiment.having([f'model.level="{level}"']), loads=loads)
         except ConfigError as error:
             found.append(LevelCost(**row, why_not="; ".join(problem.what for problem in error.problems)))
             continue
-        row |= _cost(prepared)
+        pilot = timed_pilot(prepared, assemble(prepared).steps(), _PILOT_SECONDS)
+        steps = math.ceil(pilot.whole * (forecast_pace(prepared, pilot) or 1.0))
+        row |= {"steps": float(steps), "cpu_seconds": steps * pilot.seconds_per_step}
         if level == FULL:
             row["error_rad"] = 0.0
         elif known is not None:
@@ -81,10 +83,3 @@ def timed_pilot(prepared: InitialValueProblem, corrected: CorrectedStepper, seco
         chunk=1,
         largest_chunk=_LARGEST_CHUNK,
     )
-
-
-def _cost(prepared: InitialValueProblem) -> dict[str, float]:
-    """Steps and seconds of the whole integration."""
-    pilot = timed_pilot(prepared, assemble(prepared).steps(), _PILOT_SECONDS)
-    steps = math.ceil(pilot.whole * (forecast_pace(prepared, pilot) or 1.0))
-    return {"steps": float(steps), "cpu_seconds": steps * pilot.seconds_per_step}

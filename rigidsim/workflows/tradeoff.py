@@ -129,18 +129,13 @@ def with_models(dataset: xarray.Dataset, experiment: Experiment) -> xarray.Datas
     ]
     if not known:
         return dataset
-    told = {
-        "model_error": ("rad", "error of the momentum's and the figure axis' direction at the end",
-                        [error for _, error, _ in known]),
-        "model_cpu_ratio": ("1", "CPU time relative to the full model in the default setting",
-                            [ratio for _, _, ratio in known]),
-    }  # fmt: skip
-    found = {
-        name: ("model", np.array(values), {"units": units, "long_name": long_name})
-        for name, (units, long_name, values) in told.items()
-    }
-    names = np.array([level for level, _, _ in known], dtype=object)
-    return dataset.assign(found).assign_coords(model=("model", names, {"long_name": "averaged model"}))
+    levels, errors, ratios = (list(column) for column in zip(*known, strict=True))
+    what = "error of the momentum's and the figure axis' direction at the end"
+    relative = "CPU time relative to the full model in the default setting"
+    return dataset.assign(
+        model_error=("model", np.array(errors), {"units": "rad", "long_name": what}),
+        model_cpu_ratio=("model", np.array(ratios), {"units": "1", "long_name": relative}),
+    ).assign_coords(model=("model", np.array(levels, dtype=object), {"long_name": "averaged model"}))
 
 
 def save(dataset: xarray.Dataset, folder: Path) -> None:

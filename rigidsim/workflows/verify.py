@@ -184,9 +184,8 @@ def _compare(saved: Path, again: Path) -> tuple[list[str], Difference | None, in
 def _first_difference(name: str, one: xarray.DataArray, other: xarray.DataArray) -> Difference | None:
     for first in range(0, one.shape[0] if one.ndim else 1, _ROWS_AT_ONCE):
         rows: Any = slice(first, first + _ROWS_AT_ONCE) if one.ndim else ()
-        unequal = first_unequal(
-            *(np.atleast_1d(np.asarray(of[rows].values, dtype="<f8")) for of in (one, other))
-        )
+        a, b = (np.atleast_1d(np.asarray(of[rows].values, dtype="<f8")) for of in (one, other))
+        unequal = first_unequal(a, b)
         if unequal is not None:
             row, saved, again = unequal
             return Difference(name, first + row, saved, again)

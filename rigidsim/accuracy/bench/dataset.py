@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import groupby
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -195,10 +196,9 @@ def advice(dataset: xarray.Dataset) -> list[BestSetting]:
                 found.append((exponent, int(min(fit, key=lambda n: cost[n])), kind is RowStatus.SHORT))
                 break
     result: list[BestSetting] = []
-    for position, (exponent, n, less) in enumerate(found):
-        if position and found[position - 1][1] == n:
-            continue
-        last = min(later for later, other, _ in found if other == n)
+    for n, decades in groupby(found, key=lambda best: best[1]):
+        same = list(decades)
+        (exponent, _, less), (last, _, _) = same[0], same[-1]
         one = dataset.isel(setting=n)
         result.append(
             BestSetting(

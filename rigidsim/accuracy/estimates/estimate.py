@@ -67,13 +67,8 @@ def estimate_errors(
     uneven: float = math.inf,
     go_on: Callable[[], bool] = lambda: True,
 ) -> Estimate | None:
-    """Estimate the errors of a run.
-
-    Args:
-        waypoints: some of its step boundaries, where growth is examined besides the beginning.
-
-    Returns:
-        None if ``go_on`` ended it.
+    """Estimate the errors of a run, whose growth is examined at waypoints besides the beginning; None if
+    ``go_on`` ended it.
     """
     scene, system, epsilon = prepared.scene, prepared.system, float(prepared.precision.epsilon)
     if not prepared.has_steps:

@@ -8,6 +8,7 @@ to time. The run's average over the rotation and the orbits carries errors alike
 """
 
 import math
+from functools import partial
 
 import numpy as np
 
@@ -151,7 +152,7 @@ def _follow(course: Course, part: float, tolerance: float) -> tuple[Followed, bo
             soon += OWN_FIRST / steps
             going = go_to(soon)
         if going:
-            _prepare(ensemble, steps * (first - soon))
+            interruptible(partial(ensemble.prepare_for, steps * (first - soon)))
     on_course = _stay_on_course(course, ensemble, first)
     if on_course:
         go_to(first)
@@ -165,7 +166,7 @@ def _follow(course: Course, part: float, tolerance: float) -> tuple[Followed, bo
             whole = any(course.suspicious(s, waypoint.time, power) for s, waypoint in beginnings)
         for stage in (margins.STAGE / steps, 1.0) if whole else ():
             if first < stage <= 1 and not ensemble.all_lost(course.lost):
-                _prepare(ensemble, steps * (stage - first))
+                interruptible(partial(ensemble.prepare_for, steps * (stage - first)))
                 on_course = on_course and _stay_on_course(course, ensemble, stage)
                 if on_course:
                     go_to(stage)
@@ -197,10 +198,6 @@ def _stay_on_course(course: Course, ensemble: ShadowEnsemble, share: float) -> b
         if ensemble.away_from(waypoint.state) > margins.STRAYED + own_error:
             return False
     return True
-
-
-def _prepare(ensemble: ShadowEnsemble, steps: float) -> None:
-    interruptible(lambda: ensemble.prepare_for(steps))
 
 
 def _waypoints(course: Course, part: float) -> list[Waypoint]:

@@ -111,7 +111,7 @@ def run_members(
     if not done.why:
         done = batches_of(sweep.experiment.text).run(members, keep, apart)
     for place in done.left:
-        member = partial(_run_alone, sweep, members[place])
+        member = partial(lambda member: run(sweep.experiment_of(member), out=None), members[place])
         done.results.append(run_alone(member, keep, most, events, more, hidden))
         done.members.append(np.array([place]))
     whole = in_order(done.results, done.members)
@@ -140,10 +140,6 @@ def single_member(experiment: Experiment, member: int) -> Experiment:
         raise ConfigError(Problem("--member", what), experiment.source)
     name = f"{experiment.config.name}_{member}"
     return sweep.experiment_of(member).having([f'name="{name}"'])
-
-
-def _run_alone(sweep: Sweep, member: int) -> MemoryRun:
-    return run(sweep.experiment_of(member), out=None)
 
 
 def frequencies_of(result: MemoryRun) -> Kept:

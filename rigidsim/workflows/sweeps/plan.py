@@ -62,7 +62,11 @@ def check_sweep(sweep: Sweep, *, every: bool = True, each: Each = map) -> Initia
     given = _shares(sweep, each) if every else []  # others begin with them at once
     problems = _worked_out(sweep, _FEWER)
     if not problems:
-        refused, accepted = _refused_or_accepted(given)
+        refused, accepted = list[int](), 0
+        for refused, some in given:  # up to a share that tells of none
+            accepted += some
+            if refused or not some:
+                break
         if accepted < sweep.count and sweep.count > _ALL:
             problems = _worked_out(sweep, _OF_AN_AXIS)
         if refused and not problems:
@@ -101,16 +105,6 @@ def _shares(sweep: Sweep, each: Each) -> Iterable[Share]:
         return []
     edges = [*range(0, sweep.count, _AT_ONCE), sweep.count]
     return each(refused_of, [(sweep.experiment.text, *ends) for ends in itertools.pairwise(edges)])
-
-
-def _refused_or_accepted(shares: Iterable[Share]) -> Share:
-    """The first members that are refused, and how many are accepted, up to a share that tells of none."""
-    known = 0
-    for refused, accepted in shares:
-        known += accepted
-        if refused or not accepted:
-            return refused, known
-    return [], known
 
 
 def refused_of(share: tuple[str, int, int]) -> Share:
@@ -190,17 +184,12 @@ def tile_length(sweep: Sweep) -> int:
 def _member_seconds(sweep: Sweep, made: RunPlan) -> float:
     predicted = made.predicted
     seconds = predicted.integration_seconds + predicted.recording_seconds
-    if not _side_by_side(sweep):
+    if why_alone(sweep, sweep.table.keep) or batches_of(sweep.experiment.text).apart is not None:
         beside = predicted.choosing_seconds + predicted.modelling_seconds
         return seconds + max(predicted.building_seconds, _BUILD_SECONDS) + beside
     each = _ESTIMATED if sweep.base.config.output.estimate else 1.0
     # half of what lanes could gain
     return each * seconds / max(1.0, recommended_width() / 2) + _BATCH_SECONDS
-
-
-def _side_by_side(sweep: Sweep) -> bool:
-    """Whether members run in batches."""
-    return not why_alone(sweep, sweep.table.keep) and batches_of(sweep.experiment.text).apart is None
 
 
 def _length(sweep: Sweep, seconds: float, size: float) -> int:

@@ -147,7 +147,8 @@ def run_sweep(
             observer.nothing_left()
             return done
     with way.ready_for(wanted):
-        known = _known(wanted, folder)
+        # a sweep that was begun before had all its members checked
+        known = any(g.config_sha256 == wanted.experiment.sha256 for g in folder.generations()[-1:])
         check_sweep(wanted, every=not known, each=way.each)
         length = None if known else tile_length(wanted)
         with folder.locked(shared=share is not None):
@@ -178,11 +179,6 @@ def _complete(wanted: Sweep, folder: SweepFolder) -> bool:
         and summary.get("config_sha256") == wanted.experiment.sha256
         and folder.dataset.exists()
     )
-
-
-def _known(wanted: Sweep, folder: SweepFolder) -> bool:
-    """Whether the sweep was begun before, which implies that all its members were checked."""
-    return any(g.config_sha256 == wanted.experiment.sha256 for g in folder.generations()[-1:])
 
 
 def _refuse_other(wanted: Sweep, folder: SweepFolder) -> None:
