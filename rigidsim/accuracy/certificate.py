@@ -24,7 +24,7 @@ from rigidsim.accuracy.comparison import (
 from rigidsim.accuracy.motion import KnownMotion, motion_of
 from rigidsim.accuracy.reference import Reference, ReferenceKind, references, scatter_of
 from rigidsim.accuracy.setting import Setting, setting_of
-from rigidsim.accuracy.trial import Told, Trial, Trials, try_setting
+from rigidsim.accuracy.trial import Told, Trials, try_setting
 from rigidsim.model.load import Load
 from rigidsim.scene.config import Experiment
 
@@ -108,21 +108,18 @@ class _Compared:
         everything = np.unique(np.concatenate(list(self._rows.values())))
         self._place = {row: n for n, row in enumerate(everything)}
         self._times = exact_times(dataset, everything)
-        if "quaternion" in dataset:
-            self._parts = parts_of(dataset, "quaternion", everything)
-        else:
-            self._parts = self._again(trials).attitudes
-        self._places: list[np.ndarray] | None = None
-        if trials.experiment.config.integrator.accuracy_position is not None:
-            if "position" in dataset:
-                self._places = parts_of(dataset, "position", everything)
-            else:
-                self._places = self._again(trials).places
-        self.largest = self.own = math.inf
+        experiment, loads = trials.experiment, trials.loads
 
-    def _again(self, trials: Trials) -> Trial:
-        """The run once more, for what it didn't record."""
-        return try_setting(trials.experiment, self.setting, self._times, loads=trials.loads, repeating=True)
+        def recorded(name: str) -> list[np.ndarray]:
+            if name in dataset:
+                return parts_of(dataset, name, everything)
+            again = try_setting(experiment, self.setting, self._times, loads=loads, repeating=True)
+            return again.attitudes if name == "quaternion" else again.places
+
+        self._parts = recorded("quaternion")
+        of_path = experiment.config.integrator.accuracy_position is not None
+        self._places = recorded("position") if of_path else None
+        self.largest = self.own = math.inf
 
     def against(self, reference: Reference) -> Certificate | None:
         """The certificate that a reference gives; None if it is impossible."""

@@ -10,7 +10,7 @@ fetches, while this one keeps checking whether there are workers.
 
 import time
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future
 from concurrent.futures import wait as wait_for
 from threading import Thread
@@ -35,6 +35,7 @@ class Cluster(Way):
 
     def __init__(self, address: str, patience: float = 20.0, alone: float = 120.0) -> None:
         self._address, self._patience, self._alone = address, patience, alone
+        self._without_since: float | None = None
 
     def images(self, generation: Generation, tiles: Sequence[int]) -> Iterator[tuple[int, bytes]]:
         """See ``Way``; StoppedError if workers die repeatedly at the same tile, or the scheduler is gone."""
@@ -60,11 +61,11 @@ class Cluster(Way):
     def _stream(
         self, distributed: Any, client: Any, generation: Generation, waiting: list[int]
     ) -> Iterator[tuple[int, bytes]]:
-        workers = _ClusterWorkers(client, self._address, self._alone)
+        self._without_since = None
         deaths: Counter[int] = Counter()
         running: dict[Any, int] = {}
         while waiting or running:
-            ahead = _AHEAD * max(1, workers.threads())
+            ahead = _AHEAD * max(1, self._threads(client))
             while waiting and len(running) < ahead:
                 tile = waiting.pop()
                 future = client.submit(tile_image, *task(generation, tile), pure=False, retries=2)
@@ -74,7 +75,7 @@ class Cluster(Way):
                 continue
             future, tile = done, running.pop(done)
             try:
-                image = _fetched(future, workers)
+                image = _fetched(future, lambda: self._threads(client))
             except distributed.KilledWorker:
                 deaths[tile] += 1
                 if deaths[tile] >= _MOST_DEATHS:
@@ -90,32 +91,20 @@ class Cluster(Way):
                 continue
             yield tile, image
 
-
-class _ClusterWorkers:
-    """Workers of a scheduler, which may be none for ``alone`` seconds."""
-
-    def __init__(self, client: Any, address: str, alone: float) -> None:
-        self._client, self._address, self._alone = client, address, alone
-        self._since: float | None = None
-
-    def threads(self) -> int:
-        """Total number of their threads; StoppedError if there has been no worker for too long."""
-        threads = sum(self._client.nthreads().values())
-        if threads:
-            self._since = None
-            return threads
+    def _threads(self, client: Any) -> int:
+        """Total number of workers' threads; StoppedError if there has been no worker for too long."""
+        threads = sum(client.nthreads().values())
         now = time.monotonic()
-        if self._since is None:
-            self._since = now
-        if now - self._since > self._alone:
+        self._without_since = None if threads else self._without_since or now
+        if self._without_since is not None and now - self._without_since > self._alone:
             raise StoppedError(
                 f"--scheduler {self._address}: no worker is left there; start some with: dask worker "
                 f"{self._address}, and give the command again; the tiles that are complete are kept"
             )
-        return 0
+        return int(threads)
 
 
-def _fetched(future: Any, workers: _ClusterWorkers) -> bytes:
+def _fetched(future: Any, look: Callable[[], object]) -> bytes:
     """Bytes of a finished tile; if its worker is gone, the tile is computed again first."""
     fetched: Future[bytes] = Future()
 
@@ -127,7 +116,7 @@ def _fetched(future: Any, workers: _ClusterWorkers) -> bytes:
 
     Thread(target=fetch, name="rigidsim fetch", daemon=True).start()  # ends with the client at the latest
     while not wait_for([fetched], timeout=_LOOK_SECONDS).done:
-        workers.threads()
+        look()
     return fetched.result()
 
 
