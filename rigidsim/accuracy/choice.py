@@ -223,10 +223,8 @@ def choose_level(
     experiment: Experiment, *, loads: Sequence[Load] = (), without: Sequence[str] = ()
 ) -> LevelChoice | None:
     """Choose the model for the requested accuracy of axes, each level measured over the beginning of the
-    span; None if the level is given. Raises ``ConfigError`` if no accuracy is asked for.
-
-    Recording something that no average provides, such as a quaternion, leaves the full model, whose attitude
-    is then held to the same accuracy.
+    span; None if the level is given. Raises ``ConfigError`` if no accuracy is asked for. What no average
+    provides, such as a quaternion, leaves the full model, whose attitude is held to the same accuracy.
     """
     config = experiment.config
     if config.model.level != AUTO:

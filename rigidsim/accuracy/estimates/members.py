@@ -1,12 +1,10 @@
-"""Errors of a batch's members until their ends, from a shadow ensemble of their motions.
+"""Errors of a batch's members until their ends, from a shadow ensemble of their motions, with the
+perturbations and margins of single runs.
 
-As for a single run (``rigidsim.accuracy.estimates.estimate``), with the same perturbations and margins. Each
-member is followed over all of its motion, at a loose tolerance; where errors grow so much that a motion so
-followed becomes another one, once more at the run's own.
-
-Where the tolerance lets steps be wrong by more than rounding does, members are simply run again at a
-tighter one and compared at their samples. That costs no more than an ensemble would, and is no question of
-chance.
+Each member is followed over all of its motion, at a loose tolerance; where errors grow so much that a motion
+so followed becomes another one, once more at the run's own. Where the tolerance lets steps be wrong by more
+than rounding does, members are run again at a tighter one and compared at their samples, which costs no more
+than an ensemble would, and is no question of chance.
 """
 
 import math

@@ -1,11 +1,9 @@
 """Tiles computed by the workers of a Dask cluster; their files come back here and are saved here.
 
-The workers need rigidsim and nothing of this machine's disk. Only a few tiles for each of their threads are
-out at any time, so that neither the scheduler nor this process ever holds many.
-
-A finished tile stays on the worker that computed it until it is fetched. If that worker dies first, the
-tile is computed again, and whoever fetches it waits meanwhile, for ever if no worker is left. So a thread
-fetches, while this one keeps checking whether there are workers.
+The workers need rigidsim and nothing of this machine's disk. A few tiles for each of their threads are out at
+any time, so that nobody ever holds many. A finished one stays on its worker until it is fetched; if that dies
+first, the tile is computed again, and whoever fetches it waits meanwhile, for ever if no worker is left: so a
+thread fetches, while this one keeps checking whether there are workers.
 """
 
 import time
