@@ -34,7 +34,7 @@ from rigidsim.model.load_estimate import estimate_drive, orbit_tags, probe, star
 from rigidsim.model.loads.uniform_gravity import UniformGravity
 from rigidsim.model.observables.observable import NEEDS
 from rigidsim.model.orbits.prescribed import places_of
-from rigidsim.model.own_states import first_units, sizes_along, units_along
+from rigidsim.model.own_states import first_units, refuse_odd_states, sizes_along, units_along
 from rigidsim.model.scaling import Scaling, amplitude_of, choose_scaling, scaled_numbers
 from rigidsim.model.state_blocks import BODY
 from rigidsim.scene.choices import AUTO, variables_named
@@ -79,6 +79,7 @@ def plan_model(
         scaling = choose_scaling(scene, like.scaling.drive)
     elif scaling is None:
         unknown = [x for x in loads if formulation.resolves_rotation and amplitude_of(x, scene) is None]
+        refuse_odd_states(scene)
         refuse_odd_loads(scene, requirements, unknown)
         scaling = choose_scaling(scene, estimate_drive(scene, unknown, requirements))
     if not formulation.carries_rates:

@@ -19,11 +19,12 @@ from rigidsim.model.kinematics import Kinematics
 from rigidsim.model.names import in_si, written
 from rigidsim.model.scaling import exponent
 from rigidsim.model.state_blocks import StateBlock
-from rigidsim.scene.expressions.names import NameProvider, Readable, provides
-from rigidsim.scene.expressions.tree import evaluate
+from rigidsim.scene.expressions.names import BODY_NAMES, NameProvider, Readable, provides
+from rigidsim.scene.expressions.tree import evaluate, names_used
 from rigidsim.scene.initial_values import start_values
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.schema import Config
+from rigidsim.scene.surfaces import changes, random_states
 from rigidsim.scene.transitions import narrow_parts, root_parts
 
 _MARGIN = 1.0625
@@ -80,6 +81,25 @@ def refuse_taken_names(scene: Scene, blocks: Iterable[StateBlock]) -> None:
         if names.count(table.name) > 1:
             what = f'given "{table.name}", which another state of the motion is called already; rename it'
             raise ConfigError(Problem(f"[[states]] number {number} name", what))
+
+
+def refuse_odd_states(scene: Scene) -> None:
+    """Refuse a derivative that differs between q and -q, as loads that do are refused.
+
+    Raises:
+        ConfigError: says what to write instead.
+    """
+    opposite = {name: lambda x: -x for name, readable in BODY_NAMES.items() if readable.changes_sign}
+    reading = [state for state in scene.states if names_used(state.derivative) & set(opposite)]
+    states = random_states(scene) if reading else []
+    for state in reading:
+        if changes(state.derivative, states, opposite, scene.context):
+            what = (
+                "changes with the sign of the quaternion, while q and -q are the same attitude; use products "
+            )
+            raise ConfigError(
+                Problem(state.where, what + "such as qw*qx, or say where it jumps: sign(qw)*qx")
+            )
 
 
 def narrow_arguments(m: Kinematics) -> list[tuple[str, Any]]:

@@ -270,6 +270,7 @@ BAD = {
     "derivative's dimension": (state("a", "wz", 0, "m"), 'in "1/s", where "m/s" is needed'),
     "initial value's dimension": (state("a", "wz", "3 s", "rad"), 'in "s", where "rad", the unit of a'),
     "no value at the start": (state("a", "1/a"), "no finite value at the start"),
+    "the quaternion's sign": (state("a", "qx"), "changes with the sign of the quaternion"),
     "unknown name": (state("a", "b"), 'unknown name "b".*a, pi, e; x, y, z, vx'),
 }
 
