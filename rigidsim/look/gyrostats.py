@@ -69,7 +69,9 @@ def rotors(dataset: xarray.Dataset) -> list[RecordedRotor]:
 
 
 def tensor(dataset: xarray.Dataset) -> Array | None:
-    """The body's tensor (3, 3), rotors locked, body axes, kg m^2."""
+    """The body's tensor (3, 3), rotors locked, body axes, kg m^2; None if it changes, or isn't known."""
+    if "principal_moments" in dataset:
+        return None
     found, moments = signals.attribute(dataset, "inertia_tensor"), signals.moments(dataset)
     if found is not None and found.shape == (3, 3):
         return found

@@ -244,3 +244,26 @@ def test_a_body_with_rotors_has_neither_polhode_surfaces_nor_poinsots_constructi
     at_rest = still.replace("rate = 2", "rate = 0").replace('name = "free"', 'name = "free"\nfixed = true')
     dataset = rigidsim.run(rigidsim.parse(at_rest), out=None).dataset.load()
     assert [stage.root for stage in build_picture(dataset)[0].stages] == ["scene", "poinsot"]
+
+
+def test_a_flight_has_its_rotors_where_the_body_is_to_scale(two: xarray.Dataset) -> None:
+    time = two["time"].values
+    moving = two.assign(position=(("time", "space_axis"), np.stack([9 * time, 0 * time, -time], axis=1)))
+    stages = build_picture(moving)[0].stages
+    assert [set(stage.frames) for stage in stages] == [{"body/rotor_free", "body/rotor_kept"}, set()]
+    solids = [solid for solid in stages[0].solids if solid.name == "disc"]
+    reach = max(float(mesh.vertices.max()) for mesh in stages[0].meshes)
+    for solid, axis in zip(solids, ([1, 0, 1], [0, 1, 0]), strict=True):
+        middle = solid.mesh.vertices.mean(axis=0)
+        np.testing.assert_allclose(np.cross(middle, axis), 0, atol=1e-2)  # on its axis
+        assert middle @ axis > 0.5 * reach  # and outside
+
+
+def test_of_moments_that_vary_no_sphere_is_drawn() -> None:
+    text = DRIVEN.replace("[50, 90, 110]", '[50, 90, "110 - 10*sin(t/10)"]')
+    dataset = rigidsim.run(rigidsim.parse(text), out=None).dataset.load()
+    assert "momentum_sphere" not in figures.available(dataset)
+    assert "body_momentum" not in {arrow.name for arrow in build_picture(dataset)[0].stages[0].arrows}
+    assert "Rates of the rotors, relative to the body" in [
+        axes.get_title("left") for axes in figures.figure(dataset).axes
+    ]

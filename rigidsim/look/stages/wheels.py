@@ -46,9 +46,10 @@ class _Disc:
 def with_wheels(dataset: xarray.Dataset, subject: Subject, picture: Picture) -> Picture:
     """The picture with the dataset's rotors on its body, if it has some and the body is drawn to scale."""
     found = gyrostats.rotors(dataset)
-    stage = picture.stages[0]
-    if not found or stage.unit != subject.reach or not stage.meshes:
+    to_scale = [stage for stage in picture.stages if stage.unit == subject.reach and stage.meshes]
+    if not found or not to_scale:
         return picture
+    stage = to_scale[0]
     frames, solids, spots, lines, notes = {}, [], [], [], []
     for disc in _placed(dataset, subject, found):
         rotor, name = disc.rotor, f"rotor_{disc.rotor.name}"
@@ -76,9 +77,8 @@ def with_wheels(dataset: xarray.Dataset, subject: Subject, picture: Picture) -> 
     vary = any(rotor.varies for rotor in found)
     first, *rest = picture.leading or ("",)
     leading = (first, _LEADING, *rest) if vary else picture.leading
-    return replace(
-        picture, stages=[changed, *picture.stages[1:]], leading=leading, notes=[*picture.notes, *notes, *told]
-    )
+    stages = [changed if one is stage else one for one in picture.stages]
+    return replace(picture, stages=stages, leading=leading, notes=[*picture.notes, *notes, *told])
 
 
 def slowing(dataset: xarray.Dataset, rotor: RecordedRotor) -> float:
