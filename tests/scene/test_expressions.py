@@ -91,6 +91,12 @@ def test_precedence_and_associativity(text: str, expected: Fraction | int) -> No
     assert exact(text) == expected
 
 
+def test_several_lines_are_one() -> None:
+    found = parse_expression("\n  2*\r\n\t(1\n + 3)\n", NAMES)
+    assert evaluate(found, {}, CONTEXT) == 8
+    assert found.text == "2* (1 + 3)"
+
+
 def test_decimals_and_parameters_stay_exact() -> None:
     assert exact("0.1 + 0.2") == Fraction(3, 10)
     assert exact("1/3 + 1/6 - k") == Fraction(1, 4)

@@ -97,7 +97,7 @@ def parse_expression(
     """Parse an expression.
 
     Args:
-        text: one line of at most ``LONGEST_TEXT`` characters (which bounds the tree as well).
+        text: of at most ``LONGEST_TEXT`` characters (which bounds the tree as well); several lines are joined.
         names: those of time and the state that are allowed here; ``Names`` say what would bring others.
         parameters: named constants, which enter as exact numbers.
         jumps: whether piecewise constant functions are allowed.
@@ -116,6 +116,8 @@ def parse_expression(
             )
     if len(text) > LONGEST_TEXT:
         raise ExpressionError(f"an expression of {len(text)} characters; at most {LONGEST_TEXT} are allowed")
+    if "\n" in text:  # columns and what is shown are those of one line
+        text = " ".join(text.split())
     if not text.strip(" \t"):
         raise ExpressionError("an empty expression; write a number or a formula such as k*sin(t)^2")
     whole = _Parser(text, names, parameters, jumps).all()

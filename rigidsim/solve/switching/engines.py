@@ -48,6 +48,7 @@ class SwitchedEngines(TaylorStepper):
         surfaces = system.plan.surfaces
         self._modes = [1] * len(surfaces.found)
         self._fresh, self._count, self._since = False, 0, 0.0
+        hy.set_logger_level_error()  # it warns, on stdout, of roots that it loses; they are looked for here
         super().__init__(system, precision, tolerance, start, log)
         probe = self._probe
         pars = self._pars([0.0] * probe.angles, 1.0)
