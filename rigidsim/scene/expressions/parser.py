@@ -97,7 +97,7 @@ def parse_expression(
     """Parse an expression.
 
     Args:
-        text: of at most ``LONGEST_TEXT`` characters (which bounds the tree as well); several lines are joined.
+        text: of at most ``LONGEST_TEXT`` characters (which bounds the tree as well); lines are joined.
         names: those of time and the state that are allowed here; ``Names`` say what would bring others.
         parameters: named constants, which enter as exact numbers.
         jumps: whether piecewise constant functions are allowed.
