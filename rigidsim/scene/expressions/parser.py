@@ -111,13 +111,11 @@ def parse_expression(
     parameters = parameters or {}
     for name in parameters:
         if name in names or name in RESERVED:
-            raise ExpressionError(
-                f'the parameter "{name}" has the name of a variable, a function or a constant; rename it'
-            )
+            what = f'the parameter "{name}" has the name of a variable, a function or a constant; rename it'
+            raise ExpressionError(what)
     if len(text) > LONGEST_TEXT:
         raise ExpressionError(f"an expression of {len(text)} characters; at most {LONGEST_TEXT} are allowed")
-    if "\n" in text:  # columns and what is shown are those of one line
-        text = " ".join(text.split())
+    text = " ".join(text.split()) if "\n" in text else text  # columns are those of one line
     if not text.strip(" \t"):
         raise ExpressionError("an empty expression; write a number or a formula such as k*sin(t)^2")
     whole = _Parser(text, names, parameters, jumps).all()
