@@ -218,7 +218,7 @@ def test_errors_say_what_is_wrong_and_where(text: str, column: int | None, messa
         ("t; wx", 2),
         ("t # comment", 3),
         ("t if wx else 1", 3),
-        ("t\nwx", 2),
+        ("t\nwx", 3),
         ("t\0", 2),
         ("\ufefft", 1),
         ("wх", 2),  # a Cyrillic letter
