@@ -205,6 +205,43 @@ def test_a_pointing_law_with_an_integral_and_a_limit_follows_its_pieces() -> Non
     assert_same_motion(loaded(run), saturated(times), ["sum_x", "sum_y", "sum_z"], 1e-13)
 
 
+NADIR = """[parameters]
+k = 16
+d = 16
+i = 4
+bias = 0.125
+"""
+NADIR += state("sum_x", "uy_earth") + state("sum_y", "ux_earth")
+GRADIENT = (
+    'kind = "gravity_gradient"\nname = "earth"\ngravitational_parameter = 1\norbit = {semi_major_axis = 1}'
+)
+STEERED = 'kind = "torque"\ncomponents = ["-k*uy_earth - i*sum_x - d*wx + bias", '
+STEERED += '"k*ux_earth + i*sum_y - d*(wy - 1)", "-2*k*(qx*qz - qw*qy) - d*wz"]'
+
+
+def test_nadir_is_pointed_at_with_an_integral_against_a_bias() -> None:
+    """On a circle with a rate of 1 rad/s in the plane of X and Y: the body turns its z to the source, and
+    its y along the normal."""
+    motion = Motion("sx", "sy")
+    m, (x, y, z) = motion.matrix, motion.rates
+    towards = [hy.cos(hy.time), hy.sin(hy.time), hy.expression(0.0)]
+    u = [sum(m[i][k] * towards[i] for i in range(3)) for k in range(3)]
+    a, b, c = MOMENTS
+    gradient = [3.0 * (c - b) * u[1] * u[2], 3.0 * (a - c) * u[2] * u[0], 3.0 * (b - a) * u[0] * u[1]]
+    law = [
+        -16.0 * u[1] - 4.0 * motion.more["sx"] - 16.0 * x + 0.125,
+        16.0 * u[0] + 4.0 * motion.more["sy"] - 16.0 * (y - 1.0),
+        -16.0 * m[2][0] - 16.0 * z,
+    ]
+    torque = [g + t for g, t in zip(gradient, law, strict=True)]
+    times = np.linspace(0, 60, 31)
+    rows = followed(motion.equations(torque, sx=u[1], sy=u[0]), motion.start(0, 0), times)
+    data = loaded(run_text(config(loads=[GRADIENT, STEERED], more=NADIR, time="end = 60\nsamples = 31")))
+    assert_same_motion(data, rows, ["sum_x", "sum_y"], 1e-13)
+    turned = rows[-1, 3:12].astype(float).reshape(3, 3)
+    assert turned[:, 2] @ [np.cos(60), np.sin(60), 0] > 1 - 1e-6
+
+
 @pytest.mark.optimised  # as in the process that is killed
 def test_a_killed_run_with_states_and_surfaces_resumes_bit_for_bit(tmp_path: Path) -> None:
     one = f'kind = "torque"\ncomponents = ["{LAW.format("x")}", "-d*wy", "-d*wz"]'
