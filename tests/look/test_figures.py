@@ -170,6 +170,18 @@ def test_recorded_polar_motion_is_drawn_as_it_is() -> None:
     np.testing.assert_allclose(line.get_ydata(), np.linspace(0, 5, 1001))
 
 
+def test_the_page_of_a_spin_tells_what_changes_beside_it() -> None:
+    dataset = earth()
+    growing = np.linspace(1, 2, 1001)[:, None] * np.array([8.01e37, 8.01e37, 8.04e37])
+    varying = dataset.assign(principal_moments=(("time", "body_axis"), growing, {"units": "kg m2"}))
+    page = figures.figure(varying)
+    assert titles(page)[:2] == ["Angular velocity, body axes", "Principal moments of inertia"]
+    np.testing.assert_array_equal(page.axes[1].get_lines()[2].get_ydata(), growing[:, 2])
+    marked = {"units": "rad", "given_by": "[[states]]"}
+    own = dataset.assign(slosh=("time", np.linspace(0, 0.1, 1001), marked))
+    assert titles(figures.figure(own))[:2] == ["Angular velocity, body axes", "Own state slosh"]
+
+
 def test_obliquity_and_longitude_have_axes_of_their_own_and_say_what_was_taken_off() -> None:
     dataset = precessing()
     page = figures.figure(dataset, "obliquity")

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 
 from rigidsim.look import signals
 from rigidsim.look.figure_names import FIGURES, OVERVIEW, SPECTRUM
-from rigidsim.look.figures import gyrostat, poles, polhode, timelines
+from rigidsim.look.figures import changing, gyrostat, poles, polhode, timelines
 from rigidsim.look.figures.composing import compose, shown_rows
 from rigidsim.look.figures.drift import drift
 from rigidsim.look.figures.panel import Panel
@@ -66,9 +66,9 @@ KINDS: dict[str, Kind] = {
     "rotors": Kind("rotors whose rates were recorded", [gyrostat.tilts, gyrostat.rotor_rates]),
     "herpolhode": Kind("an attitude and a momentum that stays put", (), [polhode.herpolhode]),
     "path": Kind("position recorded", (), [poles.path]),
-    "rates": Kind(_TURNS, [timelines.rates]),
+    "rates": Kind(_TURNS, [timelines.rates, changing.moments]),
     "attitude": Kind(_ATTITUDE, [timelines.attitude, timelines.wobble]),
-    "states": Kind("states of one's own ([[states]]) recorded", timelines.OWN_STATES),
+    "states": Kind("states of one's own ([[states]]) recorded", changing.OWN_STATES),
     "drift": Kind("invariants", [drift]),
 }
 
@@ -136,7 +136,7 @@ def _leading(rows: xarray.Dataset) -> tuple[Sequence[Panel], Sequence[Panel]]:
     found = gyrostat.leading(rows, timelines.rates)
     curves, planes = found or _of_body(rows)
     wheels = [] if found else [gyrostat.rotor_rates]
-    return [*curves, *wheels, *timelines.OWN_STATES], planes
+    return [*curves, *wheels, *changing.OWN_STATES], planes
 
 
 def _of_body(rows: xarray.Dataset) -> tuple[Sequence[Panel], Sequence[Panel]]:
@@ -148,6 +148,10 @@ def _of_body(rows: xarray.Dataset) -> tuple[Sequence[Panel], Sequence[Panel]]:
     if signals.is_top(rows):
         turning = timelines.precession if timelines.precession.shows(rows) else timelines.attitude
         return [timelines.tilt, turning], [poles.tip]
+    if signals.near_axis(rows) and changing.moments.shows(rows):
+        return [timelines.rates, changing.moments, timelines.wobble], [*moving, poles.polar_motion]
+    if signals.near_axis(rows) and changing.OWN_STATES[0].shows(rows):
+        return [timelines.wobble, timelines.rates], [*moving, poles.polar_motion]
     if signals.near_axis(rows):
         if poles.precesses(rows) and not moving:
             return tilting, [poles.nutation, poles.pole_path]
