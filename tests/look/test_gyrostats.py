@@ -246,6 +246,13 @@ def test_a_body_with_rotors_has_neither_polhode_surfaces_nor_poinsots_constructi
     assert [stage.root for stage in build_picture(dataset)[0].stages] == ["scene", "poinsot"]
 
 
+def test_rotors_that_are_drawn_slower_share_a_factor() -> None:
+    text = TWO_ROTORS.replace("fixed = true", "").replace("rate = 2", "rate = 40")
+    dataset = rigidsim.run(rigidsim.parse(text), out=None).dataset.load()
+    words = [line.words for line in build_picture(dataset)[0].stages[0].lines if line.words]
+    assert words == [f"rotor {name}, drawn turning 50 times slower" for name in ("free", "kept")]
+
+
 def test_a_flight_has_its_rotors_where_the_body_is_to_scale(two: xarray.Dataset) -> None:
     time = two["time"].values
     moving = two.assign(position=(("time", "space_axis"), np.stack([9 * time, 0 * time, -time], axis=1)))

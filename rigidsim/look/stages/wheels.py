@@ -3,7 +3,8 @@
 A disc is drawn where its axis leaves the body, so that it is seen. Its radius is as of a disc of the body's
 density: moments of inertia go with the fifth power of size. It turns by the integral of its rate relative to
 the body; if that were too fast for a screen it would seem to stand or to go backwards, and is drawn slower by
-one factor for the whole run, which the legend tells: a wheel that spins up is seen to spin up.
+one factor for all such rotors and the whole run, which the legend tells: a wheel that spins up is seen to do
+so, and which of several is the fastest.
 """
 
 from dataclasses import dataclass, replace
@@ -51,9 +52,10 @@ def with_wheels(dataset: xarray.Dataset, subject: Subject, picture: Picture) -> 
         return picture
     stage = to_scale[0]
     frames, solids, spots, lines, notes = {}, [], [], [], []
-    for disc in _placed(dataset, subject, found):
+    slowed = [_slowing(dataset, rotor) for rotor in found]
+    for disc, needed in zip(_placed(dataset, subject, found), slowed, strict=True):
         rotor, name = disc.rotor, f"rotor_{disc.rotor.name}"
-        slower = slowing(dataset, rotor)
+        slower = max(slowed) if needed > 1 else 1.0
         frames[f"{BODY}/{name}"] = parts.viewer_quaternion(_turning(dataset, rotor, slower))
         solids.append(Solid("disc", _mesh(disc), f"{BODY}/{name}"))
         beside = disc.middle * rotor.axis + 1.2 * disc.radius * signals.across(rotor.axis)[0]
@@ -81,8 +83,8 @@ def with_wheels(dataset: xarray.Dataset, subject: Subject, picture: Picture) -> 
     return replace(picture, stages=stages, leading=leading, notes=[*picture.notes, *notes, *told])
 
 
-def slowing(dataset: xarray.Dataset, rotor: RecordedRotor) -> float:
-    """How many times slower than it is a rotor is drawn: 1, or 2, 5, 10, 20, 50 and so on."""
+def _slowing(dataset: xarray.Dataset, rotor: RecordedRotor) -> float:
+    """How many times slower than it is a rotor has to be drawn: 1, or 2, 5, 10, 20, 50 and so on."""
     seconds = signals.seconds(dataset)
     if len(seconds) < 2:
         return 1.0
