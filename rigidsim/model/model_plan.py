@@ -15,7 +15,7 @@ import numpy as np
 from rigidsim.errors import ConfigError, Problem
 from rigidsim.model.assembly import assemble_states
 from rigidsim.model.averaged.average import Average
-from rigidsim.model.capabilities import GradientAlone, Reacting, table_of
+from rigidsim.model.capabilities import GradientAlone, Reacting, is_wide, table_of
 from rigidsim.model.carriers import Carrier
 from rigidsim.model.formulations.averaged import Averaged
 from rigidsim.model.formulations.formulation import (
@@ -111,7 +111,9 @@ def _own_units(plan: ModelPlan, like: ModelPlan | None) -> dict[str, int]:
         own = like.scaling.own.items()
         return units_along(scene, {name: scene.context.ldexp(1, unit) for name, unit in own})
     units = first_units(scene, scaling.time)
-    if plan.wide or plan.tables:  # too long to be tried, or with steps that have to end at rows
+    if (
+        any(map(is_wide, plan.loads)) or plan.tables
+    ):  # too long to be tried, or with steps that have to end at rows
         return units
     formulation = Quaternion() if plan.requirements.attitude else Rates()
     tried = replace(

@@ -61,7 +61,7 @@ class _Pair:
         for part, name in self.parts.items():
             own = f"{part}{self.other.number}"
             text = text.replace(part, own)
-            found[own] = Readable(name, "", states, 1)
+            found[own] = Readable(name, "", states, 1, long=True)
         return f"({text})", found
 
 
@@ -83,6 +83,10 @@ class Shadows(NameProvider):
             text = "*".join(text for text, _ in written)
             jumps = "" if pairs[0].source.extended else "give its source a radius, for a penumbra"
             yield Readable(f"shadow_{name}", "", states, 1, jumps=jumps, formula=text, parts=parts)
+
+    def elsewhere(self, config: Config) -> str:
+        """Any load may have a name."""
+        return self.brings
 
     def at_start(self, scene: Scene) -> Mapping[str, Any]:
         """Of those that are read."""

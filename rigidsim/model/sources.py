@@ -102,6 +102,10 @@ class SourceNames(NameProvider):
                 yield Readable(f"u{axis}_{source.name}", "", source.states | {"attitude"}, 1)
             yield Readable(f"r_{source.name}", "m", source.states)
 
+    def elsewhere(self, config: Config) -> str:
+        """Any load may have a name."""
+        return self.brings
+
     def at_start(self, scene: Scene) -> Mapping[str, Any]:
         """Of those that are read: the series of an ephemeris takes a while."""
         found: dict[str, Any] = {}

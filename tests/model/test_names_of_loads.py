@@ -11,9 +11,10 @@ import heyoka as hy
 import mpmath
 import numpy as np
 import pytest
+from killing import killed
 from scipy.integrate import quad
 from scipy.optimize import brentq
-from support import config, loaded, run_text
+from support import config, loaded, run_text, same_bits
 
 import rigidsim
 from rigidsim import ConfigError
@@ -334,3 +335,86 @@ def test_the_shadow_on_a_point_jumps() -> None:
     np.testing.assert_allclose(data["lit"].values, true, rtol=0, atol=1e-9)
     with pytest.raises(ConfigError, match=r'"shadow_sun" jumps.*give its source a radius'):
         run_text(shadowed("", '[[events]]\nname = "a"\nexpression = "shadow_sun - 0.5"\n'))
+
+
+# --- in flight ----------------------------------------------------------------------------------------------
+
+AIR = """kind = "force"
+frame = "body"
+components = ["-D*vrx", "-D*vry", "-D*vrz"]""".replace("D", "0.004*exp(-altitude/(60 km))")
+CENTRE = """kind = "central_gravity"
+radius = "6378 km"
+gravitational_parameter = 3.986004418e14
+atmosphere_rate = [1e-5, 0, "7.3e-5 rad/s"]"""
+BALL = "principal_moments = [1, 1, 1]\nmass = 4"
+FLIGHT = f"{START}\nposition = [6.9e6, 0, 1e5]\nvelocity = [10, 5000, 5600]"
+
+
+def test_altitude_and_the_velocity_relative_to_the_air() -> None:
+    """A ball in air, whose attitude drops out of its path."""
+    fp = np.longdouble
+    place, moving = hy.make_vars("x", "y", "z"), hy.make_vars("u", "v", "w")
+    far = hy.sqrt(dot(place, place))
+    wind = cross([fp("1e-5"), fp(0), fp("7.3e-5")], place)
+    density = fp("0.004") * hy.exp(-(far - fp(6378000)) / fp(60000)) / fp(4)
+    pull = fp(MU) / far**3.0
+    equations = list(zip(place, moving, strict=True)) + [
+        (v, -pull * x - density * (v - u)) for x, v, u in zip(place, moving, wind, strict=True)
+    ]
+    start = np.array([6.9e6, 0, 1e5, 10, 5000, 5600], dtype=fp)
+    engine = hy.taylor_adaptive(equations, start, fp_type=fp, compact_mode=True)
+    engine.propagate_until(fp(6000))
+    text = config(BALL, FLIGHT, loads(CENTRE, AIR), "end = 6000\nsamples = 3", 'precision = "extended"')
+    exact = run_text(text).dataset
+    found = exact["position"].values[-1].astype(fp) + exact["position_lo"].values[-1]
+    still = run_text(text.replace("0.004", "0.000")).dataset["position"].values[-1]
+    assert np.linalg.norm(still - found) > 100  # the air matters
+    assert (
+        np.abs(found - engine.state[:3]).max() <= 2e-8 * 7
+    )  # 3e-15 of the path of 45,000 km, seven times over
+
+
+# --- what every expression has ------------------------------------------------------------------------------
+
+
+def test_members_of_a_batch_are_the_runs_they_stand_for(tmp_path: Any) -> None:
+    law = torque("k*ux_earth*shadow_sun", "1e-6*r_earth/(7e6 m)", "0")
+    disc = SUN + '\nradius = "695700 km"'
+    more = '[parameters]\nk = "1e-6 N m"\n'
+    text = config(BODY, START, loads(EARTH, disc, law), "end = 400\nsamples = 5", more=more)
+    axis = '[sweep]\naxes."loads[0].orbit.semi_major_axis" = {values = [7e6, 7.1e6, 7.2e6]}\n'
+    sweep = rigidsim.sweep(rigidsim.parse(text + axis), out=tmp_path)
+    final = sweep.dataset["quaternion_final"].values
+    for number, size in enumerate((7e6, 7.1e6, 7.2e6)):
+        alone = run_text(text, f"loads[0].orbit.semi_major_axis={size}").dataset["quaternion"].values[-1]
+        assert abs(abs(final[number] @ alone) - 1) <= 1e-13
+
+
+@pytest.mark.slow  # some minutes of compilation
+@pytest.mark.optimised  # as in the process that is killed
+def test_a_killed_run_with_a_shadow_resumes_bit_for_bit(tmp_path: Any) -> None:
+    given = shadowed('\nradius = "695700 km"', end=3000, samples=61)
+    done = rigidsim.resume(killed("support", given, tmp_path))
+    same_bits(run_text(given, estimate=True), done)
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        (loads(EARTH, torque("ux_sun", "0", "0")), "ux_NAME, uy_NAME, uz_NAME, r_NAME with a load"),
+        (loads(EARTH, torque("1e-9*bx", "0", "0")), "bx, by, bz with the field of a magnetic_dipole"),
+        (loads(EARTH, torque("1e-9*altitude", "0", "0")), "altitude, vrx, vry, vrz in flight"),
+        (loads(EARTH, torque("1e-9*shadow_earth", "0", "0")), "another one whose source has a radius"),
+        (loads(EARTH, torque("2 N m*r_earth", "0", "0")), "N m"),
+        (loads(EARTH, EARTH), 'two loads are named "earth"'),
+        (EARTH.replace('"earth"', '"my earth"'), "letters, digits and underscores"),
+        (EARTH.replace("6378 km", "-1 km"), "a positive length is allowed"),
+        (loads(EARTH, MAGNET.replace("MOMENT", '["2 N m", 0, 0]')), "A m^2"),
+        (loads(EARTH, MAGNET.replace("MOMENT", '["bq", 0, 0]')), 'moment[0]: column 1: unknown name "bq"'),
+        (loads(EARTH, MAGNET.replace("MOMENT", "[true, 0, 0]")), "moment[0]"),
+    ],
+)
+def test_what_makes_no_sense_is_refused(given: str, message: str) -> None:
+    with pytest.raises(ConfigError) as caught:
+        run_text(config(BODY, START, given, "end = 1\nsamples = 2"))
+    assert message in str(caught.value)

@@ -23,6 +23,7 @@ from rigidsim.model.rotations import Symbolic
 from rigidsim.model.scaling import Rounder, ScaledNumbers, Scaling, largest_rates
 from rigidsim.model.state_blocks import BODY, AttitudeStates, StateBlock
 from rigidsim.scene.choices import DEFAULT_FORMULATION, FORMULATIONS, Variables
+from rigidsim.scene.expressions.tree import readables
 from rigidsim.scene.orbit_tables.pieces import TabulatedOrbit
 from rigidsim.scene.orbits import KeplerOrbit
 from rigidsim.scene.scene import Scene
@@ -71,7 +72,8 @@ class ModelPlan:
     @property
     def wide(self) -> bool:
         """Whether the equations are too long to be compiled unrolled."""
-        return self.formulation.wide or any(map(is_wide, self.loads))
+        read = [readable for _, expression in self.scene.formulas() for readable in readables(expression)]
+        return self.formulation.wide or any(map(is_wide, self.loads)) or any(x.long for x in read)
 
 
 class Formulation:

@@ -50,6 +50,7 @@ class Readable:
         changes_sign: with the quaternion's sign, which means nothing.
         turns: whether it is an angle that is continued over full turns.
         jumps: what to do about it, if it isn't continuous: no event can read it then.
+        long: whether its expression is too long to be compiled unrolled.
         formula: what it is written out as, in terms of ``parts``, if it has kinks or jumps of its own.
     """
 
@@ -60,6 +61,7 @@ class Readable:
     changes_sign: bool = False
     turns: bool = False
     jumps: str = ""
+    long: bool = False
     formula: str = ""
     parts: Mapping[str, Readable] = field(default_factory=dict, compare=False)
 
