@@ -192,3 +192,51 @@ def laws(draw: Draw) -> None:
     draw.load("torque", f"components = {torque}")
     for name, derivative, initial in states:
         _state(draw, name, derivative, initial)
+
+
+def moving_mass(draw: Draw) -> None:
+    """Moments that change with time and with a state that follows the motion; in half of them mass leaves and
+    takes its momentum along.
+    """
+    moments, size = draw.moments(), draw.mass * draw.length**2
+    draw.body(moments)
+    draw.start(draw.direction() * draw.between(0.2, 2))
+    leaving = draw.sometimes(0.5)
+    draw.parameters += [
+        f"n = {draw.between(0.05, 1) / draw.time!r}",
+        f"lag = {draw.time * draw.between(0.5, 5)!r}",
+    ]
+    _state(draw, "drawn", "1/lag/300" if leaving else "(sin(wx*lag)^2 - drawn)/lag")
+    parts = [draw.between(0.01, 0.08) * float(min(moments)) * size for _ in range(3)]
+    varying = [f"{m * size!r} - {part!r}*drawn" for m, part in zip(map(float, moments), parts, strict=True)]
+    if not leaving:
+        varying[1] += f" + {parts[1]!r}*sin(n*t)/3"
+    (place,) = (k for k, line in enumerate(draw.lines) if line.startswith("principal_moments"))
+    draw.lines[place] = f"principal_moments = {varying}".replace("'", '"')
+    if leaving:
+        exit_point = [float(x) * draw.length for x in draw.direction()]
+        rate = draw.mass / draw.time * draw.decades(-4, -2.5)
+        draw.load("mass_loss", f'rate = "{rate!r}"', f"exit_point = {exit_point}")
+
+
+def magnetic(draw: Draw) -> None:
+    """B-dot by the body's rates, or by a filter of the field, on an inclined orbit in a dipole's field."""
+    draw.body(draw.moments())
+    draw.start(draw.direction() * draw.between(0.3, 2))
+    size, axis = draw.mass * draw.length**2, 1e3 * draw.length
+    motion = draw.between(0.02, 0.2) / draw.time
+    field = 1e-5
+    gain = size / draw.time / field**2 * draw.decades(-4, -1.5)
+    draw.parameters += [f"k = {gain!r}", f"lag = {draw.time * draw.between(0.2, 2)!r}"]
+    moment = ["-k*(wz*by - wy*bz)", "-k*(wx*bz - wz*bx)", "-k*(wy*bx - wx*by)"]
+    if draw.sometimes(0.5):
+        for name in "xyz":
+            _state(draw, f"f{name}", f"(b{name} - f{name})/lag")
+        moment = [f"-k*(b{name} - f{name})/lag" for name in "xyz"]
+    draw.load(
+        "magnetic_dipole",
+        f"moment = {moment}".replace("'", '"'),
+        f"source_moment = [0, 0, {-field * axis**3 / 1e-7!r}]",
+        f"orbit = {{semi_major_axis = {axis!r}, eccentricity = 0.05, inclination = {draw.between(0.5, 2)!r}, "
+        f"period = {2 * math.pi / motion!r}}}",
+    )

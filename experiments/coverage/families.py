@@ -259,6 +259,8 @@ FAMILIES: dict[str, Family] = {
     "controller": Family(carried.controller, (1.0, 2.5), canonical=False),
     "filter": Family(carried.lagging, (1.0, 3.0), canonical=False),
     "slosh": Family(carried.slosh, (1.0, 3.0), canonical=False),
+    "moving mass": Family(carried.moving_mass, (1.0, 2.3), canonical=False),
+    "B-dot": Family(carried.magnetic, (1.0, 2.5), canonical=False),
 }
 """By the name under which the table shows them."""
 
