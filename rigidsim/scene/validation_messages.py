@@ -11,17 +11,18 @@ from pydantic import BaseModel, ValidationError
 from rigidsim.errors import ConfigError, Problem
 
 _TABLES = (
-    "body", "initial", "loads", "bodies", "rotors", "frame", "time", "integrator", "output", "limits",
-    "parameters", "events", "sweep", "tables",
+    "body", "initial", "loads", "bodies", "rotors", "states", "frame", "time", "integrator", "output",
+    "limits", "parameters", "events", "sweep", "tables",
 )  # fmt: skip
-_ARRAYS_OF_TABLES = ("loads", "bodies", "rotors", "events")
+_ARRAYS_OF_TABLES = ("loads", "bodies", "rotors", "states", "events")
 _MEANT = {
     "box": "cuboid", "brick": "cuboid", "ball": "sphere", "disc": "disk", "hoop": "ring", "bar": "rod",
     "stick": "rod", "pipe": "tube", "rectangle": "plate", "square": "plate", "donut": "torus",
     "gravity": "uniform_gravity", "weight": "uniform_gravity", "friction": "viscous_torque torque",
     "damping": "viscous_torque", "drag": "viscous_torque", "thruster": "torque force", "motor": "torque",
     "spring": "torque force", "wheel": "rotors", "wheels": "rotors", "flywheel": "rotors",
-    "gyroscope": "rotors", "speed": "rate", "magnet": "magnetic_dipole", "tide": "gravity_gradient",
+    "gyroscope": "rotors", "controller": "states", "filter": "states", "slosh": "states",
+    "speed": "rate", "magnet": "magnetic_dipole", "tide": "gravity_gradient",
     "planet": "gravity_gradient central_gravity", "sun": "gravity_gradient", "moon": "gravity_gradient",
     "spin": "angular_velocity rate", "omega": "angular_velocity", "w": "angular_velocity",
     "rates": "angular_velocity", "attitude": "quaternion euler_angles", "inertia": "inertia_tensor moment",
@@ -153,6 +154,8 @@ def _what(table: type[BaseModel] | None, error: Mapping[str, Any]) -> str:
         names = [part.strip() for part in allowed.split(",")]
         near = nearest(given if isinstance(given, str) else shown(given), names)
         return f"given {shown(given)}{near}; allowed: {', '.join(names)}"
+    if kind == "list_type" and isinstance(given, Mapping) and location[0] in _ARRAYS_OF_TABLES:
+        return f"given a table; an array of them is allowed: write [[{location[0]}]] in double brackets"
     if kind in _WORDS:
         return _WORDS[kind].format(given=shown(given), msg=error["msg"], **context)
     return str(error["msg"])
