@@ -355,3 +355,12 @@ def test_members_of_a_sweep_are_single_runs(tmp_path: Path) -> None:
     for n, k in enumerate(("0.0", "0.1", "0.3")):
         alone = run_text(text, f"parameters.k={k}").dataset
         np.testing.assert_array_equal(found["quaternion_final"][n], alone["quaternion"][-1])
+
+
+def test_a_body_that_shrinks_by_states_has_scales_that_fit() -> None:
+    """Energies and rates become 400 times as large: drifts are told against what there is."""
+    body = 'principal_moments = ["s", "2*s", "2.5*s"]'
+    text = scene(30, body) + '[[states]]\nname = "s"\ninitial = 1\nderivative = "-s/5"\n'
+    run = run_text(text, estimate=True)
+    assert run.summary["warnings"] == []
+    assert_sound(run)

@@ -12,6 +12,7 @@ their motion relative to the body isn't counted. In a field, potential energy ch
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 from typing import Any
@@ -25,13 +26,15 @@ from rigidsim.model.load import Load, Term, loads_of
 from rigidsim.model.names import state_names
 from rigidsim.model.own_states import own_blocks
 from rigidsim.model.rotations import Symbolic
-from rigidsim.scene.arithmetic import Vector
+from rigidsim.scene.arithmetic import Vector, cross
 from rigidsim.scene.exact import ExactNumber
+from rigidsim.scene.expressions.names import RATE_NAMES
 from rigidsim.scene.expressions.tree import Expression, ExpressionError, evaluate, names_used, states_read
 from rigidsim.scene.moving_moments import WHERE, formulas_of, least_part, varies
 from rigidsim.scene.registry import Surroundings, register_of_body
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.schema import Config
+from rigidsim.scene.tracing.numbers import plain
 from rigidsim.scene.transitions import narrow_parts, root_parts
 
 _CLOCK = "t_of_moments"
@@ -39,6 +42,9 @@ _ELEMENTS = ("moment_x", "moment_y", "moment_z")
 _SLACK, _SLACK_SINGLE = 2.0**-40, 2.0**-16
 """Part of their sum by which the moments of a flat body may break I1 + I2 >= I3, beside rounding."""
 _TIMES = 512  # of a run's span, at which functions of time alone are looked at
+_STEPS, _ROUGH = 1000, 1e-6  # most steps of a rough integration, and its tolerance
+_MOST = 1e9  # ratio of moments, and of energies, past which no size is estimated
+_LITTLE = 1e-6
 
 
 @register_of_body("principal_moments")
@@ -172,21 +178,74 @@ class MovedMass(Load):
     # --- sizes ----------------------------------------------------------------------------------------------
 
     def amplitude(self, scene: Scene) -> Any | None:
-        """By how much energy of rotation grows as moments that depend on time alone shrink, L being kept."""
+        """By how much energy of rotation grows as moments shrink, L being kept; a power of two."""
         context = scene.context
-        least = context.one
+        energies = zip(scene.body.principal_moments, scene.angular_velocity, strict=True)
+        energy = sum((moment * rate**2 / 2 for moment, rate in energies), context.zero)
+        largest = max(self._by_time(scene), self._by_states(scene), 1.0)
+        return energy * (2 ** math.frexp(largest)[1]) if largest > 1 + _LITTLE else context.zero
+
+    def _by_time(self, scene: Scene) -> float:
+        """Largest ratio by which a moment that depends on time alone falls."""
+        found = 1.0
         for axis, expression in self.formulae:
-            begun = scene.body.principal_moments[axis]
+            begun = float(plain(scene.body.principal_moments[axis]))
             for n in range(_TIMES + 1) if names_used(expression) == {"t"} else ():
                 then = scene.start + (scene.end - scene.start) * n / _TIMES
                 try:
-                    share = evaluate(expression, {"t": then}, context) / begun
+                    moment = float(plain(evaluate(expression, {"t": then}, scene.context)))
                 except ExpressionError:
                     continue
-                least = context.minimum([least, share]) if share > 0 else least
-        energies = zip(scene.body.principal_moments, scene.angular_velocity, strict=True)
-        energy = sum((moment * rate**2 / 2 for moment, rate in energies), context.zero)
-        return energy * (1 / context.maximum([least, context.mpf(2) ** -10]) - 1)
+                found = max(found, begun / moment) if moment > begun / _MOST else found
+        return found
+
+    def _by_states(self, scene: Scene) -> float:
+        """Largest ratio by which the energy grows in a rough integration of the free rotation with states of
+        one's own, as far as these read time, rates and each other.
+        """
+        names = {state.name: hy.make_vars(state.name) for state in scene.states}
+        momenta = list(hy.make_vars("m_x", "m_y", "m_z"))
+        read = frozenset().union(*(names_used(state.derivative) for state in scene.states))
+        if not self.reads or not read <= {"t", *RATE_NAMES, *names}:
+            return 1.0
+
+        def number(x: Any) -> float:
+            return float(plain(x))
+
+        context, unit = scene.context, max(number(x) for x in scene.body.principal_moments)
+        start_of = zip(scene.body.principal_moments, scene.angular_velocity, strict=True)
+        begun = [number(i) * number(w) for i, w in start_of]
+        size = math.hypot(*begun) or 1.0
+        moments = [
+            to_heyoka(x, names, number, context) if isinstance(x, Expression) else hy.expression(number(x))
+            for x in self.moments
+        ]
+        rates = [size * m / i for m, i in zip(momenta, moments, strict=True)]
+        known = {**names, **dict(zip(RATE_NAMES, rates, strict=True))}
+        system = [(m, x) for m, x in zip(momenta, cross(momenta, rates), strict=True)]
+        for state in scene.states:
+            system.append((names[state.name], to_heyoka(state.derivative, known, number, context)))
+        start = [x / size for x in begun] + [number(state.initial) for state in scene.states]
+        engine = hy.taylor_adaptive(
+            [(x, hy.expression(y)) for x, y in system], start, time=number(scene.start),
+            tol=_ROUGH, compact_mode=True, opt_level=0,
+        )  # fmt: skip
+        energy = hy.cfunc(
+            [unit * hy.sum([m * m / i for m, i in zip(momenta, moments, strict=True)])],
+            [x for x, _ in system], compact_mode=True, opt_level=0,
+        )  # fmt: skip
+        found: list[float] = []
+        for _ in range(_STEPS):
+            value = float(energy(engine.state, time=engine.time)[0])
+            if not 0 < value < math.inf or (found and value > _MOST * found[0]):
+                break
+            found.append(value)
+            if engine.time >= number(scene.end):
+                break
+            outcome, _ = engine.step(max_delta_t=number(scene.end) - engine.time)
+            if outcome not in (hy.taylor_outcome.success, hy.taylor_outcome.time_limit):
+                break
+        return max(found) / found[0] if found else 1.0
 
     # --- what readers are told ------------------------------------------------------------------------------
 
