@@ -86,3 +86,18 @@ def test_check_plan_and_info_show_it_and_run_does_not(config: Config, rigidsim_c
         told_json = json.loads(rigidsim_command(*command, "--json").stdout)
         assert told_json["loads"][0].startswith(said)
         assert "length_without_unit" in told_json["warning_codes"]
+
+
+def test_rotors_and_own_states_are_on_lines_of_their_own(config: Config, rigidsim_command: Command) -> None:
+    text = config(
+        rest='[[rotors]]\nname = "wheel"\naxis = [0, 0, 1]\nmoment = 0.01\n'
+        '[[states]]\nname = "turned"\nderivative = "wz"\n'
+    )
+    assert rigidsim_command("run", text).exit_code == 0
+    for command in (("check", text), ("plan", text), ("info", "runs/free")):
+        lines = rigidsim_command(*command).stdout.splitlines()
+        assert any(line.startswith("rotor    wheel: 0.01 kg m^2 about") for line in lines)
+        assert 'state    turned: from 0, changes by "wz"' in lines
+        assert not any(line.startswith("load ") for line in lines)
+        told_json = json.loads(rigidsim_command(*command, "--json").stdout)
+        assert [line.split()[0] for line in told_json["loads"]] == ["rotor", "state"]

@@ -10,7 +10,15 @@ from typing import TYPE_CHECKING, Any
 from rich.console import Console
 
 from rigidsim.cli.screens.page import Page, Styled, answer
-from rigidsim.cli.screens.words import advice_line, body_text, next_lines, start_text, time_text, verdict_line
+from rigidsim.cli.screens.words import (
+    advice_line,
+    body_text,
+    labelled,
+    next_lines,
+    start_text,
+    time_text,
+    verdict_line,
+)
 from rigidsim.errors import ConfigError
 from rigidsim.scene.choices import method_named, variables_named
 from rigidsim.scene.readable import YEAR, TimeWords, span_text
@@ -69,7 +77,7 @@ def print_run(result: Run, as_json: bool) -> int:
 
 
 def print_understood(told: Checked | RunPlan | Summary, loads: Sequence[str], on: Page) -> None:
-    """Print body, start, time (as far as an older summary has them) and loads as they were understood."""
+    """Print body, start, time (as far as an older summary has them) and what acts as they were understood."""
     if told.body is not None:
         on.line("body", body_text(told.body))
     if told.start is not None:
@@ -77,7 +85,7 @@ def print_understood(told: Checked | RunPlan | Summary, loads: Sequence[str], on
     if told.time is not None:
         on.line("time", time_text(told.time))
     for load in loads:
-        on.line("load", load)
+        on.line(*labelled(load))
 
 
 def from_step(step: int | None) -> str:

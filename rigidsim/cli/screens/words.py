@@ -82,6 +82,12 @@ def time_text(time: Span) -> str:
     return f"{text}\n{dates[0]} to {dates[1]}"
 
 
+def labelled(acting: str) -> tuple[str, str]:
+    """The label and the text of what is among the loads: rotors and states of one's own say so first."""
+    what, _, rest = acting.partition(" ")
+    return (what, rest) if what in ("rotor", "state") else ("load", acting)
+
+
 def _number(value: float) -> str:
     return number_text(value, _DIGITS)
 
