@@ -162,11 +162,13 @@ def _what(table: type[BaseModel] | None, error: Mapping[str, Any]) -> str:
 
 
 def _of_the_user(location: tuple[str | int, ...], alternatives: Collection[str]) -> tuple[str | int, ...]:
-    """A location without the names of alternatives; what stands in one is a key, even one of such a name."""
+    """A location without the names of alternatives, each of which follows a key; what stands in one is a key,
+    even one of such a name.
+    """
     found: list[str | int] = []
     within = False
     for part in location:
-        within = part in alternatives and not within
+        within = bool(found) and part in alternatives and not within
         if not within:
             found.append(part)
     return tuple(found)

@@ -189,6 +189,7 @@ def test_a_rotor_at_rest_changes_no_bit() -> None:
     same_bits(run_text(text(rotor([0, 0, 0]))), run_text(text("")))
 
 
+@pytest.mark.slow
 @pytest.mark.optimised  # as in the process that is killed
 def test_a_killed_run_resumes_bit_for_bit(tmp_path: Path) -> None:
     given = text(integrator="tolerance = 1e-12", time="end = 6\nsamples = 25")
@@ -197,6 +198,7 @@ def test_a_killed_run_resumes_bit_for_bit(tmp_path: Path) -> None:
     same_bits(run_text(given, estimate=True), done)
 
 
+@pytest.mark.slow
 @pytest.mark.optimised
 def test_a_killed_run_with_rotors_of_the_config_resumes_bit_for_bit(tmp_path: Path) -> None:
     rotors = '[[rotors]]\nname = "free"\naxis = [1, 2, 3]\nmoment = 0.1\nrate = 5\n'

@@ -166,6 +166,7 @@ def test_it_is_the_motion_of_another_integrator() -> None:
     assert np.abs(data["angular_velocity"].values - found.y[:3].T).max() < 1e-9
 
 
+@pytest.mark.slow
 @pytest.mark.optimised  # as in the process that is killed
 def test_a_killed_run_resumes_bit_for_bit(tmp_path: Path) -> None:
     given = text(end=20, samples=81)

@@ -77,6 +77,7 @@ def test_its_unit_is_checked_and_others_are_told_where_it_is() -> None:
         run_text(text(more="[parameters]\nlux = 1"))
 
 
+@pytest.mark.slow
 @pytest.mark.optimised  # as in the process that is killed
 def test_a_killed_run_resumes_bit_for_bit(tmp_path: Path) -> None:
     given = text(integrator="tolerance = 1e-12", time="end = 6\nsamples = 25")

@@ -175,6 +175,7 @@ def test_its_errors_are_of_fourth_order() -> None:
 SHORT = {"time": "end = 6\nsamples = 25"}
 
 
+@pytest.mark.slow
 @pytest.mark.optimised  # as in the process that is killed
 def test_a_killed_run_resumes_bit_for_bit(tmp_path: Path) -> None:
     given = text(1e-4, **SHORT)

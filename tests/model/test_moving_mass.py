@@ -49,6 +49,7 @@ def assert_sound(run: rigidsim.Run) -> None:
 # --- against equations of their own -------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.optimised  # as runs are: what isn't rounds more
 @pytest.mark.parametrize(("precision", "within"), [("double", 1e-12), ("extended", 1e-15)])
 def test_a_thousand_radians(precision: str, within: float) -> None:
@@ -341,6 +342,7 @@ def test_what_no_jet_does_is_refused(load: str, more: str, said: str) -> None:
 # --- sessions and sweeps ------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.optimised  # as in the process that is killed
 def test_a_killed_run_is_resumed_bit_for_bit(tmp_path: Path) -> None:
     text = scene(100, samples=401, loads='kind = "mass_loss"\nrate = "0.01"\nexit_point = [0, 0, 1]') + TABLES
@@ -348,6 +350,7 @@ def test_a_killed_run_is_resumed_bit_for_bit(tmp_path: Path) -> None:
     same_bits(run_text(text), done)
 
 
+@pytest.mark.slow
 def test_members_of_a_sweep_are_single_runs(tmp_path: Path) -> None:
     text = scene(20) + TABLES
     swept = text + '[sweep]\nkeep = ["final"]\naxes."parameters.k" = {values = [0.0, 0.1, 0.3]}\n'

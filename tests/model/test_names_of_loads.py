@@ -377,6 +377,7 @@ def test_altitude_and_the_velocity_relative_to_the_air() -> None:
 # --- what every expression has ------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_members_of_a_batch_are_the_runs_they_stand_for(tmp_path: Any) -> None:
     law = torque("k*ux_earth*shadow_sun", "1e-6*r_earth/(7e6 m)", "0")
     disc = SUN + '\nradius = "695700 km"'

@@ -32,6 +32,7 @@ def _slope(_: float, state: np.ndarray) -> np.ndarray:
     return np.concatenate([np.cross(momentum, rates) + DISTURBANCE, turned.ravel(), motor, summed])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("rate", "saturated"), [(0.0, False), (622.0, True)])
 def test_it_turns_by_its_wheels_within_their_limits(
     rate: float, saturated: bool, capfd: pytest.CaptureFixture[str]

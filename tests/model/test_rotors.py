@@ -105,6 +105,7 @@ def test_rates_alone_are_enough() -> None:
     np.testing.assert_allclose(data["rotor_rate"].values, spins.astype(float), rtol=0, atol=2e-13)
 
 
+@pytest.mark.slow
 def test_a_wheel_whose_momentum_dwarfs_the_bodys() -> None:
     wheel = Wheel([1, 2, 3], 0.05, 3000)
     run = run_text(scene(wheel, end=20), estimate=True)
@@ -431,6 +432,7 @@ def test_events_and_loads_read_the_rates_of_rotors() -> None:
 # --- whole workflows ----------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_members_of_a_sweep_are_their_single_runs(tmp_path: Path) -> None:
     text = scene(FREE, DRIVEN, end=10, samples=5, motors={1: "-k*wz"}, more="[parameters]\nk = 0.1\n")
     text += '[sweep]\nkeep = ["final"]\naxes."rotors[0].rate" = {values = [-3, 0, 2]}\n'

@@ -176,6 +176,7 @@ IN_ONE_TABLE: dict[str, list[tuple[str, ...]]] = {
     "top": [
         ('nmae = "y"', "nmae", "unknown key", 'did you mean "name"?'),
         ("loads = 3", "[[loads]]", "given 3; an array is allowed"),
+        ('torque = "x"', "torque", "unknown key", "rotors, states"),
         ('[states]\nname = "s"', "[[states]]", "write [[states]] in double brackets"),
         ('loads = ["gravity"]', "[[loads]] number 1", 'given "gravity"; a table is allowed'),
     ],

@@ -279,6 +279,7 @@ def test_plan_and_summary_tell_the_same_of_the_state() -> None:
     assert told.name == "cassini_2"
 
 
+@pytest.mark.slow
 def test_mercurys_state_in_three_turns_to_two_revolutions() -> None:
     """2.04(8) arcmin from the orbit's normal (Margot et al. 2012), whose moments the preset has."""
     orbit = 'semi_major_axis = "57909050 km"\neccentricity = 0.20563\ninclination = "8.58 deg"\n'
@@ -305,6 +306,7 @@ PLANET = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("number", [1, 2, 3, 4])
 def test_a_planet_of_two_equal_moments_has_colombos_states(number: int) -> None:
     """cos th sin th 3 n^2 (C - A)/(2 C w) + g sin(th - I) = 0 (Colombo 1966), to first order in the averages;
