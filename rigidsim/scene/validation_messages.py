@@ -21,6 +21,7 @@ _MEANT = {
     "gravity": "uniform_gravity", "weight": "uniform_gravity", "friction": "viscous_torque torque",
     "damping": "viscous_torque", "drag": "viscous_torque", "thruster": "torque force", "motor": "torque",
     "spring": "torque force", "wheel": "rotors", "wheels": "rotors", "flywheel": "rotors",
+    "cassini": "cassini_1 cassini_2 cassini_3 cassini_4",
     "gyroscope": "rotors", "controller": "states", "filter": "states", "slosh": "states",
     "speed": "rate", "magnet": "magnetic_dipole", "tide": "gravity_gradient",
     "planet": "gravity_gradient central_gravity", "sun": "gravity_gradient", "moon": "gravity_gradient",

@@ -94,3 +94,26 @@ def test_loads_from_python(precision: str) -> None:
     experiment = rigidsim.parse(SCENE.format(initial="", loads="", precision=precision))
     with pytest.raises(ConfigError, match="derivatives of wx, work aren't finite at the start"):
         prepare(experiment, loads=[Pole()])
+
+
+def test_a_state_named_like_something_else_is_told_where_it_stands() -> None:
+    rotor = '[[rotors]]\nname = "w"\naxis = [0, 0, 1]\nmoment = 0.1\n'
+    state = '[[states]]\nname = "{}"\nderivative = "wz"\n'
+    said = refused(rotor + state.format("a") + state.format("rate_w"))
+    assert '[[states]] number 2 name: two things are called "rate_w" in expressions' in said
+    assert "one of [[rotors]]" in said
+
+
+@pytest.mark.parametrize("derivative", ["sqrt(s)", "asin(1 - s)", "s^1.5"])
+def test_a_derivative_without_derivative_at_the_start_is_named(derivative: str) -> None:
+    state = f'[[states]]\nname = "s"\nderivative = "{derivative}"\n'
+    outcome = run_text(SCENE.format(initial="", loads=state, precision="double")).outcome
+    assert outcome.exit_code != 0
+    assert (
+        f'"{derivative}" ([[states]] number 1 derivative) has no derivative at the start' in outcome.message
+    )
+
+
+def test_cassini_alone_leads_to_all_four() -> None:
+    with pytest.raises(ConfigError, match='"cassini_1" or "cassini_2" or "cassini_3" or "cassini_4"'):
+        rigidsim.parse(SCENE.format(initial='equilibrium = "cassini"', loads="", precision="double"))

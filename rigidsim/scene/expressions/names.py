@@ -140,19 +140,27 @@ def names_of(config: Any) -> Names:
         ConfigError: two things of one name.
     """
     known: dict[str, Readable] = {}
+    bringing: dict[str, str] = {}
     elsewhere = []
     for provider in PROVIDERS:
         elsewhere.append(provider.elsewhere(config))
         for readable in provider.names(config):
             if readable.name in known:
-                what = f'two things are called "{readable.name}" in expressions; rename one'
-                raise ConfigError(Problem("names", what))
-            known[readable.name] = readable
+                raise ConfigError(_taken(config, readable.name, (bringing[readable.name], provider.brings)))
+            known[readable.name], bringing[readable.name] = readable, provider.brings
     for name in known:
         if name in config.parameters:
             what = f'given the name "{name}", which expressions of this scene use already; rename it'
             raise ConfigError(Problem(f"[parameters] {name}", what))
     return Names(known, tuple(filter(None, elsewhere)))
+
+
+def _taken(config: Any, name: str, brings: tuple[str, str]) -> Problem:
+    """Where a name is given that another thing has in expressions; ``brings`` of both providers."""
+    both = "; ".join(filter(None, brings))
+    what = f'two things are called "{name}" in expressions ({both}); rename one'
+    numbers = [number for number, state in enumerate(config.states, start=1) if state.name == name]
+    return Problem(f"[[states]] number {numbers[-1]} name" if numbers else "names", what)
 
 
 # --- time and the body's own --------------------------------------------------------------------------------
