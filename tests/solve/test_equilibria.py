@@ -402,6 +402,7 @@ def test_independent_equations_come_back_and_grow_alike() -> None:
         (SATELLITE, {"more": '\n[[loads]]\nkind = "torque"\ncomponents = ["9", "9", "9"]'},
          "equilibrium", "none was found"),
         (SATELLITE, {"body": "principal_moments = [1, 1, 1]"}, "equilibrium", "rests in any attitude"),
+        (SATELLITE, {"body": 'principal_moments = ["1 + t", 2, 2.5]'}, "equilibrium", "moments vary"),
         (SATELLITE, {"more": '\n[[states]]\nname = "sum"\nderivative = "wy"\n[[loads]]\nkind = "torque"\n'
          'components = ["1e-9*sum", "0", "0"]'}, "equilibrium", "the state sum changes in it"),
         (SATELLITE, {"name": "cassini_5"}, "equilibrium", 'did you mean "cassini_'),

@@ -20,7 +20,7 @@ from dataclasses import replace
 from itertools import permutations, product
 from typing import Any
 
-from rigidsim.model.capabilities import corotating_orbit_of, orbit_of
+from rigidsim.model.capabilities import Reshaping, corotating_orbit_of, having, orbit_of
 from rigidsim.model.load import loads_of
 from rigidsim.scene import attitude
 from rigidsim.scene.arithmetic import (
@@ -114,6 +114,9 @@ def _orbit(scene: Scene) -> KeplerOrbit:
         what = "no load has a source on an orbit (gravity_gradient with orbit)"
         if scene.free_flight:
             what = "the body flies on an orbit of its own, and this is for a prescribed one"
+        raise refusal(_KEY, f"{given}{what}; give the attitude and rates themselves")
+    if having(Reshaping, loads):
+        what = "the body's moments vary, and its equilibria with them"
         raise refusal(_KEY, f"{given}{what}; give the attitude and rates themselves")
     moments = scene.body.principal_moments
     if max(moments) - min(moments) <= max(moments) * negligible(scene.context):
