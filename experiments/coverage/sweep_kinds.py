@@ -1,4 +1,6 @@
-"""Kinds of sweeps whose announced errors are judged: bodies free and driven, satellites, spins, flights."""
+"""Kinds of sweeps whose announced errors are judged: bodies free and driven, satellites, spins, flights,
+gyrostats, and laws with states of their own.
+"""
 
 from __future__ import annotations
 
@@ -90,6 +92,53 @@ frame = "body"
 end = {end}
 samples = 2
 """
+_GYROSTAT = """
+[body]
+principal_moments = [1, 2, 2.5]
+[initial]
+angular_velocity = [0.1, 0.2, 1]
+[[rotors]]
+name = "free"
+axis = [0, 0.6, 0.8]
+moment = 0.1
+rate = 5
+[[rotors]]
+name = "driven"
+axis = [1, 0, 0]
+moment = 0.05
+rate = -8
+torque = "0.02*sin(0.7*t)"
+[time]
+end = {end}
+samples = 2
+"""
+_LAWS = """
+[parameters]
+k = 0.5
+[body]
+principal_moments = [1, 2, 2.5]
+[initial]
+angular_velocity = [0.1, 0.2, 0.3]
+[[states]]
+name = "slow"
+unit = "rad/s"
+derivative = "(wz - slow)/(3 s)"
+[[states]]
+name = "slosh"
+unit = "rad"
+derivative = "rolling"
+[[states]]
+name = "rolling"
+unit = "rad/s"
+derivative = "-(4 s^-2)*slosh - (0.02 s^-1)*rolling + 0.3*(1 s^-1)*wy"
+[[loads]]
+kind = "torque"
+components = ["-k*qw*qx", "-k*qw*qy - (0.1 N m)*slosh", "-k*qw*qz - (0.05 N m s)*slow"]
+frame = "body"
+[time]
+end = {end}
+samples = 2
+"""
 _FLIGHT = """
 [body]
 principal_moments = [1, 1.6, 2]
@@ -142,6 +191,12 @@ _SATELLITES = {
 }
 _TOPS = {"initial.angular_velocity[2]": "uniform = [1, 9]", "initial.euler_angles[1]": "uniform = [0.1, 2.5]"}
 _SPINS = {"initial.euler_angles[2]": "uniform = [0, 3]", "initial.angular_velocity[2]": "uniform = [0, 3]"}
+_ROTORS = {"rotors[0].rate": "uniform = [-20, 20]", "rotors[1].rate": "uniform = [-20, 20]"}
+_STARTS = {
+    "states[0].initial": "uniform = [-1, 1]",
+    "states[1].initial": "uniform = [-1, 1]",
+    "parameters.k": "uniform = [0.1, 2]",
+}
 KINDS = {
     "free": Kind(_FREE, _RATES | _MOMENT, {"end": "1000"}),
     "free, short": Kind(_FREE, _RATES | _MOMENT, {"end": "5"}),
@@ -157,6 +212,8 @@ KINDS = {
     "tops": Kind(_TOP, _TOPS, {"end": "60", "second": "1"}),
     "tops, asymmetric": Kind(_TOP, _TOPS, {"end": "20", "second": "1.2"}),
     "driven": Kind(_DRIVEN, _RATES | {"parameters.n": "uniform = [0.1, 2]"}, {"end": "200"}),
+    "gyrostats": Kind(_GYROSTAT, _RATES | _ROTORS, {"end": "200"}),
+    "laws": Kind(_LAWS, _RATES | _STARTS, {"end": "200"}),
     "flights": Kind(
         _FLIGHT,
         {
