@@ -132,9 +132,9 @@ def plan_plots(dataset: xarray.Dataset, leading: Sequence[str] = ()) -> list[Plo
 
 def _reading(variable: xarray.DataArray, unit: str) -> tuple[float, str]:
     """Factor to, and symbol of, the unit that suits a variable."""
-    if unit == "rad/s":
-        divisor, prefixed = si_scale(_columns(variable), unit)
-        return 1 / divisor, prefixed
+    if pretty_unit(unit) == "rad/s":  # "rad s-1" in datasets
+        divisor, prefixed = si_scale(_columns(variable), "rad/s")
+        return (1.0, "rad/s") if prefixed.startswith("1e") else (1 / divisor, prefixed)
     if unit != "rad":
         return 1.0, unit
     values = _columns(variable)

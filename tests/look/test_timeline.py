@@ -12,6 +12,7 @@ import xarray
 pytest.importorskip("rerun")
 
 import rigidsim
+from rigidsim.look.plots import plan_plots
 from rigidsim.look.signals import thin
 from rigidsim.look.timeline import write_timeline
 from rigidsim.look.timeline.writing import CHUNK
@@ -254,3 +255,16 @@ def test_no_residual_is_a_variable_of_its_own(
         shown = thin(dataset, 10)
         assert {"angular_velocity", "quaternion", "energy", "energy_drift"} <= set(shown)
         assert not any("_lo" in str(name) for name in shown)
+
+
+@pytest.mark.parametrize("unit", ["rad/s", "rad s-1"])
+@pytest.mark.parametrize(
+    ("size", "shown", "factor"), [(7.3e-5, "µrad/s", 1e6), (2.0, "rad/s", 1.0), (1e-20, "rad/s", 1.0)]
+)
+def test_rates_have_prefixes_as_datasets_write_their_unit(
+    unit: str, size: float, shown: str, factor: float
+) -> None:
+    rates = np.linspace(0.5, 1.0, 4) * size
+    (plot,) = plan_plots(xarray.Dataset({"rate": ("time", rates, {"units": unit})}))
+    assert plot.title == f"Rate [{shown}]"
+    np.testing.assert_allclose(plot.series[0].values[:, 0], rates * factor, rtol=1e-14)
