@@ -144,6 +144,24 @@ def test_a_damper_and_slosh_follow_the_motion_over_a_thousand_radians() -> None:
     assert true / 3 <= run.summary["accuracy"]["estimated_attitude_error"] <= 100 * true
 
 
+def test_states_that_make_steps_shorter_hide_no_truncation_of_angles() -> None:
+    """Quaternions with the same states would take shorter steps, and cut off next to nothing."""
+    more = state("push", "(0.01*sin(2*t) - push)/2") + state("one", "2*two", 0.5) + state("two", "-2*one")
+    given = config(
+        "principal_moments = [1, 1.25, 1.02]",
+        "angular_velocity = [0.6, -0.2, -0.2]\nquaternion = [-0.36, -0.47, -0.8, -0.01]",
+        'kind = "torque"\ncomponents = ["push", "0", "0.001*one"]',
+        "end = 40\nsamples = 9",
+        more=more,
+    )
+    run = run_text(
+        given, 'integrator.formulation="euler_angles"', "integrator.tolerance=1e-10", estimate=True
+    )
+    exact = loaded(run_text(given, 'integrator.precision="extended"'))["quaternion"].values
+    true = angle_between(loaded(run)["quaternion"].values, exact).max()
+    assert true / 3 <= run.summary["accuracy"]["estimated_attitude_error"] <= 100 * true
+
+
 def test_eighty_bits_agree_with_quadruple_precision() -> None:
     given = config(loads=DAMPER, more=LOOSE, time="end = 20\nsamples = 11")
     one, other = (loaded(run_text(given, f'integrator.precision="{x}"')) for x in ("extended", "quadruple"))

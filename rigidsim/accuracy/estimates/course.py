@@ -174,7 +174,11 @@ def ensemble_of(course: Course, part: float, first: float, tolerance: float) -> 
         else:
             carrier = BatchCarrier(system, course.steps * part, tolerance)
         if course.loose and not system.stepwise:
-            series = SeriesErrors(system, prepared.effective_tolerance)
+            turning, places = list[int](), Measures(system).places
+            if prepared.scene.config.states and prepared.system.formulation.rounding is Rounding.ANGLES:
+                turning = places["rates"] + places["attitude"]
+            mean = abs(course.end - course.start) / max(course.steps, 1)
+            series = SeriesErrors(system, prepared.effective_tolerance, turning=turning, mean=mean)
     measures, exponents = Measures(system), system.state_exponents
     units = [[math.ldexp(1.0, int(exponents[place]))] for place in measures.places["rates"]]
     return ShadowEnsemble(

@@ -2,7 +2,7 @@
 
 import copy
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from typing import Any
@@ -262,9 +262,23 @@ class SeriesErrors:
     Errors are those of the series' order, a whole number, and one more term may gain nothing at all (its
     coefficient has a phase): they are looked at with the tolerance as it is. Where they don't stand out of
     double precision's rounding, that is done with 80 bits. Without an integrator in double one is compiled.
+
+    Args:
+        turning: indices of the rates and the attitude, if these stand in for a run's Euler angles.
+        mean: mean step of that run. Where it is shorter than other states alone would make it, angles set it,
+            and an error is what the tolerance allows these, however short the other states make steps here.
     """
 
-    def __init__(self, system: System, tolerance: float, integrator: TaylorEngine | None = None) -> None:
+    def __init__(
+        self,
+        system: System,
+        tolerance: float,
+        integrator: TaylorEngine | None = None,
+        *,
+        turning: Sequence[int] = (),
+        mean: float = math.inf,
+    ) -> None:
+        self._turning, self._mean = list(turning), mean
         wide = tolerance < _LEAST_TOLERANCE and _EIGHTY_BITS
         tried = max(tolerance, _LEAST_WIDE_TOLERANCE if wide else _LEAST_TOLERANCE)
         self._share = min(tolerance / tried * _ONE_ORDER, 1.0)
@@ -285,10 +299,37 @@ class SeriesErrors:
         number = engine.state.dtype.type
         engine.time = number(time)
         engine.state[:] = state
-        _, size = engine.step(number(2.0**10))
+        _, size = engine.step(number(2.0**10), write_tc=bool(self._turning))
         if not (size and np.isfinite(engine.state).all()):
             return np.zeros_like(state)
+        least = self._of_turning(state, float(size))
         engine.propagate_until(number(time), max_steps=64, max_delta_t=number(size) / _PARTS)
         wrong = (engine.state - state).astype(float)
         wrong[np.abs(wrong) < self._rounding * np.abs(state)] = 0.0
-        return self._share * wrong if np.isfinite(wrong).all() else np.zeros_like(wrong)
+        wrong = self._share * wrong if np.isfinite(wrong).all() else np.zeros_like(wrong)
+        return np.copysign(np.maximum(np.abs(wrong), np.abs(least)), np.where(wrong != 0, wrong, least))
+
+    def _of_turning(self, state: np.ndarray, size: float) -> np.ndarray:
+        """First neglected term of the rates and the attitude in a step as long as they alone would make it,
+        times the share of the run's steps that angles set; 0 where no other states shorten steps.
+        """
+        found = np.zeros_like(state)
+        if not self._turning:
+            return found
+        series = np.asarray(self._integrator.tc, dtype=float)
+        order = series.shape[1] - 1
+        longer = _radius(series[self._turning], state) / _radius(series, state)
+        share = 1 - self._mean / size
+        turning, step = series[self._turning], size * longer
+        before, last = (np.abs(turning[:, n]).max() for n in (order - 1, order))
+        if longer > 1 and share > 0 and math.isfinite(longer) and before > 0:
+            gain = min(step * last / before, 1 / _ONE_ORDER)  # terms of a rotation gain more and more
+            found[self._turning] = share * self._share * gain * step**order * turning[:, order]
+        return found
+
+
+def _radius(series: np.ndarray, state: np.ndarray) -> float:
+    """Radius of convergence by which steps are chosen (Jorba & Zou 2005), from the last two orders."""
+    largest, order = max(1.0, float(np.abs(state).max())), series.shape[1] - 1
+    terms = [(n, float(np.abs(series[:, n]).max())) for n in (order - 1, order)]
+    return min((largest / term) ** (1 / n) if term > 0 else math.inf for n, term in terms)
