@@ -274,3 +274,32 @@ def test_of_moments_that_vary_no_sphere_is_drawn() -> None:
     assert "Rates of the rotors, relative to the body" in [
         axes.get_title("left") for axes in figures.figure(dataset).axes
     ]
+
+
+def test_a_rotor_whose_rate_is_not_recorded_is_told_of() -> None:
+    text = """
+name = "unseen"
+[body]
+principal_moments = [1, 2, 3]
+[initial]
+angular_velocity = [0.1, 1, 0.1]
+[[rotors]]
+name = "free"
+axis = [0, 0, 1]
+moment = 0.1
+rate = 3
+[[rotors]]
+name = "kept"
+axis = [0, 1, 0]
+moment = 0.1
+rate = 3
+fixed = true
+[time]
+end = 10
+samples = 11
+[output]
+record = ["quaternion"]
+"""
+    picture = build_picture(rigidsim.run(rigidsim.parse(text)).dataset)[0]
+    assert "not drawn, since rotor_rate isn't recorded: rotor free" in picture.notes
+    assert [spot.label for spot in picture.stages[0].spots if spot.name.startswith("rotor")] == ["kept"]

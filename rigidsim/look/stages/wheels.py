@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import xarray
 
-from rigidsim.look import gyrostats, signals
+from rigidsim.look import gyrostats, signals, surroundings
 from rigidsim.look.gyrostats import RecordedRotor
 from rigidsim.look.solids import Mesh, solid_mesh
 from rigidsim.look.stages import parts
@@ -47,6 +47,11 @@ class _Disc:
 def with_wheels(dataset: xarray.Dataset, subject: Subject, picture: Picture) -> Picture:
     """The picture with the dataset's rotors on its body, if it has some and the body is drawn to scale."""
     found = gyrostats.rotors(dataset)
+    drawn = {rotor.name for rotor in found}
+    missing = [one["name"] for one in surroundings.told(dataset, "rotor") if one["name"] not in drawn]
+    if missing:
+        unseen = f"not drawn, since {_LEADING} isn't recorded: rotor {', '.join(missing)}"
+        picture = replace(picture, notes=[*picture.notes, unseen])
     to_scale = [stage for stage in picture.stages if stage.unit == subject.reach and stage.meshes]
     if not found or not to_scale:
         return picture
