@@ -300,6 +300,6 @@ samples = 11
 [output]
 record = ["quaternion"]
 """
-    picture = build_picture(rigidsim.run(rigidsim.parse(text)).dataset)[0]
+    picture = build_picture(rigidsim.run(rigidsim.parse(text), out=None).dataset)[0]
     assert "not drawn, since rotor_rate isn't recorded: rotor free" in picture.notes
     assert [spot.label for spot in picture.stages[0].spots if spot.name.startswith("rotor")] == ["kept"]
