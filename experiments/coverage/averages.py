@@ -42,7 +42,7 @@ def judge_average(scene: CoverageScene) -> Judged:
     truth, progress, *_ = gone_through(_compact(experiment.having(['model.level="full"'])), 2 * MOST_STEPS)
     if progress.status is not Status.FINISHED or found.modelling is None:
         return replace(begin, ended="no truth", cpu_seconds=time.process_time() - started)
-    announced = dict(zip(_AXES, (found.modelling.momentum, found.modelling.figure), strict=True))
+    announced = dict(zip(_AXES, (found.modelling.momentum_axis, found.modelling.figure_axis), strict=True))
     pairs = []
     for name in _AXES:
         apart = np.array(seen.exact(name), dtype=float) - np.array(truth.exact(name), dtype=float)

@@ -200,8 +200,10 @@ def test_announced_errors_of_late_pulses_and_spikes(family: str) -> None:
     for n in range(60):
         found = judge(coverage_scene(place + n * len(FAMILIES), seed=1125))
         if found.ended != "finished":
-            # canonical momenta don't suit torques; single precision can't tell the times of some spikes
-            assert found.ended == "refused" or "single" in found.setting
+            # canonical momenta don't suit torques; single precision can't tell the times of some spikes; and
+            # 1/cosh(u)^2 of the narrowest is beyond double's range at the start: told there
+            too_narrow = found.ended == "stopped: non-finite state" and found.steps == 0
+            assert found.ended == "refused" or "single" in found.setting or too_narrow
             continue
         judged += 1
         beyond += found.true > 3 * found.announced
