@@ -1,0 +1,350 @@
+"""The full Moon of DE421 with heyoka alone: degree 4, Sun, planets, Earth's figure, tide, spin, delay, core.
+
+python -m experiments.bare.moon [OUT.npz] [--days 18264] [--package de421] [--without core,degree4,...]
+
+States are the mantle's momentum (not its rate), the core's rate in the mantle's axes, and a quaternion:
+with the momentum nothing asks for the distorted tensor's rate of change, since L' = N + N_c - w x L, and
+w = (I + dI - I_c)^-1 L. What dI needs of w is taken from the undistorted tensor first, then from that
+result (dI/I is 1e-6: the second time is exact to rounding). The delayed tide is computed from the Earth's
+polynomial at t - tau itself, in the body axes of then, to the third order in the angle turned since.
+Kilometres and days; each block of four days has its own time, and the sources' polynomials are parameters
+of the compiled system. What is left over against the package's own librations is printed; nothing is
+fitted.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import resource
+import time
+from collections.abc import Sequence
+from typing import Any
+
+import heyoka as hy
+import numpy as np
+from numpy.polynomial import chebyshev
+
+from experiments.bare import blocks, mechanics
+from experiments.bare.mechanics import scaled, total
+
+EFFECTS = (
+    "core",
+    "core_flattening",
+    "core_friction",
+    "degree3",
+    "degree4",
+    "sun",
+    "planets",
+    "figure",
+    "distortion",
+    "spin_distortion",
+    "delay",
+)
+"""What can be left out; "sun" takes the planets with it."""
+MEAN_RATE = 0.2299715
+MAS = math.degrees(1.0) * 3.6e6
+
+
+def earth_pole(julian_dates: np.ndarray) -> np.ndarray:
+    """The Earth's pole in axes of J2000: IAU 1976 precession and the 18.6-year term of nutation, (n, 3)."""
+    t = (julian_dates - 2451545.0) / 36525
+    arcsec = math.radians(1 / 3600)
+    zeta = (2306.2181 * t + 0.30188 * t**2 + 0.017998 * t**3) * arcsec
+    z = (2306.2181 * t + 1.09468 * t**2 + 0.018203 * t**3) * arcsec
+    theta = (2004.3109 * t - 0.42665 * t**2 - 0.041833 * t**3) * arcsec
+    node = np.radians(125.04452 - 1934.136261 * t)
+    obliquity = (84381.448 - 46.8150 * t) * arcsec
+    longitude, tilt = -17.1996 * arcsec * np.sin(node), 9.2025 * arcsec * np.cos(node)
+
+    def turned(axis: int, angle: np.ndarray, v: np.ndarray) -> np.ndarray:
+        """Components after the axes have turned by an angle about one of them."""
+        c, s = np.cos(angle), np.sin(angle)
+        a, b = (axis + 1) % 3, (axis + 2) % 3
+        found = v.copy()
+        found[:, a], found[:, b] = c * v[:, a] + s * v[:, b], -s * v[:, a] + c * v[:, b]
+        return found
+
+    # True to mean of date: N = R1(-eps - deps) R3(-dpsi) R1(eps), inverted; then mean of date to J2000.
+    v = np.tile([0.0, 0.0, 1.0], (len(t), 1))
+    v = turned(0, -obliquity, turned(2, longitude, turned(0, obliquity + tilt, v)))
+    return turned(2, zeta, turned(1, -theta, turned(2, z, v)))
+
+
+class Moon:
+    """Constants, equations and blocks of one package's Moon, with some effects left out."""
+
+    def __init__(self, package: str = "de421", without: Sequence[str] = ()) -> None:
+        unknown = sorted(set(without) - set(EFFECTS))
+        if unknown:
+            raise ValueError(f"{', '.join(unknown)}: not among {', '.join(EFFECTS)}")
+        self.kernel = blocks.Kernel(package)
+        self.without = set(without) | ({"planets"} if "sun" in without else set())
+        c = self.constants = self.kernel.constants
+        # beta = (C - A)/B, gamma = (B - A)/C, J2 = (C - (A + B)/2)/(M R^2).
+        beta, gamma, j2 = c["LBET"], c["LGAM"], c["J2M"]
+        polar = 2 * (1 + beta) * j2 / (2 * beta - gamma + beta * gamma)
+        self.moments = [
+            polar * (1 - beta * gamma) / (1 + beta),
+            polar * (1 + gamma) / (1 + beta),
+            polar,
+        ]
+        self.radius = c["AM"]
+        self.field = self._field()
+        self.core_polar = 0.0 if "core" in self.without else c["IFAC"] * polar
+        flattening = 0.0 if "core_flattening" in self.without else c["COBLAT"]
+        self.core_equatorial = self.core_polar * (1 - flattening)
+        self.friction = 0.0 if self.without & {"core", "core_friction"} else c["KVC"] * polar
+        self.delay = 0.0 if "delay" in self.without else c["TAUM"]
+        self.love = 0.0 if "distortion" in self.without else c["K2M"]
+        self.start = c["JDEPOC"]
+        far = [] if "sun" in self.without else ["sun", *(() if "planets" in self.without else blocks.PLANETS)]
+        self.sources = ("earth", *far)
+
+    def _field(self) -> dict[tuple[int, int], tuple[float, float]]:
+        """Degrees 3 and 4 that are asked for."""
+        c, found = self.constants, {}
+        for n in (3, 4):
+            if f"degree{n}" in self.without:
+                continue
+            found[n, 0] = (-c[f"J{n}M"], 0.0)
+            for m in range(1, n + 1):
+                found[n, m] = (c[f"C{n}{m}M"], c.get(f"S{n}{m}M", 0.0))
+        return found
+
+    def rigid_torque(self, q: Any, places: dict[str, Any], pole: Any) -> list:
+        """On the undistorted body."""
+        tensor = [[self.moments[0], 0.0, 0.0], [0.0, self.moments[1], 0.0], [0.0, 0.0, self.moments[2]]]
+        found: list = [0.0, 0.0, 0.0]
+        for name in self.sources:
+            seen = mechanics.to_body(q, places[name])
+            found = total(found, mechanics.gradient_torque(self.kernel.parameters[name], seen, tensor))
+        earth, parameter = mechanics.to_body(q, places["earth"]), self.kernel.parameters["earth"]
+        if self.field:
+            found = total(found, mechanics.field_torque(parameter, earth, self.radius, self.field))
+        if "figure" not in self.without:
+            axis, c = mechanics.to_body(q, pole), self.constants
+            found = total(found, mechanics.figure_torque(parameter, earth, tensor, c["J2E"], c["RE"], axis))
+        return found
+
+    def distortion(self, q: Any, w: Any, acceleration: Any, delayed: Any) -> list[list]:
+        """What tide and spin added a delay ago; the Earth's place is that of then, all else of now."""
+        parameters = self.kernel.parameters
+        seen = mechanics.turned_back(w, acceleration, self.delay, mechanics.to_body(q, delayed))
+        found = mechanics.tide_tensor(self.love, parameters["earth"] / parameters["moon"], self.radius, seen)
+        if "spin_distortion" not in self.without:
+            then = [a - self.delay * b for a, b in zip(w, acceleration, strict=True)]
+            spin = mechanics.spin_tensor(self.love, parameters["moon"], self.radius, then, MEAN_RATE)
+            found = [[found[i][j] + spin[i][j] for j in range(3)] for i in range(3)]
+        return found
+
+    def motion(self, momentum: Any, core: Any, q: Any, places: dict, delayed: Any, pole: Any) -> tuple:
+        """(w, the whole torque on the mantle)."""
+        a, b, c = self.moments
+        mantle = [a - self.core_equatorial, b - self.core_equatorial, c - self.core_polar]
+        rigid = self.rigid_torque(q, places, pole)
+
+        def coupling(w: Any) -> list:
+            """Of the core."""
+            if not self.core_polar:
+                return [0.0, 0.0, 0.0]
+            return mechanics.core_torque(self.friction, self.core_equatorial, self.core_polar, w, core)
+
+        w = [x / m for x, m in zip(momentum, mantle, strict=True)]
+        if not self.love:
+            return w, total(rigid, coupling(w))
+        change: list = []
+        for _ in range(2):
+            torque = total(rigid, coupling(w), scaled(-1.0, mechanics.cross(w, momentum)))
+            acceleration = [x / m for x, m in zip(torque, mantle, strict=True)]
+            change = self.distortion(q, w, acceleration, delayed)
+            distorted = [[change[i][j] + (mantle[i] if i == j else 0.0) for j in range(3)] for i in range(3)]
+            w = mechanics.solved(distorted, momentum)
+        torque = total(rigid, coupling(w))
+        for name in self.sources:
+            seen = mechanics.to_body(q, places[name])
+            torque = total(torque, mechanics.gradient_torque(self.kernel.parameters[name], seen, change))
+        return w, torque
+
+    def parameters(self, count: int) -> tuple[np.ndarray, dict[str, tuple[int, int]]]:
+        """Rows of parameters, one a block, and each polynomial's first column and number of terms."""
+        columns, where, at = [], {}, 0
+        found = {
+            name: blocks.powers(series, blocks.terms(series))
+            for name, series in self.kernel.places("moon", self.sources, self.start, count).items()
+        }
+        if self.love:
+            found["delayed"] = blocks.later(found["earth"], -self.delay)
+        nodes = chebyshev.chebpts1(3)
+        dates = self.start + blocks.DAYS * (np.arange(count)[:, None] + (nodes + 1) / 2)
+        poles = earth_pole(dates.ravel()).reshape(count, 3, 3)
+        series = np.swapaxes(np.linalg.inv(chebyshev.chebvander(nodes, 2)) @ poles, 1, 2)
+        if "figure" not in self.without:
+            found["pole"] = blocks.powers(series, 3)
+        for name, values in found.items():
+            where[name] = (at, values.shape[-1])
+            at += 3 * values.shape[-1]
+            columns.append(values.reshape(count, -1))
+        return np.concatenate(columns, axis=1), where
+
+    def equations(self, where: dict[str, tuple[int, int]]) -> list:
+        """heyoka's system; time counts from the block's edge."""
+        names = [f"l{k}" for k in "xyz"] + [f"q{k}" for k in "wxyz"]
+        names += [f"c{k}" for k in "xyz"] if self.core_polar else []
+        states = hy.make_vars(*names)
+        s = 2.0 / blocks.DAYS * hy.time - 1.0
+
+        def polynomial(name: str) -> list:
+            """Horner's rule, three axes."""
+            if name not in where:
+                return []
+            first, count = where[name]
+            found = []
+            for axis in range(3):
+                value: Any = hy.par[first + axis * count + count - 1]
+                for k in range(count - 2, -1, -1):
+                    value = hy.par[first + axis * count + k] + s * value
+                found.append(value)
+            return found
+
+        momentum, q, core = states[:3], states[3:7], states[7:]
+        places = {name: polynomial(name) for name in self.sources}
+        w, torque = self.motion(momentum, core, q, places, polynomial("delayed"), polynomial("pole"))
+        right = total(torque, scaled(-1.0, mechanics.cross(w, momentum))) + mechanics.quaternion_rate(q, w)
+        if self.core_polar:
+            right += mechanics.core_acceleration(
+                self.friction, self.core_equatorial, self.core_polar, w, core
+            )
+        return list(zip(states, right, strict=True))
+
+    def initial(self, row: np.ndarray, where: dict[str, tuple[int, int]]) -> np.ndarray:
+        """The package's start: the momentum that belongs to its rate."""
+        c = self.constants
+        q = np.array([1.0, 0.0, 0.0, 0.0])
+        for angle, axis in ((c["PHI"], 3), (c["THT"], 1), (c["PSI"], 3)):
+            turn = np.zeros(4)
+            turn[0], turn[axis] = math.cos(angle / 2), math.sin(angle / 2)
+            q = np.concatenate(
+                [
+                    [q[0] * turn[0] - q[1:] @ turn[1:]],
+                    q[0] * turn[1:] + turn[0] * q[1:] + np.cross(q[1:], turn[1:]),
+                ]
+            )
+        rate = np.array([c["OMEGAX"], c["OMEGAY"], c["OMEGAZ"]])
+        core = np.array([c["OMGCX"], c["OMGCY"], c["OMGCZ"]]) if self.core_polar else np.zeros(3)
+
+        def place(name: str) -> list[float]:
+            """At the block's edge, s = -1."""
+            if name not in where:
+                return []
+            first, count = where[name]
+            series = row[first : first + 3 * count].reshape(3, count)
+            return [float(x) for x in series @ (-1.0) ** np.arange(count)]
+
+        places = {name: place(name) for name in self.sources}
+        momentum = np.array(self.moments) * rate
+        for _ in range(5):
+            w, _ = self.motion(list(momentum), list(core), list(q), places, place("delayed"), place("pole"))
+            momentum = momentum + np.array(self.moments) * (rate - np.array(w))
+        return np.concatenate([momentum, q, core if self.core_polar else []])
+
+    def integrate(self, days: float, tolerance: float | None = None) -> dict[str, Any]:
+        """States at the block edges, and the cost."""
+        count = math.ceil(days / blocks.DAYS)
+        began = time.process_time()
+        rows, where = self.parameters(count)
+        read = time.process_time()
+        options = {} if tolerance is None else {"tol": tolerance}
+        integrator = hy.taylor_adaptive(
+            self.equations(where), self.initial(rows[0], where), compact_mode=True, pars=rows[0], **options
+        )
+        compiled = time.process_time()
+        states, steps = [integrator.state.copy()], 0
+        for row in rows:
+            integrator.time = 0.0
+            integrator.pars[:] = row
+            steps += integrator.propagate_until(blocks.DAYS)[3]
+            states.append(integrator.state.copy())
+        done = time.process_time()
+        found = np.array(states)
+        return {
+            "days": blocks.DAYS * np.arange(count + 1),
+            "quaternion": found[:, 3:7],
+            "states": found,
+            "steps": steps,
+            "read": read - began,
+            "compile": compiled - read,
+            "seconds": done - compiled,
+            "expressions": len(integrator.decomposition),
+        }
+
+
+def librations(package: str, julian_dates: np.ndarray) -> np.ndarray:
+    """The package's own attitudes: matrices from body to ICRF, (n, 3, 3)."""
+    kernel = blocks.Kernel(package)
+    stored = np.load(kernel.folder / "jpl-librations.npy", mmap_mode="r")
+    length = (kernel.last - kernel.first) / len(stored)
+    since = (julian_dates - kernel.first) / length
+    index = np.minimum(since.astype(int), len(stored) - 1)
+    values = chebyshev.chebvander(2 * (since - index) - 1, stored.shape[2] - 1)
+    phi, theta, psi = np.einsum("nk,nak->an", values, stored[index])
+    return turn(2, phi) @ turn(0, theta) @ turn(2, psi)
+
+
+def turn(axis: int, angle: np.ndarray) -> np.ndarray:
+    """Matrices that turn vectors about one axis."""
+    found = np.zeros((len(angle), 3, 3))
+    a, b = (axis + 1) % 3, (axis + 2) % 3
+    found[:, axis, axis] = 1.0
+    found[:, a, a] = found[:, b, b] = np.cos(angle)
+    found[:, b, a] = np.sin(angle)
+    found[:, a, b] = -np.sin(angle)
+    return found
+
+
+def between(computed: np.ndarray, published: np.ndarray) -> np.ndarray:
+    """The small rotation vector (body axes, rad) from published attitudes to computed ones, (n, 3)."""
+    small = np.swapaxes(published, 1, 2) @ computed
+    parts = (small - np.swapaxes(small, 1, 2)) / 2
+    return np.stack([parts[:, 2, 1], parts[:, 0, 2], parts[:, 1, 0]], axis=1)
+
+
+def matrices(quaternions: np.ndarray) -> np.ndarray:
+    """Body to space, (n, 3, 3)."""
+    q = quaternions / np.linalg.norm(quaternions, axis=1, keepdims=True)
+    return np.moveaxis(np.array(mechanics.body_to_space(list(q.T))), -1, 0)
+
+
+def left_over(package: str, start: float, days: np.ndarray, quaternions: np.ndarray) -> dict[str, Any]:
+    """Rotation vectors from the package's librations to these attitudes, milliarcseconds."""
+    vectors = between(matrices(quaternions), librations(package, start + days)) * MAS
+    return {
+        "vectors": vectors,
+        "rms": float(np.sqrt((vectors**2).sum(axis=1).mean())),
+        "components": np.abs(vectors).max(axis=0).tolist(),
+    }
+
+
+def main() -> None:
+    """One run, told in a line of JSON."""
+    options = argparse.ArgumentParser(description=__doc__)
+    options.add_argument("out", nargs="?")
+    options.add_argument("--days", type=float, default=18264.0)
+    options.add_argument("--package", default="de421")
+    options.add_argument("--without", default="")
+    options.add_argument("--tolerance", type=float)
+    given = options.parse_args()
+    moon = Moon(given.package, [name for name in given.without.split(",") if name])
+    found = moon.integrate(given.days, given.tolerance)
+    rest = left_over(given.package, moon.start, found["days"], found["quaternion"])
+    if given.out:
+        np.savez(given.out, days=found["days"], states=found["states"], vectors=rest["vectors"])
+    shown = {key: found[key] for key in ("steps", "expressions", "read", "compile", "seconds")}
+    shown |= {"rms_mas": rest["rms"], "largest_mas": rest["components"]}
+    shown["peak"] = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+    print(json.dumps(shown))
+
+
+if __name__ == "__main__":
+    main()
