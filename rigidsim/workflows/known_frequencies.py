@@ -50,7 +50,7 @@ def known_frequencies(scene: Scene, *, driven: bool = False) -> list[Known]:
     for number, orbit in enumerate(orbits, 1):
         found += _of_orbit(orbit, str(number) if len(orbits) > 1 else "")
     sources = [gradient_source_of(load) for load in loads]
-    if any(source is not None and source.ephemeris for source in sources):
+    if any(source is not None and source.placement.lunisolar for source in sources):
         found += _delaunay(scene)
     librations = _librations(scene, orbits[0]) if len(orbits) == 1 == len(loads) else []
     return found + (librations or _of_spin(scene))

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from support import config, run_text
 
-from rigidsim.model.gradient import MEAN_DISTANCE, source_position
+from rigidsim.model.placements.series import MEAN_DISTANCE, source_position
 
 
 def at(body: str, seconds: float) -> tuple[float, float, float]:

@@ -14,7 +14,7 @@ from support import EPSILON, config, loaded, run_text, wide
 
 import rigidsim
 from rigidsim import ConfigError
-from rigidsim.model.gradient import source_position
+from rigidsim.model.placements.series import source_position
 
 NAMES = 'record = ["quaternion", "roll_pitch_yaw", "libration", "nadir"{}]'
 BODY = 'principal_moments = ["0.9", 1, "0.4"]\nmass = 2'

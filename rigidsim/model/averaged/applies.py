@@ -20,6 +20,7 @@ from rigidsim.model.averaged.spectrum import BodySpectrum
 from rigidsim.model.averaged.torques import reads_rates_alone
 from rigidsim.model.capabilities import gradient_source_of
 from rigidsim.model.carriers import carried_beside
+from rigidsim.model.gradient import GradientSource
 from rigidsim.model.load import Load
 from rigidsim.scene.choices import ORBIT_AVERAGED
 from rigidsim.scene.readable import span_text
@@ -91,20 +92,17 @@ def refuse_scene(scene: Scene, loads: Sequence[Load]) -> None:
     elif scene.bodies is not None and scene.bodies.full:
         against = 'coupling = "full" makes the bodies feel every rotation of this one'
         raise refused(level, against, 'set [body] coupling to "one_way", or choose level = "full"')
-    elif level == ORBIT_AVERAGED:
-        if beside := [source.pair.name for source in sources if source.pair]:
-            against = f'the orbit of the point mass "{beside[0]}" is integrated, so that there is no '
-            against += "ellipse to average over"
-            remedy = 'choose "spin_averaged", or write the elements of the orbit into a table '
-            raise refused(level, against, remedy + '(orbit = {table = "elements.csv"})')
-        if any(source.ephemeris for source in sources):
-            against = "the source of an ephemeris has no elements to average over"
-            raise refused(level, against, 'choose "spin_averaged", or give it an orbit with a node_rate')
+    elif level == ORBIT_AVERAGED and (unsuited := [x for x in map(_unsuited, sources) if x]):
+        raise refused(level, *unsuited[0])
     if against:
         raise refused(level, against)
     if alone and config.model.short_period:
         what = f"given true, but what {alone[0].title} does within a rotation isn't added back; "
         raise ConfigError(Problem("[model] short_period", what + "set it to false"))
+
+
+def _unsuited(source: GradientSource) -> tuple[str, str] | None:
+    return source.placement.without_elements
 
 
 def refuse_frequencies(

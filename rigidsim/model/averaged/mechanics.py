@@ -199,7 +199,7 @@ class AveragedMechanics(Mechanics):
             return self._pull_in_plane(source, orbit, s)
         if source.of.pair is not None:
             return self._pull_of_mass(source, source.of.pair, s)
-        direction, inverse = source.of.seen(self)
+        direction, inverse = source.of.placement.seen(self)
         factor = self._strength(source) * dot(direction, s)
         if inverse is not None:
             factor = factor * inverse**3
@@ -229,7 +229,7 @@ class AveragedMechanics(Mechanics):
         states = self.carried(self.point_masses)
         ends = min(pair.host, pair.number), max(pair.host, pair.number)  # either direction will do
         place, inverse = states.between(*ends), states.inverse_distances[ends]
-        cubed = self.number(context.ldexp(source.of.distance(context) ** 3, -3 * scaling.length))
+        cubed = self.number(context.ldexp(source.of.placement.distance(context) ** 3, -3 * scaling.length))
         size = cubed * self._strength(source)
         factor = size * (dot(place, s) * (inverse * inverse * inverse * (inverse * inverse)))
         return [factor * x for x in place]

@@ -18,11 +18,6 @@ from rigidsim.scene.arithmetic import Vector, eccentric_anomaly, norm
 from rigidsim.scene.orbit_tables.pieces import AXIS
 from rigidsim.scene.scene import Scene
 
-_DAY = 86400.0
-_ALMOST_PARABOLIC = 0.99  # a larger eccentricity's harmonics, of which a few thousand are told, hardly differ
-_SERIES = {"sun": (365.25636, 0.0167), "moon": (27.32166, 0.0549)}
-"""Sidereal period (days) and eccentricity, used to judge whether averages over the Earth's spin apply."""
-
 
 @dataclass(frozen=True)
 class Source:
@@ -30,49 +25,26 @@ class Source:
 
     number: int  # position of its ``[[loads]]`` table, from 1
     of: GradientSource
-    strength: Any  # 3 G M / a^3 (mpf, 1/s^2), a being ``GradientSource.distance``
-    motion: float = 0.0  # mean motion, rad/s; 0 at rest, or for a point mass that isn't bound to the body
-    eccentricity: float = 0.0  # of its orbit, the largest in a table
-    nearest: float = 1.0  # (a/r)^3 at the closest approach
-    slow_rate: float = 0.0  # bound of the rate of node and periapsis together, rad/s; for a mass an estimate
-    uncertainty: float = 0.0  # of a point mass's mean motion, rad/s
-    passing_rate: float | None = None  # of a point mass: angular rate at the closest approach, rad/s
+    strength: Any  # 3 G M / a^3 (mpf, 1/s^2), a being ``Placement.distance``
+    # as in ``Course``:
+    motion: float = 0.0
+    eccentricity: float = 0.0
+    nearest: float = 1.0
+    slow_rate: float = 0.0
+    uncertainty: float = 0.0
+    passing_rate: float | None = None
 
     @classmethod
     def at_start(cls, context: Any, number: int, source: GradientSource) -> Self:
         """The source as it moves at the start."""
-        given = number, source, 3 * source.gravitational_parameter / source.distance(context) ** 3
-        if (pair := source.pair) is not None:
-            least, rate = pair.encounter(context)
-            if (ellipse := pair.ellipse(context)) is None:
-                return cls(*given, passing_rate=float(rate))
-            # what the others do to axis and eccentricity is of the size of their share in the acceleration
-            perturbed, (axis, e, motion) = pair.perturbation(context), ellipse
-            closer = float(least / axis) * max(1 - 2 * perturbed, 0.5)
-            e = min(e + 2 * perturbed, _ALMOST_PARABOLIC)
-            doubt = perturbed * motion
-            return cls(*given, motion, e, closer**-3, doubt, doubt, float(rate))
-        if source.ephemeris is not None:
-            days, e = _SERIES[source.ephemeris]
-            return cls(*given, 2 * math.pi / (days * _DAY), e, (1 - e) ** -3)
-        if (table := source.table) is not None:
-            slow = float(table.normal_drift + table.shape_drift)
-            nearest = float(table.semi_major_axis / table.pericentre) ** 3
-            return cls(*given, float(table.mean_motion), float(table.largest_eccentricity), nearest, slow)
-        if (orbit := source.orbit) is None:
-            return cls(*given)
-        e = float(orbit.eccentricity)
-        slow = abs(float(orbit.node_rate)) + abs(float(orbit.periapsis_rate))
-        return cls(*given, abs(float(orbit.mean_motion)), e, (1 - e) ** -3, slow)
+        size = 3 * source.gravitational_parameter / source.placement.distance(context) ** 3
+        return cls(number, source, size, **vars(source.placement.course(context)))
 
     @property
     def name(self) -> str:
         """What messages call it."""
-        return (
-            f"number {self.number}"
-            if self.of.pair is None
-            else f'number {self.number} ("{self.of.pair.name}")'
-        )
+        name = self.of.placement.name
+        return f'number {self.number} ("{name}")' if name else f"number {self.number}"
 
     @property
     def has_elements(self) -> bool:
@@ -138,11 +110,11 @@ class Source:
 
     def pull(self, context: Any, time: Any) -> np.ndarray | None:
         """(a/r)^3 r r^T, (3, 3), at a time (a point mass: at the start); None for an ephemeris."""
-        place = self.of.position if self.of.pair is None else self.of.pair.place
+        place = self.of.placement.at(context, time)
         if place is not None:
             length = norm(context, place)
             direction = np.array([float(x / length) for x in place])
-            return np.outer(direction, direction) * float(self.of.distance(context) / length) ** 3
+            return np.outer(direction, direction) * float(self.of.placement.distance(context) / length) ** 3
         if not self.has_elements:
             return None
         e, at = float(self.ellipse(context, time).eccentricity), self.place(context, time)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
-import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, Literal
@@ -16,15 +14,15 @@ from rigidsim.model.capabilities import SourcePlace
 from rigidsim.model.gradient import GradientSource, gradient_terms, tidal_range
 from rigidsim.model.kinematics import Kinematics, quadratic_form
 from rigidsim.model.load import Load, Term
-from rigidsim.model.load_words import orbit_text, reach_text, source_text, value_text
+from rigidsim.model.load_words import source_text, value_text
 from rigidsim.model.loads.point_attraction import MovingGradient, positive_strength
-from rigidsim.model.orbit_planes import EclipticPlane, OrbitPlane
-from rigidsim.model.plausibility import about_distance, about_orbit, about_spin, about_strength, attracting
+from rigidsim.model.orbit_planes import OrbitPlane
+from rigidsim.model.placements.prescribed_orbit import AtRest, OnKeplerOrbit, OnTable
+from rigidsim.model.placements.series import BySeries
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.two_part import as_factor
-from rigidsim.scene.arithmetic import Vector, across, norm, parallel
-from rigidsim.scene.epochs import J2000
-from rigidsim.scene.exact import ExactNumber
+from rigidsim.scene.arithmetic import Vector, norm
+from rigidsim.scene.epochs import J2000, Epoch
 from rigidsim.scene.fields import GravitationalParameter, Metre, Triple
 from rigidsim.scene.frame import ECLIPTIC
 from rigidsim.scene.orbits import KeplerOrbit, Orbit, attracting_body, resolve_orbit, resolve_tabulated_orbit
@@ -64,7 +62,6 @@ class GravityGradient(GradientSource, Load):
     scene's epoch, by default J2000.
     """
 
-    axes: str | None = None
     Fields = GravityGradientFields
     title = "gravity_gradient"
     described = "a gravity-gradient load"
@@ -86,44 +83,43 @@ class GravityGradient(GradientSource, Load):
                 "orbit", f"given {found}; exactly one of orbit, position and ephemeris is needed"
             )
         if fields.orbit is not None and fields.orbit.table is not None:
-            return cls(strength, table=resolve_tabulated_orbit(fields.orbit, strength, around))
+            return cls(strength, OnTable(resolve_tabulated_orbit(fields.orbit, strength, around)))
         if fields.orbit is not None:
-            return cls(strength, orbit=resolve_orbit(fields.orbit, strength, around))
-        if fields.position is None:
+            return cls(strength, OnKeplerOrbit(resolve_orbit(fields.orbit, strength, around)))
+        if fields.ephemeris is not None:
             if around.axes not in (None, ECLIPTIC):
                 what = f'given "{around.axes}", but the ephemeris of [[loads]] number {around.number + 1} '
                 what += f'is in "{ECLIPTIC}"; write that, or leave axes out'
                 raise ConfigError(Problem("[frame] axes", what))
-            epoch = around.epoch or J2000
-            return cls(strength, ephemeris=fields.ephemeris, axes=ECLIPTIC, epoch=epoch)
-        position = [x.at(context) for x in fields.position]
+            return cls(strength, BySeries(fields.ephemeris, around.epoch or J2000))
+        position = [x.at(context) for x in fields.position or []]
         if all(x == 0 for x in position):
             raise around.fault("position", "given the origin, where the body is; another point is allowed")
-        return cls(strength, position=position)
+        return cls(strength, AtRest(position))
 
     def pictured(self) -> dict[str, Any]:
         strength = float(self.gravitational_parameter)
-        shown: dict[str, Any] = {"what": "source", "gravitational_parameter": strength}
-        if self.orbit is not None:
-            names = [field.name for field in dataclasses.fields(self.orbit)]
-            shown["orbit"] = {name: float(getattr(self.orbit, name)) for name in names}
-        if self.position is not None:
-            shown["position"] = [float(x) for x in self.position]
-        if self.ephemeris is not None:
-            shown["ephemeris"] = self.ephemeris
-        return shown
+        return {"what": "source", "gravitational_parameter": strength, **self.placement.pictured()}
 
     @property
     def gradient_source(self) -> GradientSource:
         return self
 
     @property
+    def axes(self) -> str | None:  # type: ignore[override]
+        return self.placement.axes
+
+    @property
+    def epoch(self) -> Epoch | None:  # type: ignore[override]
+        return self.placement.epoch
+
+    @property
     def conservative(self) -> bool:  # type: ignore[override]
-        return self.position is not None
+        return self.placement.rests() is not None
 
     @property
     def wide(self) -> bool:
-        return self.ephemeris is not None
+        return self.placement.wide
 
     @property
     def corotating_orbit(self) -> KeplerOrbit | None:
@@ -132,36 +128,33 @@ class GravityGradient(GradientSource, Load):
 
     @property
     def plane(self) -> OrbitPlane | None:
-        return EclipticPlane() if self.ephemeris == "sun" else None
+        return self.placement.plane
 
     @property
     def without_plane(self) -> str:
-        return "the series of the Moon alone names none" if self.ephemeris == "moon" else ""
+        return self.placement.without_plane
 
     @property
     def seconds_ahead(self) -> float:
-        """Time of the scene's epoch since J2000, in which the series count."""
-        if self.ephemeris is None or self.epoch is None:
-            return 0.0
-        return float(ExactNumber(self.epoch.since_j2000()))
+        return self.placement.seconds_ahead
 
     def source_direction(self, m: Kinematics) -> list[Symbolic]:
         if m.attitude is not None and m.attitude.orbital is not None:
             return m.attitude.orbital.direction
-        return m.seen(self.seen(m)[0])
+        return m.seen(self.placement.seen(m)[0])
 
     def source_place(self, m: Kinematics) -> SourcePlace:
-        direction, inverse = self.seen(m)
+        direction, inverse = self.placement.seen(m)
         inverse = hy.expression(1.0) if inverse is None else inverse
-        return SourcePlace(direction, inverse, self.distance(m.scene.context))
+        return SourcePlace(direction, inverse, self.placement.distance(m.scene.context))
 
     def source_at_start(self, scene: Scene) -> Vector:
-        return self.place(scene)
+        return self.placement.at_start(scene)
 
     def strength(self, m: Kinematics) -> tuple[Any, Symbolic | None]:
         """G M / R^3 in internal units: at a constant distance (mpf), and the factor by which it varies."""
-        context, (_, inverse) = m.scene.context, self.seen(m)
-        distance = self.distance(context)
+        context, (_, inverse) = m.scene.context, self.placement.seen(m)
+        distance = self.placement.distance(context)
         value = context.ldexp(self.gravitational_parameter / distance**3, 2 * m.scaling.time)
         return value, None if inverse is None else inverse**3
 
@@ -180,56 +173,28 @@ class GravityGradient(GradientSource, Load):
 
     def keeps_plane(self, scene: Scene, axis: Vector, normal: Vector) -> bool:
         """Whether c stays perpendicular to or along the axis: c x (I c) is then along the axis or zero."""
-        if self.orbit is not None:
-            return self.orbit.node_rate == 0 and parallel(
-                scene.context, self.orbit.normal(scene.context), normal
-            )
-        if self.position is None:
-            return False
-        length = norm(scene.context, self.position)
-        direction = [x / length for x in self.position]
-        return across(scene.context, direction, normal) or parallel(scene.context, direction, normal)
+        return self.placement.keeps_plane(scene.context, normal)
 
     def fixed_source(self, scene: Scene) -> tuple[Any, Vector] | None:
         """See ``Load``: the source, if it is at rest."""
-        if self.position is None:
+        position = self.placement.rests()
+        if position is None:
             return None
-        distance = norm(scene.context, self.position)
-        return 3 * self.gravitational_parameter / distance**3, [x / distance for x in self.position]
+        distance = norm(scene.context, position)
+        return 3 * self.gravitational_parameter / distance**3, [x / distance for x in position]
 
     def amplitude(self, scene: Scene) -> Any:
-        path = self.orbit or self.table
-        distance = self.distance(scene.context) if path is None else path.pericentre
-        return tidal_range(scene, self.gravitational_parameter, distance)
+        return tidal_range(scene, self.gravitational_parameter, self.placement.nearest(scene.context))
 
     def fastest_rate(self, scene: Scene) -> Any:
-        if self.table is not None:
-            return self.table.fastest_rate()
-        return scene.context.zero if self.orbit is None else self.orbit.fastest_rate(scene.context)
+        return self.placement.fastest_rate(scene.context)
 
     def told(self, scene: Scene) -> str:
-        strength, context = self.gravitational_parameter, scene.context
-        if self.orbit is not None:
-            where = orbit_text(self.orbit, strength)
-        elif self.table is not None:
-            where = f"{reach_text(strength, self.distance(context))} on average, on an orbit "
-            where += self.table.described
-        elif self.position is not None:
-            where = f"at rest, {reach_text(strength, norm(context, self.position))}"
-        else:
-            where = f"from its series, about {reach_text(strength, self.distance(context))}"
-        largest = value_text(self.amplitude(scene), "N m")
+        strength, largest = self.gravitational_parameter, value_text(self.amplitude(scene), "N m")
+        where = self.placement.told(scene.context, strength)
         return f"gravity gradient of {source_text(strength)}, {where}; torque up to {largest}"
 
     def cautions(self, fields: GravityGradientFields, where: str, scene: Scene) -> Iterator[Caution]:
         given = fields.gravitational_parameter
         assert given is not None
-        if fields.orbit is not None and self.orbit is not None:
-            yield from about_orbit(fields.orbit, self.orbit, given, where, scene)
-            yield from about_spin(fields.orbit, self.orbit, given, where, scene)
-        elif fields.position is not None:
-            distance = math.hypot(*map(float, fields.position))
-            yield from about_strength(given, distance, where)
-            yield from about_distance(
-                attracting(given, distance), distance, fields.position, f"{where} position"
-            )
+        yield from self.placement.cautions(fields, given, where, scene)

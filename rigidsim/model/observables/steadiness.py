@@ -56,8 +56,8 @@ def _turns_about_its_figure(m: Mechanics) -> bool:
 
 def _moves(load: Load) -> bool:
     source = gradient_source_of(load)
-    series = source is not None and source.ephemeris
-    return bool(orbit_of(load) or table_of(load) or series or isinstance(load, Reacting))
+    moves = source is not None and source.placement.moves
+    return bool(orbit_of(load) or table_of(load) or moves or isinstance(load, Reacting))
 
 
 def is_planet(m: Mechanics) -> bool:

@@ -1,0 +1,1 @@
+"""How distant sources are placed: one class for each way, all of one protocol."""

@@ -1,0 +1,140 @@
+# ruff: noqa: D102 (methods are those of Placement)
+"""Sources at rest, on Kepler orbits, and on tabulated ones."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+from rigidsim.model.kinematics import Kinematics
+from rigidsim.model.load_words import orbit_text, reach_text
+from rigidsim.model.placements.placement import Course, Placement
+from rigidsim.model.plausibility import about_distance, about_orbit, about_spin, about_strength, attracting
+from rigidsim.model.rotations import Symbolic
+from rigidsim.scene.arithmetic import Vector, across, norm, parallel
+from rigidsim.scene.orbit_tables.pieces import TabulatedOrbit
+from rigidsim.scene.orbits import KeplerOrbit
+from rigidsim.scene.scene import Scene
+from rigidsim.store.summary_parts import Caution
+
+
+@dataclass(frozen=True)
+class AtRest(Placement):
+    """A source that never moves."""
+
+    position: Vector  # m (mpf)
+
+    def distance(self, context: Any) -> Any:
+        return norm(context, self.position)
+
+    def _direction(self, context: Any) -> Vector:
+        length = norm(context, self.position)
+        return [x / length for x in self.position]
+
+    def seen(self, m: Kinematics) -> tuple[list[Symbolic], None]:
+        return m.fixed(self._direction(m.scene.context)), None
+
+    def at_start(self, scene: Scene) -> Vector:
+        return self.position
+
+    def at(self, context: Any, time: Any) -> Vector:
+        return self.position
+
+    def rests(self) -> Vector:
+        return self.position
+
+    def course(self, context: Any) -> Course:
+        return Course()
+
+    def keeps_plane(self, context: Any, normal: Vector) -> bool:
+        direction = self._direction(context)
+        return across(context, direction, normal) or parallel(context, direction, normal)
+
+    def told(self, context: Any, strength: Any) -> str:
+        return f"at rest, {reach_text(strength, norm(context, self.position))}"
+
+    def pictured(self) -> dict[str, Any]:
+        return {"position": [float(x) for x in self.position]}
+
+    def cautions(self, fields: Any, given: Any, where: str, scene: Scene) -> Iterator[Caution]:
+        distance = math.hypot(*map(float, fields.position))
+        yield from about_strength(given, distance, where)
+        yield from about_distance(attracting(given, distance), distance, fields.position, f"{where} position")
+
+
+@dataclass(frozen=True)
+class OnKeplerOrbit(Placement):
+    """A source on a prescribed Kepler orbit."""
+
+    orbit: KeplerOrbit
+
+    def distance(self, context: Any) -> Any:
+        return self.orbit.semi_major_axis
+
+    def nearest(self, context: Any) -> Any:
+        return self.orbit.pericentre
+
+    def seen(self, m: Kinematics) -> tuple[list[Symbolic], Symbolic | None]:
+        place = m.orbit(self.orbit)
+        return place.direction, None if self.orbit.circular else place.inverse_distance
+
+    def at_start(self, scene: Scene) -> Vector:
+        return self.orbit.place(scene.context, scene.start)
+
+    def course(self, context: Any) -> Course:
+        orbit, e = self.orbit, float(self.orbit.eccentricity)
+        slow = abs(float(orbit.node_rate)) + abs(float(orbit.periapsis_rate))
+        return Course(abs(float(orbit.mean_motion)), e, (1 - e) ** -3, slow)
+
+    def fastest_rate(self, context: Any) -> Any:
+        return self.orbit.fastest_rate(context)
+
+    def keeps_plane(self, context: Any, normal: Vector) -> bool:
+        return self.orbit.node_rate == 0 and parallel(context, self.orbit.normal(context), normal)
+
+    def told(self, context: Any, strength: Any) -> str:
+        return orbit_text(self.orbit, strength)
+
+    def pictured(self) -> dict[str, Any]:
+        names = [field.name for field in dataclasses.fields(self.orbit)]
+        return {"orbit": {name: float(getattr(self.orbit, name)) for name in names}}
+
+    def cautions(self, fields: Any, given: Any, where: str, scene: Scene) -> Iterator[Caution]:
+        yield from about_orbit(fields.orbit, self.orbit, given, where, scene)
+        yield from about_spin(fields.orbit, self.orbit, given, where, scene)
+
+
+@dataclass(frozen=True)
+class OnTable(Placement):
+    """A source on a tabulated orbit."""
+
+    table: TabulatedOrbit
+
+    def distance(self, context: Any) -> Any:
+        return self.table.semi_major_axis
+
+    def nearest(self, context: Any) -> Any:
+        return self.table.pericentre
+
+    def seen(self, m: Kinematics) -> tuple[list[Symbolic], Symbolic]:
+        place = m.table(self.table)
+        return place.direction, place.inverse_distance
+
+    def at_start(self, scene: Scene) -> Vector:
+        return self.table.place(scene.start)
+
+    def course(self, context: Any) -> Course:
+        table = self.table
+        slow = float(table.normal_drift + table.shape_drift)
+        nearest = float(table.semi_major_axis / table.pericentre) ** 3
+        return Course(float(table.mean_motion), float(table.largest_eccentricity), nearest, slow)
+
+    def fastest_rate(self, context: Any) -> Any:
+        return self.table.fastest_rate()
+
+    def told(self, context: Any, strength: Any) -> str:
+        reach = reach_text(strength, self.distance(context))
+        return f"{reach} on average, on an orbit {self.table.described}"
