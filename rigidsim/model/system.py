@@ -15,7 +15,8 @@ from rigidsim.model.formulations.formulation import Formulation, ModelPlan
 from rigidsim.model.heyoka_expressions import carries_sign, plain_angles, to_heyoka
 from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.names import state_names
-from rigidsim.model.orbits.prescribed import Pieces
+from rigidsim.model.orbits.pieces import Part, Pieces
+from rigidsim.model.orbits.prescribed import TablePieces
 from rigidsim.model.outputs import Invariant, Recorded, drift_outputs, find_invariants, recorded_variables
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.scaling import Rounder
@@ -240,10 +241,10 @@ class System:
 
     @cached_property
     def pieces(self) -> Pieces | None:
-        """What is reset at given times, where steps must end; None without tables."""
-        if not self.plan.tables:
-            return None
-        return Pieces(self.plan.tables, self.scaling.time, self.scene.start, self.number)
+        """What is set at given times, where steps must end; None without tables."""
+        given = self.scaling.time, self.scene.start, self.number
+        parts: list[Part] = [TablePieces(orbit, place, *given) for orbit, place in self.plan.tables.items()]
+        return Pieces(parts) if parts else None
 
     @property
     def stepwise(self) -> bool:

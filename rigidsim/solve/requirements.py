@@ -31,12 +31,14 @@ class Requirement(Protocol):
 def requirement_of(system: System) -> Requirement | None:
     """What a system's equations need; None if nothing, or if they switch and see to it themselves."""
     if system.pieces is not None:
-        return TableRows(system)
+        return SetAtKnots(system)
     return SecondNumber(system.parameters - 1) if system.clocked and not system.switches else None
 
 
-class TableRows:
-    """Parameters and states reset at the rows of a table, where steps end: any number gives the same bits."""
+class SetAtKnots:
+    """Parameters and states set where pieces of the equations begin, and steps end: at rows of tables, say.
+    Any number of times gives the same bits.
+    """
 
     each = False
 

@@ -13,7 +13,8 @@ Between two rows of a table each element is a polynomial of u, the elapsed fract
     u' = 1 / L,    x' = (c_1 + 2 c_2 u + ... + 5 c_5 u^4) / L,
 
 with coefficients that are parameters of the compiled equations. Steps end at the rows, where the parameters
-of the next piece take over and the states are put on the table's own values (``Pieces``): nothing adds up.
+of the next piece take over and the states are put on the values of the table (``TablePieces``): nothing adds
+up.
 The place on the orbit is the eccentric longitude K, carried by its cosine c and sine s as well:
 
     K' = (l' + k' s - h' c) / (1 - k c - h s),    r = a (1 - k c - h s).
@@ -24,7 +25,6 @@ from its start in a unit of which the whole table has less than one.
 """
 
 import math
-from bisect import bisect_right
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
@@ -258,78 +258,55 @@ def _unit(orbit: TabulatedOrbit, element: str) -> Any:
     return orbit.semi_major_axis if element == AXIS else orbit.context.one
 
 
-class Pieces:
-    """Pieces of the table that begin at ``knots`` (internal units): parameters, and states that are reset."""
+class TablePieces:
+    """Pieces of one table, which begin at its rows (see ``rigidsim.model.orbits.pieces.Part``)."""
 
     def __init__(
-        self, places: Mapping[TabulatedOrbit, TablePlace], time_exponent: int, start: Any, number: Rounder
+        self, orbit: TabulatedOrbit, place: TablePlace, time_exponent: int, start: Any, number: Rounder
     ) -> None:
-        self._places, self._exponent, self._start, self._number = places, time_exponent, start, number
-        found = [
-            (time, row, orbit)
-            for orbit in places
-            for row, time in enumerate(orbit.table.times[1:-1], start=1)
-            if time > start
-        ]
+        self._orbit, self._place, self._exponent = orbit, place, time_exponent
+        self._start, self._number = start, number
         self.knots: list[Any] = []
-        self._rows: list[dict[TabulatedOrbit, int]] = []
-        for time, row, orbit in sorted(found, key=lambda each: each[0]):
-            knot = number(orbit.context.ldexp(time, -time_exponent))
-            if not self.knots or knot > self.knots[-1]:  # rows of several tables may be at the same time
-                self.knots.append(knot)
-                self._rows.append({})
-            self._rows[-1][orbit] = row
-        self._known: dict[int, list[Any]] = {}
-
-    def number_at(self, time: Any) -> int:
-        """Number of the piece that begins at or contains a time (internal units, working precision)."""
-        return bisect_right(self.knots, time)
+        self._rows = [orbit.number_at(start)]
+        for row, time in enumerate(orbit.table.times[1:-1], start=1):
+            if time > start:
+                knot = number(orbit.context.ldexp(time, -time_exponent))
+                if self.knots and knot == self.knots[-1]:  # rows that the precision can't tell apart
+                    self._rows[-1] = row
+                else:
+                    self.knots.append(knot)
+                    self._rows.append(row)
 
     def parameters(self, number: int) -> list[Any]:
-        """All parameters of a piece, working precision."""
-        if number not in self._known:
-            found: list[Any] = []
-            for orbit in self._places:
-                least = orbit.context.ldexp(1, _LEAST * (orbit.context.prec - GUARD_BITS))
-                found += [
-                    self._number(x if abs(x) > least else 0 * x)
-                    for x in self._of(orbit, self._row(orbit, number))
-                ]
-            self._known = {number: found}  # the latest is asked for again and again
-        return self._known[number]
+        """See ``Part``."""
+        orbit = self._orbit
+        least = orbit.context.ldexp(1, _LEAST * (orbit.context.prec - GUARD_BITS))
+        return [self._number(x if abs(x) > least else 0 * x) for x in self._of(self._rows[number])]
 
     def states(self, number: int) -> dict[str, Any]:
-        """Values, by name, of the states that are reset where a piece begins, working precision."""
+        """See ``Part``."""
         found: dict[str, Any] = {}
-        for orbit, row in self._rows[number - 1].items() if number else ():
-            place, begin = self._places[orbit], orbit.row(row)
-            tag, elements = place.tag, place.elements(orbit)
-            found[_name("part", tag)] = orbit.context.zero
-            for element in elements:
-                if element != LONGITUDE:
-                    found[_name(element, tag)] = begin[element] / _unit(orbit, element)
-            if LONGITUDE in elements and place.longitude is Carried.MEAN:
-                since = begin[LONGITUDE] - orbit.starting_longitude(self._start)
-                found[_name(LONGITUDE, tag)] = orbit.context.ldexp(since, -orbit.longitude_exponent)
-            elif LONGITUDE in elements:
-                turned = orbit.eccentric_longitude(begin, begin[LONGITUDE])
-                found[f"cos_longitude{tag}"] = orbit.context.cos(turned)
-                found[f"sin_longitude{tag}"] = orbit.context.sin(turned)
+        orbit, place = self._orbit, self._place
+        begin, tag, elements = orbit.row(self._rows[number]), place.tag, place.elements(orbit)
+        found[_name("part", tag)] = orbit.context.zero
+        for element in elements:
+            if element != LONGITUDE:
+                found[_name(element, tag)] = begin[element] / _unit(orbit, element)
+        if LONGITUDE in elements and place.longitude is Carried.MEAN:
+            since = begin[LONGITUDE] - orbit.starting_longitude(self._start)
+            found[_name(LONGITUDE, tag)] = orbit.context.ldexp(since, -orbit.longitude_exponent)
+        elif LONGITUDE in elements:
+            turned = orbit.eccentric_longitude(begin, begin[LONGITUDE])
+            found[f"cos_longitude{tag}"] = orbit.context.cos(turned)
+            found[f"sin_longitude{tag}"] = orbit.context.sin(turned)
         return {name: self._number(value) for name, value in found.items()}
 
-    def _row(self, orbit: TabulatedOrbit, number: int) -> int:
-        """Table row at which a piece begins or in whose interval it lies."""
-        for before in range(number - 1, -1, -1):
-            if orbit in self._rows[before]:
-                return self._rows[before][orbit]
-        return orbit.number_at(self._start)
-
-    def _of(self, orbit: TabulatedOrbit, row: int) -> list[Any]:
+    def _of(self, row: int) -> list[Any]:
+        orbit = self._orbit
         times, piece = orbit.table.times, orbit.piece(row)
-        context = orbit.context
-        inverse = 1 / context.ldexp(times[row + 1] - times[row], -self._exponent)
+        inverse = 1 / orbit.context.ldexp(times[row + 1] - times[row], -self._exponent)
         found = [inverse]
-        for element in self._places[orbit].elements(orbit):
+        for element in self._place.elements(orbit):
             scale = inverse / _unit(orbit, element)
             found += [power * c * scale for power, c in enumerate(piece[element]) if power]
         return found
