@@ -15,7 +15,7 @@ from rigidsim.model.formulations.formulation import Formulation, ModelPlan
 from rigidsim.model.heyoka_expressions import carries_sign, plain_angles, to_heyoka
 from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.names import state_names
-from rigidsim.model.orbits.pieces import Part, Pieces
+from rigidsim.model.orbits.pieces import Pieces, PieceSeries
 from rigidsim.model.orbits.prescribed import TablePieces
 from rigidsim.model.outputs import Invariant, Recorded, drift_outputs, find_invariants, recorded_variables
 from rigidsim.model.rotations import Symbolic
@@ -242,8 +242,10 @@ class System:
     @cached_property
     def pieces(self) -> Pieces | None:
         """What is set at given times, where steps must end; None without tables."""
-        given = self.scaling.time, self.scene.start, self.number
-        parts: list[Part] = [TablePieces(orbit, place, *given) for orbit, place in self.plan.tables.items()]
+        unit, start = self.scaling.time, self.scene.start
+        parts: list[PieceSeries] = [
+            TablePieces(orbit, place, unit, start, self.number) for orbit, place in self.plan.tables.items()
+        ]
         return Pieces(parts) if parts else None
 
     @property

@@ -26,7 +26,7 @@ class Source:
     number: int  # position of its ``[[loads]]`` table, from 1
     of: GradientSource
     strength: Any  # 3 G M / a^3 (mpf, 1/s^2), a being ``Placement.distance``
-    # as in ``Course``:
+    # as in ``Circuit``:
     motion: float = 0.0
     eccentricity: float = 0.0
     nearest: float = 1.0
@@ -38,7 +38,7 @@ class Source:
     def at_start(cls, context: Any, number: int, source: GradientSource) -> Self:
         """The source as it moves at the start."""
         size = 3 * source.gravitational_parameter / source.placement.distance(context) ** 3
-        return cls(number, source, size, **vars(source.placement.course(context)))
+        return cls(number, source, size, **vars(source.placement.circuit(context)))
 
     @property
     def name(self) -> str:

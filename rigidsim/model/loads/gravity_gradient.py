@@ -17,8 +17,8 @@ from rigidsim.model.load import Load, Term
 from rigidsim.model.load_words import source_text, value_text
 from rigidsim.model.loads.point_attraction import MovingGradient, positive_strength
 from rigidsim.model.orbit_planes import OrbitPlane
-from rigidsim.model.placements.prescribed_orbit import AtRest, OnKeplerOrbit, OnTable
-from rigidsim.model.placements.series import BySeries
+from rigidsim.model.placements.prescribed_orbit import PlacedAtRest, PlacedByTable, PlacedOnOrbit
+from rigidsim.model.placements.series import PlacedBySeries
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.two_part import as_factor
 from rigidsim.scene.arithmetic import Vector, norm
@@ -83,19 +83,19 @@ class GravityGradient(GradientSource, Load):
                 "orbit", f"given {found}; exactly one of orbit, position and ephemeris is needed"
             )
         if fields.orbit is not None and fields.orbit.table is not None:
-            return cls(strength, OnTable(resolve_tabulated_orbit(fields.orbit, strength, around)))
+            return cls(strength, PlacedByTable(resolve_tabulated_orbit(fields.orbit, strength, around)))
         if fields.orbit is not None:
-            return cls(strength, OnKeplerOrbit(resolve_orbit(fields.orbit, strength, around)))
+            return cls(strength, PlacedOnOrbit(resolve_orbit(fields.orbit, strength, around)))
         if fields.ephemeris is not None:
             if around.axes not in (None, ECLIPTIC):
                 what = f'given "{around.axes}", but the ephemeris of [[loads]] number {around.number + 1} '
                 what += f'is in "{ECLIPTIC}"; write that, or leave axes out'
                 raise ConfigError(Problem("[frame] axes", what))
-            return cls(strength, BySeries(fields.ephemeris, around.epoch or J2000))
+            return cls(strength, PlacedBySeries(fields.ephemeris, around.epoch or J2000))
         position = [x.at(context) for x in fields.position or []]
         if all(x == 0 for x in position):
             raise around.fault("position", "given the origin, where the body is; another point is allowed")
-        return cls(strength, AtRest(position))
+        return cls(strength, PlacedAtRest(position))
 
     def pictured(self) -> dict[str, Any]:
         strength = float(self.gravitational_parameter)

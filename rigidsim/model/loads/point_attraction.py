@@ -22,7 +22,7 @@ from rigidsim.model.load import Load, Term
 from rigidsim.model.load_words import reach_text, source_text, value_text
 from rigidsim.model.orbit_planes import OrbitPlane
 from rigidsim.model.orbits.point_mass_states import PointMassPair
-from rigidsim.model.placements.point_mass import IsPointMass
+from rigidsim.model.placements.point_mass import PlacedAsMass
 from rigidsim.model.plausibility import about_start, about_strength, attracting
 from rigidsim.model.rotations import Symbolic, apply, length, transpose, unit
 from rigidsim.scene.arithmetic import Vector, cross, norm, unit_vectors
@@ -245,7 +245,7 @@ class MovingGradient(MovingSource):
         """The mass as the source of a gradient alone; None for a body that flies by itself."""
         if self.masses.host is None:
             return None
-        return GradientSource(self.strength, IsPointMass(PointMassPair(self.masses, self.number)))
+        return GradientSource(self.strength, PlacedAsMass(PointMassPair(self.masses, self.number)))
 
     def check(self, number: int, position: Vector | None) -> None:
         if self.masses.host is None and self.masses.full:

@@ -1,7 +1,7 @@
 """Pieces of the equations between times at which parameters and states are set, where steps have to end.
 
-Rows of a table of elements and blocks of an ephemeris are such times. Each ``Part`` numbers its own pieces,
-the one that contains the start being 0; ``Pieces`` joins parts, whose parameters follow one another.
+Rows of a table of elements and blocks of an ephemeris are such times. Each ``PieceSeries`` numbers its own
+pieces, the one that contains the start being 0; ``Pieces`` joins several, and their parameters.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from typing import Any, Protocol
 
 
-class Part(Protocol):
+class PieceSeries(Protocol):
     """Pieces of one kind.
 
     Attributes:
@@ -28,13 +28,13 @@ class Part(Protocol):
 
 
 class Pieces:
-    """Pieces of several parts together: one begins wherever one of a part does.
+    """Pieces of several series together: one begins wherever one of a series does.
 
     Attributes:
-        knots: as those of ``Part``.
+        knots: as those of ``PieceSeries``.
     """
 
-    def __init__(self, parts: Sequence[Part]) -> None:
+    def __init__(self, parts: Sequence[PieceSeries]) -> None:
         self._parts = parts
         found = sorted((knot, place) for place, part in enumerate(parts) for knot in part.knots)
         self.knots: list[Any] = []

@@ -259,7 +259,7 @@ def _unit(orbit: TabulatedOrbit, element: str) -> Any:
 
 
 class TablePieces:
-    """Pieces of one table, which begin at its rows (see ``rigidsim.model.orbits.pieces.Part``)."""
+    """Pieces of one table, which begin at its rows (see ``rigidsim.model.orbits.pieces.PieceSeries``)."""
 
     def __init__(
         self, orbit: TabulatedOrbit, place: TablePlace, time_exponent: int, start: Any, number: Rounder
@@ -278,13 +278,13 @@ class TablePieces:
                     self._rows.append(row)
 
     def parameters(self, number: int) -> list[Any]:
-        """See ``Part``."""
+        """See ``PieceSeries``."""
         orbit = self._orbit
         least = orbit.context.ldexp(1, _LEAST * (orbit.context.prec - GUARD_BITS))
         return [self._number(x if abs(x) > least else 0 * x) for x in self._of(self._rows[number])]
 
     def states(self, number: int) -> dict[str, Any]:
-        """See ``Part``."""
+        """See ``PieceSeries``."""
         found: dict[str, Any] = {}
         orbit, place = self._orbit, self._place
         begin, tag, elements = orbit.row(self._rows[number]), place.tag, place.elements(orbit)

@@ -24,7 +24,7 @@ from rigidsim.store.summary_parts import Caution
 
 
 @dataclass(frozen=True)
-class Course:
+class Circuit:
     """How a source goes round, as far as averages have to know.
 
     Attributes:
@@ -92,7 +92,7 @@ class Placement(ABC):
         """Where it is in a reader's terms, for a source of a gravitational parameter."""
 
     @abstractmethod
-    def course(self, context: Any) -> Course:
+    def circuit(self, context: Any) -> Circuit:
         """How it goes round."""
 
     def at(self, context: Any, time: Any) -> Vector | None:

@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 from rigidsim.model.kinematics import Kinematics
 from rigidsim.model.load_words import reach_text
 from rigidsim.model.orbits.point_mass_states import PointMassPair
-from rigidsim.model.placements.placement import Course, Placement
+from rigidsim.model.placements.placement import Circuit, Placement
 from rigidsim.model.rotations import Symbolic
 from rigidsim.scene.arithmetic import Vector, norm
 from rigidsim.scene.scene import Scene
@@ -18,7 +18,7 @@ _ALMOST_PARABOLIC = 0.99  # a larger eccentricity's harmonics, of which a few th
 
 
 @dataclass(frozen=True)
-class IsPointMass(Placement):
+class PlacedAsMass(Placement):
     """A point mass that moves under mutual gravity; it is judged by its osculating orbit of the start."""
 
     pair: PointMassPair
@@ -54,16 +54,16 @@ class IsPointMass(Placement):
         """The place at the start, whatever the time."""
         return self.pair.place
 
-    def course(self, context: Any) -> Course:
+    def circuit(self, context: Any) -> Circuit:
         least, rate = self.pair.encounter(context)
         if (ellipse := self.pair.ellipse(context)) is None:
-            return Course(passing_rate=float(rate))
+            return Circuit(passing_rate=float(rate))
         # what the others do to axis and eccentricity is of the size of their share in the acceleration
         perturbed, (axis, e, motion) = self.pair.perturbation(context), ellipse
         closer = float(least / axis) * max(1 - 2 * perturbed, 0.5)
         e = min(e + 2 * perturbed, _ALMOST_PARABOLIC)
         doubt = perturbed * motion
-        return Course(motion, e, closer**-3, doubt, doubt, float(rate))
+        return Circuit(motion, e, closer**-3, doubt, doubt, float(rate))
 
     def told(self, context: Any, strength: Any) -> str:
         return f"{reach_text(strength, norm(context, self.pair.place))} at the start"

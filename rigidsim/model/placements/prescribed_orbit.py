@@ -11,7 +11,7 @@ from typing import Any
 
 from rigidsim.model.kinematics import Kinematics
 from rigidsim.model.load_words import orbit_text, reach_text
-from rigidsim.model.placements.placement import Course, Placement
+from rigidsim.model.placements.placement import Circuit, Placement
 from rigidsim.model.plausibility import about_distance, about_orbit, about_spin, about_strength, attracting
 from rigidsim.model.rotations import Symbolic
 from rigidsim.scene.arithmetic import Vector, across, norm, parallel
@@ -22,7 +22,7 @@ from rigidsim.store.summary_parts import Caution
 
 
 @dataclass(frozen=True)
-class AtRest(Placement):
+class PlacedAtRest(Placement):
     """A source that never moves."""
 
     position: Vector  # m (mpf)
@@ -46,8 +46,8 @@ class AtRest(Placement):
     def rests(self) -> Vector:
         return self.position
 
-    def course(self, context: Any) -> Course:
-        return Course()
+    def circuit(self, context: Any) -> Circuit:
+        return Circuit()
 
     def keeps_plane(self, context: Any, normal: Vector) -> bool:
         direction = self._direction(context)
@@ -66,7 +66,7 @@ class AtRest(Placement):
 
 
 @dataclass(frozen=True)
-class OnKeplerOrbit(Placement):
+class PlacedOnOrbit(Placement):
     """A source on a prescribed Kepler orbit."""
 
     orbit: KeplerOrbit
@@ -84,10 +84,10 @@ class OnKeplerOrbit(Placement):
     def at_start(self, scene: Scene) -> Vector:
         return self.orbit.place(scene.context, scene.start)
 
-    def course(self, context: Any) -> Course:
+    def circuit(self, context: Any) -> Circuit:
         orbit, e = self.orbit, float(self.orbit.eccentricity)
         slow = abs(float(orbit.node_rate)) + abs(float(orbit.periapsis_rate))
-        return Course(abs(float(orbit.mean_motion)), e, (1 - e) ** -3, slow)
+        return Circuit(abs(float(orbit.mean_motion)), e, (1 - e) ** -3, slow)
 
     def fastest_rate(self, context: Any) -> Any:
         return self.orbit.fastest_rate(context)
@@ -108,7 +108,7 @@ class OnKeplerOrbit(Placement):
 
 
 @dataclass(frozen=True)
-class OnTable(Placement):
+class PlacedByTable(Placement):
     """A source on a tabulated orbit."""
 
     table: TabulatedOrbit
@@ -126,11 +126,11 @@ class OnTable(Placement):
     def at_start(self, scene: Scene) -> Vector:
         return self.table.place(scene.start)
 
-    def course(self, context: Any) -> Course:
+    def circuit(self, context: Any) -> Circuit:
         table = self.table
         slow = float(table.normal_drift + table.shape_drift)
         nearest = float(table.semi_major_axis / table.pericentre) ** 3
-        return Course(float(table.mean_motion), float(table.largest_eccentricity), nearest, slow)
+        return Circuit(float(table.mean_motion), float(table.largest_eccentricity), nearest, slow)
 
     def fastest_rate(self, context: Any) -> Any:
         return self.table.fastest_rate()

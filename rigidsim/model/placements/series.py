@@ -20,7 +20,7 @@ import heyoka as hy
 from rigidsim.model.kinematics import Kinematics, seconds
 from rigidsim.model.load_words import reach_text
 from rigidsim.model.orbit_planes import EclipticPlane, OrbitPlane
-from rigidsim.model.placements.placement import Course, Placement
+from rigidsim.model.placements.placement import Circuit, Placement
 from rigidsim.model.rotations import Symbolic
 from rigidsim.scene.arithmetic import Vector
 from rigidsim.scene.epochs import Epoch
@@ -59,7 +59,7 @@ def source_position(body: str, seconds: Symbolic) -> SourcePosition:
 
 
 @dataclass(frozen=True)
-class BySeries(Placement):
+class PlacedBySeries(Placement):
     """The geocentric Sun ("sun") or Moon ("moon"); space axes are the mean ecliptic and equinox of J2000."""
 
     body: str
@@ -101,9 +101,9 @@ class BySeries(Placement):
         far = self.distance(context) / context.mpf(inverse)
         return [far * context.mpf(x) for x in direction]
 
-    def course(self, context: Any) -> Course:
+    def circuit(self, context: Any) -> Circuit:
         days, e = _MEAN[self.body]
-        return Course(2 * math.pi / (days * _DAY), e, (1 - e) ** -3)
+        return Circuit(2 * math.pi / (days * _DAY), e, (1 - e) ** -3)
 
     def told(self, context: Any, strength: Any) -> str:
         return f"from its series, about {reach_text(strength, self.distance(context))}"
