@@ -26,7 +26,7 @@ import heyoka as hy
 import numpy as np
 from numpy.polynomial import chebyshev
 
-from experiments.bare import blocks, mechanics
+from experiments.bare import blocks, mechanics, precession
 from experiments.bare.mechanics import scaled, total
 
 EFFECTS = (
@@ -45,31 +45,6 @@ EFFECTS = (
 """What can be left out; "sun" takes the planets with it."""
 MEAN_RATE = 0.2299715
 MAS = math.degrees(1.0) * 3.6e6
-
-
-def earth_pole(julian_dates: np.ndarray) -> np.ndarray:
-    """The Earth's pole in axes of J2000: IAU 1976 precession and the 18.6-year term of nutation, (n, 3)."""
-    t = (julian_dates - 2451545.0) / 36525
-    arcsec = math.radians(1 / 3600)
-    zeta = (2306.2181 * t + 0.30188 * t**2 + 0.017998 * t**3) * arcsec
-    z = (2306.2181 * t + 1.09468 * t**2 + 0.018203 * t**3) * arcsec
-    theta = (2004.3109 * t - 0.42665 * t**2 - 0.041833 * t**3) * arcsec
-    node = np.radians(125.04452 - 1934.136261 * t)
-    obliquity = (84381.448 - 46.8150 * t) * arcsec
-    longitude, tilt = -17.1996 * arcsec * np.sin(node), 9.2025 * arcsec * np.cos(node)
-
-    def turned(axis: int, angle: np.ndarray, v: np.ndarray) -> np.ndarray:
-        """Components after the axes have turned by an angle about one of them."""
-        c, s = np.cos(angle), np.sin(angle)
-        a, b = (axis + 1) % 3, (axis + 2) % 3
-        found = v.copy()
-        found[:, a], found[:, b] = c * v[:, a] + s * v[:, b], -s * v[:, a] + c * v[:, b]
-        return found
-
-    # True to mean of date: N = R1(-eps - deps) R3(-dpsi) R1(eps), inverted; then mean of date to J2000.
-    v = np.tile([0.0, 0.0, 1.0], (len(t), 1))
-    v = turned(0, -obliquity, turned(2, longitude, turned(0, obliquity + tilt, v)))
-    return turned(2, zeta, turned(1, -theta, turned(2, z, v)))
 
 
 class Moon:
@@ -178,7 +153,7 @@ class Moon:
             found["delayed"] = blocks.later(found["earth"], -self.delay)
         nodes = chebyshev.chebpts1(3)
         dates = self.start + blocks.DAYS * (np.arange(count)[:, None] + (nodes + 1) / 2)
-        poles = earth_pole(dates.ravel()).reshape(count, 3, 3)
+        poles = precession.true_pole(dates.ravel()).reshape(count, 3, 3)
         series = np.swapaxes(np.linalg.inv(chebyshev.chebvander(nodes, 2)) @ poles, 1, 2)
         if "figure" not in self.without:
             found["pole"] = blocks.powers(series, 3)

@@ -1,0 +1,1 @@
+"""What the studies of the real Moon and the rigid Earth share: lines of nutation, fitted."""
