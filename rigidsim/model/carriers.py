@@ -62,6 +62,15 @@ class Lending(Protocol):
     lends: bool
 
 
+@runtime_checkable
+class Loose(Protocol):
+    """If ``loose``, its momentum isn't carried round with the body: ``exerted_torque`` is then all that it
+    exerts on the body, and -h' that less h x w.
+    """
+
+    loose: bool
+
+
 def carried_beside(loads: Iterable[Load]) -> str:
     """Why more turns than a body of constant moments, for what can't do with that; empty if it doesn't."""
     found = next((load for load in loads if isinstance(load, Carrier)), None)
@@ -86,7 +95,8 @@ def momentum_terms(carriers: Iterable[Carrier], m: Kinematics) -> list[Term]:
 def inner_torque(carriers: Iterable[Carrier], m: Kinematics) -> list[Term]:
     """Terms of h x w and of the torques that carriers exert on the body, in internal units of energy."""
     carriers, found = list(carriers), []
-    for vector, expression in momentum_terms(carriers, m):
+    held = [x for x in carriers if not (isinstance(x, Loose) and x.loose)]
+    for vector, expression in momentum_terms(held, m):
         for axis, unit, rate in zip(
             unit_vectors(m.scene.context), m.numbers.rate_units, m.rate_states, strict=True
         ):

@@ -13,7 +13,8 @@ from typing import Any, ClassVar, Protocol
 from pydantic import Field, field_validator
 
 from rigidsim.errors import ConfigError, Problem
-from rigidsim.scene.arithmetic import Vector
+from rigidsim.scene.arithmetic import Matrix, Vector
+from rigidsim.scene.bodies.body import RigidBody
 from rigidsim.scene.epochs import Epoch
 from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.expressions.names import Names
@@ -72,6 +73,7 @@ class Surroundings:
         bodies: point masses besides the body.
         names: what expressions may read.
         table: array of tables that it stands in.
+        body: the rigid body, for what keys of ``[body]`` bring.
     """
 
     number: int
@@ -86,6 +88,7 @@ class Surroundings:
     bodies: PointMasses | None = None
     names: Names = field(default_factory=Names)
     table: str = "loads"
+    body: RigidBody | None = None
 
     @property
     def carried_bodies(self) -> PointMasses:
@@ -111,6 +114,8 @@ class SceneLoad:
         epoch: date of time 0 in its own equations; None if these have none.
         bearing: moment (mpf, kg m^2) and unit axis (body axes) of what turns on a bearing of its own, which
             torques on the body don't accelerate about that axis; None for all others.
+        apart: tensor of inertia (mpf, kg m^2, body axes) of what doesn't turn with the body, a fluid core's,
+            which is part of the body's own; None for all others.
         inner_momentum: angular momentum relative to the body at the start (mpf, body axes); None for none.
     """
 
@@ -121,6 +126,7 @@ class SceneLoad:
     axes: str | None = None
     epoch: Epoch | None = None
     bearing: tuple[Any, Vector] | None = None
+    apart: Matrix | None = None
     inner_momentum: Vector | None = None
 
     @classmethod

@@ -41,9 +41,11 @@ class RotorTable(ConfigTable):
     """a motor keeps the rate, whatever torque that takes"""
 
 
-def turning_inertia(context: Any, body: RigidBody, bearings: Sequence[Bearing]) -> tuple[Matrix, Matrix]:
-    """Tensor of what turns with the body, I - sum of J a a^T over rotors that turn on bearings, and its
-    inverse: by elements, so that numbers of a sweep stay in it.
+def turning_inertia(
+    context: Any, body: RigidBody, bearings: Sequence[Bearing], apart: Sequence[Matrix] = ()
+) -> tuple[Matrix, Matrix]:
+    """Tensor of what turns with the body, I - sum of J a a^T over rotors that turn on bearings and less the
+    tensors of what turns ``apart``, and its inverse: by elements, so that numbers of a sweep stay in it.
 
     Raises:
         ConfigError: no body has such a tensor.
@@ -53,6 +55,8 @@ def turning_inertia(context: Any, body: RigidBody, bearings: Sequence[Bearing]) 
         for i, row in enumerate(tensor):
             for j in range(3):
                 row[j] -= moment * axis[i] * axis[j]
+    for other in apart:
+        tensor = [[x - y for x, y in zip(*rows, strict=True)] for rows in zip(tensor, other, strict=True)]
     half = sum((tensor[i][i] for i in range(3)), context.zero) / 2
     spread = [[(half if i == j else context.zero) - tensor[i][j] for j in range(3)] for i in range(3)]
     size = context.maximum([abs(x) for row in body.inertia for x in row])

@@ -63,7 +63,7 @@ class Scene:
         states: those of one's own that are carried.
         events: crossings that are recorded, or end the run.
         turning_inertia: tensor of what turns with the body: ``body.inertia``, the one of the mass
-            distribution, less the moments about their axes of what turns on bearings.
+            distribution, less the moments about their axes of what turns on bearings, and a fluid core's.
         inverse_inertia: its pseudo-inverse.
         axes, epoch: what the space axes and time 0 are, if the config says so or a load implies it.
         figure: the body's figure axis, see ``[frame] figure_axis``.
@@ -164,12 +164,17 @@ def build_scene(experiment: Experiment, context: Any = None) -> Scene:
         given, tabled = _resolve_loads(
             config, body, context, masses, names, free_flight=free_flight, span=(start, end)
         )
-        around = Surroundings(0, context, config.parameters, body.center_of_mass, free_flight, names=names)
+        around = Surroundings(
+            0, context, config.parameters, body.center_of_mass, free_flight, names=names, body=body
+        )
         brought = [kind.resolve(config, around) for kind in OF_BODY.values() if kind.brought_by(config)]
         resolved = [*given, *(load for found in tabled.values() for load in found), *brought]
         bearings = [load.bearing for load in resolved if load.bearing is not None]
         inverse = inverse_inertia(context, body)
-        turning = turning_inertia(context, body, bearings) if bearings else (body.inertia, inverse)
+        apart = [load.apart for load in resolved if load.apart is not None]
+        turning = body.inertia, inverse
+        if bearings or apart:
+            turning = turning_inertia(context, body, bearings, apart)
         fields = [load.uniform_field for load in resolved if load.uniform_field is not None]
         gravity = [sum(x, context.zero) for x in zip(*fields, strict=True)] if fields else None
         for number, load in enumerate(resolved):

@@ -21,6 +21,8 @@ from rigidsim.scene.fields import (
     Moment,
     MomentOrFormula,
     OneOf,
+    PerSecond,
+    Rate,
     Triple,
     name_or_vector,
 )
@@ -104,6 +106,19 @@ Reference = Annotated[
 ]
 
 
+class Core(ConfigTable):
+    """A fluid core that turns by itself: symmetric about the body's axis of largest moment."""
+
+    moment: Dimensionless = Field(examples=[0.0007])
+    """its moment about that axis, over the body's own, which includes it; at least 0 and below 1"""
+    flattening: Dimensionless = Field(ZERO, examples=[3.8e-4])
+    """(C_c - A_c) / C_c of its moments, from 0 to 0.5: by it the mantle's pressure turns it"""
+    friction: PerSecond = Field(ZERO, examples=["1.5e-8 day^-1"])
+    """torque of the mantle on it per difference of their rates, over the body's largest moment"""
+    angular_velocity: Triple[Rate] | None = Field(None, examples=[[0, 0, "13 deg/day"]])
+    """its angular velocity relative to space at the start, body axes; by default the body's"""
+
+
 class Body(Solid):
     """``[body]``: exactly one source of inertia, and what loads need beside it."""
 
@@ -125,6 +140,8 @@ class Body(Solid):
     """solids that make up the body"""
     preset: Annotated[str, OneOf(PRESETS)] | None = None
     """name of a published body"""
+    core: Core | None = None
+    """a fluid core within the body"""
     mass: Kilogram | None = Field(None, examples=[12])
     """mass of the body; required for shapes, and wherever a load or the translational motion uses it"""
     host: StrictStr | None = Field(None, examples=["earth"])

@@ -1,0 +1,276 @@
+"""A fluid core: it turns at a rate of its own, by friction and by the pressure of a flattened boundary.
+
+Its axis p is the body's axis of largest moment, its tensor I_c = A_c + (C_c - A_c) p p^T stays in body axes,
+and with its rate v and the body's w, both in body axes,
+
+    N_c = K (v - w) + (C_c - A_c) (p . v) p x v,
+    d(I_m w)/dt + w x I_m w = N + N_c,    d(I_c v)/dt + w x I_c v = -N_c,    I_m = I - I_c
+
+(Poincare's model to first order in the flattening, as in Williams, Boggs, Yoder, Ratcliff & Dickey 2001, JGR
+106, 27933). The angular momentum I_m w + I_c v is kept, and of the energy w . I_m w / 2 + v . I_c v / 2
+friction takes K |v - w|^2. With d = w - v, f = (C_c - A_c) / C_c and M = 1 - f p p^T the core's equation is
+
+    v' = M (v x d + K / A_c d) + f / (1 - f) (p . v) p x d,
+
+in which everything is small where the core follows the body. Other torques act on the whole tensor I.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import heyoka as hy
+
+from rigidsim.errors import ConfigError, Problem
+from rigidsim.model.kinematics import Kinematics, in_common_unit
+from rigidsim.model.load import Load, Term
+from rigidsim.model.load_words import value_text
+from rigidsim.model.rotations import Symbolic
+from rigidsim.model.scaling import exponent, largest_rates
+from rigidsim.model.state_blocks import StateBlock
+from rigidsim.scene.arithmetic import Matrix, Vector, apply, cross, dot, norm, unit_vectors
+from rigidsim.scene.bodies.body import RigidBody
+from rigidsim.scene.frame import unique_axis
+from rigidsim.scene.registry import Surroundings, register_of_body
+from rigidsim.scene.scene import Scene
+from rigidsim.scene.schema import Config
+from rigidsim.scene.tracing.numbers import plain
+
+STATES = ("core_wx", "core_wy", "core_wz")
+
+
+@register_of_body("core")
+@dataclass(frozen=True)
+class FluidCore(Load):
+    """The core; numbers are mpf.
+
+    Attributes:
+        axis: its axis of symmetry (unit, body axes).
+        polar: its moment about that, kg m^2.
+        flattening: (C_c - A_c) / C_c.
+        friction: K, kg m^2/s.
+        rate: its angular velocity at the start (rad/s, body axes); None for the body's.
+    """
+
+    axis: Vector
+    polar: Any
+    flattening: Any
+    friction: Any
+    rate: Vector | None
+
+    title = "fluid core"
+    described = "a fluid core"
+    conservative = True  # what friction takes is told by ``supplied_power``
+    loose = True  # see ``carriers.Loose``
+
+    @classmethod
+    def brought_by(cls, config: Config) -> bool:
+        return config.body.core is not None
+
+    @classmethod
+    def resolve(cls, fields: Config, around: Surroundings) -> FluidCore:
+        context, body, table = around.context, around.body, fields.body.core
+        assert table is not None
+        assert body is not None
+        moment, flattening, friction = (
+            x.at(context) for x in (table.moment, table.flattening, table.friction)
+        )
+        if not 0 <= moment < 1:
+            raise _fault("moment", f"given {_text(moment)}; a part of the body's own, from 0 to below 1, is")
+        if not 0 <= flattening <= 0.5:
+            raise _fault("flattening", f"given {_text(flattening)}; a number from 0 to 0.5 is")
+        if friction < 0:
+            raise _fault("friction", f"given {_text(friction)} s^-1; a positive rate or 0 is")
+        if any(x != 0 for x in body.center_of_mass):
+            what = (
+                "given for a body that turns about another point than its centre of mass, about which a core "
+            )
+            raise ConfigError(Problem("[body] core", what + "would turn; remove reference or center_of_mass"))
+        if fields.initial.angular_momentum is not None and table.angular_velocity is not None:
+            what = (
+                "given beside angular_velocity of [body] core, from which the body's own would follow; give "
+            )
+            raise ConfigError(Problem("[initial] angular_momentum", what + "angular_velocity here, too"))
+        if fields.initial.equilibrium is not None:
+            what = "given for a body with a fluid core, and equilibria are found for rigid bodies; give the "
+            raise ConfigError(Problem("[initial] equilibrium", what + "attitude and rates themselves"))
+        largest = context.maximum(body.principal_moments)
+        axis = unique_axis(body, context, largest=True)
+        if axis is None and flattening != 0 and moment != 0:
+            what = (
+                f"given {_text(flattening)}, but the body's two largest moments are equal, so that no axis "
+                "of largest moment tells the core's; 0 is"
+            )
+            raise _fault("flattening", what)
+        rate = None if table.angular_velocity is None else [x.at(context) for x in table.angular_velocity]
+        axis = axis or unit_vectors(context)[2]
+        made = cls(axis, moment * largest, flattening, friction * largest, rate)
+        if made.acts():
+            _refuse_odd_mantle(made, body, context)
+        return made
+
+    def acts(self) -> bool:
+        """Without a moment the body is rigid."""
+        return bool(self.polar != 0)
+
+    # --- its tensor and rate --------------------------------------------------------------------------------
+
+    @property
+    def tensor(self) -> Matrix:
+        """I_c, kg m^2, body axes."""
+        equatorial, more = self.polar * (1 - self.flattening), self.polar * self.flattening
+        return [
+            [more * p * q + (equatorial if i == j else 0) for j, q in enumerate(self.axis)]
+            for i, p in enumerate(self.axis)
+        ]
+
+    @property
+    def apart(self) -> Matrix | None:  # type: ignore[override]
+        """See ``SceneLoad``."""
+        return self.tensor if self.acts() else None
+
+    def at_start(self, scene: Scene) -> Vector:
+        """Its rate at the start, rad/s, body axes."""
+        return scene.angular_velocity if self.rate is None else self.rate
+
+    def unit(self, m: Kinematics) -> int:
+        """Binary exponent of the unit of its rate, relative to 1 / (unit of time): for as fast as it begins,
+        or as the body may turn.
+        """
+        context, scene = m.scene.context, m.scene
+        fastest = context.maximum(
+            [norm(context, self.at_start(scene)), *largest_rates(scene, m.scaling.drive)]
+        )
+        return exponent(context, fastest) + m.scaling.time
+
+    def rates(self, m: Kinematics) -> list[Symbolic]:
+        """Its angular velocity, body axes, in units of 1/time."""
+        unit = m.scene.context.ldexp(m.scene.context.one, self.unit(m))
+        return in_common_unit(list(hy.make_vars(*STATES)), [unit] * 3, m.number)
+
+    def _slip(self, m: Kinematics) -> list[Symbolic]:
+        """w - v."""
+        return [w - v for w, v in zip(m.rates, self.rates(m), strict=True)]
+
+    def _along(self, m: Kinematics, vector: list[Symbolic]) -> Symbolic:
+        return hy.sum([m.number(p) * x for p, x in zip(self.axis, vector, strict=True) if p != 0])
+
+    def extra_states(self, m: Kinematics) -> StateBlock:
+        context, f, unit = m.scene.context, self.flattening, self.unit(m)
+        rates, slip = self.rates(m), self._slip(m)
+        across = cross(rates, slip)
+        if self.friction != 0:
+            drag = m.number(context.ldexp(self.friction / (self.polar * (1 - f)), m.scaling.time))
+            across = [x + drag * d for x, d in zip(across, slip, strict=True)]
+        slopes = [[x] for x in across]
+        if f != 0:
+            along, spin = self._along(m, across), self._along(m, rates)
+            for row, p, turned in zip(slopes, self.axis, cross(m.fixed(self.axis), slip), strict=True):
+                row += [m.number(-f * p) * along] if p != 0 else []
+                row.append(m.number(f / (1 - f)) * (spin * turned))
+        own = m.number(context.ldexp(context.one, -unit))
+        derivatives = [hy.sum(row) if unit == 0 else own * hy.sum(row) for row in slopes]
+        start = [context.ldexp(x, m.scaling.time - unit) for x in self.at_start(m.scene)]
+        exponents = [unit - m.scaling.time] * 3
+        return StateBlock(STATES, derivatives, start, exponents=exponents, why="rate of the fluid core")
+
+    # --- its momentum ---------------------------------------------------------------------------------------
+
+    def carried_momentum(self, m: Kinematics) -> list[Term]:
+        context, tensor = m.scene.context, self.tensor
+        inner = [[context.ldexp(x, -m.scaling.inertia) for x in row] for row in tensor]
+        return list(zip(inner, self.rates(m), strict=True))  # symmetric: rows are columns
+
+    def carried_energy(self, m: Kinematics) -> Symbolic:
+        rates, terms = self.rates(m), []
+        for vector, rate in self.carried_momentum(m):
+            terms += [m.number(x / 2) * (v * rate) for x, v in zip(vector, rates, strict=True) if x != 0]
+        return hy.sum(terms)
+
+    def exerted_torque(self, m: Kinematics) -> list[Term]:
+        context, rates, found = m.scene.context, self.rates(m), []
+        if self.flattening != 0:
+            size = context.ldexp(self.polar * self.flattening, -m.scaling.inertia)
+            spin = self._along(m, rates)
+            for axis, rate in zip(unit_vectors(context), rates, strict=True):
+                found.append(([size * x for x in cross(self.axis, axis)], spin * rate))
+        if self.friction != 0:
+            drag = context.ldexp(self.friction, -m.scaling.momentum)
+            for axis, slip in zip(unit_vectors(context), self._slip(m), strict=True):
+                found.append(([-drag * x for x in axis], slip))
+        return found
+
+    def supplied_power(self, m: Kinematics) -> Symbolic | None:
+        if self.friction == 0:
+            return None
+        drag = m.number(m.scene.context.ldexp(self.friction, -m.scaling.momentum))
+        return -(drag * hy.sum([d * d for d in self._slip(m)]))
+
+    def carried_at_start(self, scene: Scene) -> tuple[Vector, Any]:
+        rate = self.at_start(scene)
+        momentum = apply(self.tensor, rate)
+        return momentum, dot(rate, momentum) / 2
+
+    def amplitude(self, scene: Scene) -> Any:
+        """Half its energy: all of the sum of both, which friction can only lessen, may become the body's, and
+        bounds add four times this to w . I_m w.
+        """
+        return self.carried_at_start(scene)[1] / 2
+
+    # --- what readers are told ------------------------------------------------------------------------------
+
+    def told(self, scene: Scene) -> str:
+        body, context = scene.body, scene.context
+        part = plain(self.polar) / max(plain(x) for x in body.principal_moments)
+        said = f"fluid core: {context.nstr(part, 6)} of the body's largest moment"
+        said += f", flattened by {_text(self.flattening)}" if self.flattening != 0 else ", spherical"
+        if self.friction != 0:
+            time = plain(self.polar / self.friction)
+            said += f"; friction would take its rate to the mantle's in {value_text(time, 's')}"
+        else:
+            said += "; without friction"
+        slip = norm(
+            context,
+            [plain(x) - plain(y) for x, y in zip(self.at_start(scene), scene.angular_velocity, strict=True)],
+        )
+        same = (
+            f"begins {value_text(slip, 'rad/s')} from the mantle's rate"
+            if slip
+            else "begins at the mantle's rate"
+        )
+        return f"{said}; {same}"
+
+
+def _refuse_odd_mantle(core: FluidCore, body: RigidBody, context: Any) -> None:
+    """Refuse a core whose rest, the mantle, is no body."""
+    moments = []
+    for moment, axis in zip(body.principal_moments, body.principal_axes, strict=True):
+        moments.append(moment - dot(axis, apply(core.tensor, axis)))
+    slack = -context.maximum(body.principal_moments) * _ROUNDING_OF_INPUT
+    total = sum(moments, context.zero)
+    if all(x > 0 and total - 2 * x >= slack for x in moments):
+        return
+    listed = ", ".join(context.nstr(plain(x), 8) for x in moments)
+    what = (
+        f"given a moment of {context.nstr(plain(core.polar), 8)} kg m^2, which leaves the mantle the moments "
+        f"{listed} kg m^2, and no body has these (all are positive, and none is more than the sum of the "
+        "others); make the core smaller, or flatten it otherwise"
+    )
+    raise ConfigError(Problem("[body] core", what))
+
+
+_ROUNDING_OF_INPUT = 1e-14
+
+
+def _text(number: Any) -> str:
+    return f"{float(plain(number)):.6g}"
+
+
+def _fault(key: str, text: str) -> ConfigError:
+    return ConfigError(Problem(f"[body] core.{key}", f"{text} allowed"))
+
+
+def core_of(scene: Scene) -> FluidCore | None:
+    """The fluid core of a scene; None for a rigid body."""
+    return next((load for load in scene.loads if isinstance(load, FluidCore)), None)
