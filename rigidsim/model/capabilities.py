@@ -209,6 +209,20 @@ class Ending(Protocol):
     def endings(self, m: Kinematics) -> list[tuple[str, Symbolic]]: ...
 
 
+@runtime_checkable
+class Beside(Protocol):
+    """It acts beside another load, on the same source, which that one places."""
+
+    beside: Any
+
+
+@runtime_checkable
+class Unaveraged(Protocol):
+    """Why no average over the rotation takes it."""
+
+    unaveraged: str
+
+
 # --- how it acts ------------------------------------------------------------------------------------------
 
 

@@ -6,8 +6,8 @@ that a config, a schema or a message never needs a second list of names.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar, Protocol
 
 from pydantic import Field, field_validator
@@ -180,6 +180,23 @@ class SceneLoad:
         yield from ()
 
 
+class Companion(Protocol):
+    """A class of loads that a key of another load brings beside it, on the same source."""
+
+    @classmethod
+    def beside_of(cls, load: SceneLoad, fields: Any, body: Any, around: Surroundings) -> SceneLoad | None:
+        """The load that acts beside another one; None where the key's value brings none.
+
+        Args:
+            load: the one that has the key, resolved.
+            fields: its keys.
+            body: the body (``RigidBody``).
+
+        Raises:
+            ConfigError: the key contradicts something else.
+        """
+
+
 class Named(Protocol):
     """An observable as far as a config needs to know it."""
 
@@ -196,6 +213,9 @@ TABLES: dict[str, type[SceneLoad]] = {}
 
 OF_BODY: dict[str, type[SceneLoad]] = {}
 """Loads that keys of ``[body]`` bring, by the key: ``resolve`` is given the whole config."""
+
+BESIDE: dict[str, Any] = {}
+"""Loads that a key of a load brings beside it (``Companion``), by the key."""
 
 OBSERVABLES: dict[str, Any] = {}
 """What can be recorded, by name, in the order in which a dataset holds it (``Named``)."""
@@ -235,6 +255,28 @@ def register_of_body(key: str) -> Callable[[type[SceneLoad]], type[SceneLoad]]:
         return kind
 
     return register
+
+
+def register_beside(key: str) -> Callable[[Any], Any]:
+    """Register loads that a key of other loads brings beside these (a class decorator)."""
+
+    def register(kind: Any) -> Any:
+        BESIDE[key] = kind
+        return kind
+
+    return register
+
+
+def companions(
+    loads: Sequence[SceneLoad], tables: Sequence[LoadFields], body: Any, around: Surroundings
+) -> list[SceneLoad]:
+    """What the keys of loads bring beside them."""
+    found = []
+    for number, (load, fields) in enumerate(zip(loads, tables, strict=True)):
+        for key, kind in BESIDE.items():
+            if getattr(fields, key, None) is not None:
+                found.append(kind.beside_of(load, fields, body, replace(around, number=number)))
+    return [load for load in found if load is not None]
 
 
 def register_observable(observable: Named) -> None:

@@ -10,6 +10,7 @@ from rigidsim.errors import ConfigError, Problem
 from rigidsim.scene import schema, starts
 from rigidsim.scene.arithmetic import Matrix, Vector, context_for
 from rigidsim.scene.bodies.body import RigidBody, build_body, inverse_inertia
+from rigidsim.scene.bodies.gravity_field import gravity_field_of
 from rigidsim.scene.config import Experiment
 from rigidsim.scene.epochs import Epoch
 from rigidsim.scene.exact import ExactNumber
@@ -20,7 +21,7 @@ from rigidsim.scene.frame import Figure, figure_of, reference_normal
 from rigidsim.scene.moving_moments import moments_at_start
 from rigidsim.scene.own_states import OwnState, carried_states, resolve_states
 from rigidsim.scene.point_masses import PointMasses, resolve_point_masses
-from rigidsim.scene.registry import LOAD_KINDS, OF_BODY, TABLES, SceneLoad, Surroundings
+from rigidsim.scene.registry import LOAD_KINDS, OF_BODY, TABLES, SceneLoad, Surroundings, companions
 from rigidsim.scene.rotors import refuse_odd_rotors, turning_inertia
 from rigidsim.scene.sample_times import SampleTimes, sample_times
 
@@ -168,6 +169,8 @@ def build_scene(experiment: Experiment, context: Any = None) -> Scene:
             0, context, config.parameters, body.center_of_mass, free_flight, names=names, body=body
         )
         brought = [kind.resolve(config, around) for kind in OF_BODY.values() if kind.brought_by(config)]
+        dated = replace(around, axes=config.frame.axes or _first(given, "axes"), epoch=config.time.epoch)
+        brought += companions(given, config.loads, body, dated)
         resolved = [*given, *(load for found in tabled.values() for load in found), *brought]
         bearings = [load.bearing for load in resolved if load.bearing is not None]
         inverse = inverse_inertia(context, body)
@@ -210,8 +213,8 @@ def build_scene(experiment: Experiment, context: Any = None) -> Scene:
             start=start,
             end=end,
             samples=samples,
-            axes=config.frame.axes or next((load.axes for load in resolved if load.axes), None),
-            epoch=config.time.epoch or next((load.epoch for load in resolved if load.epoch), None),
+            axes=config.frame.axes or _first(resolved, "axes"),
+            epoch=config.time.epoch or _first(resolved, "epoch"),
             figure=figure_of(config.frame, body, context),
             reference=reference_normal(config.frame, context),
             config=config,
@@ -227,7 +230,13 @@ def build_scene(experiment: Experiment, context: Any = None) -> Scene:
 
 def _body_at_start(config: schema.Config, context: Any) -> RigidBody:
     moments = moments_at_start(config, context, config.time.start.at(context))
-    return build_body(config.body, context, config.integrator.euler_sequence, moments)
+    body = build_body(config.body, context, config.integrator.euler_sequence, moments)
+    return replace(body, gravity=gravity_field_of(config.body.gravity_field, body, context))
+
+
+def _first(loads: Iterable[SceneLoad], what: str) -> Any:
+    """The first that a load implies; None if none does."""
+    return next((found for load in loads if (found := getattr(load, what))), None)
 
 
 def _is_among(load: SceneLoad, loads: Iterable[SceneLoad]) -> bool:

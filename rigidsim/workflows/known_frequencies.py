@@ -9,7 +9,7 @@ from typing import Any
 import mpmath
 
 from rigidsim.analysis.labels import Known
-from rigidsim.model.capabilities import GradientAlone, gradient_source_of, orbit_of
+from rigidsim.model.capabilities import Beside, GradientAlone, gradient_source_of, orbit_of
 from rigidsim.model.carriers import carried_beside
 from rigidsim.model.load import loads_of
 from rigidsim.scene.arithmetic import Vector, apply, dot, transpose
@@ -43,7 +43,7 @@ def known_frequencies(scene: Scene, *, driven: bool = False) -> list[Known]:
         found = _of_motion(closed.motion)
         return [Known(k.name, mpmath.ldexp(k.value, -closed.scaling.time), 0.0, k.source) for k in found]
     found = []
-    loads = loads_of(scene)
+    loads = [load for load in loads_of(scene) if not isinstance(load, Beside)]
     if carried_beside(loads):
         return []
     orbits = [orbit for load in loads if (orbit := orbit_of(load)) is not None]

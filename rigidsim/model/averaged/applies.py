@@ -18,7 +18,7 @@ from rigidsim.model.averaged.resonance import Resonance
 from rigidsim.model.averaged.sources import Source
 from rigidsim.model.averaged.spectrum import BodySpectrum
 from rigidsim.model.averaged.torques import reads_rates_alone
-from rigidsim.model.capabilities import gradient_source_of
+from rigidsim.model.capabilities import Unaveraged, gradient_source_of, having
 from rigidsim.model.carriers import carried_beside
 from rigidsim.model.gradient import GradientSource
 from rigidsim.model.load import Load
@@ -57,6 +57,8 @@ def refuse_scene(scene: Scene, loads: Sequence[Load]) -> None:
         against = "the body has a position and flies"
     elif against:
         pass
+    elif strange := [load.unaveraged for load in having(Unaveraged, loads)]:
+        against = strange[0]
     elif not loads:
         against = "no torque acts, so that the direction of the angular momentum rests"
     elif max(scene.body.principal_moments) == min(scene.body.principal_moments):

@@ -19,7 +19,7 @@ from typing import Any
 import heyoka as hy
 
 from rigidsim.model import rotations
-from rigidsim.model.capabilities import corotating_orbit_of
+from rigidsim.model.capabilities import Beside, corotating_orbit_of
 from rigidsim.model.formulations.formulation import Formulation, ModelPlan
 from rigidsim.model.load import Load
 from rigidsim.model.rotations import Symbolic, SymbolicMatrix
@@ -48,7 +48,7 @@ class OrbitalQuaternion(Formulation):
         """The formulation where it saves products: on a circle in a fixed plane, if the load on it is the
         only one that reads the attitude; None elsewhere.
         """
-        readers = [load for load in loads if {"attitude", "vertical"} & load.reads]
+        readers = [x for x in loads if {"attitude", "vertical"} & x.reads and not isinstance(x, Beside)]
         if scene.torque_arm is not None or len(readers) != 1 or _reads_places(scene):
             return None
         orbit = corotating_orbit_of(readers[0])

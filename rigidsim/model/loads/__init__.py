@@ -9,6 +9,7 @@ from rigidsim.model.loads import (  # noqa: F401  (each enters its kind; a new l
     applied,
     central_gravity,
     fluid_core,
+    gravity_field,
     gravity_gradient,
     magnetic_dipole,
     mass_loss,

@@ -13,6 +13,7 @@ from rigidsim.model.gradient import tidal_range
 from rigidsim.model.kinematics import Kinematics
 from rigidsim.model.load import Load, Term
 from rigidsim.model.load_words import length_text, reach_text, source_text, span_words, value_text
+from rigidsim.model.loads.gravity_field import AttractingFields
 from rigidsim.model.loads.point_attraction import MovingAttractor, PointAttraction, positive_strength
 from rigidsim.model.plausibility import about_start, about_strength, attracting
 from rigidsim.model.rotations import Symbolic
@@ -21,12 +22,12 @@ from rigidsim.scene.exact import ZERO
 from rigidsim.scene.fields import GravitationalParameter, Metre, Rate, Triple
 from rigidsim.scene.orbits import Orbit, attracting_body
 from rigidsim.scene.point_masses import closest
-from rigidsim.scene.registry import SourceFields, Surroundings, register_load
+from rigidsim.scene.registry import Surroundings, register_load
 from rigidsim.scene.scene import Scene
 from rigidsim.store.summary_parts import Caution
 
 
-class CentralGravityFields(SourceFields):
+class CentralGravityFields(AttractingFields):
     """A point that attracts a freely flying body: force and torque to second degree."""
 
     kind: Literal["central_gravity"]

@@ -15,6 +15,7 @@ from rigidsim.model.gradient import GradientSource, gradient_terms, tidal_range
 from rigidsim.model.kinematics import Kinematics, quadratic_form
 from rigidsim.model.load import Load, Term
 from rigidsim.model.load_words import source_text, value_text
+from rigidsim.model.loads.gravity_field import AttractingFields
 from rigidsim.model.loads.point_attraction import MovingGradient, positive_strength
 from rigidsim.model.orbit_planes import OrbitPlane
 from rigidsim.model.placements.prescribed_orbit import PlacedAtRest, PlacedByTable, PlacedOnOrbit
@@ -26,12 +27,12 @@ from rigidsim.scene.epochs import J2000, Epoch
 from rigidsim.scene.fields import GravitationalParameter, Metre, Triple
 from rigidsim.scene.frame import ECLIPTIC
 from rigidsim.scene.orbits import KeplerOrbit, Orbit, attracting_body, resolve_orbit, resolve_tabulated_orbit
-from rigidsim.scene.registry import SourceFields, Surroundings, register_load
+from rigidsim.scene.registry import Surroundings, register_load
 from rigidsim.scene.scene import Scene
 from rigidsim.store.summary_parts import Caution
 
 
-class GravityGradientFields(SourceFields):
+class GravityGradientFields(AttractingFields):
     """Torque of a distant attracting body, to second degree (MacCullagh's formula)."""
 
     kind: Literal["gravity_gradient"]

@@ -173,9 +173,11 @@ class MovingSource(PointAttraction):
         return [-x - y for x, y in zip(*self.pull(m, as_point=self.as_points), strict=True)]
 
     def reaction(self, m: Kinematics) -> list[tuple[int, Any, list[Symbolic]]]:
-        if not self.masses.full:
-            return []
-        pull, host, context = self.acceleration(m), self.masses.host, m.scene.context
+        return self.answered(self.acceleration(m), m) if self.masses.full else []
+
+    def answered(self, pull: list[Symbolic], m: Kinematics) -> list[tuple[int, Any, list[Symbolic]]]:
+        """What the masses feel where the body is accelerated so by this one; see ``Reacting``."""
+        host, context = self.masses.host, m.scene.context
         if host is None:
             own = context.mpf(GRAVITATIONAL_CONSTANT) * m.carried(m.scene.body.mass)
             return [(self.number, -own / self.strength, pull)]

@@ -23,7 +23,7 @@ from typing import Any
 
 import heyoka as hy
 
-from rigidsim.model.capabilities import Reacting, gradient_source_of, orbit_of, table_of
+from rigidsim.model.capabilities import Beside, Reacting, gradient_source_of, orbit_of, table_of
 from rigidsim.model.frames import plane_drift
 from rigidsim.model.load import Load
 from rigidsim.model.mechanics import Mechanics
@@ -55,7 +55,7 @@ def _turns_about_its_figure(m: Mechanics) -> bool:
 
 
 def _moves(load: Load) -> bool:
-    source = gradient_source_of(load)
+    source = gradient_source_of(load.beside if isinstance(load, Beside) else load)
     moves = source is not None and source.placement.moves
     return bool(orbit_of(load) or table_of(load) or moves or isinstance(load, Reacting))
 

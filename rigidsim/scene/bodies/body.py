@@ -15,6 +15,7 @@ from pydantic import BaseModel
 from rigidsim.scene import attitude
 from rigidsim.scene.arithmetic import Matrix, Vector, apply, diagonal, eigen, multiply, transpose
 from rigidsim.scene.bodies import table as body_table
+from rigidsim.scene.bodies.gravity_field import GravityField
 from rigidsim.scene.bodies.pieces import (
     drawn,
     parallel_axis,
@@ -55,6 +56,7 @@ class RigidBody:
         principal_axes: the matching unit axes as rows, body axes, right-handed.
         drawing: solids for the pictures (see ``rigidsim.look.solids``), as plain JSON values.
         source: key that the inertia came from, with the preset's reference if there is one.
+        gravity: its gravity beyond the inertia tensor; None if the config gives none.
     """
 
     mass: Any | None
@@ -64,6 +66,7 @@ class RigidBody:
     principal_axes: Matrix
     source: str
     drawing: list[dict[str, Any]] = field(default_factory=list)
+    gravity: GravityField | None = None
 
 
 def build_body(

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import Field, StrictStr, Tag, WithJsonSchema, create_model
 
+from rigidsim.scene.bodies.gravity_field import GravityFieldTable
 from rigidsim.scene.bodies.presets import PRESETS
 from rigidsim.scene.bodies.shapes import DIMENSIONS, SHAPES
 from rigidsim.scene.exact import ZERO
@@ -144,6 +145,10 @@ class Body(Solid):
     """a fluid core within the body"""
     mass: Kilogram | None = Field(None, examples=[12])
     """mass of the body; required for shapes, and wherever a load or the translational motion uses it"""
+    gravity_field: GravityFieldTable | None = Field(
+        None, examples=[{"radius": "1738 km", "C": {"3,0": -8.4e-6, "3,1": 2.8e-5}, "S": {"3,1": 5.9e-6}}]
+    )
+    """the body's gravity beyond the inertia tensor, from degree 3 on, for loads that ask for it by degree"""
     host: StrictStr | None = Field(None, examples=["earth"])
     """name of the point mass in [[bodies]] that this body is"""
     coupling: Literal["one_way", "full"] | None = None

@@ -1,0 +1,324 @@
+"""The torque and force of a source on the body's field of degree 3 and more: ``degree`` of a load.
+
+It acts beside the load that has the key, which is to second degree, on the same source. With u the unit
+vector to the source in body axes, r its distance and f_n the body's harmonics of degree n,
+
+    U = -(G M m / r) sum (R/r)^n f_n(u),       N = -(G M m / r) sum (R/r)^n u x grad f_n,
+    a = (G M / r^2) sum (R/r)^n ((n + 1) f_n u + u x (u x grad f_n)),
+
+G M being the source's, m the body's mass, a its acceleration in flight.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import heyoka as hy
+from pydantic import Field, StrictInt
+
+from rigidsim.model.capabilities import (
+    Attracting,
+    KeepsPlane,
+    Reacting,
+    corotating_orbit_of,
+    fixed_source_of,
+    is_wide,
+    orbit_of,
+    table_of,
+)
+from rigidsim.model.harmonics import Harmonics, Series, polynomial, turning
+from rigidsim.model.kinematics import Kinematics
+from rigidsim.model.load import Load, Term
+from rigidsim.model.load_words import length_text, value_text
+from rigidsim.model.rotations import Symbolic, apply
+from rigidsim.scene.arithmetic import Vector, across, cross, negligible, norm, parallel, unit_vectors
+from rigidsim.scene.bodies.gravity_field import LEAST, MOST, GravityField, Harmonic
+from rigidsim.scene.orbit_tables.pieces import TabulatedOrbit
+from rigidsim.scene.orbits import KeplerOrbit
+from rigidsim.scene.point_masses import PointMasses
+from rigidsim.scene.registry import SceneLoad, SourceFields, Surroundings, register_beside
+from rigidsim.scene.scene import Scene
+from rigidsim.scene.tracing.numbers import plain
+
+_UNROLLED = 4
+"""Degree up to which the expressions are unrolled."""
+
+
+class AttractingFields(SourceFields):
+    """Keys of a load whose source attracts the body."""
+
+    degree: StrictInt | None = Field(
+        None,
+        ge=2,
+        le=MOST,
+        description="degree of [body] gravity_field to which this source attracts the body; by default 2, "
+        "which is the inertia tensor",
+        examples=[4],
+    )
+
+
+@dataclass(frozen=True)
+class FieldAttraction(Load):
+    """Attraction of the field from degree 3 on.
+
+    Attributes:
+        beside: the load of degree 2 on the same source.
+        field: of the body.
+        strength: G M of the source, m^3/s^2 (mpf).
+        number: of the load in the config, from 1.
+    """
+
+    beside: Any
+    field: GravityField
+    degree: int
+    strength: Any
+    number: int
+
+    title = "gravity_field"
+    described = "the body's gravity field"
+    has_source = False
+    unaveraged = (
+        "the gravity field of degree 3 and more has no average; the gradient alone has one (set degree = 2)"
+    )
+
+    @property
+    def reads(self) -> frozenset[str]:  # type: ignore[override]
+        return frozenset(self.beside.reads)
+
+    @property
+    def conservative(self) -> bool:  # type: ignore[override]
+        return bool(self.beside.conservative)
+
+    @property
+    def orbit(self) -> KeplerOrbit | None:
+        return orbit_of(self.beside)
+
+    @property
+    def table(self) -> TabulatedOrbit | None:
+        return table_of(self.beside)
+
+    @property
+    def corotating_orbit(self) -> KeplerOrbit | None:
+        return corotating_orbit_of(self.beside)
+
+    @property
+    def wide(self) -> bool:
+        return is_wide(self.beside) or self.degree > _UNROLLED
+
+    def acts(self) -> bool:
+        return bool(self.coefficients)
+
+    def among(self, masses: PointMasses) -> SceneLoad:
+        return replace(self, beside=self.beside.among(masses))
+
+    # --- the harmonics --------------------------------------------------------------------------------------
+
+    @cached_property
+    def coefficients(self) -> dict[Harmonic, Any]:
+        """Those that aren't zero, unnormalized (mpf)."""
+        return self.field.to(self.degree)
+
+    def _by_degree(self) -> list[tuple[int, Series]]:
+        found: dict[int, dict[Harmonic, Any]] = {}
+        for key, value in self.coefficients.items():
+            found.setdefault(key[0], {})[key] = value
+        return list(found.items())
+
+    def _seen(self, m: Kinematics) -> tuple[Harmonics, Symbolic, Any]:
+        """Polynomials of the direction to the source in body axes, unit over distance, and that unit, m."""
+        place = self.beside.source_place(m)
+        direction = m.carried(self.beside.source_direction(m))
+        return Harmonics(direction, m.number, m.scene.context), place.inverse, place.unit
+
+    def _energy(self, m: Kinematics, unit: Any, n: int) -> Any:
+        """G M m R^n over unit^(n + 1), internal units of energy (mpf)."""
+        size = self.strength * m.scene.body.mass / unit * (self.field.radius / unit) ** n
+        return m.scene.context.ldexp(size, -m.scaling.energy)
+
+    def _torque(self, m: Kinematics) -> list[Symbolic]:
+        """Components in body axes, internal units of energy."""
+        harmonics, inverse, unit = self._seen(m)
+        parts: list[list[tuple[int, Symbolic]]] = [[], [], []]
+        for n, series in self._by_degree():
+            size = -self._energy(m, unit, n)
+            vectors = turning(series, m.scene.context)
+            for axis, part in enumerate(parts):
+                along = {key: size * vector[axis] for key, vector in vectors.items()}
+                if any(c != 0 for c in along.values()):
+                    part.append((n, harmonics.summed(along)))
+        return [_by_powers(part, inverse, 1) for part in parts]
+
+    def _scalar(self, m: Kinematics, sizes: Any, above: int) -> Symbolic:
+        """Sum of f_n times a constant (mpf) of each degree and ``inverse`` to the power of n + ``above``."""
+        harmonics, inverse, unit = self._seen(m)
+        parts = []
+        for n, series in self._by_degree():
+            size = sizes(unit, n)
+            scaled = {key: size * c for key, c in polynomial(series, m.scene.context).items()}
+            parts.append((n, harmonics.summed(scaled)))
+        return _by_powers(parts, inverse, above)
+
+    # --- what it does ---------------------------------------------------------------------------------------
+
+    def torque(self, m: Kinematics) -> list[Term]:
+        pairs = zip(unit_vectors(m.scene.context), self._torque(m), strict=True)
+        return [(axis, part) for axis, part in pairs if part != hy.expression(0.0)]
+
+    def potential(self, m: Kinematics) -> Symbolic | None:
+        return self._scalar(m, lambda unit, n: -self._energy(m, unit, n), 1)
+
+    def acceleration(self, m: Kinematics) -> list[Symbolic]:
+        """Of the centre of mass, space axes, internal units of speed over time."""
+        context, scaling = m.scene.context, m.scaling
+        place = self.beside.source_place(m)
+
+        def radial(unit: Any, n: int) -> Any:
+            size = (n + 1) * self.strength / unit**2 * (self.field.radius / unit) ** n
+            return context.ldexp(size, scaling.time - scaling.speed)
+
+        outward = self._scalar(m, radial, 2)
+        arm = m.carried(m.scene.body.mass) * place.unit
+        lever = context.ldexp(-1 / arm, scaling.energy + scaling.time - scaling.speed)
+        turned = cross(place.direction, apply(m.matrix, self._torque(m)))
+        factor = m.number(lever) * place.inverse
+        return [outward * u + factor * x for u, x in zip(place.direction, turned, strict=True)]
+
+    # --- what it conserves ----------------------------------------------------------------------------------
+
+    def _vectors(self, context: Any) -> dict[int, dict[Harmonic, Vector]]:
+        return {n: turning(series, context) for n, series in self._by_degree()}
+
+    def keeps_axial(self, m: Kinematics, axis: Vector) -> bool:
+        """Whether the field is symmetric about the axis, too."""
+        context = m.scene.context
+        found = self._vectors(context).values()
+        return all(across(context, vector, axis) for vectors in found for vector in vectors.values())
+
+    def keeps_plane(self, scene: Scene, axis: Vector, normal: Vector) -> bool:
+        """Whether the source stays in the plane, or along its normal, and the torque there is along the axis:
+        for a field that is symmetric to the plane.
+        """
+        context, towards = scene.context, self.beside.source_at_start(scene)
+        if not (isinstance(self.beside, KeepsPlane) and self.beside.keeps_plane(scene, axis, normal)):
+            return False
+        if parallel(context, towards, normal):
+            return all(self._keeps(context, axis, u) for u in (axis, [-x for x in axis]))
+        least = min(range(3), key=lambda i: abs(plain(axis[i])))
+        first = cross(axis, unit_vectors(context)[least])
+        first = [x / norm(context, first) for x in first]
+        second, count = cross(axis, first), 2 * self.degree + 1  # which tell a sum of such harmonics
+        for k in range(count):
+            c, s = context.cos(2 * context.pi * k / count), context.sin(2 * context.pi * k / count)
+            if not self._keeps(context, axis, [c * a + s * b for a, b in zip(first, second, strict=True)]):
+                return False
+        return True
+
+    def _keeps(self, context: Any, axis: Vector, direction: Vector) -> bool:
+        """Whether the torque towards a source in a direction (mpf) is along the axis, or zero, degree by
+        degree.
+        """
+        tiny, values = negligible(context), Harmonics(direction, lambda x: x, context)
+        for vectors in self._vectors(context).values():
+            torque = [sum((x[i] * values[key] for key, x in vectors.items()), context.zero) for i in range(3)]
+            size = sum((norm(context, x) for x in vectors.values()), context.zero)
+            if norm(context, cross(axis, torque)) > tiny * size:
+                return False
+        return True
+
+    def turns_about(self, m: Kinematics, axis: Vector) -> bool:
+        """Whether the axis isn't the line to a source at rest."""
+        fixed = fixed_source_of(self.beside, m.scene)
+        return fixed is None or not parallel(m.scene.context, fixed[1], axis)
+
+    # --- sizes, and what readers are told -------------------------------------------------------------------
+
+    def _size(self, scene: Scene) -> Any:
+        """Bound of the potential energy at the closest approach, J: |P_nm|^2 <= (n + m)! / (n - m)!."""
+        context, near, total = scene.context, _nearest(self.beside, scene), scene.context.zero
+        for (n, m, _), value in self.coefficients.items():
+            highest = context.sqrt(context.mpf(math.factorial(n + m)) / math.factorial(n - m))
+            total += abs(value) * highest * (self.field.radius / near) ** n
+        return total * self.strength * scene.body.mass / near
+
+    def amplitude(self, scene: Scene) -> Any:
+        return 2 * self._size(scene)
+
+    def told(self, scene: Scene) -> str:
+        count, radius = len(self.coefficients), length_text(float(plain(self.field.radius)))
+        which = f"degree {LEAST}" if self.degree == LEAST else f"degrees {LEAST} to {self.degree}"
+        from_where = f", from {self.field.described}" if self.field.described else ""
+        return (
+            f"gravity field of the body, {which} ({count} coefficient{'s' * (count > 1)}, radius {radius}"
+            f"{from_where}), on which the source of [[loads]] number {self.number} acts; energy up to "
+            f"{value_text(plain(self._size(scene)), 'J')}"
+        )
+
+    @classmethod
+    def beside_of(cls, load: Any, fields: AttractingFields, body: Any, around: Surroundings) -> Load | None:
+        """See ``Companion``."""
+        degree, field = fields.degree, body.gravity
+        assert degree is not None
+        if degree < LEAST:
+            return None
+        given = f"given {degree}, but "
+        if field is None:
+            what = (
+                "[body] has no gravity_field; give it, or leave degree out (the inertia tensor is degree 2)"
+            )
+            raise around.fault("degree", given + what)
+        if degree > field.degree:
+            raise around.fault("degree", f"{given}[body] gravity_field ends at degree {field.degree}")
+        kind = _Flown if isinstance(load, Attracting) else _Moving if isinstance(load, Reacting) else cls
+        strength = getattr(load, "gravitational_parameter", None) or load.strength
+        return kind(load, field, degree, strength, around.number + 1)
+
+
+register_beside("degree")(FieldAttraction)
+
+
+class _Flown(FieldAttraction):
+    """Of a point at rest, about which the body flies."""
+
+    @property
+    def attracting_point(self) -> Vector:
+        point: Vector = self.beside.attracting_point
+        return point
+
+    def force(self, m: Kinematics) -> list[Term]:
+        return list(zip(unit_vectors(m.scene.context), self.acceleration(m), strict=True))
+
+
+class _Moving(FieldAttraction):
+    """Of a point mass that moves besides the body."""
+
+    def force(self, m: Kinematics) -> list[Term]:
+        if not self.beside.as_points:
+            return []
+        return list(zip(unit_vectors(m.scene.context), self.acceleration(m), strict=True))
+
+    def reaction(self, m: Kinematics) -> list[tuple[int, Any, list[Symbolic]]]:
+        return self.beside.answered(self.acceleration(m), m) if self.beside.masses.full else []
+
+
+def _nearest(load: Any, scene: Scene) -> Any:
+    """Least distance of a load's source, m (mpf)."""
+    if hasattr(load, "nearest_approach"):
+        return load.nearest_approach(scene)
+    if hasattr(load, "encounter"):
+        return load.encounter(scene)[0]
+    return load.placement.nearest(scene.context)
+
+
+def _by_powers(parts: list[tuple[int, Symbolic]], inverse: Symbolic, above: int) -> Symbolic:
+    """Sum of expressions, each times ``inverse`` to the power of its degree + ``above``."""
+    if not parts:
+        return hy.expression(0.0)
+    constant = inverse == hy.expression(1.0)
+    (last, total), *others = reversed(parts)
+    for n, part in others:
+        total = part + (total if constant else inverse ** (last - n) * total)
+        last = n
+    return total if constant else inverse ** (last + above) * total

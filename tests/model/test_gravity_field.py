@@ -1,0 +1,233 @@
+"""The field of the body from degree 3 on: torque and force against Legendre functions and point masses."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+import pytest
+from equations import CLOSE, Random, array, derivative, general_body, matrix, prepared
+from field_truth import gradient, keys, lumpy, moments_of, pulled, random_field, tensor_of
+from support import config, run_text
+
+import rigidsim
+from rigidsim import ConfigError
+from rigidsim.solve.problem import prepare
+
+RADIUS, MU, MASS = 0.7, 2.5, 3.25
+LUMPS = (
+    'gravity_field = {radius = 0.5, C = {"3,0" = -0.02, "3,1" = 0.013, "3,3" = 0.004, "4,0" = 0.008, '
+    '"4,2" = -0.003, "4,4" = 1e-4}, S = {"3,1" = 5.9e-3, "3,2" = -2e-3, "4,1" = 3e-3, "4,3" = 1e-3}}'
+)
+BODY = f"principal_moments = [1, 1.2, 1.5]\nmass = 10\n{LUMPS}"
+START = "angular_velocity = [0.1, 0.4, 0.5]\neuler_angles = [0.3, 0.7, 0.2]"
+ORBIT = "orbit = {semi_major_axis = 2, eccentricity = 0.2, inclination = 0.3}"
+
+
+def gradient_of(place: str = ORBIT, degree: int = 4, strength: float = 2.0) -> str:
+    return f'kind = "gravity_gradient"\ngravitational_parameter = {strength}\n{place}\ndegree = {degree}'
+
+
+def expected(tensor: np.ndarray, field: dict, c: np.ndarray) -> np.ndarray:
+    """Torque by a source at c (body axes): MacCullagh's, and -G M m x cross grad Phi."""
+    r = np.linalg.norm(c)
+    return 3 * MU / r**5 * np.cross(c, tensor @ c) - MU * MASS * np.cross(c, gradient(field, RADIUS, c))
+
+
+@pytest.mark.parametrize("degree", [3, 4, 7])
+def test_the_torque_is_that_of_the_differentiated_series_in_any_body_axes(degree: int) -> None:
+    random = Random(degree)
+    for number in range(3):
+        tensor, field = random.tensor(), random_field(random.generator, degree)
+        place, q, w = random.vector(2), random.quaternion(), random.vector()
+        if number == 2:  # over the body's pole
+            q, place = np.array([1.0, 0, 0, 0]), np.array([0, 0, -1.5])
+        load = gradient_of(f"position = {array(place)}", degree, MU)
+        body = f"{general_body(tensor, MASS)}\n{keys(field, RADIUS)}".replace(
+            "center_of_mass = [0, 0, 0]", ""
+        )
+        system = prepared(body, f"angular_velocity = {array(w)}\nquaternion = {array(q)}", load).system
+        found = tensor @ derivative(system, np.array([*w, *q]))[:3] + np.cross(w, tensor @ w)
+        torque = expected(tensor, field, matrix(q).T @ place)
+        if number == 2:
+            # the series in longitudes has none over the pole
+            torque = expected(tensor, field, place + np.array([1e-9, 0, 0]))
+            assert np.allclose(found, torque, atol=1e-7 * np.abs(torque).max())
+            continue
+        assert np.abs(found - torque).max() < 20 * CLOSE * np.abs(torque).max()
+
+
+@pytest.mark.parametrize("degree", [3, 5])
+def test_the_force_in_flight_is_that_of_the_differentiated_series(degree: int) -> None:
+    random = Random(10 + degree)
+    tensor, field = random.tensor(), random_field(random.generator, degree)
+    q, w, x, v = random.quaternion(), random.vector(), np.array([1.2, -0.8, 0.9]), random.vector()
+    body = f"{general_body(tensor, MASS)}\n{keys(field, RADIUS)}"
+    start = f"angular_velocity = {array(w)}\nquaternion = {array(q)}\n"
+    start += f"position = {array(x)}\nvelocity = {array(v)}"
+
+    def motion(degree: int) -> np.ndarray:
+        load = f'kind = "central_gravity"\ngravitational_parameter = {MU}\ndegree = {degree}'
+        return derivative(prepared(body, start, load).system, np.array([*w, *q, *x, *v]))
+
+    beyond = motion(degree) - motion(2)
+    r = matrix(q)
+    pull = gradient(field, RADIUS, r.T @ -x)
+    # the source feels G M m grad Phi, and the body the opposite
+    assert np.abs(beyond[-3:] + MU * r @ pull).max() < 20 * CLOSE * np.abs(motion(2)[-3:]).max()
+    torque = -MU * MASS * np.cross(r.T @ -x, pull)
+    assert np.abs(tensor @ beyond[:3] - torque).max() < 20 * CLOSE * np.abs(tensor @ motion(2)[:3]).max()
+
+
+def test_degrees_converge_to_a_body_of_point_masses() -> None:
+    """Torque and force by Newton's law; each degree leaves less by about the ratio of the radii."""
+    random = Random(3)
+    masses, places = lumpy(random.generator)
+    tensor, total = tensor_of(masses, places), float(masses.sum())
+    field = moments_of(masses, places, 1.0, 8)
+    source = np.array([5.0, -3.0, 4.0])
+    force, torque = pulled(masses, places, source)
+    body = f"inertia_tensor = {array(tensor)}\nmass = {total!r}\n{keys(field, 1.0)}"
+    left = []
+    for degree in range(2, 9):
+        load = f'kind = "central_gravity"\ngravitational_parameter = 1\ndegree = {degree}\n'
+        load += f"position = {array(source)}"
+        start = "angular_velocity = [0, 0, 0]\nposition = [0, 0, 0]\nvelocity = [0, 0, 0]"
+        system = prepared(body, start, load).system
+        found = derivative(system, np.array([0.0] * 3 + [1.0] + [0.0] * 9))
+        off = np.abs(tensor @ found[:3] - torque).max() / np.abs(torque).max()
+        left.append((off, np.abs(total * found[-3:] - force).max() / np.abs(force).max()))
+    torques, forces = np.array(left).T
+    ratio = np.linalg.norm(places, axis=1).max() / np.linalg.norm(source)
+    assert torques[0] > 0.02
+    assert torques[-1] < torques[0] * (1.5 * ratio) ** 6
+    assert forces[-1] < forces[0] * (1.5 * ratio) ** 6
+    assert np.all(np.diff(np.log(torques)) < 0.3)
+
+
+def drifts(run: rigidsim.Run) -> dict[str, float]:
+    """Largest relative drifts of the invariants."""
+    return {name: row["largest_drift"] for name, row in run.summary["invariants"].items()}
+
+
+# --- whole motions ------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("place", "kept"),
+    [
+        ("position = [2, 0.3, 0.2]", {"energy", "angular_momentum_source"}),
+        ("orbit = {semi_major_axis = 2, inclination = 0.3}", {"energy_balance", "jacobi_constant"}),
+        (ORBIT, {"energy_balance"}),
+    ],
+)
+def test_what_is_conserved_is_found_and_nothing_else(place: str, kept: set[str]) -> None:
+    run = run_text(config(BODY, START, gradient_of(place), "end = 200\nsamples = 41"))
+    assert {name for name in drifts(run) if "norm" not in name} == kept
+    assert max(drifts(run).values()) < 2e-14
+
+
+def test_energy_and_momentum_are_conserved_in_flight() -> None:
+    load = 'kind = "central_gravity"\ngravitational_parameter = 2\ndegree = 4'
+    start = f"{START}\nposition = [2, 0, 0.1]\nvelocity = [0, 0.9, 0.3]"
+    run = run_text(config(BODY, start, load, "end = 300\nsamples = 31"))
+    assert {"energy", "total_angular_momentum"} <= set(drifts(run))
+    assert max(drifts(run).values()) < 2e-14
+
+
+@pytest.mark.parametrize("formulation", ["euler_angles", "rotation_matrix", "canonical"])
+def test_all_formulations_agree(formulation: str) -> None:
+    text = config(BODY, START, gradient_of(), "end = 20\nsamples = 21", output='record = ["quaternion"]')
+    one, other = (
+        run_text(text, f'integrator.formulation="{x}"').dataset for x in ("quaternion", formulation)
+    )
+    same = np.abs((one.quaternion * other.quaternion).sum("quaternion_component"))
+    assert float((1 - same).max()) < 1e-13
+
+
+def test_a_field_symmetric_to_the_orbit_keeps_the_motion_in_its_plane() -> None:
+    body = "principal_moments = [1, 1.2, 1.5]\nmass = 10\ngravity_field = {radius = 0.5, "
+    start = "angular_velocity = [0, 0, 0.9]"
+    load = gradient_of("orbit = {semi_major_axis = 2, eccentricity = 0.2}")
+    even = 'C = {"3,1" = 0.01, "3,3" = 0.003, "4,2" = 0.002}, S = {"3,1" = 0.01, "4,4" = 1e-4}}'
+    odd = 'C = {"4,1" = 0.01}}'
+    time = "end = 50\nsamples = 51"
+    names = prepare(rigidsim.parse(config(body + even, start, load, time))).system.states
+    assert names[:2] == ["angle", "spin"]
+    assert "qw" in prepare(rigidsim.parse(config(body + odd, start, load, time))).system.states
+    plane, full = (
+        run_text(config(body + even, start, load, time), f'integrator.formulation="{x}"').dataset
+        for x in ("planar", "quaternion")
+    )
+    assert np.abs(plane.quaternion.values - full.quaternion.values).max() < 1e-12
+
+
+def test_momentum_about_an_axis_of_symmetry_is_kept_by_a_zonal_field_alone() -> None:
+    body = "principal_moments = [1, 1, 1.5]\nmass = 10\ngravity_field = "
+    body += '{radius = 0.5, C = {"4,0" = 0.02, "3,0" = 0.01'
+    for more, kept in (("}}", True), (', "3,1" = 1e-3}}', False)):
+        run = run_text(config(body + more, START, gradient_of(), "end = 20\nsamples = 11"))
+        assert ("angular_momentum_axial" in drifts(run)) is kept
+
+
+def test_the_frame_of_a_circular_orbit_serves_the_field_too() -> None:
+    load = gradient_of("orbit = {semi_major_axis = 2, inclination = 0.3}")
+    text = config(BODY, START, load, "end = 20\nsamples = 21", output='record = ["quaternion"]')
+    assert "pw" in prepare(rigidsim.parse(text)).system.states
+    ways = [run_text(text, f'integrator.formulation="{x}"').dataset for x in ("auto", "rotation_matrix")]
+    same = np.abs((ways[0].quaternion * ways[1].quaternion).sum("quaternion_component"))
+    assert float((1 - same).max()) < 1e-13
+
+
+# --- what is refused ----------------------------------------------------------------------------------------
+
+FIELD = "gravity_field = "
+NONSENSE = {
+    "degree without a field": ("", gradient_of(), "has no gravity_field; give it, or leave degree out"),
+    "beyond its end": (LUMPS, gradient_of(degree=5), "ends at degree 4"),
+    "first degree": (FIELD + '{radius = 1, C = {"1,0" = 0.1}}', "", "the centre of mass is the origin"),
+    "second degree": (FIELD + '{radius = 1, C = {"2,0" = 0.1}}', "", "the inertia tensor says it"),
+    "order beyond degree": (FIELD + '{radius = 1, C = {"3,4" = 0.1}}', "", "the order is at most the degree"),
+    "sine of order 0": (FIELD + '{radius = 1, S = {"3,0" = 0.1}}', "", "zonal coefficients are in C"),
+    "no such key": (
+        FIELD + '{radius = 1, C = {"J3" = 0.1}}',
+        "",
+        'degree and order are allowed, such as "3,0"',
+    ),
+    "no radius": (FIELD + '{C = {"3,0" = 0.1}}', "", "missing radius"),
+    "no length": (FIELD + '{radius = "1 kg", C = {"3,0" = 0.1}}', "", "radius"),
+    "not positive": (FIELD + '{radius = -1, C = {"3,0" = 0.1}}', "", "a positive length is allowed"),
+    "with a unit": (FIELD + '{radius = 1, C = {"3,0" = "1 m"}}', "", "3,0"),
+    "nothing": (FIELD + "{radius = 1}", "", "missing coefficients"),
+    "both": (FIELD + '{radius = 1, C = {"3,0" = 0.1}, file = "x.gfc"}', "", "either file, or radius"),
+    "unknown": (FIELD + '{radius = 1, c = {"3,0" = 0.1}}', "", "C"),
+    "degree 1": (LUMPS, gradient_of(degree=1), "degree"),
+    "degree of a text": (LUMPS, gradient_of().replace("degree = 4", 'degree = "4"'), "degree"),
+}
+
+
+@pytest.mark.parametrize("which", NONSENSE)
+def test_nonsense_is_refused(which: str) -> None:
+    given, load, message = NONSENSE[which]
+    text = config(
+        f"principal_moments = [1, 1.2, 1.5]\nmass = 10\n{given}", START, load or gradient_of(degree=3)
+    )
+    with pytest.raises(ConfigError, match=re.escape(message)):
+        prepare(rigidsim.parse(text))
+
+
+def test_a_field_takes_a_mass_and_a_centre() -> None:
+    for body, message in (
+        (f"principal_moments = [1, 1.2, 1.5]\n{LUMPS}", "mass is missing"),
+        (f"{BODY}\ncenter_of_mass = [0, 0, 0.1]", "another point than its centre of mass"),
+    ):
+        with pytest.raises(ConfigError, match=message):
+            prepare(rigidsim.parse(config(body, START, gradient_of())))
+
+
+def test_no_average_takes_the_field() -> None:
+    text = config(BODY, "angular_velocity = [0, 0, 50]", gradient_of())
+    with pytest.raises(
+        ConfigError, match=re.escape("has no average; the gradient alone has one (set degree = 2)")
+    ):
+        prepare(rigidsim.parse(text, overrides=['model.level="spin_averaged"']))
