@@ -132,7 +132,8 @@ def gravity_field_of(table: GravityFieldTable | None, body: Any, context: Any) -
             "given, but the body turns about another point than its centre of mass, from which the harmonics "
             "count; remove center_of_mass or reference"
         )
-    assert table.radius is not None
+    if table.radius is None:
+        raise fault("given file, but files aren't read yet; list C and S")
     found: dict[Harmonic, Any] = {}
     for given, sine in ((table.C, False), (table.S, True)):
         for key, value in (given or {}).items():

@@ -52,7 +52,9 @@ def axis_name(key: str, given: str | None) -> str:
     name = given
     if name is None:
         parts = [re.sub(r"\[(\d+)\]", r"_\1", re.sub("[\"']", "", part)) for part in key.split(".")]
-        name = "_".join(parts) if parts[-1] in OBSERVABLES else parts[-1]
+        parts = [part.replace(",", "_") for part in parts]
+        whole = parts[-1] in OBSERVABLES
+        name = "_".join(parts if whole else parts[-2:] if parts[-1][:1].isdigit() else parts[-1:])
     if not _NAME.fullmatch(name):
         raise ValueError(
             f"given the name {shown(name)}; allowed: letters, digits and underscores, beginning with a letter"
