@@ -73,7 +73,8 @@ def gyrostat_in_flight(draw: Draw) -> None:
     rotors(draw, moments)
 
 
-def _state(draw: Draw, name: str, derivative: str, initial: float = 0.0) -> None:
+def state(draw: Draw, name: str, derivative: str, initial: float = 0.0) -> None:
+    """``[[states]]``, of one's own."""
     draw.more += ["[[states]]", f'name = "{name}"', f'derivative = "{derivative}"', f"initial = {initial!r}"]
 
 
@@ -100,7 +101,7 @@ def controller(draw: Draw) -> None:
     for axis in "xyz":
         law = f"2*k*qw*q{axis} + d*w{axis} + i*sum_{axis}"
         laws.append(f"max(-most, min(most, {law}))" if limited else law)
-        _state(draw, f"sum_{axis}", f"2*qw*q{axis}")
+        state(draw, f"sum_{axis}", f"2*qw*q{axis}")
     if wheels:
         moment = 0.02 * float(min(moments)) * size
         for k, (axis, law) in enumerate(zip("xyz", laws, strict=True)):
@@ -125,13 +126,13 @@ def lagging(draw: Draw) -> None:
         f"n = {draw.between(0.3, 3) / draw.time!r}",
         f"p = {torque * draw.decades(-3, -1)!r}",
     ]
-    _state(draw, "seen", "(wx - seen)/lag", draw.between(-1, 1) / draw.time)
-    _state(draw, "push", "(p*sin(n*t) - push)/lag")
-    _state(draw, "angle", "wz")
+    state(draw, "seen", "(wx - seen)/lag", draw.between(-1, 1) / draw.time)
+    state(draw, "push", "(p*sin(n*t) - push)/lag")
+    state(draw, "angle", "wz")
     components = ["-k*seen", "push", "0"]
     if draw.sometimes(0.5):
-        _state(draw, "one", "n*two", draw.decades(-3, 3))
-        _state(draw, "two", "-n*one")
+        state(draw, "one", "n*two", draw.decades(-3, 3))
+        state(draw, "two", "-n*one")
         components[2] = "p*sin(angle + one)"
     draw.load("torque", f"components = {components}".replace("'", '"'))
 
@@ -152,9 +153,9 @@ def slosh(draw: Draw) -> None:
             f"n{k} = {draw.decades(-1, 0.7) / draw.time!r}",
             f"c{k} = {draw.decades(-3, -0.5) / draw.time!r}",
         ]
-        _state(draw, f"slosh{k}", f"swing{k} - w{axis}", draw.between(-0.1, 0.1))
+        state(draw, f"slosh{k}", f"swing{k} - w{axis}", draw.between(-0.1, 0.1))
         back = f"n{k}^2*sin(slosh{k})" if draw.sometimes(0.5) else f"n{k}^2*slosh{k}"
-        _state(draw, f"swing{k}", f"-{back} - c{k}*(swing{k} - w{axis})", draw.between(-0.1, 0.1) / draw.time)
+        state(draw, f"swing{k}", f"-{back} - c{k}*(swing{k} - w{axis})", draw.between(-0.1, 0.1) / draw.time)
         components[k] = f"j{k}*({back} + c{k}*(swing{k} - w{axis}))"
     draw.load("torque", f"components = {components}".replace("'", '"'))
     if draw.sometimes(0.25):
@@ -191,7 +192,7 @@ def laws(draw: Draw) -> None:
     ][place]
     draw.load("torque", f"components = {torque}")
     for name, derivative, initial in states:
-        _state(draw, name, derivative, initial)
+        state(draw, name, derivative, initial)
 
 
 def moving_mass(draw: Draw) -> None:
@@ -206,7 +207,7 @@ def moving_mass(draw: Draw) -> None:
         f"n = {draw.between(0.05, 1) / draw.time!r}",
         f"lag = {draw.time * draw.between(0.5, 5)!r}",
     ]
-    _state(draw, "drawn", "1/lag/300" if leaving else "(sin(wx*lag)^2 - drawn)/lag")
+    state(draw, "drawn", "1/lag/300" if leaving else "(sin(wx*lag)^2 - drawn)/lag")
     parts = [draw.between(0.01, 0.08) * float(min(moments)) * size for _ in range(3)]
     varying = [f"{m * size!r} - {part!r}*drawn" for m, part in zip(map(float, moments), parts, strict=True)]
     if not leaving:
@@ -231,7 +232,7 @@ def magnetic(draw: Draw) -> None:
     moment = ["-k*(wz*by - wy*bz)", "-k*(wx*bz - wz*bx)", "-k*(wy*bx - wx*by)"]
     if draw.sometimes(0.5):
         for name in "xyz":
-            _state(draw, f"f{name}", f"(b{name} - f{name})/lag")
+            state(draw, f"f{name}", f"(b{name} - f{name})/lag")
         moment = [f"-k*(b{name} - f{name})/lag" for name in "xyz"]
     draw.load(
         "magnetic_dipole",

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from experiments.coverage import carried
+from experiments.coverage import carried, known
 from experiments.coverage.hyperbolic import HYPERBOLIC, hyperbolic_average
 from experiments.coverage.moments import put_late, spike, switch
 from experiments.random_scenes import KINDS, Draw
@@ -261,6 +261,11 @@ FAMILIES: dict[str, Family] = {
     "slosh": Family(carried.slosh, (1.0, 3.0), canonical=False),
     "moving mass": Family(carried.moving_mass, (1.0, 2.3), canonical=False),
     "B-dot": Family(carried.magnetic, (1.0, 2.5), canonical=False),
+    "shadow": Family(known.shadow, (1.0, 2.3), canonical=False),
+    "air": Family(known.air, (1.0, 2.5), canonical=False),
+    "names on a table": Family(known.table, (1.0, 2.5), finish=known.write_table, canonical=False),
+    "names of point masses": Family(known.moving_bodies, (1.0, 2.5), canonical=False),
+    "jet damping": Family(known.jet, (1.0, 2.3), canonical=False),
 }
 """By the name under which the table shows them."""
 
