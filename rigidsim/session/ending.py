@@ -14,7 +14,6 @@ from rigidsim.scene.expressions.tree import (
     names_used,
     operations,
 )
-from rigidsim.scene.initial_values import start_values
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.transitions import narrow_parts, root_parts
 from rigidsim.session.diagnostics import NEAR_SINGULAR
@@ -77,9 +76,6 @@ def closing_words(prepared: InitialValueProblem, progress: Progress, parts: Asse
         if reason:
             return text + reason
         m = prepared.system.mechanics
-        odd = _without_derivative(prepared.scene) if progress.steps == 0 else ""
-        if odd:
-            return f"{text}; {odd}"
         states = any(root_parts(state.derivative) for state in prepared.scene.states)
         if states or any(load.roots(m) for load in having(Rooted, m.loads)):
             text += (
@@ -131,19 +127,6 @@ def _why_it_broke(prepared: InitialValueProblem, time: float) -> str:
                 f'; "{large}" ({where}) exceeds the range of {precision.name} precision there '
                 f"(2^{most}): write it with functions that stay small, such as 1 - tanh(u)^2 in place of "
                 "1/cosh(u)^2, or choose a higher precision"
-            )
-    return ""
-
-
-def _without_derivative(scene: Scene) -> str:
-    """Which expression has no derivative at the start, such as a root of zero, and what to do; else empty."""
-    values = start_values(scene)
-    for where, expression in scene.acting_formulas():
-        if any(evaluate(part, values, scene.context) == 0 for part in root_parts(expression)):
-            return (
-                f'"{expression.text}" ({where}) has no derivative at the start, where its sqrt, fractional '
-                "power, asin or acos is at the end of its range: start elsewhere, write abs(u) for the norm "
-                "of a single component u, or add a small number under the root"
             )
     return ""
 

@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
-import heyoka as hy
 import mpmath
 import numpy as np
 
@@ -23,7 +22,7 @@ from rigidsim.scene.choices import AUTO, FORMULATIONS
 from rigidsim.scene.config import Experiment
 from rigidsim.scene.initial_values import check_start
 from rigidsim.scene.scene import Scene, build_scene
-from rigidsim.solve.compiled import compiled_function
+from rigidsim.solve.first_step import refuse_non_finite_start, refuse_roots_of_zero
 from rigidsim.solve.precision import Precision, Scalar, precision_of
 from rigidsim.solve.sampling import SampleClock
 from rigidsim.solve.solvers.algorithm import Algorithm, algorithm_of
@@ -140,8 +139,10 @@ def prepare_scene(
         step_control = _auto(precision, averaged=averaged) if given is None else precision.number(given)
         _refuse_spectrum(system)
         if loads:
-            _refuse_non_finite_start(system, precision)
+            refuse_non_finite_start(system, precision)
         algorithm = algorithm_of(scene, system, driven=bool(loads))
+        if algorithm.takes_series:
+            refuse_roots_of_zero(system, precision)
         late = False
         holds = scene.config.integrator.hold_invariants is True
         if holds and system.mechanics.shape is not None:
@@ -237,29 +238,6 @@ def _refuse_spectrum(system: System) -> None:
         why += "variational equations end"
         instead = "make the change smooth with tanh"
     raise ConfigError(Problem("[output] lyapunov", f"given true, but {why}; set it to false, or {instead}"))
-
-
-def _refuse_non_finite_start(system: System, precision: Precision) -> None:
-    """Evaluate the equations once: a load from Python may have no finite value at the start."""
-    outputs = [right for _, right in system.equations]
-    sides = {}
-    if count := system.parameters:  # on whichever side, and at the start's own time
-        outputs.append(hy.par[count - 1])
-        sides["pars"] = precision.array([mpmath.mpf(n < count - system.clocked) for n in range(count)])
-    elif system.pieces is not None:
-        sides["pars"] = np.array(system.pieces.parameters(0), dtype=precision.scalar)
-    rhs = compiled_function(outputs, system.variables, compact_mode=True, **precision.options)
-    start = precision.number(system.scene.context.ldexp(system.scene.start, -system.scaling.time))
-    values = rhs(precision.array(system.initial), time=start, **sides)
-    lost = [n for n, v in zip(system.states, values, strict=False) if not math.isfinite(float(v))]
-    if lost and system.partner is not None:  # a chart's own singularity is no fault of a load
-        _refuse_non_finite_start(system.partner, precision)
-    elif lost:
-        what = (
-            f"the derivatives of {', '.join(lost)} aren't finite at the start; start elsewhere, or give "
-            "the loads from Python finite torques and forces there"
-        )
-        raise ConfigError(Problem("loads", what))
 
 
 def double_twin(prepared: InitialValueProblem) -> System:

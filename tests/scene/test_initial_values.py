@@ -104,14 +104,38 @@ def test_a_state_named_like_something_else_is_told_where_it_stands() -> None:
     assert "one of [[rotors]]" in said
 
 
+NO_DERIVATIVE = "has no finite derivative at the start"
+
+
+@pytest.mark.parametrize("precision", ["single", "double", "quadruple"])
 @pytest.mark.parametrize("derivative", ["sqrt(s)", "asin(1 - s)", "s^1.5"])
-def test_a_derivative_without_derivative_at_the_start_is_named(derivative: str) -> None:
+def test_a_derivative_without_derivative_at_the_start_is_refused(derivative: str, precision: str) -> None:
     state = f'[[states]]\nname = "s"\nderivative = "{derivative}"\n'
-    outcome = run_text(SCENE.format(initial="", loads=state, precision="double")).outcome
-    assert outcome.exit_code != 0
-    assert (
-        f'"{derivative}" ([[states]] number 1 derivative) has no derivative at the start' in outcome.message
-    )
+    said = refused(state, precision=precision)
+    assert f'[[states]] number 1 derivative: "{derivative}" {NO_DERIVATIVE} (s = 0.0)' in said
+    assert "start elsewhere" in said
+
+
+def test_roots_of_zero_at_the_start_are_refused_wherever_they_stand() -> None:
+    torque = '[[loads]]\nkind = "torque"\ncomponents = ["sqrt(t - 2)", "-sqrt(wx^2 + psi^2)", 0]\n'
+    event = '[[events]]\nname = "e"\nexpression = "sqrt(wx) - 1"\n'
+    motor = '[[rotors]]\nname = "r"\naxis = [0, 0, 1]\nmoment = 0.1\ntorque = "sqrt(wy - 1/2)"\n'
+    said = refused(torque + event + motor)
+    assert f'components[0]: "sqrt(t - 2)" {NO_DERIVATIVE} (t = 2.0)' in said
+    assert f'"-sqrt(wx^2 + psi^2)" {NO_DERIVATIVE} (psi = 0.0, wx = 0.0)' in said
+    assert f'[[events]] number 1 expression: "sqrt(wx) - 1" {NO_DERIVATIVE}' in said
+    assert f'[[rotors]] number 1 torque: "sqrt(wy - 1/2)" {NO_DERIVATIVE}' in said
+    moved = SCENE.replace("[1, 2, 3]", '["1 + sqrt(t - 2)/20", 2, 2.5]')
+    with pytest.raises(ConfigError, match="principal_moments"):
+        rigidsim.run(rigidsim.parse(moved.format(initial="", loads="", precision="double")), out=None)
+
+
+@pytest.mark.parametrize("derivative", ["sqrt(s^2)", "sqrt((t - 2)^2)*wy", "sqrt(s + 1)"])
+def test_roots_that_have_series_are_none_of_these(derivative: str) -> None:
+    """A square's root is an absolute value, which steps end at; near zero is not zero."""
+    state = f'[[states]]\nname = "s"\nderivative = "{derivative}"\n'
+    run = run_text(SCENE.format(initial="", loads=state, precision="double"))
+    assert run.status == "finished"
 
 
 def test_cassini_alone_leads_to_all_four() -> None:

@@ -33,6 +33,7 @@ class Algorithm:
         method: what can be said of it for any scene.
         finds_events: whether its stepper looks for ``[[events]]``, which needs steps.
         sets_parameters: whether its stepper sets those of equations that change at surfaces or given times.
+        takes_series: whether its steps are Taylor series, which a root of zero at the start has none of.
         own_errors: whether it tells its errors itself (``Stepper.errors``), or has none to tell; if not, they
             are estimated from motions that begin beside its own, in heyoka's rounding.
         form: the closed form that gives the states; None if none does.
@@ -41,6 +42,7 @@ class Algorithm:
     method: ClassVar[Method]
     finds_events: ClassVar[bool] = False
     sets_parameters: ClassVar[bool] = False
+    takes_series: ClassVar[bool] = False
     own_errors: ClassVar[bool] = True
     form: ClosedForm | None = None
 

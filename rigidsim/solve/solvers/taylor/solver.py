@@ -111,7 +111,7 @@ class Taylor(Algorithm):
     """Solves any scene."""
 
     title = "heyoka Taylor, natural steps, dense output"
-    finds_events = sets_parameters = True
+    finds_events = sets_parameters = takes_series = True
     own_errors = False
 
     def stepper(
