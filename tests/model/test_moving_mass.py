@@ -181,7 +181,7 @@ JET = 'kind = "mass_loss"\nrate = "0.5"\nexit_point = [0, 0, -2.5]\nexit_radius 
 @pytest.mark.parametrize(("precision", "within"), [("double", 1e-12), ("extended", 1e-15)])
 def test_jet_damping_by_its_closed_form(precision: str, within: float) -> None:
     """A = A0 - k m, C = C0 - c m: abs(w_t) goes with A to the power (l^2 + a^2/4)/k - 1, the spin with C to
-    the power (a^2/2)/c - 1 (Thomson 1961, section 8.3; Eke and Wang 1995).
+    the power (a^2/2)/c - 1 (Thomson 1961; Eke and Wang 1995).
     """
     text = scene(
         100, ROCKET, loads=JET, initial="angular_velocity = [0.3, 0, 2]",

@@ -2,7 +2,7 @@
 
 Mass that leaves at a point rho from the centre of mass, at the rate mu kg/s, with a velocity relative to the
 body that gives no torque by itself, takes off the angular momentum mu rho x (w x rho) that it has because the
-body turns (Thomson, Introduction to Space Dynamics, 1961, section 8.3). About the centre of mass
+body turns (Thomson, Introduction to Space Dynamics, 1961). About the centre of mass
 
     I w' = (I w) x w - I' w - mu <rho x (w x rho)> + N.
 
@@ -11,7 +11,7 @@ its middle,
 
     <rho x (w x rho)> = (l^2 + a^2/4) (w - n (n . w)) + (a^2/2) n (n . w),    l = |rho|
 
-(Eke and Wang, J. Appl. Mech. 62, 1995). I' is that of principal_moments, which say how the body's own
+(Eke and Wang 1995). I' is that of principal_moments, which say how the body's own
 mass distribution changes: nothing here changes them.
 """
 
