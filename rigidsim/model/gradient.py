@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -29,12 +30,27 @@ def gradient_terms(
     """Torque 3 strength factor c x (I c) for a unit direction c in body axes (MacCullagh): the constant
     strength (mpf) becomes one coefficient with the moments, the factor is an expression.
     """
-    units, columns = unit_vectors(m.scene.context), transpose(m.numbers.inertia)
     if m.shape is not None:
         turned = cross(direction, inertia_times(m, direction))
-        scaled = [[3 * strength * x for x in unit] for unit in units]
+        scaled = [[3 * strength * x for x in unit] for unit in unit_vectors(m.scene.context)]
         parts = turned if factor is None else [factor * x for x in turned]
         return list(zip(scaled, parts, strict=True))
+
+    def element(a: int, j: int) -> Symbolic:
+        product = direction[a] * direction[j]
+        return product if factor is None else factor * product
+
+    return tensor_terms(m, 3 * strength, element)
+
+
+def tensor_terms(m: Kinematics, strength: Any, element: Callable[[int, int], Symbolic]) -> list[Term]:
+    """Torque sum of strength S_aj e_a x (I e_j) of a symmetric tensor S in body axes, I being the constant
+    tensor of inertia: the constant strength (mpf) becomes one coefficient with the moments.
+
+    Args:
+        element: S_aj, asked for where it has a torque.
+    """
+    units, columns = unit_vectors(m.scene.context), transpose(m.numbers.inertia)
     terms: list[Term] = []
     for a in range(3):
         for j in range(a, 3):
@@ -42,9 +58,7 @@ def gradient_terms(
             if j != a:
                 vector = [x + y for x, y in zip(vector, cross(units[j], columns[a]), strict=True)]
             if any(x != 0 for x in vector):
-                product = direction[a] * direction[j]
-                scaled = [3 * strength * x for x in vector]
-                terms.append((scaled, product if factor is None else factor * product))
+                terms.append(([strength * x for x in vector], element(a, j)))
     return terms
 
 

@@ -184,13 +184,12 @@ class Companion(Protocol):
     """A class of loads that a key of another load brings beside it, on the same source."""
 
     @classmethod
-    def beside_of(cls, load: SceneLoad, fields: Any, body: Any, around: Surroundings) -> SceneLoad | None:
+    def beside_of(cls, load: SceneLoad, fields: Any, around: Surroundings) -> SceneLoad | None:
         """The load that acts beside another one; None where the key's value brings none.
 
         Args:
             load: the one that has the key, resolved.
             fields: its keys.
-            body: the body (``RigidBody``).
 
         Raises:
             ConfigError: the key contradicts something else.
@@ -268,14 +267,14 @@ def register_beside(key: str) -> Callable[[Any], Any]:
 
 
 def companions(
-    loads: Sequence[SceneLoad], tables: Sequence[LoadFields], body: Any, around: Surroundings
+    loads: Sequence[SceneLoad], tables: Sequence[LoadFields], around: Surroundings
 ) -> list[SceneLoad]:
     """What the keys of loads bring beside them."""
     found = []
     for number, (load, fields) in enumerate(zip(loads, tables, strict=True)):
         for key, kind in BESIDE.items():
             if getattr(fields, key, None) is not None:
-                found.append(kind.beside_of(load, fields, body, replace(around, number=number)))
+                found.append(kind.beside_of(load, fields, replace(around, number=number)))
     return [load for load in found if load is not None]
 
 

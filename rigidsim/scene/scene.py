@@ -169,8 +169,9 @@ def build_scene(experiment: Experiment, context: Any = None) -> Scene:
             0, context, config.parameters, body.center_of_mass, free_flight, names=names, body=body
         )
         brought = [kind.resolve(config, around) for kind in OF_BODY.values() if kind.brought_by(config)]
-        dated = replace(around, axes=config.frame.axes or _first(given, "axes"), epoch=config.time.epoch)
-        brought += companions(given, config.loads, body, dated)
+        axes = config.frame.axes or _first(given, "axes")
+        dated = replace(around, axes=axes, epoch=config.time.epoch or _first(given, "epoch"))
+        brought += companions(given, config.loads, dated)
         resolved = [*given, *(load for found in tabled.values() for load in found), *brought]
         bearings = [load.bearing for load in resolved if load.bearing is not None]
         inverse = inverse_inertia(context, body)

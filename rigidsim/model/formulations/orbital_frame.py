@@ -48,7 +48,7 @@ class OrbitalQuaternion(Formulation):
         """The formulation where it saves products: on a circle in a fixed plane, if the load on it is the
         only one that reads the attitude; None elsewhere.
         """
-        readers = [x for x in loads if {"attitude", "vertical"} & x.reads and not isinstance(x, Beside)]
+        readers = [load for load in loads if {"attitude", "vertical"} & load.reads and not _rides_along(load)]
         if scene.torque_arm is not None or len(readers) != 1 or _reads_places(scene):
             return None
         orbit = corotating_orbit_of(readers[0])
@@ -85,6 +85,11 @@ class OrbitalQuaternion(Formulation):
             orbital=OrbitalFrame(direction=relative[0], normal=relative[2], states=states),
             chord=2.0,
         )
+
+
+def _rides_along(load: Load) -> bool:
+    """Whether it acts beside another load, and rests in the same frame."""
+    return isinstance(load, Beside) and corotating_orbit_of(load) is not None
 
 
 def _reads_places(scene: Scene) -> bool:

@@ -15,6 +15,7 @@ from rigidsim.model.loads import (  # noqa: F401  (each enters its kind; a new l
     mass_loss,
     moved_mass,
     rotor,
+    source_figure,
     uniform_gravity,
     viscous_torque,
 )

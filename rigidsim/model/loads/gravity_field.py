@@ -237,7 +237,7 @@ class FieldAttraction(Load):
 
     def _size(self, scene: Scene) -> Any:
         """Bound of the potential energy at the closest approach, J: |P_nm|^2 <= (n + m)! / (n - m)!."""
-        context, near, total = scene.context, _nearest(self.beside, scene), scene.context.zero
+        context, near, total = scene.context, least_distance(self.beside, scene), scene.context.zero
         for (n, m, _), value in self.coefficients.items():
             highest = context.sqrt(context.mpf(math.factorial(n + m)) / math.factorial(n - m))
             total += abs(value) * highest * (self.field.radius / near) ** n
@@ -257,10 +257,12 @@ class FieldAttraction(Load):
         )
 
     @classmethod
-    def beside_of(cls, load: Any, fields: AttractingFields, body: Any, around: Surroundings) -> Load | None:
+    def beside_of(cls, load: Any, fields: AttractingFields, around: Surroundings) -> Load | None:
         """See ``Companion``."""
-        degree, field = fields.degree, body.gravity
+        degree = fields.degree
         assert degree is not None
+        assert around.body is not None
+        field = around.body.gravity
         if degree < LEAST:
             return None
         given = f"given {degree}, but "
@@ -303,7 +305,7 @@ class _Moving(FieldAttraction):
         return self.beside.answered(self.acceleration(m), m) if self.beside.masses.full else []
 
 
-def _nearest(load: Any, scene: Scene) -> Any:
+def least_distance(load: Any, scene: Scene) -> Any:
     """Least distance of a load's source, m (mpf)."""
     if hasattr(load, "nearest_approach"):
         return load.nearest_approach(scene)

@@ -15,8 +15,8 @@ from rigidsim.model.gradient import GradientSource, gradient_terms, tidal_range
 from rigidsim.model.kinematics import Kinematics, quadratic_form
 from rigidsim.model.load import Load, Term
 from rigidsim.model.load_words import source_text, value_text
-from rigidsim.model.loads.gravity_field import AttractingFields
 from rigidsim.model.loads.point_attraction import MovingGradient, positive_strength
+from rigidsim.model.loads.source_figure import FigureFields
 from rigidsim.model.orbit_planes import OrbitPlane
 from rigidsim.model.placements.prescribed_orbit import PlacedAtRest, PlacedByTable, PlacedOnOrbit
 from rigidsim.model.placements.series import PlacedBySeries
@@ -32,7 +32,7 @@ from rigidsim.scene.scene import Scene
 from rigidsim.store.summary_parts import Caution
 
 
-class GravityGradientFields(AttractingFields):
+class GravityGradientFields(FigureFields):
     """Torque of a distant attracting body, to second degree (MacCullagh's formula)."""
 
     kind: Literal["gravity_gradient"]

@@ -1,0 +1,261 @@
+"""The torque of a source that is oblate itself: ``figure`` of a gravity gradient.
+
+With u the unit vector to the source and p its pole, both in body axes, s = u . p, its J2 and radius R',
+
+    U = (15 G M J2 R'^2 / 2 r^5) ((1 - 7 s^2) u . I u / 2 + 2 s u . I p - p . I p / 5),
+    N = (15 G M J2 R'^2 / 2 r^5) ((1 - 7 s^2) u x I u + 2 s (u x I p + p x I u) - (2/5) p x I p),
+
+(Schutz 1981, Celest. Mech. 24, 173; Williams et al. 2001, J. Geophys. Res. 106, 27933), the leading term of
+figure against figure. It acts beside the load that has the key, which takes the source as a point.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Annotated, Any, Literal
+
+import heyoka as hy
+from pydantic import Field, Tag, field_validator
+
+from rigidsim.model.capabilities import KeepsPlane, corotating_orbit_of, fixed_source_of, orbit_of, table_of
+from rigidsim.model.earth_pole import earth_pole
+from rigidsim.model.gradient import tensor_terms
+from rigidsim.model.kinematics import Kinematics, inertia_times
+from rigidsim.model.load import Load, Term
+from rigidsim.model.load_words import length_text, value_text
+from rigidsim.model.loads.gravity_field import AttractingFields, least_distance
+from rigidsim.model.rotations import Symbolic
+from rigidsim.scene.arithmetic import Vector, across, cross, norm, parallel, unit_vectors
+from rigidsim.scene.epochs import Epoch
+from rigidsim.scene.exact import ExactNumber
+from rigidsim.scene.fields import (
+    NAME_OR_VECTOR,
+    ConfigTable,
+    Dimensionless,
+    Metre,
+    Triple,
+    name_or_vector,
+    refuse,
+)
+from rigidsim.scene.orbit_tables.pieces import TabulatedOrbit
+from rigidsim.scene.orbits import KeplerOrbit
+from rigidsim.scene.readable import number_text
+from rigidsim.scene.registry import Surroundings, register_beside
+from rigidsim.scene.scene import Scene
+from rigidsim.scene.tracing.numbers import plain
+
+EARTH = "iau1976"
+
+
+class SourceFigure(ConfigTable):
+    """``figure`` of a source: its oblateness."""
+
+    J2: Dimensionless = Field(examples=[1.0826e-3])
+    """its unnormalized coefficient J2 = -C20"""
+    radius: Metre = Field(examples=["6378.137 km"])
+    """its equatorial radius, to which J2 refers"""
+    pole: Annotated[
+        Annotated[Literal["iau1976"], Tag(NAME_OR_VECTOR[0])]
+        | Annotated[Triple[Dimensionless], Tag(NAME_OR_VECTOR[1])],
+        name_or_vector('"iau1976" (the Earth\'s, by precession and nutation) or a vector in space axes'),
+    ] = Field(examples=["iau1976", [0, 0, 1]])
+    """direction of its axis of figure: a vector in space axes, or iau1976, the Earth's of date"""
+
+    @field_validator("radius")
+    @classmethod
+    def _positive(cls, value: ExactNumber) -> ExactNumber:
+        if value.sign <= 0:
+            raise refuse(f"given {float(value):g}; a positive length is allowed")
+        return value
+
+
+class FigureFields(AttractingFields):
+    """Keys of a load whose source may be oblate."""
+
+    figure: SourceFigure | None = Field(
+        None,
+        description="oblateness of the source itself, for its torque on the body's figure",
+        examples=[{"J2": 1.0826e-3, "radius": "6378.137 km", "pole": "iau1976"}],
+    )
+
+
+@dataclass(frozen=True)
+class FigureAttraction(Load):
+    """Torque of the source's oblateness on the body's inertia.
+
+    Attributes:
+        beside: the load by the same source as a point.
+        strength: G M of the source, m^3/s^2 (mpf).
+        size: its J2 R'^2, m^2 (mpf).
+        radius: R', m (mpf).
+        pole: unit vector (mpf, space axes) that rests; None for the Earth's.
+        number: of the load in the config, from 1.
+        epoch, axes: date of time 0 and the space axes, for the Earth's.
+        context: the scene's arithmetic.
+    """
+
+    beside: Any
+    strength: Any
+    size: Any
+    radius: Any
+    pole: Vector | None
+    number: int
+    context: Any
+    epoch: Epoch | None = None
+    axes: str | None = None
+
+    title = "figure"
+    described = "the figure of a source"
+    has_source = False
+    unaveraged = "the figure of a source has no average: leave figure out"
+
+    @property
+    def reads(self) -> frozenset[str]:  # type: ignore[override]
+        return frozenset(self.beside.reads)
+
+    @property
+    def conservative(self) -> bool:  # type: ignore[override]
+        return bool(self.beside.conservative) and self.pole is not None
+
+    @property
+    def orbit(self) -> KeplerOrbit | None:
+        return orbit_of(self.beside)
+
+    @property
+    def table(self) -> TabulatedOrbit | None:
+        return table_of(self.beside)
+
+    @property
+    def corotating_orbit(self) -> KeplerOrbit | None:
+        """The orbit of the source, if its pole is along the orbit's normal."""
+        orbit = corotating_orbit_of(self.beside)
+        if orbit is None or self.pole is None:
+            return None
+        return orbit if parallel(self.context, orbit.normal(self.context), self.pole) else None
+
+    def acts(self) -> bool:
+        return bool(self.size != 0)
+
+    # --- what it does ---------------------------------------------------------------------------------------
+
+    def _seen(self, m: Kinematics) -> tuple[list[Symbolic], list[Symbolic], Symbolic]:
+        """u and p in body axes, and s."""
+        u = m.carried(self.beside.source_direction(m))
+        if self.pole is not None:
+            space = m.fixed(self.pole)
+        else:
+            space = earth_pole(m, m.carried(self.epoch), m.carried(self.axes))
+        p = m.seen(space)
+        return u, p, hy.sum([a * b for a, b in zip(u, p, strict=True)])
+
+    def _strength(self, m: Kinematics) -> tuple[Any, Symbolic | None]:
+        """15 G M J2 R'^2 / 2 r^5 in internal units: a constant (mpf), and the factor by which it varies."""
+        place, context = self.beside.source_place(m), m.scene.context
+        value = 15 * self.strength * self.size / (2 * place.unit**5)
+        constant = place.inverse == hy.expression(1.0)
+        return context.ldexp(value, 2 * m.scaling.time), None if constant else place.inverse**5
+
+    def torque(self, m: Kinematics) -> list[Term]:
+        u, p, s = self._seen(m)
+        strength, factor = self._strength(m)
+        shrunk, fifths = 1.0 - 7.0 * (s * s), m.number(m.scene.context.mpf(2) / 5)
+        if m.shape is not None:
+            turned, turned_pole = inertia_times(m, u), inertia_times(m, p)
+            mixed = [x + y for x, y in zip(cross(u, turned_pole), cross(p, turned), strict=True)]
+            sums = [
+                shrunk * a + 2.0 * (s * b) - fifths * c
+                for a, b, c in zip(cross(u, turned), mixed, cross(p, turned_pole), strict=True)
+            ]
+            parts = sums if factor is None else [factor * x for x in sums]
+            return [
+                ([strength * x for x in unit], y)
+                for unit, y in zip(unit_vectors(m.scene.context), parts, strict=True)
+            ]
+        # the tensor (1 - 7 s^2) u u + 2 s (u p + p u) - (2/5) p p is the symmetric part of u v - (2/5) p p
+        v = [shrunk * a + 4.0 * (s * b) for a, b in zip(u, p, strict=True)]
+
+        def element(a: int, j: int) -> Symbolic:
+            found = 0.5 * (u[a] * v[j] + u[j] * v[a]) - fifths * (p[a] * p[j])
+            return found if factor is None else factor * found
+
+        return tensor_terms(m, strength, element)
+
+    def potential(self, m: Kinematics) -> Symbolic | None:
+        u, p, s = self._seen(m)
+        strength, factor = self._strength(m)
+        turned, turned_pole = inertia_times(m, u), inertia_times(m, p)
+
+        def product(a: list[Symbolic], b: list[Symbolic]) -> Symbolic:
+            return hy.sum([x * y for x, y in zip(a, b, strict=True)])
+
+        fifth = m.number(m.scene.context.one / 5)
+        inner = 0.5 * ((1.0 - 7.0 * (s * s)) * product(u, turned)) + 2.0 * (s * product(u, turned_pole))
+        inner = m.number(strength) * (inner - fifth * product(p, turned_pole))
+        return inner if factor is None else factor * inner
+
+    # --- what it conserves ----------------------------------------------------------------------------------
+
+    def keeps_axial(self, m: Kinematics, axis: Vector) -> bool:
+        """True: the tensor of a symmetric body has no torque about its axis."""
+        return True
+
+    def keeps_plane(self, scene: Scene, axis: Vector, normal: Vector) -> bool:
+        """Whether the source stays in the plane or on its normal, and the pole, too."""
+        if self.pole is None or not isinstance(self.beside, KeepsPlane):
+            return False
+        flat = across(scene.context, self.pole, normal) or parallel(scene.context, self.pole, normal)
+        return flat and self.beside.keeps_plane(scene, axis, normal)
+
+    def turns_about(self, m: Kinematics, axis: Vector) -> bool:
+        """Whether the axis isn't the line to a source at rest that is its pole as well."""
+        fixed, context = fixed_source_of(self.beside, m.scene), m.scene.context
+        if fixed is None or self.pole is None:
+            return True
+        return not (parallel(context, fixed[1], axis) and parallel(context, self.pole, axis))
+
+    # --- sizes, and what readers are told -------------------------------------------------------------------
+
+    def amplitude(self, scene: Scene) -> Any:
+        """15 G M J2 R'^2 / r^5 times the difference of moments, more than any direction of u and p gives."""
+        moments, context = scene.body.principal_moments, scene.context
+        difference = context.maximum(moments) - context.minimum(moments)
+        near = least_distance(self.beside, scene)
+        return 15 * self.strength * abs(self.size) / near**5 * difference
+
+    def told(self, scene: Scene) -> str:
+        pole = "of the Earth by IAU 1976 with the 18.6-year nutation"
+        if self.pole is not None:
+            pole = "(" + ", ".join(number_text(float(plain(x)), 4) for x in self.pole) + ") in space axes"
+        oblateness = number_text(float(plain(self.size / self.radius**2)), 6)
+        return (
+            f"figure of the source of [[loads]] number {self.number}: J2 {oblateness}, radius "
+            f"{length_text(float(plain(self.radius)))}, pole {pole}; torque up to "
+            f"{value_text(plain(self.amplitude(scene)), 'N m')}"
+        )
+
+    @classmethod
+    def beside_of(cls, load: Any, fields: FigureFields, around: Surroundings) -> Load:
+        """See ``Companion``."""
+        given, context = fields.figure, around.context
+        assert given is not None
+        radius = given.radius.at(context)
+        strength = getattr(load, "gravitational_parameter", None) or load.strength
+        made = cls(load, strength, given.J2.at(context) * radius**2, radius, None, around.number + 1, context)
+        if isinstance(given.pole, str):
+            known = (
+                ("[time] epoch", around.epoch, 'epoch = "2000-01-01T12:00:00 TDB"'),
+                ("[frame] axes", around.axes, 'axes = "ICRF"'),
+            )
+            for what, found, example in known:
+                if found is None:
+                    why = f'given "{EARTH}", a pole of date, which takes {what}; give {example}, or a vector'
+                    raise around.fault("figure.pole", why)
+            return replace(made, epoch=around.epoch, axes=around.axes)
+        pole = [x.at(context) for x in given.pole]
+        size = norm(context, pole)
+        if size == 0:
+            raise around.fault("figure.pole", "given [0, 0, 0]; a vector along the source's axis is allowed")
+        return replace(made, pole=[x / size for x in pole])
+
+
+register_beside("figure")(FigureAttraction)

@@ -1,0 +1,174 @@
+"""An oblate source: its torque against two bodies of point masses, its energy, and the Earth's pole."""
+
+from __future__ import annotations
+
+import re
+
+import erfa
+import heyoka as hy
+import numpy as np
+import pytest
+from equations import CLOSE, Random, array, derivative, matrix, prepared
+from field_truth import tensor_of
+from support import config, run_text
+
+import rigidsim
+from rigidsim import ConfigError
+from rigidsim.model.earth_pole import earth_pole
+from rigidsim.scene.epochs import parse_epoch
+from rigidsim.solve.problem import prepare
+
+MOMENTS = "principal_moments = [1, 1.2, 1.5]"
+START = "angular_velocity = [0.1, 0.4, 0.5]\neuler_angles = [0.3, 0.7, 0.2]"
+ORBIT = "orbit = {semi_major_axis = 2, eccentricity = 0.2, inclination = 0.3}"
+
+
+def oblate(place: str, pole: str = "[0.2, -0.1, 1]", size: str = "J2 = 0.1, radius = 0.8") -> str:
+    load = f'kind = "gravity_gradient"\ngravitational_parameter = 2\n{place}\n'
+    return load + f"figure = {{{size}, pole = {pole}}}"
+
+
+def turned(place: np.ndarray, pole: np.ndarray, tensor: np.ndarray, q: np.ndarray, figure: str) -> np.ndarray:
+    """Torque in body axes on a body at rest in the scene."""
+    load = f'kind = "gravity_gradient"\ngravitational_parameter = 1\nposition = {array(place)}\n'
+    load += f"figure = {{{figure}, pole = {array(pole)}}}" if figure else ""
+    start = f"angular_velocity = [0, 0, 0]\nquaternion = {array(q)}"
+    system = prepared(f"inertia_tensor = {array(tensor)}", start, load).system
+    return tensor @ derivative(system, np.array([0, 0, 0, *q]))[:3]
+
+
+def test_the_torque_is_that_of_the_formula_in_any_axes() -> None:
+    random = Random(1)
+    for _ in range(4):
+        tensor, q, place, pole = random.tensor(), random.quaternion(), random.vector(2), random.vector()
+        found = turned(place, pole, tensor, q, "J2 = 0.1, radius = 0.8") - turned(place, pole, tensor, q, "")
+        r = np.linalg.norm(place)
+        u, p = matrix(q).T @ place / r, matrix(q).T @ pole / np.linalg.norm(pole)
+        s, iu, ip = u @ p, tensor @ u, tensor @ p
+        inner = (1 - 7 * s * s) * np.cross(u, iu) + 2 * s * (np.cross(u, ip) + np.cross(p, iu))
+        expected = 7.5 * 0.1 * 0.8**2 / r**5 * (inner - 0.4 * np.cross(p, ip))
+        scale = np.abs(expected).max() + np.abs(turned(place, pole, tensor, q, "")).max()
+        assert np.abs(found - expected).max() < 10 * CLOSE * scale
+
+
+def test_it_is_the_leading_torque_between_two_bodies_of_point_masses() -> None:
+    """A body symmetric to its centre and a ring of six masses: what is left falls by the distance squared."""
+    random = Random(2)
+    half, weights = random.generator.uniform(-1, 1, (4, 3)), random.generator.uniform(0.5, 2, 4)
+    masses, places = np.tile(weights, 2), np.vstack([half, -half])
+    q = random.quaternion()
+    pole, towards = np.array([0.3, -0.5, 0.8]), np.array([0.6, 0.7, 0.4])
+    pole, towards = pole / np.linalg.norm(pole), towards / np.linalg.norm(towards)
+    first = np.cross(pole, [0, 0, 1.0]) / np.linalg.norm(np.cross(pole, [0, 0, 1.0]))
+    second = np.cross(pole, first)
+    angles = np.arange(6) * np.pi / 3
+    ring = 0.9 * (np.cos(angles)[:, None] * first + np.sin(angles)[:, None] * second)
+    j2 = "J2 = 0.5, radius = 0.9"  # of a thin ring: -C20 = (1/R^2) (r^2 / 2)
+    inside = places @ matrix(q).T  # space axes
+
+    def direct(sources: np.ndarray) -> np.ndarray:
+        torque = np.zeros(3, dtype=np.longdouble)
+        for source in sources.astype(np.longdouble):
+            away = source - inside
+            forces = (masses / (away**2).sum(axis=1) ** 1.5)[:, None] * away / len(sources)
+            torque += np.cross(inside, forces).sum(axis=0)
+        return matrix(q).T @ torque
+
+    left = []
+    for distance in (10.0, 40.0, 160.0):
+        place = distance * towards
+        beyond = direct(place + ring) - direct(place[None, :])
+        tensor = tensor_of(masses, places)
+        formula = turned(place, pole, tensor, q, j2) - turned(place, pole, tensor, q, "")
+        left.append(np.abs(np.asarray(beyond - formula, float)).max() / np.abs(formula).max())
+    assert left[0] < 0.1
+    assert left[1] < left[0] / 12
+    assert left[2] < left[1] / 8  # rounding shows
+
+
+@pytest.mark.parametrize(
+    ("place", "pole", "kept"),
+    [
+        ("position = [2, 0.3, 0.2]", "[0.2, -0.1, 1]", {"energy"}),
+        ("position = [0, 0, 2]", "[0, 0, 1]", {"energy", "angular_momentum_source"}),
+        ("orbit = {semi_major_axis = 2}", "[0, 0, 3]", {"energy_balance", "jacobi_constant"}),
+        ("orbit = {semi_major_axis = 2}", "[0.1, 0, 3]", {"energy_balance"}),
+    ],
+)
+def test_what_is_conserved_is_found_and_nothing_else(place: str, pole: str, kept: set[str]) -> None:
+    run = run_text(config(MOMENTS, START, oblate(place, pole), "end = 200\nsamples = 41"))
+    drifts = {name: row["largest_drift"] for name, row in run.summary["invariants"].items()}
+    assert {name for name in drifts if "norm" not in name} == kept
+    assert max(drifts.values()) < 2e-14
+
+
+@pytest.mark.parametrize("formulation", ["euler_angles", "canonical"])
+def test_formulations_agree(formulation: str) -> None:
+    text = config(MOMENTS, START, oblate(ORBIT), "end = 20\nsamples = 21", output='record = ["quaternion"]')
+    one, other = (
+        run_text(text, f'integrator.formulation="{x}"').dataset for x in ("quaternion", formulation)
+    )
+    same = np.abs((one.quaternion * other.quaternion).sum("quaternion_component"))
+    assert float((1 - same).max()) < 1e-13
+
+
+def test_moments_that_vary_take_the_same_torque() -> None:
+    """A tensor that hardly changes is an object of its own, with another form of the torque."""
+    text = config(MOMENTS, START, oblate(ORBIT), "end = 20\nsamples = 21", output='record = ["quaternion"]')
+    other = text.replace("1.5]", '"1.5 + 1e-30*t"]')
+    one, other = (run_text(x).dataset for x in (text, other))
+    assert np.abs(one.quaternion.values - other.quaternion.values).max() < 1e-13
+
+
+@pytest.mark.parametrize("axes", ["ICRF", "ecliptic J2000"])
+def test_the_earths_pole_is_that_of_iau_1976_and_the_largest_nutation(axes: str) -> None:
+    text = config(
+        MOMENTS, START, oblate(ORBIT, '"iau1976"'), "end = 1\nsamples = 2\nepoch = \"J2000\"",
+        more=f'[frame]\naxes = "{axes}"\n',
+    )  # fmt: skip
+    m = prepare(rigidsim.parse(text)).system.mechanics
+    function = hy.cfunc(earth_pole(m, parse_epoch("J2000"), axes), [], compact_mode=True)
+    arcsec = np.pi / 180 / 3600
+    for day in (-18000.0, -5000.0, 123.0, 9000.0):
+        centuries = day / 36525
+        node = (450160.280 - 6962890.539 * centuries + 7.455 * centuries**2) * arcsec
+        longitude = -(17.1996 + 0.01742 * centuries) * np.sin(node) * arcsec
+        obliquity = (9.2025 + 0.00089 * centuries) * np.cos(node) * arcsec
+        tilt = erfa.obl80(2451545.0, day)
+        nutation = erfa.numat(tilt, longitude, obliquity)
+        expected = (nutation @ erfa.pmat76(2451545.0, day))[2]
+        # and what it leaves out of the full theory
+        full = (erfa.nutm80(2451545.0, day) @ erfa.pmat76(2451545.0, day))[2]
+        if axes != "ICRF":
+            c, s = np.cos(84381.406 * arcsec), np.sin(84381.406 * arcsec)
+            turn = np.array([[1, 0, 0], [0, c, s], [0, -s, c]])
+            expected, full = turn @ expected, turn @ full
+        unit = float(m.scene.context.ldexp(m.scene.context.one, m.scaling.time))
+        found = np.asarray(function([], time=day * 86400 / unit))
+        assert np.abs(found - expected).max() < 2e-9
+        assert np.linalg.norm(found - full) < 1.5 * arcsec
+
+
+NONSENSE = {
+    "no date": (oblate(ORBIT, '"iau1976"'), "takes [time] epoch"),
+    "no pole": (oblate(ORBIT, "[0, 0, 0]"), "a vector along the source's axis is allowed"),
+    "of a planet": (oblate(ORBIT, '"mars"'), "iau1976"),
+    "no radius": (oblate(ORBIT, size="J2 = 0.1"), "radius"),
+    "negative": (oblate(ORBIT, size="J2 = 0.1, radius = -1"), "a positive length is allowed"),
+    "in metres": (oblate(ORBIT, size='J2 = "0.1 m", radius = 1'), "J2"),
+    "another key": (oblate(ORBIT, size="J3 = 0.1, radius = 1"), "J3"),
+    "two components": (oblate(ORBIT, "[0, 1]"), "pole"),
+}
+
+
+@pytest.mark.parametrize("which", NONSENSE)
+def test_nonsense_is_refused(which: str) -> None:
+    load, message = NONSENSE[which]
+    with pytest.raises(ConfigError, match=re.escape(message)):
+        prepare(rigidsim.parse(config(MOMENTS, START, load)))
+
+
+def test_without_axes_the_earths_pole_is_refused() -> None:
+    text = config(MOMENTS, START, oblate(ORBIT, '"iau1976"'), 'end = 1\nsamples = 2\nepoch = "J2000"')
+    with pytest.raises(ConfigError, match=r"takes \[frame\] axes"):
+        prepare(rigidsim.parse(text))
