@@ -161,6 +161,34 @@ def cases(every: Iterable[Any], usual: Collection[Any]) -> list[Any]:
     return [case if case in usual else pytest.param(case, marks=pytest.mark.slow) for case in every]
 
 
+def assert_announced(announced: Sequence[float], true: Sequence[float], at_most: float = 10) -> None:
+    """Errors announced for at least five motions: none too small by more than 3 times, and half of them at
+    most so many times too large. The rounding of a single motion may cancel to any small error.
+    """
+    ratios = np.array(announced) / np.array(true)
+    assert len(ratios) >= 5
+    assert ratios.min() >= 1 / 3
+    assert np.median(ratios) <= at_most
+
+
+def assert_announced_from(text: str, starts: Sequence[str], exact: str, at_most: float = 10) -> None:
+    """The same of the attitudes of a config from several starts, each against more digits."""
+    announced, true = [], []
+    for start in starts:
+        run = run_text(text, start, estimate=True)
+        truth = loaded(run_text(text, start, f'integrator.precision="{exact}"'))["quaternion"].values
+        announced.append(run.summary["accuracy"]["estimated_attitude_error"])
+        true.append(angle_between(loaded(run)["quaternion"].values, truth).max())
+    assert_announced(announced, true, at_most)
+
+
+STARTS = [
+    f"initial.angular_velocity={w}"
+    for w in ([0.3, 1.0, 0.5], [1.0, 0.2, 0.4], [0.2, 0.3, 1.1], [-0.6, 0.7, 0.5], [0.5, -0.9, 0.4])
+]
+"""Five starts of a body."""
+
+
 def config(
     body: str = "principal_moments = [1, 2, 2.5]",
     initial: str = "angular_velocity = [0.3, 1.0, 0.5]\neuler_angles = [0.2, 1.1, 0.7]",

@@ -230,6 +230,7 @@ def test_what_cannot_be_viewed_is_said(
     assert message in result.stderr
 
 
+@pytest.mark.slow
 def test_runs_and_members_of_a_sweep_are_viewed_side_by_side(
     config: Config, rigidsim_command: Command, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -248,6 +248,7 @@ def sky(config: Config, run_once: Callable[[str], None], rigidsim_command: Comma
         return dataset.load()
 
 
+@pytest.mark.slow
 def test_independent_readers_read_orbit_messages(sky: xarray.Dataset) -> None:
     """Epochs, frames and numbers as ``oem`` and ``ccsds-ndm`` see them."""
     moments = [str(moment)[:23] for moment in sky.date.values]

@@ -117,6 +117,7 @@ def test_ctrl_c_while_the_engine_is_compiled(config: Config, start: Start) -> No
     assert rigidsim.resume("runs/free").status == "finished"
 
 
+@pytest.mark.slow
 def test_an_interruption_ends_the_whole_command(config: Config, start: Start) -> None:
     long = config("a", time=f"end = {FOREVER}\nevery = 1", rest=GUARDED)
     process = start("run", long, config("b"))

@@ -131,6 +131,7 @@ def test_a_partial_run_is_read_and_gone_on_with_later(
     same_bits(rigidsim.open_run("disk/free"), rigidsim.open_run("runs/free"))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "moment", cases(["a later segment", "the dataset", "the end of the segments"], ["the dataset"])
 )

@@ -162,6 +162,7 @@ def test_it_records_a_dataset_with_true_errors_of_its_own(tmp_path: Path) -> Non
     assert rigidsim.verify(run.folder.path).identical
 
 
+@pytest.mark.slow
 def test_its_errors_are_of_fourth_order() -> None:
     """16 times the tolerance is twice the step; terms of higher order, and rounding, are less than half."""
     exact = exact_attitudes()
@@ -197,6 +198,7 @@ def test_a_plan_is_of_its_steps_and_forecasts_no_errors(tmp_path: Path) -> None:
     assert plan.predicted.attitude_error_rad is None
 
 
+@pytest.mark.slow
 def test_it_goes_on_after_any_step(tmp_path: Path) -> None:
     given = text(1e-3, **SHORT)
     run = run_text(given + "[limits]\nmax_steps = 13\n", out=tmp_path)

@@ -103,6 +103,7 @@ def test_the_motion_is_that_of_the_impulses(method: str, samples: int) -> None:
     assert wrong.max() < bound
 
 
+@pytest.mark.slow
 @pytest.mark.optimised  # as in the process that is killed
 @pytest.mark.parametrize("method", METHODS)
 def test_a_killed_run_resumes_bit_for_bit(method: str, tmp_path: Path) -> None:

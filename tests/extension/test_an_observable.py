@@ -115,6 +115,7 @@ def test_one_that_is_conserved_is_watched_and_reproduced(tmp_path: Path) -> None
     assert rigidsim.verify(run.folder.path).identical
 
 
+@pytest.mark.slow
 @pytest.mark.optimised  # as in the process that is killed
 def test_a_killed_run_resumes_bit_for_bit(tmp_path: Path) -> None:
     done = rigidsim.resume(killed("test_an_observable", RECORDED, tmp_path))

@@ -201,6 +201,7 @@ def test_obliquity_and_longitude_have_axes_of_their_own_and_say_what_was_taken_o
     )
 
 
+@pytest.mark.slow
 def test_the_page_of_a_run_with_axes_alone_is_about_their_precession() -> None:
     dataset = precessing()  # as of an averaged model: neither attitude nor rates
     page = figures.figure(dataset.assign_attrs(formulation="orbit_averaged"))

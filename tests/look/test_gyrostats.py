@@ -266,6 +266,7 @@ def test_a_flight_has_its_rotors_where_the_body_is_to_scale(two: xarray.Dataset)
         assert middle @ axis > 0.5 * reach  # and outside
 
 
+@pytest.mark.slow
 def test_of_moments_that_vary_no_sphere_is_drawn() -> None:
     text = DRIVEN.replace("[50, 90, 110]", '[50, 90, "110 - 10*sin(t/10)"]')
     dataset = rigidsim.run(rigidsim.parse(text), out=None).dataset.load()

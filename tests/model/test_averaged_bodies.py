@@ -90,6 +90,7 @@ def nodding() -> float:
     return drive / spin
 
 
+@pytest.mark.slow
 def test_the_momentum_is_that_of_every_rotation(full: rigidsim.Run, averaged: rigidsim.Run) -> None:
     moved = full.dataset.momentum_axis.values
     path = float(np.linalg.norm(moved - moved[0], axis=1).max())

@@ -155,3 +155,17 @@ def test_a_resonance_with_a_source_is_passed_fast_or_refused() -> None:
         assert passing(slower).system.states[-2:] == ["axial", "transverse"]
     with pytest.raises(ConfigError, match=r"may be captured in a resonance.*or end the run before"):
         passing(100)
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize(
+    ("torque", "words"),
+    [
+        ("((wx - 1)/0.01)^20", "near the separatrix"),
+        ("sqrt(wx)", "no finite value somewhere on the rotation"),
+    ],
+)
+def test_a_torque_too_strong_or_without_a_value_on_the_way_is_refused(torque: str, words: str) -> None:
+    load = f'kind = "torque"\ncomponents = ["0.01*({torque})", "0", "0"]'
+    with pytest.raises(ConfigError, match=words):
+        prepared(load, rates=[0.1, 1, 0.2], moments=[1, 2, 2.5], end="2")

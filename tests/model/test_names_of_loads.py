@@ -151,7 +151,9 @@ def towards_earth(w: Any, seen: Any, time: Any, _: Any) -> Any:
     return [-fp("2e-6") * u[2], fp("1e-6") * u[0] * ratio * ratio, fp("2e-6") * u[1]], []
 
 
-@pytest.mark.parametrize(("precision", "bound"), [("double", 2e-12), ("extended", 2e-15)])
+@pytest.mark.parametrize(
+    ("precision", "bound"), [("double", 2e-12), pytest.param("extended", 2e-15, marks=pytest.mark.slow)]
+)
 def test_directions_and_distances(precision: str, bound: float) -> None:
     """1000 rad of the body, within what rounding makes of it (the truth itself has 80 bits)."""
     given = config(BODY, START, loads(EARTH, TOWARDS), "end = 950\nsamples = 3", f'precision = "{precision}"')
@@ -186,7 +188,9 @@ def b_dot(w: Any, seen: Any, time: Any, _: Any) -> Any:
     return cross([-np.longdouble(500) * x for x in cross(b, w)], b), []
 
 
-@pytest.mark.parametrize(("precision", "bound"), [("double", 2e-12), ("extended", 2e-15)])
+@pytest.mark.parametrize(
+    ("precision", "bound"), [("double", 2e-12), pytest.param("extended", 2e-15, marks=pytest.mark.slow)]
+)
 def test_a_law_of_magnetorquers(precision: str, bound: float) -> None:
     text = loads(EARTH, MAGNET.replace("MOMENT", f"[{B_DOT}]"))
     given = config(BODY, START, text, "end = 950\nsamples = 3", f'precision = "{precision}"', more=K)
@@ -196,6 +200,7 @@ def test_a_law_of_magnetorquers(precision: str, bound: float) -> None:
     assert np.linalg.norm(rates) < 0.97 * np.linalg.norm([0.5, -0.6, 0.7])  # it brakes
 
 
+@pytest.mark.slow
 def test_a_field_alone_and_a_filter_of_its_measurement() -> None:
     """A moment of zero gives the field; the law takes the change of a filtered measurement."""
     filters = "".join(
@@ -310,6 +315,7 @@ def shadowed(radius: str, more: str = "", end: float = 5800, samples: int = 30, 
     return config(BODY, START, text, f"end = {end}\nsamples = {samples}", more=LIT + more, **tables)
 
 
+@pytest.mark.slow
 def test_shadows_against_quadrature_and_root_finding() -> None:
     half = '[[events]]\nname = "half"\nexpression = "shadow_sun - 0.5"\n'
     data = loaded(run_text(shadowed('\nradius = "695700 km"', half)))

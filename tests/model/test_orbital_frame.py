@@ -48,6 +48,7 @@ def initial(system: System) -> np.ndarray:
     return np.ldexp([float(x) for x in system.initial], system.state_exponents)
 
 
+@pytest.mark.slow
 @settings(max_examples=6, deadline=None)
 @given(
     rates=st.lists(ANGLE, min_size=3, max_size=3),

@@ -15,7 +15,7 @@ import rigidsim
 from rigidsim import ConfigError
 from rigidsim.scene.scene import build_scene
 from rigidsim.store.variables import parts_in
-from tests.support import run_text
+from tests.support import cases, run_text
 
 DIGITS = 50
 CONFIG = """
@@ -106,8 +106,10 @@ def first_sample(dataset: xarray.Dataset, name: str, place: int = 0) -> mpmath.m
     return mpmath.fsum(float(np.ravel(dataset[part].values[0])[place]) for part in parts_in(dataset, name))
 
 
-@pytest.mark.parametrize("precision", ['"single"', '"double"', '"extended"', "50", "100"])
-@pytest.mark.parametrize("axis", "xyz")
+@pytest.mark.parametrize(
+    "precision", cases(['"single"', '"double"', '"extended"', "50", "100"], ['"double"', "50"])
+)
+@pytest.mark.parametrize("axis", cases("xyz", "y"))
 def test_start_and_observables_agree_to_the_last_digits(precision: str, axis: str) -> None:
     """A body that starts by its pole is recorded with it; so by its obliquity on a moving orbital plane."""
     frame = f'axes = "ecliptic J2000"\nreference = "orbit"\nfigure_axis = "{axis}"'

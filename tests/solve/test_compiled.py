@@ -83,6 +83,7 @@ PLAIN = "estimate = false"
 AWAKE = 60.0  # seconds that nobody waits for
 
 
+@pytest.mark.slow
 def test_ctrl_c_while_another_chart_is_compiled(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """In the middle of a chunk of steps: what was integrated before it is kept, and resumed with the bits of
     a run in one go.

@@ -181,7 +181,9 @@ def exact(dataset: xarray.Dataset, row: int) -> list[mpmath.mpf]:
     return [mpmath.fsum(map(float, values)) for values in zip(*parts, strict=True)]
 
 
-@pytest.mark.parametrize(("precision", "close"), [("double", 1e-13), ("50", 1e-46)])
+@pytest.mark.parametrize(
+    ("precision", "close"), [("double", 1e-13), pytest.param("50", 1e-46, marks=pytest.mark.slow)]
+)
 def test_the_moon_comes_back_after_each_revolution(precision: str, close: float) -> None:
     """In the frame that turns with the node, after 1, 2, ... 8 draconic months: no free libration at all."""
     text = config(MOON, end='"217.6976 day"', samples="9")
@@ -199,7 +201,10 @@ def test_the_moon_comes_back_after_each_revolution(precision: str, close: float)
             assert away < close
 
 
-@pytest.mark.parametrize("given", [MOON, SATELLITE], ids=["cassini", "relative"])
+@pytest.mark.parametrize(
+    "given",
+    [pytest.param(MOON, marks=pytest.mark.slow, id="cassini"), pytest.param(SATELLITE, id="relative")],
+)
 def test_a_later_start_is_where_an_earlier_one_leads(given: dict[str, str]) -> None:
     """What comes back, or rests, is the same motion whenever it begins."""
     later = "1e8" if given is MOON else "1e5"
@@ -212,6 +217,7 @@ def test_a_later_start_is_where_an_earlier_one_leads(given: dict[str, str]) -> N
     np.testing.assert_allclose(rates, end["angular_velocity"].values[-1], atol=1e-11 * np.linalg.norm(rates))
 
 
+@pytest.mark.slow
 def test_the_moons_state_is_the_observed_one_with_its_librations() -> None:
     """1.543 deg to the ecliptic (Williams et al. 2014), on a circle and on the Moon's own ellipse: 2 %.
 
@@ -256,6 +262,7 @@ def test_an_ellipse_with_turning_apsides_leaves_hardly_any_free_libration() -> N
     assert amplitude(longitude, 180 / 60.03) > 20  # forced by the apsides, with half their period
 
 
+@pytest.mark.slow
 def test_a_triaxial_planet_out_of_step_starts_by_its_mean_moments() -> None:
     """Mars' own moments, and the mean of both: one start; the pole stays where the node leads it."""
     orbit = 'semi_major_axis = "1.523679 au"\ninclination = "1.67 deg"\nnode_rate = "-17.6 arcsec/yr"'

@@ -50,6 +50,7 @@ def test_a_run_of_fewer_steps_is_the_plain_one(samples: int) -> None:
     assert "hold_from_step" not in plain.dataset.attrs
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("formulation", cases(["quaternion", "euler_angles"], ["quaternion"]))
 def test_a_run_that_is_prolonged_past_the_count_is_the_run_in_one_go(
     formulation: str, tmp_path: Path

@@ -68,7 +68,14 @@ def rounding(precision: str = "double") -> float:
 
 
 @pytest.mark.parametrize("formulation", cases(FORMULATIONS, ["quaternion", "euler_angles"]))
-@pytest.mark.parametrize("parts", [FREE, LAGRANGE, KOVALEVSKAYA], ids=["free", "lagrange", "kovalevskaya"])
+@pytest.mark.parametrize(
+    "parts",
+    [
+        pytest.param(FREE, id="free", marks=pytest.mark.slow),
+        pytest.param(LAGRANGE, id="lagrange", marks=pytest.mark.slow),
+        pytest.param(KOVALEVSKAYA, id="kovalevskaya"),
+    ],
+)
 def test_invariants_stay_within_rounding(parts: Scene, formulation: str) -> None:
     found = run(parts, 500, f'hold_invariants = true\nformulation = "{formulation}"')
     # angles amplify rounding on the way past their singularity, which charts keep at 60 degrees
@@ -95,7 +102,7 @@ def test_each_scene_holds_what_it_conserves(parts: Scene, names: set[str]) -> No
     assert max(drifts(found)[name] for name in held) < rounding()
 
 
-@pytest.mark.parametrize("precision", ["single", "extended", "quadruple"])
+@pytest.mark.parametrize("precision", cases(["single", "extended", "quadruple"], ["extended"]))
 def test_every_precision_is_held_in_the_next(precision: str) -> None:
     found = run(FREE, 20, f'hold_invariants = true\nprecision = "{precision}"')
     assert max(drifts(found).values()) < rounding(precision)

@@ -279,6 +279,7 @@ def test_a_norm_that_vanishes_is_not_passed_over() -> None:
     assert smooth.status is Status.FINISHED
 
 
+@pytest.mark.slow
 def test_the_announced_error_knows_the_sides() -> None:
     """Neighbours cross, and slide, on their own: a motion that forgets its torques isn't near this one."""
     torque = '"-0.2*abs(wx)*wx", "0.3*sign(sin(3*t))", "-0.3*sign(wz)"'

@@ -54,6 +54,7 @@ def wrong(analysis: Any, exact: Case, share: float) -> list[float]:
     return errors
 
 
+@pytest.mark.slow
 def test_lines_of_a_free_body_are_multiples_of_its_period(tmp_path: Path) -> None:
     run, exact = tumbling(400, "double", "0.8", tmp_path)
     analysis = rigidsim.analyse(run, "angular_velocity")

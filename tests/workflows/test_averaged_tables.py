@@ -85,6 +85,7 @@ def test_the_announced_error_covers_the_true_one(full: rigidsim.Run) -> None:
         assert apart(run, full) <= run.summary["modelling"]["momentum_axis"]
 
 
+@pytest.mark.slow
 def test_the_obliquity_of_mars_swings_as_published() -> None:
     """On its perturbed orbit, over half a million years: Ward 1973, Science 181, 260, says some 120,000 years
     for a swing, between 14.9 and 35.5 deg at most.

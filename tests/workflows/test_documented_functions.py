@@ -51,6 +51,7 @@ def test_every_function_is_documented() -> None:
     assert named == {*FUNCTIONS, *PIECEWISE}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("batch", cases(["true", "false"], ["true"]))
 def test_a_swept_parameter_within_a_function_of_time(tmp_path: Path, batch: str) -> None:
     text = (FAULTS / "sweep_parameter_crash.toml").read_text()

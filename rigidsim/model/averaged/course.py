@@ -49,6 +49,7 @@ _SEPARATRIX = (
     "the average isn't valid near the separatrix, the rotation about the intermediate axis, where the wobble "
     "takes forever, and the torques bring the body there"
 )
+_UNDEFINED = "a torque has no finite value somewhere on the rotation that it is averaged over"
 
 
 @dataclass(frozen=True)
@@ -113,7 +114,7 @@ def wave_of(torques: DrivingTorques, axial: float, transverse: float) -> Wave:
     upwards = np.sin(own) * torque[0] + np.cos(own) * torque[1]
     seen = across + 1j * (np.cos(nodding) * upwards - np.sin(nodding) * torque[2])
     harmonics = np.fft.fft(np.exp(1j * phase) * seen * weight) / _GRID / length
-    parameter = (1 - ratio) * (transverse / axial) ** 2 if ratio != 1 else 0.0
+    parameter = _parameter(torques, (axial, transverse))
     mean_weight = float(weight.mean())
     # over time: the rate of the mean angle is pace / <1 / dn>, by which the harmonics are to be divided
     return Wave(periodic, parameter, pace / mean_weight, turning, harmonics / mean_weight, order, phase)
@@ -153,7 +154,10 @@ def follow(
     torques: DrivingTorques, start: Sequence[float], begin: float, end: float, epsilon: float
 ) -> PolhodeCourse:
     """Follow the mean torques over the run; NoCourse says from when on no average applies, and why."""
-    times, amplitudes, fastest, failure = _followed(torques, np.array(start, dtype=float), begin, end)
+    first = np.array(start, dtype=float)
+    if not _parameter(torques, first) < 1:  # where strong torques leave it, less their periodic part
+        raise NoCourse(_SEPARATRIX)
+    times, amplitudes, fastest, failure = _followed(torques, first, begin, end)
     picked = np.unique(np.linspace(0, len(times) - 1, _EXAMINED).astype(int))
     waves = [wave_of(torques, *amplitudes[i]) for i in picked]
     root = float(torques.polhodes.root)
@@ -197,7 +201,6 @@ def _followed(
     """Times, amplitudes and the fastest relative rate, by Runge-Kutta steps of the fourth order, and what
     ended them before the run's end.
     """
-    ratio = float(torques.polhodes.ratio)
     time, fastest, part = begin, 0.0, 1.0
     times, amplitudes = [time], [now]
     failure: str | None = None
@@ -220,11 +223,11 @@ def _followed(
             third = rate(now + step / 2 * second)
             fourth = rate(now + step * third)
         later = now + step / 6 * (first + 2 * second + 2 * third + fourth)
-        parameter = 0.0 if ratio == 1 else float((1 - ratio) * (later[1] / later[0]) ** 2)
-        if not np.isfinite(later).all() or parameter > PARAMETER:
+        if not np.isfinite(later).all() or _parameter(torques, later) > PARAMETER:
             part /= 2
             if part < _NEAR:
-                failure = _SEPARATRIX
+                beyond = _parameter(torques, now + step * first) > PARAMETER
+                failure = _SEPARATRIX if beyond else _UNDEFINED
                 break
             continue
         time = end if step >= end - time else time + step
@@ -237,12 +240,20 @@ def _followed(
     return np.array(times), np.array(amplitudes), fastest, failure
 
 
+def _parameter(torques: DrivingTorques, amplitudes: Sequence[float] | np.ndarray) -> float:
+    """k^2 at amplitudes P and Q."""
+    ratio = float(torques.polhodes.ratio)
+    return 0.0 if ratio == 1 else float((1 - ratio) * (amplitudes[1] / amplitudes[0]) ** 2)
+
+
 def _seconds(torques: DrivingTorques, time: float) -> float:
     return float(np.ldexp(time, torques.scaling.time))
 
 
 def _examine(torques: DrivingTorques, amplitudes: np.ndarray, wave: Wave, root: float) -> str | None:
     """What is against an average at a place: torques that change the polhode much within a rotation."""
+    if not np.isfinite(wave.harmonics).all():
+        return _UNDEFINED
     size = float(np.hypot(amplitudes[0], root * amplitudes[1]))
     changed = float(np.abs(wave.periodic).max()) / size
     if not changed <= SWING:
