@@ -70,7 +70,8 @@ def analyse_dataset(
         for raw, size in zip(raws, sizes, strict=True)
     ]
     names = _with_precession(known, raws, clock)
-    names = settled([k for k in names if float(k.value) != 0], measured)
+    in_body = [raw.signal.in_body for raw in raws]
+    names = settled([k for k in names if float(k.value) != 0], measured, in_body)
     return Analysis(
         signals=tuple(_named(raw, clock, names) for raw in raws),
         known=tuple(names),
@@ -103,14 +104,18 @@ def _raw(signal: Signal, clock: EquidistantTimes, lines: int, floor: float, orde
 
 
 def _with_precession(known: Sequence[Known], raws: Sequence[_Raw], clock: EquidistantTimes) -> list[Known]:
-    """The known frequencies with the equinox's, unless known: it moves back with the measured precession."""
+    """The known frequencies with the equinox's, unless known: it moves back with the measured precession.
+
+    Where an axis follows the node of an orbit, its rate is that node's.
+    """
     names = list(known)
     if not known or any(k.name == "precession" for k in known):
         return names
     for raw in raws:
         if raw.signal.name in (_SECULAR, "node_longitude"):
             rate, error = _rate(raw, clock)
-            if abs(float(rate)) > 5 * error:
+            same = any(abs(float(rate - k.value)) <= 5 * math.hypot(error, k.error) for k in known)
+            if abs(float(rate)) > 5 * error and not same:
                 names.append(Known("precession", rate, 0.0, f"secular rate of {raw.signal.name}", error))
     return names
 

@@ -31,6 +31,8 @@ class Known:
 
     ``where`` is "body" or "space" if only signals in body axes, or only those in space, can have it: how far
     a symmetric body has turned about its axis is to be seen in body axes alone.
+
+    ``frames`` are rates (rad/s) of other frames in which its line may be seen, at its value plus such a rate.
     """
 
     name: str
@@ -39,6 +41,7 @@ class Known:
     source: str = ""
     error: float = 0.0
     where: str = ""
+    frames: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -163,10 +166,15 @@ def reversed_label(name: Label, known: Sequence[Known]) -> Label:
     return Label(multipliers, named(multipliers, known), -name.folds, name.doubtful)
 
 
-def settled(known: Sequence[Known], signals: Sequence[Sequence[tuple[Any, float, float]]]) -> list[Known]:
+def settled(
+    known: Sequence[Known],
+    signals: Sequence[Sequence[tuple[Any, float, float]]],
+    in_body: Sequence[bool] | None = None,
+) -> list[Known]:
     """Roughly known frequencies, replaced by the strongest line near them, or left out.
 
-    Of each signal's lines are given frequency (rad/s), its error, and amplitude.
+    Of each signal's lines are given frequency (rad/s), its error, and amplitude; ``in_body`` says which
+    signals are in body axes.
     """
     found = []
     for one in known:
@@ -174,15 +182,22 @@ def settled(known: Sequence[Known], signals: Sequence[Sequence[tuple[Any, float,
         if not one.tolerance:
             found.append(one)
             continue
+        seen = [
+            signal
+            for n, signal in enumerate(signals)
+            if not one.where or in_body is None or in_body[n] == (one.where == "body")
+        ]
         near = [
-            (amplitude / largest, frequency, error)
-            for signal in signals
+            (amplitude / largest, frequency, error, frame)
+            for signal in seen
             if (largest := max((a for _, _, a in signal), default=0.0))
             for frequency, error, amplitude in signal
-            if abs(abs(float(frequency)) - abs(value)) <= one.tolerance * abs(value)
+            for frame in (0.0, *one.frames)
+            if abs(abs(float(frequency)) - abs(value + frame)) <= one.tolerance * abs(value)
         ]
-        strength, frequency, error = max(near, key=lambda line: line[0], default=(0.0, 0.0, 0.0))
+        strength, frequency, error, frame = max(near, key=lambda line: line[0], default=(0.0, 0.0, 0.0, 0.0))
         if strength > 0:
-            measured = abs(frequency) if value > 0 else -abs(frequency)
+            measured = abs(frequency) if value + frame > 0 else -abs(frequency)
+            measured = measured - frame if frame else measured
             found.append(replace(one, value=measured, error=error, source=f"{one.source}; measured"))
     return found

@@ -1,7 +1,7 @@
 """Known frequencies of a scene, from its config, with which spectral lines are labelled.
 
 Free bodies and heavy tops have theirs from the closed form (elliptic functions), orbits from their elements,
-ephemerides from mean elements, librations on a circular orbit from the linearised equations.
+ephemerides from mean elements, librations and a fluid core from the linearised equations.
 """
 
 from typing import Any
@@ -18,6 +18,7 @@ from rigidsim.scene.scene import Scene
 from rigidsim.solve.closed_form import find_closed_form
 from rigidsim.solve.closed_form.free import AsymmetricFree, SymmetricFree
 from rigidsim.solve.closed_form.heavy import HeavyTop
+from rigidsim.workflows.free_modes import modes_of_core, synchronous_modes
 
 _LIBRATION = 0.08  # relative amount by which a libration of finite amplitude may be slower than a small one
 _SPIN = 0.02  # relative amount by which torques may change spin and wobble
@@ -44,7 +45,8 @@ def known_frequencies(scene: Scene, *, driven: bool = False) -> list[Known]:
         return [Known(k.name, mpmath.ldexp(k.value, -closed.scaling.time), 0.0, k.source) for k in found]
     found = []
     loads = [load for load in loads_of(scene) if not isinstance(load, Beside)]
-    if carried_beside(loads):
+    cored = modes_of_core(scene)
+    if not cored and carried_beside(loads):
         return []
     orbits = [orbit for load in loads if (orbit := orbit_of(load)) is not None]
     for number, orbit in enumerate(orbits, 1):
@@ -53,7 +55,8 @@ def known_frequencies(scene: Scene, *, driven: bool = False) -> list[Known]:
     if any(source is not None and source.placement.lunisolar for source in sources):
         found += _delaunay(scene)
     librations = _librations(scene, orbits[0]) if len(orbits) == 1 == len(loads) else []
-    return found + (librations or _of_spin(scene))
+    librations = librations or synchronous_modes(scene)
+    return found + (cored + librations if cored else librations or _of_spin(scene))
 
 
 def _of_motion(motion: Any) -> list[Known]:

@@ -17,6 +17,7 @@ import rigidsim
 from experiments.spectral_lines import Case, free
 from rigidsim import RigidsimError
 from rigidsim.cli.app import app
+from rigidsim.scene.scene import build_scene
 
 MOMENTS, RATES = ["3", "2", "1"], ["0.3", "0.2", "1"]
 
@@ -126,6 +127,71 @@ def test_librations_of_a_satellite() -> None:
     assert [line.label.text for line in analysis["angular_velocity.z"].lines[:1]] == ["pitch"]
     transverse = {line.label.text.lstrip("-") for line in analysis["angular_velocity.x+iy"].lines[:4]}
     assert transverse == {"rollyaw1", "rollyaw2"}
+
+
+def labels(analysis: rigidsim.Analysis, signal: str, count: int) -> dict[str, float]:
+    """The strongest lines by label, and their frequencies."""
+    return {line.label.text: float(line.frequency) for line in analysis[signal].lines[:count]}
+
+
+def test_the_free_core_nutation() -> None:
+    """Of a core that begins aside: both modes of the linearised equations, in body axes and in space."""
+    a, moment, f = 0.94, 0.11, 0.05
+    text = config(
+        f"principal_moments = [{a}, {a}, 1]\n"
+        f"core = {{moment = {moment}, flattening = {f}, angular_velocity = [1e-6, 0, 1]}}",
+        "angular_velocity = [0, 0, 1]",
+        time="end = 1000\nsamples = 2001",
+        output='record = ["angular_velocity", "core_angular_velocity", "figure_axis"]\nestimate = false',
+    )
+    analysis = rigidsim.analyse(run_text(text), ["core_angular_velocity", "figure_axis"], lines=4)
+    mantle = a - moment * (1 - f)
+    modes = np.linalg.eigvals(
+        [[(1 - moment - mantle) / mantle, moment * f / mantle], [1 / (1 - f), -1 / (1 - f)]]
+    )
+    retrograde, prograde = sorted(modes)
+    body = labels(analysis, "core_angular_velocity.x+iy", 2)
+    assert body == pytest.approx(
+        {"free_core_nutation - spin": retrograde, "wobble": prograde}, rel=1e-11
+    )  # amplitudes squared
+    space = labels(analysis, "figure_axis.X+iY", 3)
+    assert space["free_core_nutation"] == pytest.approx(1 + retrograde, rel=1e-10)
+    assert space["free_nutation"] == pytest.approx(1 + prograde, rel=1e-11)
+
+
+@pytest.mark.slow
+def test_free_librations_of_the_moon() -> None:
+    """Those that the map of the Cassini state has as eigenvalues: about 75.6 and 2.9 years, and 24.1 years in
+    the frame of the node.
+    """
+    ready = rigidsim.load(Path(__file__).parents[2] / "configs" / "moon_cassini_state.toml")
+    found = build_scene(ready).found_start
+    wobble, in_frame, longitude = sorted(x for _, x in found.exponents if x > 0)
+    quick = {"time.end": "1 day", "time.samples": 2, "output.estimate": False}
+    start = rigidsim.run(ready.replace(quick), out=None).dataset.isel(time=0)
+    pushed = start["angular_velocity"].values + np.array([1e-9, 0, 1e-10])
+    moved = ready.replace(
+        {
+            "initial": {
+                "equilibrium": None,
+                "quaternion": start["quaternion"].values.tolist(),
+                "angular_velocity": pushed.tolist(),
+            },
+            "time": {"end": "300 yr", "every": "10 day", "samples": None},
+            "output": {"record": ["angular_velocity", "figure_axis", "obliquity"], "estimate": False},
+        }
+    )
+    names = ["angular_velocity", "figure_axis.X+iY", "obliquity.spin"]
+    analysis = rigidsim.analyse(rigidsim.run(moved, out=None), names, lines=12)
+    known = {k.name: float(k.value) for k in analysis.known}
+    # amplitudes of 4e-4 rad, squared, and other lines within the span's resolution
+    assert known["longitude"] == pytest.approx(longitude, rel=1e-5)
+    assert known["wobble"] == pytest.approx(wobble, rel=1e-5)
+    assert known["latitude"] - known["node"] == pytest.approx(in_frame, rel=1e-5)
+    assert "wobble" in labels(analysis, "angular_velocity.x+iy", 4)
+    assert "longitude" in labels(analysis, "angular_velocity.z", 3)
+    assert {"node", "latitude"} <= set(labels(analysis, "figure_axis.X+iY", 6))
+    assert "latitude - node" in labels(analysis, "obliquity.spin", 4)
 
 
 def made_up(**attributes: Any) -> xarray.Dataset:
