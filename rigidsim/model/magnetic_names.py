@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import random
 from collections.abc import Collection, Iterable, Mapping
 from typing import Any
 
 from rigidsim.model.capabilities import Magnetic
 from rigidsim.model.kinematics import Kinematics
 from rigidsim.model.sources import free_flight, in_body_axes, read_in
+from rigidsim.scene.arithmetic import norm
 from rigidsim.scene.expressions.names import PLACES, NameProvider, Readable, provides
 from rigidsim.scene.registry import LOAD_KINDS
 from rigidsim.scene.scene import Scene
@@ -36,6 +38,13 @@ class FieldNames(NameProvider):
             return {}
         found = [load.flux_density_at_start(scene) for load in _fields_of(scene)]
         return dict(zip(FIELD_NAMES, in_body_axes(scene, _total(found)), strict=True))
+
+    def at_random(
+        self, scene: Scene, start: Mapping[str, Any], generator: random.Random
+    ) -> Mapping[str, Any]:
+        """Any field, about as large as at the start."""
+        size = norm(scene.context, list(start.values())) if start else scene.context.zero
+        return {name: size * scene.context.mpf(generator.gauss(0, 1)) for name in start}
 
     def expressions(self, m: Kinematics, names: Collection[str]) -> Mapping[str, Any]:
         """See ``NameProvider``."""

@@ -13,9 +13,8 @@ import heyoka as hy
 import numpy as np
 
 from rigidsim.errors import ConfigError, Problem
-from rigidsim.model.assembly import assemble_states
 from rigidsim.model.averaged.average import Average
-from rigidsim.model.capabilities import GradientAlone, Reacting, is_wide, table_of
+from rigidsim.model.capabilities import GradientAlone, Reacting, table_of
 from rigidsim.model.carriers import Carrier
 from rigidsim.model.formulations.averaged import Averaged
 from rigidsim.model.formulations.formulation import (
@@ -34,14 +33,14 @@ from rigidsim.model.load_estimate import estimate_drive, orbit_tags, probe, star
 from rigidsim.model.loads.uniform_gravity import UniformGravity
 from rigidsim.model.observables.observable import NEEDS
 from rigidsim.model.orbits.prescribed import places_of
-from rigidsim.model.own_states import first_units, refuse_odd_states, sizes_along, units_along
+from rigidsim.model.own_states import own_units, refuse_odd_states
 from rigidsim.model.scaling import Scaling, amplitude_of, choose_scaling, scaled_numbers
 from rigidsim.model.state_blocks import BODY
 from rigidsim.scene.choices import AUTO, variables_named
 from rigidsim.scene.expressions.tree import states_read
 from rigidsim.scene.registry import OBSERVABLES
 from rigidsim.scene.scene import Scene
-from rigidsim.scene.surfaces import Surfaces, surfaces_of
+from rigidsim.scene.surfaces import surfaces_of
 from rigidsim.scene.transitions import happens_at_a_moment
 
 _SAME_BODY = 1e-3  # relative difference of gravitational parameters below which two sources are taken as one
@@ -82,6 +81,9 @@ def plan_model(
         refuse_odd_states(scene)
         refuse_odd_loads(scene, requirements, unknown)
         scaling = choose_scaling(scene, estimate_drive(scene, unknown, requirements))
+    if scene.states and not scaling.own:
+        known = None if like is None else like.scaling.own
+        scaling = replace(scaling, own=own_units(scene, scaling, known))
     if not formulation.carries_rates:
         scaling = replace(scaling, rates=(0, 0, 0))
     tabulated = [(str(number), table_of(load)) for number, load in enumerate(loads_of(scene), start=1)]
@@ -96,32 +98,9 @@ def plan_model(
     tags = orbit_tags(scene)
     clocked = formulation.resolves_rotation and not tables and happens_at_a_moment(scene)
     numbers = scaled_numbers(scene, scaling)
-    plan = ModelPlan(
+    return ModelPlan(
         scene, loads, formulation, requirements, scaling, numbers, tags, surfaces, tables, clocked
     )
-    if scene.states and not scaling.own:
-        plan = replace(plan, scaling=replace(scaling, own=_own_units(plan, like)))
-    return plan
-
-
-def _own_units(plan: ModelPlan, like: ModelPlan | None) -> dict[str, int]:
-    """Binary exponents of the units of states of one's own, from the sizes that they reach."""
-    scene, scaling = plan.scene, plan.scaling
-    if like is not None:
-        own = like.scaling.own.items()
-        return units_along(scene, {name: scene.context.ldexp(1, unit) for name, unit in own})
-    units = first_units(scene, scaling.time)
-    if (
-        any(map(is_wide, plan.loads)) or plan.tables
-    ):  # too long to be tried, or with steps that have to end at rows
-        return units
-    formulation = Quaternion() if plan.requirements.attitude else Rates()
-    tried = replace(
-        plan, scaling=replace(scaling, own=units), formulation=formulation, surfaces=Surfaces(), clocked=False
-    )
-    begin, end = (float(scene.context.ldexp(t, -scaling.time)) for t in (scene.start, scene.end))
-    _, blocks = assemble_states(tried, formulation, float)
-    return units_along(scene, sizes_along(scene, units, blocks, begin, end))
 
 
 # --- which states -------------------------------------------------------------------------------------------

@@ -2,38 +2,42 @@
 
 A state of one's own is carried in a unit of 2^n of its SI unit. Step control is relative to the largest
 state, and absolute below 1: one that grew far beyond 1 would loosen the steps of all others. Its size is
-estimated by following the motion roughly, for some hundred steps at most.
+estimated from its initial value, and from its derivative at the start and in a few states like it; the length
+of the run doesn't enter, so that a run can be prolonged.
 """
 
 from __future__ import annotations
 
-import math
+import random
 from collections.abc import Collection, Iterable, Mapping
 from typing import Any
 
 import heyoka as hy
-import numpy as np
 
 from rigidsim.errors import ConfigError, Problem
 from rigidsim.model.kinematics import Kinematics
 from rigidsim.model.names import in_si, written
-from rigidsim.model.scaling import exponent
+from rigidsim.model.scaling import Scaling, exponent
 from rigidsim.model.state_blocks import StateBlock
-from rigidsim.scene.expressions.names import BODY_NAMES, NameProvider, Readable, provides
-from rigidsim.scene.expressions.tree import evaluate, names_used
+from rigidsim.scene.expressions.names import BODY_NAMES, RATE_NAMES, NameProvider, Readable, provides
+from rigidsim.scene.expressions.tree import Expression, ExpressionError, evaluate, names_used
 from rigidsim.scene.initial_values import start_values
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.schema import Config
 from rigidsim.scene.surfaces import changes, random_states
 from rigidsim.scene.transitions import narrow_parts, root_parts
 
-_MARGIN = 1.0625
-"""Over the largest value seen, so that one that tends to a power of two keeps its unit."""
-_TRIAL_STEPS = 300
-_TRIAL_TOLERANCE = 1e-6
+_ROOM = 10
+"""Binary exponent of the units of time over which a state is taken to add up its derivative if nothing brings
+it back: 160 turns. One that adds up for longer, or less, loses little: steps in double precision cut off a
+fiftieth of an epsilon.
+"""
+_ALIKE = 8  # states like the start
+_LATEST = 8.0  # binary exponent of the units of time until which functions of time are looked at
+_SMALL = -20  # binary exponent of a small part, in difference quotients
+_NEWTON = 40  # iterations, each of which halves the distance to a double zero
+_TINY, _HUGE = -200, 200  # binary exponents of what tells nothing: a spike's flank, a pole
 _MOST_GROWTH = 100  # bits
-_STALLED = 0.01  # of the time of a trial in the second half of its steps: near a pole they tell nothing
-_GROWS = 1.5  # from the first half of a trial to the second: as much again for each half that follows
 
 
 @provides
@@ -120,18 +124,18 @@ def radicands(m: Kinematics) -> list[tuple[str, Any]]:
 # --- units --------------------------------------------------------------------------------------------------
 
 
-def first_units(scene: Scene, time: int) -> dict[str, int]:
-    """Exponents by initial values, and by derivatives at the start over a unit of time."""
-    context, values = scene.context, start_values(scene)
-    unit = context.ldexp(context.one, time)
-    return units_along(
-        scene, {x.name: abs(evaluate(x.derivative, values, context)) * unit for x in scene.states}
-    )
+def own_units(scene: Scene, scaling: Scaling, like: Mapping[str, int] | None = None) -> dict[str, int]:
+    """Binary exponents of the units of states of one's own, from the sizes that they are expected to reach,
+    and from initial values, which keep their digits in single precision.
 
-
-def units_along(scene: Scene, sizes: Mapping[str, Any]) -> dict[str, int]:
-    """Exponents by sizes (mpf, SI), and by initial values, which keep their digits in single precision."""
+    Args:
+        like: units of the same scene in plain numbers.
+    """
     context, found = scene.context, {}
+    if like is None:
+        sizes = _sizes(scene, scaling)
+    else:
+        sizes = {name: context.ldexp(context.one, unit) for name, unit in like.items()}
     for state in scene.states:
         start = abs(state.initial)
         unit = exponent(context, context.maximum([start, sizes[state.name]]))
@@ -139,43 +143,102 @@ def units_along(scene: Scene, sizes: Mapping[str, Any]) -> dict[str, int]:
     return found
 
 
-def sizes_along(
-    scene: Scene, units: Mapping[str, int], blocks: Iterable[StateBlock], begin: float, end: float
-) -> dict[str, Any]:
-    """About the largest values (mpf, SI) that the states reach, by a rough integration of the equations in
-    double precision: those that still grow at its end are taken to go on as they did, and those of a motion
-    that breaks down on the way to have their first ones.
+def _sizes(scene: Scene, scaling: Scaling) -> dict[str, Any]:
+    """About the largest values (mpf, SI) that states of one's own reach; 0 where nothing tells.
+
+    What drives a state, its derivative where it is zero itself, acts for as long as the state takes to come
+    back, or for 2^10 units of time. One that follows others has its size from theirs.
+    """
+    context, known = scene.context, {x.name: abs(x.initial) for x in scene.states}
+    states = _alike(scene, scaling)
+    longest = context.ldexp(context.one, scaling.time + _ROOM)
+    for _ in scene.states:
+        begin, *others = (
+            {**values, **{name: x if not n else x * known[name] for name, x in parts.items()}}
+            for n, (values, parts) in enumerate(states)
+        )
+        sizes = {}
+        for x in scene.states:
+            begins = [
+                begin,
+                *({**begin, "t": time} for time in _moments(scene, x.derivative, begin, longest)),
+            ]
+            first, alike = (
+                [abs(driven(scene, x.name, values, known, longest)) for values in group]
+                for group in (begins, others)
+            )
+            seen = sorted(size for size in alike if size != 0)
+            sizes[x.name] = context.maximum([abs(x.initial), *first, *seen[len(seen) // 2 :][:1]])
+        if sizes == known:
+            break
+        known = sizes
+    return known
+
+
+def _alike(scene: Scene, scaling: Scaling) -> list[tuple[dict[str, Any], dict[str, Any]]]:
+    """Values of all names, and those of states of one's own: at the start, and as parts of their sizes at any
+    attitude, rates as large as they become, and times that don't depend on the run's end.
+    """
+    context, generator = scene.context, random.Random(0)
+    fastest = [context.ldexp(context.one, e - scaling.time) for e in scaling.rates]
+    unit = context.ldexp(context.one, scaling.time)
+    found = [(start_values(scene), {x.name: x.initial for x in scene.states})]
+    for values in random_states(scene)[:_ALIKE]:
+        values["t"] = scene.start + unit * context.mpf(2.0 ** generator.uniform(0.0, _LATEST))
+        for name, rate in zip(RATE_NAMES, fastest, strict=True):
+            values[name] = rate * context.mpf(generator.uniform(-1, 1))
+        parts = {x.name: context.mpf(generator.uniform(-1, 1)) for x in scene.states}
+        found.append((values, parts))
+    return found
+
+
+def _moments(scene: Scene, expression: Expression, start: Mapping[str, Any], unit: Any) -> list[Any]:
+    """Times (mpf, s) at which arguments of spikes and the like are zero, by Newton's method."""
+    context, found = scene.context, []
+    step = context.ldexp(unit, 2 * _SMALL)
+    for part in narrow_parts(expression):
+        if names_used(part) != {"t"}:
+            continue
+        time = start["t"]
+        for _ in range(_NEWTON):
+            value, beyond = (_value(part, {"t": x}, context) for x in (time, time + step))
+            if value == beyond:
+                break
+            time -= step * value / (beyond - value)
+        found.append(time)
+    return found
+
+
+def driven(scene: Scene, name: str, values: Mapping[str, Any], sizes: Mapping[str, Any], longest: Any) -> Any:
+    """To where a state is driven from zero while all others keep some values (mpf, SI).
 
     Args:
-        begin, end: of the run, internal units.
+        values: of all names.
+        sizes: of states of one's own.
+        longest: time that it has, if it doesn't come back before, s.
     """
-    whole = list(blocks)
-    names = [name for block in whole for name in block.names]
-    equations = [pair for block in whole for pair in zip(block.variables, block.derivatives, strict=True)]
-    start = [float(x) for block in whole for x in block.initial]
-    engine = hy.taylor_adaptive(
-        equations, start, time=begin, tol=_TRIAL_TOLERANCE, compact_mode=True, opt_level=0
+    context, slopes = scene.context, {x.name: x.derivative for x in scene.states}
+    here = {**values, name: context.zero}
+
+    def change(of: str, by: str) -> Any:
+        """Partial derivative of one state's slope by another state."""
+        if by not in names_used(slopes[of]):
+            return context.zero
+        step = context.ldexp(sizes[by] or context.one, _SMALL)
+        there = {**here, by: here[by] + step}
+        return (_value(slopes[of], there, context) - _value(slopes[of], here, context)) / step
+
+    rate = context.maximum(
+        abs(change(name, name)) if x == name else context.sqrt(abs(change(name, x) * change(x, name)))
+        for x in slopes
     )
-    places = [names.index(state.name) for state in scene.states]
-    times, values = [begin], [np.abs(engine.state[places])]
-    for _ in range(_TRIAL_STEPS):
-        outcome, _ = engine.step(max_delta_t=end - engine.time)
-        if outcome not in (hy.taylor_outcome.success, hy.taylor_outcome.time_limit):
-            break
-        times.append(engine.time)
-        values.append(np.abs(engine.state[places]))
-        if engine.time >= end:
-            break
-    moments, sizes = np.array(times), np.array(values)
-    slow = moments[-1] - moments[len(moments) // 2] < _STALLED * (moments[-1] - moments[0])
-    if moments[-1] < end and (slow or outcome == hy.taylor_outcome.err_nf_state):
-        return {name: scene.context.ldexp(1, unit) for name, unit in units.items()}
-    early = moments <= (moments[0] + moments[-1]) / 2
-    first, last = sizes[early].max(axis=0), sizes.max(axis=0)
-    halves = 2 * (end - moments[-1]) / max(moments[-1] - moments[0], 1e-300)
-    reached = np.where(last > _GROWS * first, last + (last - first) * halves, last)
-    found = dict(units)
-    for state, size in zip(scene.states, reached, strict=True):
-        if 0 < size < math.inf:
-            found[state.name] += math.frexp(_MARGIN * float(size))[1]
-    return {name: scene.context.ldexp(1, unit) for name, unit in found.items()}
+    found = _value(slopes[name], here, context) * (longest if rate * longest < 1 else 1 / rate)
+    return found if found and _TINY < context.mag(found) < _HUGE else context.zero
+
+
+def _value(expression: Expression, values: Mapping[str, Any], context: Any) -> Any:
+    """Value of an expression, 0 where it has none."""
+    try:
+        return evaluate(expression, values, context)
+    except ExpressionError:
+        return context.zero

@@ -303,6 +303,14 @@ def test_a_recorded_state_that_nothing_reads_changes_the_motion_within_rounding(
         assert apart < 1e-13  # rad: rounding in some hundred steps of two motions, at 1.2 rad/s
 
 
+def test_a_run_with_a_state_that_grows_is_prolonged_bit_for_bit(tmp_path: Path) -> None:
+    """Its unit doesn't depend on the end."""
+    more = state("grows", "1e6 + wx", 0, "rad") + state("held", "sin(t)")
+    done = run_text(config(more=more, time="end = 10\nsamples = 11"), out=tmp_path / "short")
+    longer = rigidsim.resume(done.folder.path, until="160")
+    same_bits(longer, run_text(config(more=more, time="end = 160\nsamples = 161")))
+
+
 def test_only_what_is_read_or_recorded_is_carried() -> None:
     more = FILTER + state("more", "held", 0, "rad") + state("apart", "1", 0)
     record = 'record = ["angular_velocity", "more"]'

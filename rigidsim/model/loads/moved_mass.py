@@ -24,12 +24,12 @@ from rigidsim.model.inertia import MassDistribution, absent
 from rigidsim.model.kinematics import Kinematics
 from rigidsim.model.load import Load, Term, loads_of
 from rigidsim.model.names import state_names
-from rigidsim.model.own_states import own_blocks
+from rigidsim.model.own_states import driven, own_blocks
 from rigidsim.model.rotations import Symbolic
-from rigidsim.scene.arithmetic import Vector, cross
+from rigidsim.scene.arithmetic import Vector
 from rigidsim.scene.exact import ExactNumber
-from rigidsim.scene.expressions.names import RATE_NAMES
 from rigidsim.scene.expressions.tree import Expression, ExpressionError, evaluate, names_used, states_read
+from rigidsim.scene.initial_values import start_values
 from rigidsim.scene.moving_moments import WHERE, formulas_of, least_part, varies
 from rigidsim.scene.registry import Surroundings, register_of_body
 from rigidsim.scene.scene import Scene
@@ -42,8 +42,8 @@ _ELEMENTS = ("moment_x", "moment_y", "moment_z")
 _SLACK, _SLACK_SINGLE = 2.0**-40, 2.0**-16
 """Part of their sum by which the moments of a flat body may break I1 + I2 >= I3, beside rounding."""
 _TIMES = 512  # of a run's span, at which functions of time alone are looked at
-_STEPS, _ROUGH = 1000, 1e-6  # most steps of a rough integration, and its tolerance
-_MOST = 1e9  # ratio of moments, and of energies, past which no size is estimated
+_DRIVEN_TIMES, _PARTS = 16, (1.0, -1.0, 0.5, -0.5, 0.25, -0.25, 0.0625, -0.0625)
+_MOST = 1e9  # ratio of moments past which no size is estimated
 _LITTLE = 1e-6
 
 
@@ -200,52 +200,30 @@ class MovedMass(Load):
         return found
 
     def _by_states(self, scene: Scene) -> float:
-        """Largest ratio by which the energy grows in a rough integration of the free rotation with states of
-        one's own, as far as these read time, rates and each other.
+        """Largest ratio by which a moment falls while states of one's own go to where they are driven at some
+        times of the run, all together, part of the way or as far to the other side; 1 if none reads them.
         """
-        names = {state.name: hy.make_vars(state.name) for state in scene.states}
-        momenta = list(hy.make_vars("m_x", "m_y", "m_z"))
-        read = frozenset().union(*(names_used(state.derivative) for state in scene.states))
-        if not self.reads or not read <= {"t", *RATE_NAMES, *names}:
+        if not self.reads:
             return 1.0
-
-        def number(x: Any) -> float:
-            return float(plain(x))
-
-        context, unit = scene.context, max(number(x) for x in scene.body.principal_moments)
-        start_of = zip(scene.body.principal_moments, scene.angular_velocity, strict=True)
-        begun = [number(i) * number(w) for i, w in start_of]
-        size = math.hypot(*begun) or 1.0
-        moments = [
-            to_heyoka(x, names, number, context) if isinstance(x, Expression) else hy.expression(number(x))
-            for x in self.moments
-        ]
-        rates = [size * m / i for m, i in zip(momenta, moments, strict=True)]
-        known = {**names, **dict(zip(RATE_NAMES, rates, strict=True))}
-        system = [(m, x) for m, x in zip(momenta, cross(momenta, rates), strict=True)]
-        for state in scene.states:
-            system.append((names[state.name], to_heyoka(state.derivative, known, number, context)))
-        start = [x / size for x in begun] + [number(state.initial) for state in scene.states]
-        engine = hy.taylor_adaptive(
-            [(x, hy.expression(y)) for x, y in system], start, time=number(scene.start),
-            tol=_ROUGH, compact_mode=True, opt_level=0,
-        )  # fmt: skip
-        energy = hy.cfunc(
-            [unit * hy.sum([m * m / i for m, i in zip(momenta, moments, strict=True)])],
-            [x for x, _ in system], compact_mode=True, opt_level=0,
-        )  # fmt: skip
-        found: list[float] = []
-        for _ in range(_STEPS):
-            value = float(energy(engine.state, time=engine.time)[0])
-            if not 0 < value < math.inf or (found and value > _MOST * found[0]):
-                break
-            found.append(value)
-            if engine.time >= number(scene.end):
-                break
-            outcome, _ = engine.step(max_delta_t=number(scene.end) - engine.time)
-            if outcome not in (hy.taylor_outcome.success, hy.taylor_outcome.time_limit):
-                break
-        return max(found) / found[0] if found else 1.0
+        context, span, values = scene.context, scene.end - scene.start, start_values(scene)
+        begun = [float(plain(x)) for x in scene.body.principal_moments]
+        sizes, found = {x.name: abs(x.initial) for x in scene.states}, 1.0
+        for n in range(_DRIVEN_TIMES + 1):
+            values["t"] = scene.start + span * n / _DRIVEN_TIMES
+            ends = {x.name: driven(scene, x.name, values, sizes, span) for x in scene.states}
+            for part in _PARTS:
+                there = {x.name: x.initial + part * (ends[x.name] - x.initial) for x in scene.states}
+                there["t"] = values["t"]
+                try:
+                    moments = [
+                        float(plain(evaluate(x, there, context) if isinstance(x, Expression) else x))
+                        for x in self.moments
+                    ]
+                except ExpressionError:
+                    continue
+                if min(moments) > 0 and sum(moments) >= 2 * max(moments):
+                    found = max(found, *(min(a / b, _MOST) for a, b in zip(begun, moments, strict=True)))
+        return found
 
     # --- what readers are told ------------------------------------------------------------------------------
 
