@@ -27,10 +27,10 @@ from rigidsim.scene.schema import Config
 from rigidsim.scene.surfaces import changes, random_states
 from rigidsim.scene.transitions import narrow_parts, root_parts
 
-_ROOM = 10
-"""Binary exponent of the units of time over which a state is taken to add up its derivative if nothing brings
-it back: 160 turns. One that adds up for longer, or less, loses little: steps in double precision cut off a
-fiftieth of an epsilon.
+_TO_AND_FRO, _ONWARD = 6, 10
+"""Binary exponents of the units of time over which a state adds up its derivative if nothing brings it back:
+10 turns if that has both signs, 160 if it has one. A state that adds up for longer, or less, loses
+little: steps in double precision cut off a fiftieth of an epsilon.
 """
 _ALIKE = 8  # states like the start
 _LATEST = 8.0  # binary exponent of the units of time until which functions of time are looked at
@@ -147,11 +147,12 @@ def _sizes(scene: Scene, scaling: Scaling) -> dict[str, Any]:
     """About the largest values (mpf, SI) that states of one's own reach; 0 where nothing tells.
 
     What drives a state, its derivative where it is zero itself, acts for as long as the state takes to come
-    back, or for 2^10 units of time. One that follows others has its size from theirs.
+    back, or for 10 to 160 turns. One that follows others has its size from theirs.
     """
     context, known = scene.context, {x.name: abs(x.initial) for x in scene.states}
     states = _alike(scene, scaling)
-    longest = context.ldexp(context.one, scaling.time + _ROOM)
+    unit = context.ldexp(context.one, scaling.time)
+    brief, long = (context.ldexp(unit, e) for e in (_TO_AND_FRO, _ONWARD))
     for _ in scene.states:
         begin, *others = (
             {**values, **{name: x if not n else x * known[name] for name, x in parts.items()}}
@@ -159,16 +160,15 @@ def _sizes(scene: Scene, scaling: Scaling) -> dict[str, Any]:
         )
         sizes = {}
         for x in scene.states:
-            begins = [
-                begin,
-                *({**begin, "t": time} for time in _moments(scene, x.derivative, begin, longest)),
-            ]
-            first, alike = (
-                [abs(driven(scene, x.name, values, known, longest)) for values in group]
-                for group in (begins, others)
-            )
-            seen = sorted(size for size in alike if size != 0)
-            sizes[x.name] = context.maximum([abs(x.initial), *first, *seen[len(seen) // 2 :][:1]])
+            times = [{**begin, "t": time} for time in _moments(scene, x.derivative, begin, unit)]
+            for longest in (brief, long):
+                found = [driven(scene, x.name, given, known, longest) for given in (begin, *times, *others)]
+                if min(found) < 0 < max(found):
+                    break
+            ends = [abs(end) for end in found]
+            usual = sorted(end for end in ends[-len(others) :] if end != 0)
+            first = ends[: -len(others)]
+            sizes[x.name] = context.maximum([abs(x.initial), *first, *usual[len(usual) // 2 :][:1]])
         if sizes == known:
             break
         known = sizes

@@ -170,7 +170,8 @@ def ensemble_of(course: Course, part: float, first: float, tolerance: float) -> 
         system = system.rounded(precision_of("double").number) if same else double_twin(prepared)
         stand_in = not same and prepared.system.partner is None
         if system.stepwise:
-            carrier = StepperCarrier(system, course.start, course.end, course.steps)
+            known = prepared.effective_tolerance if course.loose and same else None
+            carrier = StepperCarrier(system, course.start, course.end, course.steps, known)
         else:
             carrier = BatchCarrier(system, course.steps * part, tolerance)
         if course.loose and not system.stepwise:
@@ -179,6 +180,9 @@ def ensemble_of(course: Course, part: float, first: float, tolerance: float) -> 
                 turning = places["rates"] + places["attitude"]
             mean = abs(course.end - course.start) / max(course.steps, 1)
             series = SeriesErrors(system, prepared.effective_tolerance, turning=turning, mean=mean)
+    cut_off = None
+    if isinstance(carrier, StepperCarrier) and course.loose and course.same_states:
+        cut_off = carrier.of_step
     measures, exponents = Measures(system), system.state_exponents
     units = [[math.ldexp(1.0, int(exponents[place]))] for place in measures.places["rates"]]
     return ShadowEnsemble(
@@ -195,7 +199,7 @@ def ensemble_of(course: Course, part: float, first: float, tolerance: float) -> 
         _perturbations(course, stand_in),
         float(precision.epsilon),
         rounded=np.array([precision.exact(precision.number(x)) != x for x in system.initial]),
-        series=None if series is None else series.of_step,
+        series=series.of_step if series is not None else cut_off,
     )
 
 
@@ -221,7 +225,7 @@ def _perturbations(course: Course, stand_in: bool) -> Perturbations:
     """Errors of a step."""
     prepared = course.prepared
     plain, rounding = plain_perturbations(prepared.system), prepared.system.formulation.rounding
-    if prepared.system.stepwise and course.loose:
+    if prepared.system.stepwise and course.loose and not course.same_states:
         plain = replace(
             plain, own=margins.CUT_OFF * prepared.effective_tolerance / float(prepared.precision.epsilon)
         )

@@ -19,7 +19,7 @@ EXPONENTIAL = 5.0  # power of time past which growth counts as exponential
 ANGLES, ANGLE_SERIES = 4.0, 5.0  # in Euler angles over those in quaternions: rounding, truncation
 MOMENTUM_SERIES = 20.0  # truncation with canonical momenta
 NEAR, VERY_NEAR = 0.2, 0.01  # singular factors below which canonical momenta lose more than elsewhere
-CUT_OFF = 0.1  # over the tolerance, in motions with switching surfaces
+CUT_OFF = 0.1  # over the tolerance, in motions with switching surfaces in Euler angles or their momenta
 
 # a loosely followed motion
 DRIFTED = 1e6  # growth of a step's error from which it becomes a different one

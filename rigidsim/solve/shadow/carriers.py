@@ -214,16 +214,17 @@ class OwnCarrier(_SingleMotion):
 
 class StepperCarrier(_SingleMotion):
     """One after the other, by a stepper that ends its steps on switching surfaces or at given times: the
-    system's own in double precision, borrowed, or one compiled for so many steps between two times.
+    system's own in double precision, borrowed, or one compiled for so many steps, with a tolerance.
     """
 
     def __init__(
-        self, system: System, start: float, end: float, steps: int, stepper: TaylorStepper | None = None
+        self, system: System, start: float, end: float, steps: int, own: TaylorStepper | float | None = None
     ) -> None:
         super().__init__()
-        if stepper is None:
+        stepper = own
+        if not isinstance(stepper, TaylorStepper):
             precision = replace(precision_of("double"), compact=True)
-            stepper = stepper_of(system, precision, None, precision.scalar(start))
+            stepper = stepper_of(system, precision, stepper, precision.scalar(start))
         self._stepper = stepper
         self.tolerance = float(stepper.integrator.tol)
         self._begin = stepper.begun
@@ -254,6 +255,20 @@ class StepperCarrier(_SingleMotion):
             if lane == 0:
                 self._reached = {first: known, reached: replace(stepper.mark(), time=(reached, 0.0))}
         return moved, round((reached - first) * self._pace), reached
+
+    def of_step(self, state: np.ndarray, time: float) -> np.ndarray:
+        """What the next step cuts off, (states,): all terms past the last, which gain as much as that."""
+        stepper, known = self._stepper, self._reached.get(time)
+        if known is not None:
+            stepper.back_to(known)
+        engine = stepper.integrator
+        if known is None or not stepper.step():
+            return np.zeros_like(state)
+        series, size = np.asarray(engine.tc, dtype=float), float(stepper.largest)
+        order = series.shape[1] - 1
+        before, last = (np.abs(series[:, n]).max() * size**n for n in (order - 1, order))
+        gain = min(last / before, 1 / _ONE_ORDER) if before > 0 else 1 / _ONE_ORDER
+        return np.asarray(gain / (1 - gain) * size**order * series[:, order])
 
 
 class SeriesErrors:
