@@ -91,6 +91,7 @@ COMET = config(
 )
 
 
+@pytest.mark.slow
 def test_chaos_that_sets_in_late_leaves_no_digits() -> None:
     """An eccentric orbit: announced at 3.1e-9 by the growth of the beginning, 1.8 rad off."""
     run = run_text(LATE)

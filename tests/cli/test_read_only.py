@@ -84,6 +84,7 @@ def test_a_finished_run_is_read_verified_and_drawn(
     assert sorted(p.name for p in Path("disk/free").iterdir()) == before
 
 
+@pytest.mark.slow
 def test_what_has_to_be_written_there_is_refused(
     config: Config, rigidsim_command: Command, remount: Remount
 ) -> None:

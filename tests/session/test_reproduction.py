@@ -48,7 +48,7 @@ def run(text: str, out: Path) -> xarray.Dataset:
         return dataset.load()
 
 
-@pytest.mark.parametrize("setting", cases(RUNS, [RUNS[0], RUNS[5]]), ids="-".join)
+@pytest.mark.parametrize("setting", cases(RUNS, [RUNS[0]]), ids="-".join)
 def test_twice_the_same_config(
     setting: tuple[str, str], tmp_path: Path, free_body: Callable[..., str]
 ) -> None:
@@ -149,7 +149,7 @@ def test_the_sample_grid_does_not_change_the_motion(tmp_path: Path, free_body: C
         ('"single"', "quaternion", "dense"),
         ('"double"', "quaternion", "uneven"),
         ('"double"', "rotation_matrix", "a sample per step"),
-        ('"quadruple"', "quaternion", "sparse"),
+        pytest.param('"quadruple"', "quaternion", "sparse", marks=pytest.mark.slow),
         pytest.param("30", "rotation_matrix", "a sample per step", marks=pytest.mark.slow),
     ],
 )

@@ -129,6 +129,7 @@ def _frame(q: np.ndarray) -> np.ndarray:
     return matrix_of(q).T @ np.array([source, np.cross(normal, source), normal]).T
 
 
+@pytest.mark.slow
 def test_a_constant_torque_leans_it_by_the_closed_form() -> None:
     """A torque T about the normal (body y): sin 2 th = 2 T / (3 n^2 (Ix - Iz)) to 50 digits; and it stays."""
     torque = '\n[[loads]]\nkind = "torque"\nframe = "body"\ncomponents = ["0", "2e-4", "0"]'

@@ -99,6 +99,7 @@ def test_samples_move_no_bit_across_the_count() -> None:
     assert np.array_equal(bits(dense.quaternion.values[here]), bits(middling.quaternion.values[there]))
 
 
+@pytest.mark.slow
 def test_errors_stay_those_of_the_beginning() -> None:
     end = 1e5
     exact = run_text(text(end, "false", more='method = "closed_form"\nprecision = "quadruple"')).dataset
