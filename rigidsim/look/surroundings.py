@@ -2,8 +2,8 @@
 
 It is a JSON list of objects: ``{"what": "gravity", "acceleration"}``, ``{"what": "attractor",
 "gravitational_parameter", "position"}`` and ``{"what": "source", "gravitational_parameter"}`` with ``orbit``
-(elements at time zero and their rates), ``position`` or ``ephemeris``; SI units, space axes. Datasets of
-older versions have none.
+(elements at time zero and their rates), ``position``, ``ephemeris``, or ``kernel``, the name by which its
+position was recorded; SI units, space axes. Datasets of older versions have none.
 """
 
 import json
@@ -75,8 +75,10 @@ def color_of(body: KnownBody | None, unknown: Color = (150, 154, 162)) -> Color:
     return unknown if body is None else _COLORS[body.name]
 
 
-def source_path(one: dict[str, Any], seconds: Array) -> Array | None:
+def source_path(one: dict[str, Any], dataset: xarray.Dataset, seconds: Array) -> Array | None:
     """Positions (rows, 3), m, space axes, of a source that was told, from the body; None if unknown."""
+    if "source_position" in dataset and one.get("kernel") in dataset["source"].values:
+        return np.asarray(dataset["source_position"].sel(source=one["kernel"]).values)
     place = _vector(one.get("position"))
     if place is not None:
         return np.tile(place, (len(seconds), 1))

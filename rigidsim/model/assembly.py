@@ -73,7 +73,7 @@ def _flight_block(m: Mechanics, plan: ModelPlan) -> StateBlock:
 
 def _load_blocks(m: Mechanics) -> list[StateBlock]:
     """Orbits, each once for all loads on it, and any other states that loads bring."""
-    blocks: list[StateBlock] = []
+    blocks: list[StateBlock] = [] if m.sky is None else [m.sky.block()]
     carried: set[KeplerOrbit | TabulatedOrbit] = set()
     for load in m.loads:
         if (orbit := orbit_of(load)) is not None and orbit not in carried:

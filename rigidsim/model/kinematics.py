@@ -13,6 +13,7 @@ from typing import Any, TypeVar
 import heyoka as hy
 
 from rigidsim.model.inertia import ConstantInertia, Inertia, MassDistribution, VaryingInertia, absent, product
+from rigidsim.model.orbits.kernel_states import KernelStates
 from rigidsim.model.orbits.point_mass_states import PointMassStates
 from rigidsim.model.orbits.prescribed import OrbitStates, TablePlace, orbit_states, table_states
 from rigidsim.model.rotations import Symbolic, SymbolicMatrix, apply, length, transpose
@@ -161,6 +162,21 @@ class Kinematics:
         if masses is None:
             return None
         return PointMassStates(masses, self.scaling, self.scene.context, self.number)
+
+    @cached_property
+    def sky(self) -> KernelStates | None:
+        """Bodies of a kernel; None if no load sees any."""
+        scene, sights = self.scene, [sight for load in self.scene.loads for sight in load.sights]
+        if scene.ephemeris is None or not sights:
+            return None
+        first = sum(place.parameters(orbit) for orbit, place in self.tables.items())
+        unit, context = self.scaling.time, scene.context
+        return KernelStates(scene.ephemeris, sights, unit, scene.start, context, self.number, first)
+
+    @property
+    def piecewise(self) -> bool:
+        """Whether there are times at which states and parameters are set, and steps end."""
+        return bool(self.tables) or self.sky is not None
 
     def table(self, orbit: TabulatedOrbit) -> OrbitStates:
         """A tabulated orbit, carried by the states that all its loads share."""

@@ -146,6 +146,9 @@ def start_of(m: Mechanics, loads: Sequence[Load]) -> tuple[list[str], np.ndarray
     for orbit in {x: None for load in scene.loads if (x := orbit_of(load) or table_of(load)) is not None}:
         block = (m.orbit(orbit) if isinstance(orbit, KeplerOrbit) else m.table(orbit)).block
         values |= zip(block.names, block.initial, strict=True)
+    if m.sky is not None:
+        block = m.sky.block()
+        values |= zip(block.names, block.initial, strict=True)
     if m.point_masses is not None:
         block = m.point_masses.block()
         values |= zip(block.names, block.initial, strict=True)

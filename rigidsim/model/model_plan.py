@@ -89,14 +89,18 @@ def plan_model(
     tabulated = [(str(number), table_of(load)) for number, load in enumerate(loads_of(scene), start=1)]
     tables = places_of([(tag, x) for tag, x in tabulated if x is not None], formulation.longitude)
     surfaces = surfaces_of(scene)
-    if tables and surfaces.found and formulation.resolves_rotation:
+    kernel = any(load.sights for load in scene.loads)
+    if (tables or kernel) and surfaces.found and formulation.resolves_rotation:
+        where, instead = "[[loads]] orbit.table", "give the orbit by elements"
+        if not tables:
+            where, instead = "[ephemeris] kernel", "give orbits by elements"
         what = (
             f'given beside {surfaces.found[0].where}, whose "{surfaces.found[0].text}" has a kink or jump: '
-            "steps can't end at both; make the change smooth with tanh, or give the orbit by elements"
+            f"steps can't end at both; make the change smooth with tanh, or {instead}"
         )
-        raise ConfigError(Problem("[[loads]] orbit.table", what))
+        raise ConfigError(Problem(where, what))
     tags = orbit_tags(scene)
-    clocked = formulation.resolves_rotation and not tables and happens_at_a_moment(scene)
+    clocked = formulation.resolves_rotation and not (tables or kernel) and happens_at_a_moment(scene)
     numbers = scaled_numbers(scene, scaling)
     return ModelPlan(
         scene, loads, formulation, requirements, scaling, numbers, tags, surfaces, tables, clocked

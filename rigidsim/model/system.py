@@ -241,11 +241,13 @@ class System:
 
     @cached_property
     def pieces(self) -> Pieces | None:
-        """What is set at given times, where steps must end; None without tables."""
+        """What is set at given times, where steps must end; None without tables or bodies of a kernel."""
         unit, start = self.scaling.time, self.scene.start
         parts: list[PieceSeries] = [
             TablePieces(orbit, place, unit, start, self.number) for orbit, place in self.plan.tables.items()
         ]
+        if (sky := self.mechanics.sky) is not None:
+            parts += sky.pieces()
         return Pieces(parts) if parts else None
 
     @property

@@ -191,8 +191,8 @@ def _absent(m: Mechanics) -> str | None:
         return "the body is at rest, where steps are as long as one likes; give it a small rate"
     if not driven and m.attitude is not None and m.attitude.momenta:
         return 'without an orbit nothing in a plane keeps the steps short; choose formulation = "quaternion"'
-    if m.tables:
-        return "at the rows of a table the orbit's states are set, where variational equations end"
+    if m.piecewise:
+        return "at rows of a table or edges of blocks states are set, where variational equations end"
     if integrator.precision == "single":
         return "single precision can't hold a vector that small; choose double"
     if m.surfaces.found:

@@ -20,6 +20,8 @@ from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.expressions.names import Names
 from rigidsim.scene.expressions.tree import Expression
 from rigidsim.scene.fields import ConfigTable, Metre, VariableName, refuse
+from rigidsim.scene.kernels.ephemeris import Ephemeris
+from rigidsim.scene.kernels.kernel import Sight
 from rigidsim.scene.point_masses import PointMasses
 
 
@@ -74,6 +76,8 @@ class Surroundings:
         names: what expressions may read.
         table: array of tables that it stands in.
         body: the rigid body, for what keys of ``[body]`` bring.
+        ephemeris: where bodies of a kernel are; None without one.
+        host: the body of the kernel that this one is; empty for none.
     """
 
     number: int
@@ -89,6 +93,8 @@ class Surroundings:
     names: Names = field(default_factory=Names)
     table: str = "loads"
     body: RigidBody | None = None
+    ephemeris: Ephemeris | None = None
+    host: str = ""
 
     @property
     def carried_bodies(self) -> PointMasses:
@@ -117,6 +123,8 @@ class SceneLoad:
         apart: tensor of inertia (mpf, kg m^2, body axes) of what doesn't turn with the body, a fluid core's,
             which is part of the body's own; None for all others.
         inner_momentum: angular momentum relative to the body at the start (mpf, body axes); None for none.
+        sights: bodies of a kernel that it sees, each with the highest derivative of its place that is to be
+            a state.
     """
 
     Fields: ClassVar[type[LoadFields] | None] = None
@@ -128,6 +136,7 @@ class SceneLoad:
     bearing: tuple[Any, Vector] | None = None
     apart: Matrix | None = None
     inner_momentum: Vector | None = None
+    sights: tuple[tuple[Sight, int], ...] = ()
 
     @classmethod
     def resolve(cls, fields: Any, around: Surroundings) -> SceneLoad:

@@ -18,6 +18,7 @@ from rigidsim.scene.expressions.names import Names, names_of
 from rigidsim.scene.expressions.parser import parse_expression
 from rigidsim.scene.expressions.tree import Expression, ExpressionError, names_used, states_read
 from rigidsim.scene.frame import Figure, figure_of, reference_normal
+from rigidsim.scene.kernels.ephemeris import Ephemeris, host_of, resolve_ephemeris
 from rigidsim.scene.moving_moments import moments_at_start
 from rigidsim.scene.own_states import OwnState, carried_states, resolve_states
 from rigidsim.scene.point_masses import PointMasses, resolve_point_masses
@@ -69,6 +70,8 @@ class Scene:
         axes, epoch: what the space axes and time 0 are, if the config says so or a load implies it.
         figure: the body's figure axis, see ``[frame] figure_axis``.
         bodies: point masses besides the body; None if there are none.
+        ephemeris: where bodies of a kernel are; None without one.
+        host: the body of the kernel that this one is; empty for none.
         found_start: how an equilibrium was found that it starts from; None for any other start.
         reference: unit normal (space axes) of the plane that obliquity and longitudes count from; None for
             a source's own, moving plane.
@@ -101,6 +104,8 @@ class Scene:
     tabled: Mapping[str, tuple[SceneLoad, ...]] = field(default_factory=dict)
     found_start: Any = None
     states: tuple[OwnState, ...] = ()
+    ephemeris: Ephemeris | None = None
+    host: str = ""
 
     @property
     def free_flight(self) -> bool:
@@ -158,16 +163,22 @@ def build_scene(experiment: Experiment, context: Any = None) -> Scene:
     try:
         position, velocity = _translation(config, body, context)
         free_flight, table = position is not None, config.body
+        axes, epoch = config.frame.axes, config.time.epoch
+        ephemeris = resolve_ephemeris(config.ephemeris, axes, epoch, (start, end), experiment.source)
+        host = host_of(ephemeris, table.host, [one.name for one in config.bodies])
         masses = resolve_point_masses(
-            config.bodies, table.host, table.coupling, body.mass, context, free_flight=free_flight
-        )
+            config.bodies, None if host else table.host, table.coupling, body.mass, context,
+            free_flight=free_flight,
+        )  # fmt: skip
         names = names_of(config)
         given, tabled = _resolve_loads(
-            config, body, context, masses, names, free_flight=free_flight, span=(start, end)
-        )
+            config, body, context, masses, names,
+            free_flight=free_flight, span=(start, end), ephemeris=ephemeris, host=host,
+        )  # fmt: skip
         around = Surroundings(
-            0, context, config.parameters, body.center_of_mass, free_flight, names=names, body=body
-        )
+            0, context, config.parameters, body.center_of_mass, free_flight, axes=axes, epoch=epoch,
+            span=(start, end), names=names, body=body, ephemeris=ephemeris, host=host,
+        )  # fmt: skip
         brought = [kind.resolve(config, around) for kind in OF_BODY.values() if kind.brought_by(config)]
         axes = config.frame.axes or _first(given, "axes")
         dated = replace(around, axes=axes, epoch=config.time.epoch or _first(given, "epoch"))
@@ -223,6 +234,8 @@ def build_scene(experiment: Experiment, context: Any = None) -> Scene:
             given_loads=tuple(given),
             tabled=tabled,
             states=carried,
+            ephemeris=ephemeris,
+            host=host,
         )
         return _with_start(scene, starts.start_of(scene, _with_start))
     except ConfigError as error:
@@ -268,16 +281,18 @@ def _resolve_loads(
     *,
     free_flight: bool,
     span: tuple[Any, Any],
+    ephemeris: Ephemeris | None,
+    host: str,
 ) -> tuple[list[SceneLoad], dict[str, tuple[SceneLoad, ...]]]:
     """Those of ``[[loads]]``, and those with tables of their own by the table's name."""
     found = []
     tables = {name: table.text for name, table in config.tables.items()}
     fixed = config.parameters, body.center_of_mass, free_flight, config.frame.axes, config.time.epoch
+    around = Surroundings(0, context, *fixed, tables, span, masses, names, ephemeris=ephemeris, host=host)
     for number, fields in enumerate(config.loads):
         kind = LOAD_KINDS[fields.kind]  # type: ignore[attr-defined]
-        found.append(kind.resolve(fields, Surroundings(number, context, *fixed, tables, span, masses, names)))
+        found.append(kind.resolve(fields, replace(around, number=number)))
     refuse_odd_rotors(config.rotors, body, context)
-    around = Surroundings(0, context, *fixed, tables, span, masses, names)
     tabled = {}
     for name, kind in TABLES.items():
         places = enumerate(getattr(config, name))

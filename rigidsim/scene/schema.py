@@ -46,6 +46,7 @@ from rigidsim.scene.fields import (
 )
 from rigidsim.scene.frame import Frame
 from rigidsim.scene.integrator_table import Integrator
+from rigidsim.scene.kernels.ephemeris import EphemerisTable
 from rigidsim.scene.own_states import OwnStateTable
 from rigidsim.scene.point_masses import PointMassBody
 from rigidsim.scene.registry import LOAD_KINDS, OBSERVABLES, LoadFields
@@ -212,6 +213,8 @@ class Config(ConfigTable):
     initial: Initial
     """the state at the start"""
     loads: list[LoadFields] = Field(default_factory=list, description=_ABOUT_LOADS)
+    ephemeris: EphemerisTable | None = None
+    """the kernel that places real bodies: sources of loads given by name, and the body itself"""
     bodies: list[PointMassBody] = Field(default_factory=list, max_length=64)
     """point masses under mutual gravity, integrated with the body"""
     rotors: list[RotorTable] = Field(default_factory=list, max_length=64)

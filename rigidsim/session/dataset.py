@@ -11,7 +11,9 @@ import numpy as np
 
 from rigidsim.errors import ConfigError, Problem
 from rigidsim.model.loads.rotor import rotors_of
+from rigidsim.model.orbits.kernel_states import sights_of
 from rigidsim.model.outputs import Invariant
+from rigidsim.scene.kernels.ephemeris import date_of
 from rigidsim.scene.scene import Scene
 from rigidsim.session.dates import Dates
 from rigidsim.solve.assembly import Assembly
@@ -75,7 +77,8 @@ def dates_of(prepared: InitialValueProblem) -> Dates | None:
 def labels_of_the_run(scene: Scene) -> dict[str, Sequence[str]]:
     """Labels of the dimensions ``OF_THE_RUN``."""
     bodies = () if scene.bodies is None else scene.bodies.names
-    return {"point_mass": bodies, "rotor": [rotor.name for rotor in rotors_of(scene)]}
+    rotors, sources = [rotor.name for rotor in rotors_of(scene)], sights_of(scene)
+    return {"point_mass": bodies, "rotor": rotors, "source": [sight.source for sight in sources]}
 
 
 def recorded_variables(prepared: InitialValueProblem) -> list[Variable]:
@@ -259,6 +262,7 @@ def root_attributes(
         surroundings=json.dumps(_surroundings(prepared)),
         axes=scene.axes,
         epoch=None if scene.epoch is None else str(scene.epoch),
+        **kernel_attributes(scene),
         time_unit=scene.config.time.unit,
         recorded=" ".join(variable.name for variable in system.recorded),
         python_loads=" ".join(type(load).__name__ for load in prepared.python_loads),
@@ -267,6 +271,17 @@ def root_attributes(
         **platform,
         mixed_provenance=mixed or None,
     )
+
+
+def kernel_attributes(scene: Scene) -> dict[str, Any]:
+    """What tells the kernel of a scene: name, span of what was read of it, and SHA-256; empty without one."""
+    sights = sights_of(scene)
+    if scene.ephemeris is None or not sights:
+        return {}
+    first, last = zip(*(sight.span for sight in sights), strict=True)
+    span = f"{date_of(max(first))} to {date_of(min(last))} TDB"
+    kernel = scene.ephemeris.kernel
+    return {"ephemeris_kernel": kernel.name, "ephemeris_span": span, "ephemeris_sha256": kernel.digest}
 
 
 def _surroundings(prepared: InitialValueProblem) -> list[dict[str, Any]]:

@@ -24,8 +24,10 @@ LABELS: dict[str, list[str]] = {
 }
 """Coordinates besides time, with their labels."""
 
-OF_THE_RUN = ("point_mass", "rotor")
-"""Coordinates whose labels depend on the run: names of ``[[bodies]]`` and ``[[rotors]]``."""
+OF_THE_RUN = ("point_mass", "rotor", "source")
+"""Coordinates whose labels depend on the run: names of ``[[bodies]]``, ``[[rotors]]``, and of bodies of a
+kernel that loads see.
+"""
 
 SCHEMA_VERSION = 4
 """That of 0.1.0. Versions before were never released; files of any other version are refused."""

@@ -154,11 +154,11 @@ def _sources(dataset: xarray.Dataset, subject: Subject) -> _Towards:
     listed = surroundings.told(dataset, "source")
     nadir = column(dataset, "nadir", 3)
     for number, one in enumerate(listed):
-        path = surroundings.source_path(one, signals.seconds(dataset))
+        path = surroundings.source_path(one, dataset, signals.seconds(dataset))
         if path is None and nadir is not None and len(listed) == 1 and subject.attitude is not None:
             path = np.einsum("tij,tj->ti", subject.attitude, nadir)
         if path is not None:
-            name = str(one.get("ephemeris", "source"))
+            name = str(one.get("ephemeris", one.get("kernel", "source")))
             yield f"source{number}", surroundings.body_of(one), name, path
 
 

@@ -36,6 +36,7 @@ DIRECTION = ["sx", "sy", "sz"]
 TOLD = (
     "angular_momentum", "angular_momentum_norm", "energy", "figure_axis", "spin_axis", "momentum_axis",
     "right_ascension", "declination", "obliquity", "node_longitude", "point_mass_position",
+    "source_position",
     "point_mass_velocity", "orbital_energy", "orbital_angular_momentum", "orbital_linear_momentum",
 )  # fmt: skip
 """Observables that an averaged motion can provide, as far as the scene has them."""

@@ -69,6 +69,8 @@ class Averaged(Formulation):
         m, blocks = self._resonant(plan, number) if self.average.resonance else self._direction(plan, number)
         if (states := m.point_masses) is not None:
             blocks.append(states.block())
+        if m.sky is not None:
+            blocks.append(m.sky.block())
         return m, blocks
 
     def _mechanics(

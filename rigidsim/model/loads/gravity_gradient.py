@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 import heyoka as hy
-from pydantic import Field
+from pydantic import Field, StrictStr
 
 from rigidsim.errors import ConfigError, Problem
 from rigidsim.model.capabilities import SourcePlace
@@ -15,9 +15,10 @@ from rigidsim.model.gradient import GradientSource, gradient_terms, tidal_range
 from rigidsim.model.kinematics import Kinematics, quadratic_form
 from rigidsim.model.load import Load, Term
 from rigidsim.model.load_words import source_text, value_text
-from rigidsim.model.loads.point_attraction import MovingGradient, positive_strength
+from rigidsim.model.loads.point_attraction import MovingGradient, kernel_strength, positive_strength
 from rigidsim.model.loads.source_figure import FigureFields
 from rigidsim.model.orbit_planes import OrbitPlane
+from rigidsim.model.placements.kernel_body import PlacedByKernel, refuse_series
 from rigidsim.model.placements.prescribed_orbit import PlacedAtRest, PlacedByTable, PlacedOnOrbit
 from rigidsim.model.placements.series import PlacedBySeries
 from rigidsim.model.rotations import Symbolic
@@ -26,10 +27,14 @@ from rigidsim.scene.arithmetic import Vector, norm
 from rigidsim.scene.epochs import J2000, Epoch
 from rigidsim.scene.fields import GravitationalParameter, Metre, Triple
 from rigidsim.scene.frame import ECLIPTIC
+from rigidsim.scene.kernels.kernel import Sight
 from rigidsim.scene.orbits import KeplerOrbit, Orbit, attracting_body, resolve_orbit, resolve_tabulated_orbit
 from rigidsim.scene.registry import Surroundings, register_load
 from rigidsim.scene.scene import Scene
 from rigidsim.store.summary_parts import Caution
+
+_PLACES = ("orbit", "position", "ephemeris", "source")
+"""Keys that tell how a source is placed."""
 
 
 class GravityGradientFields(FigureFields):
@@ -41,8 +46,8 @@ class GravityGradientFields(FigureFields):
     )
     orbit: Orbit | None = Field(
         default=None,
-        description="orbit of the attracting body as seen from this one; exactly one of orbit, position "
-        "and ephemeris",
+        description="orbit of the attracting body as seen from this one; exactly one of orbit, position, "
+        "ephemeris and source",
         examples=[{"semi_major_axis": "7000 km", "inclination": "51.6 deg"}],
     )
     position: Triple[Metre] | None = Field(
@@ -51,6 +56,12 @@ class GravityGradientFields(FigureFields):
     ephemeris: Literal["sun", "moon"] | None = Field(
         default=None,
         description="geocentric position of Sun or Moon, from analytic series in the ecliptic of J2000",
+    )
+    source: StrictStr | None = Field(
+        default=None,
+        description="a body of the [ephemeris] kernel, as seen from [body] host; a package gives its "
+        "gravitational_parameter",
+        examples=["earth"],
     )
 
 
@@ -72,22 +83,24 @@ class GravityGradient(GradientSource, Load):
     @classmethod
     def resolve(cls, fields: GravityGradientFields, around: Surroundings) -> Load:
         if fields.orbit is not None and fields.orbit.body is not None:
-            for key in ("gravitational_parameter", "position", "ephemeris"):
+            for key in ("gravitational_parameter", *_PLACES[1:]):
                 if getattr(fields, key) is not None:
                     raise around.fault(key, "given beside orbit.body, which says it; remove it")
             return MovingGradient(around.carried_bodies, attracting_body(fields.orbit, around))
-        strength, context = positive_strength(fields.gravitational_parameter, around), around.context
-        given = [key for key in ("orbit", "position", "ephemeris") if getattr(fields, key) is not None]
+        given = [key for key in _PLACES if getattr(fields, key) is not None]
         if len(given) != 1:
-            found = " and ".join(given) or "none"
-            raise around.fault(
-                "orbit", f"given {found}; exactly one of orbit, position and ephemeris is needed"
-            )
+            found, places = " and ".join(given) or "none", f"{', '.join(_PLACES[:-1])} and {_PLACES[-1]}"
+            raise around.fault("orbit", f"given {found}; exactly one of {places} is needed")
+        if fields.source is not None:
+            placement = PlacedByKernel.of(fields.source, around)
+            return cls(kernel_strength(fields.gravitational_parameter, fields.source, around), placement)
+        strength, context = positive_strength(fields.gravitational_parameter, around), around.context
         if fields.orbit is not None and fields.orbit.table is not None:
             return cls(strength, PlacedByTable(resolve_tabulated_orbit(fields.orbit, strength, around)))
         if fields.orbit is not None:
             return cls(strength, PlacedOnOrbit(resolve_orbit(fields.orbit, strength, around)))
         if fields.ephemeris is not None:
+            refuse_series(around)
             if around.axes not in (None, ECLIPTIC):
                 what = f'given "{around.axes}", but the ephemeris of [[loads]] number {around.number + 1} '
                 what += f'is in "{ECLIPTIC}"; write that, or leave axes out'
@@ -113,6 +126,10 @@ class GravityGradient(GradientSource, Load):
     @property
     def epoch(self) -> Epoch | None:  # type: ignore[override]
         return self.placement.epoch
+
+    @property
+    def sights(self) -> tuple[tuple[Sight, int], ...]:  # type: ignore[override]
+        return self.placement.sights
 
     @property
     def conservative(self) -> bool:  # type: ignore[override]
@@ -197,5 +214,4 @@ class GravityGradient(GradientSource, Load):
 
     def cautions(self, fields: GravityGradientFields, where: str, scene: Scene) -> Iterator[Caution]:
         given = fields.gravitational_parameter
-        assert given is not None
         yield from self.placement.cautions(fields, given, where, scene)

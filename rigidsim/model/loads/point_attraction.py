@@ -26,6 +26,7 @@ from rigidsim.model.placements.point_mass import PlacedAsMass
 from rigidsim.model.plausibility import about_start, about_strength, attracting
 from rigidsim.model.rotations import Symbolic, apply, length, transpose, unit
 from rigidsim.scene.arithmetic import Vector, cross, norm, unit_vectors
+from rigidsim.scene.kernels.series import exactly
 from rigidsim.scene.point_masses import GRAVITATIONAL_CONSTANT, PointMasses, closest
 from rigidsim.scene.registry import Surroundings
 from rigidsim.scene.scene import Scene
@@ -112,6 +113,18 @@ def positive_strength(given: Any, around: Surroundings) -> Any:
     if given.sign <= 0:
         raise around.fault("gravitational_parameter", f"given {float(given):g}; a positive number is allowed")
     return given.at(around.context)
+
+
+def kernel_strength(given: Any, source: str, around: Surroundings) -> Any:
+    """The gravitational parameter (mpf, m^3/s^2) of a body of the kernel: as given, or the kernel's own."""
+    if given is not None:
+        return positive_strength(given, around)
+    assert around.ephemeris is not None
+    found = around.ephemeris.kernel.strength(source)
+    if found is None:
+        what = f'missing; {around.ephemeris.kernel.name} has none of "{source}"'
+        raise around.fault("gravitational_parameter", f"{what}: give it, in m^3/s^2 or km^3/s^2")
+    return exactly(around.context, found)
 
 
 _UNROLLED = 2

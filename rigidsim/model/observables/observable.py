@@ -87,6 +87,10 @@ _NO_POINT_MASSES = _unless(
 _NO_ROTORS = _unless(
     lambda scene: scene.tabled.get("rotors"), "there are no [[rotors]]; add them, or leave it out"
 )
+_NO_KERNEL = _unless(
+    lambda scene: any(load.sights for load in scene.loads),
+    'no load has a source = "..." in an [ephemeris] kernel; give one, or leave it out',
+)
 _NO_SOURCE = _unless(
     lambda scene: first_source(loads_of(scene)) is not None,
     "no load has a source whose direction it would count from (gravity_gradient, central_gravity, or "
@@ -150,6 +154,7 @@ NEEDS: dict[str, Need] = {
     "rotors": Need(lambda m: bool(m.scene.tabled.get("rotors")), missing=_NO_ROTORS),
     "fixed_rotors": Need(lambda m: m.lent_energy is not None and not m.driven_within, missing=_NO_ROTORS),
     "point_masses": Need(lambda m: m.scene.bodies is not None, missing=_NO_POINT_MASSES),
+    "kernel": Need(lambda m: m.sky is not None, missing=_NO_KERNEL),
     "free_fall": Need(lambda m: m.velocity is not None and fixed_axes.falls_freely(m)),
     "attractor": Need(lambda m: m.velocity is not None and any(isinstance(x, Attracting) for x in m.loads)),
 }

@@ -133,6 +133,10 @@ class TablePlace:
         neither = self.longitude is Carried.NEITHER
         return [x for x in orbit.moving if not (neither and x == LONGITUDE)]
 
+    def parameters(self, orbit: TabulatedOrbit) -> int:
+        """Number of its parameters."""
+        return 1 + _POWERS * len(self.elements(orbit))
+
 
 def places_of(
     orbits: Sequence[tuple[str, TabulatedOrbit]], longitude: Carried
@@ -143,7 +147,7 @@ def places_of(
     for tag, orbit in orbits:
         if orbit not in found:
             found[orbit] = TablePlace(tag, first, longitude)
-            first += 1 + _POWERS * len(found[orbit].elements(orbit))
+            first += found[orbit].parameters(orbit)
     return found
 
 

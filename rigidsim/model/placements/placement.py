@@ -16,6 +16,7 @@ from rigidsim.model.orbits.point_mass_states import PointMassPair
 from rigidsim.model.rotations import Symbolic
 from rigidsim.scene.arithmetic import Vector
 from rigidsim.scene.epochs import Epoch
+from rigidsim.scene.kernels.kernel import Sight
 from rigidsim.scene.orbit_tables.pieces import TabulatedOrbit
 from rigidsim.scene.orbits import KeplerOrbit
 from rigidsim.scene.registry import LoadFields
@@ -58,6 +59,7 @@ class Placement(ABC):
         plane: in which it moves, beside those of ``orbit`` and ``table``; None without one.
         without_plane: why it has an orbit, but no known plane; empty if it has one.
         seconds_ahead: time of the scene's epoch in the count of its own.
+        sights: bodies of a kernel that it is placed by, see ``SceneLoad``.
         without_elements: why it has no ellipse to average over, and what to do; None if it has one, or rests.
     """
 
@@ -74,6 +76,7 @@ class Placement(ABC):
     without_plane: str = ""
     seconds_ahead: float = 0.0
     without_elements: tuple[str, str] | None = None
+    sights: tuple[tuple[Sight, int], ...] = ()
 
     @abstractmethod
     def distance(self, context: Any) -> Any:

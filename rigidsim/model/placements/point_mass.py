@@ -1,4 +1,3 @@
-# ruff: noqa: D102 (methods are those of Placement)
 """One of ``[[bodies]]`` as the source of a body that is one of them, too."""
 
 from __future__ import annotations

@@ -1,4 +1,3 @@
-# ruff: noqa: D102 (methods are those of Placement)
 """Sources at rest, on Kepler orbits, and on tabulated ones."""
 
 from __future__ import annotations

@@ -1,4 +1,3 @@
-# ruff: noqa: D102 (methods are those of Placement)
 """Sun and Moon by analytic series.
 
 Positions are heyoka's: the Sun from VSOP2013 (Simon et al. 2013, A&A 557, A49: the heliocentric place of the

@@ -1,0 +1,270 @@
+"""Positions of a kernel's bodies, carried as states.
+
+In each block of a series, of length L, with u from -1 to 1,
+
+    u' = 2 / L,    x' = sum over k of c_k (2 / L) T_k'(u),
+
+whose coefficients are parameters: the kernel's own doubles, times a power of two. Where a block ends a step
+ends as well; u and x are then put on the next block's values, so that nothing adds up. Series of one block
+length share u and the polynomials. Where a load asks for derivatives of a place, they are states, too:
+
+    x' = v,    v' = a,    a' = sum over k of c_k (2 / L)^3 T_k'''(u).
+
+The derivatives of T_k are Gegenbauer's polynomials: T_k^(n) = 2^(n-1) (n-1)! k C_(k-n)^(n) (Abramowitz &
+Stegun 1964, 22.5.34 and 22.7.3).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from fractions import Fraction
+from typing import Any
+
+import heyoka as hy
+import numpy as np
+
+from rigidsim.model.orbits.pieces import PieceSeries
+from rigidsim.model.rotations import Symbolic
+from rigidsim.model.scaling import Rounder
+from rigidsim.model.state_blocks import StateBlock
+from rigidsim.model.two_part import as_factor, rounded
+from rigidsim.scene.kernels.ephemeris import Ephemeris
+from rigidsim.scene.kernels.kernel import Sight
+from rigidsim.scene.kernels.series import BlockSeries, chebyshev, exactly
+from rigidsim.scene.scene import Scene
+
+_AXES = "xyz"
+_RATES = ("", "v", "a", "j")
+_MOST_KNOTS = (
+    100_000  # of a kernel that is far longer than a run, those of the run and some beyond are enough
+)
+_BEYOND = 100
+
+
+@dataclass
+class _Blocks:
+    """Series of one block length."""
+
+    tag: str
+    first: int  # index of the first parameter
+    begin: Fraction  # of the first block, seconds since J2000
+    length: Fraction
+    series: list[tuple[BlockSeries, int]] = field(default_factory=list)  # and the highest derivative carried
+    _polynomials: dict[int, list[Symbolic]] = field(default_factory=dict)
+
+    @property
+    def past(self) -> str:
+        """Name of the state u."""
+        return f"kernel_part{self.tag}"
+
+    @property
+    def parameters(self) -> int:
+        """Number of parameters."""
+        return sum(3 * (one.terms - order - 1) for one, order in self.series)
+
+
+class KernelStates:
+    """States of the series that a scene's loads see, as expressions; parameters follow from ``first`` on."""
+
+    def __init__(
+        self,
+        ephemeris: Ephemeris,
+        given: Sequence[tuple[Sight, int]],
+        time_exponent: int,
+        start: Any,
+        context: Any,
+        number: Rounder,
+        first: int,
+    ) -> None:
+        self.ephemeris, self._exponent, self._start = ephemeris, time_exponent, start
+        self._context, self._number = context, number
+        self.sights = list(dict.fromkeys(sight for sight, _ in given))
+        orders: dict[int, int] = {}
+        found: dict[int, BlockSeries] = {}
+        for sight, order in given:
+            for _, series in sight.links:
+                found[id(series)] = series
+                orders[id(series)] = max(orders.get(id(series), 0), order)
+        self._groups: list[_Blocks] = []
+        self._group_of: dict[int, tuple[_Blocks, int, int]] = {}  # and first parameter, and order
+        for one in sorted(found.values(), key=lambda x: (x.length, x.begin % x.length)):
+            group = self._groups[-1] if self._groups else None
+            if group is None or one.length != group.length or (one.begin - group.begin) % one.length:
+                past = first if group is None else group.first + group.parameters
+                group = _Blocks(str(len(self._groups) + 1), past, one.begin, one.length)
+                self._groups.append(group)
+            self._group_of[id(one)] = group, group.first + group.parameters, orders[id(one)]
+            group.series.append((one, orders[id(one)]))
+
+    # --- expressions --------------------------------------------------------------------------------------
+
+    def seen(self, sight: Sight, order: int = 0) -> list[Symbolic]:
+        """Vector of a sight in space axes, in units of 2^``sight.exponent`` km, or a derivative of it per
+        internal unit of time.
+
+        Derivatives beyond those that a load asks for (``SceneLoad.sights``) are no functions of the states:
+        equations may use them, what is recorded may not.
+        """
+        rows: list[list[Symbolic]] = [[], [], []]
+        for factor, series in sight.links:
+            size = self._rounded(exactly(self._context, factor), series.exponent - sight.exponent)
+            for row, axis in zip(rows, range(3), strict=True):
+                row.append(size * self._component(series, axis, order))
+        x, y, z = (row[0] if len(row) == 1 else hy.sum(row) for row in rows)
+        if not self.ephemeris.ecliptic:
+            return [x, y, z]
+        c, s = (self._rounded(value) for value in self.ephemeris.obliquity(self._context))
+        return [x, c * y + s * z, c * z - s * y]
+
+    def _rounded(self, value: Any, exponent: int = 0) -> Symbolic:
+        return as_factor(rounded(self._number(self._context.ldexp(value, exponent))))
+
+    def _component(self, series: BlockSeries, axis: int, order: int) -> Symbolic:
+        group, first, carried = self._group_of[id(series)]
+        if order <= carried:
+            return hy.make_vars(_name(series, axis, order))
+        values = self._polynomials(group, order)
+        at = first + axis * (series.terms - carried - 1) - carried - 1
+        return hy.sum([hy.par[at + k] * values[k] for k in range(order, series.terms)])
+
+    def _polynomials(self, group: _Blocks, order: int) -> list[Symbolic]:
+        """(2 / L)^n T_k^(n)(u) of a group's largest number of terms; zeros up to k = n - 1."""
+        known = group._polynomials
+        if order not in known:
+            n, u = order, hy.make_vars(group.past)
+            terms = max(series.terms for series, _ in group.series)
+            own = [hy.expression(1.0), 2.0 * n * u]
+            for j in range(2, terms - n):
+                one, two = (self._ratio(x, j) for x in (2 * (j + n - 1), j + 2 * n - 2))
+                own.append(one * (u * own[j - 1]) - two * own[j - 2])
+            power = exactly(self._context, self._rate(group) ** n * 2 ** (n - 1) * math.factorial(n - 1))
+            known[order] = [hy.expression(0.0)] * n + [
+                self._rounded(power * (k + n)) * value for k, value in enumerate(own[: terms - n])
+            ]
+        return known[order]
+
+    def _ratio(self, numerator: int, denominator: int) -> Symbolic:
+        return self._rounded(exactly(self._context, Fraction(numerator, denominator)))
+
+    def _rate(self, group: _Blocks) -> Fraction:
+        """u', per internal unit of time."""
+        return Fraction(2) ** (self._exponent + 1) / group.length
+
+    # --- states -------------------------------------------------------------------------------------------
+
+    @property
+    def names(self) -> str:
+        """What the series that are carried place, for reasons."""
+        return ", ".join(
+            series.target.replace("_", " ") for group in self._groups for series, _ in group.series
+        )
+
+    def block(self) -> StateBlock:
+        """All states, with their equations and values at the start."""
+        names: list[str] = []
+        derivatives: list[Symbolic] = []
+        initial: list[Any] = []
+        context, now = self._context, self._start + exactly(self._context, self.ephemeris.ahead)
+        for group in self._groups:
+            number = group.series[0][0].block_at(now)
+            begin = exactly(context, group.series[0][0].begin + number * group.length)
+            names.append(group.past)
+            derivatives.append(self._rounded(exactly(context, self._rate(group))))
+            initial.append(2 * (now - begin) / exactly(context, group.length) - 1)
+            for series, carried in group.series:
+                for order in range(carried + 1):
+                    shift = order * self._exponent - series.exponent
+                    names += [_name(series, axis, order) for axis in range(3)]
+                    derivatives += [self._component(series, axis, order + 1) for axis in range(3)]
+                    initial += [context.ldexp(x, shift) for x in series.at(context, now, order)]
+        why = f"positions of {self.names} by {self.ephemeris.kernel.name}, and the time within their blocks"
+        return StateBlock(names, [hy.expression(x) for x in derivatives], initial, why=why)
+
+    def pieces(self) -> list[PieceSeries]:
+        """What is set at the edges of blocks."""
+        return [self._pieces(group) for group in self._groups]
+
+    def _pieces(self, group: _Blocks) -> BlockPieces:
+        context, ahead = self._context, self.ephemeris.ahead
+        now, one = self._start + exactly(context, ahead), group.series[0][0]
+        begun = one.block_at(now)
+        last = min(math.ceil((series.end - one.begin) / one.length) for series, _ in group.series)
+        if last - begun > _MOST_KNOTS:
+            end = self.ephemeris.run[1] + exactly(context, ahead)
+            last = min(last, max(one.block_at(end) + _BEYOND, begun + _MOST_KNOTS))
+        knots = []
+        for block in range(begun + 1, last):
+            edge = exactly(context, one.begin + block * group.length - ahead)
+            knots.append(self._number(context.ldexp(edge, -self._exponent)))
+        return BlockPieces(group, begun, knots, self._exponent, context, self._number)
+
+
+class BlockPieces:
+    """Blocks of series of one length (see ``rigidsim.model.orbits.pieces.PieceSeries``)."""
+
+    def __init__(
+        self, group: _Blocks, begun: int, knots: list[Any], exponent: int, context: Any, number: Rounder
+    ) -> None:
+        self.knots, self._group, self._context, self._number = knots, group, context, number
+        self._series = []
+        for series, carried in group.series:
+            behind = round((group.series[0][0].begin - series.begin) / group.length)
+            self._series.append((series, carried, begun + behind))
+        rate = exactly(context, Fraction(2) ** (exponent + 1) / group.length)
+        self._ends = {
+            (series.terms, order): [
+                rate**order * x for x in chebyshev(context, -context.one, series.terms, order)
+            ]
+            for series, carried, _ in self._series
+            for order in range(carried + 1)
+        }
+        kind = type(number(context.one))
+        self._kind: Any = kind if issubclass(kind, float | np.floating) else None
+
+    def parameters(self, number: int) -> list[Any]:
+        """See ``PieceSeries``: the coefficients, each of which is a double times a power of two."""
+        found: list[Any] = []
+        for series, carried, first in self._series:
+            given = np.ldexp(series.coefficients[first + number, :, carried + 1 :], -series.exponent)
+            found += self._exact(given.ravel())
+        return found
+
+    def _exact(self, values: np.ndarray) -> list[Any]:
+        if self._kind is not None:
+            return (
+                values.astype(self._kind).tolist()
+                if self._kind in (float, np.float64)
+                else list(values.astype(self._kind))
+            )
+        return [self._number(self._context.mpf(float(x))) for x in values]
+
+    def states(self, number: int) -> dict[str, Any]:
+        """See ``PieceSeries``."""
+        found: dict[str, Any] = {self._group.past: self._number(-self._context.one)}
+        for series, carried, first in self._series:
+            for axis in range(3):
+                row = series.coefficients[first + number, axis]
+                for order in range(carried + 1):
+                    found[_name(series, axis, order)] = self._at_edge(series, row, order)
+        return found
+
+    def _at_edge(self, series: BlockSeries, row: np.ndarray, order: int) -> Any:
+        """A state's value where a block begins, u = -1, rounded once."""
+        if order == 0 and self._kind in (float, np.float64):
+            return math.ldexp(
+                math.fsum(np.where(np.arange(len(row)) % 2, -row, row).tolist()), -series.exponent
+            )
+        weights, context = self._ends[series.terms, order], self._context
+        total = sum((context.mpf(float(c)) * w for c, w in zip(row, weights, strict=True)), context.zero)
+        return self._number(context.ldexp(total, -series.exponent))
+
+
+def _name(series: BlockSeries, axis: int, order: int) -> str:
+    return f"kernel_{series.target}_{_RATES[order]}{_AXES[axis]}"
+
+
+def sights_of(scene: Scene) -> list[Sight]:
+    """The bodies of a kernel that a scene's loads see."""
+    return list(dict.fromkeys(sight for load in scene.loads for sight, _ in load.sights))

@@ -1,0 +1,145 @@
+"""A body of a kernel as a source, seen from the one that the rigid body is."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, ClassVar
+
+import heyoka as hy
+import numpy as np
+
+from rigidsim.model.kinematics import Kinematics
+from rigidsim.model.load_words import reach_text
+from rigidsim.model.placements.placement import Circuit, Placement
+from rigidsim.model.rotations import Symbolic
+from rigidsim.scene.arithmetic import Vector
+from rigidsim.scene.kernels.ephemeris import Ephemeris
+from rigidsim.scene.kernels.kernel import Sight
+from rigidsim.scene.registry import Surroundings
+from rigidsim.scene.scene import Scene
+
+_LUNISOLAR = frozenset({"sun", "earth", "moon", "earth_moon_barycenter"})
+_SAMPLES = 4000  # over a run
+_ROUNDS = 2  # of finer samples about the least distance
+_WINDOW = 100 * 365.25 * 86400.0  # s, in which a kernel tells the mean motion
+_TURN = 0.2  # of a block: samples by which the mean motion is followed
+
+
+@dataclass(frozen=True)
+class PlacedByKernel(Placement):
+    """A body of the kernel, seen from the host."""
+
+    ephemeris: Ephemeris
+    sight: Sight
+    moves: ClassVar[bool] = True
+    wide = True  # unrolled, the polynomials take several times as long to compile
+    without_plane = "positions of a kernel name none"
+
+    @classmethod
+    def of(cls, source: str, around: Surroundings) -> PlacedByKernel:
+        """The body that the key ``source`` of a load names."""
+        ephemeris = around.ephemeris
+        if ephemeris is None:
+            what = f'given "{source}", but there is no [ephemeris]; add one with a kernel'
+            raise around.fault("source", what)
+        ephemeris.check_body(source, lambda what: around.fault("source", what))
+        if not around.host:
+            what = (
+                f'given "{source}", but nothing says from which body of the kernel it is seen; name that in '
+            )
+            raise around.fault("source", what + '[body] host, such as "moon"')
+        if source == around.host:
+            raise around.fault(
+                "source", f'given "{source}", which is the body itself; another one is allowed'
+            )
+        return cls(ephemeris, ephemeris.sight(source, around.host))
+
+    @property
+    def name(self) -> str:  # type: ignore[override]
+        return self.sight.source
+
+    @property
+    def axes(self) -> str:  # type: ignore[override]
+        return self.ephemeris.axes
+
+    @property
+    def lunisolar(self) -> bool:  # type: ignore[override]
+        return {self.sight.source, self.sight.host} <= _LUNISOLAR
+
+    @property
+    def without_elements(self) -> tuple[str, str]:  # type: ignore[override]
+        against = f'the kernel gives places of "{self.name}", and no elements to average over'
+        return against, 'choose "spin_averaged", or give it an orbit with a node_rate'
+
+    def distance(self, context: Any) -> Any:
+        return context.ldexp(context.mpf(1000), self.sight.exponent)
+
+    def seen(self, m: Kinematics) -> tuple[list[Symbolic], Symbolic]:
+        vector = m.carried(m.sky).seen(self.sight)
+        inverse = 1.0 / hy.sqrt(hy.sum([x * x for x in vector]))
+        return [x * inverse for x in vector], inverse
+
+    @property
+    def sights(self) -> tuple[tuple[Sight, int], ...]:  # type: ignore[override]
+        return ((self.sight, 0),)
+
+    def at_start(self, scene: Scene) -> Vector:
+        return self.at(scene.context, scene.start)
+
+    def at(self, context: Any, time: Any) -> Vector:
+        return self.ephemeris.place(context, self.sight, time)
+
+    # --- sizes, from samples in double precision ----------------------------------------------------------
+
+    @cached_property
+    def _reach(self) -> tuple[float, float, float]:
+        """Least and largest distance (m) within the run, and the largest rate of the direction (rad/s)."""
+        begin, end = (float(t) + float(self.ephemeris.ahead) for t in self.ephemeris.run)
+        times = np.linspace(begin, end, _SAMPLES)
+        far = np.linalg.norm(self.sight.sampled(times), axis=1)
+        most = float(far.max())
+        for _ in range(_ROUNDS):
+            nearest, width = times[np.argmin(far)], times[1] - times[0]
+            times = np.linspace(max(begin, nearest - width), min(end, nearest + width), _SAMPLES // 10)
+            far = np.linalg.norm(self.sight.sampled(times), axis=1)
+        least, when = float(far.min()), float(times[np.argmin(far)])
+        step = 1e-3 * float(min(series.length for _, series in self.sight.links))
+        when = min(max(when, float(self.sight.span[0]) + step), float(self.sight.span[1]) - step)
+        before, after = self.sight.sampled(np.array([when - step, when + step]))
+        turning = float(np.linalg.norm(np.cross(before, after))) / (2 * step * least**2)
+        return 1000 * least, 1000 * most, turning
+
+    def nearest(self, context: Any) -> Any:
+        return context.mpf(self._reach[0])
+
+    def fastest_rate(self, context: Any) -> Any:
+        return context.mpf(self._reach[2])
+
+    def circuit(self, context: Any) -> Circuit:
+        """From the kernel's positions of up to a century about the start."""
+        first, last = map(float, self.sight.span)
+        begin = float(self.ephemeris.run[0]) + float(self.ephemeris.ahead)
+        low, high = max(first, begin - _WINDOW / 2), min(last, begin + _WINDOW / 2)
+        finest = float(min(series.length for _, series in self.sight.links)) * _TURN
+        places = self.sight.sampled(np.linspace(low, high, max(int((high - low) / finest), 2)))
+        far = np.linalg.norm(places, axis=1)
+        units = places / far[:, None]
+        turned = 2 * np.arcsin(np.clip(np.linalg.norm(np.diff(units, axis=0), axis=1) / 2, 0, 1))
+        e = float((far.max() - far.min()) / (far.max() + far.min()))
+        motion = float(turned.sum()) / (high - low)
+        return Circuit(motion, e, (2.0**self.sight.exponent / float(far.min())) ** 3)
+
+    def pictured(self) -> dict[str, Any]:
+        return {"kernel": self.name}
+
+    def told(self, context: Any, strength: Any) -> str:
+        least, most, _ = self._reach
+        return f"where {self.ephemeris.kernel.name} has it, {reach_text(strength, least, most)}"
+
+
+def refuse_series(around: Surroundings) -> None:
+    """Refuse analytic series beside a kernel whose axes they don't share."""
+    if around.ephemeris is not None and around.axes is None:
+        what = 'given beside [ephemeris], whose axes are ICRF unless [frame] axes = "ecliptic J2000"; set '
+        raise around.fault("ephemeris", what + "that, or give source instead")

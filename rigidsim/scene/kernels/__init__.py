@@ -1,0 +1,1 @@
+"""Positions of real bodies: kernels of ephemerides, and what a scene sees of them."""

@@ -1,0 +1,162 @@
+"""``[ephemeris]``: the kernel that places sources given by name, and what a scene sees of its bodies."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from decimal import Decimal
+from fractions import Fraction
+from typing import Any
+
+from pydantic import Field, StrictStr
+
+from rigidsim.errors import ConfigError, Problem
+from rigidsim.scene.arithmetic import Vector
+from rigidsim.scene.epochs import J2000, Epoch
+from rigidsim.scene.fields import ConfigTable
+from rigidsim.scene.frame import ECLIPTIC, OBLIQUITY
+from rigidsim.scene.kernels.finding import kernel_of
+from rigidsim.scene.kernels.kernel import DAY, J2000_DATE, Kernel, KernelError, Sight
+from rigidsim.scene.kernels.series import exactly
+from rigidsim.scene.validation_messages import nearest, shown
+
+ICRF = "ICRF"
+_EQUATORIAL = (ICRF, "GCRF")  # both have the same orientation
+_METRES = 1000
+
+
+class EphemerisTable(ConfigTable):
+    """``[ephemeris]``: where sources given by name are."""
+
+    kernel: StrictStr = Field(examples=["de421", "./de440.bsp"])
+    """an installed package (de405, de421, de423), or the path of an SPK file from the config's folder, with a
+    slash or a suffix; its SHA-256 is kept in the dataset
+    """
+
+
+@dataclass(frozen=True, eq=False)
+class Ephemeris:
+    """A kernel as a scene uses it.
+
+    Attributes:
+        kernel: where bodies are.
+        given: its name or path as the config gives it.
+        axes: name of the scene's space axes.
+        ahead: date of the scene's time 0: seconds of TDB since J2000.
+        run: start and end of the run, s (mpf).
+    """
+
+    kernel: Kernel
+    given: str
+    axes: str
+    ahead: Fraction
+    run: tuple[Any, Any]
+
+    @property
+    def ecliptic(self) -> bool:
+        """Whether the space axes are the ecliptic's, rather than the kernel's own."""
+        return self.axes == ECLIPTIC
+
+    def refused(self, what: str) -> ConfigError:
+        """The error of the kernel's key."""
+        return ConfigError(Problem("[ephemeris] kernel", f'given "{self.given}", {what}'))
+
+    def check_body(self, body: str, fault: Callable[[str], ConfigError]) -> None:
+        """Refuse a body that the kernel doesn't place."""
+        if not self.kernel.known(body):
+            bodies = self.kernel.bodies
+            raise fault(
+                f"given {shown(body)}{nearest(body, bodies)}; {self.kernel.name} has {', '.join(bodies)}"
+            )
+
+    def sight(self, source: str, host: str) -> Sight:
+        """One body seen from another (empty: the barycentre) over the run.
+
+        Raises:
+            ConfigError: the run goes beyond the kernel's span, or the kernel is damaged.
+        """
+        try:
+            found = self.kernel.sight(source, host)
+        except KernelError as error:
+            raise self.refused(str(error)) from None
+        first, last = found.span
+        begin, end = self.run
+        ahead = exactly(begin.context, self.ahead)
+        if begin + ahead < exactly(begin.context, first) or end + ahead > exactly(begin.context, last):
+            asked = " to ".join(date_of(int(x + ahead)) for x in self.run)
+            reach = " to ".join(map(date_of, found.span))
+            what = f'which has "{source}" from {reach} (TDB), but the run goes from {asked}; '
+            raise self.refused(what + "change [time] epoch, start or end, or take a longer kernel")
+        return found
+
+    def place(self, context: Any, sight: Sight, time: Any, order: int = 0) -> Vector:
+        """Vector (mpf, m, space axes) of a sight at a time of the scene (mpf, s), or a derivative of it."""
+        found = sight.at(context, time + exactly(context, self.ahead), order)
+        return self.turned(context, [_METRES * x for x in found])
+
+    def turned(self, context: Any, vector: Vector) -> Vector:
+        """A vector of the kernel's axes (mpf) in space axes."""
+        if not self.ecliptic:
+            return vector
+        c, s = self.obliquity(context)
+        x, y, z = vector
+        return [x, c * y + s * z, c * z - s * y]
+
+    @staticmethod
+    def obliquity(context: Any) -> tuple[Any, Any]:
+        """Cosine and sine of the obliquity of J2000 (mpf)."""
+        angle = OBLIQUITY.at(context)
+        return context.cos(angle), context.sin(angle)
+
+
+def resolve_ephemeris(
+    table: EphemerisTable | None, axes: str | None, epoch: Epoch | None, run: tuple[Any, Any], source: str
+) -> Ephemeris | None:
+    """The ephemeris of a config; None without one. ``source`` is where the config is, if it is a file.
+
+    Raises:
+        ConfigError: it can't be read, or lacks a date or axes.
+    """
+    if table is None:
+        return None
+    if epoch is None:
+        what = 'missing; [ephemeris] needs the date of time 0, such as "2000-01-01T12:00:00 TDB" or "J2000"'
+        raise ConfigError(Problem("[time] epoch", what))
+    if axes not in (None, ECLIPTIC, *_EQUATORIAL):
+        what = (
+            f'given "{axes}", which differs from the kernel\'s axes by the bias of 0.02 arcsec of the frame '
+        )
+        what += f'J2000; "{ICRF}" (the default here), "GCRF" or "{ECLIPTIC}" is allowed'
+        raise ConfigError(Problem("[frame] axes", what))
+    try:
+        kernel = kernel_of(table.kernel, source)
+    except KernelError as error:
+        raise ConfigError(Problem("[ephemeris] kernel", f'given "{table.kernel}", {error}')) from None
+    return Ephemeris(kernel, table.kernel, axes or ICRF, epoch.since_j2000(), run)
+
+
+def host_of(ephemeris: Ephemeris | None, host: str | None, masses: Sequence[str]) -> str:
+    """The body of the kernel that ``[body] host`` names; empty where it names one of ``[[bodies]]``, or none.
+
+    Raises:
+        ConfigError: neither has it.
+    """
+    if ephemeris is None or host is None or host in masses:
+        return ""
+
+    def fault(what: str) -> ConfigError:
+        also = f", [[bodies]] are {', '.join(masses)}" if masses else ""
+        return ConfigError(Problem("[body] host", what + also))
+
+    ephemeris.check_body(host, fault)
+    return host
+
+
+def date_of(seconds: Fraction | int) -> str:
+    """Date of a time in seconds since J2000 (TDB), or its Julian date past the years that have one."""
+    try:
+        whole = J2000.after(Decimal(round(seconds)))
+    except (ValueError, OverflowError):
+        return f"JD {float(J2000_DATE + Fraction(seconds) / DAY):.1f}"
+    text = whole.calendar()
+    return text.removesuffix("T00:00:00")
