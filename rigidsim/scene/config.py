@@ -14,6 +14,8 @@ from pydantic import ValidationError
 
 from rigidsim.errors import ConfigError, Problem
 from rigidsim.scene import validation_messages as messages
+from rigidsim.scene.bodies.field_files import cut
+from rigidsim.scene.bodies.gravity_field import asked_degree
 from rigidsim.scene.fields import NAME_OR_VECTOR
 from rigidsim.scene.python_values import assignments_of, toml_text
 from rigidsim.scene.registry import LOAD_KINDS
@@ -197,6 +199,11 @@ def _table_sections(config: Config, folder: Path) -> str:
     for where, name in _named(config):
         if name not in found and name not in config.tables:
             found[name] = _section(name, _text(where, name, folder / name))
+    field = config.body.gravity_field
+    if field is not None and field.file is not None and field.file not in config.tables:
+        degree = asked_degree(field, config.loads, config.sweep)
+        where, path = "[body] gravity_field file", folder / field.file
+        found[field.file] = _section(field.file, _text(where, field.file, path, degree))
     return "".join(found.values())
 
 
@@ -208,13 +215,17 @@ def _named(config: Config) -> Iterator[tuple[str, str]]:
             yield f"[[loads]] number {number} orbit.table", name
 
 
-def _text(where: str, name: str, path: Path) -> str:
+def _text(where: str, name: str, path: Path, degree: int | None = None) -> str:
+    """Text of a table, or of a gravity field to a degree."""
+    kind = "CSV" if degree is None else "text"
     try:
-        size = path.stat().st_size
-        if size > _LARGEST_TABLE:
-            what = f'given "{name}" of {size} bytes; a table has at most {_LARGEST_TABLE}: keep the rows and '
-            raise ConfigError(Problem(where, what + "digits that the run needs"))
-        text = path.read_text(encoding="utf-8-sig")
+        with path.open(encoding="utf-8-sig") as file:
+            if degree is None:
+                _refuse_size(where, name, path.stat().st_size)
+                text = file.read()
+            else:
+                text = cut(file, degree)
+                _refuse_size(where, name, len(text))
     except OSError as error:
         what = (
             f'given "{name}", which can\'t be read ({error.strerror or error}): {path} is looked for, beside '
@@ -222,13 +233,19 @@ def _text(where: str, name: str, path: Path) -> str:
         raise ConfigError(Problem(where, what + "the config")) from None
     except (UnicodeDecodeError, ValueError):
         raise ConfigError(
-            Problem(where, f'given "{name}", which is not UTF-8 text; save it as CSV')
+            Problem(where, f'given "{name}", which is not UTF-8 text; save it as {kind}')
         ) from None
     text = text.replace("\r\n", "\n").replace("\r", "\n")
     if "'''" in text or any((ord(c) < 32 and c not in "\n\t") or ord(c) == 127 for c in text):
-        what = f'given "{name}", which holds characters that no table has; save it as plain CSV'
+        what = f'given "{name}", which holds characters that no table has; save it as plain {kind}'
         raise ConfigError(Problem(where, what))
     return text
+
+
+def _refuse_size(where: str, name: str, size: int) -> None:
+    if size > _LARGEST_TABLE:
+        what = f'given "{name}" of {size} bytes; a table has at most {_LARGEST_TABLE}: keep the rows and '
+        raise ConfigError(Problem(where, what + "digits that the run needs"))
 
 
 def _section(name: str, text: str) -> str:

@@ -10,7 +10,7 @@ from rigidsim.errors import ConfigError, Problem
 from rigidsim.scene import schema, starts
 from rigidsim.scene.arithmetic import Matrix, Vector, context_for
 from rigidsim.scene.bodies.body import RigidBody, build_body, inverse_inertia
-from rigidsim.scene.bodies.gravity_field import gravity_field_of
+from rigidsim.scene.bodies.gravity_field import asked_degree, gravity_field_of
 from rigidsim.scene.config import Experiment
 from rigidsim.scene.epochs import Epoch
 from rigidsim.scene.exact import ExactNumber
@@ -245,7 +245,11 @@ def build_scene(experiment: Experiment, context: Any = None) -> Scene:
 def _body_at_start(config: schema.Config, context: Any) -> RigidBody:
     moments = moments_at_start(config, context, config.time.start.at(context))
     body = build_body(config.body, context, config.integrator.euler_sequence, moments)
-    return replace(body, gravity=gravity_field_of(config.body.gravity_field, body, context))
+    if config.body.gravity_field is None:
+        return body
+    texts = {name: table.text for name, table in config.tables.items()}
+    degree = asked_degree(config.body.gravity_field, config.loads)
+    return replace(body, gravity=gravity_field_of(config.body.gravity_field, body, context, texts, degree))
 
 
 def _first(loads: Iterable[SceneLoad], what: str) -> Any:

@@ -192,7 +192,7 @@ class TableText(ConfigTable):
     """``[tables.NAME]``: a table that belongs to the config; files that it names are taken in like this."""
 
     text: StrictStr
-    """text of the CSV file"""
+    """text of the CSV file, or of the gravity field"""
 
 
 class Config(ConfigTable):

@@ -11,14 +11,18 @@ the first.
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from fractions import Fraction
 from typing import Any
 
 from pydantic import Field, StrictInt, StrictStr, field_validator, model_validator
 
 from rigidsim.errors import ConfigError, Problem
+from rigidsim.scene.bodies.field_files import FieldFileError, read_field
 from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.fields import ConfigTable, Dimensionless, Metre, refuse
+from rigidsim.scene.point_masses import GRAVITATIONAL_CONSTANT
 from rigidsim.scene.validation_messages import shown
 
 WHERE = "[body] gravity_field"
@@ -26,6 +30,12 @@ LEAST = 3
 """The first degree that isn't the inertia tensor's."""
 MOST = 200
 """Of a degree: beyond, double precision loses the harmonics, and no compiler takes the expressions."""
+_SAME_MASS = 0.01
+"""Relative difference up to which a mass and a gravitational parameter mean the same body."""
+_SAME_DEGREE_2 = 0.01
+"""Difference over the largest coefficient of degree 2 up to which file and tensor mean the same body: tide
+systems differ by 1e-5 of it, published moments and fields by 1e-3.
+"""
 _KEY = re.compile(r"(0|[1-9]\d{0,3}),(0|[1-9]\d{0,3})")
 
 Harmonic = tuple[int, int, bool]
@@ -114,11 +124,27 @@ class GravityField:
         return {key: c for key, c in sorted(self.coefficients.items()) if key[0] <= degree and c != 0}
 
 
-def gravity_field_of(table: GravityFieldTable | None, body: Any, context: Any) -> GravityField | None:
+def asked_degree(table: GravityFieldTable, loads: Iterable[Any], sweep: Any = None) -> int:
+    """The degree to which a file is read: the one beside it, or the highest that a load asks for, or a sweep
+    over a load's.
+    """
+    if table.degree is not None:
+        return table.degree
+    given = [getattr(load, "degree", None) for load in loads]
+    for key, axis in (sweep.axes if sweep is not None else {}).items():
+        given += (axis.values or []) if key.endswith(".degree") else []
+    return max((n for n in given if isinstance(n, int)), default=2)
+
+
+def gravity_field_of(
+    table: GravityFieldTable | None, body: Any, context: Any, texts: Mapping[str, str], degree: int
+) -> GravityField | None:
     """The field that ``[body]`` describes; None without one.
 
     Args:
-        body: mass and centre of mass (``RigidBody``).
+        body: mass, centre of mass and inertia (``RigidBody``).
+        texts: of files, by name.
+        degree: to which a file is read.
 
     Raises:
         ConfigError: it contradicts the rest of the body.
@@ -132,14 +158,71 @@ def gravity_field_of(table: GravityFieldTable | None, body: Any, context: Any) -
             "given, but the body turns about another point than its centre of mass, from which the harmonics "
             "count; remove center_of_mass or reference"
         )
-    if table.radius is None:
-        raise fault("given file, but files aren't read yet; list C and S")
+    if table.file is not None:
+        return _of_file(table.file, body, context, texts, degree)
+    assert table.radius is not None
     found: dict[Harmonic, Any] = {}
     for given, sine in ((table.C, False), (table.S, True)):
         for key, value in (given or {}).items():
             n, m = map(int, key.split(","))
             found[n, m, sine] = value.at(context)
     return GravityField(table.radius.at(context), found, max(n for n, _, _ in found))
+
+
+def _of_file(name: str, body: Any, context: Any, texts: Mapping[str, str], degree: int) -> GravityField:
+    given = f'given "{name}", '
+    if name not in texts:
+        known = ", ".join(texts) or "none"
+        what = "but this config was given as text, without files beside it; put the file's text into "
+        raise fault(f'{given}{what}[tables."{name}"] text (there now: {known})', " file")
+    try:
+        read = read_field(texts[name], degree)
+    except FieldFileError as error:
+        raise fault(f"{given}which {_sentence(error)}", " file") from None
+
+    def number(value: Fraction) -> Any:
+        return context.mpf(value.numerator) / value.denominator
+
+    radius, mass = number(read.radius), number(read.strength) / context.mpf(GRAVITATIONAL_CONSTANT)
+    if abs(mass - body.mass) > _SAME_MASS * body.mass:
+        there, here = (context.nstr(x, 6) for x in (mass, body.mass))
+        what = f"{given}whose G M makes the mass {there} kg, but [body] has {here} kg; "
+        raise fault(what + "is it the field of another body?", " file")
+    found: dict[Harmonic, Any] = {}
+    for (n, m), row in read.rows.items():
+        factor = context.sqrt(number(read.squared_factor(n, m)))
+        found |= {(n, m, sine): factor * number(x) for sine, x in zip((False, True), row, strict=True)}
+    _refuse_other_tensor(given, found, radius, body, context)
+    beyond = {key: c for key, c in found.items() if key[0] >= LEAST}
+    described = " ".join(f'"{name}" {read.name}'.split())
+    return GravityField(radius, beyond, degree, described)
+
+
+def _sentence(error: FieldFileError) -> str:
+    text = str(error)
+    return f"has in {text}" if text.startswith("line ") else text
+
+
+def _refuse_other_tensor(
+    given: str, found: dict[Harmonic, Any], radius: Any, body: Any, context: Any
+) -> None:
+    """Refuse coefficients of degree 2 that the inertia tensor doesn't have, but for tides and rounding."""
+    tensor, unit = body.inertia, body.mass * radius**2
+    expected = {
+        (2, 0, False): ((tensor[0][0] + tensor[1][1]) / 2 - tensor[2][2]) / unit,
+        (2, 1, False): -tensor[0][2] / unit,
+        (2, 1, True): -tensor[1][2] / unit,
+        (2, 2, False): (tensor[1][1] - tensor[0][0]) / (4 * unit),
+        (2, 2, True): -tensor[0][1] / (2 * unit),
+    }
+    most = context.maximum([abs(x) for x in expected.values()])
+    for (n, m, sine), value in expected.items():
+        if (n, m, sine) in found and abs(found[n, m, sine] - value) > _SAME_DEGREE_2 * most:
+            name = f"{'S' if sine else 'C'}{n}{m}"
+            there, here = (context.nstr(x, 8) for x in (found[n, m, sine], value))
+            what = f"{given}whose {name} is {there} (unnormalized), but the inertia tensor makes it {here} "
+            what += "with this mass and radius; give moments of the same body, in the same body axes"
+            raise fault(what, " file")
 
 
 def fault(text: str, key: str = "") -> ConfigError:
