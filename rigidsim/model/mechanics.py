@@ -18,6 +18,7 @@ from rigidsim.model.state_blocks import BODY, AttitudeStates
 from rigidsim.scene.arithmetic import Vector, across, parallel
 from rigidsim.scene.arithmetic import apply as multiply
 from rigidsim.scene.scene import Scene
+from rigidsim.scene.surfaces import Surfaces
 
 
 @dataclass(frozen=True)
@@ -47,8 +48,20 @@ class Mechanics(Kinematics):
         position = list(hy.make_vars(*BODY.position)) if flies else None
         velocity = list(hy.make_vars(*BODY.velocity)) if flies else None
         made = cls(scene, scaling, numbers, rates, attitude, up, position, velocity, number, **more)
-        reshaping = having(Reshaping, loads_of(scene))
-        return replace(made, shape=reshaping[0].shape(made)) if reshaping else made
+        return made._shaped()
+
+    def _shaped(self) -> Mechanics:
+        reshaping = having(Reshaping, loads_of(self.scene))
+        return replace(self, shape=reshaping[0].shape(self)) if reshaping else self
+
+    @cached_property
+    def observed(self) -> Mechanics:
+        """The same for what is recorded and watched, whose parameters are no sides of surfaces: moments with
+        kinks tell these by the state.
+        """
+        if self.shape is None or not self.surfaces.found:
+            return self
+        return replace(self, surfaces=Surfaces())._shaped()
 
     @property
     def turning_rate(self) -> Any | None:
