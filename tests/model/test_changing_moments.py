@@ -29,8 +29,8 @@ def bent(
     kinks: Sequence[Side],
     end: float,
 ) -> np.ndarray:
-    """Rotation matrix (3, 3) at the end by R' = R [w]x, with a constant momentum in space and one state of its
-    own, from kink to kink.
+    """Rotation matrix (3, 3) at the end by R' = R [w]x, with a constant momentum in space and one state of
+    its own, from kink to kink.
 
     Args:
         moments: of (t, own, sides); change: of the own state, of (t, own, w, sides).
