@@ -1,4 +1,4 @@
-"""The keys of ``[body] elasticity`` as numbers, and whose tides are raised; what makes no sense is refused."""
+"""The keys of ``[body] elasticity`` as numbers, and whose tides are raised; nonsense is refused."""
 
 from __future__ import annotations
 
