@@ -44,6 +44,7 @@ STUDIES = (
     "tumbling_averages",
     "damped_averages",
     "earth_obliquity",
+    "rigid_earth",
 )
 
 

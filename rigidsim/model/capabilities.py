@@ -197,9 +197,7 @@ class LinearPotential(Protocol):
 
 @runtime_checkable
 class Reshaping(Protocol):
-    """It changes the body's mass distribution; ``changes`` says so, for what can't do with that."""
-
-    changes: str
+    """It changes the body's mass distribution."""
 
     def shape(self, m: Kinematics) -> MassDistribution: ...
 

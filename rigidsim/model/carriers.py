@@ -59,8 +59,7 @@ class Lending(Protocol):
     state, and ``supplied_power`` tells only the drive's work on the body.
     """
 
-    def lends(self, m: Kinematics) -> bool:
-        """Whether it does."""
+    lends: bool
 
 
 @runtime_checkable
@@ -78,13 +77,13 @@ def carried_beside(loads: Iterable[Load]) -> str:
     if found is None:
         return ""
     if isinstance(found, Reshaping):
-        return found.changes
+        return f"{found.title} vary"
     return f"{found.title} carries angular momentum beside the body"
 
 
-def lends(carrier: object, m: Kinematics) -> bool:
+def lends(carrier: object) -> bool:
     """Whether it is ``Lending``."""
-    return isinstance(carrier, Lending) and carrier.lends(m)
+    return isinstance(carrier, Lending) and carrier.lends
 
 
 def momentum_terms(carriers: Iterable[Carrier], m: Kinematics) -> list[Term]:

@@ -8,11 +8,13 @@ from pathlib import Path
 from typing import Any
 
 import mpmath
+import numpy as np
 import pytest
 
 from experiments.closed_forms import free_top
 from experiments.toutatis import MOMENTS, PUBLISHED, RATES
 from rigidsim import parse
+from rigidsim.errors import ConfigError
 from rigidsim.scene.bodies.presets import PRESETS
 from rigidsim.scene.exact import parse_number
 from rigidsim.scene.scene import build_scene
@@ -143,3 +145,33 @@ def test_apophis_has_both_periods_and_the_published_energy() -> None:
     assert float(top.period) / 3600 == pytest.approx(263, abs=0.01)
     momentum, energy = math.hypot(i1 * w1, i3 * w3), (i1 * w1**2 + i3 * w3**2) / 2
     assert energy / (momentum**2 / (2 * i3)) == pytest.approx(1.024, abs=0.001)
+
+
+def test_a_whole_presets_keys_are_overridden_one_by_one() -> None:
+    def field(more: str = "") -> Any:
+        return body_of(f'preset = "earth_rigid"\n{more}').gravity
+
+    whole = field()
+    assert float(whole.coefficients[3, 0, False]) == 2.532474e-6
+    one = field('gravity_field = {C = {"3,0" = 1e-6}}')
+    assert float(one.coefficients[3, 0, False]) == 1e-6
+    assert one.coefficients[3, 1, False] == whole.coefficients[3, 1, False]
+    other = field('gravity_field = {radius = "6000 km", C = {"4,0" = 1e-6}}')
+    assert set(other.coefficients) == {(4, 0, False)}
+    with pytest.raises(ConfigError, match="gravity_field"):
+        field("gravity_field = 3")
+
+
+def test_the_rigid_earth_is_flattened_and_triaxial_as_published() -> None:
+    earth = body("earth_rigid")
+    a, b, c = earth.principal_moments
+    assert close((c - (a + b) / 2) / c, "0.0032737548")
+    scale = earth.mass * exact("6378136.6") ** 2
+    assert float((c - (a + b) / 2) / scale) == pytest.approx(0.001082625305, rel=1e-15)
+    half = math.hypot(1.5745e-6, 9.0387e-7)
+    assert float((b - a) / (4 * scale)) == pytest.approx(half, rel=1e-12)
+    greenwich = {1: (2.1931e-6, 2.681e-7), 2: (3.0905e-7, -2.1143e-7), 3: (1.0058e-7, 1.9722e-7)}
+    for m, (cosine, sine) in greenwich.items():
+        turned = complex(cosine, -sine) * np.exp(1j * m * math.radians(-14.929376301576161))
+        assert float(earth.gravity.coefficients[3, m, False]) == pytest.approx(turned.real, rel=1e-12)
+        assert float(earth.gravity.coefficients[3, m, True]) == pytest.approx(-turned.imag, rel=1e-12)

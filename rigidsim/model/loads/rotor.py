@@ -182,7 +182,8 @@ class Rotor(Load):
 
     # --- energy and torque ----------------------------------------------------------------------------------
 
-    def lends(self, m: Kinematics) -> bool:
+    @property
+    def lends(self) -> bool:
         """See ``carriers.Lending``: J s a . w of a fixed rate, h^2 / 2 J of a driven one."""
         return self.fixed or self.motor is not None
 

@@ -114,7 +114,9 @@ def _from_tensor(
         mass = parse_number(preset.mass, "kg").at(context)
         described = f"preset {table.preset} ({preset.source})"
         axes = [float(parse_number(a, "m").at(context)) for a in preset.semi_axes]
-        drawing = [{**drawn("ellipsoid", {"semi_axes": axes}, center), "name": str(table.preset)}]
+        drawing = [
+            {**drawn("ellipsoid", {"semi_axes": axes}, center), "name": preset.drawn_as or str(table.preset)}
+        ]
     elif source == "principal_moments":
         assert table.principal_moments is not None
         numbers = [x for x in table.principal_moments if isinstance(x, ExactNumber)]

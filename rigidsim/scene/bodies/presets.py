@@ -5,7 +5,8 @@ The Sun, the planets and the Moon are recognised by their gravitational paramete
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import Any
 
 from rigidsim.scene.exact import parse_number
@@ -24,6 +25,9 @@ class Preset:
         radius: R of the factor C/(M R^2), m.
         rotation: the published rotation, rad/s about the body axes; empty if there is no lasting one.
             A scene itself starts as its ``[initial]`` says.
+        tables: what else of ``[body]`` is published with them, as it would be written there: gravity_field,
+            elasticity, core.
+        drawn_as: name of the body whose picture is its own; by default that of the preset.
     """
 
     ratios: tuple[str, str, str]
@@ -33,6 +37,23 @@ class Preset:
     source: str
     radius: str = ""
     rotation: tuple[str, str, str] | tuple[()] = ()
+    tables: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    drawn_as: str | None = None
+
+    def completed(self, given: Mapping[str, Any]) -> dict[str, Any]:
+        """``[body]`` as given, with this preset's tables where it says nothing else.
+
+        Keys of a table count one by one: ``core = {friction = 0}`` keeps the rest of the core. A gravity
+        field with a radius or a file of its own is another one.
+        """
+        found = dict(given)
+        for name, table in self.tables.items():
+            own = given.get(name)
+            if own is None:
+                found[name] = dict(table)
+            elif isinstance(own, Mapping) and not (name == "gravity_field" and {"radius", "file"} & set(own)):
+                found[name] = _filled(table, own)
+        return found
 
     def moments(self, context: Any) -> list[Any]:
         """I_x, I_y, I_z, kg m^2 (mpf)."""
@@ -41,6 +62,15 @@ class Preset:
             radius = parse_number(self.radius, "m").at(context)
             largest *= parse_number(self.mass, "kg").at(context) * radius**2
         return [parse_number(ratio, "1").at(context) * largest for ratio in self.ratios]
+
+
+def _filled(table: Mapping[str, Any], own: Mapping[str, Any]) -> dict[str, Any]:
+    """A table with its keys, and those of the tables within, replaced by one's own."""
+    found = {**table, **own}
+    for key, inner in table.items():
+        if isinstance(inner, Mapping) and isinstance(own.get(key), Mapping):
+            found[key] = {**inner, **own[key]}
+    return found
 
 
 PRESETS: dict[str, Preset] = {
@@ -118,6 +148,39 @@ PRESETS: dict[str, Preset] = {
         semi_axes=("221.9", "153.1", "144.6"),
         source="ratios: Pravec et al. 2014, Icarus 233, 48; axes: the ellipsoid that has them, with the "
         "diameter 0.34 km of Brozovic et al. 2018, Icarus 300, 115; mass not measured: 2600 kg/m^3 assumed",
+    ),
+}
+
+PRESETS |= {
+    "earth_rigid": Preset(
+        # C/(M R^2) = J2/H with H = (C - (A + B)/2)/C = 0.0032737548 and J2 = 0.001082625305 of DE421;
+        # B - A = 4 sqrt(C22^2 + S22^2) M R^2 with C22 = 1.5745e-6, S22 = -9.0387e-7
+        ratios=("0.99671526542024313361", "0.99673722497975686639", "1"),
+        largest_moment="0.33069834826969936783",
+        radius="6378136.6 m",
+        mass="5.9721684106698775088e24",  # GMB AU^3 EMRAT/(1 + EMRAT) = 398600.43623333963457 km^3/s^2
+        semi_axes=("6378136.6", "6378136.6", "6356751.9"),
+        source="(C-A)/C of the rigid-Earth series: Souchay, Loysel, Kinoshita & Folgueira 1999, Astron. "
+        "Astrophys. Suppl. 135, 111; J2, J3, G M: DE421; other harmonics: see docs/presets.md",
+        rotation=("0", "0", "7.292115e-5 rad/s"),
+        tables={
+            "gravity_field": {
+                "radius": "6378136.6 m",
+                # J3; tesserals of Greenwich, turned to the axis of the smallest moment at
+                # 14.929376301576161 deg west
+                "C": {
+                    "3,0": "2.532474e-6",
+                    "3,1": "2.0499998435598484e-6",
+                    "3,2": "3.7328856333208324e-7",
+                    "3,3": "-6.7555654341113537e-8",
+                },
+                "S": {
+                    "3,1": "8.2405452574729378e-7",
+                    "3,2": "-2.9499082790305138e-8",
+                    "3,3": "2.1082765085857213e-7",
+                },
+            },
+        },
     ),
 }
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from pydantic import Field, StrictStr, Tag, WithJsonSchema, create_model
+from pydantic import Field, StrictStr, Tag, WithJsonSchema, create_model, model_validator
 
 from rigidsim.scene.bodies.gravity_field import GravityFieldTable
 from rigidsim.scene.bodies.presets import PRESETS
@@ -15,7 +15,6 @@ from rigidsim.scene.fields import (
     Angle,
     ConfigTable,
     Dimensionless,
-    EachOnce,
     EulerSequence,
     Four,
     Kilogram,
@@ -25,7 +24,6 @@ from rigidsim.scene.fields import (
     OneOf,
     PerSecond,
     Rate,
-    Second,
     Triple,
     name_or_vector,
 )
@@ -97,23 +95,6 @@ class Part(Solid):
     """sequence of euler_angles; by default that of [integrator]"""
 
 
-class ElasticityTable(ConfigTable):
-    """How tides and the spin distort the body's tensor of inertia."""
-
-    love_number: Dimensionless = Field(examples=[0.0216])
-    """Love number k2 of degree 2: 0 (rigid) to 1.5 (a homogeneous fluid)"""
-    radius: Metre = Field(examples=["1738 km"])
-    """radius that the Love number refers to"""
-    delay: Second = Field(ZERO, examples=["0.108 day"])
-    """time by which the distortion lags behind its cause; without one nothing is dissipated"""
-    mean_rate: Rate | None = Field(None, examples=["0.2299715 rad/day"])
-    """spin about the figure axis whose distortion is in the body's moments already; by default that of the
-    start
-    """
-    raised_by: EachOnce[StrictStr] | None = Field(None, examples=[["earth"]])
-    """names of the loads whose sources raise tides; by default all gravity gradients; [] for none"""
-
-
 _LANDMARKS = {name for shape in SHAPES.values() for name in shape.landmarks}
 Reference = Annotated[
     Annotated[
@@ -162,8 +143,6 @@ class Body(Solid):
     """name of a published body"""
     core: Core | None = None
     """a fluid core within the body"""
-    elasticity: ElasticityTable | None = Field(None, examples=[{"love_number": 0.0216, "radius": "1738 km"}])
-    """tides and spin distort the tensor of inertia"""
     mass: Kilogram | None = Field(None, examples=[12])
     """mass of the body; required for shapes, and wherever a load or the translational motion uses it"""
     gravity_field: GravityFieldTable | None = Field(
@@ -180,3 +159,10 @@ class Body(Solid):
     """the point that the body turns about: center_of_mass (the default), a landmark of the shape (corner,
     apex, end), or a point in the coordinates of the description
     """
+
+    @model_validator(mode="before")
+    @classmethod
+    def _whole_preset(cls, value: Any) -> Any:
+        """With what a preset says beside moments and mass."""
+        preset = PRESETS.get(str(value.get("preset"))) if isinstance(value, dict) else None
+        return preset.completed(value) if preset else value
