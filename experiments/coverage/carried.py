@@ -1,4 +1,4 @@
-"""Random scenes with rotors and states of one's own: gyrostats, controllers, filters, slosh."""
+"""Random scenes with rotors, a fluid core, and states of one's own: controllers, filters, slosh."""
 
 from __future__ import annotations
 
@@ -36,12 +36,7 @@ def gyrostat(draw: Draw) -> None:
     draw.start(draw.direction() * draw.between(0.1, 2))
     rotors(draw, moments)
     if draw.sometimes(0.3):
-        axis_of_orbit, motion = 1e3 * draw.length, draw.between(0.05, 0.4) / draw.time
-        draw.load(
-            "gravity_gradient",
-            f"gravitational_parameter = {motion**2 * axis_of_orbit**3!r}",
-            f"orbit = {{semi_major_axis = {axis_of_orbit!r}, eccentricity = 0.1}}",
-        )
+        _orbit(draw)
 
 
 def heavy_gyrostat(draw: Draw) -> None:
@@ -71,6 +66,34 @@ def gyrostat_in_flight(draw: Draw) -> None:
     strength = motion**2 * distance**3 * draw.length**3 / draw.time**2
     draw.load("central_gravity", f"gravitational_parameter = {strength!r}")
     rotors(draw, moments)
+
+
+def fluid_core(draw: Draw) -> None:
+    """A core of any size, with friction in half of them, as fast as the body in some; a third on an orbit."""
+    moments = draw.moments()
+    draw.body(moments, turned=draw.sometimes(0.3))
+    # at most what leaves a mantle with positive second moments of mass
+    most = 2 * float(min(moments.sum() / 2 - moments)) / float(max(moments))
+    core = [f"moment = {draw.between(0.01, 0.95) * most!r}", f"flattening = {draw.decades(-4, -0.7)!r}"]
+    if draw.sometimes(0.5):
+        core.append(f'friction = "{draw.decades(-5, -0.5) / draw.time!r} s^-1"')
+    rates = draw.direction() * draw.between(0.1, 2)
+    if draw.sometimes(0.6):
+        own = (rates + draw.direction() * draw.decades(-4, 0.3)) / draw.time
+        core.append(f"angular_velocity = {[float(x) for x in own]}")
+    draw.lines.append(f"core = {{{', '.join(core)}}}")
+    draw.start(rates)
+    if draw.sometimes(0.3):
+        _orbit(draw)
+
+
+def _orbit(draw: Draw) -> None:
+    axis_of_orbit, motion = 1e3 * draw.length, draw.between(0.05, 0.4) / draw.time
+    draw.load(
+        "gravity_gradient",
+        f"gravitational_parameter = {motion**2 * axis_of_orbit**3!r}",
+        f"orbit = {{semi_major_axis = {axis_of_orbit!r}, eccentricity = 0.1}}",
+    )
 
 
 def state(draw: Draw, name: str, derivative: str, initial: float = 0.0) -> None:

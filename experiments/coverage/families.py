@@ -266,6 +266,7 @@ FAMILIES: dict[str, Family] = {
     "names on a table": Family(known.table, (1.0, 2.5), finish=known.write_table, canonical=False),
     "names of point masses": Family(known.moving_bodies, (1.0, 2.5), canonical=False),
     "jet damping": Family(known.jet, (1.0, 2.3), canonical=False),
+    "fluid core": Family(carried.fluid_core, (1.0, 3.0), canonical=False),
 }
 """By the name under which the table shows them."""
 

@@ -17,6 +17,7 @@ FIGURES: dict[str, str] = {
     "herpolhode": "path of the angular velocity on the invariable plane",
     "path": "path of the centre of mass",
     "rates": "angular velocity over time",
+    "core": "axis and rate of a fluid core, from the mantle's, over time",
     "attitude": "Euler angles, or the body's z axis in space, and the nutation angle, over time",
     "states": "states of one's own ([[states]]) over time",
     SPECTRUM: "amplitude spectra of what the scene is about, their lines labelled (analyses the run first)",

@@ -82,7 +82,8 @@ def tensor(dataset: xarray.Dataset) -> Array | None:
 def momentum(dataset: xarray.Dataset) -> Array | None:
     """Angular momentum (rows, 3) of the body and all its rotors, body axes, kg m^2/s."""
     inertia, rates, found = tensor(dataset), signals.values(dataset, "angular_velocity"), rotors(dataset)
-    if inertia is None or rates is None or len(found) < len(surroundings.told(dataset, "rotor")):
+    unknown = len(found) < len(surroundings.told(dataset, "rotor")) or surroundings.told(dataset, "core")
+    if inertia is None or rates is None or unknown:
         return None
     return np.asarray(signals.turned(rates, inertia) + sum(rotor.inner for rotor in found))
 

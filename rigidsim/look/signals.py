@@ -15,7 +15,7 @@ import xarray
 from numpy.typing import NDArray
 
 from rigidsim.look.solids import Array, rotation_matrix
-from rigidsim.look.surroundings import has_rotors
+from rigidsim.look.surroundings import carries_within
 
 ROWS_AT_ONCE = 1 << 21
 
@@ -227,7 +227,7 @@ def figure_index(found: Array) -> int:
 def energy_and_momentum(dataset: xarray.Dataset) -> tuple[Array, float, float] | None:
     """Moments, twice the energy and the squared momentum of a free body; None where these aren't constant."""
     found, rates = moments(dataset), principal_rates(dataset)
-    if found is None or rates is None or has_rotors(dataset):
+    if found is None or rates is None or carries_within(dataset):
         return None
     rates = finite_rows(rates)
     twice, square = rates**2 @ found, rates**2 @ found**2
@@ -245,7 +245,7 @@ def body_direction(dataset: xarray.Dataset, direction: Array) -> Array | None:
 
 
 def pole(dataset: xarray.Dataset, axis: str) -> Array | None:
-    """Unit vectors (rows, 3), space axes, of the axis named figure, spin or momentum."""
+    """Unit vectors (rows, 3), space axes, of the axis named figure, spin, momentum or core (its rate's)."""
     recorded = values(dataset, f"{axis}_axis")
     if recorded is not None:
         return recorded
@@ -254,7 +254,8 @@ def pole(dataset: xarray.Dataset, axis: str) -> Array | None:
     if axis == "momentum":
         momentum = values(dataset, "angular_momentum")
         return None if momentum is None else _unit(momentum)
-    rates, quaternion = values(dataset, "angular_velocity"), values(dataset, "quaternion")
+    rates = values(dataset, "core_angular_velocity" if axis == "core" else "angular_velocity")
+    quaternion = values(dataset, "quaternion")
     if rates is None or quaternion is None:
         return None
     return _unit(np.einsum("tij,tj->ti", rotation_matrix(quaternion), rates))

@@ -46,6 +46,11 @@ def has_rotors(dataset: xarray.Dataset) -> bool:
     return any(one["drive"] != "fixed" or one["rate"] for one in told(dataset, "rotor"))
 
 
+def carries_within(dataset: xarray.Dataset) -> bool:
+    """Whether rotors or a fluid core carry momentum of their own."""
+    return has_rotors(dataset) or bool(told(dataset, "core"))
+
+
 def gravity(dataset: xarray.Dataset) -> Array | None:
     """Acceleration (3,) of a uniform field, m/s^2, space axes; None if there is none."""
     for one in told(dataset, "gravity"):

@@ -12,6 +12,7 @@ from rigidsim.analysis.labels import Known
 from rigidsim.model.capabilities import Beside, GradientAlone, gradient_source_of, orbit_of
 from rigidsim.model.carriers import carried_beside
 from rigidsim.model.load import loads_of
+from rigidsim.model.loads.fluid_core import FluidCore
 from rigidsim.scene.arithmetic import Vector, apply, dot, transpose
 from rigidsim.scene.attitude import rotation_matrix
 from rigidsim.scene.scene import Scene
@@ -46,7 +47,7 @@ def known_frequencies(scene: Scene, *, driven: bool = False) -> list[Known]:
     found = []
     loads = [load for load in loads_of(scene) if not isinstance(load, Beside)]
     cored = modes_of_core(scene)
-    if not cored and carried_beside(loads):
+    if carried_beside([x for x in loads if not (cored and isinstance(x, FluidCore))]):
         return []
     orbits = [orbit for load in loads if (orbit := orbit_of(load)) is not None]
     for number, orbit in enumerate(orbits, 1):

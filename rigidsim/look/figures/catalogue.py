@@ -67,6 +67,10 @@ KINDS: dict[str, Kind] = {
     "herpolhode": Kind("an attitude and a momentum that stays put", (), [polhode.herpolhode]),
     "path": Kind("position recorded", (), [poles.path]),
     "rates": Kind(_TURNS, [timelines.rates, changing.moments]),
+    "core": Kind(
+        "a fluid core whose rate was recorded, and that of the mantle",
+        [changing.core_axis, changing.core_slip],
+    ),
     "attitude": Kind(_ATTITUDE, [timelines.attitude, timelines.wobble]),
     "states": Kind("states of one's own ([[states]]) recorded", changing.OWN_STATES),
     "drift": Kind("invariants", [drift]),
@@ -148,6 +152,10 @@ def _of_body(rows: xarray.Dataset) -> tuple[Sequence[Panel], Sequence[Panel]]:
     if signals.is_top(rows):
         turning = timelines.precession if timelines.precession.shows(rows) else timelines.attitude
         return [timelines.tilt, turning], [poles.tip]
+    if changing.core_axis.shows(rows):
+        tilting = [changing.core_axis, changing.core_slip]
+        precessing = poles.precesses(rows) or not signals.near_axis(rows)
+        return tilting, [*moving, *([poles.polar_motion] if precessing else [poles.pole_path])]
     if signals.near_axis(rows) and changing.moments.shows(rows):
         return [timelines.rates, changing.moments, timelines.wobble], [*moving, poles.polar_motion]
     if signals.near_axis(rows) and changing.OWN_STATES[0].shows(rows):

@@ -59,7 +59,7 @@ def pole_paths(dataset: xarray.Dataset) -> tuple[dict[str, Array], str, str] | N
     paths: dict[str, Array] = {}
     if along is not None:
         first, second = signals.across(along)
-        for name in ("figure", "spin"):
+        for name in ("figure", "spin", "core"):
             axis = signals.pole(dataset, name)
             if axis is not None:
                 paths[name] = _flat(axis @ first, axis @ second, axis @ along)
@@ -98,7 +98,17 @@ def pole_path(axes: Axes, dataset: xarray.Dataset, found: tuple[dict[str, Array]
             style.trace(axes, x, y)
         else:
             color = timelines.AXIS_COLORS[name]
-            curve(axes, x, y, in_plane=True, color=color, lw=0.7, alpha=0.6, zorder=1, label=f"{name} axis")
+            curve(
+                axes,
+                x,
+                y,
+                in_plane=True,
+                color=color,
+                lw=0.7,
+                alpha=0.6,
+                zorder=1,
+                label=f"{name}'s axis" if name == "core" else f"{name} axis",
+            )
     points = np.vstack([path / scale for path in shown.values()])
     reach = float(np.nanmax(np.abs(points - np.nanmean(points, axis=0))))
     if np.nanmin(np.hypot(*points.T)) < 3 * reach:  # not so far that it would press the path flat

@@ -10,11 +10,11 @@ from matplotlib.axes import Axes
 from rigidsim.look import signals
 from rigidsim.look.figures.fits import secular
 from rigidsim.look.figures.panel import angle_scale, angle_text, clock, number, panel, recorded
-from rigidsim.look.figures.style import BLUE, GREY, ORANGE, PALETTE, VIOLET, X, Y, Z, curve, key
+from rigidsim.look.figures.style import BLUE, GREY, ORANGE, PALETTE, PINK, VIOLET, X, Y, Z, curve, key
 from rigidsim.look.solids import Array
 from rigidsim.scene.readable import DAY, named_unit, si_scale, span_text, unit_for
 
-AXIS_COLORS = {"figure": BLUE, "spin": ORANGE, "momentum": VIOLET}
+AXIS_COLORS = {"figure": BLUE, "spin": ORANGE, "momentum": VIOLET, "core": PINK}
 _STILL = 1e-9  # of its size, below which what a curve does is rounding
 _VISIBLE = 0.01  # of its start, from which a change is seen on an axis from zero
 _QUICK = np.deg2rad(1.0)  # a day, from which a node's motion is told in the axis' own unit

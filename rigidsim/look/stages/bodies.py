@@ -123,6 +123,14 @@ def vectors_of(
             Arrow("angular_velocity", "ω", parts.VELOCITY, tip, attitude is None, words, label_at=at)
         )
         notes.append(f"{words} (cyan): 1 unit = {1 / factor:.6g} rad/s")
+        core = column(dataset, "core_angular_velocity", 3)
+        if core is not None:
+            shown = core * factor if attitude is None else np.einsum("tij,tj->ti", attitude, core * factor)
+            words = "angular velocity of the core"
+            arrows.append(
+                Arrow("core_angular_velocity", "core", parts.OF_CORE, shown, attitude is None, words)
+            )
+            notes.append(f"{words} (orange), in the same unit")
         if paths:
             words = "polhode: ω's path in the body"
             trails.append(Trail("polhode", parts.POLHODE, in_body, in_body=True, words=words))

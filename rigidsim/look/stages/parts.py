@@ -30,6 +30,7 @@ _SMOOTH = 0.2  # of a trail's radius, between its corners: some thirty a turn
 
 MOMENTUM: Color = (255, 196, 40)
 VELOCITY: Color = (90, 215, 235)
+OF_CORE: Color = (255, 150, 60)
 POLHODE: Color = (240, 100, 175)
 TRACK: Color = (150, 205, 110)
 PULL: Color = (255, 120, 70)

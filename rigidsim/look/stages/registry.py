@@ -15,7 +15,7 @@ from rigidsim.look.stages import orbits, parts, planet, precession, top
 from rigidsim.look.stages.bodies import Subject, column, source_arrows, vectors_of, with_track
 from rigidsim.look.stages.parts import BODY, Array, Arrow, Camera, Line, Picture, Shell, Spot, Stage, Vector
 from rigidsim.look.stages.wheels import with_wheels
-from rigidsim.look.surroundings import has_rotors
+from rigidsim.look.surroundings import carries_within
 
 ENERGY: tuple[int, int, int] = (120, 150, 200)
 _LEADING = ("angular_velocity", "polar_motion", "nutation_angle")
@@ -131,7 +131,7 @@ def build_picture(dataset: xarray.Dataset) -> tuple[Picture, Subject]:
 
 def _any(dataset: xarray.Dataset, subject: Subject) -> Picture:
     """Any scene: the body with its momentum and angular velocity, and its track if it moves far."""
-    arrows, trails, notes = vectors_of(dataset, subject, paths=not has_rotors(dataset))
+    arrows, trails, notes = vectors_of(dataset, subject, paths=not carries_within(dataset))
     if subject.attitude is None:
         notes.append("no attitude was recorded: the body is shown in its own axes and doesn't turn")
     else:

@@ -241,6 +241,14 @@ class FluidCore(Load):
         )
         return f"{said}; {same}"
 
+    def pictured(self) -> dict[str, Any]:
+        return {
+            "what": "core",
+            "axis": [float(plain(x)) for x in self.axis],
+            "moment": float(plain(self.polar)),
+            "flattening": float(plain(self.flattening)),
+        }
+
 
 def _refuse_odd_mantle(core: FluidCore, body: RigidBody, context: Any) -> None:
     """Refuse a core whose rest, the mantle, is no body."""
