@@ -44,6 +44,7 @@ from rigidsim.workflows.sweeps.members import run_members
 NAME = "sweep_coverage"
 _MEMBERS, _SEED = 60, 1
 _CHEAP, _FEW_MEMBERS = ("free, short", "planar", "tops", "driven", "flights"), 8
+_WARM = 16  # members, in batches of up to 8; one alone would leave their compilation to whoever is first
 _GONE = warning_bits(["attitude_uncertain"])
 _MOST_RATIO, _WORST_RATIO, _MOST_CAUTION = 3.0, 10.0, 20.0
 _FEW = 0.01
@@ -81,7 +82,7 @@ def found_of(kind: str, members: int, seed: int) -> list[tuple[str, Found]]:
     silent = Sweep.of(parse(sweep.experiment.text.replace("[output]", "[output]\nestimate = false")))
     seconds = []
     for which in (silent, sweep):
-        run_members(which, everybody[:1], ["final"])  # compiled
+        run_members(which, everybody[:_WARM], ["final"])  # compiled, for whole batches
         before = time.process_time()
         results = run_members(which, everybody, ["final"])
         seconds.append((time.process_time() - before) / members)

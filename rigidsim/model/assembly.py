@@ -35,6 +35,8 @@ def assemble_states(
         vertical=requirements.vertical, flies=flies, loads=list(plan.loads), orbit_tags=plan.orbit_tags,
         surfaces=plan.surfaces, tables=plan.tables, clocked=plan.clocked,
     )  # fmt: skip
+    if m.slip is not None and m.attitude is not None:  # which turns by rates that take the attitude
+        m = replace(m, attitude=formulation.attitude(plan, m.rates, number))
     blocks = formulation.blocks(m, plan)
     if flies:
         blocks.append(_flight_block(m, plan))

@@ -197,7 +197,9 @@ class LinearPotential(Protocol):
 
 @runtime_checkable
 class Reshaping(Protocol):
-    """It changes the body's mass distribution."""
+    """It changes the body's mass distribution; ``changes`` says so, for what can't do with that."""
+
+    changes: str
 
     def shape(self, m: Kinematics) -> MassDistribution: ...
 

@@ -59,7 +59,8 @@ class Lending(Protocol):
     state, and ``supplied_power`` tells only the drive's work on the body.
     """
 
-    lends: bool
+    def lends(self, m: Kinematics) -> bool:
+        """Whether it does."""
 
 
 @runtime_checkable
@@ -77,13 +78,13 @@ def carried_beside(loads: Iterable[Load]) -> str:
     if found is None:
         return ""
     if isinstance(found, Reshaping):
-        return f"{found.title} vary"
+        return found.changes
     return f"{found.title} carries angular momentum beside the body"
 
 
-def lends(carrier: object) -> bool:
+def lends(carrier: object, m: Kinematics) -> bool:
     """Whether it is ``Lending``."""
-    return isinstance(carrier, Lending) and carrier.lends
+    return isinstance(carrier, Lending) and carrier.lends(m)
 
 
 def momentum_terms(carriers: Iterable[Carrier], m: Kinematics) -> list[Term]:

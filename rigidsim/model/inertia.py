@@ -77,11 +77,19 @@ class Inertia:
 class MassDistribution:
     """One that changes: its tensor and dI/dt along the motion, body axes, internal units.
 
-    Both are symmetric; an element that is zero for good is the number 0.
+    Both are symmetric; an element that is zero for good is the number 0. Where the momentum is carried
+    instead of the rates, nobody needs dI/dt: the states are then the rates that a body of the constant tensor
+    would have with the same momentum.
+
+    Attributes:
+        slip: what the angular velocity differs by from these, 1 / time; None where rates are the states.
+        distortion: what the tensor differs by from the constant one; known where something slips.
     """
 
     matrix: SymbolicMatrix
-    change: SymbolicMatrix
+    change: SymbolicMatrix | None
+    slip: list[Symbolic] | None = None
+    distortion: SymbolicMatrix | None = None
 
 
 @dataclass(frozen=True)
@@ -89,7 +97,7 @@ class VaryingInertia(Inertia):
     """That of a ``MassDistribution`` less a constant part, of what turns on bearings."""
 
     matrix: SymbolicMatrix
-    rates: SymbolicMatrix
+    rates: SymbolicMatrix | None
     number: Rounder
 
     @classmethod

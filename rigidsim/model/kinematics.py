@@ -39,7 +39,7 @@ class Kinematics:
     scene: Scene
     scaling: Scaling
     numbers: ScaledNumbers
-    rate_states: list[Symbolic]  # the three states of the rates, each in its own unit
+    rate_states: list[Symbolic]  # the rates, each in its own unit: three states, unless something slips
     attitude: AttitudeStates | None
     vertical: list[Symbolic] | None  # unit vector against gravity, body axes; None where no torque needs it
     position: list[Symbolic] | None  # states in their own units
@@ -69,16 +69,35 @@ class Kinematics:
         return in_common_unit(self.rate_states, self.numbers.rate_units, self.number)
 
     @cached_property
+    def bare_rates(self) -> list[Symbolic]:
+        """The same of a body of the constant tensor with the same angular momentum, where that is carried."""
+        if self.slip is None:
+            return self.rates
+        return in_common_unit(self.carried_rates, self.numbers.rate_units, self.number)
+
+    @property
+    def slip(self) -> list[Symbolic] | None:
+        """See ``MassDistribution``."""
+        return None if self.shape is None else self.shape.slip
+
+    @property
+    def carried_rates(self) -> list[Symbolic]:
+        """The three states of the rates, each in its own unit."""
+        return list(hy.make_vars(*self.body.rates)) if self.slip is not None else self.rate_states
+
+    @cached_property
     def inertia(self) -> Inertia:
-        """Tensor of what turns with the body, by which torques change the rates."""
-        if self.shape is not None:
+        """Tensor of what turns with the body, by which torques change the rates; the constant one where the
+        momentum is carried.
+        """
+        if self.shape is not None and self.shape.slip is None:
             return VaryingInertia.of(self.shape, self.numbers, self.number)
         return ConstantInertia.of(self.numbers, self.number, self.scene.context)
 
     @cached_property
     def own_momentum(self) -> list[Symbolic]:
         """Angular momentum I w of the body itself, body axes."""
-        return self.inertia.times(self.rates)
+        return self.inertia.times(self.bare_rates)
 
     @staticmethod
     def carried(part: T | None) -> T:

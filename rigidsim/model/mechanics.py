@@ -15,9 +15,10 @@ from rigidsim.model.load import Load, Term, force_terms, loads_of, torque_terms
 from rigidsim.model.rotations import Symbolic, apply
 from rigidsim.model.scaling import Rounder, ScaledNumbers, Scaling, exponent
 from rigidsim.model.state_blocks import BODY, AttitudeStates
-from rigidsim.scene.arithmetic import Vector, across, parallel
+from rigidsim.scene.arithmetic import Vector, across, cross, parallel, unit_vectors
 from rigidsim.scene.arithmetic import apply as multiply
 from rigidsim.scene.scene import Scene
+from rigidsim.scene.surfaces import Surfaces
 
 
 @dataclass(frozen=True)
@@ -47,8 +48,27 @@ class Mechanics(Kinematics):
         position = list(hy.make_vars(*BODY.position)) if flies else None
         velocity = list(hy.make_vars(*BODY.velocity)) if flies else None
         made = cls(scene, scaling, numbers, rates, attitude, up, position, velocity, number, **more)
-        reshaping = having(Reshaping, loads_of(scene))
-        return replace(made, shape=reshaping[0].shape(made)) if reshaping else made
+        return made._shaped()
+
+    def _shaped(self) -> Mechanics:
+        reshaping = having(Reshaping, loads_of(self.scene))
+        if not reshaping:
+            return self
+        made = replace(self, shape=reshaping[0].shape(self))
+        if made.slip is None:
+            return made
+        states = zip(made.carried_rates, made.slip, self.numbers.rate_units, strict=True)
+        turning = [w + (x if u == 1 else self.number(1 / u) * x) for w, x, u in states]
+        return replace(made, rate_states=turning)
+
+    @cached_property
+    def observed(self) -> Mechanics:
+        """The same for what is recorded and watched, whose parameters are no sides of surfaces: moments with
+        kinks tell these by the state.
+        """
+        if self.shape is None or not self.surfaces.found:
+            return self
+        return replace(self, surfaces=Surfaces())._shaped()
 
     @property
     def turning_rate(self) -> Any | None:
@@ -108,18 +128,28 @@ class Mechanics(Kinematics):
     @cached_property
     def kept_rotational_energy(self) -> Symbolic:
         """The same without carriers whose energy changes by what their drives do alone."""
-        return self._rotational([x for x in self.carriers if not lends(x)])
+        return self._rotational([x for x in self.carriers if not lends(x, self)])
 
     def _rotational(self, carriers: list[Carrier]) -> Symbolic:
-        own = self.inertia.energy(self.rates, self.own_momentum)
+        own = self.inertia.energy(self.bare_rates, self.own_momentum)
         others = [found for x in carriers if (found := x.carried_energy(self)) is not None]
         return hy.sum([own, *others]) if others else own
 
     @cached_property
     def lent_energy(self) -> Symbolic | None:
-        """Kinetic energy of those carriers; None without any."""
-        found = [x.carried_energy(self) for x in self.carriers if lends(x)]
+        """Energy of those carriers; None without any."""
+        found = [x.carried_energy(self) for x in self.carriers if lends(x, self)]
+        if found and self._rigid is not None and self.potential_energy is not None:
+            found.append(self.potential_energy - self.carried(self._rigid.potential_energy))
         return hy.sum([x for x in found if x is not None]) if found else None
+
+    @cached_property
+    def _rigid(self) -> Mechanics | None:
+        """The same with the constant tensor, where a lending carrier changes it: the energy in fields that
+        the change brings counts as lent.
+        """
+        lending = any(lends(x, self) for x in self.carriers)
+        return replace(self, shape=None) if lending and self.slip is not None else None
 
     @cached_property
     def starting_momentum(self) -> Vector:
@@ -129,6 +159,18 @@ class Mechanics(Kinematics):
             momentum, _ = carrier.carried_at_start(self.scene)
             total = [x + y for x, y in zip(total, momentum, strict=True)]
         return total
+
+    @property
+    def starting_rates(self) -> Vector:
+        """What the states of the rates are at the start (mpf, rad/s)."""
+        if self.slip is None:
+            return self.scene.angular_velocity
+        momentum = multiply(self.scene.turning_inertia, self.scene.angular_velocity)
+        for carrier in self.carriers:
+            if isinstance(carrier, Reshaping):  # which has none of its own
+                own, _ = carrier.carried_at_start(self.scene)
+                momentum = [x + y for x, y in zip(momentum, own, strict=True)]
+        return multiply(self.scene.inverse_inertia, momentum)
 
     @cached_property
     def inner_torque(self) -> list[Term]:
@@ -156,6 +198,15 @@ class Mechanics(Kinematics):
         """The loads but for those that only carry momentum."""
         turning = self.turning
         return [x for x in self.loads if not isinstance(x, Carrier) or x in turning or x.force(self)]
+
+    @cached_property
+    def accelerations(self) -> list[Symbolic]:
+        """Derivatives of the states of the rates, each in its own unit."""
+        torque = [*self.torque, *self.inner_torque]
+        if self.slip is not None:  # M x w is that of the states and this
+            turned = cross(self.own_momentum, self.slip)
+            torque += zip(unit_vectors(self.scene.context), turned, strict=True)
+        return self.inertia.accelerations(self.carried_rates, self.numbers.rate_units, torque)
 
     @cached_property
     def force(self) -> list[Term]:
@@ -227,22 +278,23 @@ class Mechanics(Kinematics):
     @cached_property
     def energy(self) -> Symbolic:
         """Kinetic energy (rotation, and translation if the centre of mass moves) plus potential energy."""
-        return self._with_rotational(self.rotational_energy)
+        return self._with_rotational(self.rotational_energy, self.potential_energy)
 
     @cached_property
     def kept_energy(self) -> Symbolic:
         """The same with ``kept_rotational_energy``."""
-        return self._with_rotational(self.kept_rotational_energy)
+        potential = self.potential_energy if self._rigid is None else self._rigid.potential_energy
+        return self._with_rotational(self.kept_rotational_energy, potential)
 
-    def _with_rotational(self, rotational: Symbolic) -> Symbolic:
+    def _with_rotational(self, rotational: Symbolic, potential: Symbolic | None) -> Symbolic:
         terms = [rotational]
         mass = self.scene.body.mass
         if self.velocity is not None and mass is not None:
             context, scaling = self.scene.context, self.scaling
             half_mass = context.ldexp(mass / 2, 2 * scaling.speed - scaling.energy)
             terms.append(self.number(half_mass) * hy.sum([v * v for v in self.velocity]))
-        if self.potential_energy is not None:
-            terms.append(self.potential_energy)
+        if potential is not None:
+            terms.append(potential)
         return hy.sum(terms)
 
     @property

@@ -37,7 +37,7 @@ from rigidsim.model.own_states import own_units, refuse_odd_states
 from rigidsim.model.scaling import Scaling, amplitude_of, choose_scaling, scaled_numbers
 from rigidsim.model.state_blocks import BODY
 from rigidsim.scene.choices import AUTO, variables_named
-from rigidsim.scene.expressions.tree import states_read
+from rigidsim.scene.expressions.tree import readables, states_read
 from rigidsim.scene.registry import OBSERVABLES
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.surfaces import surfaces_of
@@ -164,10 +164,11 @@ def _choose_requirements(scene: Scene, loads: Sequence[Load]) -> Requirements:
         why["attitude"] = reason + ("; gravity's torque reads it" if torque else "")
         if readers["attitude"] and reason != _read_by(readers["attitude"]):
             why["attitude"] += f"; {_read_by(readers['attitude'])}"
+        why["attitude"] += _names_that_take(scene, "attitude")
     if not scene.free_flight:
         left_out.append(("position and velocity", "[initial] has neither"))
     elif (reason := _flight(scene, record, readers["flight"])) is not None:
-        why["flight"] = reason
+        why["flight"] = reason + _names_that_take(scene, "flight")
     else:
         left_out.append(("position and velocity", "neither recorded nor read by a load"))
     carried = [state.name for state in scene.states]
@@ -191,6 +192,17 @@ def _attitude(scene: Scene, asked: str, record: list[str] | None, readers: list[
 
 def _read_by(readers: list[str]) -> str:
     return f"{', '.join(readers)} reads it"
+
+
+def _names_that_take(scene: Scene, need: str) -> str:
+    """The names in expressions that stand for what takes these states, and where they are read."""
+    found: dict[str, set[str]] = {}
+    for where, expression in scene.formulas():
+        names = {readable.name for readable in readables(expression) if need in readable.states}
+        if names:
+            found.setdefault(where.rsplit(" ", 1)[0], set()).update(names)
+    told = [f"{', '.join(sorted(names))} in {place}" for place, names in found.items()]
+    return f" ({'; '.join(told)})" if told else ""
 
 
 def _flight(scene: Scene, record: list[str] | None, readers: list[str]) -> str | None:

@@ -190,7 +190,7 @@ class System:
 
     @cached_property
     def _recorded(self) -> tuple[list[Recorded], list[Symbolic]]:
-        recorded, outputs = recorded_variables(self.mechanics, self.requirements.record)
+        recorded, outputs = recorded_variables(self.mechanics.observed, self.requirements.record)
         drifts = drift_outputs(self.invariants, self.scene.context, self.number)
         attitude = self.mechanics.attitude
         if attitude is not None and self._chart is not None:
@@ -217,7 +217,7 @@ class System:
     @cached_property
     def invariants(self) -> list[Invariant]:
         """All that is conserved."""
-        return find_invariants(self.mechanics, list(self._joined.norms))
+        return find_invariants(self.mechanics.observed, list(self._joined.norms))
 
     @cached_property
     def crossings(self) -> list[Crossing]:

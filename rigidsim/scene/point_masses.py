@@ -84,6 +84,26 @@ class PointMasses:
             return self.strengths[self.host] / mass
         return context.mpf(GRAVITATIONAL_CONSTANT)
 
+    def relative(self, i: int, j: int, context: Any) -> tuple[Vector, Vector, Vector]:
+        """Place, velocity and acceleration of mass j as seen from mass i, under mutual gravity."""
+
+        def pulled(n: int) -> Vector:
+            found = [context.zero] * 3
+            for other, strength in enumerate(self.strengths):
+                if other != n:
+                    towards = [b - a for a, b in zip(self.positions[n], self.positions[other], strict=True)]
+                    size = strength / norm(context, towards) ** 3
+                    found = [x + size * y for x, y in zip(found, towards, strict=True)]
+            return found
+
+        pairs = (
+            (self.positions[i], self.positions[j]),
+            (self.velocities[i], self.velocities[j]),
+            (pulled(i), pulled(j)),
+        )
+        place, velocity, acceleration = ([b - a for a, b in zip(*pair, strict=True)] for pair in pairs)
+        return place, velocity, acceleration
+
     def encounter(self, context: Any, one: int, other: int) -> tuple[Any, Any]:
         """See ``closest``, for two of the masses."""
         place = [a - b for a, b in zip(self.positions[one], self.positions[other], strict=True)]

@@ -2,10 +2,11 @@
 
 from typing import Any
 
-from rigidsim.model.load import Load
+from rigidsim.model.load import Load, loads_of
 from rigidsim.scene import attitude
 from rigidsim.scene.arithmetic import Vector, working_bits
 from rigidsim.scene.readable import TimeWords
+from rigidsim.scene.registry import OF_BODY
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.schema import Config
 from rigidsim.scene.suspicions import (
@@ -90,6 +91,9 @@ def cautions_of(scene: Scene) -> list[Caution]:
     for number, (fields, load) in enumerate(zip(scene.config.loads, scene.given_loads, strict=True), start=1):
         if isinstance(load, Load):
             found += load.cautions(fields, f"[[loads]] number {number}", scene)
+    for load in loads_of(scene):
+        if isinstance(load, tuple(OF_BODY.values())):
+            found += load.cautions(scene.config.body, "[body]", scene)
     if scene.gravity is not None and not scene.free_flight and scene.torque_arm is None:
         found.append(
             Caution(

@@ -12,6 +12,7 @@ import mpmath
 import numpy as np
 
 from rigidsim.errors import ConfigError, Problem, either
+from rigidsim.model.carriers import carried_beside
 from rigidsim.model.load import Load, own_loads
 from rigidsim.model.model_plan import plan_model
 from rigidsim.model.projected_invariants import conserves, projected_invariants
@@ -146,7 +147,8 @@ def prepare_scene(
         late = False
         holds = scene.config.integrator.hold_invariants is True
         if holds and system.mechanics.shape is not None:
-            what = "given true, but principal_moments vary, which corrections don't know; leave it out"
+            what = f"given true, but {carried_beside(system.mechanics.loads)}, which corrections don't know; "
+            what += "leave it out"
             raise ConfigError(Problem("[integrator] hold_invariants", what))
         if holds or gyroscopic_rate(scene) > _NUTATES * system.rate_bound:
             parts = in_two_parts(precision.number, precision.exact, precision.bits, scene.context)

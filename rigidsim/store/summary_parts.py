@@ -80,6 +80,7 @@ class WarningCode(Enum):
     GRAVITY_UPWARDS = "gravity_upwards"
     NEAR_RESONANCE = "near_resonance"
     MODEL_UNMEASURED = "model_unmeasured"
+    DELAY_TOO_LONG = "delay_too_long"
 
 
 class UnmeasuredCode(Enum):

@@ -20,6 +20,7 @@ LABELS: dict[str, list[str]] = {
     "andoyer_momentum": ["L", "G", "H"],
     "andoyer_angle": ["l", "g", "h"],
     "roll_pitch_yaw_component": ["roll", "pitch", "yaw"],
+    "tensor_component": ["xx", "yy", "zz", "xy", "xz", "yz"],
     "libration_angle": ["in_plane", "out_of_plane"],
 }
 """Coordinates besides time, with their labels."""

@@ -425,3 +425,14 @@ def test_what_makes_no_sense_is_refused(given: str, message: str) -> None:
     with pytest.raises(ConfigError) as caught:
         run_text(config(BODY, START, given, "end = 1\nsamples = 2"))
     assert message in str(caught.value)
+
+
+def test_plan_says_which_names_take_which_states() -> None:
+    """And where they are read; a direction takes the attitude, a distance doesn't."""
+    reading = torque("1e-6*ux_sun", "1e-9*r_sun/(1 m)", "1e-6*uz_sun*wx/(1 s^-1)")
+    given = config(
+        BODY, START, loads(SUN, reading), output='record = ["angular_velocity"]',
+        more='[[events]]\nname = "up"\nexpression = "uy_sun"',
+    )  # fmt: skip
+    why = {row["states"]: row["why"] for row in rigidsim.plan(rigidsim.parse(given)).as_dict()["reasons"]}
+    assert "(ux_sun, uz_sun in [[loads]] number 2; uy_sun in [[events]] number 1)" in why["qw qx qy qz"]

@@ -174,6 +174,13 @@ def test_states_that_make_steps_shorter_hide_no_truncation_of_angles() -> None:
     assert true / 3 <= run.summary["accuracy"]["estimated_attitude_error"] <= 100 * true
 
 
+def test_a_start_that_is_hardly_anything_is_no_size_of_a_state() -> None:
+    """Else the motion couldn't be followed, and no digit would be announced."""
+    given = config(more=state("held", "(wx - held)/10", 1e-40, "rad/s"), time="end = 10\nsamples = 11")
+    found = run_text(given, estimate=True).summary["accuracy"]
+    assert found["estimated_attitude_error"] < 1e-12
+
+
 def test_eighty_bits_agree_with_quadruple_precision() -> None:
     given = config(loads=DAMPER, more=LOOSE, time="end = 20\nsamples = 11")
     one, other = (loaded(run_text(given, f'integrator.precision="{x}"')) for x in ("extended", "quadruple"))

@@ -180,16 +180,15 @@ class Formulation:
 
 
 def rate_block(m: Mechanics, why: str) -> StateBlock:
-    """The body rates, by Euler's equations."""
+    """The body rates, by Euler's equations; where the momentum is carried instead, by M' = M x w + N."""
     context, scaling = m.scene.context, m.scaling
     initial = [
-        context.ldexp(w, scaling.time - e)
-        for w, e in zip(m.scene.angular_velocity, scaling.rates, strict=True)
+        context.ldexp(w, scaling.time - e) for w, e in zip(m.starting_rates, scaling.rates, strict=True)
     ]
     exponents = [e - scaling.time for e in scaling.rates]
-    torque = [*m.torque, *m.inner_torque]
-    turning = m.inertia.accelerations(m.rate_states, m.numbers.rate_units, torque)
-    return StateBlock(BODY.rates, turning, initial, exponents=exponents, why=why)
+    if m.slip is not None:
+        why += "; those of the undistorted body with the angular momentum of this one"
+    return StateBlock(BODY.rates, m.accelerations, initial, exponents=exponents, why=why)
 
 
 REGISTERED: dict[str, type[Formulation]] = {}

@@ -8,6 +8,7 @@ from rigidsim.model.load import Load, Term
 from rigidsim.model.loads import (  # noqa: F401  (each enters its kind; a new load is one line more here)
     applied,
     central_gravity,
+    elasticity,
     fluid_core,
     gravity_field,
     gravity_gradient,

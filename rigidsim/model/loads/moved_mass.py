@@ -56,6 +56,7 @@ class MovedMass(Load):
 
     title = "principal_moments"
     described = "mass that moves in the body"
+    changes = "principal_moments vary"
     conservative = True  # the work of what moves it is told by ``supplied_power``
 
     @classmethod
@@ -161,6 +162,7 @@ class MovedMass(Load):
     def supplied_power(self, m: Kinematics) -> Symbolic | None:
         """-w . I' w / 2, and what potential energies change by."""
         assert m.shape is not None
+        assert m.shape.change is not None
         changes = [m.shape.change[i][i] for i in range(3)]
         terms = [-0.5 * (x * (w * w)) for x, w in zip(changes, m.rates, strict=True) if not absent(x)]
         places = hy.make_vars(*_ELEMENTS)

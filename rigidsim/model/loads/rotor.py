@@ -182,8 +182,7 @@ class Rotor(Load):
 
     # --- energy and torque ----------------------------------------------------------------------------------
 
-    @property
-    def lends(self) -> bool:
+    def lends(self, m: Kinematics) -> bool:
         """See ``carriers.Lending``: J s a . w of a fixed rate, h^2 / 2 J of a driven one."""
         return self.fixed or self.motor is not None
 

@@ -61,7 +61,7 @@ def rotational_scale(m: Mechanics, *, kept: bool = False) -> tuple[Any, str]:
     momentum = apply(scene.turning_inertia, scene.angular_velocity)
     kinetic = dot(scene.angular_velocity, momentum) / 2
     for carrier in m.carriers:
-        if not (kept and lends(carrier)):
+        if not (kept and lends(carrier, m)):
             kinetic += carrier.carried_at_start(scene)[1]
     carried = context.maximum(scene.body.principal_moments) * source_rate(scene) ** 2 / 2
     amplitude = potential_amplitude(scene) + loads_amplitude(scene) + carried + _driven(m)
@@ -218,7 +218,7 @@ def _work(m: Mechanics) -> list[Symbolic]:
     if m.lent_energy is None:
         return [state]
     unit = m.scene.context.ldexp(m.scene.context.one, m.work_unit - m.scaling.energy)
-    lent = [x.carried_at_start(m.scene)[1] for x in m.carriers if lends(x)]
+    lent = [x.carried_at_start(m.scene)[1] for x in m.carriers if lends(x, m)]
     begun = m.scene.context.ldexp(sum(lent, m.scene.context.zero), -m.scaling.energy)
     return [hy.sum([m.number(unit) * state, m.lent_energy, hy.expression(m.number(-begun))])]
 

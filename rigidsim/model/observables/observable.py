@@ -15,7 +15,7 @@ from typing import Any
 import heyoka as hy
 
 from rigidsim.model import fixed_axes
-from rigidsim.model.capabilities import Attracting, Damping, corotating_orbit_of
+from rigidsim.model.capabilities import Attracting, Damping, Reshaping, corotating_orbit_of
 from rigidsim.model.euler_poles import Poles
 from rigidsim.model.first_integrals import goryachev_chaplygin_top, kovalevskaya_top
 from rigidsim.model.frames import (
@@ -55,7 +55,8 @@ class Need:
 
 def work_is_needed(m: Mechanics) -> bool:
     """Whether the loads' power is integrated: energy isn't conserved, and there is no Jacobi constant."""
-    has_jacobi = m.attitude is not None and len(m.loads) == 1 and corotating_orbit_of(m.loads[0]) is not None
+    acting = [load for load in m.loads if m.driven_within or not isinstance(load, Reshaping)]
+    has_jacobi = m.attitude is not None and len(acting) == 1 and corotating_orbit_of(acting[0]) is not None
     return _has_energy(m) and not m.conserves_energy and not has_jacobi and m.power is not None
 
 

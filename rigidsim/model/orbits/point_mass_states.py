@@ -69,6 +69,18 @@ class PointMassStates:
                 terms[n][a].append(x if factor == 1 else self._number(factor) * x)
         return [list(map(hy.sum, three)) for three in terms]
 
+    def relative(self, i: int, j: int) -> tuple[list[Symbolic], list[Symbolic], list[Symbolic]]:
+        """Place, velocity and acceleration of mass j as seen from mass i under the mutual gravity of points,
+        internal units of length and time.
+        """
+        scaling = self._scaling
+        exponent = scaling.speed + scaling.time - scaling.length
+        ratio = self._number(self._context.ldexp(self._context.one, exponent))
+        pulled = self._accelerations(())
+        pairs = (self.velocities[i], self.velocities[j]), (pulled[i], pulled[j])
+        moving = [[ratio * (b - a) for a, b in zip(*pair, strict=True)] for pair in pairs]
+        return self.between(i, j), moving[0], moving[1]
+
     def block(self, pulls: Sequence[Pull] = ()) -> StateBlock:
         """One block with the states of all masses, which feel these pulls of the body's shape."""
         context, scaling, masses = self._context, self._scaling, self.masses

@@ -32,6 +32,7 @@ from typing import Any
 
 import heyoka as hy
 
+from rigidsim.model.orbits.kepler_motion import KeplerParts
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.scaling import Rounder
 from rigidsim.model.state_blocks import StateBlock
@@ -55,6 +56,7 @@ class OrbitStates:
     direction: list[Symbolic]  # unit vector towards the attracting body
     normal: list[Symbolic]  # of the plane; the attracting body moves about it directly
     inverse_distance: Symbolic  # semi-major axis over distance, 1 for a circle
+    parts: KeplerParts | None = None  # of a Kepler orbit, from which its motion follows
 
 
 def orbit_states(
@@ -106,7 +108,10 @@ def orbit_states(
     y = w_s * along + w_c * across
     direction = [n_c * x - n_s * (i_c * y), n_s * x + n_c * (i_c * y), i_s * y]
     normal = [n_s * i_s, -(n_c * i_s), i_c]
-    return OrbitStates(StateBlock(names, derivatives, initial, norms), direction, normal, inverse)
+    eccentricity, root = rounded(number(e)), rounded(number(context.sqrt(1 - e * e)))
+    turns = [(w_c, w_s, uniform(orbit.periapsis_rate)), (n_c, n_s, uniform(orbit.node_rate))]
+    parts = KeplerParts(eccentricity, root, motion, (c, s), inverse, turns[0], turns[1], (i_c, i_s))
+    return OrbitStates(StateBlock(names, derivatives, initial, norms), direction, normal, inverse, parts)
 
 
 # --- tables -------------------------------------------------------------------------------------------------

@@ -11,7 +11,7 @@ import numpy as np
 
 from rigidsim.model.kinematics import Kinematics
 from rigidsim.model.load_words import reach_text
-from rigidsim.model.placements.placement import Circuit, Placement
+from rigidsim.model.placements.placement import Circuit, Placement, SourceMotion
 from rigidsim.model.rotations import Symbolic
 from rigidsim.scene.arithmetic import Vector
 from rigidsim.scene.kernels.ephemeris import Ephemeris
@@ -32,6 +32,7 @@ class PlacedByKernel(Placement):
 
     ephemeris: Ephemeris
     sight: Sight
+    untracked = ""
     moves: ClassVar[bool] = True
     wide = True  # unrolled, the polynomials take several times as long to compile
     without_plane = "positions of a kernel name none"
@@ -79,6 +80,17 @@ class PlacedByKernel(Placement):
         vector = m.carried(m.sky).seen(self.sight)
         inverse = 1.0 / hy.sqrt(hy.sum([x * x for x in vector]))
         return [x * inverse for x in vector], inverse
+
+    def motion(self, m: Kinematics) -> SourceMotion:
+        """The derivatives are those of the series; for what is recorded they have to be states."""
+        sky = m.carried(m.sky)
+        place, velocity, acceleration = (sky.seen(self.sight, order) for order in range(3))
+        return SourceMotion(place, velocity, acceleration, self.seen(m)[1], self.distance(m.scene.context))
+
+    def motion_at_start(self, scene: Scene) -> tuple[Vector, Vector, Vector]:
+        found = (self.ephemeris.place(scene.context, self.sight, scene.start, order) for order in range(3))
+        place, velocity, acceleration = found
+        return place, velocity, acceleration
 
     @property
     def sights(self) -> tuple[tuple[Sight, int], ...]:  # type: ignore[override]

@@ -45,6 +45,19 @@ class Circuit:
     passing_rate: float | None = None
 
 
+@dataclass(frozen=True)
+class SourceMotion:
+    """How a source moves as seen from the body, space axes: in a unit of length (m, mpf), per internal unit
+    of time; ``inverse`` is that unit over the distance.
+    """
+
+    place: list[Symbolic]
+    velocity: list[Symbolic]
+    acceleration: list[Symbolic]
+    inverse: Symbolic
+    unit: Any
+
+
 class Placement(ABC):
     """How a source is placed; vectors in space axes.
 
@@ -60,6 +73,7 @@ class Placement(ABC):
         without_plane: why it has an orbit, but no known plane; empty if it has one.
         seconds_ahead: time of the scene's epoch in the count of its own.
         sights: bodies of a kernel that it is placed by, see ``SceneLoad``.
+        untracked: why velocity and acceleration aren't known; empty if they are, by ``motion``.
         without_elements: why it has no ellipse to average over, and what to do; None if it has one, or rests.
     """
 
@@ -75,6 +89,7 @@ class Placement(ABC):
     plane: OrbitPlane | None = None
     without_plane: str = ""
     seconds_ahead: float = 0.0
+    untracked: str = "only its place is known"
     without_elements: tuple[str, str] | None = None
     sights: tuple[tuple[Sight, int], ...] = ()
 
@@ -97,6 +112,14 @@ class Placement(ABC):
     @abstractmethod
     def circuit(self, context: Any) -> Circuit:
         """How it goes round."""
+
+    def motion(self, m: Kinematics) -> SourceMotion:
+        """Place, velocity and acceleration, where they are known."""
+        raise NotImplementedError
+
+    def motion_at_start(self, scene: Scene) -> tuple[Vector, Vector, Vector]:
+        """The same at the start (mpf, SI)."""
+        raise NotImplementedError
 
     def at(self, context: Any, time: Any) -> Vector | None:
         """Place (mpf, m) at a time of the scene, if it is known without an orbit's elements."""

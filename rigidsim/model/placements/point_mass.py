@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 from rigidsim.model.kinematics import Kinematics
 from rigidsim.model.load_words import reach_text
 from rigidsim.model.orbits.point_mass_states import PointMassPair
-from rigidsim.model.placements.placement import Circuit, Placement
+from rigidsim.model.placements.placement import Circuit, Placement, SourceMotion
 from rigidsim.model.rotations import Symbolic
 from rigidsim.scene.arithmetic import Vector, norm
 from rigidsim.scene.scene import Scene
@@ -21,6 +21,7 @@ class PlacedAsMass(Placement):
     """A point mass that moves under mutual gravity; it is judged by its osculating orbit of the start."""
 
     pair: PointMassPair
+    untracked = ""
     moves: ClassVar[bool] = True
 
     @property
@@ -45,6 +46,18 @@ class PlacedAsMass(Placement):
         inverse = states.inverse_distances[ends]
         unit = m.scene.context.ldexp(self.distance(m.scene.context), -m.scaling.length)
         return [x * inverse for x in place], m.number(unit) * inverse
+
+    def motion(self, m: Kinematics) -> SourceMotion:
+        """Under the mutual gravity of all as points."""
+        found = m.carried(m.point_masses).relative(self.pair.host, self.pair.number)
+        _, inverse = self.seen(m)
+        context, exponent = m.scene.context, m.scaling.length
+        unit = context.ldexp(context.one, exponent)
+        ratio = m.number(unit / self.distance(context))
+        return SourceMotion(*found, ratio * inverse, unit)
+
+    def motion_at_start(self, scene: Scene) -> tuple[Vector, Vector, Vector]:
+        return self.pair.masses.relative(self.pair.host, self.pair.number, scene.context)
 
     def at_start(self, scene: Scene) -> Vector:
         return self.pair.place

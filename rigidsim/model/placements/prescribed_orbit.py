@@ -8,9 +8,12 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
+import heyoka as hy
+
 from rigidsim.model.kinematics import Kinematics
 from rigidsim.model.load_words import orbit_text, reach_text
-from rigidsim.model.placements.placement import Circuit, Placement
+from rigidsim.model.orbits.kepler_motion import KeplerParts
+from rigidsim.model.placements.placement import Circuit, Placement, SourceMotion
 from rigidsim.model.plausibility import about_distance, about_orbit, about_spin, about_strength, attracting
 from rigidsim.model.rotations import Symbolic
 from rigidsim.scene.arithmetic import Vector, across, norm, parallel
@@ -25,6 +28,7 @@ class PlacedAtRest(Placement):
     """A source that never moves."""
 
     position: Vector  # m (mpf)
+    untracked = ""
 
     def distance(self, context: Any) -> Any:
         return norm(context, self.position)
@@ -41,6 +45,14 @@ class PlacedAtRest(Placement):
 
     def at(self, context: Any, time: Any) -> Vector:
         return self.position
+
+    def motion(self, m: Kinematics) -> SourceMotion:
+        context, zero = m.scene.context, [hy.expression(0.0)] * 3
+        place = m.fixed(self._direction(context))
+        return SourceMotion(place, zero, zero, hy.expression(1.0), self.distance(context))
+
+    def motion_at_start(self, scene: Scene) -> tuple[Vector, Vector, Vector]:
+        return self.position, [scene.context.zero] * 3, [scene.context.zero] * 3
 
     def rests(self) -> Vector:
         return self.position
@@ -69,6 +81,7 @@ class PlacedOnOrbit(Placement):
     """A source on a prescribed Kepler orbit."""
 
     orbit: KeplerOrbit
+    untracked = ""
 
     def distance(self, context: Any) -> Any:
         return self.orbit.semi_major_axis
@@ -82,6 +95,16 @@ class PlacedOnOrbit(Placement):
 
     def at_start(self, scene: Scene) -> Vector:
         return self.orbit.place(scene.context, scene.start)
+
+    def motion(self, m: Kinematics) -> SourceMotion:
+        states = m.orbit(self.orbit)
+        assert states.parts is not None
+        return SourceMotion(*states.parts.motions(), states.inverse_distance, self.orbit.semi_major_axis)
+
+    def motion_at_start(self, scene: Scene) -> tuple[Vector, Vector, Vector]:
+        axis, found = self.orbit.semi_major_axis, KeplerParts.at(self.orbit, scene.context, scene.start)
+        place, velocity, acceleration = ([axis * x for x in vector] for vector in found.motions())
+        return place, velocity, acceleration
 
     def circuit(self, context: Any) -> Circuit:
         orbit, e = self.orbit, float(self.orbit.eccentricity)
@@ -111,6 +134,7 @@ class PlacedByTable(Placement):
     """A source on a tabulated orbit."""
 
     table: TabulatedOrbit
+    untracked = "its orbit goes by a table, whose derivatives aren't carried"
 
     def distance(self, context: Any) -> Any:
         return self.table.semi_major_axis

@@ -15,6 +15,7 @@ from rigidsim.scene.fields import (
     Angle,
     ConfigTable,
     Dimensionless,
+    EachOnce,
     EulerSequence,
     Four,
     Kilogram,
@@ -24,6 +25,7 @@ from rigidsim.scene.fields import (
     OneOf,
     PerSecond,
     Rate,
+    Second,
     Triple,
     name_or_vector,
 )
@@ -95,6 +97,23 @@ class Part(Solid):
     """sequence of euler_angles; by default that of [integrator]"""
 
 
+class ElasticityTable(ConfigTable):
+    """How tides and the spin distort the body's tensor of inertia."""
+
+    love_number: Dimensionless = Field(examples=[0.0216])
+    """Love number k2 of degree 2: 0 (rigid) to 1.5 (a homogeneous fluid)"""
+    radius: Metre = Field(examples=["1738 km"])
+    """radius that the Love number refers to"""
+    delay: Second = Field(ZERO, examples=["0.108 day"])
+    """time by which the distortion lags behind its cause; without one nothing is dissipated"""
+    mean_rate: Rate | None = Field(None, examples=["0.2299715 rad/day"])
+    """spin about the figure axis whose distortion is in the body's moments already; by default that of the
+    start
+    """
+    raised_by: EachOnce[StrictStr] | None = Field(None, examples=[["earth"]])
+    """names of the loads whose sources raise tides; by default all gravity gradients; [] for none"""
+
+
 _LANDMARKS = {name for shape in SHAPES.values() for name in shape.landmarks}
 Reference = Annotated[
     Annotated[
@@ -143,6 +162,8 @@ class Body(Solid):
     """name of a published body"""
     core: Core | None = None
     """a fluid core within the body"""
+    elasticity: ElasticityTable | None = Field(None, examples=[{"love_number": 0.0216, "radius": "1738 km"}])
+    """tides and spin distort the tensor of inertia"""
     mass: Kilogram | None = Field(None, examples=[12])
     """mass of the body; required for shapes, and wherever a load or the translational motion uses it"""
     gravity_field: GravityFieldTable | None = Field(

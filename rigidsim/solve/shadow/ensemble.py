@@ -39,6 +39,10 @@ surfaces on which the motion's invariants are constant by half its square, which
 perturbations did.
 """
 _NEAREST = 1e-280
+_NOTHING = 2.0**-96
+"""Initial value, in internal units, that is zero but for the arithmetic of the scene, and no size: a state
+that is measured alone would be lost after its first step.
+"""
 _SHORTEST, _LONGEST = 4, 4096
 """Steps of a stretch. They are counted in steps, among which those of a close passage are many, not in time,
 of which they take little.
@@ -128,7 +132,7 @@ class ShadowEnsemble:
         self._starts, motions = starts, len(starts.begin)
         self._states = np.repeat(starts.states[:, :, None], 1 + PERTURBED, axis=2)
         self._factor = np.full(motions, _FIRST)  # distance for one epsilon
-        self._largest = np.abs(starts.states)
+        self._largest = np.where(np.abs(starts.states) > _NOTHING, np.abs(starts.states), 0.0)
         self._weigh()
         self.time, self._steps = starts.begin.copy(), np.zeros(motions)
         self._ahead, self._cut = np.zeros(motions), np.zeros(motions)

@@ -300,7 +300,7 @@ def _twin_states(twin: System, chart: System) -> list[hy.expression]:
     """States of the twin as expressions of the states of a chart."""
     m = chart.mechanics
     attitude = m.carried(m.attitude)
-    known = dict(zip(chart.states, chart.variables, strict=True))
+    known = dict(zip(BODY.rates, m.rate_states, strict=True))
+    known |= dict(zip(chart.states, chart.variables, strict=True))
     known |= dict(zip(m.carried(twin.mechanics.attitude).names, attitude.quaternion, strict=True))
-    known |= dict(zip(BODY.rates, m.rate_states, strict=True))
     return [known[name] for name in twin.states]

@@ -1,0 +1,348 @@
+"""An elastic body: tides and spin distort its tensor of inertia, with a delay.
+
+The states of the rates are those of the undistorted body with the same momentum, w0 = I^-1 M, so that the
+distorted tensor's rate of change is needed nowhere: M' = M x w + N, w = (I + D)^-1 M; what D is stands in
+``rigidsim.model.distortion``.
+
+Energy of rotation with the elastic one is w . M / 2 + (K/8) F : F, where (K/2) F is D without its constant
+part and K = 2 k R^5/(3 G): the Legendre transform of a linear elastic body. Without delay it is conserved
+with the potential energy wherever a rigid body's energy is. With one, E0 = w0 . M / 2 has the exact
+derivative w . N + (w0 - w) . M', which tells what the distortion takes or gives: the rest is a function of
+the state.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import heyoka as hy
+
+from rigidsim.model.capabilities import (
+    corotating_orbit_of,
+    fixed_source_of,
+    gradient_source_of,
+)
+from rigidsim.model.distortion import Distortion, SeenTide, total
+from rigidsim.model.gradient import GradientSource
+from rigidsim.model.inertia import ConstantInertia, MassDistribution
+from rigidsim.model.kinematics import Kinematics, in_common_unit, inertia_times
+from rigidsim.model.load import Load, Term, loads_of
+from rigidsim.model.load_words import span_words, value_text
+from rigidsim.model.loads.elastic_keys import WHERE, elastic_values, fault, told_elasticity
+from rigidsim.model.mechanics import Mechanics
+from rigidsim.model.rotations import Symbolic, transpose
+from rigidsim.model.rotations import apply as turned
+from rigidsim.model.scaling import Scaling, source_rate
+from rigidsim.model.two_part import rounded
+from rigidsim.scene.arithmetic import Matrix, Vector, apply, dot, norm, working_epsilon
+from rigidsim.scene.attitude import rotation_matrix
+from rigidsim.scene.kernels.kernel import Sight
+from rigidsim.scene.point_masses import GRAVITATIONAL_CONSTANT
+from rigidsim.scene.registry import Surroundings, register_of_body
+from rigidsim.scene.scene import Scene
+from rigidsim.scene.schema import Config
+from rigidsim.scene.tracing.numbers import plain
+from rigidsim.store.summary_parts import Caution, WarningCode
+
+_MOST = 0.1  # of a moment, up to which a linear response makes sense
+_LATE, _TOO_LATE = 0.3, 1.0
+"""Radians by which body and source together may turn within the delay: at the first, what the expansion
+leaves out is some percent of what the delay does, which is told, and at the second about as much.
+"""
+
+
+@register_of_body("elasticity")
+@dataclass(frozen=True)
+class Elasticity(Load):
+    """The distortion; numbers are mpf, SI."""
+
+    love_number: Any
+    radius: Any
+    delay: Any
+    mean_rate: Any | None
+    raising: tuple[int, ...]  # places in [[loads]]
+    sights: tuple[tuple[Sight, int], ...]  # of a kernel, with derivatives
+
+    title = "elasticity"
+    described = "a body that tides and its spin distort"
+    wide = True  # some hundreds of expressions
+    changes = "the moments of an elastic body vary"
+    conservative = True  # its work is told by ``supplied_power``
+
+    @classmethod
+    def brought_by(cls, config: Config) -> bool:
+        return config.body.elasticity is not None
+
+    @classmethod
+    def resolve(cls, fields: Config, around: Surroundings) -> Elasticity:
+        return cls(*elastic_values(fields, around))
+
+    @cached_property
+    def strength(self) -> Any:
+        """k R^5 / G, kg s^2."""
+        return self.love_number * self.radius**5 / self.radius.context.mpf(GRAVITATIONAL_CONSTANT)
+
+    def acts(self) -> bool:
+        return bool(self.love_number != 0)
+
+    @property
+    def reads(self) -> frozenset[str]:  # type: ignore[override]
+        return frozenset({"attitude"} if self.raising else ())
+
+    def sources(self, scene: Scene) -> list[GradientSource]:
+        """The sources that raise tides.
+
+        Raises:
+            ConfigError: a source whose derivatives aren't known.
+        """
+        found = [gradient_source_of(scene.given_loads[n]) for n in self.raising]
+        sources = [source for source in found if source is not None]
+        for source in sources:
+            if why := source.placement.untracked:
+                what = (
+                    f"given a source whose velocity isn't known: {why}; give it an orbit by elements, take "
+                )
+                what += "it from a kernel, make it one of [[bodies]], or name others here"
+                raise fault("raised_by", what)
+        return sources
+
+    # --- the tensor -----------------------------------------------------------------------------------------
+
+    def shape(self, m: Kinematics) -> MassDistribution:
+        """The distorted tensor, internal units."""
+        tensor, slip = self._found(m)
+        rows = zip(m.numbers.inertia, tensor, strict=True)
+        matrix = [
+            [total([rounded(m.number(x)), y]) if x != 0 else y for x, y in zip(*row, strict=True)]
+            for row in rows
+        ]
+        return MassDistribution(matrix, None, slip, tensor)
+
+    def _found(self, m: Kinematics) -> tuple[Matrix, list[Symbolic]]:
+        """D and the slip as expressions of the states, internal units."""
+        scene, scaling = m.scene, m.scaling
+        states = list(hy.make_vars(*m.body.rates))
+        bare = in_common_unit(states, m.numbers.rate_units, m.number)
+        tides = []
+        for load in self.sources(scene):
+            motion = load.placement.motion(m)
+            vectors = motion.place, motion.velocity, motion.acceleration
+            place, velocity, acceleration = (turned(transpose(m.matrix), x) for x in vectors)
+            lift, pull = (rounded(m.number(x)) for x in self._sizes(load, motion.unit, scaling))
+            tides.append(SeenTide(place, velocity, acceleration, motion.inverse, lift, pull))
+        rigid = ConstantInertia.of(m.numbers, m.number, scene.context)
+        *constants, offset = self._constants(scene, scaling.time, scaling.inertia)
+        spin, delay, third = (rounded(m.number(x)) if x != 0 else 0 for x in constants)
+        distortion = Distortion(
+            spin,
+            delay,
+            third,
+            offset=_rounded(m, offset),
+            tensor=_rounded(m, m.numbers.turning_inertia),
+            turning=rigid.times,
+            solved=rigid.solved,
+            massive=lambda x: inertia_times(m, x),
+            iterations=self.iterations(scene),
+        )
+        return distortion.found(bare, tides)
+
+    def _sizes(self, load: GradientSource, unit: Any, scaling: Scaling) -> tuple[Any, Any]:
+        """``SeenTide.lift`` and ``pull``, internal units."""
+        strength = load.gravitational_parameter / unit**3
+        context = unit.context
+        return (
+            context.ldexp(self.strength * strength, -scaling.inertia),
+            context.ldexp(3 * strength, 2 * scaling.time),
+        )
+
+    def _constants(self, scene: Scene, time: int, inertia: int) -> tuple[Any, Any, Any, Matrix]:
+        """First members of ``Distortion``, in units of 2^time s and 2^inertia kg m^2."""
+        context = scene.context
+        spin = context.ldexp(self.strength / 3, -inertia)
+        rate, pole = self.known_rate(scene), scene.figure.pole
+        size = spin * rate * rate
+        third = context.one / 3
+        offset = [
+            [size * ((third if i == j else context.zero) - pole[i] * pole[j]) for j in range(3)]
+            for i in range(3)
+        ]
+        return context.ldexp(spin, -2 * time), context.ldexp(self.delay, -time), third, offset
+
+    def known_rate(self, scene: Scene) -> Any:
+        """Spin whose distortion is in the body's moments already, rad/s."""
+        if self.mean_rate is not None:
+            return self.mean_rate
+        return dot(scene.figure.pole, scene.angular_velocity)
+
+    # --- sizes ----------------------------------------------------------------------------------------------
+
+    def shares(self, scene: Scene) -> tuple[Any, Any]:
+        """Bounds of the distortion, and of what the spin's changes by where the rate does, over the least
+        moment.
+        """
+        context = scene.context
+        least = context.minimum([x for x in scene.body.principal_moments if x > 0])
+        squared = dot(scene.angular_velocity, scene.angular_velocity)
+        spin = self.strength / 3 * (squared + self.known_rate(scene) ** 2) / least
+        tide = context.zero
+        for load in self.sources(scene):
+            nearest = load.placement.nearest(context)
+            tide = tide + self.strength * load.gravitational_parameter / nearest**3 / least
+        return spin + tide, 2 * spin
+
+    def iterations(self, scene: Scene) -> int:
+        """Of the rate without delay, until what is left is less than rounding."""
+        distorted, factor = self.shares(scene)
+        if distorted > _MOST:
+            what = f"given numbers by which the tensor changes by up to {float(plain(distorted)):.3g} of the "
+            what += f"least moment; up to {_MOST:g} is allowed, since the response is linear: check "
+            raise fault("", what + "love_number, radius, and G M and distances of the sources")
+        if (late := self.turned_within(scene)) > _TOO_LATE:
+            what = f"given {span_words(plain(self.delay))}, in which body and source turn by {late:.3g} rad; "
+            what += f"up to {_TOO_LATE:g} is allowed, since what it does is a series in it"
+            raise fault("delay", what)
+        least, count = working_epsilon(scene.context) / 4, 0
+        left = distorted * factor
+        while left > least:
+            left, count = left * factor, count + 1
+        return count
+
+    def turned_within(self, scene: Scene) -> float:
+        """Radians by which the body and the fastest source turn within the delay."""
+        rate = norm(scene.context, scene.angular_velocity)
+        fastest = source_rate(scene) if self.raising else scene.context.zero
+        return float(plain(self.delay * (rate + fastest)))
+
+    def cautions(self, fields: Any, where: str, scene: Scene) -> Iterator[Caution]:
+        turned = self.turned_within(scene)
+        if turned > _LATE:
+            text = f"{WHERE} delay: in {span_words(plain(self.delay))} body and source turn by {turned:.2g} "
+            text += "rad, of which the expansion to second order leaves out some "
+            text += f"{turned**2 / 6:.1%} of what the delay does"
+            yield Caution(WarningCode.DELAY_TOO_LONG, text)
+
+    # --- at the start, in numbers ---------------------------------------------------------------------------
+
+    def begun(self, scene: Scene) -> tuple[Matrix, Vector, Vector]:
+        """D, the momentum and w0 at the start (mpf, SI), where the angular velocity is given."""
+        context = scene.context
+        inside = transpose(rotation_matrix(scene.quaternion))
+        tides = []
+        for load in self.sources(scene):
+            place, velocity, acceleration = (apply(inside, x) for x in load.placement.motion_at_start(scene))
+            strength, inverse = load.gravitational_parameter, 1 / norm(context, place)
+            sizes = self.strength * strength, 3 * strength
+            tides.append(SeenTide(place, velocity, acceleration, inverse, *sizes))
+        turning, inverse_tensor, massive = scene.turning_inertia, scene.inverse_inertia, scene.body.inertia
+        distortion = Distortion(
+            *self._constants(scene, 0, 0),
+            tensor=turning,
+            turning=lambda x: apply(turning, x),
+            solved=lambda x: apply(inverse_tensor, x),
+            massive=lambda x: apply(massive, x),
+            iterations=self.iterations(scene),
+        )
+        rates = scene.angular_velocity
+        bare = list(rates)
+        tensor, _ = distortion.found(bare, tides)
+        for _ in range(self.iterations(scene) + 2):
+            added = apply(inverse_tensor, apply(tensor, rates))
+            bare = [x + y for x, y in zip(rates, added, strict=True)]
+            tensor, _ = distortion.found(bare, tides)
+        return tensor, apply(turning, bare), bare
+
+    # --- as a carrier: of none but of energy ----------------------------------------------------------------
+
+    def carried_momentum(self, m: Kinematics) -> list[Term]:
+        return []
+
+    def exerted_torque(self, m: Kinematics) -> list[Term]:
+        return []
+
+    def carried_at_start(self, scene: Scene) -> tuple[Vector, Any]:
+        """What the momentum exceeds I w by, and the energy beside w0 . M / 2."""
+        tensor, momentum, bare = self.begun(scene)
+        rates = scene.angular_velocity
+        lost = [x - y for x, y in zip(rates, bare, strict=True)]
+        offset = self._constants(scene, 0, 0)[3]
+        bent = [[x - y for x, y in zip(*rows, strict=True)] for rows in zip(tensor, offset, strict=True)]
+        squared = sum((x * x for row in bent for x in row), scene.context.zero)
+        energy = dot(lost, momentum) / 2 + 3 * squared / (4 * self.strength)  # (K/8) F : F
+        for load in loads_of(scene):
+            fixed = fixed_source_of(load, scene) if load.conservative else None
+            if fixed is not None and self._lends(scene):
+                towards = apply(transpose(rotation_matrix(scene.quaternion)), fixed[1])
+                energy = energy + fixed[0] / 2 * dot(towards, apply(tensor, towards))
+        return apply(tensor, rates), energy
+
+    def carried_energy(self, m: Kinematics) -> Symbolic | None:
+        """(w - w0) . M / 2, and the elastic energy."""
+        assert m.shape is not None
+        assert m.slip is not None
+        context, scaling = m.scene.context, m.scaling
+        offset = self._constants(m.scene, scaling.time, scaling.inertia)[3]
+        bent = [
+            total([x, hy.expression(rounded(m.number(-y)))]) if y != 0 else x
+            for rows in zip(m.carried(m.shape.distortion), offset, strict=True)
+            for x, y in zip(*rows, strict=True)
+        ]
+        size = context.ldexp(3 / (4 * self.strength), scaling.inertia + 2 * scaling.time)
+        elastic = rounded(m.number(size)) * hy.sum([x * x for x in bent])
+        lost = [0.5 * x * y for x, y in zip(m.slip, m.own_momentum, strict=True)]
+        return hy.sum([*lost, elastic])
+
+    def lends(self, m: Kinematics) -> bool:
+        """Whether its work is counted: where it dissipates, or its forces have no potential."""
+        return self._lends(m.scene)
+
+    def _lends(self, scene: Scene) -> bool:
+        if self.delay != 0:
+            return True
+        others = [load for load in loads_of(scene) if load is not self]
+        raising = [scene.given_loads[n] for n in self.raising]
+        drawn = [load for load in others if gradient_source_of(load) is not None]
+        if any(all(x is not y for y in raising) for x in drawn):
+            return True  # whose potential the distortion changes without being caused by it
+        alone = len(others) == 1 and corotating_orbit_of(others[0]) is not None
+        return not (alone or all(load.conservative for load in others))
+
+    def supplied_power(self, m: Kinematics) -> Symbolic | None:
+        """(w0 - w) . M', and the torque on the distortion in fields with a potential times w."""
+        if not self.lends(m):
+            return None
+        assert isinstance(m, Mechanics)
+        assert m.slip is not None
+        turning = m.inertia.times(in_common_unit(m.accelerations, m.numbers.rate_units, m.number))
+        terms = [-(x * y) for x, y in zip(m.slip, turning, strict=True)]
+        rigid = replace(m, shape=None)
+        for load in m.loads:
+            if not load.conservative or load is self:
+                continue
+            for sign, each in ((1.0, m), (-1.0, rigid)):
+                for vector, expression in load.torque(each):
+                    pairs = zip(vector, m.rates, strict=True)
+                    along = hy.sum([rounded(m.number(x)) * w for x, w in pairs if x != 0])
+                    terms.append(sign * expression * along)
+        return hy.sum(terms)
+
+    # --- what readers are told ------------------------------------------------------------------------------
+
+    def told(self, scene: Scene) -> str:
+        tensor = self.begun(scene)[0]
+        largest = max(abs(float(plain(x))) for row in tensor for x in row)
+        share = largest / float(plain(max(scene.body.principal_moments)))
+        names = [scene.config.loads[n].name or f"[[loads]] number {n + 1}" for n in self.raising]
+        raised = f"tides of {', '.join(names)} and the spin" if names else "the spin"
+        late = f", {span_words(plain(self.delay))} late" if self.delay != 0 else ", without delay"
+        return told_elasticity(raised + " distort the tensor" + late, self.love_number, self.radius) + (
+            f"; up to {value_text(largest, 'kg m^2')} at the start, {share:.3g} of the largest moment; the "
+            "moments given contain the distortion by a spin of "
+            f"{value_text(plain(self.known_rate(scene)), 'rad/s', 8)}"
+        )
+
+
+def _rounded(m: Kinematics, matrix: Matrix) -> Matrix:
+    return [[rounded(m.number(x)) if x != 0 else 0 for x in row] for row in matrix]
