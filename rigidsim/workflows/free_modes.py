@@ -109,12 +109,15 @@ def _core_modes(scene: Scene, core: FluidCore, spin: Any, moments: Vector) -> An
     return found[1], found[0]
 
 
-def synchronous_modes(scene: Scene) -> list[Known]:
+def synchronous_modes(scene: Scene, node_rate: Any = None) -> list[Known]:
     """Free librations of a body that turns one face to the source of a gravity gradient; none for others.
 
     On a circular orbit, with x towards the source and z along the figure axis, s^2 = -3 n^2 (B - A) / C in
     longitude, and s^4 + n^2 (1 + 3 sx + sx sz) s^2 + 4 n^4 sx sz = 0 for the figure axis with
     sx = (C - A) / B and sz = (C - B) / A (Hughes, Spacecraft Attitude Dynamics, 1986, section 9.2).
+
+    Args:
+        node_rate: of a source that isn't on an orbit of its own, rad/s; None if it isn't known.
     """
     context, body = scene.context, scene.body
     if scene.free_flight:
@@ -141,7 +144,7 @@ def synchronous_modes(scene: Scene) -> list[Known]:
         root = context.sqrt(half**2 - product)
         about = "small librations in step with the orbit"
         precession = n - n * context.sqrt(half + root)
-        node = context.zero if orbit is None else orbit.node_rate
+        node = orbit.node_rate if orbit is not None else node_rate or context.zero
         along = n * context.sqrt(3 * (b - a) / c)
         return [
             Known("longitude", along, _LONGITUDE, f"{about}: n sqrt(3 (B - A) / C)"),

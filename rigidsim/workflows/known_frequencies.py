@@ -12,6 +12,7 @@ from rigidsim.analysis.labels import Known
 from rigidsim.model.capabilities import Beside, GradientAlone, gradient_source_of, orbit_of
 from rigidsim.model.carriers import carried_beside
 from rigidsim.model.load import loads_of
+from rigidsim.model.loads.elasticity import Elasticity
 from rigidsim.model.loads.fluid_core import FluidCore
 from rigidsim.scene.arithmetic import Vector, apply, dot, transpose
 from rigidsim.scene.attitude import rotation_matrix
@@ -46,8 +47,10 @@ def known_frequencies(scene: Scene, *, driven: bool = False) -> list[Known]:
         return [Known(k.name, mpmath.ldexp(k.value, -closed.scaling.time), 0.0, k.source) for k in found]
     found = []
     loads = [load for load in loads_of(scene) if not isinstance(load, Beside)]
-    cored = modes_of_core(scene)
-    if carried_beside([x for x in loads if not (cored and isinstance(x, FluidCore))]):
+    elastic = any(isinstance(load, Elasticity) for load in loads)
+    cored = [] if elastic else modes_of_core(scene)
+    known = (Elasticity, FluidCore) if cored or elastic else ()
+    if carried_beside([load for load in loads if not isinstance(load, known)]):
         return []
     orbits = [orbit for load in loads if (orbit := orbit_of(load)) is not None]
     for number, orbit in enumerate(orbits, 1):
@@ -56,8 +59,12 @@ def known_frequencies(scene: Scene, *, driven: bool = False) -> list[Known]:
     if any(source is not None and source.placement.lunisolar for source in sources):
         found += _delaunay(scene)
     librations = _librations(scene, orbits[0]) if len(orbits) == 1 == len(loads) else []
-    librations = librations or synchronous_modes(scene)
-    return found + (cored + librations if cored else librations or _of_spin(scene))
+    librations = librations or synchronous_modes(
+        scene, next((k.value for k in found if k.name == "Om"), None)
+    )
+    if cored or elastic:  # whose own distortion changes the wobble
+        return found + cored + librations
+    return found + (librations or _of_spin(scene))
 
 
 def _of_motion(motion: Any) -> list[Known]:

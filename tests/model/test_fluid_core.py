@@ -196,6 +196,23 @@ def test_beside_a_rotor_and_in_flight_and_with_moving_mass() -> None:
     assert_sound(moving)
 
 
+def test_within_an_elastic_body() -> None:
+    """Whose tide and delay distort the mantle: the momentum stays, and what friction and delay take is told."""
+    body = "principal_moments = [8e37, 8.05e37, 8.1e37]\n"
+    body += 'elasticity = {love_number = 0.3, radius = "6378 km", raised_by = []}'
+    core = 'core = {moment = 0.1, flattening = 0.003, angular_velocity = ["1e-6 rad/s", 0, "7.29e-5 rad/s"]}'
+    initial = 'angular_velocity = ["2e-6 rad/s", 0, "7.292115e-5 rad/s"]'
+    text = config(f"{body}\n{core}", initial, time='end = "20 day"\nsamples = 21')
+    free = run_text(text)
+    assert physical(free) == {"angular_momentum", "angular_momentum_norm", "energy"}
+    assert_sound(free)
+    late = text.replace("0.003,", '0.003, friction = "1e-3 day^-1",').replace("[]", '[], delay = "20 min"')
+    lossy = run_text(late)
+    assert physical(lossy) == {"angular_momentum", "angular_momentum_norm", "energy_balance"}
+    assert_sound(lossy)
+    assert lossy.dataset["work"].values[-1] < 0
+
+
 # --- closed forms -------------------------------------------------------------------------------------------
 
 
