@@ -197,7 +197,7 @@ def test_beside_a_rotor_and_in_flight_and_with_moving_mass() -> None:
 
 
 def test_within_an_elastic_body() -> None:
-    """Whose tide and delay distort the mantle: the momentum stays, and what friction and delay take is told."""
+    """Spin and delay distort the mantle: the momentum stays, and what friction and delay take is told."""
     body = "principal_moments = [8e37, 8.05e37, 8.1e37]\n"
     body += 'elasticity = {love_number = 0.3, radius = "6378 km", raised_by = []}'
     core = 'core = {moment = 0.1, flattening = 0.003, angular_velocity = ["1e-6 rad/s", 0, "7.29e-5 rad/s"]}'
