@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from experiments.coverage import carried, known
+from experiments.coverage import carried, fields, known
 from experiments.coverage.hyperbolic import HYPERBOLIC, hyperbolic_average
 from experiments.coverage.moments import put_late, spike, switch
 from experiments.random_scenes import KINDS, Draw
@@ -267,6 +267,8 @@ FAMILIES: dict[str, Family] = {
     "names of point masses": Family(known.moving_bodies, (1.0, 2.5), canonical=False),
     "jet damping": Family(known.jet, (1.0, 2.3), canonical=False),
     "fluid core": Family(carried.fluid_core, (1.0, 3.0), canonical=False),
+    "gravity field": Family(fields.gravity_field, (1.0, 3.0)),
+    "gravity field in flight": Family(fields.gravity_field_in_flight, (0.3, 2.0)),
 }
 """By the name under which the table shows them."""
 

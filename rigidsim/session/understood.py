@@ -102,6 +102,10 @@ def cautions_of(scene: Scene) -> list[Caution]:
                 "reference or center_of_mass for a top, or [initial] position for free flight",
             )
         )
+    given = scene.config.body.gravity_field is not None and scene.config.body.preset is None
+    if given and all(getattr(load, "degree", None) is None for load in scene.config.loads):
+        what = "[body] gravity_field has no effect, since no load has degree; give a gravity_gradient or "
+        found.append(Caution(WarningCode.NO_EFFECT, what + "central_gravity the degree that it feels"))
     wasted = _wasted_tolerance(scene)
     if wasted:
         found.append(Caution(WarningCode.NO_EFFECT, wasted))

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import re
+from pathlib import Path
 
 import numpy as np
 import pytest
 from equations import CLOSE, Random, array, derivative, general_body, matrix, prepared
 from field_truth import gradient, keys, lumpy, moments_of, pulled, random_field, tensor_of
-from support import config, run_text
+from killing import killed
+from support import config, run_text, same_bits
 
 import rigidsim
 from rigidsim import ConfigError
+from rigidsim.session.understood import cautions_of
 from rigidsim.solve.problem import prepare
 
 RADIUS, MU, MASS = 0.7, 2.5, 3.25
@@ -135,6 +138,41 @@ def test_energy_and_momentum_are_conserved_in_flight() -> None:
     assert max(drifts(run).values()) < 2e-14
 
 
+def test_point_masses_feel_the_force_of_the_field() -> None:
+    """Two bodies of the same size, one of them lumpy: energy, momentum and angular momentum of both stay."""
+    g = 6.6743e-11
+    masses = "".join(
+        f'[[bodies]]\nname = "{name}"\ngravitational_parameter = {strength}\nposition = {place}\n'
+        f"velocity = {velocity}\n"
+        for name, strength, place, velocity in (
+            ("lumpy", 10 * g, "[2, 0, 0]", "[0, 1.1e-5, 2e-6]"),
+            ("point", 8 * g, "[-0.5, 0.1, 0.2]", "[0, -1.375e-5, -2.5e-6]"),
+        )
+    )
+    start = "angular_velocity = [1e-5, 4e-6, 5e-6]\neuler_angles = [0.3, 0.7, 0.2]"
+    load = 'kind = "gravity_gradient"\norbit = {body = "point"}\ndegree = 4'
+    body = f'{BODY}\nhost = "lumpy"\ncoupling = "full"'
+    text = config(body, start, load, "end = 2e6\nsamples = 21", more=masses)
+    run = run_text(text)
+    found = drifts(run)
+    assert {"system_energy", "system_angular_momentum", "system_linear_momentum"} <= set(found)
+    assert max(found.values()) < 4e-14
+    other = run_text(text.replace("degree = 4", "degree = 2"))
+    assert np.abs(run.dataset.point_mass_position - other.dataset.point_mass_position).max() > 1e-3
+    # the same as flights about the other mass, which flies too
+    apart = masses.split("[[bodies]]")
+    own = apart[1].split("\n", 3)[3]
+    pulled = 'kind = "central_gravity"\norbit = {body = "point"}\ndegree = 4'
+    flying = config(
+        f'{BODY}\ncoupling = "full"', f"{start}\n{own}", pulled, "end = 2e6\nsamples = 21",
+        more="[[bodies]]" + apart[2],
+    )  # fmt: skip
+    flown = run_text(flying)
+    assert max(drifts(flown).values()) < 4e-14
+    place = run.dataset.point_mass_position.sel(point_mass="lumpy").values
+    assert np.abs(flown.dataset.position.values - place).max() < 1e-9
+
+
 @pytest.mark.parametrize("formulation", ["euler_angles", "rotation_matrix", "canonical"])
 def test_all_formulations_agree(formulation: str) -> None:
     text = config(BODY, START, gradient_of(), "end = 20\nsamples = 21", output='record = ["quaternion"]')
@@ -231,3 +269,32 @@ def test_no_average_takes_the_field() -> None:
         ConfigError, match=re.escape("has no average; the gradient alone has one (set degree = 2)")
     ):
         prepare(rigidsim.parse(text, overrides=['model.level="spin_averaged"']))
+
+
+def test_a_field_that_no_load_feels_is_told() -> None:
+    text = config(BODY, START, gradient_of().replace("degree = 4", ""))
+    found = cautions_of(prepare(rigidsim.parse(text)).scene)
+    assert any("gravity_field has no effect" in x.text for x in found)
+    assert not cautions_of(prepare(rigidsim.parse(config(BODY, START, gradient_of(degree=2)))).scene)
+
+
+@pytest.mark.slow
+@pytest.mark.optimised  # as in the process that is killed
+def test_a_killed_run_goes_on_with_the_same_bits(tmp_path: Path) -> None:
+    text = config(BODY, START, gradient_of(), "end = 4e3\nsamples = 401")
+    done = rigidsim.resume(killed("support", text, tmp_path))
+    same_bits(run_text(text), done)
+
+
+@pytest.mark.parametrize("key", ['body.gravity_field.C."3,1"', 'body.gravity_field.S."3,2"'])
+def test_members_of_a_sweep_are_single_runs(key: str, tmp_path: Path) -> None:
+    """In batches, in which coefficients are parameters."""
+    output = 'record = ["quaternion", "angular_velocity"]'
+    text = config(BODY, START, gradient_of(), "end = 20\nsamples = 5", output=output)
+    sweep = f"\n[sweep]\nkeep = [\"series\"]\naxes.'{key}' = {{linspace = [0.001, 0.01, 8]}}\n"
+    swept = rigidsim.sweep(rigidsim.parse(text + sweep), out=tmp_path).dataset
+    for number in (0, 5):
+        value = 0.001 + 0.009 * number / 7
+        single = run_text(text, f"{key}={value!r}").dataset
+        found = swept.quaternion.isel({swept.quaternion.dims[0]: number}).values
+        assert np.abs(found - single.quaternion.values).max() < 1e-12
