@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 
 from rigidsim.look import signals
 from rigidsim.look.figure_names import FIGURES, OVERVIEW, SPECTRUM
-from rigidsim.look.figures import changing, gyrostat, poles, polhode, timelines
+from rigidsim.look.figures import changing, gyrostat, librations, poles, polhode, timelines
 from rigidsim.look.figures.composing import compose, shown_rows
 from rigidsim.look.figures.drift import drift
 from rigidsim.look.figures.panel import Panel
@@ -49,7 +49,7 @@ KINDS: dict[str, Kind] = {
     "obliquity": Kind(_AXIS, [timelines.obliquity, timelines.longitude]),
     "libration": Kind(
         "libration, roll_pitch_yaw or nadir recorded",
-        [timelines.libration, timelines.roll_pitch_yaw],
+        [librations.longitude, librations.latitude, timelines.libration, timelines.roll_pitch_yaw],
         [poles.nadir, poles.phases],
     ),
     "tip": Kind(
@@ -148,7 +148,10 @@ def _of_body(rows: xarray.Dataset) -> tuple[Sequence[Panel], Sequence[Panel]]:
     attitude = [timelines.rates, timelines.attitude]
     tilting = [timelines.obliquity, timelines.longitude]
     if librates(rows):
-        return [timelines.libration, timelines.roll_pitch_yaw], [poles.nadir, *(moving or [poles.phases])]
+        swinging = [timelines.libration, timelines.roll_pitch_yaw]
+        if librations.latitude.shows(rows):  # its figure axis precesses, as the Moon's
+            swinging = [librations.longitude, librations.latitude, timelines.libration]
+        return swinging, [poles.nadir, *(moving or [poles.phases])]
     if signals.is_top(rows):
         turning = timelines.precession if timelines.precession.shows(rows) else timelines.attitude
         return [timelines.tilt, turning], [poles.tip]
