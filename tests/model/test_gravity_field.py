@@ -217,6 +217,22 @@ def test_the_frame_of_a_circular_orbit_serves_the_field_too() -> None:
     assert float((1 - same).max()) < 1e-13
 
 
+def test_the_moons_axis_librates_about_a_direction_an_arcminute_off() -> None:
+    """The torque of degree 3 on a body that looks at its source is balanced by the gradient's at
+
+    (m R^2 / (B - A)) (R / r) (45 S33 - 1.5 S31) / 3,    and librates with n sqrt(3 (B - A) / C) nearly.
+    """
+    path = Path(__file__).parents[2] / "configs" / "moon_mean_axis.toml"
+    scene = prepare(rigidsim.load(path)).scene
+    a, b, _ = (float(x) for x in scene.body.principal_moments)
+    mass, radius, distance = float(scene.body.mass), 1.738e6, 3.844e8
+    off = mass * radius**2 / (b - a) * radius / distance * (45 * -2.485526e-7 - 1.5 * 5.9008e-6) / 3
+    # half a libration later it is as far on the other side
+    text = path.read_text().replace('end = "6 yr"\nevery = "2 day"', 'end = "1.5 yr"\nevery = "2 day"')
+    angles = run_text(text).dataset.libration.values[:, 0]
+    assert angles.min() == pytest.approx(2 * off, rel=5e-3)
+
+
 # --- what is refused ----------------------------------------------------------------------------------------
 
 FIELD = "gravity_field = "
