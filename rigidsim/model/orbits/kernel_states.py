@@ -220,6 +220,7 @@ class BlockPieces:
             for series, carried, _ in self._series
             for order in range(carried + 1)
         }
+        self._rounded_ends = {key: np.array(list(map(float, x))) for key, x in self._ends.items()}
         kind = type(number(context.one))
         self._kind: Any = kind if issubclass(kind, float | np.floating) else None
 
@@ -251,11 +252,12 @@ class BlockPieces:
         return found
 
     def _at_edge(self, series: BlockSeries, row: np.ndarray, order: int) -> Any:
-        """A state's value where a block begins, u = -1, rounded once."""
-        if order == 0 and self._kind in (float, np.float64):
-            return math.ldexp(
-                math.fsum(np.where(np.arange(len(row)) % 2, -row, row).tolist()), -series.exponent
-            )
+        """A state's value where a block begins, u = -1, rounded once; derivatives in double precision are
+        sums of rounded products, since mpf take longer than all steps of a run.
+        """
+        if self._kind in (float, np.float64):
+            rounded_ends = self._rounded_ends[series.terms, order]
+            return math.ldexp(math.fsum((row * rounded_ends).tolist()), -series.exponent)
         weights, context = self._ends[series.terms, order], self._context
         total = sum((context.mpf(float(c)) * w for c, w in zip(row, weights, strict=True)), context.zero)
         return self._number(context.ldexp(total, -series.exponent))
