@@ -80,6 +80,7 @@ DEAR = (  # to compile
     "pointing_law",
     "pointing_with_wheels",
     "skater",
+    "young_moon",
 )
 
 
