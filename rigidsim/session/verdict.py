@@ -54,6 +54,7 @@ LEAST: dict[WarningCode, Soundness] = {
     WarningCode.PERIOD_CONTRADICTS: Soundness.SOUND,
     WarningCode.GRAVITY_UPWARDS: Soundness.SOUND,
     WarningCode.NEAR_RESONANCE: Soundness.SOUND,
+    WarningCode.FRICTION_STIFF: Soundness.SOUND,
 }
 """The best that can be said of a run beside each warning; of a later version's warnings ``LIMITED``."""
 _DEGREES = list(Soundness)

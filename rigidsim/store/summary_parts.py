@@ -81,6 +81,7 @@ class WarningCode(Enum):
     NEAR_RESONANCE = "near_resonance"
     MODEL_UNMEASURED = "model_unmeasured"
     DELAY_TOO_LONG = "delay_too_long"
+    FRICTION_STIFF = "friction_stiff"
 
 
 class UnmeasuredCode(Enum):

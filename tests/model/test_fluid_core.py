@@ -285,6 +285,13 @@ def test_strong_friction_makes_the_body_rigid() -> None:
     np.testing.assert_allclose(np.array(apart[1:]) / apart[:-1], 0.1, rtol=0.02)
 
 
+def test_stiff_friction_is_told_beforehand() -> None:
+    warned = run_text(scene(0.01, Core("0.3", "0.02", "1e3"))).summary["warnings"]
+    assert len(warned) == 1
+    assert "steps are as short as that" in warned[0]
+    assert not run_text(scene(0.01, CORE)).summary["warnings"]
+
+
 def test_without_a_moment_the_body_is_rigid_bit_for_bit() -> None:
     same_bits(run_text(scene(20, None)), run_text(scene(20, Core(0, "0.02", "0.01"))))
 

@@ -17,6 +17,7 @@ in which everything is small where the core follows the body. Other torques act 
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -36,8 +37,11 @@ from rigidsim.scene.registry import Surroundings, register_of_body
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.schema import Config
 from rigidsim.scene.tracing.numbers import plain
+from rigidsim.store.summary_parts import Caution, WarningCode
 
 STATES = ("core_wx", "core_wy", "core_wz")
+_ROUNDING_OF_INPUT = 1e-14  # relative, of moments that a double-precision program printed
+_STIFF = 100.0  # by which friction may be faster than the rotation before it is told
 
 
 @register_of_body("core")
@@ -218,6 +222,20 @@ class FluidCore(Load):
         """
         return self.carried_at_start(scene)[1] / 2
 
+    def cautions(self, fields: Any, where: str, scene: Scene) -> Iterator[Caution]:
+        if self.friction == 0 or not self.acts():
+            return
+        rates = [*scene.angular_velocity, *self.at_start(scene)]
+        fastest = max(abs(plain(x)) for x in rates)
+        damping = plain(self.friction / (self.polar * (1 - self.flattening)))
+        if fastest > 0 and damping > _STIFF * fastest:
+            time, times = value_text(1 / damping, "s"), f"{float(damping / fastest):.2g}"
+            text = (
+                f"[body] core.friction: it takes the core to the mantle's rate in {time}, {times} times as "
+            )
+            text += "fast as anything turns, and steps are as short as that; without a core the motion is "
+            yield Caution(WarningCode.FRICTION_STIFF, text + "nearly the same")
+
     # --- what readers are told ------------------------------------------------------------------------------
 
     def told(self, scene: Scene) -> str:
@@ -266,9 +284,6 @@ def _refuse_odd_mantle(core: FluidCore, body: RigidBody, context: Any) -> None:
         "others); make the core smaller, or flatten it otherwise"
     )
     raise ConfigError(Problem("[body] core", what))
-
-
-_ROUNDING_OF_INPUT = 1e-14
 
 
 def _text(number: Any) -> str:
