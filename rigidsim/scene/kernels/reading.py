@@ -10,6 +10,7 @@ import hashlib
 import importlib
 import importlib.util
 import re
+import struct
 import zipfile
 from fractions import Fraction
 from functools import cached_property, lru_cache
@@ -20,7 +21,7 @@ from typing import Any
 import numpy as np
 
 from rigidsim.scene.kernels.kernel import DAY, J2000_DATE, Kernel, KernelError
-from rigidsim.scene.kernels.series import BlockSeries
+from rigidsim.scene.kernels.series import BlockSeries, joined
 from rigidsim.scene.validation_messages import nearest
 
 _EXTRA = "pip install 'rigidsim[ephemeris]'"
@@ -34,6 +35,10 @@ _BARYCENTER = "earth_moon_barycenter"
 _FRAME = 1  # of SPICE: J2000, which DE kernels since DE403 identify with the ICRF
 _TYPES = (2, 3)
 _LARGEST_CACHED = 4
+_RECORD = 1024  # bytes, of SPK files
+_IDENTIFIERS = (b"DAF/SPK", b"NAIF/DAF")  # of SPK files today, and before 1997
+_UNREADABLE = (OSError, EOFError, ValueError, TypeError, LookupError, ArithmeticError, AssertionError, struct.error)
+"""What jplephem comes upon in files that aren't what they should be."""
 
 
 def _jplephem(part: str) -> ModuleType:
@@ -90,6 +95,7 @@ class PackagedKernel(Kernel):
                 span = (self._end - self._begin) * DAY
                 if given.ndim != 3 or given.shape[1] != 3 or given.dtype != np.float64 or not len(given):
                     raise ValueError(f"an array of {given.dtype} {given.shape}")
+                joined(given)
             except (OSError, ValueError, EOFError) as error:
                 remedy = f"install {self.name} again"
                 raise KernelError(_damaged(f"jpl-{file}.npy", error, remedy)) from None
@@ -149,12 +155,22 @@ class SpkKernel(Kernel):
     def __init__(self, path: Path) -> None:
         self.name, self._path = path.name, path
         spk = _jplephem("spk")
+        file = path.open("rb")
         try:
-            self._file = spk.SPK.open(str(path))
-        except (OSError, ValueError, EOFError, IndexError) as error:
-            what = f"which is no SPK file ({_words(error)}); a file .bsp of SPICE is allowed"
+            daf = spk.DAF(file)
+            if daf.locidw not in _IDENTIFIERS:
+                raise ValueError(f"it begins with {daf.locidw.decode('ascii', 'replace')}")
+            most = path.stat().st_size // _RECORD
+            if any(number > most for number, _ in enumerate(daf.summary_records())):
+                raise ValueError("its list of segments has no end")
+            self._file = spk.SPK(daf)
+        except _UNREADABLE as error:
+            file.close()
+            what = f"which is no SPK file, or a damaged one ({_words(error)}); a file .bsp of SPICE is allowed"
             raise KernelError(what) from None
-        last = max((segment.end_i for segment in self._file.segments), default=0)
+        if not self._file.segments:
+            raise KernelError("which has no segments; an SPK file with positions of bodies is allowed")
+        last = max(segment.end_i for segment in self._file.segments)
         size = path.stat().st_size
         if 8 * last > size:
             what = f"which is truncated: it has {size} bytes, and its segments go on to {8 * last}"
@@ -244,11 +260,15 @@ class SpkKernel(Kernel):
         try:
             begin, length, _, count = self._file.daf.read_array(segment.end_i - 3, segment.end_i)
             coefficients = segment.load_array()[2]
-        except (OSError, ValueError, IndexError) as error:
+            covered = segment.start_second, segment.end_second
+            if not (length > 0 and begin <= covered[0] < covered[1] <= begin + count * length):
+                raise ValueError("its blocks don't cover its span")
+            blocks = np.moveaxis(coefficients[:3], 0, 1)
+            if len(blocks) != count:
+                raise ValueError("blocks are missing")
+            joined(blocks)
+        except _UNREADABLE as error:
             raise KernelError(_damaged(f'segment of "{label}"', error, "copy it again")) from None
-        blocks = np.moveaxis(coefficients[:3], 0, 1)
-        if not np.isfinite(blocks).all() or not length > 0 or len(blocks) != int(count):
-            raise KernelError(f'whose segment of "{label}" is damaged; copy it again')
         return Fraction(float(begin)), Fraction(float(length)), blocks
 
     def strength(self, body: str) -> None:

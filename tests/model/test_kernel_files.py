@@ -1,0 +1,127 @@
+"""SPK files: read as they are written, and refused where they are cut, swapped or damaged."""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from spk_files import FIRST, write_kernel
+from support import run_text
+
+import rigidsim
+from rigidsim.scene.kernels.kernel import KernelError
+from rigidsim.scene.kernels.reading import SpkKernel
+
+SCENE = """
+name = "moon"
+[body]
+principal_moments = ["0.999369252102309314", "0.999596982633729229", 1]
+host = "moon"
+[initial]
+euler_angles = [0.005, 0.38, 1.29]
+angular_velocity = [1e-8, -2e-8, 2.6617e-6]
+[ephemeris]
+kernel = "{kernel}"
+[[loads]]
+kind = "gravity_gradient"
+source = "earth"
+gravitational_parameter = 398600436233339.6
+[[loads]]
+kind = "gravity_gradient"
+source = "sun"
+gravitational_parameter = 1.3271244004127942e20
+[time]
+epoch = "1969-06-28T00:00:00 TDB"
+end = "40 day"
+every = "1 day"
+"""
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> bytes:
+    path = tmp_path_factory.mktemp("kernel") / "moon.bsp"
+    write_kernel(path)
+    return path.read_bytes()
+
+
+def test_a_file_by_hand_places_bodies_as_the_package_does(tmp_path: Path, whole: bytes) -> None:
+    """The file has the Moon about the barycentre with the Earth, the package about the Earth."""
+    path = tmp_path / "moon.bsp"
+    path.write_bytes(whole)
+    found = run_text(SCENE.format(kernel=path)).dataset
+    package = run_text(SCENE.format(kernel="de421")).dataset
+    for source in ("earth", "sun"):
+        one, other = (x["source_position"].sel(source=source).values for x in (found, package))
+        size = np.linalg.norm(one, axis=1)
+        # the file's own factors of the Moon's place are rounded
+        assert (np.linalg.norm(one - other, axis=1) / size).max() < 1e-15
+    np.testing.assert_allclose(found["quaternion"].values, package["quaternion"].values, atol=1e-13)
+    assert found.attrs["ephemeris_kernel"] == "moon.bsp"
+    assert found.attrs["ephemeris_span"] == "1969-05-27 to 1970-02-07 TDB"
+
+
+def flipped(at: int, bit: int = 0x40) -> Callable[[bytes], bytes]:
+    """One bit of a byte, counted from the end where negative, is another."""
+
+    def changed(given: bytes) -> bytes:
+        data = bytearray(given)
+        data[at] ^= bit
+        return bytes(data)
+
+    return changed
+
+
+DAMAGE: dict[str, tuple[Callable[[bytes], bytes], str]] = {
+    "cut": (lambda x: x[:20_000], "which is truncated: it has 20000 bytes, and its segments go on to 54912"),
+    "cut by a number": (lambda x: x[:-8], "which is truncated: it has 54904 bytes"),
+    "cut after the first record": (lambda x: x[:1024], "which is no SPK file, or a damaged one"),
+    "cut in the first record": (lambda x: x[:500], "which is no SPK file, or a damaged one"),
+    "empty": (lambda _: b"", "which is no SPK file, or a damaged one (file starts with b''"),
+    "text": (lambda _: b"name = 1\n", "which is no SPK file"),
+    "of attitudes": (lambda x: b"DAF/CK  " + x[8:], "it begins with DAF/CK); a file .bsp of SPICE is allowed"),
+    "list without an end": (lambda x: x[:1024] + np.float64(2).tobytes() + x[1032:], "has no end"),
+    "no segments": (lambda x: x[:1040] + np.float64(0).tobytes() + x[1048:], "which has no segments"),
+    "byte of a coefficient": (flipped(20_006), "doesn't begin where block"),
+    "not a number": (lambda x: x[:20_000] + np.float64("nan").tobytes() + x[20_008:], "aren't finite"),
+    "other span": (flipped(-26), "is damaged or truncated (its blocks don't cover its span); copy it again"),
+}
+
+
+@pytest.mark.parametrize("name", DAMAGE)
+def test_damage_is_told_beforehand(name: str, tmp_path: Path, whole: bytes) -> None:
+    change, words = DAMAGE[name]
+    path = tmp_path / "moon.bsp"
+    path.write_bytes(change(whole))
+    with pytest.raises(rigidsim.ConfigError) as caught:
+        rigidsim.plan(rigidsim.parse(SCENE.format(kernel=path)))
+    assert words in str(caught.value)
+    assert "[ephemeris] kernel: given " in str(caught.value)
+
+
+def test_no_flipped_bit_of_the_directory_and_no_cut_ends_in_a_traceback(tmp_path: Path, whole: bytes) -> None:
+    """Either the file is refused, or what changed was no part of what is read."""
+    draw, path = random.Random(3), tmp_path / "moon.bsp"
+    refused = 0
+    for number in range(150):
+        changed = flipped(draw.randrange(3072), 1 << draw.randrange(8))(whole)
+        path.write_bytes(changed if number % 3 else whole[: draw.randrange(len(whole))])
+        try:
+            kernel = SpkKernel(path)
+            for body in ("sun", "earth"):
+                if kernel.known(body) and kernel.known("moon"):
+                    kernel.sight(body, "moon")
+        except KernelError:
+            refused += 1
+    assert refused >= 50
+
+
+def test_a_run_beyond_the_file_is_refused_with_both_spans(tmp_path: Path, whole: bytes) -> None:
+    path = tmp_path / "moon.bsp"
+    path.write_bytes(whole)
+    assert FIRST == 2440368.5  # 1969-05-27
+    with pytest.raises(rigidsim.ConfigError) as caught:
+        run_text(SCENE.format(kernel=path), 'time.end="300 day"')
+    assert 'has "earth" from 1969-05-27 to 1970-02-07 (TDB), but the run goes from 1969-06-28' in str(caught.value)
