@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from experiments.coverage import carried, fields, known
+from experiments.coverage import carried, fields, known, real_bodies
 from experiments.coverage.hyperbolic import HYPERBOLIC, hyperbolic_average
 from experiments.coverage.moments import put_late, spike, switch
 from experiments.random_scenes import KINDS, Draw
@@ -269,6 +269,8 @@ FAMILIES: dict[str, Family] = {
     "fluid core": Family(carried.fluid_core, (1.0, 3.0), canonical=False),
     "gravity field": Family(fields.gravity_field, (1.0, 3.0)),
     "gravity field in flight": Family(fields.gravity_field_in_flight, (0.3, 2.0)),
+    "bodies of a kernel": Family(real_bodies.kernel, (1.0, 2.0), epochs=(1950, 2100), canonical=False),
+    "elastic body": Family(real_bodies.elastic, (1.0, 3.0), canonical=False),
 }
 """By the name under which the table shows them."""
 
