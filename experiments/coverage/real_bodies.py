@@ -28,7 +28,9 @@ def kernel(draw: Draw) -> None:
     for body, distance in _DISTANCES[host].items():
         if body != "sun" or host in ("mars", "mercury") or draw.sometimes(0.6):
             strength = (draw.decades(-1.5, -0.3) / draw.time) ** 2 * distance**3
-            draw.load("gravity_gradient", f'source = "{body}"', f"gravitational_parameter = {float(strength)!r}")
+            draw.load(
+                "gravity_gradient", f'source = "{body}"', f"gravitational_parameter = {float(strength)!r}"
+            )
 
 
 def elastic(draw: Draw) -> None:

@@ -37,7 +37,9 @@ _TYPES = (2, 3)
 _LARGEST_CACHED = 4
 _RECORD = 1024  # bytes, of SPK files
 _IDENTIFIERS = (b"DAF/SPK", b"NAIF/DAF")  # of SPK files today, and before 1997
-_UNREADABLE = (OSError, EOFError, ValueError, TypeError, LookupError, ArithmeticError, AssertionError, struct.error)
+_UNREADABLE = (
+    OSError, EOFError, ValueError, TypeError, LookupError, ArithmeticError, AssertionError, struct.error,
+)  # fmt: skip
 """What jplephem comes upon in files that aren't what they should be."""
 
 
@@ -166,7 +168,8 @@ class SpkKernel(Kernel):
             self._file = spk.SPK(daf)
         except _UNREADABLE as error:
             file.close()
-            what = f"which is no SPK file, or a damaged one ({_words(error)}); a file .bsp of SPICE is allowed"
+            what = f"which is no SPK file, or a damaged one ({_words(error)}); "
+            what += "a file .bsp of SPICE is allowed"
             raise KernelError(what) from None
         if not self._file.segments:
             raise KernelError("which has no segments; an SPK file with positions of bodies is allowed")
