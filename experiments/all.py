@@ -45,6 +45,7 @@ STUDIES = (
     "damped_averages",
     "earth_obliquity",
     "rigid_earth",
+    "real_moon",
 )
 
 

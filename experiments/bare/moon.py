@@ -98,10 +98,14 @@ class Moon:
         earth, parameter = mechanics.to_body(q, places["earth"]), self.kernel.parameters["earth"]
         if self.field:
             found = total(found, mechanics.field_torque(parameter, earth, self.radius, self.field))
-        if "figure" not in self.without:
-            axis, c = mechanics.to_body(q, pole), self.constants
-            found = total(found, mechanics.figure_torque(parameter, earth, tensor, c["J2E"], c["RE"], axis))
-        return found
+        return total(found, self.figure_torque(q, earth, tensor, pole))
+
+    def figure_torque(self, q: Any, earth: Any, tensor: Any, pole: Any) -> list:
+        """Of the Earth's oblateness."""
+        if "figure" in self.without:
+            return [0.0, 0.0, 0.0]
+        c, parameter, axis = self.constants, self.kernel.parameters["earth"], mechanics.to_body(q, pole)
+        return mechanics.figure_torque(parameter, earth, tensor, c["J2E"], c["RE"], axis)
 
     def distortion(self, q: Any, w: Any, acceleration: Any, delayed: Any) -> list[list]:
         """What tide and spin added a delay ago; the Earth's place is that of then, all else of now."""
@@ -140,7 +144,7 @@ class Moon:
         for name in self.sources:
             seen = mechanics.to_body(q, places[name])
             torque = total(torque, mechanics.gradient_torque(self.kernel.parameters[name], seen, change))
-        return w, torque
+        return w, total(torque, self.figure_torque(q, mechanics.to_body(q, places["earth"]), change, pole))
 
     def parameters(self, count: int) -> tuple[np.ndarray, dict[str, tuple[int, int]]]:
         """Rows of parameters, one a block, and each polynomial's first column and number of terms."""

@@ -9,6 +9,7 @@ from collections.abc import Mapping
 from fractions import Fraction
 from typing import Any
 
+from rigidsim.scene.bodies.presets import PRESETS
 from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.schema import Config, config_model
 
@@ -32,7 +33,16 @@ def editor_schema(model: type[Config] | None = None) -> dict[str, Any]:
     items = made["$defs"]["Output"]["properties"]["record"]["anyOf"][0]["items"]
     strictly = {"properties": {"record": {"items": items["anyOf"][0]}}}
     without = {"if": {"not": {"required": ["states"]}}, "then": {"properties": {"output": strictly}}}
+    for name in _brought(made):  # a preset may have the rest of their keys
+        made["$defs"][name].pop("required", None)
     return {"$schema": DRAFT, **_table(made), **without, "title": "rigidsim config"}
+
+
+def _brought(made: Mapping[str, Any]) -> set[str]:
+    """Names of the tables of ``[body]`` that presets bring."""
+    keys = made["$defs"]["Body"]["properties"]
+    kinds = [kind for preset in PRESETS.values() for name in preset.tables for kind in keys[name]["anyOf"]]
+    return {kind["$ref"].rsplit("/", 1)[1] for kind in kinds if "$ref" in kind}
 
 
 def _table(node: Mapping[str, Any]) -> dict[str, Any]:

@@ -43,6 +43,7 @@ SLOW = {  # about how many seconds they take
     "hyperion": 40,
     "luni_solar_precession": 15,
     "precession_and_nutation": 40,
+    "real_moon": 250,
     "rigid_earth": 60,
     "round_off_ensemble": 25,
     "satellite_stability": 15,

@@ -11,6 +11,7 @@ import mpmath
 import numpy as np
 import pytest
 
+from experiments.bare import blocks
 from experiments.closed_forms import free_top
 from experiments.toutatis import MOMENTS, PUBLISHED, RATES
 from rigidsim import parse
@@ -175,3 +176,27 @@ def test_the_rigid_earth_is_flattened_and_triaxial_as_published() -> None:
         turned = complex(cosine, -sine) * np.exp(1j * m * math.radians(-14.929376301576161))
         assert float(earth.gravity.coefficients[3, m, False]) == pytest.approx(turned.real, rel=1e-12)
         assert float(earth.gravity.coefficients[3, m, True]) == pytest.approx(-turned.imag, rel=1e-12)
+
+
+def test_the_moon_of_de421_has_the_packages_constants() -> None:
+    constants = blocks.Kernel(pytest.importorskip("de421").__name__).constants
+    moon = body("moon_de421")
+    a, b, c = moon.principal_moments
+    scale = moon.mass * 1738000**2
+    assert float((c - a) / b) == pytest.approx(constants["LBET"], rel=1e-15)
+    assert float((b - a) / c) == pytest.approx(constants["LGAM"], rel=1e-15)
+    assert float((c - (a + b) / 2) / scale) == pytest.approx(constants["J2M"], rel=1e-14)
+    cube = constants["AU"] ** 3 * 1e9 / 86400**2
+    strength = constants["GMB"] * cube / (1 + constants["EMRAT"])
+    assert float(moon.mass) * 6.67430e-11 == pytest.approx(strength, rel=1e-14)
+    for (n, m, sine), value in moon.gravity.coefficients.items():
+        name = f"{'S' if sine else 'C'}{n}{m}M" if m else f"J{n}M"
+        assert float(value) == (constants[name] if m else -constants[name])
+    assert len(moon.gravity.coefficients) == 16
+    tables = PRESETS["moon_de421"].tables
+    assert float(tables["elasticity"]["love_number"]) == constants["K2M"]
+    assert float(tables["elasticity"]["delay"].split()[0]) == constants["TAUM"]
+    named = {"moment": "IFAC", "flattening": "COBLAT", "friction": "KVC"}
+    assert {key: float(tables["core"][key].split()[0]) for key in named} == {
+        key: constants[name] for key, name in named.items()
+    }

@@ -152,6 +152,55 @@ PRESETS: dict[str, Preset] = {
 }
 
 PRESETS |= {
+    "moon_de421": Preset(
+        # A/C, B/C as above with beta = LBET = 0.0006310022025364629 and gamma = LGAM = 0.0002277305314199142;
+        # C/(M R^2) = 2 (1 + beta) J2/(2 beta - gamma + beta gamma) with J2 = J2M = 0.0002032732576370724
+        ratios=("0.99936925210230931440", "0.99959698263372922860", "1"),
+        largest_moment="0.39326772667542688771",
+        radius="1738 km",
+        mass="7.3457891857239608769e22",  # GMB AU^3/(1 + EMRAT) = 4902.8000762277432081 km^3/s^2
+        semi_axes=("1737400", "1737400", "1737400"),
+        source="constants of JPL's DE421: Folkner, Williams & Boggs 2008, JPL IOM 343R-08-003; "
+        "radius of pictures, rotation: Archinal et al. 2018, Celest. Mech. Dyn. Astr. 130, 22",
+        rotation=("0", "0", "13.17635815 deg/day"),
+        drawn_as="moon",
+        tables={
+            "gravity_field": {
+                "radius": "1738 km",
+                "C": {
+                    "3,0": "-8.404701525941e-6",
+                    "3,1": "2.8452435e-5",
+                    "3,2": "4.84638724000903e-6",
+                    "3,3": "1.674047530039142e-6",
+                    "4,0": "9.642286e-6",
+                    "4,1": "-5.692687e-6",
+                    "4,2": "-1.5862e-6",
+                    "4,3": "-8.12041e-8",
+                    "4,4": "-1.273941e-7",
+                },
+                "S": {
+                    "3,1": "5.9008e-6",
+                    "3,2": "1.6841984741476e-6",
+                    "3,3": "-2.485526e-7",
+                    "4,1": "1.574393e-6",
+                    "4,2": "-1.517312e-6",
+                    "4,3": "-8.027907000000001e-7",
+                    "4,4": "8.31475e-8",
+                },
+            },
+            "elasticity": {
+                "love_number": "0.02163368386360741",
+                "delay": "0.1078586819856588 day",
+                "radius": "1738 km",
+                "mean_rate": "0.2299715 rad/day",
+            },
+            "core": {
+                "moment": "0.0007",
+                "flattening": "0.0003797712936914387",
+                "friction": "1.493760249305661e-8 day^-1",
+            },
+        },
+    ),
     "earth_rigid": Preset(
         # C/(M R^2) = J2/H with H = (C - (A + B)/2)/C = 0.0032737548 and J2 = 0.001082625305 of DE421;
         # B - A = 4 sqrt(C22^2 + S22^2) M R^2 with C22 = 1.5745e-6, S22 = -9.0387e-7
