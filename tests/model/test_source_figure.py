@@ -129,7 +129,7 @@ def test_the_earths_pole_is_that_of_iau_1976_and_the_largest_nutation(axes: str)
     m = prepare(rigidsim.parse(text)).system.mechanics
     function = hy.cfunc(earth_pole(m, parse_epoch("J2000"), axes), [], compact_mode=True)
     arcsec = np.pi / 180 / 3600
-    for day in (-18000.0, -5000.0, 123.0, 9000.0):
+    for day in (-36000.0, -18000.0, -5000.0, 123.0, 9000.0):
         centuries = day / 36525
         node = (450160.280 - 6962890.539 * centuries + 7.455 * centuries**2) * arcsec
         longitude = -(17.1996 + 0.01742 * centuries) * np.sin(node) * arcsec
@@ -145,7 +145,7 @@ def test_the_earths_pole_is_that_of_iau_1976_and_the_largest_nutation(axes: str)
             expected, full = turn @ expected, turn @ full
         unit = float(m.scene.context.ldexp(m.scene.context.one, m.scaling.time))
         found = np.asarray(function([], time=day * 86400 / unit))
-        assert np.abs(found - expected).max() < 2e-9
+        assert np.abs(found - expected).max() < 0.02 * arcsec
         assert np.linalg.norm(found - full) < 1.5 * arcsec
 
 
