@@ -600,11 +600,11 @@ def candidates(system: Any, states: np.ndarray, times: np.ndarray) -> dict[str, 
     for load in scene.loads:
         name = type(load).__name__
         if name == "GravityGradient" and load.orbit is None:
-            place = np.array(load.position, dtype=float)
+            place = np.array(load.placement.rests(), dtype=float)
             sources += 3 * np.outer(place, place) / np.linalg.norm(place) ** 5
         if name == "GravityGradient":
             if load.orbit is None:
-                place = np.tile(np.array(load.position, dtype=float), (len(times), 1))
+                place = np.tile(np.array(load.placement.rests(), dtype=float), (len(times), 1))
             else:
                 given = {k: float(getattr(load.orbit, k)) for k in ORBIT_KEYS[:-1]}
                 given["period"] = 2 * np.pi / float(load.orbit.mean_motion)
