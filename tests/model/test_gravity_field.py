@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+import math
 import re
+from functools import lru_cache
 from pathlib import Path
 
+import heyoka as hy
 import numpy as np
 import pytest
+import xarray
 from equations import CLOSE, Random, array, derivative, general_body, matrix, prepared
 from field_truth import gradient, keys, lumpy, moments_of, pulled, random_field, tensor_of
+from gyrostats import BITS, exact
 from killing import killed
 from support import config, run_text, same_bits
 
@@ -22,6 +27,11 @@ LUMPS = (
     'gravity_field = {radius = 0.5, C = {"3,0" = -0.02, "3,1" = 0.013, "3,3" = 0.004, "4,0" = 0.008, '
     '"4,2" = -0.003, "4,4" = 1e-4}, S = {"3,1" = 5.9e-3, "3,2" = -2e-3, "4,1" = 3e-3, "4,3" = 1e-3}}'
 )
+LUMPY = {
+    (3, 0): ("-0.02", "0"), (3, 1): ("0.013", "5.9e-3"), (3, 2): ("0", "-2e-3"), (3, 3): ("0.004", "0"),
+    (4, 0): ("0.008", "0"), (4, 1): ("0", "3e-3"), (4, 2): ("-0.003", "0"), (4, 3): ("0", "1e-3"),
+    (4, 4): ("1e-4", "0"),
+}  # fmt: skip
 BODY = f"principal_moments = [1, 1.2, 1.5]\nmass = 10\n{LUMPS}"
 START = "angular_velocity = [0.1, 0.4, 0.5]\neuler_angles = [0.3, 0.7, 0.2]"
 ORBIT = "orbit = {semi_major_axis = 2, eccentricity = 0.2, inclination = 0.3}"
@@ -108,6 +118,12 @@ def test_degrees_converge_to_a_body_of_point_masses() -> None:
     assert np.all(np.diff(np.log(torques)) < 0.3)
 
 
+def whole(data: xarray.Dataset, name: str) -> np.ndarray:
+    """A variable with what doubles leave out of it."""
+    total = data[name].values.astype(np.longdouble)
+    return total + data[f"{name}_lo"].values if f"{name}_lo" in data else total
+
+
 def drifts(run: rigidsim.Run) -> dict[str, float]:
     """Largest relative drifts of the invariants."""
     return {name: row["largest_drift"] for name, row in run.summary["invariants"].items()}
@@ -171,6 +187,86 @@ def test_point_masses_feel_the_force_of_the_field() -> None:
     assert max(drifts(flown).values()) < 4e-14
     place = run.dataset.point_mass_position.sel(point_mass="lumpy").values
     assert np.abs(flown.dataset.position.values - place).max() < 1e-9
+
+
+@lru_cache
+def by_momentum(spin: tuple[str, ...], end: float) -> tuple[np.ndarray, np.ndarray]:
+    """Rotation matrix and rates after ``end`` seconds in 113 bits, from equations of their own: the momentum
+    in body axes, the matrix, and the torque c x dU/dc of the potential written out (Rodrigues' formula).
+    """
+    moments, e, distance, strength, mass, radius = ("1", "1.2", "1.5"), "0.2", "20", "20", "10", "0.5"
+    number = exact
+    big = list(hy.make_vars("l0", "l1", "l2"))
+    r = [list(hy.make_vars(*(f"r{i}{j}" for j in range(3)))) for i in range(3)]
+    anomaly = hy.make_vars("anomaly")
+    motion = (number(strength) / number(distance) ** 3) ** number("0.5")
+    far = number(distance) * (1.0 - number(e) * hy.cos(anomaly))
+    plane = [
+        number(distance) * (hy.cos(anomaly) - number(e)),
+        number(distance) * (1.0 - number(e) * number(e)) ** number("0.5") * hy.sin(anomaly),
+    ]
+    c = [(r[0][k] * plane[0] + r[1][k] * plane[1]) / far for k in range(3)]
+    x, y, z = seen = list(hy.make_vars("x", "y", "z"))
+    potential = sum(number(i) * a * a for i, a in zip(moments, seen, strict=True)) * (
+        3.0 * number(strength) / (2.0 * far**3)
+    )
+    for (n, m), (cosine, sine) in LUMPY.items():
+        turns = [hy.expression(1.0), hy.expression(0.0)]  # (x + i y)^m
+        for _ in range(m):
+            turns = [turns[0] * x - turns[1] * y, turns[0] * y + turns[1] * x]
+        zonal = hy.expression(0.0)
+        for k in range((n - m) // 2 + 1):
+            top = (-1) ** k * math.factorial(2 * n - 2 * k)
+            below = math.factorial(k) * math.factorial(n - k) * math.factorial(n - 2 * k - m) * 2**n
+            zonal += number(str(top)) / number(str(below)) * math.prod([z] * (n - 2 * k - m))
+        both = number(cosine) * turns[0] + number(sine) * turns[1]
+        size = number(strength) * number(mass) * number(radius) ** n
+        potential -= size * both * zonal / far ** (n + 1.0)
+    slope = [hy.subs(hy.diff(potential, v), dict(zip(seen, c, strict=True))) for v in seen]
+    w = [a / number(i) for a, i in zip(big, moments, strict=True)]
+    turned = ((0, 1, 2), (1, 2, 0), (2, 0, 1))
+    system = [
+        (big[i], big[j] * w[k] - big[k] * w[j] + c[j] * slope[k] - c[k] * slope[j]) for i, j, k in turned
+    ]
+    system += [(row[i], row[j] * w[k] - row[k] * w[j]) for row in r for i, j, k in turned]
+    system.append((anomaly, motion / (1.0 - number(e) * hy.cos(anomaly))))
+    start = [number(i) * number(a) for i, a in zip(moments, spin, strict=True)]
+    start += [number(str(float(i == j))) for i in range(3) for j in range(3)] + [number("0")]
+    engine = hy.taylor_adaptive(system, start, fp_type=hy.real, prec=BITS, compact_mode=True)
+    engine.propagate_until(number(str(end)))
+    found = np.array([np.longdouble(str(v)) for v in engine.state[:12]])
+    return found[3:].reshape(3, 3), found[:3] / np.array([np.longdouble(i) for i in moments])
+
+
+@pytest.mark.parametrize(
+    ("precision", "end", "least"),
+    [
+        ("double", 50.0, 1e-13),
+        pytest.param("double", 1000.0, 1e-12, marks=pytest.mark.slow),
+        pytest.param("extended", 1000.0, 1e-15, marks=pytest.mark.slow),
+    ],
+)
+def test_motions_are_those_of_equations_of_their_own(precision: str, end: float, least: float) -> None:
+    text = config(
+        BODY,
+        "angular_velocity = [0.1, 0.2, 1.0]",
+        gradient_of("orbit = {semi_major_axis = 20, eccentricity = 0.2}", strength=20.0),
+        f"end = {end}\nsamples = 2",
+        f'precision = "{precision}"\nformulation = "rotation_matrix"',
+        'record = ["quaternion", "angular_velocity"]',
+    )
+    matrices, rates = by_momentum(("0.1", "0.2", "1.0"), end)
+    data = run_text(text).dataset
+    w, x, y, z = whole(data, "quaternion")[-1]
+    found = np.array(
+        [
+            [w * w + x * x - y * y - z * z, 2 * (x * y - w * z), 2 * (x * z + w * y)],
+            [2 * (x * y + w * z), w * w - x * x + y * y - z * z, 2 * (y * z - w * x)],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), w * w - x * x - y * y + z * z],
+        ]
+    )
+    assert np.abs(found - matrices).max() < least
+    assert np.abs(whole(data, "angular_velocity")[-1] - rates).max() < least
 
 
 @pytest.mark.parametrize("formulation", ["euler_angles", "rotation_matrix", "canonical"])
