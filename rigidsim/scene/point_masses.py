@@ -4,7 +4,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from pydantic import Field, StrictStr
+from pydantic import Field, StrictBool, StrictStr
 
 from rigidsim.errors import ConfigError, Problem
 from rigidsim.scene.arithmetic import Vector, cross, eccentric_anomaly, norm
@@ -19,6 +19,8 @@ from rigidsim.scene.fields import (
     Triple,
     VariableName,
 )
+from rigidsim.scene.kernels.ephemeris import Ephemeris
+from rigidsim.scene.kernels.series import exactly
 from rigidsim.scene.validation_messages import nearest, shown
 
 GRAVITATIONAL_CONSTANT = "6.67430e-11"
@@ -55,8 +57,12 @@ class PointMassBody(ConfigTable):
 
     name: VariableName = Field(examples=["sun"])
     """letters, digits and underscores, beginning with a letter"""
-    gravitational_parameter: GravitationalParameter = Field(examples=["1.32712440018e20 m^3/s^2"])
-    """G M"""
+    gravitational_parameter: GravitationalParameter | None = Field(
+        None, examples=["1.32712440018e20 m^3/s^2"]
+    )
+    """G M; with ephemeris = true a package's own by default"""
+    ephemeris: StrictBool = False
+    """start where the [ephemeris] kernel has a body of this name, from the solar system's barycentre"""
     position: Triple[Metre] | None = None
     """position at the start, space axes"""
     velocity: Triple[Speed] | None = None
@@ -140,6 +146,7 @@ def resolve_point_masses(
     context: Any,
     *,
     free_flight: bool,
+    ephemeris: Ephemeris | None = None,
 ) -> PointMasses | None:
     """Initial states of ``[[bodies]]``; None without any. ``mass`` (kg) is the rigid body's."""
     if not tables:
@@ -151,7 +158,7 @@ def resolve_point_masses(
     names = [table.name for table in tables]
     at_host = _host(host, names, free_flight)
     full = coupling == "full"
-    strengths = [table.gravitational_parameter.at(context) for table in tables]
+    strengths = [_strength(number, table, context, ephemeris) for number, table in enumerate(tables)]
     for number, strength in enumerate(strengths):
         if not strength > 0:
             what = f"given {context.nstr(strength, 8)}; a positive number is allowed"
@@ -165,18 +172,45 @@ def resolve_point_masses(
             what = f"given {context.nstr(mass, 6)} kg, but the gravitational parameter of its host "
             what += f'"{names[at_host]}" makes it {context.nstr(expected, 6)} kg; correct one of them'
             raise ConfigError(Problem("[body] mass", what))
-    places: dict[int, tuple[Vector, Vector]] = {}
+    places = {n: _of_kernel(n, x, context, ephemeris) for n, x in enumerate(tables) if x.ephemeris}
     for number in range(len(tables)):
         _place(number, tables, names, strengths, context, places, ())
     positions = [places[n][0] for n in range(len(tables))]
     velocities = [places[n][1] for n in range(len(tables))]
-    if all(table.position is None and table.velocity is None for table in tables):
+    if all(table.position is None and table.velocity is None and not table.ephemeris for table in tables):
         positions, velocities = (_about_barycentre(x, strengths) for x in (positions, velocities))
     for i in range(len(tables)):
         for j in range(i):
             if positions[i] == positions[j]:
                 raise _fault(i, "position", f'the same as that of "{names[j]}"; start it elsewhere')
     return PointMasses(tuple(names), strengths, tuple(positions), tuple(velocities), at_host, full)
+
+
+def _strength(number: int, table: PointMassBody, context: Any, ephemeris: Ephemeris | None) -> Any:
+    if table.gravitational_parameter is not None:
+        return table.gravitational_parameter.at(context)
+    found = None
+    if table.ephemeris and ephemeris is not None:
+        ephemeris.check_body(table.name, lambda what: _fault(number, "name", what))
+        found = ephemeris.kernel.strength(table.name)
+    if found is None and table.ephemeris and ephemeris is not None:
+        raise _fault(number, "gravitational_parameter", f"missing; {ephemeris.kernel.name} has none: give it")
+    if found is None and not table.ephemeris:
+        raise _fault(number, "gravitational_parameter", "missing; it is needed")
+    return context.one if found is None else exactly(context, found)
+
+
+def _of_kernel(
+    number: int, table: PointMassBody, context: Any, ephemeris: Ephemeris | None
+) -> tuple[Vector, Vector]:
+    """Where the kernel has a body at the start, and its velocity, from the barycentre."""
+    for key in ("position", "velocity", "orbit"):
+        if getattr(table, key) is not None:
+            raise _fault(number, key, "given beside ephemeris = true, which says it; remove one of them")
+    if ephemeris is None:
+        raise _fault(number, "ephemeris", "given true, but there is no [ephemeris]; add one with a kernel")
+    sight, start = ephemeris.sight(table.name, ""), ephemeris.run[0]
+    return ephemeris.place(context, sight, start), ephemeris.place(context, sight, start, 1)
 
 
 def _host(host: str | None, names: Sequence[str], free_flight: bool) -> int | None:

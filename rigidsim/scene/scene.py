@@ -168,7 +168,7 @@ def build_scene(experiment: Experiment, context: Any = None) -> Scene:
         host = host_of(ephemeris, table.host, [one.name for one in config.bodies])
         masses = resolve_point_masses(
             config.bodies, None if host else table.host, table.coupling, body.mass, context,
-            free_flight=free_flight,
+            free_flight=free_flight, ephemeris=ephemeris,
         )  # fmt: skip
         names = names_of(config)
         given, tabled = _resolve_loads(
@@ -180,7 +180,8 @@ def build_scene(experiment: Experiment, context: Any = None) -> Scene:
             span=(start, end), names=names, body=body, ephemeris=ephemeris, host=host,
         )  # fmt: skip
         brought = [kind.resolve(config, around) for kind in OF_BODY.values() if kind.brought_by(config)]
-        axes = config.frame.axes or _first(given, "axes")
+        known = ephemeris.axes if ephemeris is not None else _first(given, "axes")
+        axes = config.frame.axes or known
         dated = replace(around, axes=axes, epoch=config.time.epoch or _first(given, "epoch"))
         brought += companions(given, config.loads, dated)
         resolved = [*given, *(load for found in tabled.values() for load in found), *brought]
@@ -225,7 +226,7 @@ def build_scene(experiment: Experiment, context: Any = None) -> Scene:
             start=start,
             end=end,
             samples=samples,
-            axes=config.frame.axes or _first(resolved, "axes"),
+            axes=axes or _first(resolved, "axes"),
             epoch=config.time.epoch or _first(resolved, "epoch"),
             figure=figure_of(config.frame, body, context),
             reference=reference_normal(config.frame, context),

@@ -275,10 +275,9 @@ def root_attributes(
 
 def kernel_attributes(scene: Scene) -> dict[str, Any]:
     """What tells the kernel of a scene: name, span of what was read of it, and SHA-256; empty without one."""
-    sights = sights_of(scene)
-    if scene.ephemeris is None or not sights:
+    if scene.ephemeris is None or not scene.ephemeris.used:
         return {}
-    first, last = zip(*(sight.span for sight in sights), strict=True)
+    first, last = zip(*(sight.span for sight in scene.ephemeris.used), strict=True)
     span = f"{date_of(max(first))} to {date_of(min(last))} TDB"
     kernel = scene.ephemeris.kernel
     return {"ephemeris_kernel": kernel.name, "ephemeris_span": span, "ephemeris_sha256": kernel.digest}

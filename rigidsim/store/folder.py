@@ -13,6 +13,7 @@ from typing import ClassVar
 
 from rigidsim.errors import FORCE, OUT, RESUME, RunFolderError, StoppedWritingError, once_mended
 from rigidsim.look.figure_names import FIGURES
+from rigidsim.scene.kernels.finding import NOTE
 from rigidsim.store import atomic, provenance, segments
 from rigidsim.store.summary import Brief, read_summary
 from rigidsim.store.summary_parts import SummaryPart
@@ -152,11 +153,13 @@ class RunFolder(WorkFolder):
         """Default file of ``rigidsim plot --what`` for a figure of that name."""
         return self.path / f"figure_{what}.png"
 
-    def begin(self, config: str, *, force: bool) -> None:
-        """Make the folder ready for a new run: write its config and mark it as under way."""
+    def begin(self, config: str, *, force: bool, kernel: Path | None = None) -> None:
+        """Make the folder ready for a new run: write its config and its kernel's place; it is under way."""
         self.create(force=force)
         try:
             atomic.write_bytes(self.config, config.encode())
+            if kernel is not None:
+                atomic.write_bytes(self.path / NOTE, f"{kernel}\n".encode())
             self.segments.mkdir()
         except OSError as error:
             raise self.unwritable(error) from None
@@ -165,7 +168,7 @@ class RunFolder(WorkFolder):
         """Create the folder, or clear it of an earlier run."""
         files = [self.config, self.dataset, self.timeline, self.summary, self.checkpoint, self.figure]
         files += [self.figure_of(name) for name in FIGURES]
-        files += [self.analysis, self.spectrum]
+        files += [self.analysis, self.spectrum, self.path / NOTE]
         folders = [self.segments, self.set_aside]
         try:
             present = self.content([path.name for path in files + folders])

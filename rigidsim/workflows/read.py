@@ -13,9 +13,12 @@ import rigidsim.model.starts
 import rigidsim.solve.equilibria  # noqa: F401  (each enters what it defines into a registry of rigidsim.scene)
 from rigidsim.errors import ConfigError, Problem, RunFolderError
 from rigidsim.scene.config import Experiment, load, parse
+from rigidsim.scene.kernels.finding import EMBEDDED, FOLDERS
 from rigidsim.scene.registry import OBSERVABLES
+from rigidsim.scene.scene import build_scene
 from rigidsim.scene.schema import config_model
 from rigidsim.scene.validation_messages import shown
+from rigidsim.session.dataset import kernel_attributes
 from rigidsim.store.netcdf import check_version, root_attributes
 from rigidsim.store.provenance import read_attributes
 
@@ -46,7 +49,7 @@ def embedded(dataset: Path, *, overrides: Sequence[str] = ()) -> Experiment:
     text, given, settings = (found.get(name) for name in ("config", "config_given", "config_set"))
     if not (isinstance(text, str) and isinstance(given, str) and isinstance(settings, str)):
         raise RunFolderError(f"{dataset}: embeds no config; it is no dataset of rigidsim")
-    experiment = parse(text, source=f"{dataset} (embedded config)", overrides=overrides)
+    experiment = parse(text, source=f"{dataset}{EMBEDDED}", overrides=overrides)
     return replace(experiment, given=given, settings=(*settings.splitlines(), *experiment.settings))
 
 
@@ -61,6 +64,25 @@ def as_begun(experiment: Experiment, saved: Path) -> Experiment:
     names = [name for name in recorded.split() if name in known]
     config = experiment.config.model_copy(update={"output": output.model_copy(update={"record": names})})
     return replace(experiment, config=config)
+
+
+def refuse_other_kernel(experiment: Experiment, saved: Path) -> None:
+    """Refuse to go on from a file with another kernel than the one that it was begun with.
+
+    Raises:
+        RunFolderError: its bytes differ.
+        ConfigError: it is missing, or can't be read.
+    """
+    begun = read_attributes(saved)
+    if experiment.config.ephemeris is None or begun.ephemeris_sha256 is None:
+        return
+    now = kernel_attributes(build_scene(experiment)).get("ephemeris_sha256")
+    if now != begun.ephemeris_sha256:
+        what = (
+            f'{saved}: begun with a kernel "{begun.ephemeris_kernel}" of SHA-256 {begun.ephemeris_sha256}, '
+        )
+        what += f"but the one found is of {now}; put the former in its place, or name its folder in the "
+        raise RunFolderError(f"{what}environment variable {FOLDERS}, and remove the other")
 
 
 def text_difference(one: str, other: str) -> str:

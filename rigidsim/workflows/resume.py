@@ -30,7 +30,7 @@ from rigidsim.store.seal import check_seal
 from rigidsim.store.segments import Chain, read_chain
 from rigidsim.store.summary import Summary
 from rigidsim.store.summary_parts import Caution, WarningCode
-from rigidsim.workflows.read import as_begun, embedded, text_difference
+from rigidsim.workflows.read import as_begun, embedded, refuse_other_kernel, text_difference
 from rigidsim.workflows.run import certified
 
 _ROWS_AT_ONCE = 65536
@@ -92,6 +92,7 @@ def resume(
         chain = _of_finished(folder) if finished else read_chain(folder.segments)
         if chain.paths:
             experiment = as_begun(_continued(experiment, chain.paths[-1]), chain.paths[0])
+            refuse_other_kernel(experiment, chain.paths[-1])
         prepared = prepare(experiment, loads=loads)
         if chain.paths:
             session.mixed = _compared(prepared, chain)

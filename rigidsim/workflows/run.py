@@ -149,7 +149,8 @@ def _place(
     folder = RunFolder(Path(out) / prepared.scene.name)
     refuse_too_large(prepared, folder.path)
     with folder.locked():
-        folder.begin(config, force=force)
+        ephemeris = prepared.scene.ephemeris
+        folder.begin(config, force=force, kernel=None if ephemeris is None else ephemeris.kernel.place)
         yield folder
 
 

@@ -22,7 +22,7 @@ from rigidsim.store.run import Run, open_run
 from rigidsim.store.seal import check_seal
 from rigidsim.store.summary import Brief, Summary
 from rigidsim.store.summary_parts import Claim
-from rigidsim.workflows.read import as_begun, embedded, text_difference
+from rigidsim.workflows.read import as_begun, embedded, refuse_other_kernel, text_difference
 from rigidsim.workflows.run import run
 
 _ROWS_AT_ONCE = 65536
@@ -86,6 +86,7 @@ def verify(path: str | Path, *, observer: Observer | None = None) -> Verdict:
             f"{dataset}: the run had loads from Python ({saved.python_loads}), which its config lacks"
         )
     experiment = as_begun(embedded(dataset), dataset)
+    refuse_other_kernel(experiment, dataset)
     with _scratch() as scratch:
         quiet = experiment.config.output.model_copy(update={"timeline": False})
         unguarded = type(experiment.config.limits).model_construct()

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from pydantic import Field
+from pydantic import Field, StrictStr
 
 from rigidsim.errors import ConfigError, Problem
 from rigidsim.model.gradient import tidal_range
@@ -14,7 +14,14 @@ from rigidsim.model.kinematics import Kinematics
 from rigidsim.model.load import Load, Term
 from rigidsim.model.load_words import length_text, reach_text, source_text, span_words, value_text
 from rigidsim.model.loads.gravity_field import AttractingFields
-from rigidsim.model.loads.point_attraction import MovingAttractor, PointAttraction, positive_strength
+from rigidsim.model.loads.kernel_attractor import KernelAttractor
+from rigidsim.model.loads.point_attraction import (
+    MovingAttractor,
+    PointAttraction,
+    check_flies,
+    kernel_strength,
+    positive_strength,
+)
 from rigidsim.model.plausibility import about_start, about_strength, attracting
 from rigidsim.model.rotations import Symbolic
 from rigidsim.scene.arithmetic import Vector, cross, norm, unit_vectors
@@ -33,6 +40,12 @@ class CentralGravityFields(AttractingFields):
     kind: Literal["central_gravity"]
     gravitational_parameter: GravitationalParameter | None = Field(
         default=None, description="G M of the attracting point", examples=["3.986004418e14 m^3/s^2"]
+    )
+    source: StrictStr | None = Field(
+        default=None,
+        description="the attracting body of the [ephemeris] kernel, instead of position; a package gives its "
+        "gravitational_parameter",
+        examples=["moon"],
     )
     orbit: Orbit | None = Field(
         default=None,
@@ -75,10 +88,17 @@ class CentralGravity(PointAttraction):
             if fields.orbit.body is None:
                 raise around.fault("orbit", "given without body; the name of one of [[bodies]] is allowed")
             number = attracting_body(fields.orbit, around)
-            for key in ("gravitational_parameter", "position"):
+            for key in ("gravitational_parameter", "position", "source"):
                 if key in fields.model_fields_set:
                     raise around.fault(key, "given beside orbit.body, which says it; remove it")
             return MovingAttractor(around.carried_bodies, number)
+        if fields.source is not None:
+            if "position" in fields.model_fields_set:
+                raise around.fault("position", "given beside source, which says it; remove it")
+            strength = kernel_strength(fields.gravitational_parameter, fields.source, around)
+            if fields.source == around.host:  # the origin of the space axes
+                return cls(strength, [around.context.zero] * 3)
+            return KernelAttractor.of(fields.source, strength, around)
         strength = positive_strength(fields.gravitational_parameter, around)
         return cls(strength, [x.at(around.context) for x in fields.position])
 
@@ -88,11 +108,8 @@ class CentralGravity(PointAttraction):
         return {"what": "attractor", "gravitational_parameter": strength, "position": place}
 
     def check(self, number: int, position: Vector | None) -> None:
+        check_flies(number, position)
         where = f"[[loads]] number {number + 1} kind"
-        if position is None:
-            what = 'given "central_gravity" for a body without a position; give [initial] position and '
-            what += 'velocity, or use "gravity_gradient" for a prescribed orbit'
-            raise ConfigError(Problem(where, what))
         if position == self.position:
             raise ConfigError(Problem(where, "the body starts at the attracting point; start it elsewhere"))
 
@@ -172,7 +189,8 @@ class CentralGravity(PointAttraction):
 
     def cautions(self, fields: CentralGravityFields, where: str, scene: Scene) -> Iterator[Caution]:
         given = fields.gravitational_parameter
-        assert given is not None
+        if given is None:  # a kernel's
+            return
         offset, distance, _ = self._start(scene)
         yield from about_strength(given, float(distance), where)
         yield from about_start(scene, attracting(given, float(distance)), offset, scene.velocity or [])

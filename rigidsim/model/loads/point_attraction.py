@@ -22,6 +22,7 @@ from rigidsim.model.load import Load, Term
 from rigidsim.model.load_words import reach_text, source_text, value_text
 from rigidsim.model.orbit_planes import OrbitPlane
 from rigidsim.model.orbits.point_mass_states import PointMassPair
+from rigidsim.model.placements.kernel_body import kernel_body
 from rigidsim.model.placements.point_mass import PlacedAsMass
 from rigidsim.model.plausibility import about_start, about_strength, attracting
 from rigidsim.model.rotations import Symbolic, apply, length, transpose, unit
@@ -117,14 +118,22 @@ def positive_strength(given: Any, around: Surroundings) -> Any:
 
 def kernel_strength(given: Any, source: str, around: Surroundings) -> Any:
     """The gravitational parameter (mpf, m^3/s^2) of a body of the kernel: as given, or the kernel's own."""
+    ephemeris = kernel_body(source, around)
     if given is not None:
         return positive_strength(given, around)
-    assert around.ephemeris is not None
-    found = around.ephemeris.kernel.strength(source)
+    found = ephemeris.kernel.strength(source)
     if found is None:
-        what = f'missing; {around.ephemeris.kernel.name} has none of "{source}"'
+        what = f'missing; {ephemeris.kernel.name} has none of "{source}"'
         raise around.fault("gravitational_parameter", f"{what}: give it, in m^3/s^2 or km^3/s^2")
     return exactly(around.context, found)
+
+
+def check_flies(number: int, position: Vector | None) -> None:
+    """Refuse a point that attracts a body without a position; ``number`` is the load's, from 0."""
+    if position is None:
+        what = 'given "central_gravity" for a body without a position; give [initial] position and '
+        what += 'velocity, or use "gravity_gradient" for a prescribed orbit'
+        raise ConfigError(Problem(f"[[loads]] number {number + 1} kind", what))
 
 
 _UNROLLED = 2
@@ -241,7 +250,8 @@ class MovingSource(PointAttraction):
 
     def cautions(self, fields: Any, where: str, scene: Scene) -> Iterator[Caution]:
         given, distance = self._given(scene)
-        yield from about_strength(given, distance, f"[[bodies]] number {self.number + 1}")
+        if given is not None:  # rather than a kernel's
+            yield from about_strength(given, distance, f"[[bodies]] number {self.number + 1}")
 
     def _given(self, scene: Scene) -> tuple[Any, float]:
         """The strength as it was given, and the distance at the start, m."""
@@ -290,7 +300,9 @@ class MovingAttractor(MovingSource):
 
     def cautions(self, fields: Any, where: str, scene: Scene) -> Iterator[Caution]:
         yield from super().cautions(fields, where, scene)
-        yield from about_start(scene, attracting(*self._given(scene)), *self.start(scene))
+        given, distance = self._given(scene)
+        if given is not None:
+            yield from about_start(scene, attracting(given, distance), *self.start(scene))
 
 
 @dataclass(frozen=True)

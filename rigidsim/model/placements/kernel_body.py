@@ -40,16 +40,15 @@ class PlacedByKernel(Placement):
     @classmethod
     def of(cls, source: str, around: Surroundings) -> PlacedByKernel:
         """The body that the key ``source`` of a load names."""
-        ephemeris = around.ephemeris
-        if ephemeris is None:
-            what = f'given "{source}", but there is no [ephemeris]; add one with a kernel'
-            raise around.fault("source", what)
-        ephemeris.check_body(source, lambda what: around.fault("source", what))
+        ephemeris = kernel_body(source, around)
         if not around.host:
-            what = (
-                f'given "{source}", but nothing says from which body of the kernel it is seen; name that in '
-            )
-            raise around.fault("source", what + '[body] host, such as "moon"')
+            what = "nothing says from which body of the kernel it is seen; name that in "
+            what += '[body] host, such as "moon"'
+            if around.bodies is not None and around.bodies.host is not None:
+                own = around.bodies.names[around.bodies.host]
+                what = f'the body is "{own}", which is one of [[bodies]] and moves by itself; give orbit = '
+                what += '{body = "..."} of another one, or a [body] host that is none of them'
+            raise around.fault("source", f'given "{source}", but {what}')
         if source == around.host:
             raise around.fault(
                 "source", f'given "{source}", which is the body itself; another one is allowed'
@@ -148,6 +147,15 @@ class PlacedByKernel(Placement):
     def told(self, context: Any, strength: Any) -> str:
         least, most, _ = self._reach
         return f"where {self.ephemeris.kernel.name} has it, {reach_text(strength, least, most)}"
+
+
+def kernel_body(source: str, around: Surroundings) -> Ephemeris:
+    """The ephemeris that has a body which a load names; refused if none has."""
+    if around.ephemeris is None:
+        what = f'given "{source}", but there is no [ephemeris]; add one with a kernel'
+        raise around.fault("source", what)
+    around.ephemeris.check_body(source, lambda what: around.fault("source", what))
+    return around.ephemeris
 
 
 def refuse_series(around: Surroundings) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from decimal import Decimal
 from fractions import Fraction
 from typing import Any
@@ -34,7 +34,7 @@ class EphemerisTable(ConfigTable):
     """
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Ephemeris:
     """A kernel as a scene uses it.
 
@@ -44,6 +44,7 @@ class Ephemeris:
         axes: name of the scene's space axes.
         ahead: date of the scene's time 0: seconds of TDB since J2000.
         run: start and end of the run, s (mpf).
+        used: what the scene has seen of it so far.
     """
 
     kernel: Kernel
@@ -51,6 +52,7 @@ class Ephemeris:
     axes: str
     ahead: Fraction
     run: tuple[Any, Any]
+    used: list[Sight] = field(default_factory=list)
 
     @property
     def ecliptic(self) -> bool:
@@ -87,6 +89,7 @@ class Ephemeris:
             reach = " to ".join(map(date_of, found.span))
             what = f'which has "{source}" from {reach} (TDB), but the run goes from {asked}; '
             raise self.refused(what + "change [time] epoch, start or end, or take a longer kernel")
+        self.used.append(found)
         return found
 
     def place(self, context: Any, sight: Sight, time: Any, order: int = 0) -> Vector:

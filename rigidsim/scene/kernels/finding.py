@@ -1,4 +1,9 @@
-"""Where a kernel's file is: beside the config, in the working folder, or in folders that are named."""
+"""Where a kernel's file is: beside the config, or in folders that are named.
+
+A run's folder remembers the place of the file in ``.kernel``, which only says where to look: whether it is
+the same file, its SHA-256 tells. Workers of a sweep, which know no folder of a config, look where their
+parent found it.
+"""
 
 from __future__ import annotations
 
@@ -10,13 +15,11 @@ from rigidsim.scene.kernels.reading import is_path, open_file, open_package
 
 FOLDERS = "RIGIDSIM_KERNELS"
 """Environment variable with folders in which kernels are looked for by their names."""
-
-
-def remember(folder: Path) -> None:
-    """Look for kernels by their paths from this folder, too: in this process and those that it begins."""
-    known = os.environ.get(FOLDERS, "").split(os.pathsep)
-    given = str(folder.absolute())
-    os.environ[FOLDERS] = os.pathsep.join([given, *(x for x in known if x and x != given)])
+EMBEDDED = " (embedded config)"
+"""What follows a dataset's path where that stands for the config in it."""
+NOTE = ".kernel"
+"""File of a run's folder with the place of its kernel."""
+_FOUND = "RIGIDSIM_KERNELS_FOUND"  # the same of a parent process, for its workers
 
 
 def kernel_of(given: str, source: str) -> Kernel:
@@ -32,17 +35,19 @@ def kernel_of(given: str, source: str) -> Kernel:
             beside = [x for x in _folders(source) if (x / f"{given}.bsp").is_file()]
             hint = f'; the file beside the config is "./{given}.bsp"' if beside else ""
             raise KernelError(f"{error}{hint}") from None
-    path = find_file(given, source)
+    path = _find(given, source).absolute()
     try:
-        return open_file(path)
+        found = open_file(path)
     except OSError as error:
         raise KernelError(f"which can't be read ({error.strerror or error}): {path}") from None
+    known = os.environ.get(_FOUND, "").split(os.pathsep)
+    folder = str(path.parent)
+    os.environ[_FOUND] = os.pathsep.join([folder, *(x for x in known if x and x != folder)])
+    return found
 
 
-def find_file(given: str, source: str) -> Path:
-    """The file of a path as given; ``KernelError`` if there is none."""
-    wanted = Path(given).expanduser()
-    folders = _folders(source)
+def _find(given: str, source: str) -> Path:
+    wanted, folders = Path(given).expanduser(), _folders(source)
     places = [wanted] if wanted.is_absolute() else [folder / wanted for folder in folders]
     for path in [*places, *(folder / wanted.name for folder in folders)]:
         if path.is_file():
@@ -65,7 +70,12 @@ def _is_package(name: str) -> bool:
 
 
 def _folders(source: str) -> list[Path]:
-    """Folders to look in, the config's first."""
-    config = Path(source)
+    """Folders to look in: the config's, the one that a run's folder notes, and those that are named."""
+    file = Path(source.removesuffix(EMBEDDED)).absolute()
     named = [Path(x) for x in os.environ.get(FOLDERS, "").split(os.pathsep) if x]
-    return [*([config.absolute().parent] if config.is_file() else []), *named, Path.cwd()]
+    if not file.is_file():
+        found = [Path(x) for x in os.environ.get(_FOUND, "").split(os.pathsep) if x]
+        return [Path.cwd(), *named, *found]
+    noted = file.parent / NOTE
+    beside = [Path(noted.read_text(encoding="utf-8").strip()).parent] if noted.is_file() else []
+    return [file.parent, *named, *beside]

@@ -5,6 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from fractions import Fraction
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -63,11 +64,11 @@ class Kernel(ABC):
 
     Attributes:
         name: as in the config, without its place.
-        packaged: whether it is an installed package.
+        place: path of its file; None for an installed package.
     """
 
     name: str
-    packaged: bool
+    place: Path | None = None
 
     @property
     @abstractmethod

@@ -62,8 +62,6 @@ def is_path(given: str) -> bool:
 class PackagedKernel(Kernel):
     """A package with one file of coefficients for each body, and a file of constants."""
 
-    packaged = True
-
     def __init__(self, name: str, folder: Path) -> None:
         self.name, self._folder = name, folder
         self._used: dict[str, BlockSeries] = {}
@@ -152,10 +150,8 @@ def _digest(paths: list[Path]) -> str:
 class SpkKernel(Kernel):
     """An SPK file."""
 
-    packaged = False
-
     def __init__(self, path: Path) -> None:
-        self.name, self._path = path.name, path
+        self.name, self.place = path.name, path
         spk = _jplephem("spk")
         file = path.open("rb")
         try:
@@ -279,7 +275,8 @@ class SpkKernel(Kernel):
 
     @property
     def digest(self) -> str:
-        return _digest([self._path])
+        assert self.place is not None
+        return _digest([self.place])
 
 
 def _word(text: str) -> str:

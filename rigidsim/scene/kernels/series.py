@@ -22,7 +22,7 @@ from rigidsim.scene.arithmetic import Vector
 _TORN = 1e-6  # of the usual distance: a jump beyond it at a block's edge is damage
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class BlockSeries:
     """Position of ``target`` relative to ``center``; km and seconds of TDB, axes of the ICRF.
 
