@@ -175,10 +175,10 @@ def test_point_masses_start_from_the_kernel_and_go_on_as_it_says() -> None:
         ("bodies[0].position=[1, 0, 0]", "given beside ephemeris = true, which says it"),
         ('bodies[0].name="sunn"', 'given "sunn"; did you mean "sun"'),
         ("ephemeris=", "given true, but there is no [ephemeris]"),
-        ('loads[0].orbit=,loads[0].source="sun"', "which is one of [[bodies]]"),
+        ('loads[0].orbit=; loads[0].source="sun"', "which is one of [[bodies]]"),
     ],
 )
 def test_mistakes_of_point_masses_are_refused(setting: str, words: str) -> None:
     with pytest.raises(rigidsim.ConfigError) as caught:
-        run_text(SYSTEM, *setting.split(","))
+        run_text(SYSTEM, *setting.split("; "))
     assert words in str(caught.value)
