@@ -2,13 +2,14 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from fractions import Fraction
+from typing import Any, Protocol
 
 from pydantic import Field, StrictBool, StrictStr
 
 from rigidsim.errors import ConfigError, Problem
 from rigidsim.scene.arithmetic import Vector, cross, eccentric_anomaly, norm
-from rigidsim.scene.exact import ZERO
+from rigidsim.scene.exact import ZERO, ExactNumber
 from rigidsim.scene.fields import (
     Angle,
     ConfigTable,
@@ -19,8 +20,6 @@ from rigidsim.scene.fields import (
     Triple,
     VariableName,
 )
-from rigidsim.scene.kernels.ephemeris import Ephemeris
-from rigidsim.scene.kernels.series import exactly
 from rigidsim.scene.validation_messages import nearest, shown
 
 GRAVITATIONAL_CONSTANT = "6.67430e-11"
@@ -71,6 +70,23 @@ class PointMassBody(ConfigTable):
         None, examples=[{"about": "sun", "semi_major_axis": "1 au", "eccentricity": 0.0167}]
     )
     """osculating elements at the start, instead of position and velocity"""
+
+
+class PlacesBodies(Protocol):
+    """Where bodies are at the start: ``rigidsim.scene.kernels.ephemeris.Ephemeris``."""
+
+    @property
+    def name(self) -> str:
+        """What messages call it."""
+
+    def check_body(self, body: str, fault: Callable[[str], ConfigError]) -> None:
+        """Refuse a body that it doesn't place."""
+
+    def strength(self, body: str) -> Fraction | None:
+        """Gravitational parameter, m^3/s^2."""
+
+    def start_of(self, body: str, context: Any) -> tuple[Vector, Vector]:
+        """Place and velocity at the start, m and m/s (mpf), space axes, from the barycentre."""
 
 
 @dataclass(frozen=True)
@@ -146,7 +162,7 @@ def resolve_point_masses(
     context: Any,
     *,
     free_flight: bool,
-    ephemeris: Ephemeris | None = None,
+    ephemeris: PlacesBodies | None = None,
 ) -> PointMasses | None:
     """Initial states of ``[[bodies]]``; None without any. ``mass`` (kg) is the rigid body's."""
     if not tables:
@@ -186,22 +202,22 @@ def resolve_point_masses(
     return PointMasses(tuple(names), strengths, tuple(positions), tuple(velocities), at_host, full)
 
 
-def _strength(number: int, table: PointMassBody, context: Any, ephemeris: Ephemeris | None) -> Any:
+def _strength(number: int, table: PointMassBody, context: Any, ephemeris: PlacesBodies | None) -> Any:
     if table.gravitational_parameter is not None:
         return table.gravitational_parameter.at(context)
     found = None
     if table.ephemeris and ephemeris is not None:
         ephemeris.check_body(table.name, lambda what: _fault(number, "name", what))
-        found = ephemeris.kernel.strength(table.name)
+        found = ephemeris.strength(table.name)
     if found is None and table.ephemeris and ephemeris is not None:
-        raise _fault(number, "gravitational_parameter", f"missing; {ephemeris.kernel.name} has none: give it")
+        raise _fault(number, "gravitational_parameter", f"missing; {ephemeris.name} has none: give it")
     if found is None and not table.ephemeris:
         raise _fault(number, "gravitational_parameter", "missing; it is needed")
-    return context.one if found is None else exactly(context, found)
+    return context.one if found is None else ExactNumber(found).at(context)
 
 
 def _of_kernel(
-    number: int, table: PointMassBody, context: Any, ephemeris: Ephemeris | None
+    number: int, table: PointMassBody, context: Any, ephemeris: PlacesBodies | None
 ) -> tuple[Vector, Vector]:
     """Where the kernel has a body at the start, and its velocity, from the barycentre."""
     for key in ("position", "velocity", "orbit"):
@@ -209,8 +225,7 @@ def _of_kernel(
             raise _fault(number, key, "given beside ephemeris = true, which says it; remove one of them")
     if ephemeris is None:
         raise _fault(number, "ephemeris", "given true, but there is no [ephemeris]; add one with a kernel")
-    sight, start = ephemeris.sight(table.name, ""), ephemeris.run[0]
-    return ephemeris.place(context, sight, start), ephemeris.place(context, sight, start, 1)
+    return ephemeris.start_of(table.name, context)
 
 
 def _host(host: str | None, names: Sequence[str], free_flight: bool) -> int | None:

@@ -92,6 +92,20 @@ class Ephemeris:
         self.used.append(found)
         return found
 
+    @property
+    def name(self) -> str:
+        """The kernel's name."""
+        return self.kernel.name
+
+    def strength(self, body: str) -> Fraction | None:
+        """Gravitational parameter of a body, m^3/s^2; None if the kernel has none."""
+        return self.kernel.strength(body)
+
+    def start_of(self, body: str, context: Any) -> tuple[Vector, Vector]:
+        """Place and velocity of a body at the start, m and m/s (mpf), space axes, from the barycentre."""
+        sight = self.sight(body, "")
+        return self.place(context, sight, self.run[0]), self.place(context, sight, self.run[0], 1)
+
     def place(self, context: Any, sight: Sight, time: Any, order: int = 0) -> Vector:
         """Vector (mpf, m, space axes) of a sight at a time of the scene (mpf, s), or a derivative of it."""
         found = sight.at(context, time + exactly(context, self.ahead), order)
