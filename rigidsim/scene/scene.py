@@ -181,8 +181,8 @@ def build_scene(experiment: Experiment, context: Any = None) -> Scene:
         )  # fmt: skip
         brought = [kind.resolve(config, around) for kind in OF_BODY.values() if kind.brought_by(config)]
         known = ephemeris.axes if ephemeris is not None else _first(given, "axes")
-        axes = config.frame.axes or known
-        dated = replace(around, axes=axes, epoch=config.time.epoch or _first(given, "epoch"))
+        named: str | None = config.frame.axes or known
+        dated = replace(around, axes=named, epoch=config.time.epoch or _first(given, "epoch"))
         brought += companions(given, config.loads, dated)
         resolved = [*given, *(load for found in tabled.values() for load in found), *brought]
         bearings = [load.bearing for load in resolved if load.bearing is not None]
@@ -226,7 +226,7 @@ def build_scene(experiment: Experiment, context: Any = None) -> Scene:
             start=start,
             end=end,
             samples=samples,
-            axes=axes or _first(resolved, "axes"),
+            axes=named or _first(resolved, "axes"),
             epoch=config.time.epoch or _first(resolved, "epoch"),
             figure=figure_of(config.frame, body, context),
             reference=reference_normal(config.frame, context),
