@@ -104,15 +104,20 @@ class Distortion:
 
     def found(self, bare: list[Any], tides: Sequence[SeenTide]) -> tuple[Matrix, list[Any]]:
         """D, and what the angular velocity differs by from ``bare`` (w0)."""
+        rate, fixed = self._without_delay(bare, tides)
+        found = self._joined(fixed, _outer(rate, None, self.spin))
+        if self.delay != 0:
+            found = self._delayed(rate, tides)
+        return found, self.slip(found, bare)
+
+    def _without_delay(self, bare: list[Any], tides: Sequence[SeenTide]) -> tuple[list[Any], Matrix | None]:
+        """The rate w*, and the tides' part of the tensor with its trace."""
         fixed = self._sum([_outer(tide.place, tide.fifth, -tide.lift) for tide in tides])
         rate = bare
         for _ in range(self.iterations):
             slip = self.slip(self._joined(fixed, _outer(rate, None, self.spin)), bare)
             rate = _plus(bare, slip)
-        found = self._joined(fixed, _outer(rate, None, self.spin))
-        if self.delay != 0:
-            found = self._delayed(rate, tides)
-        return found, self.slip(found, bare)
+        return rate, fixed
 
     def slip(self, distortion: Matrix, bare: list[Any]) -> list[Any]:
         """-(I + D)^-1 D w0, by the adjugate."""
@@ -131,35 +136,69 @@ class Distortion:
 
     # --- the tensors ----------------------------------------------------------------------------------------
 
-    def _delayed(self, rate: list[Any], tides: Sequence[SeenTide]) -> Matrix:
-        """D for a rate w*, to second order in the delay."""
-        late, half = -self.delay, self.delay * self.delay * 0.5
+    def _followed(
+        self, rate: list[Any], tides: Sequence[SeenTide]
+    ) -> tuple[list[Any], list[Any], list[list[Any]]]:
+        """First and second derivative of a rate w* along the undistorted motion, and for each tide those of x
+        in body axes, and 1 / r^5 with its own.
+        """
         momentum = self.turning(rate)
         torque, change = [cross(momentum, rate)], []
         for tide in tides:
             torque.append(tide_torque(tide, self.massive))
         turning = self.solved(_plus(*torque))
-        parts = []
+        found = []
         for tide in tides:
             x, v, inverse = tide.place, tide.velocity, tide.inverse
-            moved = _plus(v, cross(x, rate))  # x' in body axes
+            moved = _plus(v, cross(x, rate))
             again = _plus(tide.acceleration, cross(_plus(v, moved), rate), cross(x, turning))
             squared, fifth = inverse * inverse, tide.fifth
             grown = 2.0 * _dot(x, v) * squared  # (r^2)' / r^2
             faster = 2.0 * total([_dot(v, v), _dot(x, tide.acceleration)]) * squared - grown * grown
-            first = -2.5 * grown * fifth  # (r^-5)'
+            first = -2.5 * grown * fifth
             second = (6.25 * grown * grown - 2.5 * faster) * fifth
-            both = total([fifth, late * first])
-            scale = total([both, half * second]), 2.0 * both, 2.0 * fifth
-            series = x, _times(late, moved), _times(half, again)
-            parts.append(_scaled(_expanded(series, scale, fifth), -tide.lift))
+            found.append([moved, again, fifth, first, second])
             into = cross(moved, self.massive(x)), cross(x, self.massive(moved))
             tugged = _times(first, cross(x, self.massive(x)))
             change.append(_times(tide.pull, _plus(tugged, *(_times(fifth, y) for y in into))))
         change += [cross(self.turning(turning), rate), cross(momentum, turning)]
-        series = rate, _times(late, turning), _times(half, self.solved(_plus(*change)))
+        return turning, self.solved(_plus(*change)), found
+
+    def _delayed(self, rate: list[Any], tides: Sequence[SeenTide]) -> Matrix:
+        """D for a rate w*, to second order in the delay."""
+        late, half = -self.delay, self.delay * self.delay * 0.5
+        turning, jerk, followed = self._followed(rate, tides)
+        parts = []
+        for tide, (moved, again, fifth, first, second) in zip(tides, followed, strict=True):
+            both = total([fifth, late * first])
+            scale = total([both, half * second]), 2.0 * both, 2.0 * fifth
+            series = tide.place, _times(late, moved), _times(half, again)
+            parts.append(_scaled(_expanded(series, scale, fifth), -tide.lift))
+        series = rate, _times(late, turning), _times(half, jerk)
         parts.append(_scaled(_expanded(series, (1.0, 2.0, 2.0), 1.0), self.spin))
         return self._joined(self._sum(parts), None)
+
+    def power(self, bare: list[Any], tides: Sequence[SeenTide]) -> Any:
+        """-T : D' / 2 with T the tidal tensor, sum of pull (x x^T - r^2/3) / r^5, and D' to first order in
+        the delay, whose second contributes nothing to a mean.
+        """
+        late, rate = -self.delay, self._without_delay(bare, tides)[0]
+        turning, jerk, followed = self._followed(rate, tides)
+        changes = []  # symmetric parts of a p^T, and c e e^T
+        for tide, (moved, again, fifth, first, second) in zip(tides, followed, strict=True):
+            terms = (total([first, late * second]), tide.place), (2.0 * fifth + 4.0 * late * first, moved)
+            along = _plus(*(_times(c, x) for c, x in (*terms, (2.0 * late * fifth, again))))
+            changes.append((-tide.lift, tide.place, along, 2.0 * late * fifth, moved))
+        along = _plus(_times(2.0, turning), _times(2.0 * late, jerk))
+        changes.append((self.spin, rate, along, 2.0 * late, turning))
+        found = []
+        for tide in tides:
+            x, third = tide.place, self.third / (tide.inverse * tide.inverse)
+            for size, a, p, c, e in changes:
+                drawn = total([_dot(x, a) * _dot(x, p), c * (_dot(x, e) * _dot(x, e))])
+                trace = total([_dot(a, p), c * _dot(e, e)])
+                found.append(-0.5 * tide.pull * tide.fifth * size * (drawn - third * trace))
+        return total(found)
 
     def _sum(self, parts: Sequence[Matrix]) -> Matrix | None:
         if not parts:

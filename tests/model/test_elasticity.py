@@ -147,6 +147,7 @@ def test_a_synchronous_body_is_heated_on_an_eccentric_orbit() -> None:
     text = config(
         body=SPINDLE + f"delay = {delay}}}", initial="angular_velocity = [0, 0, 1]",
         loads=MOON.replace("0.1", str(e)), time=f"end = {2 * np.pi}\nsamples = {count + 1}",
+        output='record = ["quaternion", "inertia_distortion", "tidal_power"]',
     )  # fmt: skip
     data = run_text(text).dataset
     flat = data["inertia_distortion"].values[:-1]
@@ -161,6 +162,9 @@ def test_a_synchronous_body_is_heated_on_an_eccentric_orbit() -> None:
     expected = 10.5 * STRENGTH * delay * e**2
     # further powers of e^2 (a factor of some tens), and the spin that the torque changes
     assert np.mean(power) == pytest.approx(expected, rel=2e-3)
+    assert data["tidal_power"].values[:-1].mean() == pytest.approx(expected, rel=2e-3)
+    # Fourier's sums take the spin, which the torque changes, for periodic
+    np.testing.assert_allclose(data["tidal_power"][:-1], power, rtol=0, atol=1e-4 * np.abs(power).max())
 
 
 # --- other sources, other carriers --------------------------------------------------------------------------

@@ -2,18 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
 from rigidsim.errors import ConfigError, Problem
-from rigidsim.model.load_words import length_text
+from rigidsim.model.load_words import length_text, span_words
 from rigidsim.scene.kernels.kernel import Sight
 from rigidsim.scene.registry import Surroundings
 from rigidsim.scene.schema import Config
 from rigidsim.scene.tracing.numbers import plain
 from rigidsim.scene.validation_messages import nearest
+from rigidsim.store.summary_parts import Caution, WarningCode
 
 WHERE = "[body] elasticity"
 _FLUID = "1.5"  # Love number of a homogeneous fluid, the largest that there is
+_LATE, _TOO_LATE = 0.3, 1.0
+"""Radians by which body and source together may turn within the delay: at the first, what the expansion
+leaves out is some percent of what the delay does, which is told, and at the second about as much.
+"""
 _RAISING = "gravity_gradient"
 _DERIVATIVES = 2  # of the place
 
@@ -93,3 +99,20 @@ def told_elasticity(what: str, love: Any, radius: Any) -> str:
     """What it does, and its numbers, in a reader's terms."""
     size = length_text(float(plain(radius)))
     return f"elasticity: {what}; Love number {float(plain(love)):.6g}, radius {size}"
+
+
+def refuse_delay(delay: Any, turned: float) -> None:
+    """Refuse a delay (s) in which body and source turn by so many radians, if the expansion says nothing."""
+    if turned > _TOO_LATE:
+        what = f"given {span_words(delay)}, in which body and source turn by {turned:.3g} rad; "
+        raise fault("delay", what + f"up to {_TOO_LATE:g} is allowed, since what it does is a series in it")
+
+
+def about_delay(delay: Any, turned: float) -> Iterator[Caution]:
+    """A delay whose expansion leaves out a part of what it does."""
+    if turned > _LATE:
+        text = (
+            f"{WHERE} delay: in {span_words(delay)} body and source turn by {turned:.2g} rad, of which the "
+        )
+        text += f"expansion to second order leaves out some {turned**2 / 6:.1%} of what the delay does"
+        yield Caution(WarningCode.DELAY_TOO_LONG, text)

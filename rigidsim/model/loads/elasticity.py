@@ -13,10 +13,10 @@ the state.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, TypeVar
 
 import heyoka as hy
 
@@ -31,7 +31,13 @@ from rigidsim.model.inertia import ConstantInertia, MassDistribution
 from rigidsim.model.kinematics import Kinematics, in_common_unit, inertia_times
 from rigidsim.model.load import Load, Term, loads_of
 from rigidsim.model.load_words import span_words, value_text
-from rigidsim.model.loads.elastic_keys import WHERE, elastic_values, fault, told_elasticity
+from rigidsim.model.loads.elastic_keys import (
+    about_delay,
+    elastic_values,
+    fault,
+    refuse_delay,
+    told_elasticity,
+)
 from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.rotations import Symbolic, transpose
 from rigidsim.model.rotations import apply as turned
@@ -45,13 +51,10 @@ from rigidsim.scene.registry import Surroundings, register_of_body
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.schema import Config
 from rigidsim.scene.tracing.numbers import plain
-from rigidsim.store.summary_parts import Caution, WarningCode
+from rigidsim.store.summary_parts import Caution
 
+T = TypeVar("T")
 _MOST = 0.1  # of a moment, up to which a linear response makes sense
-_LATE, _TOO_LATE = 0.3, 1.0
-"""Radians by which body and source together may turn within the delay: at the first, what the expansion
-leaves out is some percent of what the delay does, which is told, and at the second about as much.
-"""
 
 
 @register_of_body("elasticity")
@@ -113,7 +116,7 @@ class Elasticity(Load):
 
     def shape(self, m: Kinematics) -> MassDistribution:
         """The distorted tensor, internal units."""
-        tensor, slip = self._found(m)
+        tensor, slip = self._of(m, Distortion.found)
         rows = zip(m.numbers.inertia, tensor, strict=True)
         matrix = [
             [total([rounded(m.number(x)), y]) if x != 0 else y for x, y in zip(*row, strict=True)]
@@ -121,8 +124,12 @@ class Elasticity(Load):
         ]
         return MassDistribution(matrix, None, slip, tensor)
 
-    def _found(self, m: Kinematics) -> tuple[Matrix, list[Symbolic]]:
-        """D and the slip as expressions of the states, internal units."""
+    def power(self, m: Kinematics) -> Symbolic:
+        """Power that the tides put into the distortion, internal units of energy over time."""
+        return self._of(m, Distortion.power)
+
+    def _of(self, m: Kinematics, ask: Callable[[Distortion, list[Symbolic], list[SeenTide]], T]) -> T:
+        """What is asked of the distortion, with expressions of the states."""
         scene, scaling = m.scene, m.scaling
         states = list(hy.make_vars(*m.body.rates))
         bare = in_common_unit(states, m.numbers.rate_units, m.number)
@@ -133,6 +140,7 @@ class Elasticity(Load):
             place, velocity, acceleration = (turned(transpose(m.matrix), x) for x in vectors)
             lift, pull = (rounded(m.number(x)) for x in self._sizes(load, motion.unit, scaling))
             tides.append(SeenTide(place, velocity, acceleration, motion.inverse, lift, pull))
+        rigid_body = replace(m, shape=None)
         rigid = ConstantInertia.of(m.numbers, m.number, scene.context)
         *constants, offset = self._constants(scene, scaling.time, scaling.inertia)
         spin, delay, third = (rounded(m.number(x)) if x != 0 else 0 for x in constants)
@@ -144,10 +152,10 @@ class Elasticity(Load):
             tensor=_rounded(m, m.numbers.turning_inertia),
             turning=rigid.times,
             solved=rigid.solved,
-            massive=lambda x: inertia_times(m, x),
+            massive=lambda x: inertia_times(rigid_body, x),
             iterations=self.iterations(scene),
         )
-        return distortion.found(bare, tides)
+        return ask(distortion, bare, tides)
 
     def _sizes(self, load: GradientSource, unit: Any, scaling: Scaling) -> tuple[Any, Any]:
         """``SeenTide.lift`` and ``pull``, internal units."""
@@ -200,10 +208,7 @@ class Elasticity(Load):
             what = f"given numbers by which the tensor changes by up to {float(plain(distorted)):.3g} of the "
             what += f"least moment; up to {_MOST:g} is allowed, since the response is linear: check "
             raise fault("", what + "love_number, radius, and G M and distances of the sources")
-        if (late := self.turned_within(scene)) > _TOO_LATE:
-            what = f"given {span_words(plain(self.delay))}, in which body and source turn by {late:.3g} rad; "
-            what += f"up to {_TOO_LATE:g} is allowed, since what it does is a series in it"
-            raise fault("delay", what)
+        refuse_delay(plain(self.delay), self.turned_within(scene))
         least, count = working_epsilon(scene.context) / 4, 0
         left = distorted * factor
         while left > least:
@@ -217,12 +222,7 @@ class Elasticity(Load):
         return float(plain(self.delay * (rate + fastest)))
 
     def cautions(self, fields: Any, where: str, scene: Scene) -> Iterator[Caution]:
-        turned = self.turned_within(scene)
-        if turned > _LATE:
-            text = f"{WHERE} delay: in {span_words(plain(self.delay))} body and source turn by {turned:.2g} "
-            text += "rad, of which the expansion to second order leaves out some "
-            text += f"{turned**2 / 6:.1%} of what the delay does"
-            yield Caution(WarningCode.DELAY_TOO_LONG, text)
+        yield from about_delay(plain(self.delay), self.turned_within(scene))
 
     # --- at the start, in numbers ---------------------------------------------------------------------------
 
