@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Any
 
-from rigidsim.model.capabilities import gradient_source_of
+from rigidsim.model.capabilities import Beside, gradient_source_of
 from rigidsim.model.load import Load, loads_of
 from rigidsim.scene.arithmetic import Matrix, cross, dot, negligible
 from rigidsim.scene.orbits import KeplerOrbit
@@ -51,6 +51,8 @@ def _source(scene: Scene, given: str) -> tuple[Load, KeplerOrbit, Any]:
     sources = [(load, source) for load in loads if (source := gradient_source_of(load)) is not None]
     if scene.free_flight or len(loads) != 1 or len(sources) != 1 or sources[0][1].orbit is None:
         what = "it is for a body under the gravity_gradient of one source with elements of its orbit, and "
+        if any(isinstance(load, Beside) for load in loads):
+            what = f"it is found by the gradient alone: leave degree and figure out; {what}"
         raise refusal(
             "equilibrium", f"{given}{what}nothing else; remove other loads, or give attitude and rates"
         )
