@@ -27,6 +27,9 @@ class Requirement(Protocol):
     def meet(self, integrator: TaylorEngine) -> Scalar | None:
         """Set it where the integrator is; returns the time beyond which no step may go, None for any."""
 
+    def end_after(self, time: Scalar) -> Scalar | None:
+        """That time, for steps that begin at a time."""
+
 
 def requirement_of(system: System) -> Requirement | None:
     """What a system's equations need; None if nothing, or if they switch and see to it themselves."""
@@ -61,7 +64,12 @@ class SetAtKnots:
         if self._entered != (number, id(integrator)):
             integrator.pars[:] = np.array(pieces.parameters(number), dtype=integrator.pars.dtype)
             self._entered = (number, id(integrator))
-        return pieces.knots[number] if number < len(pieces.knots) else None
+        return self.end_after(high)
+
+    def end_after(self, time: Scalar) -> Scalar | None:
+        """See ``Requirement``."""
+        knots, number = self._pieces.knots, self._pieces.number_at(time)
+        return knots[number] if number < len(knots) else None
 
 
 class SecondNumber:
@@ -74,6 +82,9 @@ class SecondNumber:
 
     def meet(self, integrator: TaylorEngine) -> None:
         integrator.pars[self._place] = integrator.dtime[1]
+
+    def end_after(self, time: Scalar) -> None:
+        """See ``Requirement``."""
 
 
 def after_each_step(

@@ -111,8 +111,14 @@ class TaylorStepper(Stepper):
         """Set what the equations need here; returns the time beyond which no step may go, None for any."""
         if self._requirement is None:
             return self.until
-        ends = [end for end in (self._requirement.meet(self._integrator), self.until) if end is not None]
-        return min(ends, default=None)
+        return _earlier(self._requirement.meet(self._integrator), self.until)
+
+    @property
+    def end(self) -> Scalar | None:
+        """The time beyond which no step that begins now may go; None for any."""
+        if self._requirement is None:
+            return self.until
+        return _earlier(self._requirement.end_after(self.time), self.until)
 
     def _watched(self) -> Callable[[TaylorEngine], bool] | None:
         """What to call after each of the steps that begin now."""
@@ -290,3 +296,8 @@ class TaylorStepper(Stepper):
             self._tiny += 1
         else:
             self.unresolved = True
+
+
+def _earlier(*times: Scalar | None) -> Scalar | None:
+    """The earlier of the times that there are."""
+    return min((time for time in times if time is not None), default=None)

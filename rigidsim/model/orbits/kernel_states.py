@@ -221,14 +221,16 @@ class BlockPieces:
             for order in range(carried + 1)
         }
         self._rounded_ends = {key: np.array(list(map(float, x))) for key, x in self._ends.items()}
+        self._rows = [np.asarray(series.coefficients) for series, _ in group.series]  # a memmap is slow
+        self._begin = number(-context.one)
         kind = type(number(context.one))
         self._kind: Any = kind if issubclass(kind, float | np.floating) else None
 
     def parameters(self, number: int) -> list[Any]:
         """See ``PieceSeries``: the coefficients, each of which is a double times a power of two."""
         found: list[Any] = []
-        for series, carried, first in self._series:
-            given = np.ldexp(series.coefficients[first + number, :, carried + 1 :], -series.exponent)
+        for (series, carried, first), rows in zip(self._series, self._rows, strict=True):
+            given = np.ldexp(rows[first + number, :, carried + 1 :], -series.exponent)
             found += self._exact(given.ravel())
         return found
 
@@ -243,24 +245,26 @@ class BlockPieces:
 
     def states(self, number: int) -> dict[str, Any]:
         """See ``PieceSeries``."""
-        found: dict[str, Any] = {self._group.past: self._number(-self._context.one)}
-        for series, carried, first in self._series:
-            for axis in range(3):
-                row = series.coefficients[first + number, axis]
-                for order in range(carried + 1):
-                    found[_name(series, axis, order)] = self._at_edge(series, row, order)
+        found: dict[str, Any] = {self._group.past: self._begin}
+        for (series, carried, first), rows in zip(self._series, self._rows, strict=True):
+            for order in range(carried + 1):
+                values = self._at_edge(series, rows[first + number], order)
+                found |= {_name(series, axis, order): value for axis, value in enumerate(values)}
         return found
 
-    def _at_edge(self, series: BlockSeries, row: np.ndarray, order: int) -> Any:
-        """A state's value where a block begins, u = -1, rounded once; derivatives in double precision are
-        sums of rounded products, since mpf take longer than all steps of a run.
+    def _at_edge(self, series: BlockSeries, rows: np.ndarray, order: int) -> list[Any]:
+        """Values of three states where a block begins, u = -1, rounded once; derivatives in double precision
+        are sums of rounded products, since mpf take longer than all steps of a run.
         """
         if self._kind in (float, np.float64):
-            rounded_ends = self._rounded_ends[series.terms, order]
-            return math.ldexp(math.fsum((row * rounded_ends).tolist()), -series.exponent)
+            products = (rows * self._rounded_ends[series.terms, order]).tolist()
+            return [math.ldexp(math.fsum(row), -series.exponent) for row in products]
         weights, context = self._ends[series.terms, order], self._context
-        total = sum((context.mpf(float(c)) * w for c, w in zip(row, weights, strict=True)), context.zero)
-        return self._number(context.ldexp(total, -series.exponent))
+        found = []
+        for row in rows:
+            total = sum((context.mpf(float(c)) * w for c, w in zip(row, weights, strict=True)), context.zero)
+            found.append(self._number(context.ldexp(total, -series.exponent)))
+        return found
 
 
 def _name(series: BlockSeries, axis: int, order: int) -> str:

@@ -97,7 +97,7 @@ class WayFinder:
                     return SampleWay.GRID, self._grid_steps(left)
                 limit = corrected.left  # steps to where a grid can start
             if spacing <= ways.block_spacing:
-                if min(left, corrected.left) >= ways.least_block_steps:
+                if min(left, corrected.left, self._to_stop(size)) >= ways.least_block_steps:
                     wanted = max(1, int(self._pacing.rows_at_once * spacing), ways.least_block_steps)
                     return SampleWay.BLOCK, min(ways.block_steps, wanted, corrected.left, left)
                 limit = corrected.left  # steps to where a block is worth it again
@@ -110,6 +110,11 @@ class WayFinder:
                 steps = max(steps, likely) if likely <= self._skipped else steps
             return SampleWay.SKIP, max(1, int(min(steps, self._most(SampleWay.SKIP), limit)))
         return SampleWay.STEP, min(self._most(SampleWay.STEP), limit)
+
+    def _to_stop(self, size: float) -> float:
+        """Steps of a size to where one must end, the edge of a table's rows or a block of an ephemeris."""
+        end = self._stepper.end
+        return math.inf if end is None else (float(end) - float(self._stepper.time)) / size
 
     def _spacing(self, following: int) -> float:
         """Steps per sample, over the next samples."""
