@@ -194,7 +194,8 @@ def _of_file(name: str, body: Any, context: Any, texts: Mapping[str, str], degre
         found |= {(n, m, sine): factor * number(x) for sine, x in zip((False, True), row, strict=True)}
     _refuse_other_tensor(given, found, radius, body, context)
     beyond = {key: c for key, c in found.items() if key[0] >= LEAST}
-    described = " ".join(f'"{name}" {read.name}'.split())
+    tide = f"({read.tide})" if read.tide else ""
+    described = " ".join(f'"{name}" {read.name} {tide}'.split())
     return GravityField(radius, beyond, degree, described)
 
 
