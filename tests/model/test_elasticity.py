@@ -289,6 +289,12 @@ def test_what_knows_rigid_bodies_alone_refuses_it(more: str, said: str) -> None:
     assert said in str(refused.value)
 
 
+def test_a_rod_isnt_elastic() -> None:
+    body = f'shape = "rod"\nlength = 1\nmass = 12\nelasticity = {{{ELASTIC}}}'
+    with pytest.raises(rigidsim.ConfigError, match="without inertia about an axis"):
+        run_text(config(body, "angular_velocity = [0.1, 0.2, 0]", MOON, "end = 1\nsamples = 2"))
+
+
 @pytest.mark.parametrize(
     ("initial", "load", "said"),
     [

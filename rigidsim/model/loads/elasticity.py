@@ -192,7 +192,9 @@ class Elasticity(Load):
         moment.
         """
         context = scene.context
-        least = context.minimum([x for x in scene.body.principal_moments if x > 0])
+        least = context.minimum(scene.body.principal_moments)
+        if not least > 0:
+            raise fault("", "given for a body without inertia about an axis; give it some, or leave it out")
         squared = dot(scene.angular_velocity, scene.angular_velocity)
         spin = self.strength / 3 * (squared + self.known_rate(scene) ** 2) / least
         tide = context.zero
