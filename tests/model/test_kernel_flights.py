@@ -69,7 +69,7 @@ def flown(start: np.ndarray, origin: str, days: float) -> np.ndarray:
         return np.concatenate([y[3:], total])
 
     y = start
-    for begin, end in pairwise([0, *(x for x in np.arange(3.5, days, 4)), days]):
+    for begin, end in pairwise([0, *(x for x in np.arange(1.5, days, 4)), days]):
         scale = np.array([1e8] * 3 + [1e4] * 3)
         solver = DOP853(slope, begin * DAY, y, end * DAY, rtol=1e-13, atol=1e-15 * scale)
         while solver.status == "running":

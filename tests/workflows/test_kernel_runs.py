@@ -1,0 +1,148 @@
+"""Runs with kernels: SPK files, resuming at block edges, and kernels that are missing, swapped or moved."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from kernels import write_spk
+
+import rigidsim
+from rigidsim.scene.kernels.finding import FOLDERS
+
+CONFIG = """
+name = "moon"
+[body]
+principal_moments = [8.79e34, 8.7920e34, 8.7955e34]
+host = "moon"
+[initial]
+angular_velocity = [1e-8, -2e-8, 2.6617e-6]
+quaternion = [0.9, 0.1, 0.2, 0.3]
+[ephemeris]
+kernel = "{kernel}"
+[[loads]]
+kind = "gravity_gradient"
+source = "earth"
+{strengths[0]}
+[[loads]]
+kind = "gravity_gradient"
+source = "sun"
+{strengths[1]}
+[time]
+epoch = "1969-07-20T12:00:00 TDB"
+end = "60 day"
+samples = 61
+[output]
+timeline = false
+"""
+STRENGTHS = [f"gravitational_parameter = {gm!r}" for gm in (3.986004356e14, 1.32712440041e20)]
+BEGIN, END = 2440420.0, 2440500.0
+
+
+@pytest.fixture
+def scene(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A config with an SPK file beside it."""
+    monkeypatch.delenv(FOLDERS, raising=False)
+    folder = tmp_path / "configs"
+    folder.mkdir()
+    write_spk(folder / "small.bsp", BEGIN, END)
+    path = folder / "moon.toml"
+    path.write_text(CONFIG.format(kernel="small.bsp", strengths=STRENGTHS))
+    return path
+
+
+def same(one: rigidsim.Run, other: rigidsim.Run) -> None:
+    first, second = one.dataset, other.dataset
+    assert set(first) == set(second)
+    for name in first:
+        np.testing.assert_array_equal(first[name].values, second[name].values, err_msg=str(name))
+
+
+@pytest.mark.parametrize("kind", [2, 3])
+def test_a_file_says_what_the_package_does(scene: Path, tmp_path: Path, kind: int) -> None:
+    write_spk(scene.parent / "small.bsp", BEGIN, END, kind=kind)
+    by_file = rigidsim.run(scene, out=None).dataset
+    text = CONFIG.format(kernel="de421", strengths=STRENGTHS)
+    by_package = rigidsim.run(rigidsim.parse(text), out=None).dataset
+    for source in ("earth", "sun"):
+        one, other = (x["source_position"].sel(source=source).values for x in (by_file, by_package))
+        error = np.linalg.norm(one - other, axis=1) / np.linalg.norm(other, axis=1)
+        assert error.max() < 1e-15
+    np.testing.assert_allclose(by_file["quaternion"], by_package["quaternion"], atol=1e-13)
+    assert by_file.attrs["ephemeris_kernel"] == "small.bsp"
+
+
+@pytest.mark.parametrize("kernel", ["small.bsp", "de421"])
+def test_resumed_anywhere_it_has_the_same_bits(scene: Path, tmp_path: Path, kernel: str) -> None:
+    """At each of many steps, among them those that end at edges."""
+    scene.write_text(CONFIG.format(kernel=kernel, strengths=STRENGTHS))
+    whole = rigidsim.run(scene, out=tmp_path / "whole")
+    steps = whole.summary["cost"]["steps"]
+    edges = 0
+    for stop in range(1, steps, max(steps // 12, 1)):
+        changes = {"limits.max_steps": stop}
+        begun = rigidsim.run(scene, out=tmp_path / "begun", changes=changes, force=True)
+        assert begun.status == "stopped: max_steps"
+        past = (begun.summary["engine_time"] / 86400 - 1.5 + 2) % 4 - 2  # the first block ends after 1.5 days
+        edges += abs(past) < 1e-9
+        resumed = rigidsim.resume(tmp_path / "begun" / "moon", overrides={"limits.max_steps": 10**6})
+        same(whole, resumed)
+    assert edges > 0
+
+
+def test_the_same_bytes_go_on_elsewhere_and_others_are_refused(
+    scene: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    whole = rigidsim.run(scene, out=tmp_path / "whole")
+    rigidsim.run(scene, out=tmp_path / "begun", changes={"limits.max_steps": 20})
+    run, kernel = tmp_path / "begun" / "moon", scene.parent / "small.bsp"
+    assert rigidsim.verify(tmp_path / "whole" / "moon").identical
+    given = kernel.read_bytes()
+    kernel.unlink()
+    for repeat in (rigidsim.resume, rigidsim.verify):
+        with pytest.raises(rigidsim.RigidsimError, match=r"small.bsp.*isn't there: looked for in"):
+            repeat(run if repeat is rigidsim.resume else tmp_path / "whole" / "moon")
+    write_spk(kernel, BEGIN, END, shift=1e-3)
+    for repeat in (rigidsim.resume, rigidsim.verify):
+        with pytest.raises(rigidsim.RigidsimError, match=r"begun with a kernel .* but the one found is of"):
+            repeat(run if repeat is rigidsim.resume else tmp_path / "whole" / "moon")
+    kernel.unlink()
+    elsewhere = tmp_path / "elsewhere"
+    elsewhere.mkdir()
+    (elsewhere / "small.bsp").write_bytes(given)
+    monkeypatch.setenv(FOLDERS, str(elsewhere))
+    same(whole, rigidsim.resume(run, overrides={"limits.max_steps": 10**6}))
+    assert rigidsim.verify(tmp_path / "whole" / "moon").identical
+
+
+BAD = {
+    "truncated": (lambda x: x[: len(x) // 2], "which is truncated"),
+    "no kernel": (lambda x: b"hello" * 1000, "which is no SPK file"),
+    "empty": (lambda x: b"", "which is no SPK file"),
+}
+
+
+@pytest.mark.parametrize("name", BAD)
+def test_damaged_files_are_refused(scene: Path, name: str) -> None:
+    damage, words = BAD[name]
+    kernel = scene.parent / "small.bsp"
+    kernel.write_bytes(damage(kernel.read_bytes()))
+    with pytest.raises(rigidsim.ConfigError, match=words):
+        rigidsim.run(scene, out=None)
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"loads[0].gravitational_parameter": None}, "small.bsp has none of .*give it, in m.3/s.2"),
+        ({"time.end": "200 day"}, "from 1969-07-.* to 1969-.*but the run goes from 1969-07-20T12:00:00 to"),
+        ({"ephemeris.kernel": "small"}, 'the file beside the config is "./small.bsp"'),
+        ({"ephemeris.kernel": "de421.bsp"}, 'the package is named without a suffix: "de421"'),
+        ({"ephemeris.kernel": "../configs"}, "is no installed package|which is a folder"),
+        ({"loads[0].source": "mars"}, 'given "mars"; .*small.bsp has .*earth'),
+    ],
+)
+def test_mistakes_with_files_are_refused(scene: Path, changes: dict[str, object], words: str) -> None:
+    with pytest.raises(rigidsim.ConfigError, match=words):
+        rigidsim.run(rigidsim.load(scene).replace(changes), out=None)
