@@ -20,6 +20,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
+from functools import lru_cache
 from typing import Any
 
 import heyoka as hy
@@ -37,10 +38,7 @@ from rigidsim.scene.scene import Scene
 
 _AXES = "xyz"
 _RATES = ("", "v", "a", "j")
-_MOST_KNOTS = (
-    100_000  # of a kernel that is far longer than a run, those of the run and some beyond are enough
-)
-_BEYOND = 100
+_BEYOND = 100  # blocks after the end of a run, whose own steps go past its last sample
 
 
 @dataclass
@@ -191,9 +189,7 @@ class KernelStates:
         now, one = self._start + exactly(context, ahead), group.series[0][0]
         begun = one.block_at(now)
         last = min(math.ceil((series.end - one.begin) / one.length) for series, _ in group.series)
-        if last - begun > _MOST_KNOTS:
-            end = self.ephemeris.run[1] + exactly(context, ahead)
-            last = min(last, max(one.block_at(end) + _BEYOND, begun + _MOST_KNOTS))
+        last = min(last, one.block_at(self.ephemeris.run[1] + exactly(context, ahead)) + _BEYOND)
         knots = []
         for block in range(begun + 1, last):
             edge = exactly(context, one.begin + block * group.length - ahead)
@@ -267,6 +263,7 @@ class BlockPieces:
         return found
 
 
+@lru_cache(maxsize=512)
 def _name(series: BlockSeries, axis: int, order: int) -> str:
     return f"kernel_{series.target}_{_RATES[order]}{_AXES[axis]}"
 

@@ -100,7 +100,8 @@ class PackagedKernel(Kernel):
                 remedy = f"install {self.name} again"
                 raise KernelError(_damaged(f"jpl-{file}.npy", error, remedy)) from None
             begin = (self._begin - J2000_DATE) * DAY
-            self._used[target] = BlockSeries(target, center, begin, span / len(given), given)
+            plain = given.view(np.ndarray)  # which is quicker to index than a memmap
+            self._used[target] = BlockSeries(target, center, begin, span / len(given), plain)
         return self._used[target]
 
     def path_of(self, body: str) -> list[tuple[Fraction, BlockSeries]]:

@@ -44,7 +44,7 @@ class BlockSeries:
         """End of the last block, seconds since J2000."""
         return self.begin + self.length * len(self.coefficients)
 
-    @property
+    @cached_property
     def terms(self) -> int:
         """Number of coefficients of one component in one block."""
         return int(self.coefficients.shape[2])
