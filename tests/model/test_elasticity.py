@@ -68,6 +68,23 @@ def test_without_delay(precision: str, formulation: str, end: float, within: flo
     assert "energy_balance" in run.summary["invariants"]
 
 
+@pytest.mark.slow
+@pytest.mark.optimised  # as runs are: what isn't rounds more
+@pytest.mark.parametrize(
+    # the attitude adds up what the rates wander by, a thousand radians long
+    ("precision", "rates_within", "attitude_within"),
+    [("double", 1e-12, 1e-11), ("extended", 1e-15, 1e-15)],
+)
+def test_a_thousand_radians(precision: str, rates_within: float, attitude_within: float) -> None:
+    run = run_text(scene(1000, integrator=f'precision = "{precision}"'))
+    times, elastic = run.dataset["time"].values, strength("0.3", "0.002")
+    rates, attitudes, momenta = followed(MOMENTS, elastic, RATES[2], 1, orbit_start(), RATES, times)
+    assert np.abs(wide(run.dataset, "angular_velocity") - rates).max() <= rates_within
+    assert np.abs(wide(run.dataset, "angular_momentum") - momenta).max() <= rates_within
+    assert np.abs(matrices(run.dataset) - attitudes).max() <= attitude_within
+    assert_sound(run)
+
+
 # --- with a delay -------------------------------------------------------------------------------------------
 
 
