@@ -26,7 +26,39 @@ EVENT = '[[events]]\nname = "flip"\nexpression = "wy"\n'
 DRIVEN = '[[loads]]\nkind = "torque"\ncomponents = ["0.1*sin(t)", "0", "0.05*wx"]\n'
 GRAVITY = '[[loads]]\nkind = "uniform_gravity"\n'
 
+MOON = """
+[body]
+preset = "moon"
+host = "moon"
+elasticity = {love_number = 0.0216, radius = "1738 km", delay = "0.108 day", raised_by = ["earth"]}
+core = {moment = 0.0007, flattening = 3.8e-4, friction = "1.5e-8 day^-1"}
+[body.gravity_field]
+radius = "1738 km"
+C = {"3,0" = -8.4e-6, "3,1" = 2.8e-5, "3,2" = 4.8e-6, "3,3" = 1.7e-6, "4,0" = 9.6e-6, "4,2" = -1.6e-6}
+S = {"3,1" = 5.9e-6, "3,2" = 1.7e-6, "3,3" = -2.5e-7, "4,1" = 1.6e-6, "4,2" = -1.5e-6}
+[initial]
+euler_angles = [0.0051, 0.3824, 1.2942]
+angular_velocity = ["4.6e-5 rad/day", "-2.2e-6 rad/day", "0.2299 rad/day"]
+[ephemeris]
+kernel = "de421"
+[[loads]]
+kind = "gravity_gradient"
+name = "earth"
+source = "earth"
+degree = 4
+figure = {J2 = 1.0826e-3, radius = "6378.1 km", pole = "iau1976"}
+[[loads]]
+kind = "gravity_gradient"
+source = "sun"
+"""
+"""Its kernel's blocks end every 4 and every 16 days, which are 1 and 4 samples here."""
+DAYS = 86400
 # end, samples, [integrator], rest, [output]
+MOONS = {
+    "moon_double": (1000 * DAYS, 251, "", "", ""),
+    "moon_extended": (400 * DAYS, 101, 'precision = "extended"', "", ""),
+    "moon_quadruple": (40 * DAYS, 41, 'precision = "quadruple"', "", ""),
+}
 SCENES = {
     "double_dense": (4000, 16001, "", "", ""),
     "double_chunks": (8000, 120_001, "", "", ""),  # segments of whole chunks
@@ -40,6 +72,7 @@ SCENES = {
     "extended_events": (1000, 501, 'precision = "extended"', EVENT + DRIVEN, ""),
     "quadruple_dense": (80, 321, 'precision = "quadruple"', "", ""),
     "quadruple_events": (60, 61, 'precision = "quadruple"\nformulation = "rotation_matrix"', EVENT, ""),
+    **MOONS,
 }
 
 
@@ -51,8 +84,9 @@ def text_of(name: str, longer: int = 1) -> str:
     """
     end, samples, integrator, rest, output = SCENES[name]
     end *= longer
+    body, epoch = (MOON, 'epoch = "1969-06-28T00:00:00 TDB"\n') if name in MOONS else (BODY, "")
     return (
-        f'name = "{name}"\n{BODY}{rest}[time]\nend = {end}\nsamples = {samples}\n'
+        f'name = "{name}"\n{body}{rest}[time]\n{epoch}end = {end}\nsamples = {samples}\n'
         # a run that may be stopped isn't refused where the disk is too small for all of it
         f"[integrator]\n{integrator}\n[limits]\nwall_time = 3600\n[output]\ntimeline = false\n{output}\n"
     )

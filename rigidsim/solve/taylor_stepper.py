@@ -270,8 +270,9 @@ class TaylorStepper(Stepper):
     ) -> bool:
         self.smallest, self.largest = abs(float(smallest)), abs(float(largest))
         if taken and self.largest == 0.0 and self._integrator.dtime != before:
-            # heyoka omits steps of the greatest allowed size
-            self.smallest = self.largest = float(self._longest)
+            # heyoka omits steps of the greatest allowed size, and one that ends where it must
+            gone = abs(float(self._integrator.time - before[0])) if taken == 1 else 0.0
+            self.smallest = self.largest = gone or float(self._longest)
         self.steps += int(taken)
         self._judge(before[0], int(taken))
         return bool(outcome != _LOST)

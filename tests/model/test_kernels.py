@@ -210,3 +210,20 @@ def test_mistakes_are_refused(name: str) -> None:
     with pytest.raises(rigidsim.ConfigError) as caught:
         run_text(MOON.format(times=[0, 1.0]), setting)
     assert words in str(caught.value)
+
+
+def test_steps_that_end_at_the_edges_of_blocks_leave_a_loose_runs_errors_known() -> None:
+    """Their size is how far they went. Taken for the longest allowed, they would be told in the summary, and
+    what the tolerance cuts off beyond all bounds.
+    """
+    loose, usual = (
+        run_text(MOON.format(times=[0, 57 * 86400.0]), f"integrator.tolerance={tolerance}", estimate=True)
+        for tolerance in ("1e-8", '"auto"')
+    )
+    angle = 2 * np.linalg.norm(
+        loose.dataset["quaternion"].values[-1] - usual.dataset["quaternion"].values[-1]
+    )
+    announced = loose.summary["accuracy"]["estimated_attitude_error"]
+    assert angle / 3 < announced < 3000 * angle
+    assert announced < 1e-4
+    assert loose.summary["cost"]["largest_step"] <= 4 * 86400
