@@ -2,18 +2,22 @@
 
 import re
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import lru_cache, partial
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from rigidsim.errors import ConfigError, MemberError, Problem, RigidsimError
+from rigidsim.errors import ConfigError, MemberError, Problem, RigidsimError, RunFolderError
 from rigidsim.model.tangents import GROWTH
 from rigidsim.scene.config import Experiment
+from rigidsim.scene.kernels.finding import FOLDERS
+from rigidsim.scene.scene import build_scene
 from rigidsim.scene.sweep_table import INDICATORS
 from rigidsim.scene.sweeps.sweep import Sweep
+from rigidsim.session.dataset import kernel_attributes
 from rigidsim.session.members import MemberResults, run_alone
 from rigidsim.solve.problem import prepare
 from rigidsim.store import provenance
@@ -33,6 +37,28 @@ _LINES = 5  # of each signal's spectrum
 def sweep_of(config: str) -> Sweep:
     """The sweep of a config's text, worked out once per process."""
     return recording(Sweep.of(parse(config, source="the sweep's config")))
+
+
+@lru_cache(maxsize=4)
+def kernel_of_members(config: str) -> dict[str, Any]:
+    """What tells the kernel of a config's members; empty without one."""
+    sweep = sweep_of(config)
+    if sweep.base.config.ephemeris is None:
+        return {}
+    return kernel_attributes(build_scene(sweep.worked_out(first_possible(sweep))))
+
+
+def refuse_other_kernel(config: str, begun: Mapping[str, Any], place: Path) -> None:
+    """Refuse to go on with members that were begun with another kernel than the one that is found now.
+
+    Raises:
+        RunFolderError: its bytes differ.
+    """
+    then, now = begun.get("ephemeris_sha256"), kernel_of_members(config).get("ephemeris_sha256")
+    if then is not None and now is not None and then != now:
+        what = f'{place}: begun with a kernel "{begun["ephemeris_kernel"]}" of SHA-256 {then}, but the one '
+        what += f"found is of {now}; put the former in its place, or name its folder in the environment "
+        raise RunFolderError(f"{what}variable {FOLDERS}, and remove the other")
 
 
 def first_possible(sweep: Sweep) -> int:
@@ -89,6 +115,7 @@ def tile_image(config: str, members: Sequence[int], keep: Sequence[str], apart: 
         "finished_at": provenance.now(),
         "cpu_model": provenance.cpu_model(),
         **{f"version_{name}": version for name, version in provenance.versions().items()},
+        **kernel_of_members(config),
     }
     return Tile(
         sweep.experiment.sha256,

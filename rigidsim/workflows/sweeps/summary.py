@@ -57,7 +57,8 @@ def summary_of(
         for engine, number in made["engines"].items():
             engines[engine] = engines.get(engine, 0) + number
     kinds = [
-        {k: v for k, v in made.items() if k.startswith(("version_", "cpu_model"))} for made in found.made
+        {k: v for k, v in made.items() if k.startswith(("version_", "cpu_model", "ephemeris_"))}
+        for made in found.made
     ]
     differing = sorted({k for kind in kinds for k, v in kind.items() if v != kinds[0].get(k)})
     mixed = ", ".join(differing) or None

@@ -21,7 +21,7 @@ from rigidsim.store.variables import SCHEMA_VERSION
 from rigidsim.workflows.read import Given, as_experiment
 from rigidsim.workflows.sweeps.batch import why_alone
 from rigidsim.workflows.sweeps.cluster import Cluster
-from rigidsim.workflows.sweeps.members import batches_of, recording, sweep_of
+from rigidsim.workflows.sweeps.members import batches_of, recording, refuse_other_kernel, sweep_of
 from rigidsim.workflows.sweeps.plan import check_sweep, refuse_untold_tiles, tile_length
 from rigidsim.workflows.sweeps.summary import summary_of
 from rigidsim.workflows.sweeps.ways import Way, Workers
@@ -155,6 +155,10 @@ def run_sweep(
             if share is None:
                 folder.begin(force=force)
             _refuse_other(wanted, folder)
+            for begun in folder.generations() if wanted.base.config.ephemeris is not None else ():
+                for tile in folder.present(begun).nonzero()[0][:1].tolist():
+                    made = folder.read(begun, tile).made
+                    refuse_other_kernel(wanted.experiment.text, made, folder.tile(begun, tile))
             generation = _generation(wanted, folder, length, exclusive=share is not None)
             interrupted = _run_tiles(folder, generation, way, share, observer)
             all_there = bool(folder.present(generation).all())

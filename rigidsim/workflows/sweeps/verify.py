@@ -13,7 +13,7 @@ from rigidsim.scene.sweeps.sweep import Sweep
 from rigidsim.store import provenance
 from rigidsim.store.sweeps.run import SavedSweep, open_sweep
 from rigidsim.store.sweeps.tiles import Kept
-from rigidsim.workflows.sweeps.members import run_members, sweep_of
+from rigidsim.workflows.sweeps.members import refuse_other_kernel, run_members, sweep_of
 from rigidsim.workflows.verify import Difference, Verdict, first_unequal
 
 MEMBERS = 100
@@ -35,6 +35,7 @@ def verify_sweep(
         raise RunFolderError(f"{saved.place}: is {saved.status}; {RESUME} completes it")
     with saved.dataset as dataset:
         sweep = sweep_of(str(dataset.attrs["config"]))
+        refuse_other_kernel(sweep.experiment.text, saved.outcome.provenance, saved.folder.dataset)
         problems = _problems(saved, dataset, sweep)
         chosen = sorted(random.Random(seed).sample(range(sweep.count), min(members, sweep.count)))
         differing: dict[str, None] = {}
