@@ -1,4 +1,4 @@
-"""Runs and sweeps under an SPK file go on with the same bytes wherever they are, and refuse others at once."""
+"""Runs and sweeps under an SPK file go on with the same bytes wherever these are, and with no others."""
 
 from __future__ import annotations
 
