@@ -235,6 +235,11 @@ def _refuse_spectrum(system: System) -> None:
         return
     why = "an orbit goes by a table, at whose rows its states are set and variational equations end"
     instead = "give the orbit by elements"
+    if not system.plan.tables:
+        why = (
+            "places go by a kernel, at the edges of whose blocks states are set and variational equations end"
+        )
+        instead = "give orbits by elements"
     if found:
         why = f"the equations switch at a kink or jump of {found[0].text} ({found[0].where}), where "
         why += "variational equations end"

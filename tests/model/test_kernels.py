@@ -200,6 +200,9 @@ BAD = {
     "host": ('body.host="mon"', 'given "mon"; did you mean "moon"'),
     "no host": ("body.host=", "name that in [body] host"),
     "itself": ('body.host="earth"', 'given "earth", which is the body itself'),
+    "averaged": ('model.level="spin_averaged"', "set at the edges of its blocks"),
+    "spectrum": ("output.lyapunov=true", "at the edges of whose blocks states are set"),
+    "two places": ("loads[0].position=[1, 0, 0]", "exactly one of orbit, position, ephemeris and source"),
     "axes": ('frame.axes="EME2000"', "the bias of 0.02 arcsec"),
 }
 
