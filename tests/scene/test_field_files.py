@@ -40,7 +40,7 @@ def _factorial(n: int) -> int:
 def gfc(
     norm: str = "norm fully_normalized", rows: dict | None = None, more: str = "", mark: str = "e"
 ) -> str:
-    full = "fully" in norm
+    full = "unnormalized" not in norm  # the default of the format
     lines = [
         f"gfc {n} {m} {c / (factor(n, m) if full else 1):.17e} {s / (factor(n, m) if full else 1):.17e} 0 0"
         for (n, m), (c, s) in (rows or ROWS).items()
@@ -98,8 +98,8 @@ def final(experiment: rigidsim.Experiment) -> np.ndarray:
 
 @pytest.mark.parametrize(
     "field",
-    [gfc(), gfc("norm unnormalized"), gfc(mark="D"), tab(), tab(0)],
-    ids=["gfc", "unnormalized", "fortran", "tab", "tab unnormalized"],
+    [gfc(), gfc("errors formal"), gfc("norm unnormalized"), gfc(mark="D"), tab(), tab(0)],
+    ids=["gfc", "normalized by default", "unnormalized", "fortran", "tab", "tab unnormalized"],
 )
 def test_a_file_is_the_field_that_it_lists(tmp_path: Path, field: str) -> None:
     found, expected = final(saved(tmp_path, field)), final(rigidsim.parse(text(listed())))
@@ -156,7 +156,6 @@ def test_every_digit_is_kept(tmp_path: Path) -> None:
 
 
 REFUSED = {
-    "no normalization": (gfc("").replace("\n\n", "\n"), "doesn't say how its coefficients are normalized"),
     "another normalization": (gfc("norm half"), "has norm half"),
     "degree 2 of another body": (
         gfc(rows=ROWS | {(2, 0): (-0.001, 0.0)}),

@@ -109,19 +109,15 @@ def _icgem(lines: list[tuple[int, str]]) -> tuple[FieldFile, Iterator[Row]]:
     for key in ("radius", "max_degree", *([] if strength else _STRENGTH[:1])):
         if key not in head:
             raise FieldFileError(f"has no {key} before {HEAD_ENDS}")
-    if "norm" not in head:
-        raise FieldFileError(
-            f"doesn't say how its coefficients are normalized; write a line norm fully_normalized (or norm "
-            f"unnormalized) before {HEAD_ENDS}"
-        )
-    if head["norm"] not in _NORMALIZED:
-        raise FieldFileError(f"has norm {head['norm']}; {' and '.join(_NORMALIZED)} are read")
+    norm = head.get("norm", "fully_normalized")  # the format's own default
+    if norm not in _NORMALIZED:
+        raise FieldFileError(f"has norm {norm}; {' and '.join(_NORMALIZED)} are read")
     if not head["max_degree"].isdigit():
         raise FieldFileError(f"has max_degree {head['max_degree']}; a whole number is expected")
     found = FieldFile(
         _positive(head["radius"], "radius"),
         _positive(head[strength or ""], strength or ""),
-        _NORMALIZED[head["norm"]],
+        _NORMALIZED[norm],
         int(head["max_degree"]),
         head.get("tide_system", ""),
         head.get("modelname", ""),
