@@ -9,9 +9,11 @@ from pathlib import Path
 from typing import Any
 
 from rigidsim.errors import FORCE, OUT, ConfigError, Problem, RunFolderError
+from rigidsim.scene.scene import build_scene
 from rigidsim.scene.sweeps.sweep import Sweep
 from rigidsim.scene.toml_text import apply_overrides, parse_toml
 from rigidsim.scene.validation_messages import shown
+from rigidsim.session.dataset import kernel_attributes
 from rigidsim.store.sweeps.dataset import write_dataset
 from rigidsim.store.sweeps.folder import SweepFolder
 from rigidsim.store.sweeps.run import SavedSweep, open_sweep
@@ -292,6 +294,8 @@ def _completed(wanted: Sweep, folder: SweepFolder, wall: float, cpu: float) -> S
         "mixed_provenance": summary.mixed_provenance or "",
         **summary.provenance,
     }
+    if wanted.base.config.ephemeris is not None:  # of the first member, as the config's own values are
+        attributes |= kernel_attributes(build_scene(wanted.experiment_of(0)))
     digest = write_dataset(folder.dataset, wanted, sources, reader, found, attributes)
     summary = summary.having(dataset_sha256=digest)
     folder.write_summary(summary)
