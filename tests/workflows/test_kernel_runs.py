@@ -73,7 +73,7 @@ def test_a_file_says_what_the_package_does(scene: Path, tmp_path: Path, kind: in
     assert by_file.attrs["ephemeris_kernel"] == "small.bsp"
 
 
-@pytest.mark.parametrize("kernel", ["small.bsp", "de421"])
+@pytest.mark.parametrize("kernel", ["small.bsp", pytest.param("de421", marks=pytest.mark.slow)])
 def test_resumed_anywhere_it_has_the_same_bits(scene: Path, tmp_path: Path, kernel: str) -> None:
     """At each of many steps, among them those that end at edges."""
     scene.write_text(CONFIG.format(kernel=kernel, strengths=STRENGTHS))
