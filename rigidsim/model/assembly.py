@@ -35,7 +35,7 @@ def assemble_states(
         vertical=requirements.vertical, flies=flies, loads=list(plan.loads), orbit_tags=plan.orbit_tags,
         surfaces=plan.surfaces, tables=plan.tables, clocked=plan.clocked,
     )  # fmt: skip
-    if m.slip is not None and m.attitude is not None:  # which turns by rates that take the attitude
+    if m.slip is not None and m.attitude is not None and formulation.carries_rates:  # turns by what takes it
         m = replace(m, attitude=formulation.attitude(plan, m.rates, number))
     blocks = formulation.blocks(m, plan)
     if flies:

@@ -290,7 +290,7 @@ def test_what_no_elastic_body_has_is_refused(elastic: str, said: str) -> None:
     [
         ('[integrator]\nformulation = "canonical"', "the moments of an elastic body vary"),
         ('[integrator]\nformulation = "planar"', "the moments of an elastic body vary"),
-        ('[integrator]\nmethod = "closed_form"', "distort"),
+        ('[integrator]\nmethod = "closed_form"', "no closed form here"),
         ("[integrator]\nhold_invariants = true", "the moments of an elastic body vary"),
         ('[model]\nlevel = "spin_averaged"', "the moments of an elastic body vary"),
         ('[model]\nlevel = "orbit_averaged"', "the moments of an elastic body vary"),
