@@ -41,6 +41,7 @@ LEAST: dict[WarningCode, Soundness] = {
     WarningCode.SINGULARITY: Soundness.LIMITED,
     WarningCode.NOT_JOINED: Soundness.LIMITED,
     WarningCode.UNDEFINED: Soundness.LIMITED,
+    WarningCode.DELAY_TOO_LONG: Soundness.LIMITED,
     # of what the config asks for, and of the files: they leave the numbers what they are
     WarningCode.NO_EFFECT: Soundness.SOUND,
     WarningCode.SET_ASIDE: Soundness.SOUND,

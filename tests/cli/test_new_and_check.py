@@ -141,6 +141,6 @@ def test_completion(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, rigidsim_co
     assert methods == [f"integrator.method={name}" for name in METHODS]  # also those that a test registers
     assert "integrator.precision=quadruple" in completion.settings("integrator.precision=")
     assert completion.settings("output.timeline=f") == ["output.timeline=false"]
-    assert completion.settings("body.preset=ea") == ["body.preset=earth"]
+    assert completion.settings("body.preset=ea") == ["body.preset=earth", "body.preset=earth_rigid"]
     assert completion.settings("nonsense=") == []
     assert "--install-completion" in rigidsim_command("--help").stdout
