@@ -194,5 +194,5 @@ def _recurrence(orbit: KeplerOrbit, halves: int) -> tuple[int, int]:
 
 def _with_orbit(scene: Scene, load: Any, orbit: KeplerOrbit) -> Scene:
     """The scene with its source on another orbit that has the same place at the start."""
-    moved = replace(load, orbit=orbit)
+    moved = replace(load, placement=replace(load.placement, orbit=orbit))
     return replace(scene, loads=tuple(moved if x is load else x for x in scene.loads))
