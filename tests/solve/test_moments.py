@@ -208,7 +208,7 @@ def test_announced_errors_of_late_pulses_and_spikes(family: str) -> None:
         judged += 1
         beyond += found.true > 3 * found.announced
         assert found.true <= 10 * found.announced or found.warned or found.gone, found.line
-    assert judged >= 40
+    assert judged >= 30  # about a third are refused: canonical momenta, spikes too narrow
     assert beyond <= 1
 
 
