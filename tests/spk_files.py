@@ -1,4 +1,4 @@
-"""SPK files written by hand: SPICE's double precision arrays with segments of type 2, little-endian."""
+"""SPK files written by hand: SPICE's arrays of doubles, with segments of types 2 and 3, little-endian."""
 
 from __future__ import annotations
 
@@ -17,17 +17,17 @@ FIRST, LAST = 2440368.5, 2440624.5
 
 def write_spk(path: Path, segments: Mapping[tuple[int, int], tuple[float, float, np.ndarray]]) -> None:
     """An SPK file: by target and centre the first block's begin and the length of all (s since J2000), and
-    coefficients (blocks, 3, terms), km.
+    coefficients (blocks, 3, terms), km; (blocks, 6, terms), with velocities, is type 3.
     """
     summaries, words, at = [], [], 3 * _RECORD // 8 + 1
     for (target, center), (begin, length, blocks) in segments.items():
-        count, _, terms = blocks.shape
+        count, parts, terms = blocks.shape
         middles = begin + length * (np.arange(count) + 0.5)
         rows = np.column_stack([middles, np.full(count, length / 2), blocks.reshape(count, -1)])
-        data = [*rows.ravel(), begin, length, 2 + 3 * terms, count]
+        data = [*rows.ravel(), begin, length, 2 + parts * terms, count]
         last = at + len(data) - 1
         span = begin, begin + length * count
-        summaries.append(struct.pack("<2d6i", *span, target, center, 1, 2, at, last))
+        summaries.append(struct.pack("<2d6i", *span, target, center, 1, parts // 3 + 1, at, last))
         words += data
         at = last + 1
     header = struct.pack("<8sII60sIII8s", b"DAF/SPK ", 2, 6, b"by hand".ljust(60), 2, 2, at, b"LTL-IEEE")
