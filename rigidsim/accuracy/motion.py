@@ -48,7 +48,9 @@ def run_pilot(
     the most, give or take a chunk, and none come after the last sample. ``skip`` takes steps with what is
     done between.
     """
-    skip = skip or stepper.skip
+    # past the last of its pieces a motion may be one in which nothing happens, with steps of any length
+    near_end = skip is not None and stepper.system.pieces is not None
+    chunk, skip = 1 if near_end else chunk, skip or stepper.skip
     begin, end = float(clock.start), float(clock.at(clock.count - 1))
     going = not warming or skip(warming)
     warm, spent = stepper.steps, 0.0
@@ -58,6 +60,9 @@ def run_pilot(
         spent += time.process_time() - started
         going = going and spent < seconds and stepper.steps < steps and float(stepper.time) < end
         chunk = min(2 * chunk, largest_chunk)
+        if near_end and going:
+            left = (end - float(stepper.time)) / (float(stepper.time) - begin)
+            chunk = min(chunk, max(1, math.ceil(left * stepper.steps)))
     done = max(float(stepper.time) - begin, 1e-300)
     taken = max(stepper.steps, 1)
     return Pilot(

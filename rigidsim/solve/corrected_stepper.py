@@ -69,6 +69,11 @@ class CorrectedStepper:
         self.stepper.until = min((end for end in ends if end is not None), default=None)
 
     @property
+    def acts_anywhere(self) -> bool:
+        """Whether effects may be due within a stride."""
+        return bool(self._anywhere)
+
+    @property
     def left(self) -> int:
         """Steps until the next corrections, at least 1."""
         return self.stride - self.stepper.steps % self.stride

@@ -91,10 +91,12 @@ def _begins(system: System, precision: Precision) -> bool:
 
 def _sides(system: System, precision: Precision) -> dict[str, Any]:
     """Parameters of the equations: on whichever side of surfaces, and at the start's own time."""
+    if system.pieces is not None:
+        pieces = system.pieces.parameters(0)
+        sides = [mpmath.mpf(1)] * system.first_of_pieces
+        return {"pars": np.concatenate([precision.array(sides), pieces]) if sides else pieces}
     if count := system.parameters:
         return {"pars": precision.array([mpmath.mpf(n < count - system.clocked) for n in range(count)])}
-    if system.pieces is not None:
-        return {"pars": np.array(system.pieces.parameters(0), dtype=precision.scalar)}
     return {}
 
 

@@ -8,8 +8,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, Protocol
 
-import numpy as np
-
 from rigidsim.model.system import System
 from rigidsim.solve.compiled import TaylorEngine
 from rigidsim.solve.precision import Scalar
@@ -47,11 +45,12 @@ class SetAtKnots:
 
     def __init__(self, system: System) -> None:
         assert system.pieces is not None
-        self._pieces, self._states = system.pieces, system.states
+        self._pieces = system.pieces
+        self._places = {name: place for place, name in enumerate(system.states)}
         self._entered: tuple[int, int] | None = None
 
-    def meet(self, integrator: TaylorEngine) -> Scalar | None:
-        """See ``Requirement``: continue with the piece that begins at this boundary, or contains it."""
+    def enter(self, integrator: TaylorEngine) -> int:
+        """Continue in the states of the piece that begins at this boundary, or contains it: its number."""
         pieces = self._pieces
         high, low = integrator.dtime
         number = pieces.number_at(high)
@@ -60,15 +59,23 @@ class SetAtKnots:
                 integrator.dtime = (high, high * 0)
             state = integrator.state
             for name, value in pieces.states(number).items():
-                state[self._states.index(name)] = value
+                state[self._places[name]] = value
+        return number
+
+    def meet(self, integrator: TaylorEngine) -> Scalar | None:
+        """See ``Requirement``."""
+        pieces, number = self._pieces, self.enter(integrator)
         if self._entered != (number, id(integrator)):
-            integrator.pars[:] = np.array(pieces.parameters(number), dtype=integrator.pars.dtype)
+            integrator.pars[:] = pieces.parameters(number)
             self._entered = (number, id(integrator))
-        return self.end_after(high)
+        return self._end(number)
 
     def end_after(self, time: Scalar) -> Scalar | None:
         """See ``Requirement``."""
-        knots, number = self._pieces.knots, self._pieces.number_at(time)
+        return self._end(self._pieces.number_at(time))
+
+    def _end(self, number: int) -> Scalar | None:
+        knots = self._pieces.knots
         return knots[number] if number < len(knots) else None
 
 

@@ -1,7 +1,7 @@
 """What goes between a driver and its run: progress, checks, how much at once, and the buffer of samples."""
 
 import time
-from bisect import bisect_left
+from bisect import bisect_left, bisect_right
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Protocol
@@ -95,8 +95,7 @@ class SampleBuffer:
         self._most = _FEWEST_ROWS
         self._affordable: dict[str, int] = {}
         self._handed_at = time.perf_counter()
-        self._upcoming: tuple[int, Scalar] | None = None
-        self._found = 0  # found before the last limit: the next call expects about as many
+        self._times: tuple[int, np.ndarray] = 0, clock.internal(0, 0)  # of the rows asked for last
 
     @property
     def complete(self) -> bool:
@@ -116,26 +115,32 @@ class SampleBuffer:
     @property
     def upcoming(self) -> Scalar:
         """Time of the next sample."""
-        if self._upcoming is None or self._upcoming[0] != self.count:
-            self._upcoming = self.count, self._clock.at(self.count)
-        return self._upcoming[1]
+        first, times = self._times_around(self.count)
+        return times[self.count - first]
 
     def until(self, limit: Scalar, most: int) -> np.ndarray:
         """Times of the next samples at or before ``limit``, at most ``most``."""
-        position = first = self.count
-        rows = min(self._found + 1, self._pacing.rows_at_once)
+        position = self.count
         stop = min(self._clock.count, position + max(most, 0))
-        pieces = [self._clock.internal(0, 0)]
+        found = [self._times[1][:0]]
         while position < stop:
-            times = self._clock.internal(position, min(position + rows, stop))
-            inside = int(np.count_nonzero(times <= limit))
-            pieces.append(times[:inside])
-            position += inside
-            if inside < len(times):
+            first, times = self._times_around(position)
+            end = min(stop - first, len(times))
+            past = bisect_right(times, limit, position - first, end)
+            found.append(times[position - first : past])
+            position = first + past
+            if past < end:
                 break
-            rows = min(_GROWTH * rows, self._pacing.rows_at_once)
-        self._found = position - first
-        return np.concatenate(pieces)
+        return found[-1] if len(found) <= 2 else np.concatenate(found)
+
+    def _times_around(self, index: int) -> tuple[int, np.ndarray]:
+        """Times of a sample and those about it, as many as are evaluated together, and the first index."""
+        first, times = self._times
+        if not first <= index < first + len(times):
+            rows = self._pacing.rows_at_once
+            first = index - index % rows
+            self._times = first, self._clock.internal(first, min(first + rows, self._clock.count))
+        return self._times
 
     def take(self, block: SampleBlock, boundary: StepBoundary) -> None:
         """Take the next samples, with a step boundary before them."""

@@ -184,10 +184,12 @@ class TaylorStepper(Stepper):
         return False
 
     def grid(self, times: np.ndarray, count: int) -> tuple[bool, np.ndarray]:
-        """Take ``count`` steps from a whole time: whether all went well, and the states (n, states) at those
-        ``times`` that they reached. The times ascend, and none lies before the current one; ``until`` must be
-        None.
+        """Take ``count`` steps, from a whole time unless steps have to end at given times: whether all went
+        well, and the states (n, states) at those ``times`` that they reached. The times ascend, and none lies
+        before the current one.
         """
+        if self.end is not None:
+            return self._one_by_one(times, count)
         self._meet()
         ends = np.array([self._integrator.time, self._far], dtype=times.dtype)
         first = int(len(times) > 0 and times[0] == ends[0])
@@ -199,6 +201,23 @@ class TaylorStepper(Stepper):
             callback=self._watched(),
         )
         return self._account(before, outcome, smallest, largest, taken), states[1 - first :]
+
+    def _one_by_one(self, times: np.ndarray, count: int) -> tuple[bool, np.ndarray]:
+        """As ``grid``, which would take a step of no length at the beginning of each call."""
+        states, finite = np.empty((len(times), len(self.state)), dtype=times.dtype), True
+        smallest, largest, row = np.inf, 0.0, 0
+        for _ in range(count):
+            if not (finite := self.step()):
+                break
+            smallest, largest = min(smallest, self.smallest), max(largest, self.largest)
+            now = self._integrator.time
+            while row < len(times) and times[row] <= now:
+                states[row] = self._integrator.update_d_output(times[row])
+                row += 1
+            if self.collapsed:
+                break
+        self.smallest, self.largest = smallest, largest
+        return finite, states[:row]
 
     def step(self) -> bool:
         """Take one step with dense output; False if the state is no longer finite."""

@@ -5,29 +5,31 @@ integrator or code compiled for it, how its motions are perturbed, and what was 
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 
 from rigidsim.accuracy.estimates import margins
-from rigidsim.model.capabilities import Ahead, having, is_wide
+from rigidsim.model.capabilities import Ahead, having
 from rigidsim.model.formulations.formulation import Rounding
 from rigidsim.model.system import System
 from rigidsim.scene.transitions import acts_at_moments_alone
 from rigidsim.solve.compiled import TaylorEngine
 from rigidsim.solve.effects.angle_wrapping import STEPS_BETWEEN
-from rigidsim.solve.effects.waypoints import Waypoints
+from rigidsim.solve.effects.waypoints import Waypoint, Waypoints
 from rigidsim.solve.precision import precision_of
 from rigidsim.solve.problem import InitialValueProblem, double_twin
 from rigidsim.solve.shadow.carriers import (
     TIGHT,
     BatchCarrier,
     OwnCarrier,
-    SeriesErrors,
     StepperCarrier,
     own_until,
 )
 from rigidsim.solve.shadow.ensemble import EnsembleCarrier, Perturbations, ShadowEnsemble
 from rigidsim.solve.shadow.measures import Measures, Spread, Starts
+from rigidsim.solve.shadow.series_errors import SeriesErrors
+from rigidsim.solve.shadow.through_pieces import ThroughPieces
 from rigidsim.solve.taylor_stepper import TaylorStepper
 
 UNCERTAIN = 1e-2
@@ -56,6 +58,22 @@ class Course:
         """The errors in epsilons past which nothing is learnt."""
         return math.pi / float(self.prepared.precision.epsilon)
 
+    def passed(self, first: float, last: float) -> list[Waypoint]:
+        """The run's waypoints between two counts of steps, as the ensemble passes them: where a piece of the
+        equations ends, as the next one begins.
+        """
+        there = [] if self.waypoints is None else self.waypoints.between(first, last)
+        system = self.shadowed if self.same_states else self.prepared.system
+        if system.pieces is None or not (self.same_states or self.own is not None):
+            return there
+        through, found = ThroughPieces(system.pieces, system.states), list[Waypoint]()
+        rounding = float(self.prepared.precision.epsilon)
+        for waypoint in there:
+            state = waypoint.state.copy()
+            time = through.beginning(state, waypoint.time, rounding * abs(waypoint.time))
+            found.append(replace(waypoint, time=time, state=state))
+        return found
+
     def at(self, share: float) -> float:
         """The time at a share of the run."""
         return self.end if share >= 1 else self.start + (self.end - self.start) * share
@@ -76,6 +94,15 @@ class Course:
         singularities of these.
         """
         return self.prepared.system.formulation.variables.regular
+
+    @cached_property
+    def shadowed(self) -> System:
+        """The system in double precision that code compiled for the ensemble integrates."""
+        if not self.same_states:
+            return double_twin(self.prepared)
+        system = self.prepared.system
+        as_it_is = self.prepared.precision.name == "double" and not system.in_two_parts
+        return system if as_it_is else system.rounded(precision_of("double").number)
 
     @property
     def own(self) -> TaylorStepper | None:
@@ -159,27 +186,28 @@ def ensemble_of(course: Course, part: float, first: float, tolerance: float) -> 
     series: SeriesErrors | None = None
     stand_in = False
     follows = tolerance > TIGHT or not course.loose  # it is as loose as the run
-    if own is not None and own.system.stepwise:
+    if own is not None and system.switches:
         carrier: EnsembleCarrier = StepperCarrier(system, course.start, course.end, course.steps, own)
     elif own is not None and follows and _by_itself(course, own.integrator, part, tolerance):
         carrier = OwnCarrier(system, own.integrator, tolerance if course.same_states else None)
         if course.loose:
             series = SeriesErrors(system, prepared.effective_tolerance, own.integrator)
     else:
-        same = course.same_states
-        system = system.rounded(precision_of("double").number) if same else double_twin(prepared)
+        same, system = course.same_states, course.shadowed
         stand_in = not same and prepared.system.partner is None
-        if system.stepwise:
+        if system.switches:
             known = prepared.effective_tolerance if course.loose and same else None
             carrier = StepperCarrier(system, course.start, course.end, course.steps, known)
         else:
             carrier = BatchCarrier(system, course.steps * part, tolerance)
-        if course.loose and not system.stepwise:
+        if course.loose and not system.switches:
             turning, places = list[int](), Measures(system).places
             if prepared.scene.config.states and prepared.system.formulation.rounding is Rounding.ANGLES:
                 turning = places["rates"] + places["attitude"]
             mean = abs(course.end - course.start) / max(course.steps, 1)
-            series = SeriesErrors(system, prepared.effective_tolerance, turning=turning, mean=mean)
+            # to compile long expressions once more takes as long as the run
+            known = own.integrator if own is not None and same and system.pieces is not None else None
+            series = SeriesErrors(system, prepared.effective_tolerance, known, turning=turning, mean=mean)
     cut_off = None
     if isinstance(carrier, StepperCarrier) and course.loose and course.same_states:
         cut_off = carrier.of_step
@@ -205,18 +233,21 @@ def ensemble_of(course: Course, part: float, first: float, tolerance: float) -> 
 
 def _by_itself(course: Course, own: TaylorEngine, part: float, tolerance: float) -> bool:
     """Whether the run's own integrator carries its ensemble, at least at first."""
+    if course.prepared.system.pieces is not None and course.same_states:
+        return course.steps * part < own_until(course.prepared.system, own)
     if tolerance <= TIGHT or (part < 1 and not course.same_states):
         return course.steps * part < margins.MOST_OWN_STEPS
     if course.prepared.system.formulation.rounding is Rounding.MOMENTA:
         return course.steps * part <= margins.CANONICAL_STEPS
-    return course.same_states or course.steps * part < own_until(own)
+    return course.same_states or course.steps * part < own_until(course.prepared.system, own)
 
 
 def plain_perturbations(system: System) -> Perturbations:
     """Errors of a step in quaternions or rates at the precision's own tolerance."""
-    ahead = max((x.seconds_ahead for x in having(Ahead, system.plan.loads)), key=abs, default=0.0)
+    loads = list(having(Ahead, system.plan.loads))
+    ahead = max((load.seconds_ahead for load in loads), key=abs, default=0.0)
     plain = Perturbations(ahead=math.ldexp(ahead, -system.scaling.time))
-    if not any(map(is_wide, system.plan.loads)):
+    if not any(load.of_time for load in loads):
         return plain
     return replace(plain, clock=_OF_SERIES * plain.clock, together=_WITHIN_MONTH)
 
@@ -225,7 +256,7 @@ def _perturbations(course: Course, stand_in: bool) -> Perturbations:
     """Errors of a step."""
     prepared = course.prepared
     plain, rounding = plain_perturbations(prepared.system), prepared.system.formulation.rounding
-    if prepared.system.stepwise and course.loose and not course.same_states:
+    if prepared.system.switches and course.loose and not course.same_states:
         plain = replace(
             plain, own=margins.CUT_OFF * prepared.effective_tolerance / float(prepared.precision.epsilon)
         )

@@ -259,7 +259,7 @@ def _stable(course: Course, spread: Spread, longer: float, turned: float) -> flo
     """Error at the end (rad) if the motion amplifies none of what its ensemble is perturbed by."""
     prepared, epsilon = course.prepared, float(course.prepared.precision.epsilon)
     # where steps end on surfaces, the tolerance itself is the size of perturbations
-    level = prepared.law_tolerance if prepared.system.stepwise else epsilon
+    level = prepared.law_tolerance if prepared.system.switches else epsilon
     # the ensemble may take more steps than the run, of short motions above all, and is perturbed at the start
     steps = max(course.steps, round(float(spread.largest("steps")[0]) * longer) + 1)
     # truncation errors may add up one by one, and what they do to the rates with them: n^2 / 2 of phase

@@ -94,7 +94,7 @@ def _follow_loosely(course: Course, part: float) -> tuple[Followed, bool]:
 
 def _can_be_checked(course: Course, part: float) -> bool:
     """Whether a motion that is followed loosely can be held against the run's own, or shows growth itself."""
-    if course.prepared.system.stepwise or course.waypoints is None:
+    if course.prepared.system.switches or course.waypoints is None:
         return False
     last = part * course.steps
     return not course.same_states or bool(course.waypoints.between(last / 2, last))
@@ -102,7 +102,7 @@ def _can_be_checked(course: Course, part: float) -> bool:
 
 def _affordable(course: Course) -> float:
     """Steps that may be followed: a fixed number whatever they cost, or a small part of the run's cost."""
-    if course.prepared.system.stepwise:
+    if course.prepared.system.switches:
         return max(margins.SWITCHING_STEPS, margins.SWITCHING_SHARE * course.steps)
     dearer = margins.DEARER.get(course.prepared.precision.name)
     if dearer is None:
@@ -186,7 +186,7 @@ def _stay_on_course(course: Course, ensemble: ShadowEnsemble, share: float) -> b
     loosely = isinstance(ensemble.carrier, BatchCarrier) and ensemble.carrier.tolerance == LOOSE
     if course.waypoints is None or not (loosely and course.same_states):
         return True
-    there = course.waypoints.between(0, share * course.steps)
+    there = course.passed(0, share * course.steps)
     for waypoint in reversed(there[:: -margins.LOOKS]):
         if waypoint.time <= ensemble.time[0]:
             continue
@@ -204,9 +204,9 @@ def _waypoints(course: Course, part: float) -> list[Waypoint]:
     """Where windows begin; none if the ensemble's states differ from the run's."""
     system = course.prepared.system
     own = course.own is not None and part * course.steps < margins.MOST_OWN_STEPS
-    if course.waypoints is None or system.stepwise or not (own or course.same_states):
+    if course.waypoints is None or system.switches or not (own or course.same_states):
         return []
-    there = course.waypoints.between(part * course.steps, course.steps)
+    there = course.passed(part * course.steps, course.steps)
     count = int(part * course.steps * (1 - margins.BEGINNING) / margins.WINDOW)
     count = min(count, margins.WINDOWS, len(there))
     return [there[(2 * n + 1) * len(there) // (2 * count)] for n in range(count)]

@@ -45,6 +45,7 @@ class Alone(Enum):
     MOVED_MASS = "the body changes in ways that may end its motion"
     TABLE = "an orbit goes by a table"
     MOMENT = "something happens so late, within so short a while, that steps need the time in two numbers"
+    ORIENTATION = "a published orientation is read beside it"
     BODIES = "point masses move beside the body"
     LYAPUNOV = "the Lyapunov spectrum has an integrator of its own"
     NUTATION = "wheels make it nutate so fast that coefficients take two numbers each"
@@ -69,6 +70,7 @@ def batchable(experiment: Experiment, keys: Sequence[str]) -> Alone | None:
         Alone.HELD: integrator.hold_invariants is True,
         Alone.CHART: not variables_named(integrator.formulation).regular,
         Alone.AVERAGED: config.model.level != FULL,
+        Alone.ORIENTATION: config.output.orientation is not None,
         Alone.LYAPUNOV: config.output.lyapunov,
         Alone.KEY: any(key_steps(key, "axes")[0] not in TRACED_TABLES for key in keys),
     }

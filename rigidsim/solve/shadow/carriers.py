@@ -1,8 +1,8 @@
-"""What carries a motion and the perturbed ones beside it, and the error that a loose tolerance causes."""
+"""What carries a motion and the perturbed ones beside it."""
 
 import copy
-import math
-from collections.abc import Callable, Iterator, Sequence
+from bisect import bisect_left
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from typing import Any
@@ -15,8 +15,9 @@ from rigidsim.model.observables.mechanical import WORK
 from rigidsim.model.system import System
 from rigidsim.solve.compiled import TaylorEngine
 from rigidsim.solve.precision import precision_of
-from rigidsim.solve.requirements import propagation
 from rigidsim.solve.shadow.ensemble import HOPELESS_STEPS, PERTURBED, EnsembleCarrier
+from rigidsim.solve.shadow.series_errors import ONE_ORDER
+from rigidsim.solve.shadow.through_pieces import onward
 from rigidsim.solve.switching.stepper import stepper_of
 from rigidsim.solve.taylor_stepper import TaylorStepper
 
@@ -32,6 +33,10 @@ _OWN_UNTIL, OWN_FIRST = 5_000, 500
 """Steps up to which the run's own integrator costs less than code compiled for all; and those that it takes
 of longer motions first, so that no code is compiled for a motion that is soon lost.
 """
+_OWN_UNTIL_OF_PIECES = 300
+"""The first of these through pieces of the equations, at whose edges an own integrator stops with each motion
+by itself: that alone takes 0.2 ms a step of a Moon with an edge after every second step.
+"""
 _UNROLLED_FROM, _LOOSELY_UNROLLED_FROM, _OPTIMISED_FROM = 3_000, 1_500, 300_000
 """Steps to be taken from which code pays that takes longer to compile and less time to run. Of 66 and 126
 terms of the equations' decomposition, four lanes, tolerance 1e-8: compact 42 and 48 ms, 10 and 22 us a step;
@@ -40,15 +45,6 @@ integrator takes 18 and 48 us for four lanes. At 1e-6 half of that.
 """
 _UNEVEN, _FEW_STEPS, _FEW_OF_ALL = 2.5, 8, 2048
 """Ratio of longest to shortest step of those that count as alike; and numbers of steps that don't matter."""
-_EIGHTY_BITS = int(np.finfo(np.longdouble).nmant) == 63
-_LEAST_TOLERANCE, _LEAST_WIDE_TOLERANCE = 1e-11, 1e-15
-"""Least tolerances whose step errors stand out from rounding; errors of smaller ones are in proportion."""
-_ONE_ORDER = math.exp(2.0)
-"""Typical gain of one more order, which is the tolerance's own step from order to order (Jorba & Zou 2005);
-the factor by which proportions can be wrong.
-"""
-_PARTS = 4
-"""Parts of a step, whose errors are at most a thousandth of its own: 4 to the power of the series' order."""
 Advanced = tuple[np.ndarray, np.ndarray, np.ndarray]
 
 
@@ -68,8 +64,10 @@ def borrowed(stepper: TaylorStepper | None) -> Iterator[None]:
         stepper.back_to(mark)
 
 
-def own_until(integrator: TaylorEngine) -> float:
+def own_until(system: System, integrator: TaylorEngine) -> float:
     """Steps of a run up to which its own integrator costs less than code that is compiled for all motions."""
+    if system.pieces is not None:
+        return _OWN_UNTIL_OF_PIECES
     return _OWN_UNTIL * max(1.0, (_DOUBLE_ORDER / int(integrator.order)) ** 2)
 
 
@@ -128,7 +126,7 @@ class BatchCarrier(_SingleMotion):
             options = {"compact_mode": system.wide, "opt_level": 1 if system.wide else self._level - 1}
         every = np.repeat(initial, 1 + PERTURBED, axis=1)
         self._integrator = hy.taylor_adaptive_batch(equations, every, tol=tolerance, **options)
-        self._propagate = propagation(system)
+        self._go_on = onward(system, [system.states[i] for i in self._carried])
 
     @staticmethod
     def _level_for(steps: float, tolerance: float) -> int:
@@ -147,21 +145,17 @@ class BatchCarrier(_SingleMotion):
     ) -> tuple[np.ndarray, int, float] | None:
         integrator, carried = self._integrator, self._carried
 
-        def to(times: np.ndarray, most: int) -> tuple[Any, ...]:
-            self._propagate(integrator, times.tolist(), most)
-            return tuple(integrator.propagate_res[0])
-
         def go(most: int) -> tuple[Any, ...]:
             integrator.state[:] = states[carried]
             integrator.set_time(begin.tolist())
-            return to(end, most)
+            return self._go_on(integrator, float(begin[0]), float(end[0]), end, most)
 
         steps = self._evenly(go, most)
         reached = float(integrator.time[0])
         arrived = hy.taylor_outcome.time_limit
         if any(result[0] != arrived for result in integrator.propagate_res):
             # the others took steps of almost the same lengths
-            to(end - end[0] + reached, HOPELESS_STEPS)
+            self._go_on(integrator, reached, reached, end - end[0] + reached, HOPELESS_STEPS)
             if any(result[0] != arrived for result in integrator.propagate_res):
                 return None
         moved = states.copy()
@@ -179,8 +173,8 @@ class OwnCarrier(_SingleMotion):
         super().__init__()
         self._system, self._then = system, then
         self._integrator = copy.deepcopy(integrator)
-        self._propagate = propagation(system)
-        self.until = own_until(integrator)
+        self._go_on = onward(system, system.states)
+        self.until = own_until(system, integrator)
         self.tolerance = float(integrator.tol)
 
     def again(self, steps: float) -> EnsembleCarrier:
@@ -196,16 +190,16 @@ class OwnCarrier(_SingleMotion):
     ) -> tuple[np.ndarray, int, float] | None:
         integrator, moved = self._integrator, np.empty_like(states)
 
-        def go(lane: int, until: float, most: int) -> tuple[Any, ...]:
+        def go(lane: int, last: float, until: float, most: int) -> tuple[Any, ...]:
             integrator.time = float(begin[lane])
             integrator.state[:] = states[:, lane]
-            return tuple(self._propagate(integrator, until, most))
+            return self._go_on(integrator, float(begin[0]), last, until, most)
 
-        steps = self._evenly(lambda most: go(0, float(end[0]), most), most)
+        steps = self._evenly(lambda most: go(0, float(end[0]), float(end[0]), most), most)
         moved[:, 0] = integrator.state
         reached = float(integrator.time)
         for lane in range(1, states.shape[1]):
-            outcome, *_ = go(lane, float(end[lane] - (end[0] - reached)), HOPELESS_STEPS)
+            outcome, *_ = go(lane, reached, float(end[lane] - (end[0] - reached)), HOPELESS_STEPS)
             if outcome != hy.taylor_outcome.time_limit:
                 return None
             moved[:, lane] = integrator.state
@@ -240,14 +234,18 @@ class StepperCarrier(_SingleMotion):
     ) -> tuple[np.ndarray, int, float] | None:
         stepper, moved = self._stepper, np.empty_like(states)
         first, reached = float(begin[0]), min(float(end[0]), float(begin[0]) + most / self._pace)
-        # all are on the sides, and have the signs, that the motion has
+        # all are on the sides, and have the signs, that the motion has; and none is past an edge of the
+        # equations' pieces that it isn't, where it would go on with what holds before
         known = self._reached.get(first, self._begin)
+        pieces = stepper.system.pieces
+        edges = [] if pieces is None else pieces.knots[bisect_left(pieces.knots, first) :][:1]
         for lane in range(states.shape[1]):
             state = states[:, lane]
             if lane == 0 and (known.state == state).all():
                 stepper.back_to(known)
             else:
-                stepper.back_to(replace(known, time=(float(begin[lane]), 0.0), state=state.copy()))
+                start = min([float(begin[lane]), *map(float, edges)])
+                stepper.back_to(replace(known, time=(start, 0.0), state=state.copy()))
                 stepper.settle()
             if not stepper.to(float(end[lane] - (end[0] - reached))):
                 return None
@@ -256,7 +254,7 @@ class StepperCarrier(_SingleMotion):
                 self._reached = {first: known, reached: replace(stepper.mark(), time=(reached, 0.0))}
         return moved, round((reached - first) * self._pace), reached
 
-    def of_step(self, state: np.ndarray, time: float) -> np.ndarray:
+    def of_step(self, state: np.ndarray, time: float, stretch: float) -> np.ndarray:
         """What the next step cuts off, (states,): all terms past the last, which gain as much as that."""
         stepper, known = self._stepper, self._reached.get(time)
         if known is not None:
@@ -267,84 +265,5 @@ class StepperCarrier(_SingleMotion):
         series, size = np.asarray(engine.tc, dtype=float), float(stepper.largest)
         order = series.shape[1] - 1
         before, last = (np.abs(series[:, n]).max() * size**n for n in (order - 1, order))
-        gain = min(last / before, 1 / _ONE_ORDER) if before > 0 else 1 / _ONE_ORDER
+        gain = min(last / before, 1 / ONE_ORDER) if before > 0 else 1 / ONE_ORDER
         return np.asarray(gain / (1 - gain) * size**order * series[:, order])
-
-
-class SeriesErrors:
-    """Truncation errors that a tolerance allows in a step, from comparing it with the same step in parts.
-
-    Errors are those of the series' order, a whole number, and one more term may gain nothing at all (its
-    coefficient has a phase): they are looked at with the tolerance as it is. Where they don't stand out of
-    double precision's rounding, that is done with 80 bits. Without an integrator in double one is compiled.
-
-    Args:
-        turning: indices of the rates and the attitude, if these stand in for a run's Euler angles.
-        mean: mean step of that run. Where it is shorter than other states alone would make it, angles set it,
-            and an error is what the tolerance allows these, however short the other states make steps here.
-    """
-
-    def __init__(
-        self,
-        system: System,
-        tolerance: float,
-        integrator: TaylorEngine | None = None,
-        *,
-        turning: Sequence[int] = (),
-        mean: float = math.inf,
-    ) -> None:
-        self._turning, self._mean = list(turning), mean
-        wide = tolerance < _LEAST_TOLERANCE and _EIGHTY_BITS
-        tried = max(tolerance, _LEAST_WIDE_TOLERANCE if wide else _LEAST_TOLERANCE)
-        self._share = min(tolerance / tried * _ONE_ORDER, 1.0)
-        self._rounding = 16 * float(np.finfo(np.longdouble if wide else float).eps)
-        if integrator is not None and not wide and tried == tolerance:
-            self._integrator: TaylorEngine = copy.deepcopy(integrator)
-            return
-        number: Any = np.longdouble if wide else float
-        initial = [number(float(x)) for x in system.initial]
-        options = {"compact_mode": True, "opt_level": 0, "fp_type": number}
-        self._integrator = hy.taylor_adaptive(system.equations, initial, tol=number(tried), **options)
-
-    def of_step(self, state: np.ndarray, time: float) -> np.ndarray:
-        """Error (states,) of the step that begins in the given state, as one of that state: what is wrong at
-        the step's end is carried back, since the motion turns a good part of a radian in between.
-        """
-        engine = self._integrator
-        number = engine.state.dtype.type
-        engine.time = number(time)
-        engine.state[:] = state
-        _, size = engine.step(number(2.0**10), write_tc=bool(self._turning))
-        if not (size and np.isfinite(engine.state).all()):
-            return np.zeros_like(state)
-        least = self._of_turning(state, float(size))
-        engine.propagate_until(number(time), max_steps=64, max_delta_t=number(size) / _PARTS)
-        wrong = (engine.state - state).astype(float)
-        wrong[np.abs(wrong) < self._rounding * np.abs(state)] = 0.0
-        wrong = self._share * wrong if np.isfinite(wrong).all() else np.zeros_like(wrong)
-        return np.copysign(np.maximum(np.abs(wrong), np.abs(least)), np.where(wrong != 0, wrong, least))
-
-    def _of_turning(self, state: np.ndarray, size: float) -> np.ndarray:
-        """First neglected term of the rates and the attitude in a step as long as they alone would make it,
-        times the share of the run's steps that angles set; 0 where no other states shorten steps.
-        """
-        found = np.zeros_like(state)
-        if not self._turning:
-            return found
-        series = np.asarray(self._integrator.tc, dtype=float)
-        order = series.shape[1] - 1
-        longer = _radius(series[self._turning], state) / _radius(series, state)
-        share = 1 - self._mean / size
-        turning, step = series[self._turning], size * longer
-        before, last = (np.abs(turning[:, n]).max() for n in (order - 1, order))
-        if longer > 1 and share > 0 and math.isfinite(longer) and before > 0:
-            gain = min(step * last / before, 1 / _ONE_ORDER)  # terms of a rotation gain more and more
-            found[self._turning] = share * self._share * gain * step**order * turning[:, order]
-        return found
-
-
-def _radius(series: np.ndarray, state: np.ndarray) -> float:
-    """Radius of convergence by which steps are chosen (Jorba & Zou 2005), from the last two orders."""
-    largest, order = max(1.0, float(np.abs(state).max())), series.shape[1] - 1
-    terms = [(n, float(np.abs(series[:, n]).max())) for n in (order - 1, order)]
-    return min((largest / term) ** (1 / n) if term > 0 else math.inf for n, term in terms)

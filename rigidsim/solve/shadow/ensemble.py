@@ -107,8 +107,8 @@ class ShadowEnsemble:
     Args:
         perturbations: errors of a step, in units of ``epsilon``.
         rounded: (states,) bool, which of the initial values were rounded; all by default.
-        series: truncation errors (states,) of a step that begins in a state at a time, for a tolerance far
-            above epsilon.
+        series: truncation errors (states,) of a step that begins in a state at a time and stands for so many,
+            for a tolerance far above epsilon.
         stretches: number of stretches at least, of motions with many steps.
     """
 
@@ -121,7 +121,7 @@ class ShadowEnsemble:
         epsilon: float,
         *,
         rounded: np.ndarray | None = None,
-        series: Callable[[np.ndarray, float], np.ndarray] | None = None,
+        series: Callable[[np.ndarray, float, float], np.ndarray] | None = None,
         stretches: int = 12,
     ) -> None:
         self.carrier, self._measures, self._errors = carrier, measures, perturbations
@@ -279,7 +279,7 @@ class ShadowEnsemble:
             added += size[:, None] * np.where(moving, normal[1 + states :, None], 0.0)
         for n, motion in enumerate(which if self._series is not None else ()):
             assert self._series is not None
-            of_step = self._series(self._states[:, motion, 0], float(self.time[motion]))
+            of_step = self._series(self._states[:, motion, 0], float(self.time[motion]), float(steps[n]))
             wrong = errors.series * of_step / self._epsilon
             # one step stands for all of the stretch: they add up, or walk where their errors change sign
             added[:, n] += wrong[:, None] * (steps[n] + math.sqrt(steps[n]) * normal[0])

@@ -8,6 +8,7 @@ equations of its own, which are compiled when they are first needed.
 from __future__ import annotations
 
 import math
+from bisect import bisect_left
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any
@@ -19,6 +20,7 @@ from rigidsim.model.system import System
 from rigidsim.solve.compiled import TaylorEngine, interruptible
 from rigidsim.solve.events import BESIDE, EventLog, engine_events, of_order_one
 from rigidsim.solve.precision import Precision, Scalar
+from rigidsim.solve.requirements import SetAtKnots
 from rigidsim.solve.stepper import Mark
 from rigidsim.solve.switching.sides import HELD, SLIDES, Continuation, Look, Probe, continued
 from rigidsim.solve.switching.sliding import Meeting, sliding
@@ -48,6 +50,7 @@ class SwitchedEngines(TaylorStepper):
         surfaces = system.plan.surfaces
         self._modes = [1] * len(surfaces.found)
         self._fresh, self._count, self._since = False, 0, 0.0
+        self._piece: np.ndarray | None = None  # parameters of the piece in which the latest step was
         hy.set_logger_level_error()  # it warns, on stdout, of roots that it loses; they are looked for here
         super().__init__(system, precision, tolerance, start, log)
         probe = self._probe
@@ -113,6 +116,7 @@ class SwitchedEngines(TaylorStepper):
         self._fresh, self._count = bool(fresh), int(count)
         self.failure = ""
         self._enter()
+        self._piece = None
         super().back_to(replace(mark, memory=tiny))
 
     def pack(self, memory: Any) -> dict[str, np.ndarray]:
@@ -196,6 +200,11 @@ class SwitchedEngines(TaylorStepper):
         modes = [(over or {}).get(j, mode) or 1 for j, mode in enumerate(self._modes)]
         sides = [math.copysign(1.0, mode) for mode in modes]
         numbers = [*sides, *turns, *([sign] if self._probe.signed else [])]
+        if (pieces := self.system.pieces) is not None:
+            if self._piece is None:  # of those that meet at a boundary, the one that ends there
+                self._piece = self._piece_of(bisect_left(pieces.knots, self.time))
+            numbers += [0.0] * (self.system.first_of_pieces - len(numbers))
+            return np.concatenate([self._array(numbers), self._piece])
         pars = self._array(numbers)
         if not self._probe.clocked:
             return pars
@@ -203,6 +212,27 @@ class SwitchedEngines(TaylorStepper):
         if low is not None:
             rest[0] = low
         return np.concatenate([pars, rest])
+
+    def _piece_of(self, number: int) -> np.ndarray:
+        assert self.system.pieces is not None
+        return self.system.pieces.parameters(number)
+
+    def _begin_piece(self) -> Scalar:
+        """Continue with the piece of the equations that begins here, if one does; see ``_within_piece``."""
+        if isinstance(self._requirement, SetAtKnots):
+            self._piece = self._piece_of(self._requirement.enter(self._integrator))
+        return self._within_piece()
+
+    def _meet(self) -> Scalar | None:
+        self._begin_piece()
+        return self.end
+
+    def _within_piece(self) -> Scalar:
+        """How far a step may go that begins here."""
+        if (end := self.end) is None:
+            return self._longest
+        high, low = self._integrator.dtime
+        return min(self._longest, (end - high) - low)
 
     @property
     def _low(self) -> Scalar:
@@ -300,24 +330,3 @@ class SwitchedEngines(TaylorStepper):
             square = sum((g * g for g in gradient), gradient[0] * 0)
             if square != 0:
                 state[:] = state - (look.u[j] / square) * gradient
-
-    def _moved(self, j: int) -> int:
-        """The side of a surface to which a trial step leads (it is taken back); 0 for none."""
-        engine = self._integrator
-        time, before = engine.dtime, np.array(engine.state)
-        self._set(engine)
-        muted, self.log.muted = self.log.muted, True
-        engine.step(self._longest, write_tc=True)
-        end, after = engine.time, np.array(engine.state)
-        found = 0
-        for part in (1 / 16, 1 / 2, 1.0):
-            then = time[0] + self.precision.of_double(part) * (end - time[0])
-            look = self._look(engine.update_d_output(then), then)
-            if abs(float(look.u[j])) > self._probe.noise(look, j, [before, after]):
-                found = 1 if look.u[j] > 0 else -1
-                break
-        self.log.muted = muted
-        self._roots.clear()
-        engine.dtime = time
-        engine.state[:] = before
-        return found

@@ -74,9 +74,7 @@ class SwitchingStepper(SurfaceRoots):
         if self._unsettled:
             self.failure = self._unsettled
             return False
-        if self.until is not None:
-            high, low = self._integrator.dtime
-            longest = min(longest, (self.until - high) - low)
+        longest = min(longest, self._begin_piece())
         self._watched()
         self._quieten()
         log, events = self.log, len(self.log.found)
@@ -278,6 +276,27 @@ class SwitchingStepper(SurfaceRoots):
                 return Continuation(None, "both sides lead back to it with growing speed")
             modes[j] = kept[0] or idle[j]
         return Continuation(modes)
+
+    def _moved(self, j: int) -> int:
+        """The side of a surface to which a trial step leads (it is taken back); 0 for none."""
+        engine = self._integrator
+        time, before = engine.dtime, np.array(engine.state)
+        self._set(engine)
+        muted, self.log.muted = self.log.muted, True
+        engine.step(self._longest if self._requirement is None else self._within_piece(), write_tc=True)
+        end, after = engine.time, np.array(engine.state)
+        found = 0
+        for part in (1 / 16, 1 / 2, 1.0):
+            then = time[0] + self.precision.of_double(part) * (end - time[0])
+            look = self._look(engine.update_d_output(then), then)
+            if abs(float(look.u[j])) > self._probe.noise(look, j, [before, after]):
+                found = 1 if look.u[j] > 0 else -1
+                break
+        self.log.muted = muted
+        self._roots.clear()
+        engine.dtime = time
+        engine.state[:] = before
+        return found
 
     def _fail(self, j: int, why: str, what_to_do: str = _SMOOTH) -> bool:
         surface = self.system.plan.surfaces.found[j]

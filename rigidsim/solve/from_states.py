@@ -1,0 +1,148 @@
+"""A scene's equations from any attitude and rates at any time: where a trajectory would go from each row.
+
+In double precision at its epsilon, with the attitude as a quaternion. States that a trajectory doesn't have
+(orbits, rotors, flight) start each time where the scene's own motion has them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cached_property
+from typing import Any
+
+import heyoka as hy
+import numpy as np
+
+from rigidsim.model.formulations.quaternion import Quaternion
+from rigidsim.model.model_plan import plan_model
+from rigidsim.model.observables.mechanical import WORK
+from rigidsim.model.outputs import drift_outputs
+from rigidsim.model.state_blocks import BODY
+from rigidsim.model.step_limiter import PACE
+from rigidsim.model.system import System
+from rigidsim.scene.choices import DEFAULT_METHOD
+from rigidsim.scene.scene import Scene
+from rigidsim.solve.compiled import compiled_engine, compiled_function, evaluate_rows
+from rigidsim.solve.precision import precision_of
+
+_STEPS = 100_000
+
+
+class NotFromStates(Exception):
+    """Why a scene can't be started from attitude and rates alone."""
+
+
+class FromStates:
+    """A scene's motion from states of one's own; times in s, attitudes w x y z, rates in rad/s, body axes."""
+
+    def __init__(self, scene: Scene) -> None:
+        config = scene.config
+        integrator = {"formulation": "quaternion", "method": DEFAULT_METHOD, "hold_invariants": False}
+        tables = {
+            "integrator": config.integrator.model_copy(update=integrator),
+            "output": config.output.model_copy(update={"record": ["quaternion"], "lyapunov": False}),
+            "events": [],
+        }
+        if config.model.level != "full":
+            raise NotFromStates(f"the config's model is {config.model.level}, an average without an attitude")
+        scene = replace(scene, config=config.model_copy(update=tables), events=())
+        precision = precision_of("double")
+        self._precision = precision
+        self._system = System(replace(plan_model(scene), formulation=Quaternion()), precision.number)
+        if self._system.stepwise or self._system.clocked:
+            raise NotFromStates("its equations change along the motion (tables, kernels or switches)")
+        if self._system.mechanics.slip is not None:
+            raise NotFromStates("its body is distorted, so that rates alone don't tell its momentum")
+        names = self._system.states
+        self._places = [names.index(name) for name in (*BODY.quaternion, *BODY.rates)]
+        flight = BODY.velocity
+        self.flies = all(name in names for name in (*BODY.position, *flight))
+        self._flight = [names.index(name) for name in (*BODY.position, *flight)] if self.flies else []
+        orbits = [self._system.mechanics.orbit_block(tag).names for tag in self._system.plan.orbit_tags]
+        known = {WORK, PACE, *(name for block in orbits for name in block)}
+        taken = {names[place] for place in (*self._places, *self._flight)}
+        self.others = [name for name in names if name not in known | taken]
+        self.whole = not set(names) - taken
+
+    @cached_property
+    def _scales(self) -> np.ndarray:
+        return np.ldexp(1.0, np.array(self._system.state_exponents))
+
+    @cached_property
+    def _engine(self) -> Any:
+        options = dict(self._precision.options, compact_mode=self._system.wide)
+        initial = self._precision.array(self._system.initial)
+        return compiled_engine(self._system.equations, initial, time=self._start, **options)
+
+    @property
+    def _start(self) -> float:
+        scene = self._system.scene
+        return float(scene.context.ldexp(scene.start, -self._system.scaling.time))
+
+    def _internal(self, times: np.ndarray) -> np.ndarray:
+        return np.ldexp(times, -self._system.scaling.time)
+
+    def motion(self, times: np.ndarray) -> np.ndarray:
+        """The scene's own states (rows, states), internal units, at ascending times (s)."""
+        engine = self._engine
+        engine.time = self._start
+        engine.state[:] = self._precision.array(self._system.initial)
+        internal = self._internal(times)
+        grid = internal if internal[0] == self._start else np.append(self._start, internal)
+        result = engine.propagate_grid(grid, max_steps=10**9)
+        states = np.asarray(result[5] if len(result) > 5 else result[-1])
+        if result[0] != hy.taylor_outcome.time_limit or len(states) != len(grid):
+            raise NotFromStates("its motion ends before the trajectory does")
+        return states[len(grid) - len(internal) :].copy()
+
+    def states(
+        self, own: np.ndarray, quaternions: np.ndarray, rates: np.ndarray, flight: np.ndarray | None = None
+    ) -> np.ndarray:
+        """States (rows, states), internal units, of attitudes and rates, with all else as in ``own``.
+
+        Args:
+            flight: positions and velocities (rows, 6), SI, space axes.
+        """
+        made = own.copy()
+        made[:, self._places[:4]] = quaternions
+        made[:, self._places[4:]] = rates / self._scales[self._places[4:]]
+        if flight is not None and self.flies:
+            made[:, self._flight] = flight / self._scales[self._flight]
+        return made
+
+    def after(self, start: np.ndarray, time: float, until: np.ndarray) -> np.ndarray:
+        """States (times, states) at ascending later times (s), from a state at a time; nan past an end."""
+        engine = self._engine
+        engine.time = float(self._internal(np.array([time]))[0])
+        engine.state[:] = start
+        found = np.full((len(until), len(start)), np.nan)
+        for n, moment in enumerate(self._internal(until)):
+            outcome, *_ = engine.propagate_until(moment, max_steps=_STEPS)
+            if outcome != hy.taylor_outcome.time_limit:
+                break
+            found[n] = engine.state
+        return found
+
+    def attitude(self, states: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Quaternions (rows, 4) and angular velocities (rows, 3), rad/s, of states in internal units."""
+        rates = states[..., self._places[4:]] * self._scales[self._places[4:]]
+        return states[..., self._places[:4]], rates
+
+    def flight(self, states: np.ndarray) -> np.ndarray | None:
+        """Positions and velocities (rows, 6), SI, space axes, of states; None for a body that only turns."""
+        return states[:, self._flight] * self._scales[self._flight] if self.flies else None
+
+    def drifts(self, states: np.ndarray, times: np.ndarray) -> dict[str, np.ndarray]:
+        """Drift of each invariant from the first of states (rows, states) on, relative to its scale."""
+        invariants = self._system.invariants
+        if not invariants:
+            return {}
+        components = [x for invariant in invariants for x in invariant.expressions]
+        options = dict(self._precision.options, compact_mode=self._system.wide)
+        internal = self._internal(times)
+        value = compiled_function(components, self._system.variables, **options)
+        begun = evaluate_rows(value, states[:1], times=internal[:1])[:, 0]
+        expressions = drift_outputs(invariants, self._system.scene.context, self._precision.number)
+        function = compiled_function(expressions, self._system.variables, **options)
+        found = evaluate_rows(function, states, begun, internal)
+        return {invariant.name: found[n] for n, invariant in enumerate(invariants)}
