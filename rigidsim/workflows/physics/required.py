@@ -1,0 +1,260 @@
+"""``plan --physics ERROR``: run the full model and those without an effect, and name the least one."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from decimal import Decimal
+from pathlib import Path
+
+from rigidsim.errors import FORCE, ConfigError, Problem, RunFolderError, either
+from rigidsim.scene.config import Experiment
+from rigidsim.scene.exact import parse_number
+from rigidsim.scene.readable import span_text
+from rigidsim.session.session import Tuning
+from rigidsim.solve.problem import prepare
+from rigidsim.store import atomic
+from rigidsim.workflows.physics.beyond import averaged_levels, geodetic
+from rigidsim.workflows.physics.effects import missing_from, without
+from rigidsim.workflows.physics.models import ModelRun, Models
+from rigidsim.workflows.physics.search import Candidates, search
+from rigidsim.workflows.physics.table import (
+    ARCSEC,
+    ComparedModel,
+    EffectWorth,
+    PhysicsPlan,
+    UnassessedEffect,
+)
+from rigidsim.workflows.read import Given, as_experiment
+
+FIGURE = "ladder.png"
+_LONGEST = 94  # of a name that becomes the least model's
+_WHERE = either("--physics", "error")
+_CHEAPER = 0.95  # of the least model's cost, from which on one with more effects is told
+_UNCERTAIN = 0.1  # of the error, up to which rounding doesn't matter
+
+
+def required_physics(
+    experiment: Given,
+    error: str | float | Decimal,
+    *,
+    out: str | Path = "runs",
+    write: str | Path | None = None,
+    force: bool = False,
+    told: Callable[[str], None] = lambda _: None,
+    tuning: Tuning | None = None,
+) -> PhysicsPlan:
+    """Measure what each effect of a scene is worth, and find the least model within an error.
+
+    Args:
+        experiment: as for ``rigidsim.run``.
+        error: largest angle between the attitudes, such as ``"0.1 arcsec"``; a number is in rad.
+        out: the runs are kept in ``out/NAME-physics``; called again, it goes on with them.
+        write: file for the least model's config.
+        force: replace runs of another config, and the file.
+        told: is given a line before each run.
+        tuning: as for ``rigidsim.run``.
+
+    Raises:
+        ConfigError: the config can't be run, nothing can be left out of it, or a bad error.
+        RunFolderError: a run didn't end, or a folder holds other runs.
+    """
+    experiment = as_experiment(experiment)
+    most = _asked(error)
+    if not isinstance(out, str | Path):
+        what = f"given {out!r}; a folder is allowed: the runs are kept there, so that they can go on"
+        raise ConfigError(Problem("out", what))
+    target = None if write is None else _target(Path(write), force)
+    folder = Path(out) / f"{experiment.config.name}-physics"
+    prepared = prepare(experiment)
+    models = Models(experiment, folder, force, tuning, told)
+    _refuse_without_effects(experiment, models)
+    absent = [UnassessedEffect(what=what, why=why) for what, why in missing_from(experiment.config)]
+    full = models.run([])
+    alone: dict[str, ModelRun] = {}
+    for code, effect in models.effects.items():
+        try:
+            alone[code] = models.run([code])
+        except ConfigError as problem:
+            why = "can't be left out by itself: " + "; ".join(map(_in_short, problem.problems))
+            absent.append(UnassessedEffect(what=f"{effect.words} ({code})", why=why))
+    if not alone:
+        raise ConfigError(Problem("config", "no effect can be left out by itself; nothing to compare"))
+    averaged, why_not = averaged_levels(experiment)
+    absent += why_not
+    if beyond := geodetic(prepared.scene):
+        absent.append(beyond)
+    parts = {code: models.effects[code].parts_of for code in alone}
+    found = search(Candidates(parts, full, alone, most), lambda codes: _run(models, codes))
+    tried = [_compared(models, codes, sums, most) for codes, sums in found.tried if _run(models, codes)]
+    least = next(x for x in tried if x.left_out == found.least)
+    gone = {code for code in parts if code in found.least or set(parts[code]) & set(found.least)}
+    worths = [_worth(models, code, done, code not in gone) for code, done in alone.items()]
+    config = experiment.config
+    result = PhysicsPlan(
+        name=config.name,
+        error_arcsec=most * ARCSEC,
+        compared=models.compared,
+        span_s=float(prepared.scene.samples.last - prepared.scene.start),
+        samples=len(full.rotations),
+        full=_compared(models, [], 0.0, most),
+        least=least,
+        cheapest=_cheaper(tried, least),
+        effects=sorted(worths, key=lambda x: -x.largest_arcsec),
+        averaged=averaged,
+        not_assessed=absent,
+        tried=tried,
+        models=found.models,
+        ruled_out=found.ruled_out,
+        uncertainty_arcsec=None if full.uncertainty is None else full.uncertainty * ARCSEC,
+        warnings=_warnings(full, most),
+        folder=str(folder),
+        figure=str(folder / FIGURE),
+        written=None if target is None else str(target),
+    )
+    if target is not None:
+        made = least_config(experiment, found.least)
+        made = made.having([f'name="{config.name[:_LONGEST]}-least"'])  # beside the full one's run
+        _write(target, _comments(result) + made.text)
+    _draw(result, folder / FIGURE)
+    return result
+
+
+def least_config(experiment: Experiment, codes: Sequence[str]) -> Experiment:
+    """The experiment without some effects, and without asking to record what isn't there then."""
+    made = without(experiment, codes)
+    names = made.config.output.record
+    try:
+        prepare(made)
+    except ConfigError:
+        if names is None:
+            raise
+        kept = [name for name in names if _recordable(made, name)]
+        made = made.having([f"output.record={kept}".replace("'", '"')])
+        prepare(made)
+    return made
+
+
+def _recordable(experiment: Experiment, name: str) -> bool:
+    try:
+        prepare(experiment.having([f'output.record=["{name}"]']))
+    except ConfigError:
+        return False
+    return True
+
+
+def _asked(error: str | float | Decimal) -> float:
+    """The error, rad."""
+    try:
+        value = float(parse_number(error, "rad"))
+    except ValueError as problem:
+        what = f'{problem}; an angle such as "0.1 arcsec" is allowed'
+        raise ConfigError(Problem(_WHERE, what)) from None
+    if not 0 < value < math.pi:
+        what = f'given {error}; an angle above 0 and below half a turn is allowed, such as "0.1 arcsec"'
+        raise ConfigError(Problem(_WHERE, what))
+    return value
+
+
+def _in_short(problem: Problem) -> str:
+    """A problem without the names that are allowed; numbers of tables are those of the smaller config."""
+    return problem.what.partition("; allowed: ")[0]
+
+
+def _target(path: Path, force: bool) -> Path:
+    if path.exists() and not force:
+        raise RunFolderError(f"{path}: exists; {FORCE} replaces it, or give another file")
+    if not path.parent.is_dir():
+        raise RunFolderError(f"{path}: there is no folder {path.parent}; make it, or give another file")
+    return path
+
+
+def _write(path: Path, text: str) -> None:
+    try:
+        atomic.write_bytes(path, text.encode())
+    except OSError as error:
+        raise RunFolderError(f"{path}: can't be written: {error.strerror or error}") from None
+
+
+def _refuse_without_effects(experiment: Experiment, models: Models) -> None:
+    if models.effects:
+        return
+    what = "has neither loads nor rotors, elasticity or a core, so that nothing can be left out: the body "
+    what += "rotates freely; plan without --physics tells what is integrated"
+    raise ConfigError(Problem("config", what), experiment.source)
+
+
+def _run(models: Models, codes: Sequence[str]) -> ModelRun | None:
+    """A model's run; None if the config has no meaning without all of these effects."""
+    try:
+        return models.run(codes)
+    except ConfigError:
+        return None
+
+
+def _compared(models: Models, codes: Sequence[str], expected: float, most: float) -> ComparedModel:
+    done = models.run(codes)
+    return ComparedModel(
+        left_out=list(codes),
+        rms_arcsec=done.rms * ARCSEC,
+        largest_arcsec=done.largest * ARCSEC,
+        expected_arcsec=expected * ARCSEC,
+        operations=done.operations,
+        steps=done.steps,
+        cost=done.cost,
+        cpu_seconds=done.cpu_seconds,
+        within=done.largest <= most,
+        run=str(done.folder),
+    )
+
+
+def _cheaper(tried: Sequence[ComparedModel], least: ComparedModel) -> ComparedModel | None:
+    within = [model for model in tried if model.within and model.cost < _CHEAPER * least.cost]
+    return min(within, key=lambda model: model.cost, default=None)
+
+
+def _worth(models: Models, code: str, done: ModelRun, required: bool) -> EffectWorth:
+    return EffectWorth(
+        code=code,
+        words=models.effects[code].words,
+        rms_arcsec=done.rms * ARCSEC,
+        largest_arcsec=done.largest * ARCSEC,
+        cpu_seconds=done.cpu_seconds,
+        steps=done.steps,
+        operations=done.operations,
+        required=required,
+        run=str(done.folder),
+    )
+
+
+def _comments(plan: PhysicsPlan) -> str:
+    """What the least model leaves out, for the head of its config."""
+    what = (
+        f"The least model of {plan.name} within {plan.error_arcsec:.4g} arcsec over {span_text(plan.span_s)}"
+    )
+    lines = [f"{what} (rigidsim plan --physics): measured, it differs"]
+    lines.append(f"from the full one by {plan.least.largest_arcsec:.4g} arcsec at most.")
+    rows = [row for row in plan.effects if not row.required]
+    lines.append("Left out, with what each is worth by itself:" if rows else "Nothing is left out.")
+    lines += [f"  {row.largest_arcsec:.4g} arcsec  {row.code}: {row.words}" for row in rows]
+    lines.append(
+        "What follows is the full model's config without these: its comments speak of the full model."
+    )
+    return "".join(f"# {line}\n" for line in lines) + "#\n"
+
+
+def _warnings(full: ModelRun, most: float) -> list[str]:
+    if full.uncertainty is None or full.uncertainty <= _UNCERTAIN * most:
+        return []
+    what = f"the full model's attitude is uncertain by {full.uncertainty * ARCSEC:.1e} arcsec itself, by "
+    return [what + "rounding: ask for a larger error, or for more precision"]
+
+
+def _draw(result: PhysicsPlan, path: Path) -> None:
+    from rigidsim.look.figures.ladder import save_ladder
+
+    try:
+        with atomic.replacing(path) as temporary:
+            save_ladder(result.as_dict(), temporary)
+    except OSError as error:
+        raise RunFolderError(f"{path}: can't be written: {error.strerror or error}") from None

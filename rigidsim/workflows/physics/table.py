@@ -1,0 +1,115 @@
+"""What ``plan --physics`` tells: typed values, which ``as_dict`` makes JSON of."""
+
+from __future__ import annotations
+
+import math
+
+from rigidsim.store.summary_parts import SummaryPart
+
+ARCSEC = math.degrees(1.0) * 3600.0
+"""Arcseconds of a radian."""
+
+
+class EffectWorth(SummaryPart):
+    """What leaving out one effect does, over the span.
+
+    Attributes:
+        rms_arcsec, largest_arcsec: angle between the attitudes with it and without; of averages between the
+            axes.
+        cpu_seconds, steps: of the run without it.
+        operations: of the equations without it.
+        required: whether the least model has it.
+        run: folder of the run without it.
+    """
+
+    code: str
+    words: str
+    rms_arcsec: float
+    largest_arcsec: float
+    cpu_seconds: float
+    steps: int
+    operations: int
+    required: bool
+    run: str
+
+
+class UnassessedEffect(SummaryPart):
+    """An effect that wasn't assessed, and why."""
+
+    what: str
+    why: str
+
+
+class AveragedLevel(SummaryPart):
+    """A ``[model] level`` that averages, and the largest angle between its axes and the full model's."""
+
+    level: str
+    largest_arcsec: float
+
+
+class ComparedModel(SummaryPart):
+    """A model that was run, against the full one.
+
+    Attributes:
+        left_out: codes of the effects that it doesn't have; of those with parts the whole alone.
+        expected_arcsec: largest angle of the sum of what its effects do one by one.
+        operations: of its equations.
+        cost: steps times operations.
+        within: whether its largest angle is within the error.
+    """
+
+    left_out: list[str]
+    rms_arcsec: float
+    largest_arcsec: float
+    expected_arcsec: float
+    operations: int
+    steps: int
+    cost: int
+    cpu_seconds: float
+    within: bool
+    run: str
+
+
+class PhysicsPlan(SummaryPart):
+    """What each effect of a scene is worth, and the least model within an error.
+
+    Attributes:
+        error_arcsec: the error asked for.
+        cheapest: of the models that were run and are within the error one with more effects than the least
+            one that costs less all the same, since it takes fewer steps; None for none.
+        effects: the most worth first.
+        compared: the variable that angles are of: quaternion, or the axis of an average.
+        tried: the models that were run in search of the least one.
+        models: number of all models that leave out some of the effects.
+        ruled_out: how many that leave out more than the least one, or might be cheaper, weren't run, because
+            what is known of their effects is beyond the error.
+        uncertainty_arcsec: of the full model's attitude at the end by rounding; None if not estimated.
+        written: file of the least model's config; None if none was asked for.
+    """
+
+    name: str
+    error_arcsec: float
+    compared: str
+    span_s: float
+    samples: int
+    full: ComparedModel
+    least: ComparedModel
+    cheapest: ComparedModel | None
+    effects: list[EffectWorth]
+    averaged: list[AveragedLevel]
+    not_assessed: list[UnassessedEffect]
+    tried: list[ComparedModel]
+    models: int
+    ruled_out: int
+    uncertainty_arcsec: float | None
+    warnings: list[str]
+    folder: str
+    figure: str
+    written: str | None
+
+    def __repr__(self) -> str:
+        least = self.least
+        without = ", ".join(least.left_out) or "nothing"
+        rows = [f"  {x.code:24} {x.largest_arcsec:11.4g} arcsec" for x in self.effects]
+        first = f"<Physics of {self.name!r} within {self.error_arcsec:.4g} arcsec: leave out {without}, "
+        return "\n".join([f"{first}{least.largest_arcsec:.4g} arcsec", *rows]) + ">"

@@ -1,0 +1,470 @@
+"""``plan --physics``: what effects are worth, and the least model, against all models run one by one."""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+import subprocess
+import sys
+from itertools import product
+from pathlib import Path
+from typing import Any
+
+import mpmath
+import numpy as np
+import pytest
+from support import angles_between, parts_in
+
+import rigidsim
+from experiments import least_models
+from rigidsim.workflows.physics.effects import effects_of, settings_without
+from rigidsim.workflows.physics.models import axis_vectors, rotation_vectors
+from rigidsim.workflows.physics.table import ARCSEC
+
+SCENE = """
+name = "satellite"
+[body]
+principal_moments = ["1e33 kg m^2", "1.0002e33 kg m^2", "1.0006e33 kg m^2"]
+mass = "1e21 kg"
+gravity_field = {radius = "1700 km", C = {"3,0" = -1e-5, "3,1" = 3e-5}, S = {"3,1" = 6e-6}}
+%s
+[initial]
+euler_angles = ["10 deg", "6 deg", "20 deg"]
+angular_velocity = ["1e-4 rad/day", 0, "0.23 rad/day"]
+[time]
+end = "40 day"
+every = "1 day"
+"""
+CORE = (
+    'moment = 0.001, flattening = 0, friction = "%s", angular_velocity = ["1e-3 rad/day", 0, "0.23 rad/day"]'
+)
+PLANET = """
+[[loads]]
+kind = "gravity_gradient"
+name = "planet"
+gravitational_parameter = "3.986e14 m^3/s^2"
+orbit = {semi_major_axis = "384400 km", eccentricity = 0.0549}
+"""
+FIGURE = 'figure = {J2 = 0.3, radius = "6378 km", pole = [0, 0.4, 0.9]}\n'
+SUN = """
+[[loads]]
+kind = "gravity_gradient"
+name = "sun"
+gravitational_parameter = "1.327e20 m^3/s^2"
+orbit = {semi_major_axis = "1.496e8 km", eccentricity = 0.0167}
+"""
+ELASTIC = 'elasticity = {love_number = 0.02, radius = "1700 km", delay = "0.1 day", raised_by = ["planet"]}'
+
+
+def satellite(
+    planet: bool = True, degree: bool = True, figure: bool = True, sun: bool = True, core: int = 2,
+    elastic: str = "",
+) -> str:  # fmt: skip
+    """The scene with some of its effects; of the core none, one without friction, or the whole."""
+    inner = "" if not core else f"core = {{{CORE % ('0', '1e-4 day^-1')[core - 1]}}}"
+    text = SCENE % f"{elastic}\n{inner}"
+    if planet:
+        text += PLANET + "degree = 3\n" * degree + FIGURE * figure
+    return text + SUN * sun
+
+
+def attitudes(text: str) -> list[np.ndarray]:
+    run = rigidsim.run(rigidsim.parse(text, overrides=["output.estimate=false"]), out=None)
+    return [run.dataset[part].values for part in parts_in(run.dataset, "quaternion")]
+
+
+def as_left_out(planet: bool, degree: bool, figure: bool, sun: bool, core: int) -> set[str]:
+    """Codes of the outermost effects that aren't there."""
+    found = set() if sun else {"sun"}
+    found |= {"planet"} if not planet else set()
+    found |= {"planet-degree-3"} if planet and not degree else set()
+    found |= {"planet-figure"} if planet and not figure else set()
+    return found | ({"core"} if core == 0 else {"core-friction"} if core == 1 else set())
+
+
+def closed(codes: frozenset[str]) -> set[str]:
+    """The codes and their parts."""
+    parts = {"planet": {"planet-degree-3", "planet-figure"}, "core": {"core-friction"}}
+    return set(codes).union(*(parts.get(code, set()) for code in codes))
+
+
+def required(text: str, error: str, out: Path, **given: Any) -> Any:
+    return rigidsim.required_physics(rigidsim.parse(text), error, out=out, **given)
+
+
+@pytest.mark.slow(200)
+def test_no_cheaper_model_is_within_the_error(tmp_path: Path) -> None:
+    full = attitudes(satellite())
+    errors: dict[frozenset[str], float] = {}
+    for flags in product((True, False), (True, False), (True, False), (True, False), (0, 1, 2)):
+        code = frozenset(as_left_out(*flags))
+        if code not in errors:
+            errors[code] = float(angles_between(full, attitudes(satellite(*flags))).max()) * ARCSEC
+    assert len(errors) == 30
+    for error in (0.03, 0.4, 3.0, 20.0):
+        plan = required(satellite(), f"{error} arcsec", tmp_path)
+        for row in plan.effects:
+            assert row.largest_arcsec == pytest.approx(errors[frozenset([row.code])], rel=1e-6, abs=1e-9)
+        least = frozenset(plan.least.left_out)
+        assert errors[least] <= error
+        assert plan.least.largest_arcsec == pytest.approx(errors[least], rel=1e-6, abs=1e-9)
+        for codes, angle in errors.items():  # nothing more can be left out
+            assert angle > error or not closed(codes) > closed(least), codes
+        gone = {row.code for row in plan.effects if not row.required}
+        assert gone == closed(least)
+
+
+def test_the_written_config_runs_and_is_the_least_model(tmp_path: Path) -> None:
+    text = satellite() + '[output]\nrecord = ["core_angular_velocity", "quaternion"]\n'
+    with pytest.raises(rigidsim.RunFolderError, match="there is no folder"):
+        required(text, "1 deg", tmp_path, write=tmp_path / "none" / "least.toml")
+    file = tmp_path / "least.toml"
+    plan = required(text, "1 deg", tmp_path, write=file)
+    assert plan.least.left_out
+    made = rigidsim.load(file)
+    assert made.config.name == "satellite-least"
+    head = file.read_text().split("#\n")[0]
+    for row in plan.effects:
+        assert (f"{row.largest_arcsec:.4g} arcsec  {row.code}: {row.words}" in head) != row.required
+    run = rigidsim.run(made, out=None)
+    apart = angles_between(attitudes(satellite()), [run.dataset["quaternion"].values])
+    assert apart.max() * ARCSEC == pytest.approx(plan.least.largest_arcsec, rel=1e-6)
+    with pytest.raises(rigidsim.RunFolderError, match="exists"):
+        required(text, "1 deg", tmp_path, write=file)
+    assert repr(plan).startswith("<Physics of 'satellite' within 3600 arcsec: leave out ")
+    assert Path(plan.figure).stat().st_size > 20_000
+    json.dumps(plan.as_dict())
+
+
+@pytest.mark.slow
+@pytest.mark.optimised  # as in the process that is killed
+def test_killed_and_called_again_it_goes_on(tmp_path: Path) -> None:
+    text = satellite(figure=False, core=0)
+    (tmp_path / "scene.toml").write_text(text)
+    asked = ["plan", "scene.toml", "--physics", "0.5 arcsec", "--out", "killed"]
+    process = subprocess.Popen(
+        [sys.executable, "-m", "rigidsim", *asked], cwd=tmp_path, stderr=subprocess.PIPE, text=True
+    )
+    assert process.stderr is not None
+    begun = 0
+    while begun < 3:
+        line = process.stderr.readline()
+        assert line, "it ended by itself"
+        begun += "begun" in line
+    process.kill()
+    process.wait()
+    process.stderr.close()
+    done = sorted((tmp_path / "killed/satellite-physics").glob("*/dataset.h5"))
+    before = [path.stat().st_mtime_ns for path in done]
+    assert len(done) >= 2
+    told: list[str] = []
+    plan = required(text, "0.5 arcsec", tmp_path / "killed", told=told.append)
+    assert [path.stat().st_mtime_ns for path in done] == before
+    whole = required(text, "0.5 arcsec", tmp_path / "whole")
+    for one, other in zip(plan.effects, whole.effects, strict=True):
+        assert (one.code, one.largest_arcsec, one.steps) == (other.code, other.largest_arcsec, other.steps)
+    assert plan.least.left_out == whole.least.left_out
+    told.clear()
+    required(text, "0.5 arcsec", tmp_path / "killed", told=told.append)
+    assert not told
+    with pytest.raises(rigidsim.RunFolderError, match="holds the run of another config; force=True"):
+        required(text.replace('"6 deg"', '"7 deg"'), "0.5 arcsec", tmp_path / "killed")
+
+
+def test_what_is_left_out_of_an_elastic_body() -> None:
+    given = rigidsim.parse(satellite(elastic=ELASTIC))
+    assert list(effects_of(given.config)) == [
+        "planet-degree-3", "planet-figure", "planet", "sun", "elasticity-delay", "elasticity-tides",
+        "elasticity-spin", "elasticity", "core-friction", "core",
+    ]  # fmt: skip
+    assert settings_without(given, ["planet"]) == ["body.elasticity.raised_by=[]", "loads[0]="]
+    assert settings_without(given, ["planet", "sun"])[-1] == "loads="
+    assert settings_without(given, ["planet-degree-3", "planet"])[-1] == "loads[0]="
+    assert settings_without(given, ["elasticity", "elasticity-spin"]) == ["body.elasticity="]
+    assert settings_without(given, ["elasticity-spin", "core"]) == [
+        "body.elasticity.spin=false",
+        "body.core=",
+    ]
+
+
+FLIGHT = """
+name = "flight"
+[frame]
+axes = "GCRF"
+[body]
+principal_moments = [0.01, 0.03, 0.034]
+mass = 4
+[[body.surfaces]]
+radius = 0.1
+[initial]
+angular_velocity = [0.001, 0, 0]
+quaternion = [1, 0, 0, 0]
+position = ["6878 km", 0, 0]
+velocity = [0, "-980.4 m/s", "7548.8 m/s"]
+[[loads]]
+kind = "central_gravity"
+name = "earth"
+radius = "6378.137 km"
+gravitational_parameter = 3.986004418e14
+figure = {J2 = 1.0826e-3, radius = "6378.137 km", pole = [0, 0, 1]}
+gravity_field = {radius = "6378137 m", C = {"3,0" = 2e-6, "5,0" = 1e-7}, S = {"4,1" = 1e-7}, pole = [0, 0, 1]}
+[[loads]]
+kind = "gravity_gradient"
+name = "sun"
+gravitational_parameter = 1.327e20
+orbit = {semi_major_axis = "149597870.7 km", inclination = "23.44 deg"}
+[[loads]]
+kind = "radiation_pressure"
+light = "sun"
+[[loads]]
+kind = "drag"
+density = "1e-12 kg/m^3"
+[[loads]]
+kind = "eddy_currents"
+magnetic_tensor = [1e4, 1e4, 1e4]
+field = "igrf"
+field_degree = 3
+[time]
+epoch = "2026-03-01T00:00:00 UTC"
+end = 600
+"""
+
+
+def test_what_is_left_out_of_a_satellite_in_flight() -> None:
+    given = rigidsim.parse(FLIGHT)
+    assert list(effects_of(given.config)) == [
+        "earth-figure", "earth-field-degree-5", "earth-field-degree-4", "earth-field", "earth", "sun",
+        "radiation_pressure-shadow", "radiation_pressure", "drag",
+        "eddy_currents-field-degree-3", "eddy_currents-field-degree-2", "eddy_currents",
+    ]  # fmt: skip
+    least = ["earth-field-degree-5", "earth-field-degree-4", "eddy_currents-field-degree-2", "drag"]
+    settings = [*settings_without(given, least), *settings_without(given, ["radiation_pressure-shadow"])]
+    config = rigidsim.parse(FLIGHT, overrides=settings).config
+    assert [fields.kind for fields in config.loads] == [
+        "central_gravity", "gravity_gradient", "radiation_pressure", "eddy_currents"
+    ]  # fmt: skip
+    assert (list(config.loads[0].gravity_field.C), config.loads[0].gravity_field.S) == (["3,0"], {})
+    assert (config.loads[2].shadow, config.loads[3].field_degree) == (False, 1)
+
+
+def test_a_part_that_a_preset_brings_is_set_to_zero() -> None:
+    given = rigidsim.parse(satellite()).to_dict()
+    given["body"] = {
+        "preset": "moon",
+        "core": given["body"]["core"],
+        "gravity_field": given["body"]["gravity_field"],
+    }
+    assert settings_without(rigidsim.Experiment.from_dict(given), ["core"]) == ["body.core.moment=0"]
+
+
+def test_angles_between_axes() -> None:
+    one = np.array([[0.0, 0.6, 0.8], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+    other = np.array([[0.0, 0.6, 0.8], [0.0, 1.0, 0.0], [math.sin(1e-9), 0.0, math.cos(1e-9)]])
+    expected = [[0, 0, 0], [0, 0, math.pi / 2], [0, 1e-9, 0]]
+    np.testing.assert_allclose(axis_vectors([one], [other]), expected, rtol=1e-12, atol=0)
+
+
+@pytest.mark.slow(100)
+@pytest.mark.parametrize("number", [0, 1, 2])
+def test_random_scenes(number: int) -> None:
+    told: list[str] = []
+    assert least_models.campaign(1, 100 + number, told.append)[0] == 0, told
+
+
+AVERAGED = """
+name = "precession"
+[body]
+preset = "earth"
+[initial]
+angular_velocity = [0, 0, "7.292115e-5 rad/s"]
+euler_angles = ["180 deg", "84381.406 arcsec", 0]
+[[loads]]
+kind = "gravity_gradient"
+name = "sun"
+gravitational_parameter = "1.32712440018e20"
+orbit = {semi_major_axis = "1.495978707e11", eccentricity = 0.016709}
+[[loads]]
+kind = "gravity_gradient"
+name = "moon"
+gravitational_parameter = "4.902800e12"
+orbit = {semi_major_axis = "3.84399e8", eccentricity = 0.0549}
+[time]
+end = "100 yr"
+samples = 41
+[model]
+level = "orbit_averaged"
+"""
+
+
+def test_an_average_is_compared_by_its_axis(tmp_path: Path) -> None:
+    """Sun and Moon turn the equinox by 16 and 34 arcsec a year, the axis by these times sin(23.44 deg)."""
+    plan = required(AVERAGED, "1000 arcsec", tmp_path)
+    worth = {row.code: row.largest_arcsec for row in plan.effects}
+    assert plan.compared == "figure_axis"
+    assert worth["sun"] == pytest.approx(100 * 15.9 * math.sin(math.radians(23.44)), rel=0.03)
+    assert worth["moon"] == pytest.approx(100 * 34.4 * math.sin(math.radians(23.44)), rel=0.03)
+    assert plan.least.left_out == ["sun"]
+    told = {row.what: row.why for row in plan.not_assessed}
+    assert "error runs measure" in told["averaging"]
+    rate = float(re.search(r"some ([\d.]+) arcsec", told["geodetic precession"])[1]) / 100  # type: ignore[index]
+    assert rate == pytest.approx(0.0192, rel=0.06)  # published: 19.2 mas a year
+
+
+def test_what_averaging_is_worth(tmp_path: Path) -> None:
+    text = AVERAGED.replace('"orbit_averaged"', '"full"').replace('"100 yr"', '"100 day"')
+    plan = required(text, "1 deg", tmp_path)
+    assert [row.level for row in plan.averaged] == ["spin_averaged", "orbit_averaged"]
+    assert all(0 < row.largest_arcsec < 10 for row in plan.averaged)
+    assert plan.least.left_out == ["sun", "moon"]
+
+
+def test_wheels_and_tops(tmp_path: Path) -> None:
+    top = """
+    name = "top"
+    [body]
+    principal_moments = [1, 1, 0.5]
+    mass = 1
+    center_of_mass = [0, 0, 0.1]
+    [initial]
+    angular_velocity = [0, 0, 20]
+    euler_angles = [0, "30 deg", 0]
+    [[loads]]
+    kind = "uniform_gravity"
+    [[loads]]
+    kind = "viscous_torque"
+    coefficients = [1e-6, 1e-6, 1e-6]
+    [[rotors]]
+    name = "wheel"
+    axis = [1, 0, 0]
+    moment = 0.01
+    rate = 1e-3
+    [time]
+    end = 10
+    samples = 11
+    """
+    plan = required(top, "10 deg", tmp_path)
+    assert plan.least.left_out == ["viscous_torque", "rotor-wheel"]
+    assert plan.models == 8
+    everything = required(top, "179.99 deg", tmp_path)
+    assert set(everything.least.left_out) == {"uniform_gravity", "viscous_torque", "rotor-wheel"}
+    free = rigidsim.load(Path(everything.least.run) / "config.toml").config
+    assert not free.loads
+    assert not free.rotors
+    tiny = required(top, "1e-12 mas", tmp_path)
+    assert tiny.least.left_out == []
+    assert "uncertain by" in tiny.warnings[0]
+
+
+@pytest.mark.parametrize("angle", ["1e-40", "1e-12", "0.3", "3.1"])
+def test_rotation_vectors_keep_their_digits(angle: str) -> None:
+    with mpmath.workdps(90):
+        axis = [mpmath.mpf(x) / 7 for x in (2, -3, 6)]
+        half = mpmath.mpf(angle) / 2
+        small = [mpmath.cos(half), *(mpmath.sin(half) * x for x in axis)]
+        w, x, y, z = (mpmath.mpf(k) / 10 for k in (1, 7, -5, 5))
+        a, b, c, d = small
+        turned = [
+            w * a - x * b - y * c - z * d,
+            w * b + x * a + y * d - z * c,
+            w * c - x * d + y * a + z * b,
+            w * d + x * c - y * b + z * a,
+        ]
+
+        def parts(q: list[Any]) -> list[np.ndarray]:
+            found = []
+            for _ in range(4):
+                found.append(np.array([[float(k) for k in q]]))
+                q = [k - mpmath.mpf(float(k)) for k in q]
+            return found
+
+        found = rotation_vectors(parts([w, x, y, z]), parts([-k for k in turned]))[0]
+    expected = float(angle) * np.array([2, -3, 6]) / 7
+    np.testing.assert_allclose(found, expected, rtol=1e-13, atol=0)
+
+
+@pytest.mark.parametrize(
+    ("error", "change", "told"),
+    [
+        ("0.1 km", {}, "arcsec"),
+        ("soon", {}, 'an angle such as "0.1 arcsec" is allowed'),
+        ("0 arcsec", {}, "above 0"),
+        ("-1 arcsec", {}, "above 0"),
+        ("200 deg", {}, "below half a turn"),
+        ("1 arcsec", {"model.level": "auto", "integrator.accuracy_axis": 1e-6}, "choose a level"),
+        ("1 arcsec", {"loads": None, "body.core": None}, "nothing can be left out"),
+        ("1 arcsec", {"sweep.axes": {"body.mass": {"values": [1, 2]}}}, "sweep"),
+    ],
+)
+def test_refused(error: str, change: dict[str, Any], told: str, tmp_path: Path) -> None:
+    given = rigidsim.parse(satellite()).replace(change) if change else rigidsim.parse(satellite())
+    with pytest.raises(rigidsim.ConfigError, match=told):
+        rigidsim.required_physics(given, error, out=tmp_path)
+    assert not list(tmp_path.iterdir())
+
+
+def test_what_an_expression_needs_is_told_in_short(tmp_path: Path) -> None:
+    text = """
+name = "controlled"
+[body]
+principal_moments = [1, 2, 2.5]
+[initial]
+angular_velocity = [0, 0.1, 1]
+[[loads]]
+kind = "gravity_gradient"
+name = "earth"
+gravitational_parameter = 1
+position = [5, 0, 0]
+[[loads]]
+kind = "torque"
+components = ["-0.01*uy_earth", 0, 0]
+[time]
+end = 5
+samples = 11
+"""
+    why = {x.what: x.why for x in required(text, "1 deg", tmp_path).not_assessed}["gravity gradient (earth)"]
+    assert why == 'can\'t be left out by itself: column 7: unknown name "uy_earth"'
+
+
+def test_options_that_need_physics(tmp_path: Path) -> None:
+    (tmp_path / "scene.toml").write_text(satellite())
+    asked = ["plan", "scene.toml", "--write", "least.toml"]
+    done = subprocess.run(
+        [sys.executable, "-m", "rigidsim", *asked], cwd=tmp_path, capture_output=True, text=True
+    )
+    assert done.returncode == 2
+    assert "--write: given without --physics" in done.stderr
+
+
+PUBLISHED = {
+    "sun": 11.4,
+    "core": 7.75,
+    "earth-degree-4": 1.08,
+    "core-flattening": 0.70,
+    "elasticity": 0.355,
+    "elasticity-delay": 0.29,
+    "core-friction": 0.25,
+    "earth-figure": 0.107,
+    "elasticity-spin": 0.041,
+}
+"""Arcsec rms over 1969 to 2019, of an independent program with DE421's equations and nothing fitted."""
+
+
+PLANETS = {"venus", "jupiter", "mercury", "mars", "saturn", "uranus", "neptune"}
+
+
+@pytest.mark.slow(400)
+def test_the_moons_ladder(tmp_path: Path) -> None:
+    pytest.importorskip("de421")
+    moon = rigidsim.load(Path(__file__).parents[2] / "configs/kernels/moon_since_1969.toml")
+    for error in (10.0, 1.0, 0.5):
+        plan = rigidsim.required_physics(moon, f"{error} arcsec", out=tmp_path)
+        rms = {row.code: row.rms_arcsec for row in plan.effects}
+        for code, expected in PUBLISHED.items():
+            assert rms[code] == pytest.approx(expected, rel=0.2), code
+        assert plan.effects[0].code == "earth"
+        assert sum(rms[code] for code in PLANETS) < 0.01
+        assert plan.least.largest_arcsec <= error
+        required = {row.code for row in plan.effects if row.required}
+        assert required >= {code for code, expected in PUBLISHED.items() if expected > error}
+        assert not required & PLANETS
