@@ -1,0 +1,234 @@
+"""Does `compare` measure the error of others' files in any convention, and tell their models apart?
+
+Method: random bodies, free, braked or under gravity about a fixed point, are integrated by SciPy and by
+methods of fixed step, tight and loose, at rows near and far apart, from the same start. Their files are
+written in one of 24 conventions: quaternions of two orders and directions with rates along body or space
+axes, twelve Euler sequences about body or fixed axes in radians or degrees, matrices, other space or body
+axes by a random turn. The true error is that from SciPy's DOP853 at 3e-14, written nowhere. Then the same
+with other models, well integrated: another body, one moment or the load 1 % off, or the load left out.
+
+Checked: the attitude error told is within 10 % of the true one (where that is above 1e-9 rad), and that of
+rates is as large as the true one, so that the convention is right or makes no difference; no loose
+integration is called a wrong model, no wrong model an integration error or agreement.
+
+Run: python -m experiments.compare_conventions [--files N] [--models N] [--seed N]      Exit: 1 if one fails
+"""
+
+from __future__ import annotations
+
+import argparse
+import random
+import sys
+from collections import Counter
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.integrate import solve_ivp
+from scipy.spatial.transform import Rotation
+
+if not __package__:  # as a script
+    sys.path.insert(0, str(Path(__file__).parents[1]))
+
+import rigidsim
+
+SEQUENCES = ["zxz", "zyz", "xyx", "xzx", "yxy", "yzy", "zyx", "xyz", "xzy", "yxz", "yzx", "zxy"]
+QUATERNIONS = [
+    (order, way, axes) for order in ("wxyz", "xyzw") for way in (1, -1) for axes in ("body", "space")
+]
+CONVENTIONS = [*QUATERNIONS, *SEQUENCES, "matrix", "transposed", "space turn", "body turn"]
+METHODS = ["DOP853", "RK45", "RK23", "LSODA", "Radau", "rk4", "heun"]
+LEAST = 1e-9  # rad: errors below aren't held against each other
+WITHIN = 0.1
+KINDS = ("free", "braked", "top")
+
+
+@dataclass(frozen=True)
+class Model:
+    """A body, what acts on it, and its start."""
+
+    kind: str
+    moments: np.ndarray
+    load: float
+    rates: np.ndarray
+    quaternion: np.ndarray
+    end: float
+
+    @classmethod
+    def drawn(cls, chance: random.Random) -> Model:
+        """Moments, rates and attitude at random; some 3 to 30 rad of turning."""
+        a, b = chance.uniform(1, 3), chance.uniform(1, 3)
+        moments = np.array([a, b, chance.uniform(max(abs(a - b) * 1.1, 0.3), (a + b) * 0.95)])
+        rates = np.array([chance.gauss(0, 1) for _ in range(3)])
+        quaternion = np.array([chance.gauss(0, 1) for _ in range(4)])
+        size = float(np.linalg.norm(rates))
+        kind = chance.choice(KINDS)
+        load = {"free": 0.0, "braked": 0.02, "top": 1.0}[kind] * chance.uniform(0.5, 2)
+        end = chance.uniform(3, 30) / max(size, 0.5)
+        return cls(kind, moments, load, rates, quaternion / np.linalg.norm(quaternion), end)
+
+    def slopes(self, _: float, y: np.ndarray) -> np.ndarray:
+        """Derivatives of quaternion and rates."""
+        q, w = y[:4], y[4:]
+        torque = -self.load * w if self.kind == "braked" else np.zeros(3)
+        if self.kind == "top":  # weight at (0, 0, 1) below a vertical Z: up in body axes times -load
+            x, y_, z = (
+                2 * (q[1] * q[3] - q[0] * q[2]),
+                2 * (q[2] * q[3] + q[0] * q[1]),
+                1 - 2 * (q[1] ** 2 + q[2] ** 2),
+            )
+            torque = -self.load * np.cross([0, 0, 1.0], np.array([x, y_, z]) / (q @ q))
+        turn = np.array([-q[1:] @ w, *(q[0] * w + np.cross(q[1:], w))]) / 2
+        return np.concatenate([turn, (torque - np.cross(w, self.moments * w)) / self.moments])
+
+    def rows(self, method: str, accuracy: float, times: np.ndarray) -> np.ndarray:
+        """Quaternion and rates (rows, 7), by a method: relative tolerance, or step times rate."""
+        start = np.concatenate([self.quaternion, self.rates])
+        if method not in ("rk4", "heun"):
+            options = {"rtol": max(accuracy, 3e-14), "atol": accuracy * 0.1}
+            return solve_ivp(self.slopes, (0, self.end), start, method, times, **options).y.T
+        step, f = self.end / (len(times) - 1), self.slopes
+        parts = max(1, round(step * float(np.linalg.norm(self.rates)) / accuracy))
+        h, y, found = step / parts, start, [start]
+        for _ in times[1:]:
+            for _ in range(parts):
+                a = f(0, y)
+                if method == "heun":
+                    y = y + h / 2 * (a + f(0, y + h * a))
+                    continue
+                b = f(0, y + h / 2 * a)
+                c = f(0, y + h / 2 * b)
+                y = y + h / 6 * (a + 2 * b + 2 * c + f(0, y + h * c))
+            found.append(y)
+        return np.array(found)
+
+    @property
+    def config(self) -> str:
+        """The experiment as TOML."""
+        head = f"""name = "drawn"
+[initial]
+angular_velocity = {self.rates.tolist()}
+quaternion = {self.quaternion.tolist()}
+[time]
+end = {self.end!r}
+[body]
+principal_moments = {self.moments.tolist()}
+"""
+        if self.kind == "braked":
+            head += f'[[loads]]\nkind = "viscous_torque"\ncoefficients = {[self.load] * 3}\n'
+        if self.kind == "top":
+            head += "mass = 1\ncenter_of_mass = [0, 0, 1]\n"
+            head += f'[[loads]]\nkind = "uniform_gravity"\nacceleration = [0, 0, {-self.load!r}]\n'
+        return head
+
+
+def written(convention: Any, rows: np.ndarray, chance: random.Random) -> dict[str, np.ndarray]:
+    """Columns of a file in a convention."""
+    body = Rotation.from_quat(rows[:, [1, 2, 3, 0]])
+    rates, turn = rows[:, 4:], Rotation.random(random_state=chance.randrange(2**31))
+    scale = chance.choice([1.0, 180 / np.pi])
+    if convention == "space turn":
+        body = turn * body
+    if convention == "body turn":
+        body, rates = body * turn, turn.inv().apply(rates)
+    if isinstance(convention, tuple):
+        order, way, axes = convention
+        rates = body.apply(rates) if axes == "space" else rates
+        q = (body if way == 1 else body.inv()).as_quat()
+        return {"q": q if order == "xyzw" else q[:, [3, 0, 1, 2]], "w": rates * scale}
+    if convention in SEQUENCES:
+        letters = convention if chance.random() < 0.5 else convention.upper()
+        return {"euler": body.as_euler(letters, degrees=scale != 1), "w": rates * scale}
+    if convention in ("matrix", "transposed"):
+        return {"r": (body if convention == "matrix" else body.inv()).as_matrix(), "w": rates * scale}
+    return {"q": body.as_quat(), "w": rates * scale}
+
+
+def angles(one: np.ndarray, other: np.ndarray) -> np.ndarray:
+    """Angles between attitudes, whatever the norms and signs of their quaternions."""
+    p, q = (x[:, :4] / np.linalg.norm(x[:, :4], axis=1)[:, None] for x in (one, other))
+    sign = np.where(np.einsum("ij,ij->i", p, q) < 0, -1.0, 1.0)[:, None]
+    return 4 * np.arctan2(np.linalg.norm(p - sign * q, axis=1), np.linalg.norm(p + sign * q, axis=1))
+
+
+def a_file(chance: random.Random, convention: Any) -> tuple[str, str]:
+    """Judge the file of a loose or tight integration: the verdict, and what is wrong; empty for nothing."""
+    model = Model.drawn(chance)
+    method = chance.choice(METHODS)
+    steps = method in ("rk4", "heun")
+    accuracy = 10 ** (chance.uniform(-2, -0.7) if steps else chance.uniform(-10, -3))
+    size = float(np.linalg.norm(model.rates))
+    times = np.linspace(0, model.end, max(8, round(model.end * size / 10 ** chance.uniform(-1.7, 0))))
+    rows, exact = model.rows(method, accuracy, times), model.rows("DOP853", 3e-14, times)
+    found = rigidsim.compare(rigidsim.parse(model.config), {"t": times, **written(convention, rows, chance)})
+    true = float(angles(rows, exact).max())
+    true_rates = float(np.linalg.norm(rows[:, 4:] - exact[:, 4:], axis=1).max())
+    told = found.attitude_error.largest
+    name = f"{model.kind} {method} {accuracy:.1e} {len(times)} rows {convention}"
+    if max(true, told) > LEAST and abs(told - true) > WITHIN * true:
+        return found.verdict, f"{name}: {told:.3g} rad told, {true:.3g} true; {found.convention}"
+    assert found.rate_error is not None
+    if found.rate_error > 1.1 * true_rates + 2 * size * true + LEAST:
+        return found.verdict, f"{name}: rates {found.rate_error:.3g} told, {true_rates:.3g} true"
+    if found.verdict == "wrong_model":
+        return found.verdict, f"{name}: {found.why}"
+    return found.verdict, ""
+
+
+def a_model(chance: random.Random, convention: Any) -> tuple[str, str]:
+    """Judge the file of another model: the verdict, and what is wrong."""
+    model = Model.drawn(chance)
+    wrong = chance.choice(["body", "moment", "load", "missing"])
+    if model.kind == "free" and wrong in ("load", "missing"):
+        wrong = "moment"
+    other = {
+        "body": lambda: replace(model, moments=model.moments[[1, 2, 0]]),
+        "moment": lambda: replace(
+            model, moments=model.moments * np.array([1, 1, chance.choice([0.99, 1.01])])
+        ),
+        "load": lambda: replace(model, load=model.load * chance.choice([0.99, 1.01])),
+        "missing": lambda: replace(model, load=0.0),
+    }[wrong]()
+    accuracy = 10 ** chance.uniform(-12, -9)
+    size = float(np.linalg.norm(model.rates))
+    times = np.linspace(0, model.end, max(8, round(model.end * size / 10 ** chance.uniform(-1.7, 0))))
+    rows = other.rows("DOP853", accuracy, times)
+    found = rigidsim.compare(rigidsim.parse(model.config), {"t": times, **written(convention, rows, chance)})
+    if found.verdict in ("integration_error", "agrees"):
+        name = f"{model.kind} {wrong} {accuracy:.1e} {len(times)} rows {convention}"
+        return found.verdict, f"{name}: {found.verdict}: {found.why}; {found.told}"
+    return found.verdict, ""
+
+
+def campaign(files: int, models: int, seed: int, told: Callable[[str], None] = print) -> int:
+    """Judge so many files and other models; the number of failures."""
+    failures = 0
+    for what, judge, count in (("files", a_file, files), ("other models", a_model, models)):
+        seen: Counter[str] = Counter()
+        for number in range(count):
+            verdict, wrong = judge(
+                random.Random(f"{seed} {what} {number}"), CONVENTIONS[number % len(CONVENTIONS)]
+            )
+            seen[verdict] += 1
+            if wrong:
+                failures += 1
+                told(f"{what} {number}: {wrong}")
+        told(f"{count} {what}: " + ", ".join(f"{verdict} {n}" for verdict, n in sorted(seen.items())))
+    told(f"{failures} failures")
+    return failures
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Command line; 1 if something failed."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    parser.add_argument("--files", type=int, default=24, help="of other integrators")
+    parser.add_argument("--models", type=int, default=16, help="that are others")
+    parser.add_argument("--seed", type=int, default=1)
+    given = parser.parse_args(arguments)
+    return 1 if campaign(given.files, given.models, given.seed) else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,17 @@
+"""The command ``compare``."""
+
+from pathlib import Path
+
+from rigidsim.cli.screens.compare import print_comparison
+from rigidsim.cli.screens.page import answer
+from rigidsim.workflows.compare.compared import compare as compared
+from rigidsim.workflows.read import load
+
+
+def compare(
+    config: Path, file: Path, overrides: list[str] | None, within: float, out: Path | None,
+    figure: Path | None, as_json: bool,
+) -> None:  # fmt: skip
+    """Judge another tool's trajectory."""
+    found = compared(load(config, overrides=overrides or []), file, within=within, out=out, figure=figure)
+    answer(as_json, found.as_dict(), print_comparison, found)

@@ -1,0 +1,97 @@
+"""Output of ``rigidsim compare``: the verdict, the convention found, errors, drifts and local defects."""
+
+from __future__ import annotations
+
+import math
+
+from rigidsim.cli.screens.page import Page, Styled
+from rigidsim.scene.readable import span_text
+from rigidsim.workflows.compare.result import AGREES, UNDECIDED, Comparison, FoundConvention
+
+_MOST_UNDECIDED = 6
+
+
+def print_comparison(found: Comparison) -> None:
+    """Print the result of ``rigidsim compare``."""
+    on = Page()
+    on.say(
+        (found.source, "bold"), f"  {found.rows:,} rows over {span_text(found.span_s)}, beside {found.name}"
+    )
+    good = found.verdict in (AGREES, UNDECIDED)
+    on.line("verdict", found.verdict, "bold" if good else "bold yellow")
+    on.line("", found.why)
+    on.line("written", _convention(found.convention))
+    undecided = found.convention.undecided
+    if undecided:
+        more = f", and {len(undecided) - _MOST_UNDECIDED} more" if len(undecided) > _MOST_UNDECIDED else ""
+        on.line("or", "; ".join(undecided[:_MOST_UNDECIDED]) + more + ": this motion can't tell")
+    error = found.attitude_error
+    rows: list[list[Styled]] = [
+        [
+            "attitude error",
+            _angle(error.largest),
+            f"{_angle(error.rms)} rms; at {error.time:.6g} s, {error.row}",
+        ]
+    ]
+    if found.rate_error is not None:
+        rows.append(["angular velocity", f"{found.rate_error:.3g} rad/s", ""])
+    if found.position_error is not None:
+        rows.append(["position", f"{found.position_error:.3g} m", ""])
+    for drift in found.drifts:
+        rows.append(
+            [
+                f"drift of {drift.name.replace('_', ' ')}",
+                f"{drift.largest:.2g}",
+                f"{drift.final:.2g} at the end",
+            ]
+        )
+    if (local := found.local_defects) is not None:
+        rows.append(
+            [
+                "local defect",
+                _angle(local.largest),
+                f"{_angle(local.rms)} rms; at {local.time:.6g} s, of {local.rows:,} rows",
+            ]
+        )
+        if local.rate_largest is not None:
+            rows.append(["  of the rates", f"{local.rate_largest:.3g} rad/s", ""])
+        if local.unexplained is not None and local.window_s is not None:
+            words = "of the attitude's that the rates' don't explain, over the rest"
+            rows.append(
+                [
+                    "  share",
+                    f"{local.unexplained:.2g}",
+                    f"{words}, in windows of {span_text(local.window_s, 3)}",
+                ]
+            )
+    on.table(["", "largest", ""], rows)
+    if found.first_disagreement is not None:
+        first = found.first_disagreement
+        on.line("first", f"beyond {_angle(found.within)} at {first.time:.6g} s, {first.row}")
+    for text in found.told:
+        on.line("note", text)
+    for label, name in (("dataset", found.dataset_file), ("figure", found.figure_file)):
+        if name:
+            on.line(label, name)
+
+
+def _convention(found: FoundConvention) -> str:
+    words = []
+    if found.sequence:
+        words.append(f"Euler angles {found.sequence} about {found.about} axes in {found.unit}")
+    elif found.order:
+        words.append(f"quaternion {found.order}")
+    else:
+        words.append("rotation matrix")
+    words.append(found.direction.replace("_", " "))
+    if found.rate_unit:
+        sign = "minus the " if found.rate_sign == "-" else ""
+        words.append(f"{sign}rates along {found.rate_axes} axes in {found.rate_unit}")
+    words.append(f"time in {found.time_unit}")
+    if found.offset != "none":
+        words.append(f"{found.offset} axes turned by {math.degrees(found.offset_angle):.6g} deg")
+    return ", ".join(words)
+
+
+def _angle(angle: float) -> str:
+    return f"{angle:.3g} rad"

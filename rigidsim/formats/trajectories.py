@@ -1,0 +1,267 @@
+"""Trajectories that other tools wrote, as named columns of doubles: CSV, Parquet, netCDF and AEM or OEM.
+
+Nothing is known here of what the columns mean, nor is anything left out, sorted or filled in.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import itertools
+import re
+import warnings
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from rigidsim.errors import RigidsimError
+from rigidsim.scene.epochs import Epoch, parse_epoch
+
+if TYPE_CHECKING:
+    import pandas
+    import xarray
+
+KINDS = "CSV (.csv, .txt, .dat, .tsv), Parquet, netCDF or HDF5 that xarray reads (.nc, .h5, .zarr), AEM, OEM"
+_TEXT = {".csv", ".txt", ".dat", ".tsv"}
+_XARRAY = {".nc", ".nc4", ".cdf", ".h5", ".hdf5", ".zarr"}
+_DATE = re.compile(r"(\d{4})-(\d\d\d?)(?:-(\d\d))?T([\d:.]+)Z?")
+_MOST_COLUMNS = 500
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """Columns of one trajectory.
+
+    Attributes:
+        columns: by name, in the order of the file, (rows,) float64 each.
+        units: of columns, as far as the file says so apart from their names.
+        source: the file, or what was given in Python.
+        counted: what a row is called, "line" of a text, otherwise "row".
+        first: number of the first row, as the file counts them.
+        narrow: whether the numbers were single precision.
+        epochs: times of a message as dates, in place of a column of times.
+    """
+
+    columns: Mapping[str, np.ndarray]
+    source: str
+    units: Mapping[str, str] = field(default_factory=dict)
+    counted: str = "row"
+    first: int = 0
+    narrow: bool = False
+    epochs: tuple[Epoch, ...] = ()
+
+    def row(self, index: int) -> str:
+        """A row as the file counts it."""
+        return f"{self.counted} {self.first + int(index)}"
+
+
+def read_trajectory(path: Path) -> Trajectory:
+    """Read a file by the kind that its name and its first line say.
+
+    Raises:
+        RigidsimError: there is no such file, it is of no known kind, or it can't be read.
+    """
+    if not path.exists():
+        raise RigidsimError(f"{path}: there is no such file; allowed: {KINDS}")
+    suffix = path.suffix.lower()
+    try:
+        if suffix in _XARRAY:
+            return _of_xarray_file(path)
+        if suffix in (".parquet", ".pq"):
+            return _of_parquet(path)
+        if path.is_file():
+            with path.open(errors="replace") as file:
+                head = file.read(4096)
+            if (found := re.search(r"CCSDS_(AEM|OEM)_VERS", head)) is not None:
+                return _of_message(path, found[1])
+            if suffix in _TEXT:
+                return _of_text(path)
+    except (RigidsimError, MemoryError):
+        raise
+    except Exception as error:  # readers raise many kinds on files that aren't what their names say
+        text = str(error).strip() or type(error).__name__
+        raise RigidsimError(f"{path}: can't be read ({text.splitlines()[0][:200]})") from None
+    raise RigidsimError(f"{path}: of no known kind; allowed: {KINDS}, or the folder of a run")
+
+
+def trajectory_of(table: Any, source: str = "the table") -> Trajectory:
+    """The columns of a mapping of arrays, a pandas DataFrame, or an xarray Dataset.
+
+    An array of more dimensions, as quaternions (rows, 4), becomes a column for each component.
+    """
+    if hasattr(table, "data_vars"):
+        return _of_dataset(table, source)
+    if hasattr(table, "itertuples"):
+        return _of_frame(table, source)
+    if not isinstance(table, Mapping):
+        raise RigidsimError(
+            f"given {type(table).__name__}; a path, a mapping of names to arrays, a pandas DataFrame or an "
+            "xarray Dataset is allowed"
+        )
+    return _made(((str(name), value, ()) for name, value in table.items()), source)
+
+
+def _made(
+    given: Iterable[tuple[str, Any, tuple[str, ...]]], source: str, units: Mapping[str, str] | None = None
+) -> Trajectory:
+    """Columns of arrays, each with the labels of its components (none: numbers from 0)."""
+    columns: dict[str, np.ndarray] = {}
+    narrow = False
+    for name, value, labels in given:
+        array = np.asarray(value)
+        if array.dtype.kind not in "fiu" or not array.ndim:
+            continue
+        narrow |= array.dtype == np.float32
+        array = array.astype(np.float64)
+        if array.ndim == 1:
+            columns[name] = array
+            continue
+        places = list(itertools.product(*map(range, array.shape[1:])))
+        if len(places) > _MOST_COLUMNS:
+            continue
+        for n, place in enumerate(places):
+            label = labels[n] if labels else "".join(map(str, place))
+            flat = array.reshape(len(array), -1)
+            columns[f"{name}_{label}"] = flat[:, n]
+    sizes = {len(column) for column in columns.values()}
+    if len(sizes) > 1:
+        raise RigidsimError(f"{source}: columns of different lengths ({sorted(sizes)[:5]}); give equal ones")
+    return Trajectory(columns, source, units or {}, narrow=narrow)
+
+
+def _of_frame(frame: pandas.DataFrame, source: str) -> Trajectory:
+    columns = {}
+    for name in frame.columns:
+        column = frame[name]
+        if column.dtype.kind in "fiu":
+            columns[str(name)] = column
+    if isinstance(frame.index.name, str) and frame.index.dtype.kind in "fiu":
+        columns = {frame.index.name: frame.index.values, **columns}
+    return _made(((name, value, ()) for name, value in columns.items()), source)
+
+
+def _of_dataset(dataset: xarray.Dataset, source: str) -> Trajectory:
+    """The variables along the dimension of time; residuals beyond doubles (``NAME_lo``) are left out."""
+    along = "time" if "time" in dataset.dims else next(iter(dataset.dims), None)
+    units, given = {}, []
+    for name, variable in {**dataset.coords, **dataset.data_vars}.items():
+        if along not in variable.dims or str(name).endswith(("_lo", "_lo2")):
+            continue
+        others = [dim for dim in variable.dims if dim != along]
+        labels: tuple[str, ...] = ()
+        if len(others) == 1 and others[0] in dataset.coords:
+            labels = tuple(map(str, dataset.coords[others[0]].values))
+        given.append((str(name), variable.transpose(along, *others).values, labels))
+        if isinstance(unit := variable.attrs.get("units"), str):
+            units[str(name)] = unit
+    return _made(given, source, units)
+
+
+def _of_xarray_file(path: Path) -> Trajectory:
+    import xarray
+
+    engine = {".zarr": "zarr", ".h5": "h5netcdf", ".hdf5": "h5netcdf"}.get(path.suffix.lower())
+    with xarray.open_dataset(path, engine=engine, decode_times=False) as dataset:
+        return _of_dataset(dataset, str(path))
+
+
+def _of_parquet(path: Path) -> Trajectory:
+    if importlib.util.find_spec("pyarrow") is None:
+        raise RigidsimError(f'{path}: needs pyarrow, which is missing: pip install "rigidsim[export]"')
+    from pyarrow.parquet import read_table
+
+    table = read_table(path)
+    given = ((name, table.column(name).to_numpy(), ()) for name in table.column_names)
+    return _made(given, str(path))
+
+
+def _of_text(path: Path) -> Trajectory:
+    import pandas
+
+    head, header = 0, ""
+    with path.open(encoding="utf-8-sig", errors="replace") as file:
+        for line in file:
+            if line.strip() and not line.lstrip().startswith("#"):
+                header = line.strip()
+                break
+            head += 1
+    if not header:
+        raise RigidsimError(f"{path}: empty; a line of names and rows of numbers are needed")
+    separator = next((c for c in ",;\t" if c in header), r"\s+")
+    names = [name.strip().strip('"') for name in re.split(separator, header)]
+    if all(_is_number(name) for name in names):
+        raise RigidsimError(
+            f"{path}: its first line holds numbers; put a line of names above, such as t,qw,qx,qy,qz,wx,wy,wz"
+        )
+    exact: dict[str, Any] = {"float_precision": "round_trip"} if separator != r"\s+" else {}
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # what reads exactly has other names in other versions
+        frame = pandas.read_csv(
+            path, sep=separator, skiprows=head + 1, header=None, comment="#", skip_blank_lines=True,
+            names=names, index_col=False, encoding="utf-8-sig", **exact,
+        )  # fmt: skip
+    for name in frame.columns:
+        if frame[name].dtype.kind not in "fiub" and len(frame):
+            parsed = pandas.to_numeric(frame[name], errors="coerce")
+            if parsed.notna().any():  # words in a column of numbers stay visible as what is not finite
+                frame[name] = parsed
+    made = _of_frame(frame, str(path))
+    return Trajectory(made.columns, str(path), counted="line", first=head + 2)
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
+
+
+def _of_message(path: Path, message: str) -> Trajectory:
+    """A CCSDS message in KVN: quaternions of an AEM, positions (m) and velocities (m/s) of an OEM."""
+    keys: dict[str, str] = {}
+    epochs: list[Epoch] = []
+    rows: list[list[float]] = []
+    first = 0
+    for number, line in enumerate(path.read_text(encoding="ascii", errors="replace").splitlines(), 1):
+        words = line.split()
+        if not words or words[0] == "COMMENT":
+            continue
+        if "=" in line:
+            key, _, value = line.partition("=")
+            keys[key.strip()] = value.strip()
+        elif words[0].startswith("COVARIANCE"):
+            break
+        elif _DATE.fullmatch(words[0]):
+            first = first or number
+            epochs.append(_date(words[0], keys.get("TIME_SYSTEM", ""), f"{path}, line {number}"))
+            rows.append([float(word) for word in words[1:]])
+    if not rows:
+        raise RigidsimError(f"{path}: the {message} holds no data lines")
+    if message == "AEM" and not keys.get("ATTITUDE_TYPE", "").startswith("QUATERNION"):
+        raise RigidsimError(
+            f"{path}: ATTITUDE_TYPE = {keys.get('ATTITUDE_TYPE', 'missing')}; QUATERNION is allowed: export "
+            "the attitude as quaternions, or as CSV"
+        )
+    if len({len(row) for row in rows}) > 1:
+        raise RigidsimError(f"{path}: data lines hold different numbers of values")
+    values = np.array(rows)
+    names = ["qx", "qy", "qz", "qw"] if message == "AEM" else ["x", "y", "z", "vx", "vy", "vz"]
+    if keys.get("QUATERNION_TYPE") == "FIRST":
+        names = ["qw", "qx", "qy", "qz"]
+    scale = 1.0 if message == "AEM" else 1000.0  # km
+    columns = {name: values[:, n] * scale for n, name in enumerate(names) if n < values.shape[1]}
+    return Trajectory(columns, str(path), counted="line", first=first, epochs=tuple(epochs))
+
+
+def _date(text: str, scale: str, where: str) -> Epoch:
+    match = _DATE.fullmatch(text)
+    assert match is not None
+    if match[3] is None:
+        raise RigidsimError(f"{where}: a day of the year ({text}); dates as 2029-04-13T21:46:00 are allowed")
+    try:
+        return parse_epoch(f"{match[1]}-{match[2]}-{match[3]}T{match[4]} {scale}")
+    except ValueError as error:
+        raise RigidsimError(f"{where}: {error}") from None

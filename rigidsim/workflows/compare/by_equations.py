@@ -1,0 +1,119 @@
+"""A trajectory by the experiment's equations: drifts of invariants by its numbers, and local defects."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+import xarray
+
+from rigidsim.solve.from_states import FromStates
+from rigidsim.workflows.compare import defects
+from rigidsim.workflows.compare.motion import OwnMotion
+from rigidsim.workflows.compare.result import LocalDefects, TrajectoryDrift
+from rigidsim.workflows.compare.rotations import normalised
+from rigidsim.workflows.compare.verdict import unexplained_share
+from rigidsim.workflows.physics.models import rotation_vectors
+
+_MOST_STARTS = 1500  # rows from which local defects are integrated
+_MOST_WINDOWS = 250
+_NO_RATES = "the file has no angular velocities, by which the two differ"
+_NORM = "quaternion_norm"
+
+
+@dataclass
+class ByEquations:
+    """What the equations say of a trajectory; variables are put into the dataset as they are found.
+
+    Attributes:
+        times: (rows,), s. quaternions: (rows, 4), w x y z, of norm one. rates: (rows, 3), rad/s, if there.
+        flight: positions and velocities (rows, 6), SI, if there.
+        norms: of the quaternions as they are written; None for other attitudes.
+        windows: None where models can't be told from integrators; ``missing`` says why.
+    """
+
+    equations: FromStates
+    times: np.ndarray
+    quaternions: np.ndarray
+    rates: np.ndarray | None
+    flight: np.ndarray | None
+    norms: np.ndarray | None
+    own: OwnMotion
+    dataset: xarray.Dataset
+    drifts: list[TrajectoryDrift] = field(default_factory=list)
+    local: LocalDefects | None = None
+    windows: defects.WindowDefects | None = None
+    missing: str = _NO_RATES
+    told: list[str] = field(default_factory=list)
+
+    def measure(self) -> None:
+        """Measure all of it."""
+        base = self.equations.motion(self.times)
+        if self.equations.others:
+            names = ", ".join(self.equations.others)
+            self.told.append(f"the file has no {names}: each interval begins with the experiment's own")
+        rates = self.own.rates if self.rates is None else self.rates
+        states = self.equations.states(base, self.quaternions, rates, self.flight)
+        self._drifts(states)
+        count = len(self.times) - 1
+        starts = np.unique(np.linspace(0, count - 1, min(count, _MOST_STARTS)).astype(int))
+        if len(starts) < count:
+            spread = f"{len(starts):,} of {count:,} rows, evenly spread"
+            self.told.append(f"local defects were measured from {spread}")
+        if self.rates is None:
+            self._by_shooting(states, starts[starts < count - 1])
+            return
+        rows = defects.row_defects(self.equations, self.times, states, starts)
+        rate = defects.motion_rate(self.times, self.rates)
+        self.windows = defects.window_defects(self.equations, self.times, states, rate, _MOST_WINDOWS)
+        spacing = float(np.median(np.diff(self.times)))
+        self.missing = f"rows are too far apart ({spacing:.3g} s, at {rate:.3g} rad/s)"
+        self._keep(starts, np.linalg.norm(rows.attitude, axis=1), np.linalg.norm(rows.rates, axis=1))
+
+    def _drifts(self, states: np.ndarray) -> None:
+        found = {} if self.rates is None else self.equations.drifts(states, self.times)
+        found.pop(_NORM, None)  # of quaternions that were normalised
+        if self.norms is not None:
+            found[_NORM] = self.norms / self.norms[0] - 1
+        for name, values in found.items():
+            largest, final = float(np.abs(values).max()), float(values[-1])
+            self.drifts.append(TrajectoryDrift(name=name, largest=largest, final=final))
+            attributes = {"units": "1", "long_name": f"drift of {name.replace('_', ' ')}"}
+            self.dataset[f"{name}_drift"] = ("time", values, attributes)
+
+    def _by_shooting(self, states: np.ndarray, starts: np.ndarray) -> None:
+        """Without rates in the file: those that lead to the next row also lead to the one beyond it."""
+        shot = defects.shot_rates(self.equations, self.times, states, starts)
+        quaternions, _ = self.equations.attitude(states)
+        begun = self.equations.states(states[starts], quaternions[starts], shot)
+        ends = [
+            self.equations.after(state, self.times[n], self.times[n + 2 : n + 3])[0]
+            for state, n in zip(begun, starts, strict=True)
+        ]
+        reached, _ = self.equations.attitude(np.stack(ends))
+        apart = rotation_vectors([normalised(reached)], [quaternions[starts + 2]])
+        self.told.append(
+            "the file has no angular velocities: defects are at each second row, from two attitudes"
+        )
+        self._keep(starts, np.linalg.norm(apart, axis=1), None)
+
+    def _keep(self, starts: np.ndarray, sizes: np.ndarray, rates: np.ndarray | None) -> None:
+        """Local defects as values, and along time in the dataset."""
+        put, windows = self.dataset, self.windows
+        put["defect"] = ("start", sizes, {"units": "rad", "long_name": "local defect of the attitude"})
+        put["defect_time"] = ("start", self.times[starts], {"units": "s", "long_name": "time of the row"})
+        if rates is not None:
+            words = {"units": "rad s-1", "long_name": "local defect of the angular velocity"}
+            put["rate_defect"] = ("start", rates, words)
+        at = int(np.nanargmax(sizes)) if np.isfinite(sizes).any() else 0
+        mean = None if windows is None else np.sqrt(np.mean(np.sum(windows.acceleration**2, axis=1)))
+        self.local = LocalDefects(
+            largest=float(sizes[at]),
+            rms=float(np.sqrt(np.nanmean(sizes**2))),
+            time=float(self.times[starts[at]]),
+            rate_largest=None if rates is None else float(np.nanmax(rates)),
+            rows=len(starts),
+            window_s=None if windows is None else windows.length,
+            unexplained=None if windows is None else unexplained_share(windows),
+            missing_acceleration=None if mean is None else float(mean),
+        )

@@ -1,0 +1,323 @@
+"""What the columns of a trajectory are, by their names and units; what can't be used is refused."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from decimal import Decimal
+from fractions import Fraction
+
+import numpy as np
+
+from rigidsim.errors import RigidsimError
+from rigidsim.formats.trajectories import Trajectory
+from rigidsim.scene.epochs import Epoch
+from rigidsim.scene.exact import parse_number
+
+LEAST_ROWS = 3
+_NORM = 1e-3  # that the norm of a quaternion may differ from the median, beyond which a row is damaged
+_GAP = 1000.0  # times the median spacing, from which on a gap is told
+_FIXED = 0.6  # share of numbers with the same count of decimals that a fixed format makes
+_DOUBLE_DIGITS = 15
+_TIMES = {"s": "s", "sec": "s", "seconds": "s", "second": "s", "day": "day", "days": "day", "d": "day",
+          "h": "h", "hr": "h", "hours": "h", "hour": "h", "min": "min", "minutes": "min", "ms": "ms",
+          "yr": "yr", "years": "yr", "year": "yr"}  # fmt: skip
+_STEMS = {
+    "quaternion": r"(?:quaternion|quat|attitude|q)_?",
+    "rates": r"(?:angular_?velocity|angular_?rate|angvel|body_?rate|omega|gyro|rate|om|w)_?",
+    "position": r"(?:position|pos|r|p)?_?",
+    "velocity": r"(?:velocity|vel|v)_?",
+    "matrix": r"(?:rotation_?matrix|matrix|dcm|rot|r|m|c|a)_?",
+    "euler": r"(?:euler_?angles?|euler|angles?|ang|e|a)_?",
+}
+_EULER_NAMES = [("phi", "theta", "psi"), ("roll", "pitch", "yaw"), ("alpha", "beta", "gamma"),
+                ("precession", "nutation", "spin"), ("heading", "pitch", "roll")]  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Attitudes:
+    """The columns of a trajectory by what they are; each array has a row for each time.
+
+    Attributes:
+        times: as in the file, in ``time_unit``, which is None where the file doesn't say.
+        quaternions: (rows, 4) in the order of their columns, or as w x y z where ``named`` says so.
+        matrices: (rows, 3, 3). angles: (rows, 3), in ``angle_unit``.
+        rates: (rows, 3), in ``rate_unit``. positions, velocities: (rows, 3), SI.
+        resolution: of the numbers of the attitude and of the rates by the digits that are written.
+        told: what a user should know of the columns.
+    """
+
+    trajectory: Trajectory
+    times: np.ndarray
+    time_unit: str | None
+    quaternions: np.ndarray | None = None
+    named: bool = False
+    matrices: np.ndarray | None = None
+    angles: np.ndarray | None = None
+    angle_unit: str | None = None
+    rates: np.ndarray | None = None
+    rate_unit: str | None = None
+    positions: np.ndarray | None = None
+    velocities: np.ndarray | None = None
+    resolution: tuple[float, float] = (0.0, 0.0)
+    told: list[str] = field(default_factory=list)
+
+
+def attitudes_of(found: Trajectory, epoch: Epoch | None) -> Attitudes:
+    """Find time, attitude, rates and positions among the columns, and refuse rows that can't be used.
+
+    Args:
+        epoch: date of time 0 of the experiment, for a message with dates.
+
+    Raises:
+        RigidsimError: no attitude, no time, or rows that aren't finite, ascending, or enough.
+    """
+    told: list[str] = []
+    time_unit: str | None = "s"
+    plain = {_plain(name): name for name in found.columns}
+    units = {_plain(name): found.units.get(name) or _unit_in(name) for name in found.columns}
+    rows = len(next(iter(found.columns.values()), ()))
+    if rows < LEAST_ROWS:
+        raise RigidsimError(
+            f"{found.source}: {rows} rows; at least {LEAST_ROWS} are needed: sample more often"
+        )
+    used: dict[str, list[str]] = {}
+
+    def take(kind: str, names: Sequence[str] | None) -> np.ndarray | None:
+        if names is None:
+            return None
+        used[kind] = [plain[name] for name in names]
+        return np.stack([found.columns[plain[name]] for name in names], axis=1)
+
+    if found.epochs:
+        times = _since(found, epoch, told)
+    else:
+        name, time_unit = _time_among(plain, units, found.source)
+        times = found.columns[plain[name]]
+        used["time"] = [plain[name]]
+    quaternion = _components(plain, "quaternion", "wxyz") or _bare_quaternion(plain)
+    named = quaternion is not None
+    ordered = (
+        quaternion or _components(plain, "quaternion", "0123") or _components(plain, "quaternion", "1234")
+    )
+    matrix = _matrix(plain)
+    euler = None if ordered or matrix else _euler(plain)
+    rates = _vector(plain, "rates") or _exact(plain, "pqr")
+    position = _vector(plain, "position") if _apart(plain, quaternion) else None
+    velocity = _vector(plain, "velocity")
+    made = Attitudes(
+        found, times, time_unit, take("quaternion", ordered), named, _square(take("matrix", matrix)),
+        take("euler", euler), _one_unit(units, euler), take("rates", rates), _one_unit(units, rates),
+        take("position", position), take("velocity", velocity), told=told,
+    )  # fmt: skip
+    if made.quaternions is None and made.matrices is None and made.angles is None:
+        raise RigidsimError(
+            f"{found.source}: no attitude among its columns ({', '.join(found.columns)}); name it "
+            "qw qx qy qz, q0 q1 q2 q3, r11 ... r33, or euler_1 euler_2 euler_3"
+        )
+    _refuse_rows(made, used)
+    _tell_gaps(made)
+    kept = [made.quaternions, made.matrices, made.angles]
+    attitude = next(x for x in kept if x is not None)
+    resolution = (
+        _resolution(attitude, found.narrow),
+        0.0 if made.rates is None else _resolution(made.rates, found.narrow),
+    )
+    return Attitudes(**{**made.__dict__, "resolution": resolution})
+
+
+def _plain(name: str) -> str:
+    """A name in small letters without its unit."""
+    bare = re.sub(r"[\[(].*?[\])]", "", name) if re.search(r"[a-zA-Z]\s*[\[(]", name) else name
+    return re.sub(r"[^a-z0-9]+", "_", bare.strip().lower()).strip("_")
+
+
+def _unit_in(name: str) -> str | None:
+    match = re.search(r"[\[(]([^\])]+)[\])]\s*$", name)
+    if match and not match[1].strip().isdigit():
+        return match[1].strip()
+    match = re.search(r"_(deg|rad|deg_s|rad_s|degs|rads|rpm)$", name.lower())
+    return (
+        {"deg_s": "deg/s", "rad_s": "rad/s", "degs": "deg/s", "rads": "rad/s"}.get(match[1], match[1])
+        if match
+        else None
+    )
+
+
+_SUFFIX = r"(?:_(?:deg|rad|deg_s|rad_s|degs|rads|rpm|m|s|m_s|body|b))?"
+
+
+def _components(plain: Mapping[str, str], kind: str, letters: str) -> list[str] | None:
+    """Names of a stem with each of these components, in their order; None unless all are there."""
+    found = []
+    for letter in letters:
+        form = re.compile(_STEMS[kind] + letter + _SUFFIX)
+        names = [name for name in plain if form.fullmatch(name)]
+        if not names:
+            return None
+        found.append(max(names, key=len))
+    return found if len(set(found)) == len(letters) else None
+
+
+def _vector(plain: Mapping[str, str], kind: str) -> list[str] | None:
+    """Names of the three components of a vector."""
+    found = (_components(plain, kind, letters) for letters in ("xyz", "123", "012"))
+    return next((names for names in found if names), None)
+
+
+def _exact(plain: Mapping[str, str], names: Sequence[str]) -> list[str] | None:
+    return list(names) if all(name in plain for name in names) else None
+
+
+def _bare_quaternion(plain: Mapping[str, str]) -> list[str] | None:
+    return _exact(plain, "wxyz")
+
+
+def _apart(plain: Mapping[str, str], quaternion: Sequence[str] | None) -> bool:
+    """Whether columns x y z aren't those of the quaternion."""
+    return not (quaternion and set("xyz") <= set(quaternion))
+
+
+def _matrix(plain: Mapping[str, str]) -> list[str] | None:
+    for digits in ("123", "012", "xyz"):
+        found = []
+        for pair in (f"{i}_?{j}" for i in digits for j in digits):
+            form = re.compile(_STEMS["matrix"] + pair)
+            found.append(next((name for name in plain if form.fullmatch(name)), None))
+        if all(found):
+            return [name for name in found if name]
+    return None
+
+
+def _euler(plain: Mapping[str, str]) -> list[str] | None:
+    """Angles in the order of their columns."""
+    stripped = {re.sub(r"_(deg|rad)$", "", name): name for name in plain}
+    order = list(plain)
+    for names in _EULER_NAMES:
+        forms = [re.compile(_STEMS["euler"].replace(")_?", ")?_?") + name) for name in names]
+        found = [
+            next((full for short, full in stripped.items() if form.fullmatch(short)), None) for form in forms
+        ]
+        if all(found):
+            return sorted((x for x in found if x), key=order.index)
+    return _components(plain, "euler", "123") or _components(plain, "euler", "012")
+
+
+def _square(values: np.ndarray | None) -> np.ndarray | None:
+    return None if values is None else values.reshape(-1, 3, 3)
+
+
+def _time_among(
+    plain: Mapping[str, str], units: Mapping[str, str | None], source: str
+) -> tuple[str, str | None]:
+    for name in plain:
+        match = re.fullmatch(r"(?:t|time|times|epoch|seconds|timestamp)(?:_([a-z]+))?", name)
+        if match and (match[1] is None or match[1] in _TIMES):
+            given = units[name] or match[1] or ("s" if name == "seconds" else None)
+            if given is None:
+                return name, None
+            if (known := _TIMES.get(given.lower())) is None:
+                raise RigidsimError(
+                    f'{source}: time in "{given}"; allowed: {", ".join(dict.fromkeys(_TIMES.values()))}'
+                )
+            return name, known
+    raise RigidsimError(
+        f"{source}: no time among its columns ({', '.join(plain.values())}); name it t or time"
+    )
+
+
+def _one_unit(units: Mapping[str, str | None], names: Sequence[str] | None) -> str | None:
+    found = {units[name] for name in names or ()}
+    if len(found) > 1:
+        shown = ", ".join(sorted(str(unit) for unit in found))
+        raise RigidsimError(f"columns {', '.join(names or ())} have different units ({shown}); give one")
+    return next(iter(found), None)
+
+
+def _since(found: Trajectory, epoch: Epoch | None, told: list[str]) -> np.ndarray:
+    """Times of a message, s from time 0 of the experiment."""
+    dates = found.epochs
+    if epoch is None:
+        told.append("the config has no [time] epoch: its time 0 was taken for the first row")
+        epoch = dates[0]
+    if epoch.uniform().scale == dates[0].uniform().scale:
+        zero = epoch.julian_date()
+        return np.array([float((date.julian_date() - zero) * 86400) for date in dates])
+    zero = epoch.since_j2000()
+    return np.array([float(Fraction(date.since_j2000() - zero)) for date in dates])
+
+
+def seconds_in(unit: str) -> float:
+    """Seconds of a unit of time."""
+    return float(parse_number(f"1 {unit}", "s"))
+
+
+def _refuse_rows(made: Attitudes, used: Mapping[str, Sequence[str]]) -> None:
+    found = made.trajectory
+    for names in used.values():
+        for name in names:
+            bad = np.flatnonzero(~np.isfinite(found.columns[name]))
+            if len(bad):
+                raise RigidsimError(
+                    f"{found.source}: {found.row(bad[0])}: {name} is no finite number ({len(bad):,} "
+                    "such rows); remove these rows, or write them anew"
+                )
+    steps = np.diff(made.times)
+    again = np.flatnonzero(steps == 0)
+    if len(again):
+        raise RigidsimError(
+            f"{found.source}: {found.row(again[0] + 1)} has the time of the row before ({len(again):,} such "
+            "rows); keep one row for each time"
+        )
+    back = np.flatnonzero(steps < 0)
+    if len(back):
+        raise RigidsimError(
+            f"{found.source}: {found.row(back[0] + 1)} is earlier than the row before; sort the rows by time"
+        )
+    if made.quaternions is not None:
+        norms = np.linalg.norm(made.quaternions, axis=1)
+        usual = float(np.median(norms))
+        bad = np.flatnonzero(np.abs(norms - usual) > _NORM * max(usual, 1e-300))
+        if (len(bad) and len(bad) < len(norms) / 10) or not usual:
+            at = bad[0] if len(bad) else 0
+            raise RigidsimError(
+                f"{found.source}: {found.row(at)}: a quaternion of norm {norms[at]:.6g}, where {usual:.6g} "
+                f"is usual ({len(bad):,} such rows); these are no rotations: remove or mend them"
+            )
+        if abs(usual - 1) > _NORM:
+            made.told.append(f"quaternions have the norm {usual:.6g}; they were normalised")
+    if made.matrices is not None:
+        apart = np.abs(np.einsum("nij,nkj->nik", made.matrices, made.matrices) - np.eye(3)).max(axis=(1, 2))
+        bad = np.flatnonzero(apart > 0.1)
+        if len(bad):
+            raise RigidsimError(
+                f"{found.source}: {found.row(bad[0])}: the matrix is no rotation ({len(bad):,} such rows)"
+            )
+
+
+def _tell_gaps(made: Attitudes) -> None:
+    steps = np.diff(made.times)
+    at = int(np.argmax(steps))
+    if steps[at] > _GAP * np.median(steps):
+        found = made.trajectory
+        made.told.append(
+            f"between {found.row(at)} and the next the time advances by {steps[at]:.6g}, where "
+            f"{np.median(steps):.6g} is usual: a gap, or times in mixed units"
+        )
+
+
+def _resolution(values: np.ndarray, narrow: bool) -> float:
+    """Half the last digit in which numbers are written, from a sample of them; that of doubles at least."""
+    largest = float(np.abs(values).max())
+    if narrow:
+        return largest * 2.0**-24
+    flat = values.ravel()
+    some = flat[np.linspace(0, flat.size - 1, min(flat.size, 300)).astype(int)]
+    written = [Decimal(repr(value)).normalize().as_tuple() for value in some.tolist()]
+    places = [-int(exponent) for _, _, exponent in written]
+    usual = max(set(places), key=places.count)
+    if places.count(usual) > _FIXED * len(places) and max(places) == usual:
+        return 0.5 * 10.0**-usual if usual < _DOUBLE_DIGITS else largest * 2.0**-53
+    digits = max(len(mantissa) for _, mantissa, _ in written)
+    return largest * (0.5 * 10.0 ** (1 - digits) if digits < _DOUBLE_DIGITS else 2.0**-53)

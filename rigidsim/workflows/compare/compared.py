@@ -1,0 +1,326 @@
+"""``rigidsim compare``: another tool's trajectory beside an experiment, at its own times."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray
+
+from rigidsim.errors import RigidsimError, RunFolderError
+from rigidsim.formats.trajectories import Trajectory, read_trajectory, trajectory_of
+from rigidsim.scene.config import Experiment
+from rigidsim.solve.from_states import FromStates, NotFromStates
+from rigidsim.store.run import Run, open_run
+from rigidsim.workflows.compare import defects
+from rigidsim.workflows.compare.by_equations import ByEquations
+from rigidsim.workflows.compare.columns import Attitudes, attitudes_of, seconds_in
+from rigidsim.workflows.compare.conventions import (
+    FoundReading,
+    RateReading,
+    find_convention,
+    find_rates,
+    rows_compared,
+)
+from rigidsim.workflows.compare.motion import OwnMotion, own_motion, plain
+from rigidsim.workflows.compare.result import (
+    AttitudeError,
+    Comparison,
+    Disagreement,
+    FoundConvention,
+)
+from rigidsim.workflows.compare.rotations import angles_between, normalised
+from rigidsim.workflows.compare.saving import save_dataset, save_figure
+from rigidsim.workflows.compare.verdict import Evidence, judged
+from rigidsim.workflows.physics.models import rotation_vectors
+from rigidsim.workflows.read import Given, as_experiment
+
+WITHIN = 1e-9
+"""Largest angle (rad) between attitudes that agree, if nothing else is asked for."""
+_MOST_OWN = 20_000  # rows, up to which the experiment's own method gives the motion at all of them
+_UNITS = ("s", "ms", "min", "h", "day", "yr")
+_BAD = np.log(0.15)  # mean logarithm of mismatches (rad), above which times in another unit are tried
+
+
+def compare(
+    experiment: Given,
+    table: Any,
+    *,
+    within: float = WITHIN,
+    out: str | Path | None = None,
+    figure: str | Path | None = None,
+) -> Comparison:
+    """Judge a trajectory by how far it is from an experiment, at its own times.
+
+    Args:
+        experiment: as for ``rigidsim.run``.
+        table: a file (CSV, Parquet, netCDF, AEM), a run or its folder, a mapping of names to arrays,
+            a pandas DataFrame, or an xarray Dataset. Columns are known by their names (docs/compare.md).
+        within: rad, what attitudes may differ by and agree.
+        out: file for the dataset. figure: file for the figure, a .png or .svg.
+
+    Raises:
+        ConfigError: the config can't be run.
+        RigidsimError: the trajectory can't be used, and what to do.
+    """
+    asked = as_experiment(experiment)
+    quiet, scene = plain(asked)
+    found = _trajectory(table)
+    given = attitudes_of(found, scene.epoch)
+    if not 0 < within < np.pi:
+        raise RigidsimError(f"within: given {within:g}; an angle above 0 and below pi, in rad, is allowed")
+    try:
+        equations: FromStates | None = FromStates(scene)
+        why_not = ""
+    except NotFromStates as error:
+        equations, why_not = None, str(error)
+    judging = _Judging(quiet, given, equations, why_not, float(scene.start), float(scene.samples.last))
+    result = judging.compared(asked.config.name, within)
+    if out is not None:
+        result = _with(result, dataset_file=str(save_dataset(result.dataset, Path(out))))
+    if figure is not None:
+        result = _with(result, figure_file=str(save_figure(result.dataset, Path(figure))))
+    return result
+
+
+def _with(result: Comparison, **values: str) -> Comparison:
+    made, dataset = result.having(**values), result.dataset
+    made._dataset = dataset
+    return made
+
+
+def _trajectory(table: Any) -> Trajectory:
+    if isinstance(table, Run):
+        with table.dataset as dataset:
+            return trajectory_of(dataset, table.place)
+    if not isinstance(table, str | Path):
+        return trajectory_of(table)
+    path = Path(table)
+    if path.is_dir() and path.suffix != ".zarr":
+        try:
+            return _trajectory(open_run(path))
+        except RunFolderError:
+            raise
+    return read_trajectory(path)
+
+
+@dataclass
+class _Judging:
+    """A trajectory and the experiment beside it; ``begin`` and ``end``: of the experiment, s."""
+
+    experiment: Experiment
+    given: Attitudes
+    equations: FromStates | None
+    why_not: str
+    begin: float
+    end: float
+
+    def compared(self, name: str, within: float) -> Comparison:
+        """Everything, in order: unit of time, convention, errors, drifts, defects, verdict."""
+        self.told = list(self.given.told)
+        unit, found, sampled = self._convention()
+        times = self.given.times * seconds_in(unit)
+        own = self._own(times, sampled)
+        if own.ended:
+            self.told.append(f"the experiment's motion {own.ended}; later rows aren't compared")
+        count = len(own.rates)
+        times, theirs = times[:count], found.quaternions(self.given)[:count]
+        errors = np.linalg.norm(
+            rotation_vectors([normalised(own.quaternions[0]), *own.quaternions[1:]], [theirs]), axis=1
+        )
+        rows = rows_compared(count)
+        rates: np.ndarray | None = None
+        reading: RateReading | None = None
+        more: list[str] = []
+        if self.given.rates is not None:
+            reading, more = find_rates(self.given, found, rows, theirs[rows], own.rates[rows])
+            rates = reading.rates(self.given.rates[:count], found, theirs)
+        flight = self._flight(count)
+        dataset = _dataset(times, errors, name, self.given.trajectory.source)
+        rate_errors = None if rates is None else np.linalg.norm(rates - own.rates, axis=1)
+        known = self._by_equations(times, theirs, rates, own, flight, dataset)
+        rate = defects.motion_rate(times, own.rates if rates is None else rates)
+        attitude_noise, rate_noise = self._noise(found, reading)
+        floor = max(within, 4 * attitude_noise, 3 * own.uncertainty)
+        start = (float(errors[0]), 0.0 if rate_errors is None else float(rate_errors[0]))
+        windows, missing = (None, self.why_not) if known is None else (known.windows, known.missing)
+        seen = Evidence(
+            float(errors.max()),
+            floor,
+            attitude_noise,
+            rate_noise,
+            start,
+            rate,
+            float(times[-1] - times[0]),
+            windows,
+            missing,
+        )
+        verdict, why = judged(seen)
+        if rate_errors is not None:
+            dataset["rate_error"] = (
+                "time",
+                rate_errors,
+                {"units": "rad s-1", "long_name": "difference of angular velocities"},
+            )
+        position_error = None
+        if flight is not None and own.positions is not None and self.given.positions is not None:
+            apart = np.linalg.norm(flight[:, :3] - own.positions, axis=1)
+            position_error = float(apart.max())
+            dataset["position_error"] = ("time", apart, {"units": "m", "long_name": "distance of positions"})
+        dataset.attrs["verdict"] = verdict
+        largest = int(np.argmax(errors))
+        apart_rows = np.flatnonzero(errors > floor)
+        trajectory = self.given.trajectory
+        made = Comparison(
+            name=name,
+            source=trajectory.source,
+            rows=count,
+            span_s=float(times[-1] - times[0]),
+            verdict=verdict,
+            why=why,
+            within=floor,
+            resolution=attitude_noise,
+            attitude_error=AttitudeError(
+                largest=float(errors[largest]),
+                rms=float(np.sqrt(np.mean(errors**2))),
+                time=float(times[largest]),
+                row=trajectory.row(largest),
+            ),
+            rate_error=None if rate_errors is None else float(rate_errors.max()),
+            position_error=position_error,
+            convention=_described(found, unit, reading, more),
+            drifts=[] if known is None else known.drifts,
+            local_defects=None if known is None else known.local,
+            first_disagreement=Disagreement(
+                time=float(times[apart_rows[0]]), row=trajectory.row(apart_rows[0])
+            )
+            if len(apart_rows)
+            else None,
+            told=self.told,
+        )
+        made._dataset = dataset
+        return made
+
+    def _convention(self) -> tuple[str, FoundReading, tuple[np.ndarray, OwnMotion]]:
+        """Unit of the times and convention of the attitude, with the motion at the rows compared."""
+        units = (self.given.time_unit,) if self.given.time_unit else _UNITS
+        rows = rows_compared(len(self.given.times))
+        best: tuple[str, FoundReading, tuple[np.ndarray, OwnMotion]] | None = None
+        refused = ""
+        for unit in units:
+            times = self.given.times[rows] * seconds_in(unit)
+            if times[0] < self.begin - 1e-9 * abs(self.begin):
+                refused = (
+                    f"{self.given.trajectory.source}: its first time ({times[0]:.6g} s) is before the "
+                    f"experiment's start ({self.begin:.6g} s); leave these rows out, or move [time] start"
+                )
+                continue
+            if best is not None and times[-1] > self.begin + 1.5 * (self.end - self.begin):
+                continue
+            own = own_motion(self.experiment, times)
+            kept = rows[: len(own.rates)]
+            found = find_convention(self.given, kept, own.quaternions[0])
+            # where nothing moves anything fits: what counts is the mismatch by the motion in these times
+            moved = angles_between(own.quaternions[0], own.quaternions[0][:1]).max()
+            score = found.score - float(np.log(min(1.0, moved + 1e-12)))
+            if best is None or score < min(best[1].score - 1.0, _BAD):
+                best = unit, found, (kept, own)
+            if score < _BAD:
+                break
+        if best is None:
+            raise RigidsimError(refused)
+        if self.given.time_unit is None and best[0] != "s":
+            self.told.append(
+                f"times were taken for {best[0]}, by which the attitudes fit best; name a unit: t [{best[0]}]"
+            )
+        if best[1].score > _BAD:
+            self.told.append(
+                "no convention tried brings it near the experiment: the convention found may be wrong"
+            )
+        return best
+
+    def _own(self, times: np.ndarray, sampled: tuple[np.ndarray, OwnMotion]) -> OwnMotion:
+        """The experiment at all rows; of very many rows by the same equations in double precision."""
+        if len(times) <= len(sampled[0]) and not sampled[1].ended:
+            return sampled[1]
+        if len(times) <= _MOST_OWN or self.equations is None or sampled[1].ended:
+            return own_motion(self.experiment, times)
+        states = self.equations.motion(times)
+        quaternions, rates = self.equations.attitude(states)
+        rows, own = sampled
+        apart = np.linalg.norm(
+            rotation_vectors(own.quaternions, [normalised(quaternions[rows])]), axis=1
+        ).max()
+        self.told.append(
+            f"{len(times):,} rows: all were compared with the motion in double precision, which is within "
+            f"{apart:.1g} rad of the experiment's own at {len(rows)} of them"
+        )
+        flight = self.equations.flight(states)
+        place, speed = (None, None) if flight is None else (flight[:, :3], flight[:, 3:])
+        return OwnMotion([quaternions], rates, place, speed, max(own.uncertainty, float(apart)), "")
+
+    def _flight(self, count: int) -> np.ndarray | None:
+        if self.given.positions is None or self.given.velocities is None:
+            return None
+        return np.concatenate([self.given.positions[:count], self.given.velocities[:count]], axis=1)
+
+    def _noise(self, found: FoundReading, reading: RateReading | None) -> tuple[float, float]:
+        """Resolution of attitude (rad) and rates (rad/s) by the digits of the file."""
+        attitude, rates = self.given.resolution
+        attitude *= np.pi / 180 if found.reading.unit == "deg" else 2.0
+        if reading is None:
+            return float(attitude), 0.0
+        return float(attitude), float(
+            rates
+            * np.linalg.norm(reading.rates(np.eye(3), found, np.tile([1.0, 0, 0, 0], (3, 1))), axis=1).max()
+        )
+
+    def _by_equations(
+        self, times: np.ndarray, theirs: np.ndarray, rates: np.ndarray | None, own: OwnMotion,
+        flight: np.ndarray | None, dataset: xarray.Dataset,
+    ) -> ByEquations | None:  # fmt: skip
+        """Drifts and local defects, which are put into the dataset too; None where they can't be measured."""
+        if self.equations is None:
+            self.told.append(f"neither local defects nor drifts were measured: {self.why_not}")
+            return None
+        given = self.given.quaternions
+        norms = None if given is None else np.linalg.norm(given[: len(times)], axis=1)
+        found = ByEquations(self.equations, times, theirs, rates, flight, norms, own, dataset)
+        try:
+            found.measure()
+        except NotFromStates as error:
+            self.why_not = str(error)
+            self.told.append(f"neither local defects nor drifts were measured: {error}")
+            return None
+        self.told += found.told
+        return found
+
+
+def _dataset(times: np.ndarray, errors: np.ndarray, name: str, source: str) -> xarray.Dataset:
+    attributes = {"units": "rad", "long_name": "angle between the attitudes"}
+    return xarray.Dataset(
+        {"attitude_error": ("time", errors, attributes)},
+        {"time": ("time", times, {"units": "s", "long_name": "time"})},
+        {"title": f"{source} beside {name}", "kind": "comparison"},
+    )
+
+
+def _described(found: FoundReading, unit: str, rates: RateReading | None, more: list[str]) -> FoundConvention:
+    reading, frames = found.reading, found.frames
+    return FoundConvention(
+        order=reading.order,
+        direction=reading.direction,
+        sequence=reading.sequence,
+        about=("fixed" if reading.fixed else "body") if reading.sequence else "",
+        unit=reading.unit,
+        time_unit=unit,
+        rate_unit="" if rates is None else rates.unit,
+        rate_axes="" if rates is None else rates.axes,
+        rate_sign="" if rates is None else "-" if rates.negative else "+",
+        offset=frames.side,
+        offset_angle=frames.angle,
+        offset_quaternion=[float(x) for x in frames.turn],
+        undecided=[*found.undecided, *more],
+    )

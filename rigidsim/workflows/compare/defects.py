@@ -1,0 +1,156 @@
+"""Local defects of a trajectory: where the experiment's equations lead from a row, beside where it goes.
+
+What tells a wrong model from a loose integrator is kinematics. Whatever torques act and whatever the moments
+of inertia are, the attitude is the integral of the angular velocity. So a motion of other equations, exactly
+integrated, leaves the reference that starts from one of its rows in rates first, and in attitude just by
+the integral of that: to first order d(theta)/dt = R (w - w_reference), with theta the rotation vector (space
+axes) from the reference to the trajectory, and R of the reference. An integrator's errors, which are made in
+rates and attitude alike, don't obey this: in a window of length T, in which the motion turns by little,
+errors of the attitude itself exceed what errors of rates make of it by about 2 / (rate T).
+
+The integral is taken over the rows of a window by the polynomial through them, whose first value is zero.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from rigidsim.solve.from_states import FromStates
+from rigidsim.workflows.compare.rotations import conjugated, multiplied, normalised, turned, vector_of
+
+_WINDOW = 0.5  # times the rate of the motion: length of a window, where the rows allow it
+_PARTS = 4  # of a window
+_COARSEST = 4.0  # times the rate: length of a window beyond which the integral isn't resolved
+
+
+@dataclass(frozen=True)
+class RowDefects:
+    """Defects from rows to the rows that follow.
+
+    Attributes:
+        rows: those that were started from.
+        attitude: rotation vectors (rows, 3), rad, space axes, from where the equations lead to the next row.
+        rates: differences (rows, 3), rad/s, body axes; of no use where rates aren't in the file.
+    """
+
+    rows: np.ndarray
+    attitude: np.ndarray
+    rates: np.ndarray
+
+
+@dataclass(frozen=True)
+class WindowDefects:
+    """Defects over windows of several rows.
+
+    Attributes:
+        length: of a window, s (median). coarse: its length times the rate of the motion.
+        attitude: angles (windows,), rad, at the windows' ends.
+        explained: those that are the integral of the differences of rates.
+        unexplained: what is left of the attitude's.
+        rates: differences of rates at the ends, rad/s.
+        acceleration: missing mean accelerations (windows, 3), rad/s^2, body axes.
+    """
+
+    length: float
+    coarse: float
+    attitude: np.ndarray
+    explained: np.ndarray
+    unexplained: np.ndarray
+    rates: np.ndarray
+    acceleration: np.ndarray
+
+
+def motion_rate(times: np.ndarray, rates: np.ndarray) -> float:
+    """The rate of a motion, rad/s: that of its turning, or of the change of its rates, if that is faster."""
+    size = float(np.sqrt(np.mean(np.sum(rates**2, axis=1))))
+    steps = np.diff(times)
+    change = np.diff(rates, axis=0) / steps[:, None]
+    bend = float(np.sqrt(np.sum(change**2, axis=1) @ steps / steps.sum()))
+    return max(size, bend / size if size else 0.0)
+
+
+def row_defects(equations: FromStates, times: np.ndarray, states: np.ndarray, rows: np.ndarray) -> RowDefects:
+    """Defects from some rows to the next ones; ``states`` (all rows, states) are the trajectory's."""
+    ends = np.stack([equations.after(states[n], times[n], times[n + 1 : n + 2])[0] for n in rows])
+    attitude, rates = _apart(equations, states[rows + 1], ends)
+    return RowDefects(rows, attitude, rates)
+
+
+def window_defects(
+    equations: FromStates, times: np.ndarray, states: np.ndarray, rate: float, most: int
+) -> WindowDefects | None:
+    """Defects over at most so many windows; None where rows are too few or too far apart.
+
+    Args:
+        rate: of the motion, rad/s.
+    """
+    spacing = float(np.median(np.diff(times)))
+    count = len(times)
+    stride = max(1, round(_WINDOW / (max(rate, 1e-300) * spacing * _PARTS)))
+    stride = min(stride, (count - 1) // _PARTS)
+    parts = _PARTS if stride else count - 1
+    stride = max(stride, 1)
+    while parts > 2 and parts * stride * spacing * rate > _COARSEST / 2:
+        parts -= 1
+    if parts < 2:
+        return None
+    starts = np.unique(np.linspace(0, count - 1 - parts * stride, most).astype(int))
+    found = [_one(equations, times, states, n + stride * np.arange(parts + 1)) for n in starts]
+    kept = [x for x in found if x is not None]
+    if not kept:
+        return None
+    theta, integral, rates, length = (np.array(x) for x in zip(*kept, strict=True))
+    return WindowDefects(
+        length=float(np.median(length)),
+        coarse=float(np.median(length) * rate),
+        attitude=np.linalg.norm(theta, axis=1),
+        explained=np.linalg.norm(integral, axis=1),
+        unexplained=np.linalg.norm(theta - integral, axis=1),
+        rates=np.linalg.norm(rates, axis=1),
+        acceleration=rates / length[:, None],
+    )
+
+
+def _one(
+    equations: FromStates, times: np.ndarray, states: np.ndarray, rows: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, float] | None:
+    """A window: rotation vector at its end, the integral of the rates' differences, these."""
+    reference = equations.after(states[rows[0]], times[rows[0]], times[rows[1:]])
+    if not np.isfinite(reference).all():
+        return None
+    theta, apart = _apart(equations, states[rows[1:]], reference)
+    quaternions, _ = equations.attitude(reference)
+    along = turned(normalised(quaternions), apart)  # space axes
+    length = times[rows[-1]] - times[rows[0]]
+    places = (times[rows[1:]] - times[rows[0]]) / length
+    powers = np.arange(1, len(places) + 1)
+    weights = np.linalg.solve(places[None, :] ** powers[:, None], 1.0 / (powers + 1))
+    return theta[-1], length * weights @ along, apart[-1], float(length)
+
+
+def _apart(equations: FromStates, theirs: np.ndarray, reference: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Rotation vectors (space axes) from the reference to the trajectory, and differences of rates."""
+    one, other = equations.attitude(reference), equations.attitude(theirs)
+    turn = multiplied(normalised(other[0]), conjugated(normalised(one[0])))
+    return vector_of(turn), other[1] - one[1]
+
+
+def shot_rates(equations: FromStates, times: np.ndarray, states: np.ndarray, rows: np.ndarray) -> np.ndarray:
+    """Rates (rows, 3) with which the equations lead from the attitude of each row to that of the next: for
+    trajectories without rates, from the mean rate between the rows on, by three corrections.
+    """
+    quaternions, near = equations.attitude(states)
+    spacing = times[rows + 1] - times[rows]
+    mean = vector_of(multiplied(conjugated(quaternions[rows]), quaternions[rows + 1])) / spacing[:, None]
+    fast = np.linalg.norm(near[rows], axis=1) * spacing > np.pi * 0.8
+    rates = np.where(fast[:, None], near[rows], mean)
+    for _ in range(4):
+        begun = equations.states(states[rows], quaternions[rows], rates)
+        ends = np.stack(
+            [equations.after(s, times[n], times[n + 1 : n + 2])[0] for s, n in zip(begun, rows, strict=True)]
+        )
+        reached, _ = equations.attitude(ends)
+        rates = rates + vector_of(multiplied(conjugated(reached), quaternions[rows + 1])) / spacing[:, None]
+    return np.asarray(rates)

@@ -1,0 +1,169 @@
+"""What a comparison tells: typed values, which ``as_dict`` makes JSON of, with dataset and figure."""
+
+from __future__ import annotations
+
+from html import escape
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from pydantic import PrivateAttr
+
+from rigidsim.store.summary_parts import SummaryPart
+
+if TYPE_CHECKING:
+    import xarray
+    from matplotlib.figure import Figure
+
+AGREES, INTEGRATION_ERROR, WRONG_MODEL, UNDECIDED = "agrees", "integration_error", "wrong_model", "undecided"
+
+
+class AttitudeError(SummaryPart):
+    """Angle between the trajectory's attitudes and the experiment's, rad, over all rows.
+
+    ``time``: of the largest one, s; ``row``: as the file counts it.
+    """
+
+    largest: float
+    rms: float
+    time: float
+    row: str
+
+
+class FoundConvention(SummaryPart):
+    """How the trajectory is written.
+
+    Attributes:
+        order: of quaternions, "wxyz" or "xyzw"; empty for others.
+        direction: "body_to_space" or "space_to_body": what its attitude takes vectors from and to.
+        sequence: of Euler angles, with ``about`` "body" or "fixed" axes; empty for others.
+        unit: of Euler angles. time_unit, rate_unit, rate_axes: of times and rates; empty without rates.
+        offset: "none", "space" or "body": which axes are others than the experiment's, by a constant turn.
+        offset_angle: of that turn, rad. offset_quaternion: w x y z, applied to the trajectory's attitudes
+            from the left (space) or from the right (body).
+        undecided: other readings that this motion can't tell from this one.
+    """
+
+    order: str
+    direction: str
+    sequence: str
+    about: str
+    unit: str
+    time_unit: str
+    rate_unit: str
+    rate_axes: str
+    rate_sign: str
+    offset: str
+    offset_angle: float
+    offset_quaternion: list[float]
+    undecided: list[str]
+
+
+class TrajectoryDrift(SummaryPart):
+    """Largest drift of an invariant by the trajectory's own numbers, relative to ``rigidsim``'s scale."""
+
+    name: str
+    largest: float
+    final: float
+
+
+class LocalDefects(SummaryPart):
+    """What the experiment's equations miss from rows to the next ones.
+
+    Attributes:
+        largest: angle, rad; rms: the same in the mean; time: of the largest, s.
+        rate_largest: rad/s; None without rates in the trajectory.
+        rows: number of rows that were started from.
+        window_s: length of the windows that models are told from integrators by.
+        unexplained: of the windows' attitude defects, rms of what differences of the rates don't explain
+            over rms of what they do.
+        missing_acceleration: rms, rad/s^2, that would explain the rates' defects.
+    """
+
+    largest: float
+    rms: float
+    time: float
+    rate_largest: float | None
+    rows: int
+    window_s: float | None
+    unexplained: float | None
+    missing_acceleration: float | None
+
+
+class Disagreement(SummaryPart):
+    """The first row that is further from the experiment than ``within``."""
+
+    time: float
+    row: str
+
+
+class Comparison(SummaryPart):
+    """A trajectory of another tool beside an experiment.
+
+    Attributes:
+        verdict: agrees, integration_error, wrong_model or undecided.
+        why: the verdict in words, with the numbers that it was given for.
+        within: rad, what attitudes may differ by and agree.
+        resolution: rad, of the trajectory's attitudes by the digits that they are written in.
+        rate_error: largest difference of angular velocities, rad/s; None without rates.
+        position_error: the same of positions, m.
+        told: what a user should know besides.
+        dataset_file, figure_file: where they were written; empty if nowhere.
+    """
+
+    name: str
+    source: str
+    rows: int
+    span_s: float
+    verdict: str
+    why: str
+    within: float
+    resolution: float
+    attitude_error: AttitudeError
+    rate_error: float | None
+    position_error: float | None
+    convention: FoundConvention
+    drifts: list[TrajectoryDrift]
+    local_defects: LocalDefects | None
+    first_disagreement: Disagreement | None
+    told: list[str]
+    dataset_file: str = ""
+    figure_file: str = ""
+
+    _dataset: Any = PrivateAttr(default=None)
+
+    @property
+    def dataset(self) -> xarray.Dataset:
+        """Attitude error, drifts and defects along time, with their units."""
+        found: xarray.Dataset = self._dataset
+        return found
+
+    def plot(self) -> Figure:
+        """Attitude error, drifts and local defects along time."""
+        from rigidsim.look.figures.compared import compared_figure
+
+        return compared_figure(self.dataset)
+
+    def save(self, path: str | Path) -> Path:
+        """Write the dataset (netCDF-4/HDF5)."""
+        from rigidsim.workflows.compare.saving import save_dataset
+
+        return save_dataset(self.dataset, Path(path))
+
+    def __repr__(self) -> str:
+        error = self.attitude_error
+        return (
+            f"<Comparison of {self.source} with {self.name!r}: {self.verdict}, attitude error "
+            f"{error.largest:.3g} rad at {error.time:.6g} s ({error.rms:.3g} rms)>"
+        )
+
+    __str__ = __repr__
+
+    def _repr_html_(self) -> str:
+        rows = [
+            ("verdict", self.verdict),
+            ("why", self.why),
+            ("attitude error", f"{self.attitude_error.largest:.4g} rad"),
+        ]
+        rows += [(f"drift of {x.name}", f"{x.largest:.3g}") for x in self.drifts]
+        cells = "".join(f"<tr><th>{escape(a)}</th><td>{escape(b)}</td></tr>" for a, b in rows)
+        return f"<table>{cells}</table>"

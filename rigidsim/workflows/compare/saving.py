@@ -1,0 +1,44 @@
+"""A comparison's dataset and figure as files, each of which appears only when complete."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from rigidsim.errors import RigidsimError
+from rigidsim.store import atomic
+
+if TYPE_CHECKING:
+    import xarray
+
+FIGURES = (".png", ".svg")
+
+
+def save_dataset(dataset: xarray.Dataset, path: Path) -> Path:
+    """Write the dataset; a picture's name is refused."""
+    if path.suffix.lower() in FIGURES:
+        raise RigidsimError(f"{path}: the dataset is no picture; give --out FILE.h5, and --figure for that")
+    try:
+        with atomic.replacing(path) as temporary:
+            dataset.to_netcdf(temporary, engine="h5netcdf")
+    except OSError as error:
+        raise RigidsimError(
+            f"{path}: can't be written: {error.strerror or error}; choose another --out"
+        ) from None
+    return path
+
+
+def save_figure(dataset: xarray.Dataset, path: Path) -> Path:
+    """Draw the figure, a PNG or SVG by its name."""
+    from rigidsim.look.figures.compared import save_compared
+
+    if path.suffix.lower() not in FIGURES:
+        raise RigidsimError(f"{path}: a figure is a .png or a .svg")
+    try:
+        with atomic.replacing(path) as temporary:
+            save_compared(dataset, temporary, file_format=path.suffix.lower()[1:])
+    except OSError as error:
+        raise RigidsimError(
+            f"{path}: can't be written: {error.strerror or error}; choose another name"
+        ) from None
+    return path

@@ -1,0 +1,342 @@
+"""``rigidsim.compare``: trajectories of other integrators and of other bodies, in other conventions."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas
+import pytest
+import xarray
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from scipy.integrate import solve_ivp
+from scipy.spatial.transform import Rotation
+
+import rigidsim
+from experiments import compare_conventions
+
+MOMENTS = np.array([1.0, 2.0, 2.5])
+START = np.array([0.3, 1.0, -0.4])
+QUATERNION = np.array([0.8, 0.2, -0.4, 0.4])  # w x y z, of norm one
+END = 12.0
+
+
+@pytest.fixture(scope="module")
+def experiment() -> rigidsim.Experiment:
+    return made()
+
+
+def made() -> rigidsim.Experiment:
+    return rigidsim.parse(
+        f"""
+        name = "free"
+        [body]
+        principal_moments = {MOMENTS.tolist()}
+        [initial]
+        angular_velocity = {START.tolist()}
+        quaternion = {QUATERNION.tolist()}
+        [time]
+        end = {END}
+        samples = 3
+        """
+    )
+
+
+def slopes(_: float, y: np.ndarray, moments: np.ndarray = MOMENTS) -> np.ndarray:
+    q, w = y[:4], y[4:]
+    turn = np.array([-q[1:] @ w, *(q[0] * w + np.cross(q[1:], w))]) / 2
+    return np.concatenate([turn, -np.cross(w, moments * w) / moments])
+
+
+def theirs(tolerance: float = 1e-12, moments: np.ndarray = MOMENTS, rows: int = 241) -> Any:
+    """Times, quaternions w x y z and rates by an independent integrator."""
+    times = np.linspace(0, END, rows)
+    found = solve_ivp(
+        slopes, (0, END), np.concatenate([QUATERNION, START]), "DOP853", times, args=(moments,),
+        rtol=tolerance, atol=tolerance,
+    ).y.T  # fmt: skip
+    return times, found[:, :4], found[:, 4:]
+
+
+def by_steps(step: float) -> Any:
+    """The same by the classical Runge-Kutta method."""
+    y, rows = np.concatenate([QUATERNION, START]), []
+    for n in range(round(END / step) + 1):
+        rows.append([n * step, *y])
+        a = slopes(0, y)
+        b = slopes(0, y + step / 2 * a)
+        c = slopes(0, y + step / 2 * b)
+        y = y + step / 6 * (a + 2 * b + 2 * c + slopes(0, y + step * c))
+    found = np.array(rows)
+    return found[:, 0], found[:, 1:5], found[:, 5:]
+
+
+def test_agrees(experiment: rigidsim.Experiment) -> None:
+    times, q, w = theirs(1e-13)
+    found = rigidsim.compare(experiment, {"t": times, "q": q, "w": w})
+    assert found.verdict == "agrees"
+    assert found.attitude_error.largest < 1e-10
+    assert found.convention.undecided == []
+    assert {drift.name for drift in found.drifts} > {"energy", "angular_momentum", "quaternion_norm"}
+    assert all(drift.largest < 1e-10 for drift in found.drifts)
+    assert "agrees" in repr(found)
+    assert "<table>" in found._repr_html_()
+
+
+@pytest.mark.parametrize("step", [0.2, 0.05])
+def test_a_large_step_is_an_integration_error(experiment: rigidsim.Experiment, step: float) -> None:
+    times, q, w = by_steps(step)
+    found = rigidsim.compare(experiment, {"t": times, "q": q, "w": w})
+    assert found.verdict == "integration_error"
+    exact = theirs(1e-13, rows=len(times))[1]
+    unit = q / np.linalg.norm(q, axis=1)[:, None]
+    signs = np.sign(np.einsum("ij,ij->i", unit, exact))[:, None]
+    true = (4 * np.arcsin(np.linalg.norm(unit * signs - exact, axis=1) / 2)).max()
+    assert found.attitude_error.largest == pytest.approx(true, rel=0.01)
+
+
+@pytest.mark.parametrize("tolerance", [1e-4, 1e-7])
+@pytest.mark.parametrize("rows", [pytest.param(31, marks=pytest.mark.slow), 241])
+def test_a_loose_tolerance_is_an_integration_error(
+    experiment: rigidsim.Experiment, tolerance: float, rows: int
+) -> None:
+    times, q, w = theirs(tolerance, rows=rows)
+    assert rigidsim.compare(experiment, {"t": times, "q": q, "w": w}).verdict == "integration_error"
+
+
+@pytest.mark.parametrize("moments", [[1.0, 2.0, 2.525], [1.0, 2.0, 2.5001], [1.2, 2.0, 2.5]])
+@pytest.mark.parametrize("rows", [pytest.param(31, marks=pytest.mark.slow), 241])
+def test_other_moments_are_a_wrong_model(
+    experiment: rigidsim.Experiment, moments: list[float], rows: int
+) -> None:
+    times, q, w = theirs(moments=np.array(moments), rows=rows)
+    found = rigidsim.compare(experiment, {"t": times, "q": q, "w": w})
+    assert found.verdict == "wrong_model"
+    assert found.convention.order == "wxyz"
+
+
+def test_a_missing_load_is_a_wrong_model(experiment: rigidsim.Experiment) -> None:
+    braked = experiment.having(['loads=[{kind="viscous_torque",coefficients=[0.001,0.001,0.001]}]'])
+    times, q, w = theirs()
+    found = rigidsim.compare(braked, {"t": times, "q": q, "w": w})
+    assert found.verdict == "wrong_model"
+    assert found.local_defects is not None
+    missing = found.local_defects.missing_acceleration
+    assert missing == pytest.approx(float(np.sqrt(np.mean(np.sum((0.001 * w / MOMENTS) ** 2, 1)))), rel=0.1)
+
+
+def test_another_start_is_neither(experiment: rigidsim.Experiment) -> None:
+    times, q, w = theirs(1e-13)
+    moved = experiment.having(["initial.angular_velocity[2]=-0.401"])
+    found = rigidsim.compare(moved, {"t": times, "q": q, "w": w})
+    assert found.verdict == "undecided"
+    assert "starts elsewhere" in found.why
+
+
+def test_without_rates_it_is_undecided(experiment: rigidsim.Experiment) -> None:
+    times, q, _ = theirs(1e-5)
+    found = rigidsim.compare(experiment, {"t": times, "q": q})
+    assert found.verdict == "undecided"
+    assert found.rate_error is None
+    assert found.local_defects is not None
+    assert 1e-8 < found.local_defects.largest < 1e-3
+
+
+SEQUENCES = ["zxz", "zyz", "xyx", "xzx", "yxy", "yzy", "zyx", "xyz", "xzy", "yxz", "yzx", "zxy"]
+TRAJECTORY = theirs(1e-13, rows=61)
+
+
+@settings(deadline=None, max_examples=10, suppress_health_check=[HealthCheck.too_slow])
+@given(
+    sequence=st.sampled_from(["", *SEQUENCES]), fixed=st.booleans(), inverse=st.booleans(),
+    last=st.booleans(), degrees=st.booleans(), space=st.booleans(),
+    offset=st.sampled_from(["", "space", "body"]), seed=st.integers(0, 2**31),
+)  # fmt: skip
+def test_conventions_are_found(
+    sequence: str, fixed: bool, inverse: bool, last: bool, degrees: bool, space: bool, offset: str, seed: int
+) -> None:
+    """SciPy writes the attitude in the convention, and it is read back: every digit, or another reading that
+    gives the same motion.
+    """
+    times, q, w = TRAJECTORY
+    body = Rotation.from_quat(q[:, [1, 2, 3, 0]])
+    written, rates = body, w
+    turn = Rotation.random(random_state=seed)
+    if offset == "space":
+        written = turn * body
+    elif offset == "body":
+        written, rates = body * turn, turn.inv().apply(w)
+    if space:
+        rates = written.apply(rates)
+    written = written.inv() if inverse else written
+    unit = 180 / np.pi if degrees else 1.0
+    table: dict[str, Any] = {"t": times, "w": rates * unit}
+    if sequence:
+        letters = sequence if fixed else sequence.upper()
+        table["euler"] = np.array([one.as_euler(letters, degrees=degrees) for one in written])
+    else:
+        given_last = written.as_quat()
+        table["q"] = given_last if last else given_last[:, [3, 0, 1, 2]]
+    found = rigidsim.compare(made(), table)
+    assert found.verdict == "agrees"
+    assert found.attitude_error.largest < 1e-9
+    assert found.rate_error is not None
+    assert found.rate_error < 1e-9
+    if not sequence:
+        told = found.convention
+        assert told.order == ("xyzw" if last else "wxyz")
+        assert told.direction == ("space_to_body" if inverse else "body_to_space")
+        assert told.rate_axes == ("space" if space else "body")
+        assert told.offset == (offset or "none")
+
+
+def test_a_motion_in_a_plane_leaves_the_convention_undecided() -> None:
+    turning = rigidsim.parse(
+        """
+        name = "turning"
+        [body]
+        principal_moments = [1, 2, 3]
+        [initial]
+        angular_velocity = [0, 0, 1]
+        [time]
+        end = 10
+        """
+    )
+    times = np.linspace(0, 10, 41)
+    found = rigidsim.compare(turning, {"t": times, "euler": np.stack([0 * times, 0 * times, times], axis=1)})
+    assert found.verdict == "agrees"
+    assert len(found.convention.undecided) > 3
+
+
+def test_times_in_days(experiment: rigidsim.Experiment) -> None:
+    times, q, _ = theirs(1e-12)
+    found = rigidsim.compare(experiment, pandas.DataFrame({
+        "time [day]": times / 86400, "qw": q[:, 0], "qx": q[:, 1], "qy": q[:, 2], "qz": q[:, 3],
+    }))  # fmt: skip
+    assert found.convention.time_unit == "day"
+    assert found.attitude_error.largest < 1e-9
+    unnamed = rigidsim.compare(experiment, {"t": times * 1000, "q": q})
+    assert unnamed.convention.time_unit == "ms"
+    assert any("ms" in text for text in unnamed.told)
+
+
+def write(path: Path, times: np.ndarray, q: np.ndarray, w: np.ndarray, form: str = "%.17g") -> Path:
+    table = np.column_stack([times, q, w])
+    np.savetxt(path, table, form, ",", header="t,qw,qx,qy,qz,wx,wy,wz", comments="")
+    return path
+
+
+def test_few_digits_are_no_error(experiment: rigidsim.Experiment, tmp_path: Path) -> None:
+    found = rigidsim.compare(experiment, write(tmp_path / "short.csv", *theirs(), form="%.6f"))
+    assert found.verdict == "agrees"
+    assert 1e-7 < found.resolution < 1e-5
+
+
+@pytest.mark.parametrize("suffix", ["csv", "parquet", "nc"])
+def test_files(experiment: rigidsim.Experiment, tmp_path: Path, suffix: str) -> None:
+    times, q, w = theirs(1e-12)
+    path = tmp_path / f"theirs.{suffix}"
+    if suffix == "csv":
+        write(path, times, q, w)
+    elif suffix == "parquet":
+        pytest.importorskip("pyarrow")
+        pandas.DataFrame(
+            np.column_stack([times, q, w]), columns=["t", "qw", "qx", "qy", "qz", "wx", "wy", "wz"]
+        ).to_parquet(path)
+    else:
+        dims = {"quaternion": (("time", "part"), q), "angular_velocity": (("time", "axis"), w)}
+        xarray.Dataset(dims, {"time": times}).to_netcdf(path, engine="h5netcdf")
+    figure = tmp_path / "seen.png" if suffix == "csv" else None
+    found = rigidsim.compare(experiment, path, out=tmp_path / "seen.h5", figure=figure)
+    assert found.attitude_error.largest < 1e-9
+    assert figure is None or figure.stat().st_size > 20_000
+    with xarray.open_dataset(tmp_path / "seen.h5") as saved:
+        assert saved["attitude_error"].attrs["units"] == "rad"
+        assert saved.attrs["verdict"] == found.verdict
+
+
+def test_a_message(experiment: rigidsim.Experiment, tmp_path: Path) -> None:
+    """An AEM that rigidsim exports comes back."""
+    dated = experiment.having(
+        ['time.epoch="2024-04-13T21:46:00 UTC"', 'frame.axes="ICRF"', "time.samples=31"]
+    )
+    rigidsim.run(dated, out=tmp_path)
+    from rigidsim.workflows.export import export
+
+    [path] = export(rigidsim.open_run(tmp_path / "free"), "aem", tmp_path / "free.aem")
+    found = rigidsim.compare(dated, path)
+    assert found.verdict == "agrees"
+    assert found.convention.order == "wxyz"
+    assert found.rows == 31
+
+
+def at(row: int, value: float, values: np.ndarray) -> np.ndarray:
+    """Values with a row multiplied."""
+    return np.where(np.arange(len(values))[:, None] == row, value * values, values)
+
+
+BROKEN = {
+    "not finite": (lambda t, q, w: (t, at(7, np.nan, q), w), "line 9: qw is no finite"),
+    "twice": (lambda t, q, w: (np.where(t == t[5], t[4], t), q, w), "line 7 has the time of the row before"),
+    "unsorted": (lambda t, q, w: (t[::-1], q, w), "line 3 is earlier than the row before; sort the rows"),
+    "few": (lambda t, q, w: (t[:2], q[:2], w[:2]), "2 rows; at least 3"),
+    "none": (lambda t, q, w: (t[:0], q[:0], w[:0]), "0 rows; at least 3"),
+    "no rotation": (lambda t, q, w: (t, at(3, 2.0, q), w), "line 5: a quaternion of norm 2"),
+    "before": (lambda t, q, w: (t - 5, q, w), "before the experiment's start"),
+}
+
+
+@pytest.mark.parametrize("name", BROKEN)
+def test_what_cannot_be_used_is_refused(experiment: rigidsim.Experiment, tmp_path: Path, name: str) -> None:
+    broken, told = BROKEN[name]
+    path = write(tmp_path / "broken.csv", *broken(*theirs(1e-6, rows=21)))
+    with pytest.raises(rigidsim.RigidsimError, match=told):
+        rigidsim.compare(experiment, path)
+
+
+def test_other_files_are_refused(experiment: rigidsim.Experiment, tmp_path: Path) -> None:
+    empty, bare, odd = tmp_path / "empty.csv", tmp_path / "bare.csv", tmp_path / "odd.xyz"
+    empty.write_text("")
+    bare.write_text("0,1,0,0,0\n1,1,0,0,0\n")
+    odd.write_text("?")
+    for path, told in (
+        (empty, "empty"),
+        (bare, "line of names"),
+        (odd, "no known kind"),
+        (tmp_path / "x.csv", "no such"),
+    ):
+        with pytest.raises(rigidsim.RigidsimError, match=told):
+            rigidsim.compare(experiment, path)
+    with pytest.raises(rigidsim.RigidsimError, match="no attitude"):
+        rigidsim.compare(experiment, {"t": [0.0, 1, 2], "wx": [0.0, 1, 2]})
+    with pytest.raises(rigidsim.RigidsimError, match="no time"):
+        rigidsim.compare(experiment, {"q": np.ones((4, 4))})
+
+
+def test_mixed_units_of_time_are_told(experiment: rigidsim.Experiment) -> None:
+    times, q, w = theirs(1e-12)
+    q, w = q[:100], w[:100]
+    mixed = np.where(np.arange(100) < 98, times[:100] / 100, times[:100] * 100)
+    found = rigidsim.compare(experiment, {"t_s": mixed, "q": q, "w": w})
+    assert any("mixed units" in text for text in found.told)
+
+
+def test_flights(experiment: rigidsim.Experiment) -> None:
+    """Positions are compared where both have them."""
+    flying = experiment.having(["body.mass=1", "initial.position=[0,0,0]", "initial.velocity=[1,2,3]"])
+    times, q, w = theirs(1e-12, rows=31)
+    place = np.outer(times, [1.0, 2.0, 3.0])
+    place[-1, 0] += 0.5
+    speed = np.tile([1.0, 2.0, 3.0], (31, 1))
+    found = rigidsim.compare(flying, {"t": times, "q": q, "w": w, "position": place, "velocity": speed})
+    assert found.position_error == pytest.approx(0.5)
+    assert found.verdict == "agrees"
+
+
+@pytest.mark.slow
+def test_a_campaign() -> None:
+    """The study's few files and models, of which the last once made times of another unit fit better."""
+    told: list[str] = []
+    assert compare_conventions.campaign(12, 16, 1, told.append) == 0, told
