@@ -1,0 +1,190 @@
+"""What is the real sky worth to Apophis' rotation when it passes the Earth in 2029?
+
+Method: the ready scene `apophis_2029`: six degrees of freedom under the Earth, the Moon, the Sun and the
+planets of JPL's DE421, from two days before perigee to two days after it. Its orbit is that of
+`apophis_flyby` at perigee (JPL Horizons), carried back by another integrator. The first draws of that study,
+of whom Apophis might be, fly it, and once more Kepler's hyperbola about the Earth alone.
+
+Held against:
+- the distance at perigee, 0.00025409077 au, and its time, 21:46 TDB to the minute (JPL Horizons);
+- another Horizons vector, of JD 2462239.5, relative to the barycentre of the solar system as DE441 has it,
+  from which DE421's is some 100 km away, since outer planets were weighed better;
+- Benson et al. 2023 (Icarus 390, 115324), abstract: likely stays in short-axis mode; pole likely shifted by
+  10 degrees or more. Likely is more than half;
+- the hyperbola: nothing that the Moon and the Sun do in four days should matter beside what isn't known of
+  the rotation: a tenth of a degree, and a part in a thousand of the rate, for the median member.
+
+Run: python -m experiments.apophis_real_sky [--full] [--out DIR]
+"""
+
+from __future__ import annotations
+
+import sys
+import tempfile
+from pathlib import Path
+
+if not __package__:  # as a script
+    sys.path.insert(0, str(Path(__file__).parents[1]))
+
+import numpy as np
+
+import rigidsim
+from experiments import apophis_flyby as flyby
+from experiments.common import (
+    BLUE,
+    CONFIGS,
+    GREY,
+    ORANGE,
+    Check,
+    Result,
+    main,
+    new_figure,
+    save,
+    simulate,
+    tidy,
+)
+from experiments.measure import matrices
+from experiments.real_bodies import apophis
+from experiments.tumbling import Tumbling, tumbling_of
+
+NAME = "apophis_real_sky"
+SCENE = CONFIGS / "kernels" / "apophis_2029.toml"
+AU = 149597870.7  # km
+HORIZONS = 0.00025409077441363115 * AU
+VECTOR_DATE = 2462239.5
+VECTOR = np.array([-375322.14, -201966.68, -228765.45])
+"""Horizons' place at that date, km, less the Earth's by DE421; axes of the ICRF."""
+
+
+def orbit(days: float) -> np.ndarray:
+    """Place and velocity, km and km/day, so many days after perigee."""
+    place, speed = (apophis.equatorial(x) for x in flyby.hyperbola(0.0))
+    return apophis.flight(place / 1e3, speed / 1e3 * 86400, apophis.PERIGEE, days)
+
+
+def flights(drawn: flyby.Draws) -> tuple[np.ndarray, np.ndarray]:
+    """Rates and directions of the momentum (ecliptic) of all members, after the pass."""
+    rates, poles = [], []
+    back = matrices(np.array([[np.cos(apophis.OBLIQUITY / 2), np.sin(apophis.OBLIQUITY / 2), 0, 0]]))[0]
+    for moments, spin, quaternion in zip(drawn.moments, drawn.rates, drawn.quaternions, strict=True):
+        attitude = back @ matrices(quaternion[None])[0]
+        settings = (
+            "body.preset=",
+            "body.mass=5e10",
+            f"body.principal_moments={(moments * flyby.LARGEST_MOMENT).tolist()!r}",
+            f"initial.angular_velocity={spin.tolist()!r}",
+            f"initial.quaternion={quaternion_of(attitude)!r}",
+            "time.every='4 day'",
+            "output.record=['angular_velocity', 'momentum_axis']",
+            "output.estimate=false",
+        )
+        result = simulate(SCENE, *settings)
+        rates.append(result.values("angular_velocity")[-1])
+        poles.append(result.values("momentum_axis")[-1] @ back)
+    return np.array(rates), np.array(poles)
+
+
+def quaternion_of(matrix: np.ndarray) -> list[float]:
+    """Of a rotation matrix, whatever its angle: the eigenvector of the largest eigenvalue."""
+    m = matrix
+    table = np.array(
+        [
+            [m[0, 0] + m[1, 1] + m[2, 2], m[2, 1] - m[1, 2], m[0, 2] - m[2, 0], m[1, 0] - m[0, 1]],
+            [0, m[0, 0] - m[1, 1] - m[2, 2], m[0, 1] + m[1, 0], m[0, 2] + m[2, 0]],
+            [0, 0, m[1, 1] - m[0, 0] - m[2, 2], m[1, 2] + m[2, 1]],
+            [0, 0, 0, m[2, 2] - m[0, 0] - m[1, 1]],
+        ]
+    )
+    return [float(x) for x in np.linalg.eigh(table + np.triu(table, 1).T)[1][:, -1]]
+
+
+def hyperbolas(drawn: flyby.Draws) -> tuple[np.ndarray, np.ndarray]:
+    """The same about the Earth alone."""
+    settings = [f'sweep.axes."{key}"={text}' for key, text in flyby.axes_of(drawn).items()]
+    with tempfile.TemporaryDirectory() as folder:
+        saved = rigidsim.sweep(rigidsim.load(flyby.CONFIG, overrides=settings), out=folder)
+        with saved.dataset as opened:
+            found = opened.load()
+    rates = found.angular_velocity_final.values
+    momentum = np.einsum("nij,nj->ni", matrices(found.quaternion_final.values), drawn.moments * rates)
+    return rates, momentum / np.linalg.norm(momentum, axis=1)[:, None]
+
+
+def study(full: bool, out: Path) -> list[Check]:
+    """The orbit, and members on both."""
+    drawn = flyby.draws(96 if full else 24)
+    scene = simulate(SCENE, "output.estimate=false", "time.every='1 min'")
+    distance = np.linalg.norm(scene.values("position"), axis=1) / 1e3
+    nearest = int(distance.argmin())
+    begin, vector = orbit(-2.0), orbit(VECTOR_DATE - apophis.PERIGEE)[:3]
+    rates, poles = flights(drawn)
+    other_rates, other_poles = hyperbolas(drawn)
+    after, alone = tumbling_of(drawn.moments, rates), tumbling_of(drawn.moments, other_rates)
+    shift, apart = angle(poles, drawn.poles), angle(poles, other_poles)
+    _draw(out, scene, drawn, after, shift, apart)
+    likely = "Benson et al. 2023, abstract; likely: more than half"
+    none = "none; little beside what isn't known of the rotation"
+    return [
+        Check("distance at perigee", float(distance[nearest]), HORIZONS, 1.0, "km",
+              "JPL Horizons; a minute's share, which is the scan's step", "absolute"),
+        Check("time of perigee after 21:46 TDB", float(scene.values("time")[nearest]) / 60 - 2880, 0.0, 1.0,
+              "min", "JPL Horizons, to the minute", "absolute"),
+        Check("start, beside the elements carried back", float(np.linalg.norm(
+              scene.values("position")[0] / 1e3 - begin[:3])), 0.0, 1e-3, "km", "DOP853; digits", "absolute"),
+        Check("place 0.9 days before, beside another vector", float(np.linalg.norm(vector - VECTOR)), 0.0,
+              300.0, "km", "JPL Horizons; barycentres of DE441 and DE421", "absolute"),
+        Check("share that stays in short-axis mode", float(after.short.mean()), 1.0, 0.5, "1", likely,
+              "absolute"),
+        Check("share that shifts its pole by 10 degrees", float((shift > 10).mean()), 1.0, 0.5, "1", likely,
+              "absolute"),
+        Check("pole, from that about the Earth alone, median", float(np.median(apart)), 0.0, 0.1, "deg", none,
+              "absolute"),
+        Check("effective rate over that about the Earth alone, median",
+              float(np.median(after.effective / alone.effective)), 1.0, 1e-3, "1", none, "absolute"),
+    ]  # fmt: skip
+
+
+def angle(one: np.ndarray, other: np.ndarray) -> np.ndarray:
+    """Between directions, deg."""
+    return np.asarray(np.degrees(np.arctan2(
+        np.linalg.norm(np.cross(one, other), axis=1), (one * other).sum(axis=1))))  # fmt: skip
+
+
+def _draw(
+    out: Path, scene: Result, drawn: flyby.Draws, after: Tumbling, shift: np.ndarray, apart: np.ndarray
+) -> None:
+    """The pass and the momentum, and members on both orbits."""
+    figure = new_figure(
+        14, 4.8, "Apophis past the Earth: a new rotation, to which Moon and Sun hardly matter"
+    )
+    near, turned, worth = figure.subplots(1, 3)
+    hours = scene.values("time") / 3600 - 48
+    near.semilogy(hours, np.linalg.norm(scene.values("position"), axis=1) / 1e6, color=BLUE, linewidth=1.2)
+    near.axhline(384.4, color=GREY, linewidth=0.8, linestyle="--")
+    tidy(near, "hours from perigee", "1000 km", "Distance from the Earth (dashed: the Moon's)")
+    momentum = scene.values("angular_momentum")
+    poles = momentum / np.linalg.norm(momentum, axis=1)[:, None]
+    turned.plot(
+        hours,
+        angle(poles, np.broadcast_to(poles[0], poles.shape)),
+        color=BLUE,
+        linewidth=1.2,
+        label="pole, deg",
+    )
+    share = np.linalg.norm(momentum, axis=1) / np.linalg.norm(momentum[0])
+    turned.plot(hours, 100 * (share - 1), color=ORANGE, linewidth=1.2, label="size, %")
+    turned.set_xlim(-12, 12)
+    turned.legend(loc="center right", frameon=False, fontsize=9)
+    tidy(turned, "hours from perigee", "change", "Angular momentum of the ready scene")
+    ratio = after.effective / drawn.state.effective
+    worth.semilogy(shift, apart, "o", color=BLUE, markersize=5, label="pole, deg")
+    worth.semilogy(
+        shift, 100 * np.abs(ratio - 1), "o", color=ORANGE, markersize=5, label="change of the rate, %"
+    )
+    worth.legend(loc="center right", frameon=False, fontsize=9)
+    tidy(worth, "pole shifted by, deg", "", "Members: worth of Moon, Sun and planets (blue)")
+    save(figure, out, NAME)
+
+
+if __name__ == "__main__":
+    sys.exit(main(study, NAME))
