@@ -1,4 +1,4 @@
-"""Starting from an empty folder: templates, validation alone, and what the shell completes."""
+"""Starting from an empty folder: ready scenes, validation alone, and what the shell completes."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ import rigidsim
 from rigidsim.cli import completion
 from rigidsim.cli.app import app
 from rigidsim.scene.choices import METHODS
+from rigidsim.workflows.ready_scenes import ALIASES, SUBJECTS, described, ready_scenes, write_new
 
 Config = Callable[..., str]
 Command = Callable[..., Any]
@@ -22,7 +23,7 @@ Command = Callable[..., Any]
 
 # templates
 
-TEMPLATES = Path(__file__).parents[2] / "rigidsim" / "workflows" / "templates"
+TEMPLATES = Path(__file__).parents[2] / "configs" / "templates"
 SCENES = sorted(path.stem for path in TEMPLATES.glob("*.toml"))
 
 
@@ -68,12 +69,53 @@ def test_new(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, rigidsim_command: 
     assert Path("coin.toml").read_bytes() == before
     unknown = rigidsim_command("new", "gyroscpe")
     assert unknown.exit_code == 2
-    assert 'did you mean "gyroscope"?; scenes to choose from: free_body' in unknown.stderr
+    assert 'did you mean "gyroscope"?; the command rigidsim new lists all scenes' in unknown.stderr
     for name in ("a/b", "..", "a b"):
         bad = rigidsim_command("new", "coin", name)
         assert bad.exit_code == 2
         assert "letters, digits, dots, underscores and hyphens are allowed" in bad.stderr
     assert sorted(path.name for path in tmp_path.iterdir()) == ["coin.toml", "my_coin.toml"]
+
+
+READY = sorted((Path(__file__).parents[2] / "configs").rglob("*.toml"))
+
+
+def test_every_ready_scene_has_one_name_and_one_subject() -> None:
+    listed = [name for names in SUBJECTS.values() for name in names]
+    assert sorted(listed) == sorted(path.stem for path in READY)
+    assert list(ready_scenes()) == listed
+    assert set(ALIASES.values()) <= set(listed)
+    assert not set(ALIASES) & set(listed)
+    assert [name for name, text in described().items() if not 10 < len(text) < 100] == []
+
+
+@pytest.mark.parametrize("path", READY, ids=lambda path: path.stem)
+def test_every_ready_scene_is_written_with_what_it_reads(path: Path, tmp_path: Path) -> None:
+    config, *beside = write_new(path.stem, "mine", tmp_path)
+    assert sorted(tmp_path.iterdir()) == sorted([config, *beside])
+    assert [other.read_bytes() for other in beside] == [(path.parent / x.name).read_bytes() for x in beside]
+    assert rigidsim.load(config).config.name == "mine"
+    name = f'name = "{path.stem}"'
+    assert config.read_bytes() == path.read_bytes().replace(name.encode(), b'name = "mine"', 1)
+    assert write_new(path.stem, "other", tmp_path) == [
+        tmp_path / "other.toml"
+    ]  # its tables are there already
+
+
+def test_scenes_are_known_by_other_names(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, rigidsim_command: Command
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    for name in ("cassini", "Feynman", "dzhanibekov", "chandler"):
+        assert rigidsim_command("new", name).exit_code == 0
+        assert rigidsim.load(f"{name}.toml").config.name == name
+    assert "mars_secular.csv: read by mars.toml" in rigidsim_command("new", "mars_obliquity", "mars").stdout
+    assert "rigidsim sweep flip_sphere.toml" in rigidsim_command("new", "flip_sphere").stdout
+    Path("mars_secular.csv").write_text("another table")
+    there = rigidsim_command("new", "mars_obliquity")
+    assert there.exit_code == 2
+    assert "mars_secular.csv: another file of this name, which mars_obliquity reads, is there" in there.stderr
+    assert not Path("mars_obliquity.toml").exists()
 
 
 # check
@@ -135,7 +177,8 @@ def test_completion(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, rigidsim_co
         (tmp_path / "runs" / name / "config.toml").touch()
     assert completion.runs("") == ["runs/one", "runs/two"]
     assert completion.runs("runs/t") == ["runs/two"]
-    assert [name for name, _ in completion.scenes("t")] == ["top", "thrusters", "torque"]
+    assert [name for name, _ in completion.scenes("to")] == ["top", "torque", "tossed_plate"]
+    assert [name for name, _ in completion.scenes("cas")] == ["cassini"]
     assert completion.settings("integrator.euler_s") == ["integrator.euler_sequence"]
     methods = completion.settings("integrator.method=")
     assert methods == [f"integrator.method={name}" for name in METHODS]  # also those that a test registers

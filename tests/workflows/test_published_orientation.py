@@ -1,0 +1,297 @@
+"""Published orientations beside a run: IAU elements and binary PCK frames, against formulas and series."""
+
+from __future__ import annotations
+
+import re
+import shutil
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import de421
+import numpy as np
+import pytest
+import spiceypy
+from scipy.spatial.transform import Rotation
+from support import EAGER, run_text
+
+import rigidsim
+from rigidsim.cli.commands.info import info
+from rigidsim.look.figures import figure
+
+IAU = Path(__file__).parents[2] / "configs" / "kernels" / "iau2015.tpc"
+DAY, CENTURY = 86400.0, 36525 * 86400.0
+TEXT = """
+name = "top"
+[body]
+principal_moments = [1, 1.1, 1.3]
+[initial]
+angular_velocity = ["1e-6 rad/s", "2e-6 rad/s", "7e-5 rad/s"]
+quaternion = [0.5, 0.1, -0.7, 0.4]
+[frame]
+axes = "ICRF"
+[time]
+epoch = "1990-03-04T05:06:07 TDB"
+end = "30 day"
+every = "7 h"
+"""
+AHEAD = -310200833.0  # of that epoch, s from J2000
+
+
+def asked(kernel: Path | str = IAU, of: str | None = "mars", text: str = TEXT) -> str:
+    """The scene beside a kernel."""
+    return f'{text}\n[output]\norientation = "{kernel}"\n' + (f'orientation_of = "{of}"\n' if of else "")
+
+
+def matrices(dataset: Any, name: str) -> Rotation:
+    return Rotation.from_quat(dataset[name].values[:, [1, 2, 3, 0]])
+
+
+def of_pole(ascension: np.ndarray, declination: np.ndarray, meridian: np.ndarray) -> Rotation:
+    """From body axes to the equator's, of angles in degrees."""
+    angles = np.stack([90 + ascension, 90 - declination, meridian], axis=1)
+    return Rotation.from_euler("ZXZ", angles, degrees=True)
+
+
+def of_mars(seconds: np.ndarray) -> tuple[np.ndarray, ...]:
+    """Right ascension, declination and W of Mars (Archinal et al. 2018), deg."""
+    century, day = seconds / CENTURY, seconds / DAY
+
+    def sines(*terms: tuple[float, float, float], shift: float = 0.0) -> Any:
+        return sum(a * np.sin(np.radians(b + c * century + shift)) for a, b, c in terms)
+
+    right = 317.269202 - 0.10927547 * century + sines(
+        (0.000068, 198.991226, 19139.4819985), (0.000238, 226.292679, 38280.8511281),
+        (0.000052, 249.663391, 57420.7251593), (0.000009, 266.183510, 76560.6367950),
+        (0.419057, 79.398797, 0.5042615),
+    )  # fmt: skip
+    north = 54.432516 - 0.05827105 * century + sines(
+        (0.000051, 122.433576, 19139.9407476), (0.000141, 43.058401, 38280.8753272),
+        (0.000031, 57.663379, 57420.7517205), (0.000005, 79.476401, 76560.6495004),
+        (1.591274, 166.325722, 0.5042615), shift=90,
+    )  # fmt: skip
+    meridian = 176.049863 + 350.891982443297 * day + sines(
+        (0.000145, 129.071773, 19140.0328244), (0.000157, 36.352167, 38281.0473591),
+        (0.000040, 56.668646, 57420.9295360), (0.000001, 67.364003, 76560.2552215),
+        (0.000001, 104.792680, 95700.4387578), (0.584542, 95.391654, 0.5042615),
+    )  # fmt: skip
+    return right, north, meridian
+
+
+def write_librations(path: Path, begin: float, days: int) -> Path:
+    """DE421's lunar librations from a Julian date on as a binary PCK."""
+    given = np.load(Path(str(de421.__file__)).parent / "jpl-librations.npy", mmap_mode="r")
+    first = round((begin - 2414992.5) / 8)
+    start = ((2414992.5 + 8 * first) - 2451545.0) * DAY
+    blocks = np.array(given[first : first + days // 8])
+    handle = spiceypy.pckopn(str(path), "test", 0)
+    end = start + len(blocks) * 8 * DAY
+    spiceypy.pckw02(handle, 31006, "J2000", start, end, "librations", 8 * DAY, len(blocks),
+                    blocks.shape[2] - 1, blocks.ravel(), start)  # fmt: skip
+    spiceypy.pckcls(handle)
+    return path
+
+
+@pytest.mark.parametrize("axes", ["ICRF", "ecliptic J2000"])
+@pytest.mark.parametrize("precision", ["double", "quadruple", "single"])
+def test_elements_of_the_iau_are_their_formulas(axes: str, precision: str) -> None:
+    settings = f'frame.axes="{axes}"', f'integrator.precision="{precision}"'
+    found = run_text(asked(), *settings).dataset
+    right, north, meridian = of_mars(AHEAD + found.time.values)
+    turned = 1e-9 if precision == "single" else 0.0  # of times that single precision rounds
+    for name, degrees in (("right_ascension", right), ("prime_meridian", meridian)):
+        away = found[f"published_{name}"].values - np.radians(degrees)
+        # W is 1e6 degrees by then, of which SPICE and the formula round a part in 1e16 each
+        assert np.abs(np.sin(away / 2)).max() < 1e-11 + turned, name
+        assert found[f"published_{name}"].values.min() >= 0
+        assert found[f"published_{name}"].values.max() <= 2 * np.pi
+    assert np.abs(found.published_declination.values - np.radians(north)).max() < 1e-13
+    truth = of_pole(right, north, meridian)
+    if axes != "ICRF":
+        truth = Rotation.from_rotvec([np.radians(-84381.406 / 3600), 0, 0]) * truth
+    assert (truth.inv() * matrices(found, "published_quaternion")).magnitude().max() < 1e-11 + turned
+    attitude = matrices(found, "quaternion")
+    away = (matrices(found, "published_quaternion").inv() * attitude).as_rotvec()
+    size = 1e-6 if precision == "single" else 1e-14
+    assert np.abs(found.published_rotation.values - away).max() < size
+    assert np.abs(found.published_angle.values - np.linalg.norm(away, axis=1)).max() < size
+    poles = [x.apply([0, 0, 1]) for x in (matrices(found, "published_quaternion"), attitude)]
+    angle = np.arctan2(np.linalg.norm(np.cross(*poles), axis=1), (poles[0] * poles[1]).sum(axis=1))
+    assert np.abs(found.published_pole_angle.values - angle).max() < size
+    assert found.attrs["orientation_kernel"] == "iau2015.tpc"
+    assert found.attrs["orientation_of"] == "pole and prime meridian of mars"
+    assert len(found.attrs["orientation_sha256"]) == 64
+
+
+def test_angles_are_in_the_turn_of_the_runs_own() -> None:
+    record = 'output.record=["quaternion","prime_meridian","right_ascension"]'
+    found = run_text(asked(), record).dataset
+    for name in ("prime_meridian", "right_ascension"):
+        own = found[name].values if name == "prime_meridian" else found[name].values[:, 0]
+        assert np.abs(found[f"published_{name}"].values - own).max() <= np.pi
+    assert found.prime_meridian.values.max() > 100
+
+
+def test_the_figures_axes_are_compared() -> None:
+    """With the figure axis x the published pole is beside x, and the published x beside y."""
+    found = run_text(asked(), 'frame.figure_axis="x"').dataset
+    truth = of_pole(*of_mars(AHEAD + found.time.values))
+    published = matrices(found, "published_quaternion")
+    for own, other in (([1, 0, 0], [0, 0, 1]), ([0, 1, 0], [1, 0, 0])):
+        assert np.abs(published.apply(own) - truth.apply(other)).max() < 1e-11
+
+
+def test_a_binary_kernel_is_its_series(tmp_path: Path) -> None:
+    kernel = write_librations(tmp_path / "moon.bpc", 2447900.5, 160)
+    found = run_text(asked(kernel, None)).dataset
+    given = np.load(Path(str(de421.__file__)).parent / "jpl-librations.npy", mmap_mode="r")
+    days = 2451545.0 - 2414992.5 + (AHEAD + found.time.values) / DAY
+    angles = []
+    for day in days.tolist():
+        block, rest = divmod(day, 8)
+        row = np.asarray(given[int(block)])
+        angles.append([np.polynomial.chebyshev.chebval(rest / 4 - 1, series) for series in row])
+    truth = Rotation.from_euler("ZXZ", np.array(angles))
+    # the date here is a double of days, 5e-11 of a turn of 27 days
+    assert (truth.inv() * matrices(found, "published_quaternion")).magnitude().max() < 1e-11
+    assert found.attrs["orientation_of"] == "axes 31006"
+
+
+def test_it_is_resumed_and_verified_in_every_bit(tmp_path: Path) -> None:
+    kernels = tmp_path / "kernels"
+    kernels.mkdir()
+    shutil.copy(IAU, kernels)
+    text = asked(kernels / "iau2015.tpc", "moon")
+    whole = run_text(text, 'name="whole"', tmp_path)
+    part = run_text(text, 'name="part"', "limits.max_steps=20", tmp_path, tuning=EAGER)
+    assert part.status == "stopped: max_steps"
+    done = rigidsim.resume(tmp_path / "part", overrides={"limits.max_steps": 10**6})
+    assert done.status == "finished"
+    for name, variable in whole.dataset.variables.items():
+        assert np.array_equal(variable.values, done.dataset[name].values), name
+    assert rigidsim.verify(tmp_path / "part").identical
+    shutil.move(kernels, tmp_path / "elsewhere")  # looked for beside the config, and where folders are named
+    with pytest.raises(rigidsim.RigidsimError, match="RIGIDSIM_KERNELS"):
+        rigidsim.verify(tmp_path / "part")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("RIGIDSIM_KERNELS", str(tmp_path / "elsewhere"))
+        assert rigidsim.verify(tmp_path / "part").identical
+        changed = tmp_path / "elsewhere" / "iau2015.tpc"
+        changed.write_text(changed.read_text().replace("38.3213", "38.3214"))
+        with pytest.raises(rigidsim.RigidsimError, match=r'"iau2015.tpc" of SHA-256 .* but the one found'):
+            rigidsim.verify(tmp_path / "part")
+
+
+def test_members_of_a_sweep_have_it(tmp_path: Path) -> None:
+    text = asked().replace("[output]", "[sweep]\naxes.\"body.principal_moments[2]\" = {values = [1.3, 1.4]}\n"
+                           'keep = ["final", "series"]\n[output]')  # fmt: skip
+    swept = rigidsim.sweep(rigidsim.parse(text), out=tmp_path, workers=1)
+    one = run_text(asked(), "body.principal_moments[2]=1.4").dataset
+    with swept.dataset as found:
+        assert np.array_equal(found.published_angle.values[1], one.published_angle.values)
+        assert found.published_angle_final.values[1] == one.published_angle.values[-1]
+        assert found.attrs["orientation_kernel"] == "iau2015.tpc"
+
+
+def test_it_is_drawn() -> None:
+    drawn = figure(run_text(asked()).dataset, "published")
+    titles = [axes.get_title(loc="left") for axes in drawn.axes]
+    assert any("iau2015.tpc" in title for title in titles), titles
+
+
+def test_info_tells_how_far_the_run_is(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    run = run_text(asked(), tmp_path)
+    info(tmp_path / "top", as_json=False)
+    told = re.search(
+        r"published +at most (\S+)° from the attitude in iau2015.tpc, (\S+)°", capsys.readouterr().out
+    )
+    assert told is not None
+    angle = np.degrees(run.dataset["published_angle"])
+    assert float(told[1]) == pytest.approx(float(angle.max()), rel=1e-3)
+    assert float(told[2]) == pytest.approx(float(angle.mean()), rel=1e-3)
+
+
+def test_the_pool_of_spice_is_left_as_it_was() -> None:
+    before = spiceypy.ktotal("ALL")
+    run_text(asked())
+    assert spiceypy.ktotal("ALL") == before
+
+
+def _cut(path: Path) -> None:
+    path.write_bytes(path.read_bytes()[:2500])
+
+
+def _other(path: Path) -> None:
+    path.write_bytes(b"DAF/SPK " + path.read_bytes()[8:])
+
+
+@pytest.mark.parametrize(
+    ("settings", "said"),
+    [
+        (['output.orientation="iau2015"'], "is no path"),
+        (['output.orientation="./nowhere.tpc"'], "isn't there"),
+        (['output.orientation="./"'], "is a folder"),
+        (['output.orientation_of="marz"'], "has nothing of .*marz.*did you mean.*mars.*moon, mars"),
+        (['output.orientation_of="saturn"'], "it has moon, mars"),
+        (['output.orientation_of="-99"'], "it has moon, mars"),
+        (["output.orientation_of="], "no body is named"),
+        (["output.orientation="], "without .output. orientation"),
+        (["time.epoch="], r"\[time\] epoch"),
+        (["frame.axes="], r"\[frame\] axes"),
+        (['frame.axes="EME2000"'], "0.02 arcsec"),
+        (['output.record=["angular_velocity"]'], "name quaternion"),
+        (['integrator.formulation="rates"'], "which this model hasn't"),
+    ],
+)
+def test_nonsense_is_refused(settings: list[str], said: str) -> None:
+    with pytest.raises(rigidsim.ConfigError, match=said):
+        run_text(asked(), *settings)
+
+
+@pytest.mark.parametrize(
+    ("spoil", "said"),
+    [
+        (_cut, "SPICE refuses|damaged"),
+        (_other, r"positions of bodies, which \[ephemeris\] kernel takes"),
+        (lambda path: path.write_bytes(b""), "is no PCK"),
+        (lambda path: path.write_text("KPL/PCK\n\\begindata\nBODY499_POLE_RA = ( 1 2\n"), "SPICE refuses"),
+        (lambda path: path.write_text("KPL/PCK\n\\begindata\nBODY499_POLE_RA = (1 2 3)\n"), "SPICE refuses"),
+        (lambda path: path.write_text("KPL/PCK\nnothing\n"), "no pole of any body"),
+    ],
+)
+def test_damaged_kernels_are_refused(tmp_path: Path, spoil: Callable[[Path], Any], said: str) -> None:
+    kernel = write_librations(tmp_path / "moon.bpc", 2447900.5, 160)
+    spoil(kernel)
+    with pytest.raises(rigidsim.ConfigError, match=said):
+        run_text(asked(kernel))
+
+
+@pytest.mark.parametrize(("begin", "of", "said"), [
+    (2447970.5, None, "which goes from 1990-03.* but the run from 1990-03-04"),
+    (2447900.5, "301", "a number of those that it has is allowed: 31006"),
+])  # fmt: skip
+def test_binary_kernels_without_the_run_are_refused(
+    tmp_path: Path, begin: float, of: str | None, said: str
+) -> None:
+    kernel = write_librations(tmp_path / "moon.bpc", begin, 160)
+    with pytest.raises(rigidsim.ConfigError, match=said):
+        run_text(asked(kernel, of))
+
+
+def test_without_spiceypy_it_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    from rigidsim.scene.kernels.spice import spice
+
+    spice.cache_clear()
+    monkeypatch.setitem(sys.modules, "spiceypy", None)
+    with pytest.raises(rigidsim.ConfigError, match=re.escape("pip install 'rigidsim[spice]'")):
+        run_text(asked())
+    spice.cache_clear()
+
+
+def test_naif_numbers_need_no_quotes() -> None:
+    text = f"{asked(of=None)}orientation_of = 499\n"
+    [by_number, by_name] = [rigidsim.run(rigidsim.parse(x), out=None).dataset for x in (text, asked())]
+    assert np.array_equal(by_number.published_quaternion, by_name.published_quaternion)
+    with pytest.raises(rigidsim.ConfigError, match="orientation_of: given true; a string is allowed"):
+        rigidsim.parse(text.replace("499", "true"))
