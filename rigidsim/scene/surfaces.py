@@ -54,6 +54,11 @@ class Surfaces:
     turning: tuple[str, ...] = ()
     signed: bool = False
 
+    @property
+    def parameters(self) -> int:
+        """Number of parameters that tell sides, turns and the sign, at most."""
+        return len(self.found) + len(self.turning) + self.signed
+
 
 def surfaces_of(scene: Scene) -> Surfaces:
     """Find the surfaces in the loads and events of a scene."""

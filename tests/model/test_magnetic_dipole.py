@@ -208,3 +208,27 @@ def test_a_gradient_of_what_attracts_the_body_in_flight_is_refused() -> None:
             prepare(rigidsim.parse(plain.replace("[time]", f"{gradient}[time]")))
         third = gradient.replace("3.986e14", "4.9028e12")
         prepare(rigidsim.parse(plain.replace("[time]", f"{third}[time]")))
+
+
+def test_b_dot_with_the_published_gain_brakes_within_an_orbit() -> None:
+    """The law m = (k / B^2) w x B with the gain k = 2 n (1 + sin i) J of Avanzini & Giulietti (2012, Journal
+    of Guidance, Control, and Dynamics 35, 1326). About the normal of a polar orbit, across the field, a spin
+    falls exactly as exp(-k t / J), by 1/e in T / 8 pi; any tumble is gone within an orbit.
+    """
+    axis, moment = 6.828e6, 0.35
+    motion = float(np.sqrt(MU / axis**3))
+    gain, period = 4 * motion * moment, float(2 * np.pi / motion)
+    law = [f"{gain!r}*(w{a}*b{c} - w{c}*b{a})/(bx^2 + by^2 + bz^2)" for a, c in ("yz", "zx", "xy")]
+    components = ", ".join(f'"{x}"' for x in law)
+    load = (
+        f'kind = "magnetic_dipole"\nmoment = [{components}]\nsource_moment = [0, 0, -7.7e22]\n'
+        f"gravitational_parameter = {MU}\norbit = {{semi_major_axis = {axis}, inclination = {np.pi / 2!r}}}"
+    )
+    body, time = f"principal_moments = [{moment}, {moment}, {moment}]", f"end = {period!r}\nsamples = 25"
+    spin = run_text(config(body, "angular_velocity = [0, 0.1, 0]", load, time)).dataset
+    expected = 0.1 * np.exp(-gain / moment * spin["time"].values)
+    assert np.abs(spin["angular_velocity"].values[:, 1] - expected).max() < 1e-14
+    tumble = run_text(config(body, "angular_velocity = [0.06, 0.05, -0.06]", load, time)).dataset
+    size = np.linalg.norm(tumble["angular_velocity"].values, axis=1)
+    assert (np.diff(size) < 0).all()
+    assert size[-1] < 0.01 * size[0]

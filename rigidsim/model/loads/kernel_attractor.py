@@ -11,6 +11,7 @@ nothing accelerates.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -21,11 +22,13 @@ from rigidsim.model.load import Term
 from rigidsim.model.load_words import reach_text, source_text, value_text
 from rigidsim.model.loads.point_attraction import PointAttraction, check_flies
 from rigidsim.model.placements.kernel_body import PlacedByKernel, kernel_body
+from rigidsim.model.plausibility import about_named_strength, about_start, named_body
 from rigidsim.model.rotations import Symbolic, length
 from rigidsim.scene.arithmetic import Vector, dot, norm, unit_vectors
 from rigidsim.scene.kernels.kernel import Sight
 from rigidsim.scene.registry import Surroundings
 from rigidsim.scene.scene import Scene
+from rigidsim.store.summary_parts import Caution, WarningCode
 
 
 @dataclass(frozen=True)
@@ -135,6 +138,18 @@ class KernelAttractor(PointAttraction):
 
     def fastest_rate(self, scene: Scene) -> Any:
         return self.placement.fastest_rate(scene.context)
+
+    def cautions(self, fields: Any, where: str, scene: Scene) -> Iterator[Caution]:
+        name, host = self.placement.name, self.placement.sight.host
+        yield from about_named_strength(fields.gravitational_parameter, name, where)
+        place = self._apart(scene.context, scene.position or [])
+        yield from about_start(scene, named_body(name), place, self.motion_at_start(scene))
+        first = next(x for x in scene.given_loads if isinstance(x, KernelAttractor))
+        named = [getattr(keys, "source", None) for keys in scene.config.loads]
+        if host and first is self and host not in named:
+            text = f'[body] host: given "{host}", whose own gravity no load has, so that only what others do '
+            text += f'to it acts; add central_gravity with source = "{host}", unless that is meant'
+            yield Caution(WarningCode.HOST_WITHOUT_GRAVITY, text)
 
     def told(self, scene: Scene) -> str:
         far, host = self._distance(scene), self.placement.sight.host

@@ -1,0 +1,134 @@
+"""What does a satellite's day with everything on cost over a bare heyoka script of the same equations?
+
+A spinning CubeSat at 400 km: the Earth's field to degree 4, gravity gradients of Earth and Sun, drag and
+light on a box and a panel (sides that turn away end a step), the shadow of a point Sun, a magnet and eddy
+currents in a dipole. ``experiments/bare/satellite.py`` writes the same with heyoka alone, from the formulas
+of Montenbruck & Gill and of Wertz, without the work and the drifts that a run has as well.
+
+Held against: that script's attitudes, rates and positions (1e-9 of their size); its steps and CPU from the
+first step to the last sample (1.15 asked), the least of several turns over the least, without compiling or
+estimates.
+
+Run: python -m experiments.satellite_cost [--turns 5] [--hours 24]      exit code 1 if the motions differ
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+if not __package__:  # as a script
+    sys.path.insert(0, str(Path(__file__).parents[1]))
+
+import numpy as np
+
+from experiments.bare import satellite as bare
+from experiments.common import Result, simulate
+
+NAME = "satellite_cost"
+APART = 1e-9
+_QUIET = ("output.estimate=false",)
+
+
+def scene(hours: float = 24.0) -> str:
+    """The config of the bare script's satellite."""
+
+    def table(values: dict[tuple[int, int], float]) -> str:
+        return "{" + ", ".join(f'"{n},{m}" = {x!r}' for (n, m), x in values.items()) + "}"
+
+    area = [bare.SPECULAR, bare.DIFFUSE, bare.DRAG]
+    outside = "specular = {}\ndiffuse = {}\ndrag_coefficient = {}".format(*area)
+    return f"""name = "{NAME}"
+[body]
+principal_moments = {list(bare.MOMENTS)}
+mass = {bare.MASS}
+[[body.surfaces]]
+size = {list(bare.EDGES)}
+{outside}
+[[body.surfaces]]
+normal = [0, 0, 1]
+area = {bare.PANEL}
+both_sides = true
+position = {list(bare.PLACE)}
+{outside}
+[initial]
+position = {list(bare.POSITION)}
+velocity = {list(bare.VELOCITY)}
+angular_velocity = {list(bare.RATES)}
+quaternion = {list(bare.QUATERNION)}
+[[loads]]
+kind = "central_gravity"
+name = "earth"
+gravitational_parameter = {bare.MU}
+radius = {bare.RADIUS}
+atmosphere_rate = [0, 0, {bare.SPIN}]
+[loads.gravity_field]
+radius = {bare.RADIUS}
+C = {table(bare.C)}
+S = {table(bare.S)}
+pole = [0, 0, 1]
+rate = {bare.SPIN}
+[[loads]]
+kind = "drag"
+density = {bare.DENSITY}
+altitude = {bare.ALTITUDE}
+scale_height = {bare.HEIGHT}
+[[loads]]
+kind = "gravity_gradient"
+name = "sun"
+gravitational_parameter = {bare.SUN}
+orbit = {{semi_major_axis = {bare.FAR}, inclination = {bare.TILT!r}}}
+[[loads]]
+kind = "radiation_pressure"
+light = "sun"
+[[loads]]
+kind = "magnetic_dipole"
+moment = {list(bare.MAGNET)}
+source_moment = {list(bare.DIPOLE)}
+[[loads]]
+kind = "eddy_currents"
+magnetic_tensor = {list(bare.CONDUCTOR)}
+source_moment = {list(bare.DIPOLE)}
+[time]
+end = {3600 * hours}
+samples = 1441
+[output]
+record = ["quaternion", "angular_velocity", "position"]
+"""
+
+
+def apart(ours: Result, theirs: dict[str, np.ndarray]) -> dict[str, float]:
+    """Largest differences at any sample over the largest size; of the attitude in rad."""
+    one, other = ours.values("quaternion"), theirs["quaternion"]
+    chord = np.minimum(np.linalg.norm(one - other, axis=1), np.linalg.norm(one + other, axis=1))
+    found = {"attitude": float(2 * chord.max())}
+    for name in ("angular_velocity", "position"):
+        gap = np.linalg.norm(ours.values(name) - theirs[name], axis=1).max()
+        found[name] = float(gap / np.linalg.norm(theirs[name], axis=1).max())
+    return found
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """The command; returns its exit code."""
+    parser = argparse.ArgumentParser(prog=f"python -m experiments.{NAME}")
+    parser.add_argument("--turns", type=int, default=5)
+    parser.add_argument("--hours", type=float, default=24.0)
+    arguments = parser.parse_args(argv)
+    script, ours, theirs = bare.Satellite(), [], []
+    for _ in range(arguments.turns):
+        run = simulate(scene(arguments.hours), *_QUIET)
+        ours.append(run.summary["cost"]["cpu_by_phase"]["integrate_and_record"])
+        found = script.integrate(arguments.hours)
+        theirs.append(found["seconds"])
+    gaps = apart(run, found)
+    print("| | rigidsim | bare script | ratio |\n| --- | --- | --- | --- |")
+    print(f"| CPU, s | {min(ours):.3g} | {min(theirs):.3g} | {min(ours) / min(theirs):.3g} |")
+    print(f"| steps | {run.steps} | {found['steps']} | {run.steps / found['steps']:.3g} |")
+    print("apart by " + ", ".join(f"{gap:.1e} ({name})" for name, gap in gaps.items()))
+    return int(not max(gaps.values()) < APART)
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

@@ -1,0 +1,152 @@
+"""The gravity of the attracting body beyond a point: ``gravity_field`` of ``central_gravity``.
+
+With u the unit vector from its centre to the body in its own axes, r the distance and f_n its harmonics of
+degree n, the body, of mass m, has as a point
+
+    U = -(G M m / r) sum (R/r)^n f_n(u),
+    a = -(G M / r^2) sum (R/r)^n ((n + 1) f_n u + u x (u x grad f_n)).
+
+The axes turn about the pole at a constant rate; a field without orders above 0 rests.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+from rigidsim.model.kinematics import Kinematics
+from rigidsim.model.load import Load, Term
+from rigidsim.model.load_words import length_text, span_words, value_text
+from rigidsim.model.loads.attractor_keys import AttractorFieldTable, coefficients_of
+from rigidsim.model.loads.central_gravity import CentralGravity, CentralGravityFields
+from rigidsim.model.loads.figure_in_flight import refuse_inside
+from rigidsim.model.rotations import Symbolic
+from rigidsim.model.turning_harmonics import Outward, TurningHarmonics, frame_of
+from rigidsim.scene.arithmetic import Vector, unit_vectors
+from rigidsim.scene.effect_parts import EffectPart
+from rigidsim.scene.registry import Surroundings, register_beside
+from rigidsim.scene.scene import Scene
+from rigidsim.scene.tracing.numbers import plain
+
+
+@register_beside("gravity_field")
+@dataclass(frozen=True)
+class AttractorField(Load):
+    """Force of the harmonics of a point at rest.
+
+    Attributes:
+        beside: the attraction of the point itself.
+        field: its harmonics without dimension.
+        number: of the load in the config, from 1.
+        context: the scene's arithmetic.
+    """
+
+    beside: CentralGravity
+    field: TurningHarmonics
+    number: int
+    context: Any
+
+    title = "gravity_field"
+    described = "the gravity field of an attracting body"
+    reads = frozenset({"flight"})
+    has_source = False
+    wide = True
+
+    @classmethod
+    def beside_of(cls, load: Any, fields: CentralGravityFields, around: Surroundings) -> Load:
+        """See ``Companion``."""
+        given, context = fields.gravity_field, around.context
+        assert given is not None
+        if not isinstance(load, CentralGravity):
+            what = "given for an attracting body that moves; allowed for one at rest, with position"
+            raise around.fault("gravity_field", what)
+        if fields.figure is not None and "2,0" in given.C:
+            raise around.fault("gravity_field.C", 'given "2,0" beside figure, whose J2 says it; remove one')
+        frame = frame_of(context, [x.at(context) for x in given.pole], given.prime_meridian.at(context))
+        field = TurningHarmonics(
+            coefficients_of(given, around), given.radius.at(context), frame, given.rate.at(context)
+        )
+        return cls(load, field, around.number + 1, context)
+
+    @staticmethod
+    def effect_parts(fields: CentralGravityFields) -> Iterator[EffectPart]:
+        """See ``SceneLoad``."""
+        missing = "" if fields.gravity_field else "no gravity_field is given"
+        words = "gravity of the attracting body beyond a point"
+        keys = [] if fields.gravity_field is None else _by_degree(fields.gravity_field)
+        most, wider = max((n for n, _ in keys), default=0), ["field"]
+        parts = []
+        for n in sorted({n for n, _ in keys})[1:]:
+            without = {f"gravity_field.{key}": None for degree, key in keys if degree >= n}
+            which = f"degrees {n} to {most}" if n < most else f"degree {n}"
+            parts.append(EffectPart(f"field-degree-{n}", f"{which} of that gravity", without, tuple(wider)))
+            wider.append(f"field-degree-{n}")
+        yield from reversed(parts)
+        yield EffectPart("field", words, {"gravity_field": None}, missing=missing)
+
+    def acts(self) -> bool:
+        return bool(self.field.coefficients)
+
+    @property
+    def conservative(self) -> bool:  # type: ignore[override]
+        return self.field.rests
+
+    def check(self, number: int, position: Vector | None) -> None:
+        centre = self.beside.position
+        refuse_inside(position, centre, self.field.radius, "gravity_field", self.number, self.context)
+
+    def symmetry_line(self) -> tuple[Vector, Vector] | None:
+        return (self.beside.position, self.field.frame[2]) if self.field.zonal else None
+
+    # --- what it does ---------------------------------------------------------------------------------------
+
+    def _seen(self, m: Kinematics) -> tuple[Outward, Any]:
+        """Direction from the centre with the inverse distance, and the unit of that, m (mpf)."""
+        context = m.scene.context
+        return self.beside.seen(m), context.ldexp(context.one, m.scaling.length)
+
+    def potential(self, m: Kinematics) -> Symbolic | None:
+        outward, unit = self._seen(m)
+        strength = self.beside.strength * m.carried(m.scene.body.mass) / unit
+        strength, ratio = m.scene.context.ldexp(-strength, -m.scaling.energy), self.field.radius / unit
+        return self.field.scalar(m, outward, lambda n: strength * ratio**n)
+
+    def force(self, m: Kinematics) -> list[Term]:
+        outward, unit = self._seen(m)
+        strength, shift = -self.beside.strength / unit**2, m.scaling.time - m.scaling.speed
+        strength, ratio = m.scene.context.ldexp(strength, shift), self.field.radius / unit
+        parts = self.field.vector(m, outward, lambda n: strength * ratio**n)
+        return list(zip(unit_vectors(m.scene.context), parts, strict=True))
+
+    # --- sizes, and what readers are told -------------------------------------------------------------------
+
+    def amplitude(self, scene: Scene) -> Any:
+        return scene.context.zero  # no torque
+
+    def fastest_rate(self, scene: Scene) -> Any:
+        return scene.context.zero if self.conservative else abs(self.field.rate)
+
+    def told(self, scene: Scene) -> str:
+        context, near, total = scene.context, self.beside.nearest_approach(scene), scene.context.zero
+        for (n, order, _), value in self.field.coefficients.items():
+            most = context.sqrt(context.mpf(math.factorial(n + order)) / math.factorial(n - order))
+            total += abs(value) * most * (n + 1) * (self.field.radius / near) ** n
+        share = float(plain(total * self.beside.strength / near**2))
+        radius = length_text(float(plain(self.field.radius)))
+        count, degree = len(self.field.coefficients), self.field.degree
+        turn = ""
+        if not self.conservative:
+            turn = f", turning once in {span_words(abs(2 * context.pi / self.field.rate))}"
+        return (
+            f"gravity field of the attracting point of [[loads]] number {self.number}, degree {degree} "
+            f"({count} coefficient{'s' * (count > 1)}, radius {radius}){turn}; "
+            f"acceleration up to about {value_text(share, 'm/s^2')}"
+        )
+
+
+def _by_degree(table: AttractorFieldTable) -> list[tuple[int, str]]:
+    """The degree of each coefficient, with its key."""
+    found = [(name, key) for name in ("C", "S") for key in getattr(table, name)]
+    return [(int(key.partition(",")[0]), f"{name}.{key}") for name, key in found]

@@ -1,0 +1,147 @@
+"""Drag of the air on the body's surfaces.
+
+A plate of area A with unit normal n moves through the air with velocity v, and is met by it if n . v > 0:
+the force is -rho C A (n . v) v / 2, that of the area seen against the stream; a sphere's is
+-rho C pi R^2 |v| v / 2 (Montenbruck & Gill, Satellite Orbits, 2000, section 3.5).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated, Any, Literal
+
+from pydantic import Field
+
+from rigidsim.model.air_density import AIR_DENSITY, INDICES, LEAST, NRLMSISE, height
+from rigidsim.model.flight_names import RELATIVE_NAMES
+from rigidsim.model.kinematics import Kinematics
+from rigidsim.model.loads.surface_load import Pushes, SurfaceLoad
+from rigidsim.model.rotations import Symbolic
+from rigidsim.scene.bodies.outside import Plate
+from rigidsim.scene.exact import ExactNumber
+from rigidsim.scene.expressions.parser import parse_expression
+from rigidsim.scene.expressions.tree import Expression, ExpressionError
+from rigidsim.scene.fields import Dimensionless, Metre, NumberOrFormula
+from rigidsim.scene.registry import LoadFields, Surroundings, register_load
+
+Density = Annotated[Any, NumberOrFormula("kg/m^3")]
+
+
+class DragFields(LoadFields):
+    """Drag on the body's surfaces of the air about the body that it flies about."""
+
+    kind: Literal["drag"]
+    density: Density = Field(
+        description="of the air: a number, an expression of altitude, t, the state and [parameters], or "
+        '"nrlmsise00", the Earth\'s by that model',
+        examples=["4e-12 kg/m^3", "nrlmsise00"],
+    )
+    f107: Dimensionless | None = Field(
+        default=None,
+        description="of nrlmsise00: solar flux at 10.7 cm of the day before, 1e-22 W/m^2/Hz",
+        examples=[150],
+    )
+    f107a: Dimensionless | None = Field(
+        default=None, description="of nrlmsise00: its mean of 81 days", examples=[150]
+    )
+    ap: Dimensionless | None = Field(
+        default=None, description="of nrlmsise00: the day's geomagnetic index Ap", examples=[7]
+    )
+    scale_height: Metre | None = Field(
+        default=None,
+        description="height over which the density falls to 1/e; by default it is that of density everywhere",
+        examples=["60 km"],
+    )
+    altitude: Metre | None = Field(
+        default=None, description="where the air has this density; with scale_height", examples=["400 km"]
+    )
+
+
+@register_load
+@dataclass(frozen=True)
+class Drag(SurfaceLoad):
+    """Drag on plates and spheres."""
+
+    Fields = DragFields
+    title = "drag"
+    described = "drag"
+
+    @classmethod
+    def resolve(cls, fields: DragFields, around: Surroundings) -> Drag:
+        if not around.free_flight or RELATIVE_NAMES[0] not in around.names:
+            what = "given without a velocity relative to the air; it takes [initial] position and velocity, "
+            raise around.fault("", what + "and a central_gravity (atmosphere_rate there turns the air)")
+        pushes = Pushes(around, RELATIVE_NAMES)
+        half, factors = around.context.one / 2, []
+        _refuse_indices(fields, around)
+        if fields.density == NRLMSISE:
+            factors.append(parse_expression(AIR_DENSITY, around.names))
+        elif isinstance(fields.density, ExactNumber):
+            if fields.density.sign < 0:
+                what = f"given {float(fields.density):g}; zero or more is allowed"
+                raise around.fault("density", what)
+            half = half * fields.density.at(around.context)
+        else:
+            factors.append(_law(fields.density, around))
+        factors += _falling(fields, around)
+        for number, surface in pushes.surfaces():
+            size = -half * surface.drag_coefficient * surface.area
+            if isinstance(surface, Plate):
+                pushes.along_vector(surface, size, number)
+            else:
+                pushes.along_vector(surface, size, speed=True)
+        kind = DragInThermosphere if fields.density == NRLMSISE else cls
+        return kind(pushes.acting(), tuple(factors), around.free_flight, around.number)
+
+
+class DragInThermosphere(Drag):
+    """Drag in NRLMSISE-00, which ends where the network of it does."""
+
+    described = "drag in NRLMSISE-00"
+
+    def endings(self, m: Kinematics) -> list[tuple[str, Symbolic]]:
+        why = f"it has come below {LEAST:g} km, where the network of NRLMSISE-00 doesn't hold"
+        return [(why, (height(m) - (LEAST - 1.0)) / LEAST)]
+
+    def _words(self) -> str:
+        return "drag in NRLMSISE-00"
+
+
+def _refuse_indices(fields: DragFields, around: Surroundings) -> None:
+    """Require the indices of the Sun and the field with the model alone, within what they have been."""
+    for key in INDICES:
+        value, most = getattr(fields, key), 400
+        if value is None and fields.density == NRLMSISE:
+            raise around.fault(key, f'missing; density = "{NRLMSISE}" takes {", ".join(INDICES)}')
+        if value is not None and fields.density != NRLMSISE:
+            raise around.fault(key, f'given without density = "{NRLMSISE}", which takes it; remove it')
+        least = 0 if key == "ap" else 60
+        if value is not None and not least <= float(value) <= most:
+            raise around.fault(key, f"given {float(value):g}; {least} to {most} is allowed")
+
+
+def _law(text: str, around: Surroundings) -> Expression:
+    try:
+        return parse_expression(text, around.names, parameters=around.parameters, unit="kg/m^3")
+    except ExpressionError as error:
+        raise around.fault("density", str(error)) from None
+
+
+def _falling(fields: DragFields, around: Surroundings) -> list[Expression]:
+    """The factor by which the density falls with the altitude, if it does."""
+    if (fields.scale_height is None) != (fields.altitude is None):
+        missing = "scale_height" if fields.scale_height is None else "altitude"
+        raise around.fault(missing, "missing; altitude and scale_height are given together, or neither")
+    if fields.scale_height is None or fields.altitude is None:
+        return []
+    if not isinstance(fields.density, ExactNumber):
+        what = "given beside an expression for density, which says how it falls; remove it and altitude"
+        raise around.fault("scale_height", what)
+    if fields.scale_height.sign <= 0:
+        what = f"given {float(fields.scale_height):g}; a positive length is allowed"
+        raise around.fault("scale_height", what)
+    if "altitude" not in around.names:
+        what = "given without a surface to count from; give the central_gravity a radius"
+        raise around.fault("altitude", what)
+    given = {"base": fields.altitude.alone, "scale_height": fields.scale_height.alone}
+    return [parse_expression("exp((base - altitude)/scale_height)", around.names, parameters=given)]

@@ -1,0 +1,118 @@
+"""The Earth's magnetic field about it: ``field = "igrf"`` of loads by a magnetic field.
+
+Its potential is a sum c_n r^-(n+1) f_n with Schmidt semi-normalized coefficients (Alken et al. 2021, Earth,
+Planets and Space 73, 49, eq. 1), and B minus its gradient, in axes that turn with the Earth:
+
+    B = sum (R/r)^(n+2) ((n + 1) f_n u + u x (u x grad f_n)).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from decimal import Decimal
+from typing import Any
+
+from rigidsim.model.kinematics import Kinematics
+from rigidsim.model.loads.magnetic_keys import IGRF, MagneticFieldFields
+from rigidsim.model.rotations import Symbolic
+from rigidsim.model.turning_harmonics import TurningHarmonics
+from rigidsim.scene.arithmetic import Vector, apply, transpose
+from rigidsim.scene.earth_axes import earth_axes, rotation_rate
+from rigidsim.scene.epochs import Epoch
+from rigidsim.scene.exact import ExactNumber
+from rigidsim.scene.geomagnetic_field import MOST, RADIUS, igrf
+from rigidsim.scene.registry import Surroundings
+from rigidsim.scene.tracing.numbers import plain
+
+_LEAST = 0.99
+"""Radii from the centre below which a start is refused; the poles are at 0.998."""
+
+
+@dataclass(frozen=True)
+class EarthField:
+    """Coefficients (T) at the epoch, in axes that turn with the Earth.
+
+    Attributes:
+        harmonics: unnormalized, with the Earth's axes at time 0 and its rate.
+        strengths: of each degree, T: the root of the sum of squares of its Schmidt coefficients (mpf).
+        epoch: the date.
+    """
+
+    harmonics: TurningHarmonics
+    strengths: dict[int, Any]
+    epoch: Epoch
+
+    @classmethod
+    def of(cls, fields: MagneticFieldFields, around: Surroundings) -> EarthField:
+        """The field that the keys ask for; refused where date and axes aren't known."""
+        axes = around.axes or (around.ephemeris.axes if around.ephemeris is not None else None)
+        epoch, context = around.epoch, around.context
+        known = (
+            ("[time] epoch", epoch, 'epoch = "2026-01-01T00:00:00 UTC"'),
+            ("[frame] axes", axes, 'axes = "ICRF"'),
+        )
+        for what, found, example in known:
+            if found is None:
+                why = f'given "{IGRF}", which turns with the Earth and takes {what}; give {example}'
+                raise around.fault("field", why)
+        assert epoch is not None
+        assert axes is not None
+        try:
+            given = igrf(epoch, fields.field_degree or MOST)
+            for second in around.span or ():
+                igrf(epoch.uniform().after(Decimal(round(plain(second)))), 1)
+            frame = earth_axes(epoch, axes, context)
+        except ValueError as error:
+            raise around.fault("field", f'given "{IGRF}" for a run from {epoch}; {error}') from None
+        coefficients, squares = {}, dict.fromkeys(range(1, max(n for n, _, _ in given) + 1), context.zero)
+        for (n, m, sine), value in given.items():
+            tesla = ExactNumber(value / 10**9).at(context)
+            share = context.mpf(math.factorial(n - m)) / math.factorial(n + m)
+            squares[n] += tesla**2
+            if value:
+                coefficients[n, m, sine] = tesla * (context.sqrt(2 * share) if m else 1)
+        radius = context.mpf(RADIUS)
+        harmonics = TurningHarmonics(coefficients, radius, frame, rotation_rate(context))
+        return cls(harmonics, {n: context.sqrt(x) for n, x in squares.items()}, epoch)
+
+    def dipole(self, constant: Any) -> Vector:
+        """The magnetic moment of degree 1 at time 0, space axes, A m^2 (mpf).
+
+        Args:
+            constant: mu_0 / 4 pi.
+        """
+        c = self.harmonics.coefficients
+        size = self.harmonics.radius**3 / constant
+        moment = [size * c[key] for key in ((1, 1, False), (1, 1, True), (1, 0, False))]
+        return apply(transpose(self.harmonics.frame), moment)
+
+    def most(self, far: Any) -> Any:
+        """A bound of B at a distance, T: |B_n| <= (n + 1) s_n (R/r)^(n+2), by the addition theorem."""
+        ratio = self.harmonics.radius / far
+        return sum((n + 1) * s * ratio ** (n + 2) for n, s in self.strengths.items())
+
+    def at(self, context: Any, place: Vector, time: Any) -> Vector:
+        """B (mpf, T, space axes) at a place seen from the Earth's centre, m, and a time, s."""
+        return self.harmonics.at(context, place, time)
+
+    def over(self, m: Kinematics, centre: Vector, size: Any) -> list[Symbolic]:
+        """B over a size (mpf, T), space axes."""
+        which = IGRF, self.epoch, self.harmonics.degree, *map(id, centre)  # the size is of the same
+        if which not in m.made:
+            unit = m.scene.context.ldexp(m.scene.context.one, m.scaling.length)
+            ratio = self.harmonics.radius / unit
+            sizes = {n: ratio ** (n + 2) / size for n in self.strengths}
+            m.made[which] = self.harmonics.vector(m, m.seen_from(centre), sizes.__getitem__)
+        return m.made[which]
+
+    def within(self, far: Any) -> bool:
+        """Whether a distance from the centre is inside the Earth."""
+        return bool(far < _LEAST * self.harmonics.radius)
+
+    @property
+    def described(self) -> str:
+        """What it is, for readers."""
+        degree = self.harmonics.degree
+        which = "degree 1, a tilted dipole" if degree == 1 else f"degree {degree}"
+        return f"the IGRF-14 of {self.epoch.calendar()[:10]} ({which}), which turns with the Earth"

@@ -1,0 +1,170 @@
+"""Eddy currents: the torque of a magnetic field on a conductor that turns in it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated, Any, Literal
+
+from pydantic import Field
+
+from rigidsim.model.kinematics import Kinematics
+from rigidsim.model.load import Term
+from rigidsim.model.load_words import span_words
+from rigidsim.model.loads.magnetic_field import InMagneticField
+from rigidsim.model.loads.magnetic_keys import MagneticFieldFields, numbers
+from rigidsim.scene.arithmetic import (
+    Vector,
+    across,
+    apply,
+    cross,
+    diagonal,
+    negligible,
+    norm,
+    parallel,
+    unit_vectors,
+)
+from rigidsim.scene.exact import ExactNumber
+from rigidsim.scene.fields import InUnit, Metre, Triple
+from rigidsim.scene.readable import number_text
+from rigidsim.scene.registry import Surroundings, register_load
+from rigidsim.scene.scene import Scene
+from rigidsim.scene.tracing.numbers import plain
+
+Conductivity = Annotated[ExactNumber, InUnit("S/m")]
+MagneticTensor = Annotated[ExactNumber, InUnit("S m^4")]
+
+
+class EddyCurrentsFields(MagneticFieldFields):
+    """Torque (M (w x B)) x B of the currents that a magnetic field induces in a conductor turning in it."""
+
+    kind: Literal["eddy_currents"]
+    conductivity: Conductivity | None = Field(
+        default=None, description="of a conducting sphere, with its radius", examples=["3.5e7 S/m"]
+    )
+    radius: Metre | None = Field(default=None, description="of the sphere, outside", examples=["30 cm"])
+    thickness: Metre | None = Field(
+        default=None, description="of the wall of a hollow sphere; a solid one without it", examples=["2 mm"]
+    )
+    magnetic_tensor: Triple[MagneticTensor] | None = Field(
+        default=None,
+        description="moments of M about the body axes, of another conductor, instead of conductivity and "
+        "radius",
+        examples=[["2.1e4 S m^4", "2.1e4 S m^4", "9.8e3 S m^4"]],
+    )
+
+
+@register_load
+@dataclass(frozen=True, kw_only=True)
+class EddyCurrents(InMagneticField):
+    """Torque (M (w x B)) x B on a conductor whose currents follow the field without delay.
+
+    A sphere's M is (2 pi / 15) s (R^5 - (R - d)^5): the induced electric field -r x B' / 2 is tangent to all
+    spheres, so each layer has its own currents (Landau & Lifshitz, Electrodynamics of Continuous Media,
+    section 63).
+    """
+
+    moments: Vector  # of M, body axes, S m^4 (mpf)
+    Fields = EddyCurrentsFields
+    title = "eddy_currents"
+    described = "a load of eddy currents"
+    unaveraged = "the torque of eddy currents has no average: leave it out, or use viscous_torque"
+
+    @classmethod
+    def resolve(cls, fields: EddyCurrentsFields, around: Surroundings) -> EddyCurrents:
+        if fields.magnetic_tensor is not None:
+            moments = _of_tensor(fields.magnetic_tensor, fields, around)
+        else:
+            moments = _of_sphere(fields, around)
+        return cls(moments=moments, **cls.field_of(fields, around))
+
+    def acts(self) -> bool:
+        return any(x != 0 for x in self.moments) and any(x != 0 for x in self.source)
+
+    def torque(self, m: Kinematics) -> list[Term]:
+        """Sum over axes k, l of the constant vectors M_k e_k x e_l times (w x b)_k b_l, b the field over its
+        size.
+        """
+        if not self.acts():
+            return []
+        context, b, terms = m.scene.context, self._field(m), []
+        scale, axes = context.ldexp(self._size(m.scene) ** 2, -m.scaling.momentum), unit_vectors(context)
+        induced = cross(m.rates, b)
+        for k, moment in enumerate(self.moments):
+            for n, axis in enumerate(axes):
+                if moment != 0 and n != k:
+                    vector = cross([scale * moment * x for x in axes[k]], axis)
+                    terms.append((vector, induced[k] * b[n]))
+        return terms
+
+    def turns_about(self, m: Kinematics, axis: Vector) -> bool:
+        """Whether the axis isn't along a uniform field."""
+        return not (self.uniform and parallel(m.scene.context, self.source, axis))
+
+    def spared_axis(self, scene: Scene) -> Vector | None:
+        if not self.uniform or not self.acts():
+            return None
+        return [x / norm(scene.context, self.source) for x in self.source]
+
+    def keeps_axial(self, m: Kinematics, axis: Vector) -> bool:
+        """False: it damps any spin across the field."""
+        return False
+
+    def keeps_plane(self, scene: Scene, axis: Vector, normal: Vector) -> bool:
+        """Whether a uniform field is along the axis of spin, where no torque is, or across it with a tensor
+        that keeps the axis.
+        """
+        context = scene.context
+        if not self.uniform:
+            return False
+        if parallel(context, self.source, normal):
+            return True
+        turned = apply(diagonal(self.moments), axis)
+        kept = norm(context, cross(turned, axis)) <= negligible(context) * max(self.moments)
+        return bool(kept) and across(context, self.source, normal)
+
+    def amplitude(self, scene: Scene) -> Any:
+        return scene.context.zero  # it only removes energy
+
+    def told(self, scene: Scene) -> str:
+        """See ``Load``; the time is the shortest of a spin across the field, about any body axis."""
+        context, inertia = scene.context, scene.body.inertia
+        damping = max(self.moments) * self._size(scene) ** 2
+        moments = ", ".join(number_text(float(plain(x)), 4) for x in self.moments)
+        told = f"eddy currents, magnetic tensor {moments} S m^4, in {self._described_field(scene)}"
+        if damping == 0:
+            return told
+        span = span_words(context.minimum([inertia[i][i] for i in range(3)]) / damping)
+        return f"{told}: damps a spin across the field by 1/e in {span} or more"
+
+
+def _of_tensor(given: list[ExactNumber], fields: EddyCurrentsFields, around: Surroundings) -> Vector:
+    for key in ("conductivity", "radius", "thickness"):
+        if getattr(fields, key) is not None:
+            raise around.fault(key, "given beside magnetic_tensor, which says it; remove one of them")
+    for i, x in enumerate(given):
+        if x.sign < 0:
+            raise around.fault(f"magnetic_tensor[{i}]", f"given {float(x):g}; zero or more is allowed")
+    return numbers(given, around)
+
+
+def _of_sphere(fields: EddyCurrentsFields, around: Surroundings) -> Vector:
+    for key in ("conductivity", "radius"):
+        value = getattr(fields, key)
+        if value is None:
+            what = "missing; a sphere needs conductivity and radius, any other conductor magnetic_tensor"
+            raise around.fault(key, what)
+        if value.sign < 0 or (key == "radius" and value.sign == 0):
+            allowed = "zero or more" if key == "conductivity" else "a positive length"
+            raise around.fault(key, f"given {float(value):g}; {allowed} is allowed")
+    assert fields.conductivity is not None
+    assert fields.radius is not None
+    context, radius = around.context, fields.radius.at(around.context)
+    inside = context.zero
+    if fields.thickness is not None:
+        thickness = fields.thickness.at(context)
+        if fields.thickness.sign <= 0 or thickness > radius:
+            what = f"given {float(fields.thickness):g}; more than 0, up to the radius, is allowed"
+            raise around.fault("thickness", what)
+        inside = radius - thickness
+    moment = 2 * context.pi / 15 * fields.conductivity.at(context) * (radius**5 - inside**5)
+    return [moment] * 3

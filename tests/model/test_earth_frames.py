@@ -1,0 +1,187 @@
+"""Starts of flights by two-line elements and by dated states in frames of the Earth."""
+
+import math
+from typing import Any
+
+import heyoka as hy
+import numpy as np
+import pytest
+
+from rigidsim.errors import ConfigError
+from rigidsim.scene.scene import Scene, build_scene
+from rigidsim.workflows.read import as_experiment
+
+pytest.importorskip("sgp4")
+pytest.importorskip("erfa")
+
+# Vanguard 1, the first of SGP4's published test cases (Vallado et al. 2006, AIAA 2006-6753)
+LINES = [
+    "1 00005U 58002B   00179.78495062  .00000023  00000-0  28098-4 0  4753",
+    "2 00005  34.2682 348.7242 1859667 331.7664  19.3264 10.82419157413667",
+]
+PUBLISHED = {  # date: position (km) and velocity (km/s) in TEME
+    "2000-06-27T18:50:19.733568 UTC": (
+        [7022.46529266, -1400.08296755, 0.03995155, 1.893841015, 6.405893759, 4.534807250]
+    ),
+    "2000-06-28T00:50:19.733568 UTC": (
+        [-7154.03120202, -3783.17682504, -3536.19412294, 4.741887409, -4.151817765, -2.093935425]
+    ),
+}
+# one state in three frames (Vallado, Fundamentals of Astrodynamics and Applications, example 3-15)
+DATE = "2004-04-06T07:51:28.386009 UTC"
+GCRF = [5102.5089592, 6123.0114036, 6378.1369247, -4.743220157, 0.790536497, 5.533755727]
+ITRF = [-1033.4793830, 7901.2952754, 6380.3565958, -3.225636520, -2.872451450, 5.531924446]
+TEME = [5094.18016210, 6127.64465950, 6380.34453270, -4.746131487, 0.785818041, 5.531931288]
+EARTH = {"kind": "central_gravity", "gravitational_parameter": "3.986004418e14 m^3/s^2"}
+
+
+def tables(initial: dict[str, Any], **others: Any) -> dict[str, Any]:
+    body = {"principal_moments": [1, 2, 2.5], "mass": 1}
+    rates = {"angular_velocity": [0.1, 0, 0]}
+    time = {"end": 10, "samples": 2} | others.pop("time", {})
+    return {"name": "x", "body": body, "loads": [EARTH], "initial": rates | initial, "time": time} | others
+
+
+def start(initial: dict[str, Any], **others: Any) -> Scene:
+    return build_scene(as_experiment(tables(initial, **others)))
+
+
+def state(scene: Scene) -> np.ndarray:
+    """Position (km) and velocity (km/s)."""
+    assert scene.position is not None
+    assert scene.velocity is not None
+    return np.array([float(x) for x in (*scene.position, *scene.velocity)]) / 1e3
+
+
+def given(values: list[float], frame: str) -> dict[str, Any]:
+    texts = [f"{x} km" for x in values[:3]], [f"{x} km/s" for x in values[3:]]
+    return {"position": texts[0], "velocity": texts[1], "frame": frame}
+
+
+def test_an_orbit_starts_where_sgp4_is_published_to_be() -> None:
+    for date, expected in PUBLISHED.items():
+        found = state(start({"tle": LINES}, time={"epoch": date}))
+        same = state(start(given(expected, "TEME"), time={"epoch": date}))
+        assert np.abs(found - same)[:3].max() < 2e-8  # as printed, km
+        assert np.abs(found - same)[3:].max() < 2e-9
+
+
+def test_time_0_is_the_date_of_the_lines_and_the_axes_are_gcrf() -> None:
+    scene = start({"tle": LINES})
+    assert str(scene.epoch) == "2000-06-27T18:50:19.733568 UTC"
+    assert scene.axes == "GCRF"
+    hours = {"start": "6 hr", "end": "7 hr"}
+    later = start({"tle": LINES}, time={"epoch": "2000-06-28T00:50:19.733568 UTC"})
+    assert np.abs(state(start({"tle": LINES}, time=hours)) - state(later)).max() < 1e-9
+
+
+def test_sgp4_is_that_of_heyoka() -> None:
+    angles = [math.radians(x) for x in (34.2682, 348.7242, 331.7664, 19.3264)]
+    row = [10.82419157 * 2 * math.pi / 1440, 0.1859667, *angles, 0.28098e-4, 2451722.5, 0.78495062]
+    propagator = hy.model.sgp4_propagator(np.array(row)[:, None])
+    expected = propagator(np.array([360.0])).ravel()[:6]
+    date = "2000-06-28T00:50:19.733568 UTC"
+    frame = given([float(x) for x in expected], "TEME")
+    found = state(start({"tle": LINES}, time={"epoch": date}))
+    assert np.abs(found - state(start(frame, time={"epoch": date}))).max() < 1e-7
+
+
+@pytest.mark.parametrize(
+    ("values", "frame", "metres"),
+    [
+        (TEME, "TEME", 0.03),  # 0.4 mas: the published pole is a day's own
+        (ITRF, "ITRF", 0.4),  # and its UT1 that of the day's beginning, 0.5 ms from the moment's
+        (GCRF, "J2000", 1e-6),
+    ],
+)
+def test_one_state_is_the_same_in_every_frame(values: list[float], frame: str, metres: float) -> None:
+    apart = np.abs(state(start(given(values, frame), time={"epoch": DATE})) - GCRF) * 1e3
+    assert apart[:3].max() < metres
+    assert apart[3:].max() < max(metres * 1e-3, 1e-4)  # m/s
+
+
+def test_a_point_at_rest_on_the_ground_moves_as_its_place_does() -> None:
+    place = {"position": ["6378 km", "100 km", "2000 km"], "frame": "ITRF"}
+    first, last = (state(start(place, time={"epoch": f"2020-03-01T12:00:{s:02} UTC"})) for s in (0, 2))
+    middle = state(start(place, time={"epoch": "2020-03-01T12:00:01 UTC"}))
+    moved = (last[:3] - first[:3]) / 2
+    assert np.abs(moved - middle[3:]).max() < 3e-8  # km/s: what precession is worth, 3e-12 rad/s of 6700 km
+
+
+def test_ecliptic_axes_are_turned_about_the_equinox() -> None:
+    frame = given(GCRF, "GCRF")
+    found = state(start(frame, time={"epoch": DATE}, frame={"axes": "ecliptic J2000"}))
+    tilt = math.radians(84381.406 / 3600)
+    x, y, z = GCRF[:3]
+    expected = [x, y * math.cos(tilt) + z * math.sin(tilt), z * math.cos(tilt) - y * math.sin(tilt)]
+    assert found[:3] == pytest.approx(expected, rel=1e-14)
+
+
+def test_given_digits_are_kept_where_axes_stay() -> None:
+    initial = {"position": ["7000.1 km", 0, 0], "velocity": [0, "7.5 km/s", 0], "frame": "GCRF"}
+    scene = start(initial, time={"epoch": DATE}, integrator={"precision": "quadruple"})
+    assert scene.position is not None
+    assert scene.position[0] == scene.context.mpf("7000100")
+
+
+@pytest.mark.parametrize("frame", ["TEME", "ITRF"])
+def test_frames_are_those_of_astropy(frame: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its TEME is of its own making; its tables of the Earth's orientation are a package of their own."""
+    coordinates = pytest.importorskip("astropy.coordinates")
+    from astropy import units
+    from astropy.time import Time
+    from astropy.utils import iers
+
+    monkeypatch.setattr(iers.conf, "auto_download", False)
+    numbers = {"TEME": TEME, "ITRF": ITRF}[frame]
+    when = Time(DATE.removesuffix(" UTC"), scale="utc")
+    speed = coordinates.CartesianDifferential(numbers[3:] * units.km / units.s)
+    state = coordinates.CartesianRepresentation(numbers[:3] * units.km, differentials=speed)
+    of = {"TEME": coordinates.TEME, "ITRF": coordinates.ITRS}[frame]
+    found = of(state, obstime=when).transform_to(coordinates.GCRS(obstime=when)).cartesian
+    scene = start(given(numbers, frame), time={"epoch": DATE})
+    place, moving = (np.array([float(x) for x in v]) for v in (scene.position, scene.velocity))
+    # its TEME counts no offsets of the pole; its velocities in ITRF are differences over a second
+    assert np.abs(place - found.xyz.to_value("m")).max() < {"TEME": 0.05, "ITRF": 0.5}[frame]
+    assert np.abs(moving - found.differentials["s"].d_xyz.to_value("m/s")).max() < 1e-3
+
+
+DECAYING = [  # of the same test cases: down within the hour
+    "1 28872U 05037B   05333.02012661  .25992681  00000-0  24476-3 0  1534",
+    "2 28872  96.4736 157.9986 0303955 244.0492 110.6523 16.46015938 10708",
+]
+
+
+@pytest.mark.parametrize(
+    ("initial", "others", "texts"),
+    [
+        ({"tle": LINES, "position": [1, 0, 0]}, {}, ["position", "given beside tle"]),
+        ({"tle": LINES, "frame": "TEME"}, {}, ["frame", "given beside tle"]),
+        ({"tle": LINES}, {"loads": []}, ["tle", "nothing attracts", "central_gravity"]),
+        (
+            {"tle": LINES},
+            {"loads": [EARTH | {"gravitational_parameter": "4.28e13 m^3/s^2"}]},
+            ["tle", "is about the Earth", "4.28e+13"],
+        ),
+        ({"tle": LINES}, {"loads": [EARTH | {"position": [1, 0, 0]}]}, ["another position"]),
+        ({"tle": LINES}, {"time": {"epoch": "2001-06-27 UTC"}}, ["days from the start", "up to 30", *LINES]),
+        (
+            {"tle": DECAYING},
+            {"time": {"epoch": "2005-11-29T01:28:59 UTC"}},
+            ["finds no orbit", "decayed"],
+        ),
+        (  # when SGP4 says nothing of it any more
+            {"tle": DECAYING},
+            {"time": {"epoch": "2005-11-29T06:28:59 UTC"}},
+            ["finds no orbit", "decayed"],
+        ),
+        (given(ITRF, "ITRF"), {}, ["[time] epoch", "missing", "ITRF"]),
+        (given(ITRF, "ITRF"), {"time": {"epoch": "2060-01-01 TT"}}, ["outside what is known", "1973-01-02"]),
+        ({"frame": "GCRF"}, {"time": {"epoch": DATE}}, ["frame", "without position or velocity"]),
+    ],
+)
+def test_what_can_not_be_is_refused(initial: Any, others: Any, texts: list[str]) -> None:
+    with pytest.raises(ConfigError) as refused:
+        start(initial, **others)
+    for text in texts:
+        assert text in str(refused.value)
