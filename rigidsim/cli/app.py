@@ -124,7 +124,7 @@ def _program(
 
 @_command("configs")
 def new(scene: options.SceneArgument = None, name: options.NameArgument = None) -> None:
-    """Write a commented config to start from; alone, list the scenes there are.
+    """Write a ready scene to start from, with the tables it reads; alone, list those there are by subject.
 
     An existing file is never replaced.
 
@@ -154,8 +154,9 @@ def run(
     member: options.MemberOption = None,
     force: Annotated[bool, typer.Option("--force", help="Replace a run of the same name.")] = False,
     as_json: options.JsonOption = False,
+    verbose: options.VerboseOption = False,
 ) -> None:
-    """Integrate, write the run folder, print a summary of invariants and cost.
+    """Integrate, write the run folder, print how the run came out and what it cost.
 
     Example: rigidsim run configs/intermediate_axis.toml --set time.end=100
     """
@@ -187,6 +188,7 @@ def resume(
     overrides: options.GuardOption = None,
     workers: options.ResumeWorkersOption = 1,
     as_json: options.JsonOption = False,
+    verbose: options.VerboseOption = False,
 ) -> None:
     """Go on with an interrupted, killed or guarded run; the result is bit for bit the uninterrupted one.
 
@@ -211,11 +213,34 @@ def plan(
     config: options.ConfigPath,
     overrides: options.SetOption = None,
     out: options.OutOption = Path("runs"),
+    physics: options.PhysicsOption = None,
+    write: options.WriteOption = None,
+    force: options.ReplaceOption = False,
     as_json: options.JsonOption = False,
 ) -> None:
     """Explain what would be integrated and why; predict steps, time, memory and file sizes.
 
+    With --physics run the scene without each of its effects, print what each is worth, and name the least
+    model within an error. Give the command again to go on after an interruption.
+
     Example: rigidsim plan configs/heavy_top_nutating.toml
+    """
+
+
+@_command("compare")
+def compare(
+    config: options.ConfigPath,
+    file: options.TrajectoryPath,
+    overrides: options.SetOption = None,
+    within: options.WithinOption = 1e-9,
+    out: options.ComparisonOption = None,
+    figure: options.ComparedFigureOption = None,
+    as_json: options.JsonOption = False,
+) -> None:
+    """Judge another tool's trajectory: its convention, its error along time, and whether its model or its
+    integration differs.
+
+    Example: rigidsim compare configs/intermediate_axis.toml theirs.csv --figure theirs.png
     """
 
 
@@ -231,18 +256,10 @@ def info(run_path: options.RunPath, as_json: options.JsonOption = False) -> None
 def view(
     run_paths: options.RunPaths,
     web: Annotated[bool, typer.Option("--web", help="In the browser, served on loopback only.")] = False,
-    png: Annotated[
-        Path | None, typer.Option("--png", metavar="FILE", help="Draw a picture, without a display.")
-    ] = None,
-    gif: Annotated[
-        Path | None, typer.Option("--gif", metavar="FILE", help="Draw a film, without a display.")
-    ] = None,
-    mp4: Annotated[
-        Path | None, typer.Option("--mp4", metavar="FILE", help="The same; needs rigidsim\\[film].")
-    ] = None,
-    seconds: Annotated[
-        float | None, typer.Option("--seconds", min=0.5, max=120.0, help="That a film lasts; default 6.")
-    ] = None,
+    png: options.PictureOption = None,
+    gif: options.FilmOption = None,
+    mp4: options.VideoOption = None,
+    seconds: options.FilmLengthOption = None,
     member: Annotated[
         list[int] | None,
         typer.Option("--member", metavar="N", min=0, help="Of a sweep: member N, from 0; repeatable."),
@@ -274,15 +291,9 @@ def tradeoff(
     config: options.ConfigPath,
     overrides: options.SetOption = None,
     out: options.OutOption = Path("runs"),
-    budget: Annotated[
-        float, typer.Option("--budget", metavar="SECONDS", help="Time that it may take, roughly.")
-    ] = 90.0,
-    repeats: Annotated[
-        int, typer.Option("--repeats", metavar="N", help="Fresh processes in which speeds are taken.")
-    ] = 3,
-    full: Annotated[
-        bool, typer.Option("--full", help="Every tolerance in every formulation; needs a larger budget.")
-    ] = False,
+    budget: options.BudgetOption = 90.0,
+    repeats: options.RepeatsOption = 3,
+    full: options.FullOption = False,
     force: Annotated[bool, typer.Option("--force", help="Replace an earlier measurement.")] = False,
     as_json: options.JsonOption = False,
 ) -> None:
@@ -304,11 +315,10 @@ def export(
     angle_unit: options.AngleUnitOption = None,
     epoch: options.EpochOption = None,
     axes: options.AxesOption = None,
-    object_name: Annotated[
-        str | None, typer.Option("--object-name", metavar="NAME", help="For aem and oem.")
-    ] = None,
+    object_name: options.ObjectNameOption = None,
+    object_id: options.ObjectIdOption = None,
 ) -> None:
-    """Write a run for other tools: tables with every digit, or CCSDS attitude and orbit messages.
+    """Write a run for other tools: tables with every digit, CCSDS messages, or kernels of SPICE.
 
     Of a sweep csv and parquet hold a row per member, and zarr its dataset.
 

@@ -12,7 +12,7 @@ from rigidsim.scene.bodies.shapes import SHAPES
 from rigidsim.scene.choices import METHODS
 from rigidsim.scene.fields import EULER_SEQUENCES
 from rigidsim.scene.schema import Config
-from rigidsim.workflows.templates import described
+from rigidsim.workflows.ready_scenes import ALIASES, described
 
 _NAMES: dict[str, Iterable[str]] = {
     "body.preset": PRESETS,
@@ -23,8 +23,10 @@ _NAMES: dict[str, Iterable[str]] = {
 
 
 def scenes(incomplete: str) -> list[tuple[str, str]]:
-    """Templates of ``rigidsim new`` with their descriptions."""
-    return [(name, text) for name, text in described().items() if name.startswith(incomplete)]
+    """Scenes of ``rigidsim new`` and their other names, with descriptions."""
+    told = described()
+    known = {**told, **{alias: told[name] for alias, name in ALIASES.items()}}
+    return [(name, text) for name, text in known.items() if name.startswith(incomplete)]
 
 
 def runs(incomplete: str) -> list[str]:

@@ -42,12 +42,28 @@ SetOption = Annotated[
         autocompletion=offered("settings"),
     ),
 ]
+PhysicsOption = Annotated[
+    str | None, _option("--physics", "ERROR", 'Find the least model within an angle, as "0.1 arcsec".')
+]
+WriteOption = Annotated[Path | None, _option("--write", "FILE", "With --physics: its config.")]
+ReplaceOption = Annotated[
+    bool, typer.Option("--force", help="With --physics: replace earlier runs and the file.")
+]
 OutOption = Annotated[Path, _option("--out", "DIR", "Folder of the run folders.")]
+VerboseOption = Annotated[
+    bool,
+    typer.Option(
+        "--verbose", "-v", help="Print the whole summary, with invariants, start, and cost by phase."
+    ),
+]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON for machines.")]
 SceneArgument = Annotated[
     str | None,
     typer.Argument(
-        metavar="[SCENE]", help="Which kind of scene.", autocompletion=offered("scenes"), show_default=False
+        metavar="[SCENE]",
+        help="Its name, or another that it is known by.",
+        autocompletion=offered("scenes"),
+        show_default=False,
     ),
 ]
 NameArgument = Annotated[
@@ -88,6 +104,27 @@ ResumeWorkersOption = Annotated[
     int, _option("--workers", "N", "Of a sweep: processes that run members.", min=1)
 ]
 MembersOption = Annotated[int, _option("--members", "N", "Of a sweep: how many members, drawn at random.")]
+PictureOption = Annotated[Path | None, _option("--png", "FILE", "Draw a picture, without a display.")]
+FilmOption = Annotated[Path | None, _option("--gif", "FILE", "Draw a film, without a display.")]
+FilmLengthOption = Annotated[
+    float | None, typer.Option("--seconds", min=0.5, max=120.0, help="That a film lasts; default 6.")
+]
+VideoOption = Annotated[Path | None, _option("--mp4", "FILE", "The same; needs rigidsim\\[film].")]
+BudgetOption = Annotated[float, _option("--budget", "SECONDS", "Time that it may take, roughly.")]
+RepeatsOption = Annotated[int, _option("--repeats", "N", "Fresh processes in which speeds are taken.")]
+FullOption = Annotated[
+    bool, typer.Option("--full", help="Every tolerance in every formulation; needs a larger budget.")
+]
+TrajectoryPath = Annotated[
+    Path, typer.Argument(metavar="FILE", help="CSV, Parquet, netCDF or AEM, or the folder of a run.")
+]
+WithinOption = Annotated[
+    float, _option("--within", "RAD", "Largest angle between attitudes that agree, in rad.")
+]
+ComparisonOption = Annotated[
+    Path | None, _option("--out", "FILE", "Dataset of what was found along time, such as comparison.h5.")
+]
+ComparedFigureOption = Annotated[Path | None, _option("--figure", "FILE", "Figure, a .png or a .svg.")]
 RunPaths = Annotated[
     list[Path],
     typer.Argument(
@@ -108,6 +145,12 @@ FigureOption = Annotated[
     ),
 ]
 FormatOption = Annotated[str, _option("--format", "FORMAT", f"{', '.join(FORMATS[:-1])} or {FORMATS[-1]}.")]
+ObjectNameOption = Annotated[
+    str | None, _option("--object-name", "NAME", "For aem and oem; the frame's name for ck and pck.")
+]
+ObjectIdOption = Annotated[
+    str | None, _option("--object-id", "ID", "For aem and oem; for ck and pck NAIF's, 301 or moon.")
+]
 AngleUnitOption = Annotated[
     str | None,
     _option(
@@ -121,7 +164,7 @@ EpochOption = Annotated[
     _option(
         "--epoch",
         "TIME",
-        "What time 0 is, where the config doesn't say, for aem, oem and the dates of csv: "
+        "What time 0 is, where the config doesn't say, for aem, oem, ck, pck and the dates of csv: "
         '"2029-04-13T21:46:00 TDB".',
     ),
 ]
@@ -130,7 +173,7 @@ AxesOption = Annotated[
     _option(
         "--axes",
         "NAME",
-        "For aem and oem: what the space axes are, where the config doesn't say: ICRF, EME2000, ...",
+        "For aem, oem, ck, pck: what the space axes are, where the config doesn't say: ICRF, EME2000, ...",
         "--frame",
     ),
 ]

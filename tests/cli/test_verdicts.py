@@ -13,6 +13,7 @@ from rigidsim.store.summary_parts import Advice, AdviceCode
 
 LONG = "end = 12000\nsamples = 101"
 ESTIMATED = ("--set", "output.estimate=true")
+DETAILS = "rigidsim info runs/free   (invariants, start, cost by phase)"
 
 
 @pytest.fixture
@@ -43,13 +44,32 @@ def test_a_long_run_is_told_what_would_do_better(screen: Callable[..., list[str]
     told = "\n".join(lines)
     assert "hold_invariants = true would bring" in told
     assert 'method = "closed_form" is right to' in told
-    assert said(lines, "next") == ["rigidsim view runs/free", "rigidsim plot runs/free"]
+    assert said(lines, "next") == ["rigidsim view runs/free", "rigidsim plot runs/free", DETAILS]
     assert max(map(len, lines)) <= 80
+
+
+def test_what_can_be_relied_on_comes_first_and_all_of_it_on_eight_lines(
+    screen: Callable[..., list[str]],
+) -> None:
+    lines = screen()
+    assert lines[0].split() == ["free", "finished"]
+    assert lines[1].startswith("verdict  sound")
+    assert lines[2].startswith("attitude uncertain by about")
+    assert len(lines) <= 8
+    whole = screen("--force", "--verbose")
+    assert any(line.startswith("angular_momentum ") for line in whole)
+    assert said(whole, "CPU")
+
+
+def test_warnings_follow_the_verdict_whatever_else_is_left_out(screen: Callable[..., list[str]]) -> None:
+    lines = screen(initial="angular_velocity = [0.1, 1, 0.05]\neuler_angles = [40, 60, 30]")
+    labels = [line.split()[0] for line in lines if not line.startswith(" ")]
+    assert labels[1:3] == ["verdict", "warning"]
 
 
 def test_a_run_that_a_guard_stopped_is_resumed_next(screen: Callable[..., list[str]]) -> None:
     lines = screen("--set", "limits.max_steps=1")
-    assert said(lines, "next") == ["rigidsim resume runs/free"]
+    assert said(lines, "next") == ["rigidsim resume runs/free", DETAILS]
     assert not any(line.startswith("advice") for line in lines)
 
 
@@ -79,7 +99,7 @@ def degrees(config: Config) -> str:
 
 
 def test_run_and_info_and_plan_say_it(degrees: str, rigidsim_command: Command) -> None:
-    ran = rigidsim_command("run", degrees)
+    ran = rigidsim_command("run", degrees, "--verbose")
     assert "rigidsim: warning: free.toml: [initial] euler_angles: given 40, 60, 30" in ran.stderr
     info = rigidsim_command("info", "runs/free")
     plan = rigidsim_command("plan", degrees)

@@ -6,26 +6,38 @@ from pathlib import Path
 import rigidsim.workflows.check as validation
 import rigidsim.workflows.plan as planning
 import rigidsim.workflows.tradeoff as measuring
-from rigidsim.cli.screens.page import Page, answer, print_json
+from rigidsim.cli.screens.page import Page, Styled, answer, print_json
+from rigidsim.cli.screens.physics import print_physics
 from rigidsim.cli.screens.plan import print_plan, print_tradeoff
 from rigidsim.cli.screens.summary import print_checked
 from rigidsim.cli.screens.sweeps import print_sweep_plan
+from rigidsim.errors import ConfigError, Problem
 from rigidsim.scene.editor_schema import editor_schema
 from rigidsim.scene.sweeps.sweep import Sweep
+from rigidsim.workflows.physics.required import required_physics
 from rigidsim.workflows.read import load
+from rigidsim.workflows.ready_scenes import by_subject, write_new
 from rigidsim.workflows.sweeps.plan import plan_sweep
-from rigidsim.workflows.templates import described, write_new
 
 
 def new(scene: str | None, name: str | None) -> None:
-    """Write a template, or list them."""
+    """Write a ready scene, or list them by subject."""
     if scene is None:
         on = Page()
-        on.table(["scene", "what it is"], described().items())
-        on.say("rigidsim new SCENE [NAME] writes NAME.toml")
+        rows: list[tuple[Styled, Styled]] = []
+        for subject, scenes in by_subject():
+            rows += [("", ""), ("", (subject, "bold")), *scenes.items()]
+        on.table(["scene", "what it is"], rows[1:])
+        on.say("rigidsim new SCENE [NAME] writes NAME.toml, and beside it the tables that it reads")
         return
-    path = write_new(scene, name)
-    print(f"{path}: edit it, then: rigidsim check {path}; rigidsim run {path}")
+    path, *beside = write_new(scene, name)
+    for other in beside:
+        print(f"{other}: read by {path}")
+    print(f"{path}: edit it, then: rigidsim check {path}; rigidsim {_verb_of(path)} {path}")
+
+
+def _verb_of(path: Path) -> str:
+    return "sweep" if load(path).config.sweep is not None else "run"
 
 
 def check(configs: list[Path], overrides: list[str] | None, as_json: bool) -> int:
@@ -38,9 +50,23 @@ def check(configs: list[Path], overrides: list[str] | None, as_json: bool) -> in
     return 0 if valid else 2
 
 
-def plan(config: Path, overrides: list[str] | None, out: Path, as_json: bool) -> None:
-    """Say what would be integrated, of a sweep what one member of it would."""
+def plan(
+    config: Path, overrides: list[str] | None, out: Path, physics: str | None, write: Path | None,
+    force: bool, as_json: bool,
+) -> None:  # fmt: skip
+    """Say what would be integrated, of a sweep what one member of it would; or what the scene requires."""
     experiment = load(config, overrides=overrides or [])
+    if physics is not None:
+
+        def told(text: str) -> None:
+            print(f"{experiment.config.name}: {text}", file=sys.stderr, flush=True)
+
+        found = required_physics(experiment, physics, out=out, write=write, force=force, told=told)
+        answer(as_json, found.as_dict(), print_physics, found)
+        return
+    if write is not None or force:
+        what = 'given without --physics; add --physics ERROR, such as --physics "0.1 arcsec"'
+        raise ConfigError(Problem("--write" if write is not None else "--force", what))
     swept = None if experiment.config.sweep is None else plan_sweep(Sweep.of(experiment))
     made = planning.plan(experiment, out=out) if swept is None else swept.member
     if as_json:

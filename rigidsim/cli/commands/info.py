@@ -1,11 +1,18 @@
 """``rigidsim info``: the summary of a run or a sweep."""
 
 from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
 
 from rigidsim.cli.screens.page import Page, print_json
 from rigidsim.cli.screens.summary import print_summary
+from rigidsim.cli.screens.words import arcsec_text
 from rigidsim.store.run import open_run
 from rigidsim.store.sweeps.folder import is_sweep
+
+if TYPE_CHECKING:
+    import xarray
 
 
 def info(run_path: Path, as_json: bool) -> None:
@@ -28,3 +35,11 @@ def info(run_path: Path, as_json: bool) -> None:
     with opened.dataset as dataset:
         names = ", ".join(map(str, dataset.data_vars))
         on.say(f"dataset  {dataset.sizes['time']:,} samples of {names}")
+        if "published_angle" in dataset:
+            on.line("published", _published(dataset))
+
+
+def _published(dataset: "xarray.Dataset") -> str:
+    angle = np.rad2deg(dataset["published_angle"]) * 3600
+    kernel, most, mean = dataset.attrs["orientation_kernel"], float(angle.max()), float(angle.mean())
+    return f"at most {arcsec_text(most)} from the attitude in {kernel}, {arcsec_text(mean)} on average"

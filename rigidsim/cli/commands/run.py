@@ -4,7 +4,7 @@ import sys
 from pathlib import Path
 
 import rigidsim.workflows.run as workflow
-from rigidsim.cli.screens.summary import print_run
+from rigidsim.cli.screens.closing import print_run
 from rigidsim.errors import RigidsimError
 from rigidsim.scene.scene import build_scene
 from rigidsim.session import progress
@@ -14,7 +14,7 @@ from rigidsim.workflows.read import embedded, load
 
 def run(
     configs: list[Path] | None, dataset: Path | None, out: Path, overrides: list[str] | None,
-    scan: list[str] | None, member: int | None, force: bool, as_json: bool,
+    scan: list[str] | None, member: int | None, force: bool, as_json: bool, verbose: bool,
 ) -> int:  # fmt: skip
     """Read every config before any of them is run; the exit code is that of the first that didn't finish."""
     experiments = [load(path, overrides=overrides or []) for path in configs or []]
@@ -41,7 +41,7 @@ def run(
             print(f"rigidsim: warning: {experiment.source}: {caution.text}", file=sys.stderr)
         with progress.observer() as observer:
             result = workflow.run(experiment, out=out, force=force, observer=observer)
-        code = print_run(result, as_json)
+        code = print_run(result, as_json, verbose=verbose)
         worst = worst or code
         if code == 130:
             break

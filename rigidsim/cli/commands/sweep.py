@@ -6,8 +6,9 @@ from pathlib import Path
 import rigidsim.workflows.resume as resuming
 import rigidsim.workflows.sweeps.sweep as workflow
 import rigidsim.workflows.verify as verifying
+from rigidsim.cli.screens.closing import print_run
 from rigidsim.cli.screens.page import answer
-from rigidsim.cli.screens.summary import print_run, print_verdict
+from rigidsim.cli.screens.summary import print_verdict
 from rigidsim.cli.screens.sweeps import SweepProgress, print_sweep
 from rigidsim.errors import RigidsimError
 from rigidsim.scene.config import Experiment
@@ -50,13 +51,13 @@ def run_scanned(
 
 
 def resume(
-    run_path: Path, until: str | None, overrides: list[str] | None, workers: int, as_json: bool
+    run_path: Path, until: str | None, overrides: list[str] | None, workers: int, as_json: bool, verbose: bool
 ) -> int:
     """Go on with a run or a sweep."""
     if not is_sweep(run_path):
         with progress.observer() as observer:
             run = resuming.resume(run_path, until=until, overrides=overrides or [], observer=observer)
-        return print_run(run, as_json)
+        return print_run(run, as_json, verbose=verbose)
     if until is not None or overrides:
         raise RigidsimError(
             "resume: --until and --set are for single runs; change the config of a sweep and give rigidsim "

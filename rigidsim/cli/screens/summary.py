@@ -1,4 +1,4 @@
-"""Output of ``rigidsim run``, ``info``, ``check`` and ``verify``."""
+"""Output of ``rigidsim info``, ``check``, ``verify`` and ``run --verbose``."""
 
 from __future__ import annotations
 
@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
 
-from rigidsim.cli.screens.page import Page, Styled, answer
+from rigidsim.cli.screens.outcome import event_text, print_errors, print_modelling, undefined_text
+from rigidsim.cli.screens.page import Page, Styled
 from rigidsim.cli.screens.words import (
     advice_line,
     body_text,
@@ -21,10 +22,9 @@ from rigidsim.cli.screens.words import (
 )
 from rigidsim.errors import ConfigError
 from rigidsim.scene.choices import method_named, variables_named
-from rigidsim.scene.readable import YEAR, TimeWords, span_text
-from rigidsim.store.run import Run
+from rigidsim.scene.readable import span_text
 from rigidsim.store.summary import Brief, Summary
-from rigidsim.store.summary_parts import ENGINE, Accuracy, InvariantDrift, Modelling, TableErrors
+from rigidsim.store.summary_parts import ENGINE, InvariantDrift, TableErrors
 
 if TYPE_CHECKING:
     from rigidsim.workflows.check import Checked
@@ -52,7 +52,7 @@ def _drift(value: float | None) -> str:
 
 
 def print_summary(summary: Brief, folder: str, out: Console | None = None, *, loads: bool = False) -> None:
-    """Print the table at the end of ``run`` and ``info``, with ``loads`` what acts on the body, too."""
+    """Print the whole summary, as ``info`` and ``run --verbose`` do; with ``loads`` what acts, too."""
     on = Page(out)
     color = "green" if summary.status == "finished" else "yellow"
     on.say((summary.name, "bold"), "  ", (summary.status, f"bold {color}"))
@@ -65,15 +65,6 @@ def print_summary(summary: Brief, folder: str, out: Console | None = None, *, lo
     on.line("folder", folder)
     for number, command in enumerate(next_lines(summary.status, summary.exit_code, folder)):
         on.line("" if number else "next", command, "cyan")
-
-
-def print_run(result: Run, as_json: bool) -> int:
-    """Print a run's summary; returns its exit code."""
-    answer(as_json, result.summary, print_summary, result.outcome, result.place)
-    code = result.outcome.exit_code
-    if code:
-        print(f"rigidsim: {result.outcome.message}", file=sys.stderr)
-    return code
 
 
 def print_understood(told: Checked | RunPlan | Summary, loads: Sequence[str], on: Page) -> None:
@@ -93,6 +84,16 @@ def from_step(step: int | None) -> str:
     return "" if step is None else f" from step {step:,} on"
 
 
+def _shortened(states: Sequence[str]) -> list[str]:
+    """Names of states, of those that place a kernel's bodies only the first and the last."""
+    placing = [name for name in states if name.startswith("kernel_")]
+    if len(placing) < 3:
+        return list(states)
+    first = states.index(placing[0])
+    rest = [name for name in states[first:] if name not in placing]
+    return [*states[:first], placing[0], "...", placing[-1], *rest]
+
+
 def _print_ended(summary: Summary, loads: Sequence[str], on: Page) -> None:
     print_understood(summary, loads, on)
     how = f"tolerance {summary.tolerance:.3g}"
@@ -103,7 +104,7 @@ def _print_ended(summary: Summary, loads: Sequence[str], on: Page) -> None:
         how += ", invariants projected" + from_step(summary.hold_from_step)
     on.line(
         "model",
-        f"{summary.formulation}, {len(summary.states)} states ({' '.join(summary.states)}), "
+        f"{summary.formulation}, {len(summary.states)} states ({' '.join(_shortened(summary.states))}), "
         f"{summary.precision} precision, {how}",
     )
     if caveat := variables_named(summary.formulation).caveat:
@@ -123,16 +124,14 @@ def _print_ended(summary: Summary, loads: Sequence[str], on: Page) -> None:
     on.line("drifts", "relative to: " + _scales(summary.invariants))
     if summary.held:
         on.line("held", "put back: what the drift would have been; held drifts are no independent check")
-    _print_accuracy(summary.accuracy, on, "attitude" if summary.modelling is None else "axis")
-    _print_modelling(summary.modelling, on)
+    print_errors(summary.accuracy, on, "attitude" if summary.modelling is None else "axis")
+    print_modelling(summary.modelling, on)
     for number, (name, found) in enumerate(summary.tables.items()):
         on.line("" if number else "tables", _interpolated(name, found))
     for number, name in enumerate(summary.events):
-        on.line("" if number else "events", _event(summary, name))
+        on.line("" if number else "events", event_text(summary, name))
     if summary.undefined_samples:
-        counts = summary.undefined_samples.items()
-        told = [f"{name} at {count:,} sample{'s' * (count > 1)}" for name, count in counts]
-        on.line("missing", f"{', '.join(told)}: undefined there, NaN is recorded")
+        on.line("missing", undefined_text(summary.undefined_samples))
     chaos = summary.lyapunov
     if chaos is not None:
         what = "chaotic" if chaos.chaotic else "regular"
@@ -144,23 +143,6 @@ def _print_ended(summary: Summary, loads: Sequence[str], on: Page) -> None:
     on.line("verdict", verdict, style)
     for advice in filter(None, map(advice_line, summary.advice)):
         on.line("advice", advice, "cyan")
-
-
-def _event(summary: Summary, name: str) -> str:
-    """How often an event happened, and when."""
-    count, times = summary.events[name], summary.event_times.get(name)
-    if times is None:
-        return f"{name}: {count:,}"
-    early = times.early or (times.first,)
-    if count > len(early):  # a few, and the last one
-        early = early[:3]
-    span = summary.time  # none of an older version
-    start, end = (span.start_s, span.end_s) if span else (0.0, summary.time_reached)
-    words = TimeWords.of({"epoch": span.epoch, "time_unit": span.unit} if span else {}, start, end)
-    told = [words.moment(time) for time in early]
-    if count > len(told):
-        told += ["..."] * (count > len(told) + 1) + [words.moment(times.last)]
-    return f"{name}: {count:,}, at {', '.join(told)}"
 
 
 def _print_invariants(summary: Summary, on: Page) -> None:
@@ -176,61 +158,6 @@ def _print_invariants(summary: Summary, on: Page) -> None:
     if not on.fits(columns, rows):
         columns, rows = columns[:3] + columns[4:], [row[:3] + row[4:] for row in rows]
     on.table(columns, rows)
-
-
-def _print_accuracy(accuracy: Accuracy, on: Page, what: str) -> None:
-    if accuracy.chosen:
-        on.line("chosen", f"{accuracy.chosen}: {accuracy.chosen_why}")
-    estimate = accuracy.estimated_attitude_error
-    if accuracy.certified is not None:
-        asked = "" if accuracy.requested is None else f", {accuracy.requested:.1e} asked for"
-        text = f"certified to {accuracy.certified:.1e} rad{asked} ({accuracy.how}, "
-        on.line(what, f"{text}{accuracy.times_compared} times)")
-    elif estimate is not None:
-        factor = accuracy.amplification or 1.0
-        unstable = f" ({factor:.1g} times the round-off law)" if factor > 1 else ""
-        size = f"uncertain by about {estimate:.1e} rad at the end{unstable}"
-        if what == "axis":
-            size = f"momentum's direction integrated to about {estimate:.1e} rad at the end{unstable}"
-        on.line(what, size if estimate < math.pi else "unknown at the end")
-        share = accuracy.examined_share
-        if share is not None and share < 1 and estimate < math.pi:
-            seen = f"the growth of errors was followed over the first {100 * share:.2g} % of the run"
-            on.line("examined", f"{seen} (estimated_how in the summary says more)")
-    elif accuracy.amplification is None:
-        on.line("errors", accuracy.estimated_how)
-    if accuracy.certified_position is not None:
-        length = accuracy.requested_position or math.nan
-        text = f"certified to {accuracy.certified_position:.1e} m, {length:.1e} m asked for"
-        on.line("path", text)
-        return
-    place, speed = accuracy.estimated_position_error, accuracy.estimated_velocity_error
-    if place is not None and speed is not None:
-        text = f"position uncertain by about {place:.1e} m, velocity by {speed:.1e} m/s, at the end"
-        on.line("path", text)
-
-
-def _print_modelling(found: Modelling | None, on: Page) -> None:
-    """Print how far a reduced model is from the full one."""
-    if found is None:
-        return
-    if found.momentum_axis is None:
-        on.line("averaged", f"modelling error {found.how}")
-        return
-    text = f"momentum's direction within {found.momentum_axis:.1e} rad of the full model's"
-    if found.figure_axis is not None:
-        text += f", figure axis within {found.figure_axis:.1e} rad"
-    on.line("averaged", text)
-    if found.angular_momentum_norm is not None and found.energy is not None:
-        text = f"size of the angular momentum within {found.angular_momentum_norm:.1e} of itself, energy of "
-        on.line("", text + f"rotation within {found.energy:.1e}")
-    if not found.whole and found.growth is not None and found.oscillation is not None:
-        span = found.windows[0].end - found.windows[0].start
-        text = f"{len(found.windows)} windows of {span_text(span)} with every rotation: "
-        text += f"{found.oscillation:.1e} rad in each, growing by {found.growth * YEAR:.1e} rad/yr"
-        on.line("", text)
-    if not (found.short_period or found.resonance or found.energy is not None):
-        on.line("", "[model] short_period = true adds the nutation back that averaging removed")
 
 
 def _interpolated(name: str, found: TableErrors) -> str:

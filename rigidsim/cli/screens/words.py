@@ -111,18 +111,18 @@ _STYLES = {
     Soundness.LOST: "bold yellow",
     Soundness.DRIFTED: "bold red",
 }
-_SOUND = "sound: every drift is within what rounding explains, {share} of it at most"
+_SOUND = "sound: every drift is within what rounding explains{share}"
 _WORDS = {
     Soundness.SOUND: _SOUND,
     Soundness.AMPLIFIED: _SOUND + "; the motion itself amplifies errors",
-    Soundness.HELD: "sound: what was put back is within what rounding explains, {share} of it at most; "
+    Soundness.HELD: "sound: what was put back is within what rounding explains{share}; "
     "drifts themselves are projected away",
     Soundness.LIMITED: "sound except for what the warning tells: every drift is within what rounding "
-    "explains, {share} of it at most",
+    "explains{share}",
     Soundness.UNCHECKED: "unchecked: nothing is conserved here that could be watched",
     Soundness.INACCURATE: "not accurate enough, or not known to be: see the warning; drifts are within what "
-    "rounding explains, {share} of it at most",
-    Soundness.LOST: "drifts are within what rounding explains, {share} of it at most, but digits are gone at "
+    "rounding explains{share}",
+    Soundness.LOST: "drifts are within what rounding explains{share}, but digits are gone at "
     "the end: see the warning",
     Soundness.DRIFTED: "not sound: {worst} drifted by {times} times what rounding explains; see the warning",
 }
@@ -136,13 +136,14 @@ _ADVICE = {
 }
 
 
-def verdict_line(summary: Summary) -> tuple[str, str]:
-    """The verdict, and its style on a terminal."""
+def verdict_line(summary: Summary, *, brief: bool = False) -> tuple[str, str]:
+    """The verdict, and its style on a terminal; unless ``brief``, with the largest share of its bound."""
     found = verdict_on(summary)
     words, share = _WORDS[found.soundness], found.share or 0.0
     if found.soundness is Soundness.DRIFTED and not share > 1:  # what drifted has no finite size
         words = "not sound: see the warning"
-    told = words.format(share=_percent(share), worst=found.worst, times=f"{share:.2g}")
+    most = "" if brief else f", {_percent(share)} of it at most"
+    told = words.format(share=most, worst=found.worst, times=f"{share:.2g}")
     model = summary.modelling
     if found.soundness is not Soundness.INACCURATE and model is not None and model.momentum_axis is None:
         told += "; how far the averaged model is from the full one isn't known"
@@ -162,6 +163,11 @@ def advice_line(advice: Advice) -> str | None:
     times = f"{1 / advice.share:.2g}" if advice.share else "1"
     then = f"{advice.then:.1e}" if advice.level else f"{advice.then:.0e}"
     return text.format(code=advice.code, now=f"{advice.now:.1e}", then=then, level=advice.level, times=times)
+
+
+def arcsec_text(angle: float) -> str:
+    """An angle that is known in arcseconds; from a degree on in degrees."""
+    return f"{angle / 3600:.4g}°" if angle >= 3600 else f"{angle:.4g}″"
 
 
 def next_lines(status: str, exit_code: int, place: str) -> list[str]:
