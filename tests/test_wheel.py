@@ -1,4 +1,4 @@
-"""What is packed is whole: a wheel and an sdist run outside the clone, with templates, presets and types."""
+"""What is packed is whole: wheel and sdist run outside the clone, with ready scenes, presets and types."""
 
 from __future__ import annotations
 
@@ -13,7 +13,16 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[1]
-PACKED = ("rigidsim", "pyproject.toml", "README.md", "LICENSE", "CHANGELOG.md")
+PACKED = (
+    "rigidsim",
+    "configs",
+    "setup.py",
+    "MANIFEST.in",
+    "pyproject.toml",
+    "README.md",
+    "LICENSE",
+    "CHANGELOG.md",
+)
 
 
 def call(*command: str, **options: object) -> subprocess.CompletedProcess[str]:
@@ -59,6 +68,9 @@ def test_a_wheel_holds_all_that_is_tracked(wheel: Path) -> None:
     with zipfile.ZipFile(wheel) as archive:
         packed = set(archive.namelist())
     assert {name for name in tracked if name not in packed} == set()
+    ready = call("git", "ls-files", "--", "configs", cwd=ROOT).stdout.split()
+    assert {name for name in ready if f"rigidsim/{name}" not in packed} == set()
+    assert not any(name.startswith("configs/") for name in packed)
     assert not any(name.startswith(("tests/", "docs/", "experiments/")) for name in packed)
 
 
@@ -77,13 +89,16 @@ def test_it_runs_outside_the_clone(wheel: Path, tmp_path: Path) -> None:
     where = "import rigidsim; print(rigidsim.__file__)"
     found = call(sys.executable, "-c", where, cwd=work, env=environment).stdout
     assert Path(found.strip()).is_relative_to(place)
-    listed = rigidsim("new").splitlines()
-    scenes = [line.split()[0] for line in listed[2:-1]]
-    assert len(scenes) >= 11
-    rigidsim("new", scenes[0])
-    rest = "import sys; from rigidsim.workflows.templates import write_new; [*map(write_new, sys.argv[1:])]"
-    call(sys.executable, "-c", rest, *scenes[1:], cwd=work, env=environment)
-    rigidsim("check", *(f"{scene}.toml" for scene in scenes))
+    listed = rigidsim("new")
+    rest = (
+        "from rigidsim.workflows.ready_scenes import *\n"
+        "assert ready_folder().parent.name == 'rigidsim'\n"
+        "for name in [*ready_scenes(), 'cassini']: print(write_new(name)[0])"
+    )
+    scenes = call(sys.executable, "-c", rest, cwd=work, env=environment).stdout.split()
+    assert len(scenes) > 60
+    assert all(scene.removesuffix(".toml") in listed for scene in scenes)
+    rigidsim("check", *scenes)
     assert "finished" in rigidsim("run", "top.toml", "--set", "time.end=0.1")
     assert "identical" in rigidsim("verify", "runs/top")
     assert rigidsim("plot", "runs/top").strip().endswith("figure.png")

@@ -156,8 +156,11 @@ def load(path: str | Path, *, overrides: Overrides = ()) -> Experiment:
     """Read a config file together with the table files that it names; see ``parse``.
 
     Raises:
-        ConfigError: the file is missing, not text, too large, or a bad config.
+        ConfigError: no path is given, or the file is missing, not text, too large, or a bad config.
     """
+    if not isinstance(path, str | Path):
+        what = f"given {messages.shown(path)}; the path of a config is allowed (tables go to "
+        raise ConfigError(Problem("path", what + "run as they are, or to Experiment.from_dict)"))
     path = Path(path)
     if path.is_dir() and (path / "config.toml").is_file():
         what = f"is a run folder; its config is {path / 'config.toml'}"
@@ -219,6 +222,11 @@ def _text(where: str, name: str, path: Path, degree: int | None = None) -> str:
     """Text of a table, or of a gravity field to a degree."""
     kind = "CSV" if degree is None else "text"
     try:
+        if path.exists() and not path.is_file():
+            what = (
+                f'given "{name}", which is a folder or a device: {path}; a file beside the config is allowed'
+            )
+            raise ConfigError(Problem(where, what))
         with path.open(encoding="utf-8-sig") as file:
             if degree is None:
                 _refuse_size(where, name, path.stat().st_size)

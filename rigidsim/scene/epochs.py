@@ -74,6 +74,18 @@ class Epoch:
         uniform = self.uniform()
         return uniform.day + _JULIAN_DATE_OF_DAY_0 + Fraction(uniform.ticks, _DAY)
 
+    def universal_date(self) -> Fraction:
+        """The Julian date in UTC, as if its days all had 86,400 s; past the end of the table of leap seconds
+        with its last offset. ``ValueError`` before 1972.
+        """
+        days, offsets, _ = leap_seconds()
+        ticks = self._uniform() if self.scale == "UTC" else self._uniform() - int(_TT_MINUS_TAI * _SECOND)
+        begins = [day * _DAY + offset * _SECOND for day, offset in zip(days, offsets, strict=True)]
+        found = bisect_right(begins, ticks) - 1
+        if found < 0:
+            raise ValueError("UTC began in 1972")
+        return _JULIAN_DATE_OF_DAY_0 + Fraction(ticks - offsets[found] * _SECOND, _DAY)
+
     def since_j2000(self) -> Fraction:
         """Seconds of TDB since J2000 (2000-01-01T12:00:00 TDB); for TT and UTC right to some 1e-5 s."""
         elapsed = Fraction(self._uniform() - J2000._uniform(), _SECOND)

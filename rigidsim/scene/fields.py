@@ -24,8 +24,9 @@ from pydantic_core import PydanticCustomError, core_schema
 
 from rigidsim.scene.epochs import Epoch, parse_epoch
 from rigidsim.scene.exact import ExactNumber, parse_number, parse_quantity
+from rigidsim.scene.two_line_elements import TwoLineElements, parse_elements
 from rigidsim.scene.units import UnitError, time_unit
-from rigidsim.scene.validation_messages import nearest, shown
+from rigidsim.scene.validation_messages import meant, shown
 
 _NUMBER_TEXT = r"^\s*[-+]?(\d|\.\d|pi)"
 """Beginning of any text of a number; the unit after it is left to ``parse_number``."""
@@ -231,7 +232,8 @@ class OneOf:
         allowed = [*self.more, *self.names, *(name for name in own if isinstance(name, str))]
         if isinstance(value, str) and value in allowed:
             return value
-        near = nearest(value if isinstance(value, str) else shown(value), allowed)
+        word = value if isinstance(value, str) else shown(value)
+        near = meant(word, allowed)
         raise refuse(f"given {shown(value)}{near}; allowed: {', '.join(allowed)}")
 
     def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> Any:
@@ -260,6 +262,18 @@ VariableName = Annotated[
 ]
 
 
+def _number_as_name(value: Any) -> Any:
+    return str(value) if isinstance(value, int) and not isinstance(value, bool) else value
+
+
+BodyName = Annotated[
+    StrictStr,
+    BeforeValidator(_number_as_name),
+    WithJsonSchema({"anyOf": [{"type": "string"}, {"type": "integer"}]}),
+]
+"""A body of a kernel, by its name or NAIF's number, with or without quotes."""
+
+
 def _each_once(value: list[str]) -> list[str]:
     if len(set(value)) < len(value):
         raise refuse("something is named twice; name each once")
@@ -278,6 +292,12 @@ def _instant(value: Any) -> Epoch:
 
 Instant = Annotated[Epoch, reading(_instant), WithJsonSchema({"type": "string"})]
 """A date and time with its scale."""
+ElementLines = Annotated[
+    TwoLineElements,
+    reading(parse_elements),
+    WithJsonSchema({"type": "array", "items": {"type": "string"}, "minItems": 2, "maxItems": 2}),
+]
+"""Two-line elements: a list of both lines."""
 
 
 def _time_unit(value: Any) -> str:

@@ -168,7 +168,10 @@ def resolve_point_masses(
     if not tables:
         for key, given in (("host", host), ("coupling", coupling)):
             if given is not None:
-                what = f'given "{given}", but there are no [[bodies]]; add them, or remove it'
+                missing = (
+                    "are neither [[bodies]] nor an [ephemeris]" if key == "host" else "are no [[bodies]]"
+                )
+                what = f'given "{given}", but there {missing}; add them, or remove it'
                 raise ConfigError(Problem(f"[body] {key}", what))
         return None
     names = [table.name for table in tables]
@@ -188,6 +191,7 @@ def resolve_point_masses(
             what = f"given {context.nstr(mass, 6)} kg, but the gravitational parameter of its host "
             what += f'"{names[at_host]}" makes it {context.nstr(expected, 6)} kg; correct one of them'
             raise ConfigError(Problem("[body] mass", what))
+    _refuse_overlap(tables)
     places = {n: _of_kernel(n, x, context, ephemeris) for n, x in enumerate(tables) if x.ephemeris}
     for number in range(len(tables)):
         _place(number, tables, names, strengths, context, places, ())
@@ -200,6 +204,15 @@ def resolve_point_masses(
             if positions[i] == positions[j]:
                 raise _fault(i, "position", f'the same as that of "{names[j]}"; start it elsewhere')
     return PointMasses(tuple(names), strengths, tuple(positions), tuple(velocities), at_host, full)
+
+
+def _refuse_overlap(tables: Sequence[PointMassBody]) -> None:
+    """Refuse the Earth and the Moon together beside one of them."""
+    placed = {table.name: number for number, table in enumerate(tables) if table.ephemeris}
+    for name in ("earth", "moon"):
+        if name in placed and "earth_moon_barycenter" in placed:
+            what = f'given "earth_moon_barycenter", whose mass contains that of "{name}"; remove one of them'
+            raise _fault(placed["earth_moon_barycenter"], "name", what)
 
 
 def _strength(number: int, table: PointMassBody, context: Any, ephemeris: PlacesBodies | None) -> Any:

@@ -6,7 +6,7 @@ that a config, a schema or a message never needs a second list of names.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar, Protocol
 
@@ -15,6 +15,7 @@ from pydantic import Field, field_validator
 from rigidsim.errors import ConfigError, Problem
 from rigidsim.scene.arithmetic import Matrix, Vector
 from rigidsim.scene.bodies.body import RigidBody
+from rigidsim.scene.effect_parts import EffectPart
 from rigidsim.scene.epochs import Epoch
 from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.expressions.names import Names
@@ -75,7 +76,7 @@ class Surroundings:
         bodies: point masses besides the body.
         names: what expressions may read.
         table: array of tables that it stands in.
-        body: the rigid body, for what keys of ``[body]`` bring.
+        body: the rigid body.
         ephemeris: where bodies of a kernel are; None without one.
         host: the body of the kernel that this one is; empty for none.
     """
@@ -125,6 +126,7 @@ class SceneLoad:
         inner_momentum: angular momentum relative to the body at the start (mpf, body axes); None for none.
         sights: bodies of a kernel that it sees, each with the highest derivative of its place that is to be
             a state.
+        nothing: keys of its table in ``[body]`` with values that make it nothing, where a preset brings it.
     """
 
     Fields: ClassVar[type[LoadFields] | None] = None
@@ -137,6 +139,7 @@ class SceneLoad:
     apart: Matrix | None = None
     inner_momentum: Vector | None = None
     sights: tuple[tuple[Sight, int], ...] = ()
+    nothing: ClassVar[Mapping[str, Any]] = {}
 
     @classmethod
     def resolve(cls, fields: Any, around: Surroundings) -> SceneLoad:
@@ -154,6 +157,20 @@ class SceneLoad:
     def brought_by(cls, config: Any) -> bool:
         """Whether ``[body]`` of a config brings a load that is registered for one of its keys."""
         return True
+
+    @staticmethod
+    def effect_parts(fields: Any) -> Iterator[EffectPart]:
+        """Parts of what it does that a scene can be without, wider ones after what they contain.
+
+        Args:
+            fields: as for ``resolve``.
+        """
+        yield from ()
+
+    @staticmethod
+    def without_loads(config: Any, names: Collection[str]) -> Mapping[str, Any]:
+        """Keys of its table in ``[body]`` to be changed where ``[[loads]]`` of these names are left out."""
+        return {}
 
     def acts(self) -> bool:
         """False for a load that is always zero."""
@@ -203,6 +220,10 @@ class Companion(Protocol):
         Raises:
             ConfigError: the key contradicts something else.
         """
+
+    @staticmethod
+    def effect_parts(fields: Any) -> Iterator[EffectPart]:
+        """As of ``SceneLoad``; ``fields`` are those of the load that has the key."""
 
 
 class Named(Protocol):
@@ -285,6 +306,16 @@ def companions(
             if getattr(fields, key, None) is not None:
                 found.append(kind.beside_of(load, fields, replace(around, number=number)))
     return [load for load in found if load is not None]
+
+
+def names_of(fields: Any) -> list[str]:
+    """Names that a load is known by: its own, and that of the body that is its source."""
+    given = (
+        fields.name,
+        getattr(fields, "source", None),
+        getattr(getattr(fields, "orbit", None), "body", None),
+    )
+    return [name for name in given if name]
 
 
 def register_observable(observable: Named) -> None:

@@ -13,6 +13,8 @@ from functools import reduce
 from operator import add
 from typing import Any, TypeAlias
 
+import numpy as np
+
 from rigidsim.scene.arithmetic import Matrix, Vector, transpose
 
 AXES = "xyz"
@@ -69,6 +71,22 @@ def shepperd(r: Matrix) -> tuple[Vector, dict[tuple[int, int], Scalar]]:
         pairs[0, n + 1] = r[k][j] - r[j][k]
         pairs[min(n, j) + 1, max(n, j) + 1] = r[n][j] + r[j][n]
     return squares, pairs
+
+
+def quaternion_of(matrices: np.ndarray) -> np.ndarray:
+    """Quaternions (rows, 4) w x y z of rotation matrices (rows, 3, 3), continuous in sign (Shepperd 1978)."""
+    m, rest = matrices, 1 - np.trace(matrices, axis1=1, axis2=2)
+    products = np.empty((len(m), 4, 4))  # four times those of the quaternion's components
+    products[:, 1:, 1:] = m + m.transpose(0, 2, 1)
+    products[:, [1, 2, 3], [1, 2, 3]] += rest[:, None]
+    products[:, 0, 0] = 2 - rest
+    halves = np.stack([m[:, 2, 1] - m[:, 1, 2], m[:, 0, 2] - m[:, 2, 0], m[:, 1, 0] - m[:, 0, 1]], axis=1)
+    products[:, 0, 1:] = products[:, 1:, 0] = halves
+    largest = np.einsum("tii->ti", products).argmax(axis=1)
+    found = products[np.arange(len(m)), largest]
+    found /= np.linalg.norm(found, axis=1, keepdims=True)
+    flips = np.where(np.einsum("ij,ij->i", found[1:], found[:-1]) < 0, -1.0, 1.0)
+    return np.asarray(found * np.cumprod(np.append(1.0, flips))[:, None])
 
 
 def outer_angles(sequence: str, r: Matrix) -> tuple[Pair, Pair]:

@@ -2,21 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from rigidsim.errors import ConfigError, Problem
 from rigidsim.scene import schema, starts
 from rigidsim.scene.arithmetic import Matrix, Vector, context_for
 from rigidsim.scene.bodies.body import RigidBody, build_body, inverse_inertia
 from rigidsim.scene.bodies.gravity_field import asked_degree, gravity_field_of
+from rigidsim.scene.bodies.outside import surfaces_of
 from rigidsim.scene.config import Experiment
 from rigidsim.scene.epochs import Epoch
-from rigidsim.scene.exact import ExactNumber
+from rigidsim.scene.events import Event, resolve_events
 from rigidsim.scene.expressions.names import Names, names_of
-from rigidsim.scene.expressions.parser import parse_expression
-from rigidsim.scene.expressions.tree import Expression, ExpressionError, names_used, states_read
+from rigidsim.scene.expressions.tree import Expression, names_used
+from rigidsim.scene.flight_starts import flight_start
 from rigidsim.scene.frame import Figure, figure_of, reference_normal
 from rigidsim.scene.kernels.ephemeris import Ephemeris, host_of, resolve_ephemeris
 from rigidsim.scene.moving_moments import moments_at_start
@@ -26,27 +27,10 @@ from rigidsim.scene.registry import LOAD_KINDS, OF_BODY, TABLES, SceneLoad, Surr
 from rigidsim.scene.rotors import refuse_odd_rotors, turning_inertia
 from rigidsim.scene.sample_times import SampleTimes, sample_times
 
+if TYPE_CHECKING:
+    from rigidsim.scene.kernels.orientation import Orientation
+
 T = TypeVar("T")
-
-
-@dataclass(frozen=True)
-class Event:
-    """One event of a scene: its direction is any, up or down; with ``stop`` the run ends there."""
-
-    name: str
-    expression: Expression
-    direction: str
-    stop: bool
-
-    @property
-    def reads(self) -> frozenset[str]:
-        """Names that the expression uses."""
-        return names_used(self.expression)
-
-    @property
-    def states(self) -> frozenset[str]:
-        """States without which the expression has no value."""
-        return states_read(self.expression)
 
 
 @dataclass(frozen=True)
@@ -71,6 +55,7 @@ class Scene:
         figure: the body's figure axis, see ``[frame] figure_axis``.
         bodies: point masses besides the body; None if there are none.
         ephemeris: where bodies of a kernel are; None without one.
+        orientation: the published one beside which the attitude is recorded; None without one.
         host: the body of the kernel that this one is; empty for none.
         found_start: how an equilibrium was found that it starts from; None for any other start.
         reference: unit normal (space axes) of the plane that obliquity and longitudes count from; None for
@@ -106,6 +91,7 @@ class Scene:
     states: tuple[OwnState, ...] = ()
     ephemeris: Ephemeris | None = None
     host: str = ""
+    orientation: Orientation | None = None
 
     @property
     def free_flight(self) -> bool:
@@ -200,7 +186,7 @@ def build_scene(experiment: Experiment, context: Any = None) -> Scene:
             if position is not None or off_center:
                 raise _fail("body", "mass", "missing; uniform_gravity needs it")
         loads = tuple(load for load in resolved if load.acts() and load.uniform_field is None)
-        events = _resolve_events(config.events, config.parameters, names)
+        events = resolve_events(config.events, config.parameters, names)
         states = resolve_states(config.states, config.parameters, names, context)
         readers = [(load.described, formula) for load in loads for _, formula in load.formulas()]
         readers += [(f"event {event.name}", event.expression) for event in events]
@@ -208,6 +194,8 @@ def build_scene(experiment: Experiment, context: Any = None) -> Scene:
         formulas = [formula for _, formula in readers] + [state.derivative for state in carried]
         read = frozenset[str]().union(*map(names_used, formulas))
         loads = tuple(load for load in resolved if _is_among(load, loads) or load.read_by(read))
+        all_axes, date = named or _first(resolved, "axes"), config.time.epoch or _first(resolved, "epoch")
+        published = config.output, table.host, all_axes, date, (start, end), experiment.source
         scene = Scene(
             name=config.name,
             description=config.description,
@@ -226,8 +214,8 @@ def build_scene(experiment: Experiment, context: Any = None) -> Scene:
             start=start,
             end=end,
             samples=samples,
-            axes=named or _first(resolved, "axes"),
-            epoch=config.time.epoch or _first(resolved, "epoch"),
+            axes=all_axes,
+            epoch=date,
             figure=figure_of(config.frame, body, context),
             reference=reference_normal(config.frame, context),
             config=config,
@@ -237,15 +225,26 @@ def build_scene(experiment: Experiment, context: Any = None) -> Scene:
             states=carried,
             ephemeris=ephemeris,
             host=host,
+            orientation=_orientation(*published),
         )
         return _with_start(scene, starts.start_of(scene, _with_start))
     except ConfigError as error:
         raise error.at(experiment.source) from None
 
 
+def _orientation(table: schema.Output, *around: Any) -> Orientation | None:
+    if table.orientation is None and table.orientation_of is None:
+        return None
+    from rigidsim.scene.kernels.orientation import resolve_orientation
+
+    return resolve_orientation(table, *around)
+
+
 def _body_at_start(config: schema.Config, context: Any) -> RigidBody:
     moments = moments_at_start(config, context, config.time.start.at(context))
     body = build_body(config.body, context, config.integrator.euler_sequence, moments)
+    outside = surfaces_of(config.body.surfaces, body.center_of_mass, context)
+    body = replace(body, surfaces=outside) if outside else body
     if config.body.gravity_field is None:
         return body
     texts = {name: table.text for name, table in config.tables.items()}
@@ -293,7 +292,9 @@ def _resolve_loads(
     found = []
     tables = {name: table.text for name, table in config.tables.items()}
     fixed = config.parameters, body.center_of_mass, free_flight, config.frame.axes, config.time.epoch
-    around = Surroundings(0, context, *fixed, tables, span, masses, names, ephemeris=ephemeris, host=host)
+    around = Surroundings(
+        0, context, *fixed, tables, span, masses, names, body=body, ephemeris=ephemeris, host=host
+    )
     for number, fields in enumerate(config.loads):
         kind = LOAD_KINDS[fields.kind]  # type: ignore[attr-defined]
         found.append(kind.resolve(fields, replace(around, number=number)))
@@ -306,8 +307,9 @@ def _resolve_loads(
 
 
 def _translation(config: schema.Config, body: RigidBody, context: Any) -> tuple[Vector | None, Vector | None]:
-    table = config.initial
-    if table.position is None and table.velocity is None:
+    if not config.initial.flies:
+        if config.initial.frame is not None:
+            raise _fail("initial", "frame", "given without position or velocity, which it is of; add them")
         return None, None
     if any(x != 0 for x in body.center_of_mass):
         raise _fail(
@@ -318,10 +320,7 @@ def _translation(config: schema.Config, body: RigidBody, context: Any) -> tuple[
         )
     if body.mass is None:
         raise _fail("body", "mass", "missing; a body with a position or velocity needs it")
-    zero = [context.zero] * 3
-    position = [x.at(context) for x in table.position] if table.position else zero
-    velocity = [x.at(context) for x in table.velocity] if table.velocity else list(zero)
-    return position, velocity
+    return flight_start(config, context)
 
 
 def _check_limits(limits: schema.Limits) -> None:
@@ -329,22 +328,3 @@ def _check_limits(limits: schema.Limits) -> None:
         value = getattr(limits, key)
         if value is not None and value.sign <= 0:
             raise _fail("limits", key, f"given {float(value):g}; a positive number is allowed")
-
-
-def _resolve_events(
-    tables: Sequence[schema.EventTable], parameters: Mapping[str, ExactNumber], names: Names
-) -> tuple[Event, ...]:
-    """Read the expressions of ``[[events]]``."""
-    found = []
-    for number, table in enumerate(tables):
-        where = f"[[events]] number {number + 1} expression"
-        try:
-            expression = parse_expression(table.expression, names, parameters=parameters, jumps=False)
-        except ExpressionError as error:
-            raise ConfigError(Problem(where, str(error))) from None
-        if not names_used(expression):
-            raise ConfigError(
-                Problem(where, f'given "{table.expression}", which never changes; use {", ".join(names)}')
-            )
-        found.append(Event(table.name, expression, table.direction, table.action == "stop"))
-    return tuple(found)

@@ -28,9 +28,11 @@ from rigidsim.scene.expressions.tree import RESERVED
 from rigidsim.scene.fields import (
     Angle,
     AnyQuantity,
+    BodyName,
     ConfigTable,
     Dimensionless,
     EachOnce,
+    ElementLines,
     Four,
     Metre,
     Momentum,
@@ -103,6 +105,27 @@ class Initial(ConfigTable):
     """position of the centre of mass, in space axes; with it or velocity the body flies freely"""
     velocity: Triple[Speed] | None = Field(None, examples=[[0, "7.5 km/s", 0]])
     """velocity of the centre of mass, in space axes"""
+    tle: ElementLines | None = Field(
+        None,
+        examples=[
+            [
+                "1 00005U 58002B   00179.78495062  .00000023  00000-0  28098-4 0  4753",
+                "2 00005  34.2682 348.7242 1859667 331.7664  19.3264 10.82419157413667",
+            ]
+        ],
+    )
+    """two-line elements of a satellite of the Earth, instead of position and velocity: these are SGP4's at
+    the start, in GCRF; without [time] epoch that of the elements is time 0
+    """
+    frame: Literal["GCRF", "ICRF", "EME2000", "J2000", "TEME", "ITRF"] | None = None
+    """frame of position and velocity, at the date of [time] epoch, instead of the space axes; about the
+    Earth; velocities in ITRF are relative to the rotating Earth
+    """
+
+    @property
+    def flies(self) -> bool:
+        """Whether the body has a position."""
+        return not (self.position is None and self.velocity is None and self.tle is None)
 
 
 class Model(ConfigTable):
@@ -143,6 +166,14 @@ class Output(ConfigTable):
     """
     lyapunov: StrictBool = False
     """Lyapunov exponents from variational equations; costs tens of times the plain run"""
+    orientation: StrictStr | None = Field(None, examples=["./pck00011.tpc"])
+    """a published orientation beside which the attitude is recorded: the path of a PCK of SPICE, text or
+    binary, from the config's folder; its SHA-256 is kept in the dataset
+    """
+    orientation_of: BodyName | None = Field(None, examples=["mars", 31006])
+    """the body in that kernel, by its name or number, or the number of axes in a binary one; by default
+    [body] host, or the only axes of a binary kernel
+    """
     tip: Triple[Metre] | None = Field(None, examples=[[0, 0, 0.1]])
     """the point whose path is recorded as tip, in body axes from the reference point; by default the centre
     of mass of a body that turns about another point
@@ -241,6 +272,16 @@ class Config(ConfigTable):
         default_factory=dict, examples=[{"elements.csv": {"text": "time [yr], eccentricity\n0, 0.01\n"}}]
     )
     """texts of tables that loads refer to; the text of files beside the config is copied here"""
+
+    @model_validator(mode="after")
+    def _dated(self) -> Config:
+        """Date and axes that two-line elements, or a frame, imply where the config says nothing of them."""
+        start, changes = self.initial, dict[str, Any]()
+        if start.tle is not None and self.time.epoch is None:
+            changes["time"] = self.time.model_copy(update={"epoch": start.tle.epoch})
+        if (start.tle or start.frame) and self.frame.axes is None and self.ephemeris is None:
+            changes["frame"] = self.frame.model_copy(update={"axes": "GCRF"})
+        return self.model_copy(update=changes) if changes else self
 
     @field_validator("loads", "events", "bodies", "rotors", "states")
     @classmethod

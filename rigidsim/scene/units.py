@@ -57,6 +57,7 @@ hertz = 1 / second = Hz
 ampere = [current] = A
 coulomb = ampere * second = C
 volt = watt / ampere = V
+siemens = ampere / volt = S
 weber = volt * second = Wb
 tesla = weber / meter ** 2 = T
 gauss = 1e-4 * tesla

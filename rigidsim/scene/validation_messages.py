@@ -19,11 +19,13 @@ _MEANT = {
     "box": "cuboid", "brick": "cuboid", "ball": "sphere", "disc": "disk", "hoop": "ring", "bar": "rod",
     "stick": "rod", "pipe": "tube", "rectangle": "plate", "square": "plate", "donut": "torus",
     "gravity": "uniform_gravity", "weight": "uniform_gravity", "friction": "viscous_torque torque",
-    "damping": "viscous_torque", "drag": "viscous_torque", "thruster": "torque force", "motor": "torque",
+    "damping": "viscous_torque", "air": "drag", "atmosphere": "drag", "srp": "radiation_pressure",
+    "solar_pressure": "radiation_pressure", "solar_radiation_pressure": "radiation_pressure",
+    "thruster": "torque force", "motor": "torque",
     "spring": "torque force", "wheel": "rotors", "wheels": "rotors", "flywheel": "rotors",
     "cassini": "cassini_1 cassini_2 cassini_3 cassini_4",
     "gyroscope": "rotors", "controller": "states", "filter": "states", "slosh": "states",
-    "speed": "rate", "magnet": "magnetic_dipole", "tide": "gravity_gradient",
+    "eddy": "eddy_currents", "speed": "rate", "magnet": "magnetic_dipole", "tide": "gravity_gradient",
     "planet": "gravity_gradient central_gravity", "sun": "gravity_gradient", "moon": "gravity_gradient",
     "spin": "angular_velocity rate", "omega": "angular_velocity", "w": "angular_velocity",
     "rates": "angular_velocity", "attitude": "quaternion euler_angles", "inertia": "inertia_tensor moment",
@@ -80,10 +82,17 @@ def nearest(given: str, allowed: Iterable[str]) -> str:
     if len(given) > _LONGEST_NAME:  # comparing takes time, and nothing allowed is near
         return ""
     names = list(allowed)
-    meant = [name for name in _MEANT.get(given.lower(), "").split() if name in names]
-    close = meant or difflib.get_close_matches(given, names, n=1, cutoff=0.6)
+    known = [name for name in _MEANT.get(given.lower(), "").split() if name in names]
+    close = known or difflib.get_close_matches(given, names, n=1, cutoff=0.6)
     quoted = " or ".join(f'"{name}"' for name in close)
     return f"; did you mean {quoted}?" if close else ""
+
+
+def meant(given: str, allowed: Iterable[str]) -> str:
+    """What a name that isn't allowed may mean: a similar one, or something that isn't modelled."""
+    from rigidsim.scene.scope import scope_answer  # of no use until something is refused
+
+    return f"{nearest(given, allowed)}{scope_answer(given)}"
 
 
 def key_path(location: Iterable[str | int]) -> str:
@@ -145,15 +154,16 @@ def _what(table: type[BaseModel] | None, error: Mapping[str, Any]) -> str:
     location, given = tuple(error["loc"]), error["input"]
     if kind == "extra_forbidden":
         fields = sorted(table.model_fields) if table else []
-        near = nearest(str(location[-1]), fields)
-        return f"unknown key{near}; allowed: {', '.join(fields)}"
+        key = str(location[-1])
+        return f"unknown key{meant(key, fields)}; allowed: {', '.join(fields)}"
     if kind in ("missing", "union_tag_not_found"):
         return "missing; it must be given"
     if kind in ("literal_error", "union_tag_invalid"):
         allowed = context.get("expected", context.get("expected_tags", ""))
         allowed = allowed.replace("'", "").replace(" or ", ", ")
         names = [part.strip() for part in allowed.split(",")]
-        near = nearest(given if isinstance(given, str) else shown(given), names)
+        word = given if isinstance(given, str) else shown(given)
+        near = meant(word, names)
         return f"given {shown(given)}{near}; allowed: {', '.join(names)}"
     if kind == "list_type" and isinstance(given, Mapping) and location[0] in _ARRAYS_OF_TABLES:
         return f"given a table; an array of them is allowed: write [[{location[0]}]] in double brackets"

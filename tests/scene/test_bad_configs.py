@@ -109,7 +109,7 @@ IN_ONE_TABLE: dict[str, list[tuple[str, ...]]] = {
         ("principal_moment = [1, 2, 2]", "principal_moment", "unknown key"),
         ("points = [{mass = 1, position = [0, 0, 1], charge = 1}]", "points[0].charge", "unknown key"),
         ('shape = "spere"\nmass = 1\nradius = 1', "shape", 'given "spere"', 'did you mean "sphere"?'),
-        ('preset = "erth"', "preset", 'given "erth"', 'did you mean "earth"?', "allowed: earth"),
+        ('preset = "erth"', "preset", 'given "erth"', 'did you mean "earth"?', "allowed: apophis, "),
         ("points = [{mass = 1}]", "points[0].position", "missing; it must be given"),
         ("inertia_tensor = [1, 2, 3]", "inertia_tensor[0]", "given 1; an array of 3 is allowed"),
         ("principal_moments = [1, 2]", "principal_moments", "given 2 entries; exactly 3"),
@@ -146,7 +146,9 @@ IN_ONE_TABLE: dict[str, list[tuple[str, ...]]] = {
         ("points = [{mass = -1, position = [0, 0, 1]}]", "points[0].mass", "given -1; a positive mass"),
         ('parts = [{shape = "sphere", mass = 1}]', "parts[0].radius", "a sphere needs it"),
         ('shape = "box"\nmass = 1\n', "shape", 'did you mean "cuboid"?'),
-        ('preset = "earth"\nmass = 1', "mass", "it follows from preset; remove it"),
+        ('preset = "earth"\nmass = -1', "mass", "a positive mass is allowed"),
+        ('preset = "earth"\nradius = 1', "radius", "which only a shape has; remove it"),
+        ('preset = "earth"\npoints = []\nshape = "sphere"', "points", "at least one entry is needed"),
     ],
     "rate": [
         ('"1 fortnight"', 'given "1 fortnight"', 'unknown unit "fortnight"', "known units: m kg s"),
@@ -224,7 +226,7 @@ IN_ONE_TABLE: dict[str, list[tuple[str, ...]]] = {
         ('accuracy = "high"', "accuracy", '"high"'),
     ],
     "output": [
-        ('recrod = ["energy"]', "recrod", 'did you mean "record"?', "allowed: estimate, lyapunov, record"),
+        ('recrod = ["energy"]', "recrod", 'did you mean "record"?', "allowed: estimate, lyapunov, "),
         ('record = ["angular_velocity", "enegry"]', "record[1]", 'given "enegry"', 'did you mean "energy"?'),
         ('record = "energy"', "record", 'given "energy"; an array is allowed'),
         ("timeline = 1", "timeline", "given 1; true or false is allowed"),
@@ -504,3 +506,9 @@ def test_the_command_line_names_a_missing_file(tmp_path: Path) -> None:
     assert "none.toml" in result.stderr
     assert "can't be read: No such file" in result.stderr
     assert not (tmp_path / "runs").exists()
+
+
+@pytest.mark.parametrize("given", [3, None, {"name": "x"}])
+def test_what_is_no_path_is_refused_in_words(given: Any) -> None:
+    with pytest.raises(ConfigError, match=r"path: given .*; the path of a config is allowed"):
+        load(given)

@@ -17,7 +17,7 @@ from rigidsim.scene.editor_schema import editor_schema
 from rigidsim.scene.registry import LOAD_KINDS, OBSERVABLES
 
 ROOT = Path(__file__).parents[2]
-READY = [*ROOT.glob("configs/**/*.toml"), *ROOT.glob("rigidsim/workflows/templates/*.toml")]
+READY = [*ROOT.glob("configs/**/*.toml")]
 
 
 @pytest.fixture(scope="module")

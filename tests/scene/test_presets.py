@@ -57,9 +57,13 @@ def test_the_page_has_every_number_of_every_preset(name: str) -> None:
     preset = PRESETS[name]
     texts = [*preset.ratios[:2], preset.largest_moment, preset.mass, preset.radius, *preset.semi_axes]
     texts += [rate.split()[0] for rate in preset.rotation]
+    texts += [number for row in preset.tensor for number in row]
+    for part in preset.parts:
+        texts += [part["mass"], *part["size"], *(x.removeprefix("-") for x in part.get("position", ()))]
     assert [text for text in texts if text not in section] == []
     resolved = body(name)
-    assert max(resolved.principal_moments) == max(resolved.inertia[i][i] for i in range(3))
+    if not preset.tensor:
+        assert max(resolved.principal_moments) == max(resolved.inertia[i][i] for i in range(3))
     assert resolved.source.startswith(f"preset {name} (")
 
 
@@ -119,6 +123,24 @@ def test_hyperion_is_the_ellipsoid_of_wisdom_peale_and_mignard() -> None:
     assert PRESETS["hyperion"].rotation == ()
 
 
+def test_phobos_is_as_flat_as_a_homogeneous_body_of_its_shape() -> None:
+    """J2 = 0.105 of an older model of the shape (Chao & Rubincam 1989), R = 11 km; an orbit in 7.65 h."""
+    phobos = body("phobos")
+    a, b, c = phobos.principal_moments
+    assert float((b - a) / c) == pytest.approx(0.1294, abs=1e-4)
+    assert float((c - (a + b) / 2) / (phobos.mass * 11000**2)) == pytest.approx(0.105, rel=0.1)
+    assert 2 * math.pi / spin("phobos") / 3600 == pytest.approx(7.6538, abs=1e-4)
+
+
+def test_vesta_has_its_j2_and_turns_in_five_hours() -> None:
+    vesta = body("vesta")
+    a, b, c = vesta.principal_moments
+    assert a == b
+    assert float((c - a) / (vesta.mass * 265000**2)) == pytest.approx(0.0317799 * math.sqrt(5), rel=1e-6)
+    assert float(vesta.mass) * 6.67430e-11 == pytest.approx(17.28824e9, rel=2e-6)
+    assert 2 * math.pi / spin("vesta") / 3600 == pytest.approx(5.342, abs=1e-3)
+
+
 def test_toutatis_has_both_periods() -> None:
     toutatis = body("toutatis")
     x, y, z = toutatis.principal_moments
@@ -146,6 +168,128 @@ def test_apophis_has_both_periods_and_the_published_energy() -> None:
     assert float(top.period) / 3600 == pytest.approx(263, abs=0.01)
     momentum, energy = math.hypot(i1 * w1, i3 * w3), (i1 * w1**2 + i3 * w3**2) / 2
     assert energy / (momentum**2 / (2 * i3)) == pytest.approx(1.024, abs=0.001)
+
+
+def test_venus_moves_its_pole_in_525_centuries_and_precesses_as_published() -> None:
+    """Cottereau, Souchay & Aljbaae 2010: 525 cy, and 28965.10 years of precession with C/(M R^2) = 0.336."""
+    a, b, c = (float(m) for m in body("venus").principal_moments)
+    wobble = math.sqrt((c - a) * (c - b) / (a * b)) * abs(spin("venus"))
+    assert 2 * math.pi / wobble / YEAR / 100 == pytest.approx(525, rel=5e-3)
+    assert 2 * math.pi / abs(spin("venus")) / DAY == pytest.approx(243.0226, rel=3e-6)
+    flattening, axis = (c - (a + b) / 2) / c, 0.72333 * 149597870700
+    tilt = math.cos(math.radians(2.6392))
+    rate = 1.5 * SUN / axis**3 / abs(spin("venus")) * flattening * tilt * YEAR / ARCSEC
+    assert rate == pytest.approx(1296000 / 28965.10 * 0.336 / 0.337, rel=3e-3)
+    assert rate == pytest.approx(44.58, abs=3.3)  # Margot et al. 2021
+
+
+def test_titan_is_nearly_in_hydrostatic_equilibrium_and_turns_once_in_an_orbit() -> None:
+    titan = body("titan")
+    a, b, c = titan.principal_moments
+    scale = titan.mass * 2575000**2
+    j2, c22 = float((c - (a + b) / 2) / scale), float((b - a) / (4 * scale))
+    assert j2 / c22 == pytest.approx(3.186, abs=1e-3)  # 10/3 in equilibrium
+    assert float(c / scale) == pytest.approx(0.341, rel=1e-12)
+    # an orbit takes 15.945421 days in the planetary fact sheet; IAU's rate of rotation gives 15.945448
+    assert 2 * math.pi / spin("titan") / DAY == pytest.approx(15.945421, abs=3e-5)
+
+
+def test_ceres_and_small_bodies_turn_in_their_published_hours() -> None:
+    ceres = body("ceres")
+    a, _, c = ceres.principal_moments
+    assert float((c - a) / (ceres.mass * 470000**2)) == pytest.approx(0.026499, rel=1e-12)
+    hours = {
+        "ceres": (9.074170, 1e-6),
+        "eros": (5.27025547, 3e-6),
+        "bennu": (4.296057, 2e-6),
+        "didymos": (2.26, 1e-4),
+    }
+    for name, (period, uncertain) in hours.items():
+        assert 2 * math.pi / spin(name) / 3600 == pytest.approx(period, abs=uncertain)
+
+
+def test_eros_has_its_gravity_field() -> None:
+    eros = body("eros")
+    a, b, c = eros.principal_moments
+    scale = eros.mass * 16000**2
+    assert float((c - (a + b) / 2) / scale) == pytest.approx(0.052478 * math.sqrt(5), rel=1e-3)
+    half = math.sqrt(5 / 12) * math.hypot(0.082538, 0.027745)
+    assert float((b - a) / (4 * scale)) == pytest.approx(half, rel=1e-3)
+    volume = 2503e9  # m^3, of the shape in the same publication
+    assert float(eros.mass) / volume == pytest.approx(2670, rel=0.01)  # kg/m^3, Yeomans et al. 2000
+
+
+def test_didymos_weighs_what_its_moonlet_orbits() -> None:
+    mass = 4 * math.pi**2 * 1206**3 / (6.67430e-11 * (11.921473 * 3600) ** 2)
+    assert float(body("didymos").mass) == pytest.approx(mass, rel=0.01)
+
+
+def test_the_space_station_is_the_published_tensor() -> None:
+    slug_foot_squared = exact("0.45359237") * exact("9.80665") * exact("0.3048")  # kg m^2
+    published = (
+        ("2.80701911616e7", "4.822509936e5", "-1.71675094448e7"),
+        ("4.822509936e5", "9.5144639344e7", "6.02604448e4"),
+        ("-1.71675094448e7", "6.02604448e4", "7.6594401336e7"),
+    )
+    station = body("space_station")
+    for row, expected in zip(station.inertia, published, strict=True):
+        for x, text in zip(row, expected, strict=True):
+            assert float(x / (slug_foot_squared * exact(text))) == pytest.approx(1, abs=1e-11)
+    assert station.mass is None
+    assert float(body_of('preset = "space_station"\nmass = 4e5').principal_moments[0]) == float(
+        station.principal_moments[0]
+    )
+
+
+def test_a_cubesat_is_the_sum_of_its_parts() -> None:
+    """Point masses on a fine grid in each of five boxes."""
+    boxes = [(3.6, (0.1, 0.1, 0.3405), (0.0, 0.0, 0.0))]
+    for x, y in ((0.2, 0), (-0.2, 0), (0, 0.2), (0, -0.2)):
+        boxes.append((0.1, (0.3, 0.1, 0.002) if x else (0.1, 0.3, 0.002), (x, y, -0.17025)))
+    nodes, weights = np.polynomial.legendre.leggauss(2)  # exact for squares
+    points = []
+    for mass, size, centre in boxes:
+        for i, j, k in np.ndindex(2, 2, 2):
+            place = [c + s / 2 * nodes[n] for c, s, n in zip(centre, size, (i, j, k), strict=True)]
+            points.append((mass * weights[i] * weights[j] * weights[k] / 8, np.array(place)))
+    total = sum(m for m, _ in points)
+    centre = sum(m * r for m, r in points) / total
+    tensor = sum(
+        m * ((r - centre) @ (r - centre) * np.eye(3) - np.outer(r - centre, r - centre)) for m, r in points
+    )
+    found = body("cubesat_3u")
+    assert float(found.mass) == pytest.approx(total, rel=1e-15)
+    assert np.diag(tensor) == pytest.approx([float(m) for m in found.principal_moments], rel=1e-13)
+    assert len(found.drawing) == 5
+
+
+MOMENTS_OF_MARS = [float(m) for m in body("mars").principal_moments]
+CASES = {
+    "mass = 1e23": ([m * 1e23 / 6.41691e23 for m in MOMENTS_OF_MARS], 1e23),
+    "principal_moments = [1, 2, 2.5]": ([1, 2, 2.5], 6.41691e23),
+    "principal_moments = [1, 2, 2.5]\nmass = 3": ([1, 2, 2.5], 3),
+    "inertia_tensor = [[1, 0, 0], [0, 2, 0], [0, 0, 2.5]]": ([1, 2, 2.5], 6.41691e23),
+    'shape = "sphere"\nradius = 10': ([0.4 * 6.41691e23 * 100] * 3, 6.41691e23),
+    'shape = "sphere"\nradius = 10\nmass = 3': ([120] * 3, 3),
+    "points = [{mass = 1, position = [1, 0, 0]}, {mass = 1, position = [-1, 0, 0]}]": ([0, 2, 2], 2),
+    'parts = [{shape = "sphere", mass = 5, radius = 1}]': ([2] * 3, 5),
+    "center_of_mass = [0, 0, 1]": (MOMENTS_OF_MARS, 6.41691e23),
+}
+
+
+@pytest.mark.parametrize("keys", CASES)
+def test_keys_beside_a_preset_take_the_place_of_its_own(keys: str) -> None:
+    found = body_of(f'preset = "mars"\n{keys}')
+    moments, mass = CASES[keys]
+    assert [float(m) for m in found.principal_moments] == pytest.approx(moments, rel=1e-14)
+    assert float(found.mass) == pytest.approx(mass, rel=1e-14)
+    assert "preset mars (" in found.source
+    heavier = body_of('preset = "cubesat_3u"\nmass = 6')
+    assert float(heavier.principal_moments[2]) == pytest.approx(
+        1.5 * float(body("cubesat_3u").principal_moments[2])
+    )
+    named = body_of('preset = "cubesat_3u"\nprincipal_moments = [1, 1, 1]')
+    assert (float(named.mass), len(named.drawing)) == (4.0, 5)
 
 
 def test_a_whole_presets_keys_are_overridden_one_by_one() -> None:
@@ -176,6 +320,32 @@ def test_the_rigid_earth_is_flattened_and_triaxial_as_published() -> None:
         turned = complex(cosine, -sine) * np.exp(1j * m * math.radians(-14.929376301576161))
         assert float(earth.gravity.coefficients[3, m, False]) == pytest.approx(turned.real, rel=1e-12)
         assert float(earth.gravity.coefficients[3, m, True]) == pytest.approx(-turned.imag, rel=1e-12)
+
+
+def test_mars_of_konopliv_has_the_gravity_field_of_its_source_and_the_published_precession() -> None:
+    mars = body("mars_konopliv")
+    a, b, c = mars.principal_moments
+    scale = mars.mass * 3396000**2
+    assert float((c - (a + b) / 2) / scale) == pytest.approx(8.750220924537e-4 * math.sqrt(5), rel=1e-15)
+    half = math.sqrt(5 / 12) * math.hypot(8.463302655983e-5, 4.893941832167e-5)
+    assert float((b - a) / (4 * scale)) == pytest.approx(half, rel=1e-12)
+    assert float(mars.mass) * 6.67430e-11 == pytest.approx(42828.3758157561e9, rel=1e-14)
+    flattening = float((c - (a + b) / 2) / c)
+    assert flattening == pytest.approx(0.00537997, rel=1e-15)
+    assert abs(flattening - 0.00538017) < 148e-8  # Baland et al. 2020
+    normalised = {
+        0: (-1.18970150373e-05, 0.0),
+        1: (3.804998199101e-06, 2.517711770763e-05),
+        2: (-1.594743192372e-05, 8.362393978467e-06),
+        3: (3.505629836033e-05, 2.557132545737e-05),
+    }
+    east = math.atan2(4.893941832167e-5, -8.463302655983e-5) / 2
+    for m, (cosine, sine) in normalised.items():
+        norm = math.sqrt((2 - (m == 0)) * 7 * math.factorial(3 - m) / math.factorial(3 + m))
+        turned = norm * complex(cosine, -sine) * np.exp(1j * m * east)
+        assert float(mars.gravity.coefficients[3, m, False]) == pytest.approx(turned.real, rel=1e-12)
+        if m:
+            assert float(mars.gravity.coefficients[3, m, True]) == pytest.approx(-turned.imag, rel=1e-11)
 
 
 def test_the_moon_of_de421_has_the_packages_constants() -> None:

@@ -16,6 +16,7 @@ from rigidsim.scene import attitude
 from rigidsim.scene.arithmetic import Matrix, Vector, apply, diagonal, eigen, multiply, transpose
 from rigidsim.scene.bodies import table as body_table
 from rigidsim.scene.bodies.gravity_field import GravityField
+from rigidsim.scene.bodies.outside import OuterSurface
 from rigidsim.scene.bodies.pieces import (
     drawn,
     parallel_axis,
@@ -57,6 +58,7 @@ class RigidBody:
         drawing: solids for the pictures (see ``rigidsim.look.solids``), as plain JSON values.
         source: key that the inertia came from, with the preset's reference if there is one.
         gravity: its gravity beyond the inertia tensor; None if the config gives none.
+        surfaces: its outside, as light and air meet it.
     """
 
     mass: Any | None
@@ -67,6 +69,7 @@ class RigidBody:
     source: str
     drawing: list[dict[str, Any]] = field(default_factory=list)
     gravity: GravityField | None = None
+    surfaces: tuple[OuterSurface, ...] = ()
 
 
 def build_body(
@@ -79,18 +82,23 @@ def build_body(
         moments: principal moments at the start, if some are expressions (mpf).
     """
     given = [name for name in SOURCES if getattr(table, name) is not None]
-    if len(given) != 1:
-        found = " and ".join(given) if given else "no source of inertia"
-        raise refusal("", f"given {found}; exactly one of {', '.join(SOURCES)} is needed")
-    source = given[0]
+    preset = PRESETS[str(table.preset)] if table.preset is not None else None
+    own = [name for name in given if name != "preset"]  # they take the place of a preset's moments
+    if len(own) > 1 or not given:
+        found = " and ".join(own) if own else "no source of inertia"
+        beside = ", beside a preset at most one of the others" if preset else ""
+        raise refusal("", f"given {found}; exactly one of {', '.join(SOURCES)} is needed{beside}")
+    source = own[0] if own else "preset"
     if source != "shape":
         refuse_dimensions(table, (), "which only a shape has", "")
-    if source in ("principal_moments", "inertia_tensor", "preset"):
+    if source in ("principal_moments", "inertia_tensor") or (
+        source == "preset" and preset and not preset.parts
+    ):
         return _from_tensor(table, source, context, moments)
     if table.center_of_mass is not None:
         what = f"it follows from {source}; remove it, and say with reference what the body turns about"
         raise refusal("center_of_mass", what)
-    if source != "shape" and table.mass is not None:
+    if source in ("points", "parts") and table.mass is not None:
         raise refusal("mass", f"it follows from {source}; remove it")
     return _from_pieces(table, source, context, sequence)
 
@@ -105,18 +113,9 @@ def _from_tensor(
     center = [x.at(context) for x in table.center_of_mass] if table.center_of_mass else zero
     mass = positive(table.mass, "mass", "mass", context) if table.mass is not None else None
     drawing: list[dict[str, Any]] = []
-    described = source
-    if source == "preset":
-        preset = PRESETS[str(table.preset)]
-        if table.mass is not None:
-            raise refusal("mass", "it follows from preset; remove it")
-        inertia = diagonal(preset.moments(context))
-        mass = parse_number(preset.mass, "kg").at(context)
-        described = f"preset {table.preset} ({preset.source})"
-        axes = [float(parse_number(a, "m").at(context)) for a in preset.semi_axes]
-        drawing = [
-            {**drawn("ellipsoid", {"semi_axes": axes}, center), "name": preset.drawn_as or str(table.preset)}
-        ]
+    preset = PRESETS[str(table.preset)] if table.preset is not None else None
+    if source == "preset" and preset:
+        inertia = preset.inertia(context, mass)
     elif source == "principal_moments":
         assert table.principal_moments is not None
         numbers = [x for x in table.principal_moments if isinstance(x, ExactNumber)]
@@ -125,7 +124,26 @@ def _from_tensor(
         assert table.inertia_tensor is not None
         _check_symmetric(table.inertia_tensor)
         inertia = [[x.at(context) for x in row] for row in table.inertia_tensor]
-    return _finish(context, table, source, described, mass, center, inertia, drawing)
+    if preset and preset.parts:
+        whole = build_body(body_table.Body.model_validate({"preset": table.preset}), context)
+        mass, drawing = whole.mass if mass is None else mass, whole.drawing
+    elif preset:
+        mass = preset.own_mass(context) if mass is None else mass
+        if preset.semi_axes:
+            axes = [float(parse_number(a, "m").at(context)) for a in preset.semi_axes]
+            name = preset.drawn_as or str(table.preset)
+            drawing = [{**drawn("ellipsoid", {"semi_axes": axes}, center), "name": name}]
+    return _finish(context, table, source, _told(table, source), mass, center, inertia, drawing)
+
+
+def _told(table: body_table.Body, source: str) -> str:
+    """Where the inertia comes from, with a preset's reference and what else stands in its place."""
+    if table.preset is None:
+        return source
+    told = f"preset {table.preset} ({PRESETS[str(table.preset)].source})"
+    if source != "preset":
+        return f"{source} beside {told}"
+    return f"{told}, with the mass of the config" if table.mass is not None else told
 
 
 def _check_symmetric(tensor: list[list[ExactNumber]]) -> None:
@@ -140,8 +158,16 @@ def _check_symmetric(tensor: list[list[ExactNumber]]) -> None:
 
 
 def _from_pieces(table: body_table.Body, source: str, context: Any, sequence: str) -> RigidBody:
-    pieces = pieces_of(table, source, context, sequence)
+    pieces = pieces_of(
+        _with_parts(table, source), "parts" if source == "preset" else source, context, sequence
+    )
     total = sum((piece.mass for piece in pieces), context.zero)
+    if source == "preset" and table.mass is not None:  # of the same shape
+        mass = positive(table.mass, "mass", "mass", context)
+        for piece in pieces:
+            piece.mass *= mass / total
+            piece.inertia = [[x * mass / total for x in row] for row in piece.inertia]
+        total = sum((piece.mass for piece in pieces), context.zero)
     center = [sum((p.mass * p.position[i] for p in pieces), context.zero) / total for i in range(3)]
     reference = reference_point(table, source, center, context)
     inertia = diagonal([context.zero] * 3)
@@ -154,7 +180,18 @@ def _from_pieces(table: body_table.Body, source: str, context: Any, sequence: st
         if piece.drawing["solid"] == "point":
             drawing[-1]["dimensions"] = {"mass_fraction": float(plain(piece.mass / total))}
     center = [c - r for c, r in zip(center, reference, strict=True)]
-    return _finish(context, table, source, source, total, center, inertia, drawing)
+    return _finish(context, table, source, _told(table, source), total, center, inertia, drawing)
+
+
+def _with_parts(table: body_table.Body, source: str) -> body_table.Body:
+    """The table with what its preset lends it: parts, or the mass of a shape."""
+    preset = PRESETS[str(table.preset)] if table.preset is not None else None
+    if preset and source == "preset":
+        parts = [body_table.Part.model_validate(dict(part)) for part in preset.parts]
+        return table.model_copy(update={"parts": parts})
+    if preset and source == "shape" and table.mass is None and preset.mass:
+        return table.model_copy(update={"mass": parse_number(preset.mass, "kg")})
+    return table
 
 
 def _finish(

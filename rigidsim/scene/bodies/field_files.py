@@ -10,6 +10,7 @@ their digits; exponents may be written with D.
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from decimal import Decimal, InvalidOperation
@@ -19,6 +20,8 @@ from rigidsim.scene.exact import parse_number
 
 HEAD_ENDS = "end_of_head"
 _STRENGTH = ("earth_gravity_constant", "gravity_constant")
+_DECIDING = (*_STRENGTH, "radius", "max_degree", "norm", "product_type", "tide_system")
+_WHOLE = re.compile("[0-9]{1,6}")
 _NORMALIZED = {"fully_normalized": True, "unnormalized": False}
 _ZERO = 1e-9
 """What a coefficient of degree 1, or C00 less 1, may be by rounding."""
@@ -85,7 +88,7 @@ def cut(lines: Iterable[str], degree: int) -> str:
             head = words[:1] != [HEAD_ENDS]
         else:
             degrees = words[1:2] if icgem else words[:1]
-            if not degrees or not degrees[0].isdigit() or int(degrees[0]) <= degree:
+            if not degrees or not _WHOLE.fullmatch(degrees[0]) or int(degrees[0]) <= degree:
                 kept.append(line)
     return "".join(kept)
 
@@ -101,8 +104,8 @@ def _icgem(lines: list[tuple[int, str]]) -> tuple[FieldFile, Iterator[Row]]:
     head: dict[str, str] = {}
     for _, line in lines[begin + 1 : end]:
         words = line.split()
-        if len(words) >= 2:
-            head.setdefault(words[0], words[1])
+        if len(words) >= 2 and head.setdefault(words[0], words[1]) != words[1] and words[0] in _DECIDING:
+            raise FieldFileError(f"has the {words[0]} {head[words[0]]} and {words[1]}; one is allowed")
     if head.get("product_type", "gravity_field") != "gravity_field":
         raise FieldFileError(f"is of product_type {head['product_type']}; gravity_field is read")
     strength = next((key for key in _STRENGTH if key in head), None)
@@ -112,7 +115,7 @@ def _icgem(lines: list[tuple[int, str]]) -> tuple[FieldFile, Iterator[Row]]:
     norm = head.get("norm", "fully_normalized")  # the format's own default
     if norm not in _NORMALIZED:
         raise FieldFileError(f"has norm {norm}; {' and '.join(_NORMALIZED)} are read")
-    if not head["max_degree"].isdigit():
+    if not _WHOLE.fullmatch(head["max_degree"]):
         raise FieldFileError(f"has max_degree {head['max_degree']}; a whole number is expected")
     found = FieldFile(
         _positive(head["radius"], "radius"),
@@ -137,15 +140,17 @@ def _shadr(lines: list[tuple[int, str]]) -> tuple[FieldFile, Iterator[Row]]:
     if _number(normalization) not in (0, 1):
         raise FieldFileError(f"has the normalization state {normalization}; 0 (none) and 1 (full) are read")
     for what, given in (("longitude", longitude), ("latitude", latitude)):
-        if given and _number(given) != 0:
+        if given and _number(given, f"has the {what} ") != 0:
             raise FieldFileError(f"refers to a {what} of {given} deg; fields that refer to 0 are read")
+    if not _WHOLE.fullmatch(degree):
+        raise FieldFileError(f"has the degree {degree}; a whole number is expected")
     if _number(order) < _number(degree):
         raise FieldFileError(f"goes to order {order} of degree {degree} only; whole degrees are read")
     found = FieldFile(
         1000 * _positive(radius, "radius"),
         10**9 * _positive(strength, "G M"),
         _number(normalization) == 1,
-        int(_number(degree)),
+        int(degree),
     )
     return found, ((number, "", words) for number, words in rows[1:])
 
@@ -155,7 +160,7 @@ def _add_row(found: FieldFile, number: int, key: str, words: list[str], degree: 
     if key not in ("", "gfc"):
         what = "time-variable terms aren't read" if key in ("gfct", "trnd", "dot", "asin", "acos") else ""
         raise FieldFileError(f"{where}a row {key}; {what or 'rows gfc are expected'}")
-    if len(words) < 4 or not all(x.isdigit() for x in words[:2]):
+    if len(words) < 4 or not all(_WHOLE.fullmatch(x) for x in words[:2]):
         raise FieldFileError(f"{where}degree, order, C and S are expected, given {' '.join(words)[:60]}")
     n, m = int(words[0]), int(words[1])
     if n > degree:
@@ -195,14 +200,15 @@ def _number(text: str, where: str = "") -> Fraction:
     try:
         return parse_number(Decimal(text.strip().translate(_FORTRAN)), "1").rational
     except (InvalidOperation, ValueError):
-        raise FieldFileError(f"{where}given {text[:40]!r}; a number is expected") from None
+        given = f"{text[:40]!r}" if where.startswith("has") else f"given {text[:40]!r}"
+        raise FieldFileError(f"{where}{given}; a number is expected") from None
 
 
 _FORTRAN = str.maketrans("dD", "ee")
 
 
 def _positive(text: str, what: str) -> Fraction:
-    found = _number(text)
+    found = _number(text, f"has the {what} ")
     if found <= 0:
         raise FieldFileError(f"has the {what} {text}; a positive number is expected")
     return found

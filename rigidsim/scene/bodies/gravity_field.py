@@ -10,6 +10,7 @@ the first.
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
@@ -23,6 +24,7 @@ from rigidsim.scene.bodies.field_files import FieldFileError, read_field
 from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.fields import ConfigTable, Dimensionless, Metre, refuse
 from rigidsim.scene.point_masses import GRAVITATIONAL_CONSTANT
+from rigidsim.scene.tracing.numbers import plain
 from rigidsim.scene.validation_messages import shown
 
 WHERE = "[body] gravity_field"
@@ -36,6 +38,8 @@ _SAME_DEGREE_2 = 0.01
 """Difference over the largest coefficient of degree 2 up to which file and tensor mean the same body: tide
 systems differ by 1e-5 of it, published moments and fields by 1e-3.
 """
+_WITHIN = 2
+"""Radii within which a body's mass is: reference radii of odd shapes may be less than their longest axis."""
 _KEY = re.compile(r"(0|[1-9]\d{0,3}),(0|[1-9]\d{0,3})")
 
 Harmonic = tuple[int, int, bool]
@@ -166,6 +170,7 @@ def gravity_field_of(
         for key, value in (given or {}).items():
             n, m = map(int, key.split(","))
             found[n, m, sine] = value.at(context)
+    _refuse_impossible(found, context)
     return GravityField(table.radius.at(context), found, max(n for n, _, _ in found))
 
 
@@ -193,10 +198,26 @@ def _of_file(name: str, body: Any, context: Any, texts: Mapping[str, str], degre
         factor = context.sqrt(number(read.squared_factor(n, m)))
         found |= {(n, m, sine): factor * number(x) for sine, x in zip((False, True), row, strict=True)}
     _refuse_other_tensor(given, found, radius, body, context)
+    _refuse_impossible(found, context, given, " file")
     beyond = {key: c for key, c in found.items() if key[0] >= LEAST}
     tide = f"({read.tide})" if read.tide else ""
     described = " ".join(f'"{name}" {read.name} {tide}'.split())
     return GravityField(radius, beyond, degree, described)
+
+
+def _refuse_impossible(found: Mapping[Harmonic, Any], context: Any, given: str = "", key: str = "") -> None:
+    """Refuse coefficients beyond those of any mass within some radii.
+
+    Mass within s R has abs(C_nm) <= 2 s^n max abs(P_nm) (n - m)!/(n + m)!, and P_nm^2 <= (n + m)!/(n - m)!.
+    """
+    for (n, m, sine), value in found.items():
+        ratio = context.mpf(math.factorial(n - m)) / math.factorial(n + m)
+        most = 2 * _WITHIN**n * context.sqrt(ratio)
+        if abs(value) > most:
+            name, size = f"{'S' if sine else 'C'}{n},{m}", context.nstr(plain(value), 8)
+            what = f"{given}whose {name} is {size}" if given else f'given {size} as "{n},{m}" in {name[0]}'
+            what += f" (unnormalized); no mass within {_WITHIN} radii has more than {context.nstr(most, 3)}: "
+            raise fault(what + "check radius, normalization and signs of exponents", key)
 
 
 def _sentence(error: FieldFileError) -> str:

@@ -1,27 +1,37 @@
-"""Published bodies. Every value names its source; ``docs/presets.md`` gives details and uncertainties.
+"""Published bodies: a file each in ``published/``, with the source of every value; ``docs/presets.md`` gives
+details and uncertainties.
 
 The Sun, the planets and the Moon are recognised by their gravitational parameters as well.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import tomllib
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
+from importlib.resources import files
+from importlib.resources.abc import Traversable
 from typing import Any
 
+from rigidsim.scene.arithmetic import Matrix, diagonal
 from rigidsim.scene.exact import parse_number
 
 
 @dataclass(frozen=True)
 class Preset:
-    """Principal moments along x, y, z (as ratios to ``largest_moment``), and their source.
+    """Moments of inertia, mass and picture of a body, and their source.
+
+    Moments are principal ones along x, y, z (``ratios``), a ``tensor``, or those of ``parts``.
 
     Attributes:
+        source: publication of the numbers.
         ratios: I_x, I_y, I_z over the largest moment, as exact texts.
         largest_moment: kg m^2, or the factor C/(M R^2) if ``radius`` is given.
-        mass: kg.
-        semi_axes: semi-axes for pictures, m.
-        source: publication of the numbers.
+        tensor: the tensor of inertia, kg m^2, where its axes aren't the principal ones.
+        parts: solids as in ``[body]``, whose mass, moments and picture are the body's.
+        mass: kg; empty if it isn't published.
+        semi_axes: semi-axes for pictures, m; empty if only the moments are known.
         radius: R of the factor C/(M R^2), m.
         rotation: the published rotation, rad/s about the body axes; empty if there is no lasting one.
             A scene itself starts as its ``[initial]`` says.
@@ -30,15 +40,27 @@ class Preset:
         drawn_as: name of the body whose picture is its own; by default that of the preset.
     """
 
-    ratios: tuple[str, str, str]
-    largest_moment: str
-    mass: str
-    semi_axes: tuple[str, str, str]
     source: str
+    ratios: tuple[str, str, str] | tuple[()] = ()
+    largest_moment: str = ""
+    tensor: tuple[tuple[str, str, str], ...] = ()
+    parts: tuple[Mapping[str, Any], ...] = ()
+    mass: str = ""
+    semi_axes: tuple[str, str, str] | tuple[()] = ()
     radius: str = ""
     rotation: tuple[str, str, str] | tuple[()] = ()
     tables: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     drawn_as: str | None = None
+
+    @classmethod
+    def of(cls, table: Mapping[str, Any]) -> Preset:
+        """Of its file's table: tables within are those of ``[body]``."""
+        tables = {key: value for key, value in table.items() if isinstance(value, dict)}
+        own = {key: value for key, value in table.items() if key not in tables}
+        lists = {key: tuple(value) for key, value in own.items() if isinstance(value, list)}
+        if "tensor" in lists:
+            lists["tensor"] = tuple(map(tuple, lists["tensor"]))
+        return cls(**{**own, **lists}, tables=tables)
 
     def completed(self, given: Mapping[str, Any]) -> dict[str, Any]:
         """``[body]`` as given, with this preset's tables where it says nothing else.
@@ -55,13 +77,26 @@ class Preset:
                 found[name] = _filled(table, own)
         return found
 
-    def moments(self, context: Any) -> list[Any]:
-        """I_x, I_y, I_z, kg m^2 (mpf)."""
-        largest = parse_number(self.largest_moment, "1" if self.radius else "kg m^2").at(context)
+    def inertia(self, context: Any, mass: Any = None) -> Matrix:
+        """Tensor of inertia, kg m^2 (mpf), of ``ratios`` or ``tensor``; in proportion to another ``mass``."""
+        own = self.own_mass(context)
         if self.radius:
             radius = parse_number(self.radius, "m").at(context)
-            largest *= parse_number(self.mass, "kg").at(context) * radius**2
-        return [parse_number(ratio, "1").at(context) * largest for ratio in self.ratios]
+            largest = parse_number(self.largest_moment, "1").at(context)
+            largest *= (own if mass is None else mass) * radius**2
+            return diagonal([parse_number(ratio, "1").at(context) * largest for ratio in self.ratios])
+        if self.tensor:
+            found = [[parse_number(x, "kg m^2").at(context) for x in row] for row in self.tensor]
+        else:
+            largest = parse_number(self.largest_moment, "kg m^2").at(context)
+            found = diagonal([parse_number(ratio, "1").at(context) * largest for ratio in self.ratios])
+        if mass is None or own is None:
+            return found
+        return [[x * mass / own for x in row] for row in found]
+
+    def own_mass(self, context: Any) -> Any | None:
+        """Kg (mpf); None if it isn't published, or is that of the parts."""
+        return parse_number(self.mass, "kg").at(context) if self.mass else None
 
 
 def _filled(table: Mapping[str, Any], own: Mapping[str, Any]) -> dict[str, Any]:
@@ -73,165 +108,35 @@ def _filled(table: Mapping[str, Any], own: Mapping[str, Any]) -> dict[str, Any]:
     return found
 
 
-PRESETS: dict[str, Preset] = {
-    "earth": Preset(
-        # 1 - H twice, with the dynamical flattening H = (C - A)/C = 0.00327379492
-        ratios=("0.99672620508", "0.99672620508", "1"),
-        largest_moment="8.0365e37",
-        mass="5.9722e24",
-        semi_axes=("6378136.6", "6378136.6", "6356751.9"),
-        source="(C-A)/C: Mathews, Herring & Buffett 2002, J. Geophys. Res. 107(B4), 2068; "
-        "C, axes: Groten 2004, J. Geodesy 77, 724 (mean equatorial moment: A = B); "
-        "mass: Astronomical Almanac",
-        rotation=("0", "0", "7.292115e-5 rad/s"),
-    ),
-    "moon": Preset(
-        # A/C = (1 - beta gamma)/(1 + beta), B/C = (1 + gamma)/(1 + beta) with beta = (C - A)/B = 631.0213e-6
-        # and gamma = (B - A)/C = 227.7317e-6
-        ratios=("99999985629644661479/100063102130000000000", "10002277317/10006310213", "1"),
-        largest_moment="0.392863",  # of the mean moment 0.392728 and the ratios
-        radius="1738 km",
-        mass="7.34579e22",
-        semi_axes=("1737400", "1737400", "1737400"),
-        source="(C-A)/B, (B-A)/C: Folkner et al. 2014 (DE430), IPN Progr. Rep. 42-196; mean moment "
-        "0.392728 M (1738 km)^2: Williams et al. 2014, J. Geophys. Res. Planets 119, 1546; mass: G M of "
-        "DE430; radius, rotation: Archinal et al. 2018, Celest. Mech. Dyn. Astr. 130, 22",
-        rotation=("0", "0", "13.17635815 deg/day"),
-    ),
-    "mars": Preset(
-        # 1 - H -+ 2 J22 M R^2 / C with H = (C - (A+B)/2)/C = 0.00538017, J22 = 6.311e-5
-        ratios=("0.99427276", "0.99496690", "1"),
-        largest_moment="0.36367",
-        radius="3396 km",
-        mass="6.41691e23",
-        semi_axes=("3396190", "3396190", "3376200"),
-        source="(C-(A+B)/2)/C, C/MR^2: Baland et al. 2020, Celest. Mech. Dyn. Astr. 132, 47, from the "
-        "precession of Konopliv et al. 2016, Icarus 274, 253; (B-A)/C, mass: gravity field and G M there; "
-        "axes, rotation: Archinal et al. 2018, Celest. Mech. Dyn. Astr. 130, 22",
-        rotation=("0", "0", "350.891982 deg/day"),
-    ),
-    "mercury": Preset(
-        # 1 - (J2 +- 2 C22)/0.346 with J2 = 5.0334e-5, C22 = 0.8067e-5
-        ratios=("345933532/346000000", "3459658/3460000", "1"),
-        largest_moment="0.346",
-        radius="2440 km",
-        mass="3.30100e23",
-        semi_axes=("2440530", "2440530", "2438260"),
-        source="C/MR^2: Margot et al. 2012, J. Geophys. Res. 117, E00L09; J2, C22, mass: Verma and Margot "
-        "2016, J. Geophys. Res. Planets 121, 1627; axes, rotation: Archinal et al. 2018, "
-        "Celest. Mech. Dyn. Astr. 130, 22",
-        rotation=("0", "0", "6.1385108 deg/day"),
-    ),
-    "hyperion": Preset(
-        # a homogeneous ellipsoid, (b^2 + c^2)/(a^2 + b^2) and so on
-        ratios=("34021/57125", "49096/57125", "1"),
-        largest_moment="6.3420e28",  # M (a^2 + b^2)/5
-        mass="5.5510e18",
-        semi_axes=("190000", "145000", "114000"),
-        source="axes, homogeneous: Wisdom, Peale & Mignard 1984, Icarus 58, 137; mass: Jacobson 2022, "
-        "Astron. J. 164, 199",
-    ),
-    "toutatis": Preset(
-        # 3.09 : 3.22 : 1
-        ratios=("309/322", "1", "100/322"),
-        largest_moment="2.6e19",  # M (a^2 + c^2)/5 of the axes: a scale, not a measurement
-        mass="1.9e13",
-        semi_axes=("1200", "960", "2300"),
-        source="ratios, axes, rotation: Hudson & Ostro 1995, Science 270, 84; mass not measured: 2500 kg/m^3 "
-        "assumed",
-        rotation=("20.7 deg/day", "31.3 deg/day", "98.0 deg/day"),
-    ),
-    "apophis": Preset(
-        ratios=("0.61", "0.965", "1"),
-        largest_moment="7.8e14",  # M (a^2 + b^2)/5 of the axes: a scale, not a measurement
-        mass="5.35e10",
-        semi_axes=("221.9", "153.1", "144.6"),
-        source="ratios: Pravec et al. 2014, Icarus 233, 48; axes: the ellipsoid that has them, with the "
-        "diameter 0.34 km of Brozovic et al. 2018, Icarus 300, 115; mass not measured: 2600 kg/m^3 assumed",
-    ),
-}
+class Published(Mapping[str, Preset]):
+    """Presets by name: the files of a folder, each read when it is asked for."""
 
-PRESETS |= {
-    "moon_de421": Preset(
-        # A/C, B/C as above with beta = LBET = 0.0006310022025364629 and gamma = LGAM = 0.0002277305314199142;
-        # C/(M R^2) = 2 (1 + beta) J2/(2 beta - gamma + beta gamma) with J2 = J2M = 0.0002032732576370724
-        ratios=("0.99936925210230931440", "0.99959698263372922860", "1"),
-        largest_moment="0.39326772667542688771",
-        radius="1738 km",
-        mass="7.3457891857239608769e22",  # GMB AU^3/(1 + EMRAT) = 4902.8000762277432081 km^3/s^2
-        semi_axes=("1737400", "1737400", "1737400"),
-        source="constants of JPL's DE421: Folkner, Williams & Boggs 2008, JPL IOM 343R-08-003; "
-        "radius of pictures, rotation: Archinal et al. 2018, Celest. Mech. Dyn. Astr. 130, 22",
-        rotation=("0", "0", "13.17635815 deg/day"),
-        drawn_as="moon",
-        tables={
-            "gravity_field": {
-                "radius": "1738 km",
-                "C": {
-                    "3,0": "-8.404701525941e-6",
-                    "3,1": "2.8452435e-5",
-                    "3,2": "4.84638724000903e-6",
-                    "3,3": "1.674047530039142e-6",
-                    "4,0": "9.642286e-6",
-                    "4,1": "-5.692687e-6",
-                    "4,2": "-1.5862e-6",
-                    "4,3": "-8.12041e-8",
-                    "4,4": "-1.273941e-7",
-                },
-                "S": {
-                    "3,1": "5.9008e-6",
-                    "3,2": "1.6841984741476e-6",
-                    "3,3": "-2.485526e-7",
-                    "4,1": "1.574393e-6",
-                    "4,2": "-1.517312e-6",
-                    "4,3": "-8.027907000000001e-7",
-                    "4,4": "8.31475e-8",
-                },
-            },
-            "elasticity": {
-                "love_number": "0.02163368386360741",
-                "delay": "0.1078586819856588 day",
-                "radius": "1738 km",
-                "mean_rate": "0.2299715 rad/day",
-            },
-            "core": {
-                "moment": "0.0007",
-                "flattening": "0.0003797712936914387",
-                "friction": "1.493760249305661e-8 day^-1",
-            },
-        },
-    ),
-    "earth_rigid": Preset(
-        # C/(M R^2) = J2/H with H = (C - (A + B)/2)/C = 0.0032737548 and J2 = 0.001082625305 of DE421;
-        # B - A = 4 sqrt(C22^2 + S22^2) M R^2 with C22 = 1.5745e-6, S22 = -9.0387e-7
-        ratios=("0.99671526542024313361", "0.99673722497975686639", "1"),
-        largest_moment="0.33069834826969936783",
-        radius="6378136.6 m",
-        mass="5.9721684106698775088e24",  # GMB AU^3 EMRAT/(1 + EMRAT) = 398600.43623333963457 km^3/s^2
-        semi_axes=("6378136.6", "6378136.6", "6356751.9"),
-        source="(C-A)/C of the rigid-Earth series: Souchay, Loysel, Kinoshita & Folgueira 1999, Astron. "
-        "Astrophys. Suppl. 135, 111; J2, J3, G M: DE421; other harmonics: see docs/presets.md",
-        rotation=("0", "0", "7.292115e-5 rad/s"),
-        tables={
-            "gravity_field": {
-                "radius": "6378136.6 m",
-                # J3; tesserals of Greenwich, turned to the axis of the smallest moment at
-                # 14.929376301576161 deg west
-                "C": {
-                    "3,0": "2.532474e-6",
-                    "3,1": "2.0499998435598484e-6",
-                    "3,2": "3.7328856333208324e-7",
-                    "3,3": "-6.7555654341113537e-8",
-                },
-                "S": {
-                    "3,1": "8.2405452574729378e-7",
-                    "3,2": "-2.9499082790305138e-8",
-                    "3,3": "2.1082765085857213e-7",
-                },
-            },
-        },
-    ),
-}
+    def __init__(self, folder: Traversable) -> None:
+        """The files ``NAME.toml`` of a folder."""
+        self._folder = folder
+        self._read: dict[str, Preset] = {}
+
+    @cached_property
+    def _names(self) -> list[str]:
+        found = (file.name for file in self._folder.iterdir())
+        return sorted(name.removesuffix(".toml") for name in found if name.endswith(".toml"))
+
+    def __getitem__(self, name: str) -> Preset:
+        if name not in self._names:
+            raise KeyError(name)
+        if name not in self._read:
+            text = (self._folder / f"{name}.toml").read_text(encoding="utf-8")
+            self._read[name] = Preset.of(tomllib.loads(text))
+        return self._read[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._names)
+
+    def __len__(self) -> int:
+        return len(self._names)
+
+
+PRESETS = Published(files("rigidsim.scene.bodies") / "published")
 
 _ALIKE = 0.01
 """Relative difference up to which a gravitational parameter is that of a known body: for what is written in

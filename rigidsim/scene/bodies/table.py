@@ -4,15 +4,17 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from pydantic import Field, StrictStr, Tag, WithJsonSchema, create_model, model_validator
+from pydantic import Field, StrictBool, StrictStr, Tag, WithJsonSchema, create_model, model_validator
 
 from rigidsim.scene.bodies.gravity_field import GravityFieldTable
+from rigidsim.scene.bodies.outside import SurfaceTable
 from rigidsim.scene.bodies.presets import PRESETS
 from rigidsim.scene.bodies.shapes import DIMENSIONS, SHAPES
 from rigidsim.scene.exact import ZERO
 from rigidsim.scene.fields import (
     NAME_OR_VECTOR,
     Angle,
+    BodyName,
     ConfigTable,
     Dimensionless,
     EachOnce,
@@ -112,6 +114,8 @@ class ElasticityTable(ConfigTable):
     """
     raised_by: EachOnce[StrictStr] | None = Field(None, examples=[["earth"]])
     """names of the loads whose sources raise tides; by default all gravity gradients; [] for none"""
+    spin: StrictBool = True
+    """whether the body's own spin distorts it, too"""
 
 
 _LANDMARKS = {name for shape in SHAPES.values() for name in shape.landmarks}
@@ -170,7 +174,11 @@ class Body(Solid):
         None, examples=[{"radius": "1738 km", "C": {"3,0": -8.4e-6, "3,1": 2.8e-5}, "S": {"3,1": 5.9e-6}}]
     )
     """the body's gravity beyond the inertia tensor, from degree 3 on, for loads that ask for it by degree"""
-    host: StrictStr | None = Field(None, examples=["earth"])
+    surfaces: Annotated[list[SurfaceTable], Field(min_length=1)] | None = Field(
+        None, examples=[[{"normal": [0, 0, 1], "area": "0.03 m^2", "specular": 0.2}]]
+    )
+    """its outside as light and air meet it: plates, boxes and spheres, for radiation_pressure and drag"""
+    host: BodyName | None = Field(None, examples=["earth"])
     """name of the point mass in [[bodies]] that this body is"""
     coupling: Literal["one_way", "full"] | None = None
     """whether [[bodies]] feel this body's shape: one_way (the default) or full"""

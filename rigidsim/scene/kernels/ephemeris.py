@@ -21,7 +21,7 @@ from rigidsim.scene.kernels.series import exactly
 from rigidsim.scene.validation_messages import nearest, shown
 
 ICRF = "ICRF"
-_EQUATORIAL = (ICRF, "GCRF")  # both have the same orientation
+EQUATORIAL = (ICRF, "GCRF")  # both have the same orientation
 _METRES = 1000
 
 
@@ -68,7 +68,8 @@ class Ephemeris:
         if not self.kernel.known(body):
             bodies = self.kernel.bodies
             raise fault(
-                f"given {shown(body)}{nearest(body, bodies)}; {self.kernel.name} has {', '.join(bodies)}"
+                f"given {shown(body)}{nearest(body, bodies)}; {self.kernel.name} has {', '.join(bodies)}; "
+                'others are in SPK files, which [ephemeris] kernel names by their path ("./NAME.bsp")'
             )
 
     def sight(self, source: str, host: str) -> Sight:
@@ -139,7 +140,7 @@ def resolve_ephemeris(
     if epoch is None:
         what = 'missing; [ephemeris] needs the date of time 0, such as "2000-01-01T12:00:00 TDB" or "J2000"'
         raise ConfigError(Problem("[time] epoch", what))
-    if axes not in (None, ECLIPTIC, *_EQUATORIAL):
+    if axes not in (None, ECLIPTIC, *EQUATORIAL):
         what = (
             f'given "{axes}", which differs from the kernel\'s axes by the bias of 0.02 arcsec of the frame '
         )

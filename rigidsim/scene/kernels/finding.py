@@ -1,7 +1,7 @@
 """Where a kernel's file is: beside the config, or in folders that are named.
 
-A run's folder remembers the place of the file in ``.kernel``, which only says where to look: whether it is
-the same file, its SHA-256 tells. Workers of a sweep, which know no folder of a config, look where their
+A run's folder remembers the places of its files in ``.kernel``, which only says where to look: whether a file
+is the same, its SHA-256 tells. Workers of a sweep, which know no folder of a config, look where their
 parent found it.
 """
 
@@ -11,14 +11,13 @@ import os
 from pathlib import Path
 
 from rigidsim.scene.kernels.kernel import Kernel, KernelError
-from rigidsim.scene.kernels.reading import is_path, open_file, open_package
 
 FOLDERS = "RIGIDSIM_KERNELS"
 """Environment variable with folders in which kernels are looked for by their names."""
 EMBEDDED = " (embedded config)"
 """What follows a dataset's path where that stands for the config in it."""
 NOTE = ".kernel"
-"""File of a run's folder with the place of its kernel."""
+"""File of a run's folder with the places of its kernels."""
 _FOUND = "RIGIDSIM_KERNELS_FOUND"  # the same of a parent process, for its workers
 
 
@@ -28,40 +27,65 @@ def kernel_of(given: str, source: str) -> Kernel:
     Raises:
         KernelError: it isn't there, or can't be read.
     """
+    from rigidsim.scene.kernels.reading import is_path, open_file, open_package  # few scenes have a kernel
+
     if not is_path(given):
         try:
             return open_package(given)
         except KernelError as error:
-            beside = [x for x in _folders(source) if (x / f"{given}.bsp").is_file()]
+            beside = [x for x in _folders(source) if f"{given}.bsp" in _names(x)]
             hint = f'; the file beside the config is "./{given}.bsp"' if beside else ""
             raise KernelError(f"{error}{hint}") from None
-    path = _find(given, source).absolute()
+    stem = Path(given).stem
     try:
-        found = open_file(path)
+        path = find_file(given, source, "an SPK file")
+    except KernelError as error:
+        package = f'; the package is named without a suffix: "{stem}"' if _is_package(stem) else ""
+        raise KernelError(f"{error}{package}") from None
+    try:
+        return open_file(path)
     except OSError as error:
         raise KernelError(f"which can't be read ({error.strerror or error}): {path}") from None
-    known = os.environ.get(_FOUND, "").split(os.pathsep)
-    folder = str(path.parent)
+
+
+def find_file(given: str, source: str, what: str) -> Path:
+    """The absolute path of a kernel that is given by its own, and noted for workers; ``what`` it should be.
+
+    Raises:
+        KernelError: it isn't there.
+    """
+    path = _find(given, source, what).absolute()
+    known, folder = os.environ.get(_FOUND, "").split(os.pathsep), str(path.parent)
     os.environ[_FOUND] = os.pathsep.join([folder, *(x for x in known if x and x != folder)])
-    return found
+    return path
 
 
-def _find(given: str, source: str) -> Path:
+def _find(given: str, source: str, kind: str) -> Path:
     wanted, folders = Path(given).expanduser(), _folders(source)
     places = [wanted] if wanted.is_absolute() else [folder / wanted for folder in folders]
-    for path in [*places, *(folder / wanted.name for folder in folders)]:
-        if path.is_file():
-            return path
-    if any(path.is_dir() for path in places):
-        raise KernelError("which is a folder; the path of an SPK file is allowed")
+    try:
+        for path in [*places, *(folder / wanted.name for folder in folders)]:
+            if path.is_file():
+                return path
+        if any(path.is_dir() for path in places):
+            raise KernelError(f"which is a folder; the path of {kind} is allowed")
+    except OSError as error:  # names that no file system takes
+        raise KernelError(f"which can't be looked for ({error.strerror or error})") from None
     looked = ", ".join(dict.fromkeys(str(path.parent) for path in places))
-    stem = wanted.name.removesuffix(wanted.suffix)
-    package = f'; the package is named without a suffix: "{stem}"' if _is_package(stem) else ""
     what = f"which isn't there: looked for in {looked}; put it there, or name its folder in the environment "
-    raise KernelError(f"{what}variable {FOLDERS}{package}")
+    raise KernelError(f"{what}variable {FOLDERS}")
+
+
+def _names(folder: Path) -> set[str]:
+    try:
+        return {x.name for x in folder.iterdir()}
+    except OSError:
+        return set()
 
 
 def _is_package(name: str) -> bool:
+    from rigidsim.scene.kernels.reading import open_package
+
     try:
         open_package(name)
     except KernelError:
@@ -77,5 +101,6 @@ def _folders(source: str) -> list[Path]:
         found = [Path(x) for x in os.environ.get(_FOUND, "").split(os.pathsep) if x]
         return [Path.cwd(), *named, *found]
     noted = file.parent / NOTE
-    beside = [Path(noted.read_text(encoding="utf-8").strip()).parent] if noted.is_file() else []
+    lines = noted.read_text(encoding="utf-8").splitlines() if noted.is_file() else []
+    beside = [Path(line.strip()).parent for line in lines if line.strip()]
     return [file.parent, *named, *beside]

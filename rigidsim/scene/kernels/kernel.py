@@ -94,6 +94,30 @@ class Kernel(ABC):
 
     def sight(self, source: str, host: str) -> Sight:
         """One body seen from another; ``host`` may be empty, which is the solar system's barycentre."""
+        self._refuse_odd(*filter(None, (source, host)))
+        return self._seen(source, host)
+
+    def _refuse_odd(self, *bodies: str) -> None:
+        """Refuse bodies of the solar system that aren't where they can be."""
+        from rigidsim.scene.kernels.soundness import (
+            refuse_misplaced,
+            refuse_odd_moon,
+        )  # few scenes have a kernel
+
+        try:
+            for body in bodies:
+                found = self._seen(body, "")
+                refuse_misplaced(body, found.span, found.sampled)
+            if {"earth", "moon"} & set(bodies) and self.known("earth") and self.known("moon"):
+                found = self._seen("moon", "earth")
+                refuse_odd_moon(found.span, found.sampled)
+        except ValueError as error:
+            if isinstance(error, KernelError):
+                raise
+            what = f"whose positions are damaged, or those of other bodies ({error}); take the file anew"
+            raise KernelError(what) from None
+
+    def _seen(self, source: str, host: str) -> Sight:
         factors: dict[int, Fraction] = {}
         series: dict[int, BlockSeries] = {}
         paths = [(1, self.path_of(source)), *([(-1, self.path_of(host))] if host else [])]

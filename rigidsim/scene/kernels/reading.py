@@ -11,17 +11,19 @@ import importlib
 import importlib.util
 import re
 import struct
+import tokenize
 import zipfile
 from fractions import Fraction
 from functools import cached_property, lru_cache
 from pathlib import Path
-from types import ModuleType
+from types import ModuleType, SimpleNamespace
 from typing import Any
 
 import numpy as np
 
 from rigidsim.scene.kernels.kernel import DAY, J2000_DATE, Kernel, KernelError
 from rigidsim.scene.kernels.series import BlockSeries, joined
+from rigidsim.scene.kernels.soundness import refuse_constants, refuse_exchanged
 from rigidsim.scene.validation_messages import nearest
 
 _EXTRA = "pip install 'rigidsim[ephemeris]'"
@@ -38,9 +40,10 @@ _LARGEST_CACHED = 4
 _RECORD = 1024  # bytes, of SPK files
 _IDENTIFIERS = (b"DAF/SPK", b"NAIF/DAF")  # of SPK files today, and before 1997
 _UNREADABLE = (
-    OSError, EOFError, ValueError, TypeError, LookupError, ArithmeticError, AssertionError, struct.error,
+    OSError, EOFError, ValueError, TypeError, LookupError, ArithmeticError, AssertionError, AttributeError,
+    MemoryError, SyntaxError, struct.error, tokenize.TokenError, zipfile.BadZipFile,
 )  # fmt: skip
-"""What jplephem comes upon in files that aren't what they should be."""
+"""What jplephem and numpy come upon in files that aren't what they should be."""
 
 
 def _jplephem(part: str) -> ModuleType:
@@ -65,9 +68,11 @@ class PackagedKernel(Kernel):
     def __init__(self, name: str, folder: Path) -> None:
         self.name, self._folder = name, folder
         self._used: dict[str, BlockSeries] = {}
-        self._blocks = importlib.import_module(f"{name}")
+        # its files alone count: nothing of the package is run
+        module = SimpleNamespace(__name__=name, __file__=str(folder / "__init__.py"))
         try:
-            self._data = _jplephem("ephem").Ephemeris(self._blocks)
+            refuse_exchanged(name, folder / "constants.npy")
+            self._data = _jplephem("ephem").Ephemeris(module)
             self.constants = {
                 key: float(value)
                 for key, value in vars(self._data).items()
@@ -75,9 +80,10 @@ class PackagedKernel(Kernel):
             }
             self._begin, self._end = (Fraction(self.constants[key]) for key in ("jalpha", "jomega"))
             self._ratio = Fraction(self.constants["EMRAT"])
+            refuse_constants(self.constants, self.strength)
         except KernelError:
             raise
-        except (OSError, ValueError, EOFError, KeyError, AttributeError, zipfile.BadZipFile) as error:
+        except _UNREADABLE as error:
             raise KernelError(_damaged("constants.npy", error, f"install {name} again")) from None
 
     @property
@@ -90,13 +96,15 @@ class PackagedKernel(Kernel):
 
     def _series(self, file: str, target: str, center: str) -> BlockSeries:
         if target not in self._used:
+            path = self._folder / f"jpl-{file}.npy"
             try:
-                given = np.load(self._folder / f"jpl-{file}.npy", mmap_mode="r", allow_pickle=False)
+                given = np.load(path, mmap_mode="r", allow_pickle=False)
                 span = (self._end - self._begin) * DAY
-                if given.ndim != 3 or given.shape[1] != 3 or given.dtype != np.float64 or not len(given):
+                if given.ndim != 3 or given.shape[1] != 3 or given.dtype != np.float64 or 0 in given.shape:
                     raise ValueError(f"an array of {given.dtype} {given.shape}")
                 joined(given)
-            except (OSError, ValueError, EOFError) as error:
+                refuse_exchanged(self.name, path)
+            except _UNREADABLE as error:
                 remedy = f"install {self.name} again"
                 raise KernelError(_damaged(f"jpl-{file}.npy", error, remedy)) from None
             begin = (self._begin - J2000_DATE) * DAY
@@ -126,7 +134,7 @@ class PackagedKernel(Kernel):
     def digest(self) -> str:
         files = {"earth_moon": "earthmoon"}
         used = sorted(f"jpl-{files.get(x, x)}.npy" for x in self._used)
-        return _digest([self._folder / name for name in ["constants.npy", *used]])
+        return digest_of([self._folder / name for name in ["constants.npy", *used]])
 
 
 @lru_cache(maxsize=8)
@@ -139,7 +147,7 @@ def _digest_of(paths: tuple[tuple[str, int, int], ...]) -> str:
     return total.hexdigest()
 
 
-def _digest(paths: list[Path]) -> str:
+def digest_of(paths: list[Path]) -> str:
     """SHA-256 of files one after the other, read once per process as long as they don't change."""
     known = [(str(path), (found := path.stat()).st_size, found.st_mtime_ns) for path in paths]
     return _digest_of(tuple(known))
@@ -277,7 +285,7 @@ class SpkKernel(Kernel):
     @property
     def digest(self) -> str:
         assert self.place is not None
-        return _digest([self.place])
+        return digest_of([self.place])
 
 
 def _word(text: str) -> str:

@@ -1,0 +1,160 @@
+"""``[body] surfaces``: the body's outside as light and air meet it, the same for all loads.
+
+A plate is met from the side that its normal points to. A box is six plates, a plate with ``both_sides`` two;
+light and air reach each of them whatever stands before it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Annotated, Any
+
+from pydantic import Field, StrictBool
+
+from rigidsim.errors import ConfigError, Problem
+from rigidsim.scene.arithmetic import Vector, norm
+from rigidsim.scene.exact import ZERO, ExactNumber
+from rigidsim.scene.fields import ConfigTable, Dimensionless, InUnit, Metre, Triple
+
+Area = Annotated[ExactNumber, InUnit("m^2")]
+_DRAG = ExactNumber(Fraction(11, 5))
+_COEFFICIENTS = ("specular", "diffuse", "drag_coefficient")
+_BITS = 40  # to which shares that are written as decimals add up to 1
+_FORMS = {"plate": ("normal", "area", "both_sides"), "box": ("size",), "sphere": ("radius",)}
+
+
+class SurfaceTable(ConfigTable):
+    """A plate (``normal`` and ``area``), a box (``size``) or a sphere (``radius``) of the body's outside."""
+
+    normal: Triple[Dimensionless] | None = Field(None, examples=[[0, 0, 1]])
+    """of a plate: where its front looks, body axes, of any length"""
+    area: Area | None = Field(None, examples=["0.03 m^2"])
+    """of a plate"""
+    both_sides: StrictBool = False
+    """of a plate: whether its back is like its front; by default it has none"""
+    size: Triple[Metre] | None = Field(None, examples=[["10 cm", "10 cm", "34 cm"]])
+    """of a box: its edges along the body axes; six plates"""
+    radius: Metre | None = Field(None, examples=["30 cm"])
+    """of a sphere"""
+    position: Triple[Metre] | None = Field(None, examples=[[0, 0, "2 cm"]])
+    """its centre (of pressure), in body axes from the reference point; by default the centre of mass"""
+    specular: Dimensionless = ZERO
+    """share of light that is reflected as by a mirror"""
+    diffuse: Dimensionless = ZERO
+    """share of light that is scattered by Lambert's law; what is left of 1 is absorbed"""
+    drag_coefficient: Dimensionless = _DRAG
+    """of drag, for the area seen against the stream"""
+
+
+@dataclass(frozen=True)
+class OuterSurface:
+    """What plates and spheres have in common; numbers are mpf.
+
+    Attributes:
+        place: its key in ``[body]``.
+        area: of a plate, or the cross-section of a sphere, m^2.
+        position: from the reference point, body axes, m.
+    """
+
+    place: str
+    area: Any
+    position: Vector
+    specular: Any
+    diffuse: Any
+    drag_coefficient: Any
+
+
+@dataclass(frozen=True)
+class Plate(OuterSurface):
+    """A plate that is met from one side.
+
+    Attributes:
+        normal: as written, of any length.
+        side: -1 if it is met from behind.
+    """
+
+    normal: tuple[ExactNumber, ...]
+    side: int
+
+    def unit(self, context: Any) -> Vector:
+        """Unit vector to where it is met from, body axes."""
+        normal = [self.side * x.at(context) for x in self.normal]
+        length = norm(context, normal)
+        return [x / length for x in normal]
+
+
+@dataclass(frozen=True)
+class Ball(OuterSurface):
+    """A sphere."""
+
+
+def surfaces_of(
+    tables: Sequence[SurfaceTable] | None, center_of_mass: Vector, context: Any
+) -> tuple[OuterSurface, ...]:
+    """The surfaces of a body.
+
+    Raises:
+        ConfigError: a table that is none of the three, or has a number that makes no sense.
+    """
+    found: list[OuterSurface] = []
+    for number, table in enumerate(tables or []):
+        found += _of(table, f"surfaces[{number}]", center_of_mass, context)
+    return tuple(found)
+
+
+def _of(table: SurfaceTable, place: str, center_of_mass: Vector, context: Any) -> Iterator[OuterSurface]:
+    given = [form for form, keys in _FORMS.items() if table.model_fields_set & set(keys)]
+    if len(given) != 1:
+        what = f"given the keys of a {' and a '.join(given)}" if given else "given none of its forms"
+        raise _refusal(place, f"{what}; a plate (normal, area), a box (size) or a sphere (radius) is allowed")
+    for key in _COEFFICIENTS:
+        if getattr(table, key).sign < 0:
+            raise _refusal(f"{place}.{key}", f"given {float(getattr(table, key)):g}; zero or more is allowed")
+    if table.specular.at(context) + table.diffuse.at(context) > 1 + context.ldexp(context.one, -_BITS):
+        what = (
+            f"given {float(table.specular):g} beside diffuse = {float(table.diffuse):g}; shares of the light "
+        )
+        raise _refusal(f"{place}.specular", what + "add up to at most 1")
+    center = center_of_mass if table.position is None else [x.at(context) for x in table.position]
+    coefficients = {key: getattr(table, key).at(context) for key in _COEFFICIENTS}
+    if given == ["sphere"]:
+        radius = _positive(table.radius, f"{place}.radius", "radius", context)
+        yield Ball(place, context.pi * radius * radius, center, **coefficients)
+    elif given == ["box"]:
+        assert table.size is not None
+        names = [f"{place}.size[{i}]" for i in range(3)]
+        edges = [_positive(x, name, "edge", context) for x, name in zip(table.size, names, strict=True)]
+        # Torques about the centre add up to none: with edges a, areas A and normals n, forces along n act
+        # through it, and those along u give the sum of a A (n . u) n x u / 2, where a A is the same for all.
+        for i in range(3):
+            normal = tuple(ExactNumber(Fraction(i == j)) for j in range(3))
+            area = edges[i - 1] * edges[i - 2]
+            for side in (1, -1):
+                yield Plate(place, area, center, **coefficients, normal=normal, side=side)
+    else:
+        yield from _plates(table, place, center, coefficients, context)
+
+
+def _plates(
+    table: SurfaceTable, place: str, center: Vector, coefficients: Mapping[str, Any], context: Any
+) -> Iterator[Plate]:
+    if table.normal is None or all(x.sign == 0 for x in table.normal):
+        what = "missing" if table.normal is None else "given zero"
+        raise _refusal(f"{place}.normal", f"{what}; a plate needs the direction in which its front looks")
+    area = _positive(table.area, f"{place}.area", "area", context)
+    for side in (1, -1) if table.both_sides else (1,):
+        yield Plate(place, area, center, **coefficients, normal=tuple(table.normal), side=side)
+
+
+def _positive(number: ExactNumber | None, key: str, what: str, context: Any) -> Any:
+    if number is None:
+        raise _refusal(key, f"missing; a plate needs its {what}, a positive number")
+    if number.sign <= 0:
+        raise _refusal(key, f"given {float(number):g}; a positive {what} is allowed")
+    return number.at(context)
+
+
+def _refusal(key: str, text: str) -> ConfigError:
+    return ConfigError(Problem(f"[body] {key}", text))
