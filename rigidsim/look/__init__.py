@@ -10,7 +10,8 @@ Two folders load what draws, and are imported only where a picture is drawn: `ti
 | `figure_names` | their names, without any import |
 | `stages` | stages by kind of scene, as numbers; a package of its own |
 | `plots`, `page`, `states` | variables to plots; the summary page; lanes of events, and sections |
-| `signals` | a bounded number of rows of a dataset, and what they tell and show, recorded or worked out |
+| `thinning`, `signals` | a bounded number of rows of a dataset; what they tell and show |
+| `fits`, `librations` | secular parts, periods and ellipses; a body that turns one face to its source |
 | `surroundings` | what stands around the body, from the dataset's attributes |
 | `solids`, `symbols` | meshes of bodies; toy tops, globes with their continents, edges |
 | `viewer`, `film` | the viewer, also of a run that goes on; pictures and films of a timeline |

@@ -18,6 +18,7 @@ FIGURES: dict[str, str] = {
     "path": "path of the centre of mass",
     "rates": "angular velocity over time",
     "core": "axis and rate of a fluid core, from the mantle's, over time",
+    "published": "the rotation from a published orientation to the attitude, over time",
     "attitude": "Euler angles, or the body's z axis in space, and the nutation angle, over time",
     "states": "states of one's own ([[states]]) over time",
     SPECTRUM: "amplitude spectra of what the scene is about, their lines labelled (analyses the run first)",

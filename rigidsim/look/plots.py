@@ -61,10 +61,43 @@ class Plot:
     place: str
     series: list[Series] = field(default_factory=list)
     levels: list[Level] = field(default_factory=list)
+    window: int = 0  # rows about the cursor that are shown of a long fast motion; 0 for the whole run
 
     @property
     def range(self) -> tuple[float, float] | None:
-        """Limits for constant curves that don't magnify their rounding errors; None for other plots."""
+        """Limits for constant curves that don't magnify their rounding errors, and for those that the legend
+        would cover; None for other plots.
+        """
+        return self._beside_legend if self._still is None else self._still
+
+    @property
+    def _beside_legend(self) -> tuple[float, float] | None:
+        """Limits that leave room for the legend where it would cover curves: for drifts, which grow, at the
+        lower right, for others at the upper left.
+        """
+        tables = [series.values for series in self.series]
+        if self.place == "more" or len({len(table) for table in tables}) != 1 or not len(tables[0]):
+            return None
+        drift, rows = self.place == "drift", len(tables[0])
+        near = slice(-max(rows // 3, 1), None) if drift else slice(0, max(rows // 3, 1))
+        table = np.concatenate(tables, axis=1)
+        beside = table if self.window else table[near]
+        if not np.isfinite(table).any() or not np.isfinite(beside).any():
+            return None
+        low, high = float(np.nanmin(table)), float(np.nanmax(table))
+        low, high = min([low, *(x.value for x in self.levels)]), max([high, *(x.value for x in self.levels)])
+        lines = table.shape[1] + len(self.levels)
+        share = min((_LEGEND_LINE * lines + _LEGEND_FRAME) / _PLOT_HEIGHT, 0.6)
+        low_near, high_near = float(np.nanmin(beside)), float(np.nanmax(beside))
+        room = share * (high - low)
+        covered = low_near < low + room if drift else high_near > high - room
+        if lines < 2 or high == low or not covered:
+            return None
+        room, margin = (high - low) * share / (1 - share), 0.04 * (high - low)
+        return (low - room, high + margin) if drift else (low - margin, high + room)
+
+    @property
+    def _still(self) -> tuple[float, float] | None:
         if self.place == "drift" or not self.series:
             return None
         middles = []
@@ -108,7 +141,8 @@ def plan_plots(dataset: xarray.Dataset, leading: Sequence[str] = ()) -> list[Plo
         else:
             key, place = f"scalars {shown_unit}", "more"
             title = _with_unit(name.replace("_", " "), shown_unit)
-        plot = plots.setdefault(key, Plot(key, title[:1].upper() + title[1:], place))
+        window = int(variable.attrs.get("shown_rows", 0))
+        plot = plots.setdefault(key, Plot(key, title[:1].upper() + title[1:], place, window=window))
         series = _series(variable, len(plot.series), floor)
         if factor != 1.0:
             series = replace(series, values=series.values * factor)
@@ -173,6 +207,7 @@ def drift_floor(drifts: list[Array]) -> float:
     return max(float(np.percentile(nonzero, 2)) / 10, 1e-300) if len(nonzero) else 1e-20
 
 
+_LEGEND_LINE, _LEGEND_FRAME, _PLOT_HEIGHT = 23.0, 18.0, 250.0  # points of the screen, about
 _ORDER = ("leading", "more", "drift")
 _USUAL = ("angular_velocity", "euler_angles")
 MOST_LEADING = 3

@@ -1,4 +1,4 @@
-"""A dataset as pictures read it: a bounded number of rows, config, title, roles of variables, quantities.
+"""A dataset as pictures read it: config, title, roles of variables, quantities.
 
 Quantities are recorded ones by name, others derived from attitude and rates; all take a dataset in memory and
 give float64 arrays over its rows, or None if they can't be derived.
@@ -12,53 +12,9 @@ from typing import Any
 
 import numpy as np
 import xarray
-from numpy.typing import NDArray
 
 from rigidsim.look.solids import Array, rotation_matrix
 from rigidsim.look.surroundings import carries_within
-
-ROWS_AT_ONCE = 1 << 21
-
-
-def thinned_indices(count: int, rows: int) -> NDArray[np.int64]:
-    """Indices (R,) into `count` >= 1 rows, evenly strided, R <= `rows` >= 2, with the first and the last;
-    ``ValueError`` where these are out of range.
-    """
-    if count < 1:
-        raise ValueError("the dataset has no samples: nothing to show")
-    if rows < 2:
-        raise ValueError(f"rows must be at least 2 (the first and the last), given {rows}")
-    indices = np.arange(0, count, _stride(count, rows), dtype=np.int64)
-    return indices if indices[-1] == count - 1 else np.append(indices, count - 1)
-
-
-def thin(dataset: xarray.Dataset, rows: int) -> xarray.Dataset:
-    """The rows of `thinned_indices`, in memory, of variables along time; residuals are left out.
-
-    They are read from `ROWS_AT_ONCE` rows of the file at a time: memory goes with `rows`, not with the run's
-    length. ``ValueError`` without a `time` dimension or coordinate, or see `thinned_indices`.
-    """
-    if "time" not in dataset.dims or "time" not in dataset.coords:
-        raise ValueError("the dataset has no time coordinate: nothing to show along time")
-    count = dataset.sizes["time"]
-    thinned_indices(count, rows)  # refuses what can't be
-    along = {str(n): v for n, v in dataset.data_vars.items() if "time" in v.dims and v.dtype.kind in "fiub"}
-    wanted = dataset[[name for name, variable in along.items() if "residual_of" not in variable.attrs]]
-    stride = _stride(count, rows)
-    # A slice is a strided read in HDF5; a list of indices would be read index by index. Each read makes some
-    # kilobytes of notes for every chunk that it touches, hence pieces.
-    piece = stride * max(1, ROWS_AT_ONCE // stride)
-    slices = [slice(first, min(first + piece, count), stride) for first in range(0, count, piece)]
-    if (count - 1) % stride:
-        slices.append(slice(count - 1, count))
-    parts = [wanted.isel(time=part).load() for part in slices]
-    joined = xarray.concat(parts, dim="time", data_vars="all", combine_attrs="override")
-    return joined.transpose("time", ...)
-
-
-def _stride(count: int, rows: int) -> int:
-    return max(1, -(-(count - 1) // (rows - 1)))
-
 
 _ORBIT_NORM = re.compile(r"orbit_norm_(\d+)")
 _AVERAGED = ("spin_averaged", "orbit_averaged")  # model levels whose datasets have axes but no attitude
@@ -99,6 +55,9 @@ def is_averaged(attributes: Mapping[str, Any]) -> bool:
 
 
 NEAR_AXIS = 0.35  # largest polar motion (rad) shown as such; beyond it, the body tumbles
+_EQUATORIAL = ("ICRF", "GCRF", "EME2000")  # axes of the Earth's mean equator of J2000
+_OBLIQUITY = np.deg2rad(84381.406 / 3600)  # of the ecliptic to it (IAU 2006)
+_ALIKE_PLANES = 1e-5  # between unit normals of planes that have one name
 _ALIKE = 1e-9  # moments nearer than this are one
 _STEADY = 1e-6  # a momentum that turns by less is fixed
 _SPREAD = 1e-5  # of the energy, up to which it counts as constant: more than rounding in single precision
@@ -272,10 +231,43 @@ def steady_momentum(dataset: xarray.Dataset) -> Array | None:
     return np.asarray(directions.mean(axis=0) / np.linalg.norm(directions.mean(axis=0)))
 
 
+def reference_axes(dataset: xarray.Dataset) -> tuple[Array, str] | None:
+    """X', Y' and normal (3, 3), as rows, of the plane from which obliquities and longitudes count, and what
+    it is called; None for one that moves.
+
+    As ``[frame] reference`` says; where nothing says or was recorded against it, and space axes are those of
+    the Earth's equator, the ecliptic.
+    """
+    frame: Any = read_config(dataset).get("frame", {})
+    asked: Any = frame.get("reference") if isinstance(frame, dict) else None
+    if asked == "orbit":
+        return None
+    named = str(dataset.attrs.get("axes", ""))
+    ecliptic = np.array([0.0, -np.sin(_OBLIQUITY), np.cos(_OBLIQUITY)])
+    equatorial = named in _EQUATORIAL
+    normal = ecliptic if asked is None and equatorial and "obliquity" not in dataset else np.eye(3)[2]
+    if isinstance(asked, list):
+        try:
+            normal = np.array([float(x) for x in asked])
+            normal /= np.linalg.norm(normal)
+        except (TypeError, ValueError):  # expressions
+            return None
+    flat = named.startswith("ecliptic") and normal[2] == 1.0
+    seen_as = flat or (equatorial and float(norms((normal - ecliptic)[None])[0]) < _ALIKE_PLANES)
+    x, y, z = normal
+    first = (
+        np.array([1.0, 0.0, 0.0])
+        if x == 0 and y == 0
+        else np.array([1 - x * x / (1 + z), -x * y / (1 + z), -x])
+    )
+    return np.stack([first, np.cross(normal, first), normal]), "ecliptic" if seen_as else "plane of reference"
+
+
 def orientation(dataset: xarray.Dataset, axis: str) -> tuple[Array, Array] | None:
     """Obliquity and node longitude (rows,) each, rad, of the axis named figure, spin or momentum.
 
-    As recorded; otherwise against the XY plane of space, with a continuous longitude of the ascending node.
+    As recorded; otherwise against the plane of `reference_axes`, or XY of space where that moves, with a
+    continuous longitude of the ascending node.
     """
     if "obliquity" in dataset and "node_longitude" in dataset and "axis" in dataset["obliquity"].coords:
         names = [str(label) for label in dataset["obliquity"].coords["axis"].values]
@@ -289,7 +281,8 @@ def orientation(dataset: xarray.Dataset, axis: str) -> tuple[Array, Array] | Non
     directions = pole(dataset, axis)
     if directions is None:
         return None
-    x, y, z = directions.T
+    plane = reference_axes(dataset)
+    x, y, z = directions.T if plane is None else turned(directions, plane[0]).T
     tilt = np.arctan2(np.hypot(x, y), z)
     longitude = np.arctan2(x, -y)
     finite = np.isfinite(longitude)

@@ -6,6 +6,7 @@ Longitude zero is the body's x axis, as `rigidsim`'s Earth, whose equatorial mom
 
 from functools import lru_cache
 from importlib.resources import files
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -58,6 +59,37 @@ def graticule(half_sizes: Array, step: float = 30.0, lift: float = 1.004) -> lis
             np.stack([flat * np.cos(around), flat * np.sin(around), np.full(97, np.sin(latitude))], axis=1)
         )
     return [line * half_sizes * lift for line in lines]
+
+
+_MARIA = (  # longitude, latitude (deg) and diameter (km) of the round ones: IAU's Gazetteer, rounded
+    *((-16, 33, 1100), (18, 27, 670), (31, 9, 870), (59, 16, 520), (53, -8, 800), (35, -15, 340)),
+    *((-39, -24, 420), (-17, -21, 700), (-22, -10, 350), (4, 13, 240), (82, 57, 230), (-95, -20, 290)),
+    *((87, -2, 370), (86, 13, 360), (-55, 18, 1200)),
+)
+_MOON, _MARE = 1737.4, (118, 117, 114)
+
+
+def maria() -> Mesh:
+    """The Moon's larger dark plains as discs on the unit sphere, the axis of least moment x at 0 deg."""
+    corners = []
+    around = np.linspace(0, 2 * np.pi, 33)
+    for longitude, latitude, size in _MARIA:
+        lon, lat = np.deg2rad(longitude), np.deg2rad(latitude)
+        middle = np.array([np.cos(lat) * np.cos(lon), np.cos(lat) * np.sin(lon), np.sin(lat)])
+        east = np.array([-np.sin(lon), np.cos(lon), 0.0])
+        north = np.cross(middle, east)
+        rings = [
+            np.cos(r) * middle
+            + np.sin(r) * (np.cos(around)[:, None] * east + np.sin(around)[:, None] * north)
+            for r in np.linspace(0.0, size / 2 / _MOON, 6)
+        ]
+        for inner, outer in pairwise(rings):
+            corners += [np.stack([inner[:-1], outer[:-1], outer[1:]], axis=1)]
+            corners += [np.stack([inner[:-1], outer[1:], inner[1:]], axis=1)]
+    points = np.concatenate(corners).reshape(-1, 3)
+    triangles = np.arange(len(points), dtype=np.uint32).reshape(-1, 3)
+    colors = np.tile(np.array(_MARE, dtype=np.uint8), (len(points), 1))
+    return Mesh(1.002 * points, triangles, points, colors)
 
 
 def sharp_edges(mesh: Mesh) -> Array:

@@ -316,7 +316,7 @@ def test_unknown_and_impossible_figures_are_refused_with_those_there_are(symmetr
         figures.figure(symmetric_top(), "polhod")
     with pytest.raises(
         ValueError,
-        match="needs libration, roll_pitch_yaw or nadir recorded, which this run hasn't; it has overview",
+        match="needs libration, roll_pitch_yaw, nadir or source_position recorded, which this run hasn't",
     ):
         figures.figure(symmetric_top(), "libration")
     with pytest.raises(ValueError, match=r"rigidsim\.analyse\(run\)\.figure"):

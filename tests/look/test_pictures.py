@@ -49,7 +49,10 @@ def space_picture(viewer: HeadlessViewer, share: float) -> np.ndarray:
     from matplotlib.image import imread
 
     views = [view for view in viewer.client.get_state().views if view.view_class == "3D"]
-    leading = next((v for v in views if v.origin.startswith("/scene")), views[0])
+    # The disc as its planet sees it stands before the scene, whose tab is then hidden.
+    leading = min(
+        views, key=lambda view: (not view.origin.startswith("/face"), not view.origin.startswith("/scene"))
+    )
     viewer.seek(share)
     before = b""
     for _ in range(40):

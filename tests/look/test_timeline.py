@@ -13,7 +13,7 @@ pytest.importorskip("rerun")
 
 import rigidsim
 from rigidsim.look.plots import plan_plots
-from rigidsim.look.signals import thin
+from rigidsim.look.thinning import thin
 from rigidsim.look.timeline import write_timeline
 from rigidsim.look.timeline.writing import CHUNK
 from rigidsim.store.variables import parts_in

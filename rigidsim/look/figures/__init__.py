@@ -11,7 +11,7 @@ panels (``panel.Panel``: what it finds in a dataset, and how that is drawn).
 | `timelines`, `drift` | panels over time |
 | `poles`, `polhode` | where axes point, and a body's path; polhode, herpolhode, Poinsot's motion |
 | `eye` | bodies in three dimensions on plain axes |
-| `fits` | secular parts, periods and ellipses for labels |
+| `librations` | panels of a body that turns one face to its source |
 | `style` | colours, fonts, the page's heading, keys |
 | `spectrum`, `work_precision`, `sweep_maps`, `sweep_axes` | figures of `analyse`, `tradeoff` and `sweep` |
 """

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 
 from rigidsim.look import signals
 from rigidsim.look.figure_names import FIGURES, OVERVIEW, SPECTRUM
-from rigidsim.look.figures import changing, gyrostat, librations, poles, polhode, timelines
+from rigidsim.look.figures import changing, gyrostat, librations, poles, polhode, published, timelines
 from rigidsim.look.figures.composing import compose, shown_rows
 from rigidsim.look.figures.drift import drift
 from rigidsim.look.figures.panel import Panel
@@ -48,9 +48,15 @@ KINDS: dict[str, Kind] = {
     ),
     "obliquity": Kind(_AXIS, [timelines.obliquity, timelines.longitude]),
     "libration": Kind(
-        "libration, roll_pitch_yaw or nadir recorded",
-        [librations.longitude, librations.latitude, timelines.libration, timelines.roll_pitch_yaw],
-        [poles.nadir, poles.phases],
+        "libration, roll_pitch_yaw, nadir or source_position recorded",
+        [
+            librations.longitude,
+            librations.latitude,
+            librations.locking,
+            timelines.libration,
+            timelines.roll_pitch_yaw,
+        ],
+        [librations.nadir, librations.phases, librations.locking_phases],
     ),
     "tip": Kind(
         "a top: a body on a fixed point under uniform gravity",
@@ -70,6 +76,10 @@ KINDS: dict[str, Kind] = {
     "core": Kind(
         "a fluid core whose rate was recorded, and that of the mantle",
         [changing.core_axis, changing.core_slip],
+    ),
+    "published": Kind(
+        "a published orientation ([output] orientation) beside the attitude",
+        [published.angles, published.rotation],
     ),
     "attitude": Kind(_ATTITUDE, [timelines.attitude, timelines.wobble]),
     "states": Kind("states of one's own ([[states]]) recorded", changing.OWN_STATES),
@@ -151,10 +161,12 @@ def _of_body(rows: xarray.Dataset) -> tuple[Sequence[Panel], Sequence[Panel]]:
         swinging = [timelines.libration, timelines.roll_pitch_yaw]
         if librations.latitude.shows(rows):  # its figure axis precesses, as the Moon's
             swinging = [librations.longitude, librations.latitude, timelines.libration]
-        return swinging, [poles.nadir, *(moving or [poles.phases])]
+        return swinging, [librations.nadir, *(moving or [librations.phases])]
     if signals.is_top(rows):
         turning = timelines.precession if timelines.precession.shows(rows) else timelines.attitude
         return [timelines.tilt, turning], [poles.tip]
+    if librations.locking.shows(rows):
+        return [timelines.rates, librations.locking], [*moving, librations.locking_phases]
     if changing.core_axis.shows(rows):
         tilting = [changing.core_axis, changing.core_slip]
         precessing = poles.precesses(rows) or not signals.near_axis(rows)
@@ -165,8 +177,8 @@ def _of_body(rows: xarray.Dataset) -> tuple[Sequence[Panel], Sequence[Panel]]:
         return [timelines.wobble, timelines.rates], [*moving, poles.polar_motion]
     if signals.near_axis(rows):
         if poles.precesses(rows) and not moving:
-            return tilting, [poles.nutation, poles.pole_path]
-        return [timelines.polar_motion], [poles.polar_motion, *moving]
+            return [timelines.braking, *tilting], [poles.nutation, poles.pole_path]
+        return [timelines.braking, timelines.polar_motion], [poles.polar_motion, *moving]
     if moving:
         return attitude, [*moving, polhode.polhode]
     if not any(panel.shows(rows) for panel in attitude):  # only axes are known, as of an averaged model
@@ -179,7 +191,7 @@ def _of_body(rows: xarray.Dataset) -> tuple[Sequence[Panel], Sequence[Panel]]:
 
 def librates(dataset: xarray.Dataset) -> bool:
     """Whether the body keeps its attitude to its orbit: the source stays near one body direction."""
-    nadir = signals.values(dataset, "nadir")
+    nadir = librations.toward(dataset)
     if nadir is None:
         return signals.values(dataset, "libration") is not None
     finite = signals.finite_rows(nadir)

@@ -14,7 +14,8 @@ from rigidsim.look.figures import timelines
 from rigidsim.look.figures.panel import Panel
 from rigidsim.look.figures.style import GREY, INK, STYLE, blank
 from rigidsim.look.page import largest_drift
-from rigidsim.look.signals import by_role, is_averaged, read_config, thin
+from rigidsim.look.signals import by_role, is_averaged, read_config
+from rigidsim.look.thinning import thin
 from rigidsim.scene.readable import unit_for
 
 ROWS, FULL_READ = 20_000, 2_000_000  # that a figure draws; that are read for the largest drift

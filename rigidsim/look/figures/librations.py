@@ -1,90 +1,20 @@
-"""Physical librations of a body that turns one face to its source: in longitude, and of its figure axis.
-
-The normal is that of the cone on which the figure axis precesses, or the mean figure axis where it doesn't.
-With phi the longitude of the node of the body's equator, theta its inclination and psi the angle from the
-node to the axis of least moment, the libration in longitude is phi + psi less its mean motion (it has no
-second order in theta), and those in latitude are theta and phi sin theta less theirs (Eckhardt 1981, The Moon
-and the Planets 25, 3: tau, rho and I sigma).
-"""
+"""Panels of a body that turns one face to its source: librations, the source seen from it, phases."""
 
 from __future__ import annotations
-
-from dataclasses import dataclass
 
 import numpy as np
 import xarray
 from matplotlib.axes import Axes
 
 from rigidsim.look import signals
-from rigidsim.look.figures.fits import secular
-from rigidsim.look.figures.panel import panel
-from rigidsim.look.figures.style import BLUE, ORANGE, VIOLET
+from rigidsim.look.figures import timelines
+from rigidsim.look.figures.panel import angle_scale, panel
+from rigidsim.look.figures.poles import flat, path_about
+from rigidsim.look.figures.style import BLUE, ORANGE, VIOLET, curve, key, titled
 from rigidsim.look.figures.timelines import angles_over_time
-from rigidsim.look.solids import Array, rotation_matrix
-
-_FACING = 0.7  # cosine between the axis of least moment and the source
-_ROUND = 0.3  # second over first extent of the figure axis' path, from which it is a cone's
-_REGULAR = 0.3  # of the mean inclination, by which it may change for the node to be regular
-
-
-@dataclass(frozen=True)
-class Librations:
-    """Angles (rows,), rad: longitude less its mean motion; inclination less its mean, and the node less its
-    mean motion times the inclination's sine, which are None where the figure axis doesn't precess.
-    """
-
-    longitude: Array
-    inclination: Array | None
-    node: Array | None
-
-
-def librations(dataset: xarray.Dataset) -> Librations | None:
-    """Those of a dataset; None of a body that doesn't turn one face to its source."""
-    quaternion, rates = signals.values(dataset, "quaternion"), signals.values(dataset, "angular_velocity")
-    found, seconds = signals.moments(dataset), signals.seconds(dataset)
-    if quaternion is None or rates is None or found is None or not _faces(dataset) or len(seconds) < 3:
-        return None
-    axes = signals.principal_axes(dataset)
-    long, figure = axes[found.argmin()], axes[found.argmax()]
-    figure = figure * np.sign(np.nanmean(rates @ figure))
-    matrix = rotation_matrix(quaternion)
-    pole, first, second = (matrix @ vector for vector in (figure, long, np.cross(figure, long)))
-    normal, precesses = _normal(pole)
-    e1, e2 = signals.across(normal)
-    turned = np.arctan2(first @ e2 - second @ e1, first @ e1 + second @ e2)
-    rate = rates @ figure
-    between = np.diff(seconds) * (rate[1:] + rate[:-1]) / 2
-    counted = np.concatenate([[0.0], np.cumsum(between)])
-    longitude = counted + np.unwrap(turned - counted)
-    inclination = node = None
-    if precesses:
-        tilt = np.arctan2(np.hypot(pole @ e1, pole @ e2), pole @ normal)
-        mean = float(tilt.mean())
-        if np.ptp(tilt) < _REGULAR * mean:
-            inclination = tilt - mean
-            line = np.unwrap(np.arctan2(pole @ e1, -(pole @ e2)))
-            node = (line - secular(seconds, line).at(seconds)) * np.sin(mean)
-    return Librations(longitude - secular(seconds, longitude).at(seconds), inclination, node)
-
-
-def _faces(dataset: xarray.Dataset) -> bool:
-    """Whether the axis of least moment stays near the source, or opposite to it."""
-    swing, nadir = signals.values(dataset, "libration"), signals.values(dataset, "nadir")
-    if nadir is not None:
-        found = signals.moments(dataset)
-        assert found is not None
-        cosine = nadir @ signals.principal_axes(dataset)[found.argmin()]
-        return bool(np.nanmin(np.abs(cosine)) > _FACING)
-    return swing is not None and bool(np.nanmin(np.abs(np.cos(swing).prod(axis=1))) > _FACING)
-
-
-def _normal(pole: Array) -> tuple[Array, bool]:
-    """Unit normal (3,) from which inclinations count, and whether the poles (rows, 3) precess about it."""
-    mean = pole.mean(axis=0) / np.linalg.norm(pole.mean(axis=0))
-    _, extent, ways = np.linalg.svd(pole - pole.mean(axis=0), full_matrices=False)
-    if extent[1] < _ROUND * extent[0] or extent[2] > _ROUND * extent[1]:
-        return mean, False
-    return ways[2] * np.sign(ways[2] @ mean), True
+from rigidsim.look.librations import Librations, librations, seen, toward
+from rigidsim.look.solids import Array
+from rigidsim.scene.readable import si_scale
 
 
 @panel(librations)
@@ -108,3 +38,88 @@ def latitude(axes: Axes, dataset: xarray.Dataset, found: tuple[Array, Array]) ->
     title = "Physical librations in latitude"
     table = np.stack(found, axis=1)
     angles_over_time(axes, dataset, table, title, hues=(ORANGE, VIOLET), labels=labels, word="angle")
+    for line in axes.lines:  # both swing in a month: over many years the one would cover the other
+        line.set(alpha=0.6, linewidth=0.7)
+
+
+@panel(toward)
+def nadir(axes: Axes, dataset: xarray.Dataset, directions: Array) -> None:
+    """Direction of the source in body axes, about its mean direction."""
+    mean = np.nanmean(directions, axis=0)
+    k = int(np.abs(mean).argmax())  # the body axis that it is near to
+    i, j = (k + 1) % 3, (k + 2) % 3
+    plane = flat(*(directions[:, [i, j, k]] * np.sign(mean[k])).T)
+    scale, unit = angle_scale(plane)
+    sign = "" if mean[k] > 0 else "−"
+    labels = (f"towards {sign}{'xyz'[axis]} [{unit}]" for axis in (i, j))
+    path_about(axes, plane / scale, *labels)
+    key(axes, f"The source seen from the body (+: {sign}{'xyz'[k]} axis)")
+
+
+_LAST_TURNS = 10  # before a body is locked, in the phase plane
+
+
+def _swinging(dataset: xarray.Dataset) -> tuple[Array, tuple[str, ...]] | None:
+    """Angles of libration (rows, 2), or roll, pitch and yaw (rows, 3), rad, and their names."""
+    swings = timelines.swings(dataset)
+    if swings is not None:
+        return swings[0], ("in the orbit's plane", "out of it")
+    table = timelines.regular(dataset)
+    return None if table is None else (table, ("roll", "pitch", "yaw"))
+
+
+@panel(_swinging)
+def phases(axes: Axes, dataset: xarray.Dataset, found: tuple[Array, tuple[str, ...]]) -> None:
+    """Rates of libration, or of roll, pitch and yaw, against the angles; librations are closed curves."""
+    table, names = found
+    rate = np.gradient(table, signals.seconds(dataset), axis=0)
+    scale, unit = angle_scale(table)
+    speed, speed_unit = si_scale(rate, "rad/s")
+    for k, (name, hue) in enumerate(zip(names, (BLUE, ORANGE, VIOLET), strict=False)):
+        curve(axes, table[:, k] / scale, rate[:, k] / speed, in_plane=True, color=hue, lw=0.8, label=name)
+    axes.set(xlabel=f"angle [{unit}]", ylabel=f"rate [{speed_unit}]")
+    key(axes, "Phase planes")
+
+
+def _locked(dataset: xarray.Dataset) -> Array | None:
+    """Longitude (rows,), rad, turns counted, under a source that a body faces in the end alone."""
+    found, rates = seen(dataset), signals.values(dataset, "angular_velocity")
+    if found is None or rates is None or not np.isfinite(found.directions).all():
+        return None
+    last = slice(-max(len(found.directions) // 10, 2), None)
+    if found.stays() or not found.stays(last):
+        return None
+    longitude = found.coordinates(signals.figure_direction(dataset))[:, 0]
+    steps = np.abs(np.diff(longitude))
+    return (
+        longitude - 2 * np.pi * np.round(np.mean(longitude[last]) / (2 * np.pi)) if steps.max() < 3 else None
+    )
+
+
+@panel(_locked)
+def locking(axes: Axes, dataset: xarray.Dataset, longitude: Array) -> None:
+    """Turns of the body before its source, until it keeps one face to it."""
+    timelines.lines(axes, dataset, longitude[:, None] / (2 * np.pi), [None], (BLUE,))
+    axes.set_ylabel("longitude [turns]")
+    key(axes, "The point under the source, until the rotation is locked")
+
+
+@panel(_locked)
+def locking_phases(axes: Axes, dataset: xarray.Dataset, longitude: Array) -> None:
+    """Rotation relative to the source against longitude within a turn: waves, and in the end a whirl."""
+    rates = signals.values(dataset, "angular_velocity")
+    assert rates is not None
+    last = slice(-max(len(longitude) // 10, 2), None)
+    middle, rate = float(np.mean(longitude[last])), rates @ signals.figure_direction(dataset)
+    rate = rate - np.mean(rate[last])
+    rest = slice(int(np.argmax(np.abs(longitude - middle) < 2 * np.pi * _LAST_TURNS)), None)
+    speed, unit = si_scale(rate[rest], "rad/s")
+    centre = np.degrees(np.remainder(middle + np.pi / 4, 2 * np.pi) - np.pi / 4) // 10 * 10
+    within = np.degrees(np.remainder(longitude[rest] - middle + np.pi, 2 * np.pi) - np.pi) + np.degrees(
+        middle
+    )
+    within += 360 * np.round((centre - np.degrees(middle)) / 360)
+    shades = np.linspace(0, 1, len(within))
+    axes.scatter(within, rate[rest] / speed, c=shades, cmap="plasma", s=4, lw=0, rasterized=True)
+    axes.set(xlabel="longitude under the source [deg]", ylabel=f"spin less that in the end [{unit}]")
+    titled(axes, "Until it is locked (lighter: later)")

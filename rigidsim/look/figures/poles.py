@@ -1,14 +1,14 @@
-"""Square panels: where axes point (polar motion, pole, nutation, top, libration), and paths of bodies."""
+"""Square panels: where axes point (polar motion, pole, nutation, top), and paths of bodies."""
 
 import numpy as np
 import xarray
 from matplotlib.axes import Axes
 
-from rigidsim.look import signals
+from rigidsim.look import fits, signals
 from rigidsim.look.figures import eye as eyes
-from rigidsim.look.figures import fits, style, timelines
+from rigidsim.look.figures import style, timelines
 from rigidsim.look.figures.panel import angle_scale, angle_text, panel, recorded
-from rigidsim.look.figures.style import BLUE, INK, ORANGE, VIOLET, Z, curve, key, square, titled
+from rigidsim.look.figures.style import INK, Z, curve, key, square, titled
 from rigidsim.look.solids import Array
 from rigidsim.scene.readable import si_scale, span_text
 
@@ -62,7 +62,7 @@ def pole_paths(dataset: xarray.Dataset) -> tuple[dict[str, Array], str, str] | N
         for name in ("figure", "spin", "core"):
             axis = signals.pole(dataset, name)
             if axis is not None:
-                paths[name] = _flat(axis @ first, axis @ second, axis @ along)
+                paths[name] = flat(axis @ first, axis @ second, axis @ along)
         return (paths, "momentum", "Path of the figure axis in space") if paths else None
     for name in ("figure", "momentum"):
         found = signals.orientation(dataset, name)
@@ -77,7 +77,7 @@ def pole_paths(dataset: xarray.Dataset) -> tuple[dict[str, Array], str, str] | N
     return (paths, "reference pole", "Path of the pole in space") if paths else None
 
 
-def _flat(x: Array, y: Array, z: Array) -> Array:
+def flat(x: Array, y: Array, z: Array) -> Array:
     """Directions (rows,) each as points (rows, 2) whose distance from the centre is the angle from z, rad."""
     plane = np.stack([x, y], axis=1)
     size = np.linalg.norm(plane, axis=1)
@@ -192,42 +192,6 @@ def tip(axes: Axes, dataset: xarray.Dataset, found: tuple[Array, str, str]) -> N
     names = ("X", "Y") if np.allclose(up, [0, 0, 1]) else ("across", "across")
     path_about(axes, plane / scale, names[0] + label, names[1] + label)
     key(axes, f"{what}, seen from above (+: vertical)")
-
-
-@panel(recorded("nadir"))
-def nadir(axes: Axes, dataset: xarray.Dataset, directions: Array) -> None:
-    """Direction of the source in body axes, about its mean direction."""
-    mean = np.nanmean(directions, axis=0)
-    k = int(np.abs(mean).argmax())  # the body axis that it is near to
-    i, j = (k + 1) % 3, (k + 2) % 3
-    plane = _flat(*(directions[:, [i, j, k]] * np.sign(mean[k])).T)
-    scale, unit = angle_scale(plane)
-    sign = "" if mean[k] > 0 else "−"
-    labels = (f"towards {sign}{'xyz'[axis]} [{unit}]" for axis in (i, j))
-    path_about(axes, plane / scale, *labels)
-    key(axes, f"The source seen from the body (+: {sign}{'xyz'[k]} axis)")
-
-
-def _swinging(dataset: xarray.Dataset) -> tuple[Array, tuple[str, ...]] | None:
-    """Angles of libration (rows, 2), or roll, pitch and yaw (rows, 3), rad, and their names."""
-    swings = timelines.swings(dataset)
-    if swings is not None:
-        return swings[0], ("in the orbit's plane", "out of it")
-    table = timelines.regular(dataset)
-    return None if table is None else (table, ("roll", "pitch", "yaw"))
-
-
-@panel(_swinging)
-def phases(axes: Axes, dataset: xarray.Dataset, found: tuple[Array, tuple[str, ...]]) -> None:
-    """Rates of libration, or of roll, pitch and yaw, against the angles; librations are closed curves."""
-    table, names = found
-    rate = np.gradient(table, signals.seconds(dataset), axis=0)
-    scale, unit = angle_scale(table)
-    speed, speed_unit = si_scale(rate, "rad/s")
-    for k, (name, hue) in enumerate(zip(names, (BLUE, ORANGE, VIOLET), strict=False)):
-        curve(axes, table[:, k] / scale, rate[:, k] / speed, in_plane=True, color=hue, lw=0.8, label=name)
-    axes.set(xlabel=f"angle [{unit}]", ylabel=f"rate [{speed_unit}]")
-    key(axes, "Phase planes")
 
 
 _FLAT = 1e-3  # of a path's reach: it lies in a plane up to this thickness

@@ -18,8 +18,8 @@ from rigidsim.look.figures import eye as eyes
 from rigidsim.look.figures.panel import number, panel
 from rigidsim.look.figures.poles import path_about
 from rigidsim.look.figures.style import GREY, PINK, Z, key, titled
-from rigidsim.look.signals import thinned_indices
 from rigidsim.look.solids import Array, rotation_matrix
+from rigidsim.look.thinning import thinned_indices
 from rigidsim.scene.readable import si_scale
 
 ENERGY_SURFACE, MOMENTUM_SURFACE = "#b9cde6", "#f0d3ae"

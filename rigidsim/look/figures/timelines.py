@@ -8,9 +8,9 @@ import xarray
 from matplotlib.axes import Axes
 
 from rigidsim.look import signals
-from rigidsim.look.figures.fits import secular
 from rigidsim.look.figures.panel import angle_scale, angle_text, clock, number, panel, recorded
 from rigidsim.look.figures.style import BLUE, GREY, ORANGE, PALETTE, PINK, VIOLET, X, Y, Z, curve, key
+from rigidsim.look.fits import secular
 from rigidsim.look.solids import Array
 from rigidsim.scene.readable import DAY, named_unit, si_scale, span_text, unit_for
 

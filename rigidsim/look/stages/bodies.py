@@ -10,7 +10,7 @@ import xarray
 
 from rigidsim.look import signals, surroundings
 from rigidsim.look.signals import read_config, values
-from rigidsim.look.solids import Mesh, body_meshes, point_positions, rotation_matrix
+from rigidsim.look.solids import Mesh, ball, body_meshes, point_positions, rotation_matrix
 from rigidsim.look.stages import parts
 from rigidsim.look.stages.parts import Array, Arrow, Camera, Stage, Trail
 from rigidsim.scene.bodies.presets import KnownBody
@@ -20,6 +20,7 @@ USUAL_VIEW = (float(np.deg2rad(24.0)), float(np.deg2rad(-55.0)))
 """Elevation and azimuth (rad) of the eye where nothing asks for another."""
 NEAR = 6.0  # reaches: a body that moves further gets a track view of its own
 DISTANT = 30.0  # extents from the origin, beyond which the picture has an origin of its own
+_WEAK = 1e-3  # of the strongest tide
 TRACK_BODY = 0.08  # reach of the enlarged body in the track view
 _FLAT = 0.12  # of the other extents, below which a body is a plate
 
@@ -44,6 +45,10 @@ class Subject:
         """The body of a dataset in memory; ``ValueError`` for an unreadable ``drawing``."""
         drawing = dataset.attrs.get("drawing")
         meshes = body_meshes(drawing)
+        solids = json.loads(drawing) if drawing else []
+        host = _globe_of_host(dataset) if solids and solids[0].get("equivalent") else None
+        if host is not None:  # known by its moments alone, but by its name as well
+            meshes, solids = [ball(host.radius, host.radius, host.radius)], [_sphere(host)]
         reach = max(mesh.reach() for mesh in meshes)
         quaternion = column(dataset, "quaternion", 4)
         return cls(
@@ -53,7 +58,7 @@ class Subject:
             quaternion=quaternion,
             attitude=None if quaternion is None else rotation_matrix(quaternion),
             position=column(dataset, "position", 3),
-            solids=json.loads(drawing) if drawing else [],
+            solids=solids,
         )
 
     def stage(self, arrows: list[Arrow], trails: list[Trail], title: str = "") -> Stage:
@@ -89,6 +94,17 @@ class Subject:
         corners = np.concatenate([mesh.vertices for mesh in self.meshes])
         _, spread, axes = np.linalg.svd(corners - corners.mean(axis=0), full_matrices=False)
         return axes[2] if spread[2] < _FLAT * spread[1] else None
+
+
+def _globe_of_host(dataset: xarray.Dataset) -> KnownBody | None:
+    """The known body that a kernel's scene is about."""
+    config = read_config(dataset)
+    body = config.get("body", {})
+    return surroundings.named_body(str(body.get("host", ""))) if "ephemeris" in config else None
+
+
+def _sphere(body: KnownBody) -> dict[str, Any]:
+    return {"solid": "sphere", "dimensions": {"radius": body.radius}, "name": body.name.lower()}
 
 
 def column(dataset: xarray.Dataset, name: str, width: int) -> Array | None:
@@ -145,9 +161,19 @@ def vectors_of(
 
 
 def source_arrows(dataset: xarray.Dataset, subject: Subject, length: float) -> list[Arrow]:
-    """Directions in space to attracting bodies: from orbits, recorded point masses, or the recorded nadir."""
+    """Directions in space to attracting bodies: from orbits, recorded point masses, or the recorded nadir.
+
+    Of sources those are left out whose tide is below a thousandth of the strongest one's.
+    """
     arrows = []
-    for key, body, name, path in [*_masses(dataset), *_sources(dataset, subject)]:
+    sources, strength = list(_sources(dataset, subject)), {}
+    for key, one in zip(
+        (f"source{k}" for k in range(99)), surroundings.told(dataset, "source"), strict=False
+    ):
+        strength[key] = float(one.get("gravitational_parameter") or 0.0)
+    tides = [strength[key] / float(np.nanmean(signals.norms(path) ** 3)) for key, _, _, path in sources]
+    seen = [one for one, tide in zip(sources, tides, strict=True) if tide >= _WEAK * max(tides)]
+    for key, body, name, path in [*_masses(dataset), *seen]:
         way = length * path / np.linalg.norm(path, axis=1, keepdims=True)
         called, color = surroundings.called(body, name), surroundings.color_of(body, parts.SOURCE)
         arrows.append(Arrow(key, f"to {called}", color, way, False, f"direction of {called}"))

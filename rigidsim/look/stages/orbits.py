@@ -13,6 +13,7 @@ from rigidsim.look.stages.parts import SPACE, Array, Arrow, Camera, Line, Pictur
 from rigidsim.look.surroundings import called, color_of
 from rigidsim.look.symbols import globe, graticule
 from rigidsim.scene.bodies.presets import KnownBody
+from rigidsim.scene.rotations import quaternion_of
 
 _Planet = KnownBody | None
 ORBIT_BODY = 0.11  # reach of the enlarged body, in units of the orbit's largest distance
@@ -58,7 +59,7 @@ def satellite(dataset: xarray.Dataset, subject: Subject) -> Picture | None:
         angles = column(dataset, "roll_pitch_yaw", 3)
         if angles is None or not np.isfinite(angles).all():
             return None
-        quaternion = parts.quaternion_of(local @ _turned(angles))
+        quaternion = quaternion_of(local @ _turned(angles))
     planet = surroundings.body_of(listed[0])
     known = replace(subject, quaternion=quaternion, attitude=rotation_matrix(quaternion))
     notes = ["in the local frame the planet's surface is drawn near the body, and not to scale"]
@@ -151,7 +152,7 @@ def _in_local_frame(dataset: xarray.Dataset, subject: Subject, local: Array, pla
             Vector(key, label, color, np.zeros(3), np.array(way), "local", words)
             for key, label, color, way, words in vectors
         ],
-        frames={"local": parts.viewer_quaternion(parts.quaternion_of(local))},
+        frames={"local": parts.viewer_quaternion(quaternion_of(local))},
         looked_from="local",
         camera=Camera(target + eye, target, np.array([0.0, 0.0, -1.0])),
     )

@@ -12,8 +12,9 @@ import numpy as np
 import xarray
 from numpy.typing import NDArray
 
-from rigidsim.look.signals import across, finite_rows, joined, norms, seconds, thinned_indices, values
+from rigidsim.look.signals import across, finite_rows, joined, norms, seconds, values
 from rigidsim.look.solids import Array, Color, Mesh
+from rigidsim.look.thinning import thinned_indices
 
 SPACE, BODY, CENTRE = "", "body", "centre"
 """Where a part is attached: to space, to the body, to its reference point, or to a frame by its name."""
@@ -72,6 +73,7 @@ class Trail:
     with_centre: bool = False
     words: str = ""
     head: bool = False
+    lasting: int = 0  # rows in its bright part, of one that isn't drawn whole; 0 for those of any other
 
     @cached_property
     def whole(self) -> Array:
@@ -93,7 +95,7 @@ class Trail:
     @property
     def fades(self) -> bool:
         """Whether it has a darker older part; a long trail of a fast motion is heavy enough without."""
-        return self.line and (self.stride > 1 or len(self.points) <= SCENE_ROWS)
+        return self.line and not self.lasting and (self.stride > 1 or len(self.points) <= SCENE_ROWS)
 
 
 @dataclass(frozen=True)
@@ -186,6 +188,7 @@ class Stage:
     shells: list[Shell] = field(default_factory=list)
     frames: dict[str, NDArray[np.float32]] = field(default_factory=dict)  # quaternions of others, by name
     looked_from: str = ""  # frame that the camera is in; empty for space
+    flat: bool = False  # that frame is stretched along its x axis, as for an eye far away on it
     turns_with: str = ""  # root of a stage whose body turns alike about the same point (written once)
     camera: Camera | None = None  # None for the one that suits arrows and path
 
@@ -208,7 +211,8 @@ class Plane:
 @dataclass(frozen=True)
 class Picture:
     """Everything drawn of a dataset besides its plots: the kind of scene in words, the body's stage first,
-    plane figures beside it, the variables whose plots come first, and notes on scales for a page.
+    plane figures beside it, the variables whose plots come first, notes on scales for a page, and variables
+    that were worked out for plots.
     """
 
     kind: str
@@ -216,6 +220,7 @@ class Picture:
     planes: list[Plane] = field(default_factory=list)
     leading: tuple[str, ...] = ()
     notes: list[str] = field(default_factory=list)
+    derived: dict[str, xarray.DataArray] = field(default_factory=dict)
 
 
 def _stride_of(points: Array, share: float) -> int:
@@ -247,22 +252,6 @@ def viewer_quaternion(quaternion: Array) -> NDArray[np.float32]:
     # Normalised in float64 first: the viewer takes the float32 numbers as they are.
     unit = quaternion / np.sqrt(np.einsum("ij,ij->i", quaternion, quaternion))[:, None]
     return np.ascontiguousarray(unit[:, [1, 2, 3, 0]], dtype=np.float32)
-
-
-def quaternion_of(matrices: Array) -> Array:
-    """Quaternions (rows, 4) w x y z of rotation matrices (rows, 3, 3), continuous in sign (Shepperd 1978)."""
-    m, rest = matrices, 1 - np.trace(matrices, axis1=1, axis2=2)
-    products = np.empty((len(m), 4, 4))  # four times those of the quaternion's components
-    products[:, 1:, 1:] = m + m.transpose(0, 2, 1)
-    products[:, [1, 2, 3], [1, 2, 3]] += rest[:, None]
-    products[:, 0, 0] = 2 - rest
-    halves = np.stack([m[:, 2, 1] - m[:, 1, 2], m[:, 0, 2] - m[:, 2, 0], m[:, 1, 0] - m[:, 0, 1]], axis=1)
-    products[:, 0, 1:] = products[:, 1:, 0] = halves
-    largest = np.einsum("tii->ti", products).argmax(axis=1)
-    found = products[np.arange(len(m)), largest]
-    found /= np.linalg.norm(found, axis=1, keepdims=True)
-    flips = np.where(np.einsum("ij,ij->i", found[1:], found[:-1]) < 0, -1.0, 1.0)
-    return np.asarray(found * np.cumprod(np.append(1.0, flips))[:, None])
 
 
 def circle(radius: float, normal: Array, center: Array | None = None) -> Array:

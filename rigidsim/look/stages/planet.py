@@ -11,8 +11,21 @@ import xarray
 from rigidsim.look import signals, surroundings
 from rigidsim.look.stages import parts, precession
 from rigidsim.look.stages.bodies import Subject, column, source_arrows
-from rigidsim.look.stages.parts import BODY, Array, Arrow, Color, Line, Picture, Plane, Stage, Trail, Vector
-from rigidsim.look.symbols import earth, globe, graticule
+from rigidsim.look.stages.facing import angles, facing
+from rigidsim.look.stages.parts import (
+    BODY,
+    Array,
+    Arrow,
+    Color,
+    Line,
+    Picture,
+    Plane,
+    Solid,
+    Stage,
+    Trail,
+    Vector,
+)
+from rigidsim.look.symbols import earth, globe, graticule, maria
 from rigidsim.scene.bodies.presets import KNOWN, KnownBody
 
 _LARGE = 1e5  # m: a smaller body is no globe
@@ -20,19 +33,22 @@ _ROUND = 0.9  # of the smallest over the largest semi-axis
 _ALIKE = 1e-3  # of a radius, for a body to be taken for one that is known
 _UNKNOWN: Color = (128, 148, 170)
 EQUATOR: Color = (150, 205, 110)
+_X_AXIS_WEST = {"earth_rigid": 14.93}  # deg from Greenwich, of presets whose x axis is that of least moment
+_CIRCLING = "Figure axis in space"
 _LEADING = ("polar_motion", "obliquity", "node_longitude", "wobble_angle", "rotation_angle")
 
 
 def picture(dataset: xarray.Dataset, subject: Subject) -> Picture | None:
     """Picture of a large, nearly round body that spins nearly about its figure axis; None for others."""
     axes = _semi_axes(subject)
-    poles = signals.near_axis(dataset) or "obliquity" in dataset or "polar_motion" in dataset
+    poles = _about_figure_axis(dataset) or "obliquity" in dataset or "polar_motion" in dataset
     if axes is None or subject.position is not None or not poles:
         return None
-    name = str(subject.solids[0].get("name", ""))
+    preset = str(subject.solids[0].get("name", ""))
+    name = preset.partition("_")[0]
     known = _known(name, float(axes.max()))
     name = name or (known.name.lower() if known else "")
-    half = axes / axes.max()
+    half, west = axes / axes.max(), _X_AXIS_WEST.get(preset, 0.0)
     mesh = earth(half) if name == "earth" else globe(half, surroundings.color_of(known, _UNKNOWN))
     figure = signals.figure_direction(dataset)
     turns, averaged = subject.attitude is not None, "angular_velocity" not in dataset
@@ -41,29 +57,52 @@ def picture(dataset: xarray.Dataset, subject: Subject) -> Picture | None:
     beside = subject.attitude is None and precession.moving_plane(dataset)
     if beside and averaged:
         subject = precession.pointed(dataset, subject, figure, plane=True)
-    subject = replace(subject, meshes=[mesh], reach=float(axes.max()))
+    subject = replace(subject, meshes=[mesh.moved(_turn(west), np.zeros(3))], reach=float(axes.max()))
     stage = replace(subject.stage([], [], name.capitalize() or "Planet"), axis_length=0.0)
-    rings = enumerate(graticule(half))
-    stage.lines.extend(Line(f"graticule/{k}", (20, 24, 30), line, BODY, 0.8, 0.55) for k, line in rings)
-    if turns or subject.attitude is None:  # the prime meridian stands out, so that the rotation shows
-        stage.lines.append(Line("prime_meridian", parts.PALE, graticule(half, 180.0, 1.006)[0], BODY, 1.6))
-    stage.lines.append(Line("equator", EQUATOR, parts.circle(1.01, figure), BODY, 1.8, 1.0, "equator"))
-    notes = ["continents: Natural Earth; the body's x axis is at longitude zero"] if name == "earth" else []
+    lines = _lines(half, figure, west, prime=turns or subject.attitude is None)
+    stage.lines.extend(lines)
+    zero = f"{west:.4g}° west of Greenwich" if west else "at longitude zero"
+    notes = [f"continents: Natural Earth; the body's x axis is {zero}"] if name == "earth" else []
+    if name == "moon":
+        stage.solids.append(Solid("maria", maria(), BODY))
     planes = _pole_planes(dataset)
+    face = facing(dataset, subject, figure, name)
+    faces, derived = [], {}
+    if face is not None:
+        faces, derived = [replace(face.stage, lines=[*lines, *face.stage.lines])], face.derived
+        planes = [*([face.plane] if face.plane else []), *planes]
+        notes.append(face.note)
+    motion = signals.polar_motion(dataset)
+    circling = _about_momentum(dataset, figure)
+    if circling is not None:
+        planes.insert(0, precession.plane_of("circling", _CIRCLING, parts.FIGURE, circling, ("across", "")))
+        derived = {"figure_axis_about_momentum": angles(dataset, circling, ("across", "across, 90° on"))}
+    elif (
+        motion is not None and not {"polar_motion", "obliquity"} & set(dataset) and np.nanmax(abs(motion)) > 0
+    ):
+        derived = {**derived, "polar_motion": angles(dataset, motion, ("m1", "m2"))}
+    leading = (*(name for name in derived if name != "polar_motion"), *_LEADING)
+    if face is not None and face.derived:
+        leading = (*face.derived, *(name for name in _LEADING if name != "polar_motion"))
     called = {"": "a planet", "earth": "the Earth", "moon": "the Moon"}.get(name, name.capitalize())
     if subject.attitude is None:
         _in_its_own_axes(dataset, stage, figure, notes)
         stage = replace(stage, camera=precession.eye_of_pole(0.3, 1.75))
-        return Picture(f"rotation of {called}", [stage], planes, _LEADING, notes)
+        return Picture(f"rotation of {called}", [*faces, stage], planes, leading, notes, derived)
     pole = subject.attitude @ figure
     arrow = Arrow(
         "figure_axis", "figure axis", parts.FIGURE, precession.POLE_REACH * pole, False, "figure axis"
     )
     stage.arrows.append(arrow)
-    precession.reference_plane(stage)
+    stage = precession.on_reference_plane(dataset, stage)
     precession.circle_of_precession(dataset, stage, pole, "figure", notes)
     if turns:
-        stage.arrows.extend(source_arrows(dataset, subject, precession.SOURCE_REACH))
+        arrows = source_arrows(dataset, subject, precession.SOURCE_REACH)
+        stage.arrows.extend(arrows)
+        if len(arrows) < len(surroundings.told(dataset, "source")) and "source_position" in dataset:
+            notes.append(
+                "directions are shown of sources whose tide is a thousandth of the strongest or more"
+            )
     elif beside:
         notes.append("the plane of reference moves in space: the globe is drawn as seen from it")
     else:
@@ -77,7 +116,42 @@ def picture(dataset: xarray.Dataset, subject: Subject) -> Picture | None:
             words = "the globe's turning isn't seen between them"
             notes.append(f"samples are {step:.3g} rad of rotation apart: {words}")
     stage = replace(stage, camera=precession.eye_of_pole())
-    return Picture(f"rotation of {called} in space", [stage], planes, _LEADING, notes)
+    return Picture(f"rotation of {called} in space", [*faces, stage], planes, leading, notes, derived)
+
+
+def _lines(half: Array, figure: Array, west: float, *, prime: bool) -> list[Line]:
+    """Meridians and parallels, the equator, and the prime meridian, which makes the rotation seen."""
+    turn = _turn(west)
+    lines = [
+        Line(f"graticule/{k}", (20, 24, 30), line @ turn.T, BODY, 0.8, 0.55)
+        for k, line in enumerate(graticule(half))
+    ]
+    if prime:
+        line = graticule(half, 180.0, 1.006)[0] @ turn.T
+        lines.append(Line("prime_meridian", parts.PALE, line, BODY, 1.6, 1.0, "prime meridian"))
+    return [*lines, Line("equator", EQUATOR, parts.circle(1.01, figure), BODY, 1.8, 1.0, "equator")]
+
+
+def _turn(degrees: float) -> Array:
+    """Rotation (3, 3) about z."""
+    c, s = np.cos(np.deg2rad(degrees)), np.sin(np.deg2rad(degrees))
+    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+
+
+def _about_momentum(dataset: xarray.Dataset, figure: Array) -> Array | None:
+    """The figure axis across a momentum that stays put (rows, 2), rad, if samples follow it; else None."""
+    momentum, pole = signals.steady_momentum(dataset), signals.body_direction(dataset, figure)
+    if momentum is None or pole is None or not np.isfinite(pole).all():
+        return None
+    path = pole @ np.stack(signals.across(momentum), axis=1)
+    size = float(np.abs(path).max())
+    return path if 0 < size < signals.NEAR_AXIS and signals.joined(path) else None
+
+
+def _about_figure_axis(dataset: xarray.Dataset) -> bool:
+    """Whether the body spins about its figure axis, exactly or nearly."""
+    motion = signals.polar_motion(dataset)
+    return motion is not None and bool(np.nanmax(signals.norms(motion)) < signals.NEAR_AXIS)
 
 
 def _known(name: str, radius: float) -> KnownBody | None:

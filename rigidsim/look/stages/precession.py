@@ -10,17 +10,19 @@ import numpy as np
 import xarray
 
 from rigidsim.look import signals, surroundings
-from rigidsim.look.signals import is_averaged, read_config
+from rigidsim.look.signals import is_averaged
 from rigidsim.look.stages import parts
 from rigidsim.look.stages.bodies import Subject, direction_of, eye_at, source_arrows
 from rigidsim.look.stages.parts import SPACE, Array, Arrow, Camera, Color, Line, Picture, Plane, Spot, Stage
 from rigidsim.look.symbols import graticule
 from rigidsim.scene.readable import angle_unit, span_text
+from rigidsim.scene.rotations import quaternion_of
 
 ECLIPTIC: Color = (226, 196, 90)
 PRECESSION: Color = (190, 150, 255)
 POLE_REACH = 1.45  # length of a pole's arrow, in units of the body's reach
 SOURCE_REACH = 1.75  # length of an arrow to a source
+PLANE = "plane"  # frame of the plane of reference, where that isn't XY of space
 _APART = 0.02  # rad, from which two arrows are told apart
 _UPRIGHT = 1e-9  # sine of the tilt, below which a pole has no node
 _SPARSE = 1.0  # rad of an orbit from one row to the next, from which a source can't be followed
@@ -57,7 +59,7 @@ def picture(dataset: xarray.Dataset, subject: Subject) -> Picture | None:
         # of samples too far apart it would be a cloud; on the circle of precession it wouldn't be seen
         if path.line and np.ptp(axis[:, 2]) > _APART:
             stage.trails.append(path)
-    reference_plane(stage)
+    stage = on_reference_plane(dataset, stage)
     circle_of_precession(dataset, stage, axes[leading], leading, notes)
     stage.arrows.extend(followed_sources(dataset, subject, notes))
     planes = nutation_planes(dataset, leading)
@@ -73,17 +75,19 @@ def eye_of_pole(height: float = 0.05, radius: float = 1.95) -> Camera:
 
 def axis_in_space(dataset: xarray.Dataset, axis: str) -> Array | None:
     """Unit vectors (rows, 3), space axes, of the axis named figure or momentum, as recorded, or from
-    obliquity and node longitude if these refer to the XY plane; None where not all are known.
+    obliquity and node longitude if their plane is known and fixed; None where not all are known.
     """
     found = signals.pole(dataset, axis)
-    if found is None and not moving_plane(dataset):
+    plane = signals.reference_axes(dataset)
+    if found is None and plane is not None:
         found = _against_plane(dataset, axis)
+        found = None if found is None else found @ plane[0]
     return found if found is not None and np.isfinite(found).all() else None
 
 
 def moving_plane(dataset: xarray.Dataset) -> bool:
-    """Whether obliquity and node longitude refer to a plane other than XY of space, which may move."""
-    return bool(read_config(dataset).get("frame", {}).get("reference", "space") != "space")
+    """Whether obliquity and node longitude refer to a plane that moves, or isn't known from the dataset."""
+    return signals.reference_axes(dataset) is None
 
 
 def _against_plane(dataset: xarray.Dataset, axis: str) -> Array | None:
@@ -111,7 +115,7 @@ def pointed(dataset: xarray.Dataset, subject: Subject, figure: Array, *, plane: 
     in_body = np.stack([*signals.across(figure), figure], axis=1)
     in_space = np.stack([node, np.cross(pole, node), pole], axis=2)
     attitude = in_space @ in_body.T
-    return replace(subject, attitude=attitude, quaternion=parts.quaternion_of(attitude))
+    return replace(subject, attitude=attitude, quaternion=quaternion_of(attitude))
 
 
 def standing_note(dataset: xarray.Dataset, what: str) -> str:
@@ -135,16 +139,22 @@ def followed_sources(dataset: xarray.Dataset, subject: Subject, notes: list[str]
     return kept
 
 
-def reference_plane(stage: Stage) -> None:
-    """Put the XY plane of space with its normal on a stage."""
-    up = np.array([0.0, 0.0, 1.0])
-    rim = Line("ecliptic/rim", ECLIPTIC, parts.circle(1.75, up), SPACE, 1.8, 0.9, "plane of reference")
-    stage.lines.extend([rim, Line("ecliptic/inner", ECLIPTIC, parts.circle(1.3, up), SPACE, 0.8, 0.35)])
+def on_reference_plane(dataset: xarray.Dataset, stage: Stage) -> Stage:
+    """The stage with the plane of reference and its normal, from which it is looked at."""
+    axes, words = signals.reference_axes(dataset) or (np.eye(3), "plane of reference")
+    if not np.array_equal(axes, np.eye(3)):
+        turn = parts.viewer_quaternion(quaternion_of(axes.T[None]))
+        turns = np.repeat(turn, dataset.sizes["time"], axis=0)
+        stage = replace(stage, frames={**stage.frames, PLANE: turns}, looked_from=PLANE)
+    place, up = stage.looked_from, np.array([0.0, 0.0, 1.0])
+    rim = Line("ecliptic/rim", ECLIPTIC, parts.circle(1.75, up), place, 1.8, 0.9, words)
+    stage.lines.extend([rim, Line("ecliptic/inner", ECLIPTIC, parts.circle(1.3, up), place, 0.8, 0.35)])
     for k in range(6):
         ends = np.outer([-1.75, 1.75], direction_of(0.0, np.pi * k / 6))
-        stage.lines.append(Line(f"ecliptic/spoke{k}", ECLIPTIC, ends, SPACE, 0.7, 0.22))
-    stage.lines.append(Line("normal", parts.FAINT, np.array([[0, 0, -1.5], [0, 0, 1.75]]), SPACE, 1.0))
-    stage.spots.append(Spot("normal", "normal", parts.FAINT, np.array([0.0, 0.0, 1.78])))
+        stage.lines.append(Line(f"ecliptic/spoke{k}", ECLIPTIC, ends, place, 0.7, 0.22))
+    stage.lines.append(Line("normal", parts.FAINT, np.array([[0, 0, -1.5], [0, 0, 1.75]]), place, 1.0))
+    stage.spots.append(Spot("normal", "normal", parts.FAINT, np.array([0.0, 0.0, 1.78]), place))
+    return stage
 
 
 def circle_of_precession(
@@ -153,6 +163,9 @@ def circle_of_precession(
     """Put on a stage the circle, with its period, that a pole (rows, 3), space axes, of the axis named figure
     or momentum describes about the normal, if it does.
     """
+    if stage.looked_from == PLANE:
+        frame = signals.reference_axes(dataset)
+        pole = pole if frame is None else pole @ frame[0].T
     tilt = float(np.nanmean(np.arctan2(np.hypot(pole[:, 0], pole[:, 1]), pole[:, 2])))
     if not 1e-3 < tilt < np.pi - 1e-3:
         return
@@ -171,7 +184,7 @@ def circle_of_precession(
             words += f": once in {span_text(2 * np.pi / abs(rate), 3)}"
             which = "pole" if axis == "figure" else axis
             notes.append(f"the {which}'s longitude moves by {rate:.6g} rad/s on the mean (straight line)")
-    stage.lines.append(Line("precession", PRECESSION, ring, SPACE, 2.0, 1.0, words))
+    stage.lines.append(Line("precession", PRECESSION, ring, stage.looked_from, 2.0, 1.0, words))
 
 
 def nutation_planes(dataset: xarray.Dataset, axis: str) -> list[Plane]:

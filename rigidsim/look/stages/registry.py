@@ -16,6 +16,7 @@ from rigidsim.look.stages.bodies import Subject, column, source_arrows, vectors_
 from rigidsim.look.stages.parts import BODY, Array, Arrow, Camera, Line, Picture, Shell, Spot, Stage, Vector
 from rigidsim.look.stages.wheels import with_wheels
 from rigidsim.look.surroundings import carries_within
+from rigidsim.scene.rotations import quaternion_of
 
 ENERGY: tuple[int, int, int] = (120, 150, 200)
 _LEADING = ("angular_velocity", "polar_motion", "nutation_angle")
@@ -56,7 +57,7 @@ def free(dataset: xarray.Dataset, subject: Subject) -> Picture | None:
 
 def _shell(dataset: xarray.Dataset, radii: Array) -> Shell:
     # principal axes are rows: the rotation from these to body axes is the transpose
-    turn = parts.quaternion_of(signals.principal_axes(dataset).T[None])[0]
+    turn = quaternion_of(signals.principal_axes(dataset).T[None])[0]
     return Shell("energy_ellipsoid", radii, ENERGY, BODY, turn[[1, 2, 3, 0]])
 
 

@@ -24,14 +24,17 @@ _DARK = (18, 20, 26)
 def build_blueprint(run: DrawnRun, *, following: bool = False) -> rrb.Blueprint:
     """The layout for a run, which opens at its start and plays, or stays at the end of one that goes on."""
     stages, planes, clock = run.picture.stages, run.planes, run.clock
-    narrow = len(stages) > 1
+    narrow, facing = len(stages) > 1, stages[0].flat
     spaces: list[rrb.View | rrb.Container] = [space_view(stage, run, narrow=narrow) for stage in stages]
     beside = [tabs([plane_view(plane) for plane in planes])] if planes else []
-    shares = [3.0] * len(spaces) + [1.6] * len(beside)
+    if facing and planes:  # the disc, and beside it where its source is seen, and how it moves in space
+        first, *others = map(plane_view, planes)
+        spaces, beside = spaces[:1], [tabs([first, *spaces[1:], *others])]
+    shares = [3.0] * len(spaces) + [2.6 if facing else 1.6] * len(beside)
     scene = spaces[0] if len(shares) == 1 else rrb.Horizontal(*spaces, *beside, column_shares=shares)
     left = left_side(scene, plotting.legend_of(stages), {page.lower(): page for page in run.pages})
     views = {
-        place: [plot_view(plot) for plot in run.plots if plot.place == place]
+        place: [plot_view(plot, clock) for plot in run.plots if plot.place == place]
         for place in ("leading", "drift", "more")
     }
     right: list[rrb.View | rrb.Container] = [*views["leading"]]
@@ -66,9 +69,9 @@ def build_comparison(
         common[plot.key] = replace(
             found or plot, series=[*series, *plot.series], levels=[*levels, *plot.levels]
         )
-    views = [] if difference is None else [plot_view(difference)]
-    views += [plot_view(plot) for plot in common.values() if plot.place == "leading"][: 4 - len(views)]
-    views += [plot_view(plot) for plot in common.values() if plot.place == "drift"]
+    views = [] if difference is None else [plot_view(difference, clock)]
+    views += [plot_view(plot, clock) for plot in common.values() if plot.place == "leading"][: 4 - len(views)]
+    views += [plot_view(plot, clock) for plot in common.values() if plot.place == "drift"]
     left = left_side(
         scene,
         plotting.legend_of(runs[0].picture.stages),
@@ -110,7 +113,7 @@ def left_side(
     return rrb.Vertical(scene, key, tabs(texts), row_shares=[PIXELS * 0.7 - height, height, PIXELS * 0.3])
 
 
-def tabs(views: Sequence[rrb.View]) -> rrb.View | rrb.Container:
+def tabs(views: Sequence[rrb.View | rrb.Container]) -> rrb.View | rrb.Container:
     """Views behind tabs, if there are several."""
     return views[0] if len(views) == 1 else rrb.Tabs(*views, active_tab=0)
 
@@ -136,7 +139,7 @@ def space_view(stage: Stage, run: DrawnRun, *, narrow: bool) -> rrb.Spatial3DVie
     overrides: dict[Any, Any] = {}
     for trail in stage.trails:
         path = trail_path(stage, trail)
-        shown = round(RECENT * rows) if trail.fades else rows
+        shown = trail.lasting or (round(RECENT * rows) if trail.fades else rows)
         overrides[f"{path}/recent"] = rrb.VisibleTimeRanges(_window(run.clock, shown))
         if trail.fades:
             # A piece of the older part ends where its row is: it must not stand out over the bright one.
@@ -156,9 +159,13 @@ def space_view(stage: Stage, run: DrawnRun, *, narrow: bool) -> rrb.Spatial3DVie
     )
 
 
+def _ticks_per_row(clock: Clock) -> float:
+    return float(abs(clock.ticks[-1] - clock.ticks[0])) / max(len(clock.ticks) - 1, 1)
+
+
 def _window(clock: Clock, rows: int) -> list[rr.VisibleTimeRange]:
     """So many rows before the cursor."""
-    per_row = float(abs(clock.ticks[-1] - clock.ticks[0])) / max(len(clock.ticks) - 1, 1)
+    per_row = _ticks_per_row(clock)
     return [
         rr.VisibleTimeRange(
             name,
@@ -180,8 +187,16 @@ def plane_view(plane: Plane) -> rrb.Spatial2DView:
     )
 
 
-def plot_view(plot: Plot) -> rrb.TimeSeriesView:
+def plot_view(plot: Plot, clock: Clock) -> rrb.TimeSeriesView:
     """A view of one plot."""
+    # Independent axes of infinite range: a long run opens whole.
+    shown = rr.TimeRange(start=rr.TimeRangeBoundary.infinite(), end=rr.TimeRangeBoundary.infinite())
+    if plot.window:
+        reach = round(plot.window / 2 * _ticks_per_row(clock))
+        shown = rr.TimeRange(
+            start=rr.TimeRangeBoundary.cursor_relative(seq=-reach),
+            end=rr.TimeRangeBoundary.cursor_relative(seq=reach),
+        )
     # Drifts grow upwards along time: their legend stays below, out of the way.
     corner = rrb.Corner2D.RightBottom if plot.place == "drift" else rrb.Corner2D.LeftTop
     return rrb.TimeSeriesView(
@@ -193,11 +208,5 @@ def plot_view(plot: Plot) -> rrb.TimeSeriesView:
         name=plot.title,
         plot_legend=rrb.PlotLegend(visible=True, corner=corner),
         axis_y=None if plot.range is None else rrb.ScalarAxis(range=plot.range),
-        # Independent axes of infinite range: a long run opens whole.
-        axis_x=rrb.TimeAxis(
-            link=LinkAxis.Independent,
-            view_range=rr.TimeRange(
-                start=rr.TimeRangeBoundary.infinite(), end=rr.TimeRangeBoundary.infinite()
-            ),
-        ),
+        axis_x=rrb.TimeAxis(link=LinkAxis.Independent, view_range=shown),
     )

@@ -19,6 +19,7 @@ from rigidsim.look.symbols import graticule, sharp_edges
 Columns = Iterable[rr.ComponentColumn]
 
 OLDER = 16  # rows in one piece of a trail's older part
+_STRETCH = 25.0  # of a frame along the line of sight: perspective is a 25th of what it was
 _EDGE: Color = (12, 14, 20)
 _AXIS_COLORS = [(235, 70, 60), (90, 200, 90), (80, 130, 250)]
 _FADED, _DIM = 0.5, 0.26  # of a trail's brightness: its older part, and the whole curve
@@ -149,7 +150,7 @@ def _draw_label(
 
 def _draw_trail_static(recording: rr.RecordingStream, path: str, trail: Trail) -> None:
     dark, faded = (_dimmed(trail.color, part) for part in (_DIM, _FADED))
-    if len(trail.whole) > 1:
+    if len(trail.whole) > 1 and not trail.lasting:
         whole = (
             rr.LineStrips3D([trail.whole], colors=[dark], radii=rr.Radius.ui_points(0.8))
             if joined(trail.whole, NEAR)
@@ -187,7 +188,12 @@ def stage_columns(stage: Stage, rows: slice) -> Iterable[tuple[str, slice, Colum
     if transform:
         yield f"{root}/body", rows, rr.Transform3D.columns(**transform)
     for name, turning in stage.frames.items():
-        yield f"{root}/{name}", rows, rr.Transform3D.columns(quaternion=turning[rows])
+        placed: dict[str, Any] = {"quaternion": turning[rows]}
+        if stage.flat and name == stage.looked_from:
+            placed["scale"] = np.tile(
+                np.array([_STRETCH, 1.0, 1.0], dtype=np.float32), (len(turning[rows]), 1)
+            )
+        yield f"{root}/{name}", rows, rr.Transform3D.columns(**placed)
     for arrow in stage.arrows:
         picked = _every(rows, arrow.stride)
         vectors = arrow.vectors[picked].astype(np.float32)

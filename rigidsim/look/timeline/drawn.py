@@ -12,12 +12,12 @@ from numpy.typing import NDArray
 from rigidsim.look import signals
 from rigidsim.look.page import config_page, notes_page, summary_page
 from rigidsim.look.plots import Plot, Series, plan_plots
-from rigidsim.look.signals import thin, thinned_indices
 from rigidsim.look.solids import Array
 from rigidsim.look.stages.bodies import Subject
 from rigidsim.look.stages.parts import Picture, Plane, screen_seconds
 from rigidsim.look.stages.registry import build_picture
 from rigidsim.look.states import States, charts_of, sections_of, states_of
+from rigidsim.look.thinning import thin, thinned_indices
 from rigidsim.look.timeline import drawing, plotting
 from rigidsim.scene.readable import DAY, YEAR, TimeWords
 
@@ -105,7 +105,7 @@ class DrawnRun:
         start, end = float(seconds[0]), float(seconds[-1])
         clock = build_clock(seconds)
         picture, subject = build_picture(rows)
-        plots = plan_plots(rows, picture.leading)
+        plots = plan_plots(rows.assign(picture.derived), picture.leading)
         notes = list(picture.notes)
         if not clock.duration:
             notes.append(f"the run doesn't fit nanoseconds: its timeline is `{clock.name}`")

@@ -81,7 +81,8 @@ def aggregation(plot: Plot, values: Array) -> rr.components.AggregationPolicy:
     if plot.place == "drift":
         return rr.components.AggregationPolicy.Max
     step = max(len(values) // PIXELS, 1)
-    change = np.abs(values[step:] - values[:-step]) if len(values) > step else np.zeros(1)
+    steps = {1, step} if len(values) > step else set()  # a fast motion may look slow a pixel apart
+    change = np.concatenate([np.zeros(1), *(np.abs(values[k:] - values[:-k]).ravel() for k in steps)])
     largest, range_ = float(change.max(initial=0.0)), float(np.ptp(values)) if values.size else 0.0
     if not np.isfinite(largest + range_):
         finite = values[np.isfinite(values)]

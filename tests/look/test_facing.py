@@ -1,0 +1,161 @@
+"""A Moon as the Earth sees it: the view turns with the direction of the Earth, and poles count from the
+ecliptic.
+"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray
+from scipy.spatial.transform import Rotation
+
+from rigidsim.look import signals
+from rigidsim.look.plots import plan_plots
+from rigidsim.look.stages.registry import build_picture
+
+DAY, YEAR = 86400.0, 3.15576e7
+MONTH, NODE = 2 * np.pi / (27.3217 * DAY), -2 * np.pi / (18.6 * YEAR)
+INCLINED, OBLIQUITY = np.deg2rad(1.54), np.deg2rad(84381.406 / 3600)
+SWING = np.deg2rad(6.3)  # of the Earth's direction in longitude
+CONFIG = '[body]\nhost = "moon"\n[ephemeris]\nkernel = "de421"\n'
+
+
+def moon(years: float = 40.0, config: str = CONFIG) -> tuple[xarray.Dataset, np.ndarray, Rotation]:
+    """A dataset in axes of the ICRF, unit vectors to the Earth, and attitudes: an equator inclined to the
+    ecliptic whose node goes back, and an Earth that runs before and behind the mean.
+    """
+    t = np.arange(0, years * YEAR, DAY)
+    tilt = Rotation.from_euler("x", OBLIQUITY)
+    angles = np.stack([NODE * t, np.full(len(t), INCLINED), (MONTH - NODE) * t], axis=1)
+    attitude = tilt * Rotation.from_euler("ZXZ", angles)
+    along = MONTH * t + SWING * np.sin(MONTH * t)
+    earth = tilt.apply(np.stack([np.cos(along), np.sin(along), 0 * t], axis=1))
+    steps = (attitude[:-1].inv() * attitude[1:]).as_rotvec() / DAY
+    sun = tilt.apply(np.stack([np.cos(2e-7 * t), np.sin(2e-7 * t), 0 * t], axis=1))
+    venus = 0.3 * sun
+    sources = [("earth", 3.986e14), ("sun", 1.327e20), ("venus", 3.249e14)]
+    told = [{"what": "source", "gravitational_parameter": gm, "kernel": name} for name, gm in sources]
+    solid = {"solid": "cuboid", "dimensions": {"size": [1, 1, 1]}, "position": [0, 0, 0]}
+    dataset = xarray.Dataset(
+        {
+            "quaternion": (("time", "quaternion_component"), np.roll(attitude.as_quat(), 1, axis=1)),
+            "angular_velocity": (("time", "body_axis"), np.vstack([steps, steps[-1:]])),
+            "source_position": (
+                ("time", "source", "space_axis"),
+                np.stack([3.8e8 * earth, 1.5e11 * sun, 1.5e11 * venus], axis=1),
+            ),
+        },
+        coords={"time": t, "source": [name for name, _ in sources]},
+        attrs={
+            "axes": "ICRF", "config": config, "surroundings": json.dumps(told),
+            "drawing": json.dumps([{**solid, "quaternion": [1, 0, 0, 0], "equivalent": True}]),
+            "principal_moments": "[0.99937, 0.9996, 1.0]", "principal_axes": "[[1,0,0],[0,1,0],[0,0,1]]",
+        },
+    )  # fmt: skip
+    return dataset, earth, attitude
+
+
+def test_the_view_turns_with_the_direction_of_the_earth_and_has_north_upwards() -> None:
+    dataset, earth, attitude = moon()
+    picture, subject = build_picture(dataset)
+    face = picture.stages[0]
+    assert (face.title, face.looked_from) == ("Seen from the Earth", "eye")
+    assert subject.reach == pytest.approx(1737400.0)
+    frame = Rotation.from_quat(face.frames["eye"])
+    np.testing.assert_allclose(frame.inv().apply(earth) - [1, 0, 0], 0, atol=1e-6)
+    # the mean pole is the ecliptic's, to what the last cycle of the node leaves
+    upwards = frame.inv().apply(np.tile([0, -np.sin(OBLIQUITY), np.cos(OBLIQUITY)], (len(earth), 1)))
+    assert np.abs(upwards - [0, 0, 1]).max() < 5e-3
+    # the track is where the Earth stands over the body: in its axes
+    track = face.trails[0].points
+    np.testing.assert_allclose(
+        track / np.linalg.norm(track, axis=1)[:, None], attitude.inv().apply(earth), atol=1e-12
+    )
+    # the body's x axis is seen to the east or west of the centre by the swing, and drawn without exaggeration
+    seen = (frame.inv() * attitude).apply([1.0, 0.0, 0.0])
+    assert np.abs(seen[:, 1]).max() == pytest.approx(np.sin(SWING), rel=2e-3)
+    assert np.abs(seen[:, 2]).max() < np.sin(INCLINED) * 1.01
+
+
+def test_librations_are_plotted_in_a_window_beside_the_legend() -> None:
+    dataset, _, _ = moon()
+    picture, _ = build_picture(dataset)
+    point = picture.derived["sub-Earth_point"]
+    longitude, latitude = point.values.T
+    assert np.abs(longitude).max() == pytest.approx(SWING, rel=2e-3)
+    assert np.abs(latitude).max() == pytest.approx(INCLINED, rel=1e-3)
+    first = plan_plots(dataset.assign(picture.derived), picture.leading)[0]
+    assert first.title == "Sub-Earth point [°]"
+    assert 20 * 27 < first.window < 30 * 27
+    assert first.range is not None
+    assert first.range[1] > 1.3 * np.rad2deg(SWING)  # room for the legend
+
+
+def test_poles_count_from_the_ecliptic_in_axes_of_the_equator() -> None:
+    dataset, _, _ = moon()
+    tilt, node = signals.orientation(dataset, "figure") or (np.zeros(1), np.zeros(1))
+    np.testing.assert_allclose(tilt, INCLINED, atol=1e-9)
+    np.testing.assert_allclose(np.gradient(node, dataset.time.values), NODE, rtol=1e-6)
+    picture, _ = build_picture(dataset)
+    words = {line.words for line in picture.stages[1].lines}
+    assert {"ecliptic", "prime meridian", "precession of the pole: once in 18.6 yr"} <= words
+    # Venus raises a tide of a millionth of the Earth's, and isn't pointed to
+    assert [arrow.label for arrow in picture.stages[1].arrows] == [
+        "figure axis",
+        "to the Earth",
+        "to the Sun",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("reference", "normal", "words"),
+    [
+        ('"space"', [0, 0, 1], "plane of reference"),
+        ("[0, 3, 4]", [0, 0.6, 0.8], "plane of reference"),
+        ("[0, -0.397777155931914, 0.917482062069182]", [0, -0.39777716, 0.91748206], "ecliptic"),
+    ],
+)
+def test_a_reference_that_was_given_stands(reference: str, normal: list[float], words: str) -> None:
+    dataset, _, _ = moon(2.0, f"{CONFIG}[frame]\nreference = {reference}\n")
+    found = signals.reference_axes(dataset)
+    assert found is not None
+    axes, called = found
+    np.testing.assert_allclose(axes[2], normal, atol=1e-8)
+    np.testing.assert_allclose(axes @ axes.T, np.eye(3), atol=1e-14)
+    assert called == words
+
+
+def test_its_timeline_is_written(tmp_path: Path) -> None:
+    pytest.importorskip("rerun")
+    from rigidsim.look.timeline import write_timeline
+
+    dataset, _, _ = moon(2.0)
+    assert write_timeline(dataset, tmp_path / "moon.rrd") == dataset.sizes["time"]
+
+
+def test_a_body_that_is_locked_in_the_end_has_its_last_turns_drawn() -> None:
+    pytest.importorskip("matplotlib")
+    from rigidsim.look.figures.catalogue import figure
+
+    t = np.linspace(0, 30.0, 3001)
+    turned = 2 * np.pi * 20 * (1 - np.exp(-t / 3)) + 0.3 * np.sin(3 * t)
+    rates = 2 * np.pi * 20 / 3 * np.exp(-t / 3) + 0.9 * np.cos(3 * t)
+    quaternion = np.roll(Rotation.from_euler("z", turned[:, None]).as_quat(), 1, axis=1)
+    told = [{"what": "source", "gravitational_parameter": 3.986e14, "position": [3.8e8, 0, 0]}]
+    dataset = xarray.Dataset(
+        {
+            "quaternion": (("time", "quaternion_component"), quaternion),
+            "angular_velocity": (("time", "body_axis"), np.stack([0 * t, 0 * t, rates], axis=1)),
+        },
+        coords={"time": t},
+        attrs={"surroundings": json.dumps(told), "principal_moments": "[0.99, 0.995, 1.0]"},
+    )
+    panels = {axes.get_title(loc="left"): axes for axes in figure(dataset).axes}
+    turns = panels["The point under the source, until the rotation is locked"].lines[0].get_ydata()
+    np.testing.assert_allclose(turns, (20 * 2 * np.pi - turned) / (2 * np.pi), atol=2e-3)
+    dots = np.asarray(panels["Until it is locked (lighter: later)"].collections[0].get_offsets())
+    assert np.abs(dots[-300:, 0]).max() < np.rad2deg(0.32)
+    assert 340 < np.ptp(dots[:, 0]) < 361
