@@ -46,6 +46,11 @@ STUDIES = (
     "earth_obliquity",
     "rigid_earth",
     "real_moon",
+    "mars_rotation",
+    "mercury_librations",
+    "phobos_and_vesta",
+    "moon_free_librations",
+    "apophis_real_sky",
 )
 
 

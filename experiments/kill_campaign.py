@@ -12,13 +12,14 @@ name. What was saved is noted from outside before the kill. Segments are written
 as usual (``FREQUENT``), to have many moments at which something can go wrong. Then: the same on a small
 tmpfs (as root; else under a limit of the files' size), enlarged before each resume; on a tmpfs that is
 remounted read-only (as root only) and writable again before each resume; and files of finished and
-unfinished runs damaged at random places.
+unfinished runs damaged at random places. Last, runs under a kernel that kill themselves where the integrator
+stands at the edge of a block, in three precisions; a look after every step tells, and counts.
 
 Seeded: the same kills are planned, though the machine's timing moves what they hit. Each run is told as it is
 done, and the totals are printed even when time is up or the campaign is interrupted.
 
 Run: python -m experiments.kill_campaign [--kills 300] [--full-disks 40] [--read-only 20] [--damages 400]
-[--seconds 1200] [--seed 1]
+[--edges 30] [--seconds 1200] [--seed 1]
 """
 
 from __future__ import annotations
@@ -37,6 +38,7 @@ if not __package__:  # as a script
 
 from experiments.durability.damages import damage_files
 from experiments.durability.disks import fill_disks, lock_disks
+from experiments.durability.edges import kill_at_edges
 from experiments.durability.judging import Tally
 from experiments.durability.kills import kill_runs
 
@@ -45,6 +47,7 @@ PARTS = {
     "full_disks": (fill_disks, 40, "trials, each of several full disks"),
     "read_only": (lock_disks, 20, "trials, each of several read-only disks"),
     "damages": (damage_files, 400, "files"),
+    "edges": (kill_at_edges, 30, "SIGKILLs at edges of a kernel's blocks"),
 }
 
 

@@ -14,6 +14,8 @@ if TYPE_CHECKING:
     from rigidsim.store.run import MemoryRun, Run, SavedRun, open_run
     from rigidsim.store.sweeps.run import SavedSweep, open_sweep
     from rigidsim.workflows.analyse import analyse
+    from rigidsim.workflows.compare.compared import compare
+    from rigidsim.workflows.physics.required import required_physics
     from rigidsim.workflows.plan import plan
     from rigidsim.workflows.read import Experiment, load, parse
     from rigidsim.workflows.resume import resume
@@ -25,8 +27,8 @@ __version__ = "0.1.0"
 
 __all__ = [
     "ConfigError", "Experiment", "MemoryRun", "RigidsimError", "Run", "RunFolderError", "SavedRun",
-    "SavedSweep", "analyse", "load", "open_run", "open_sweep", "parse", "plan", "resume",
-    "run", "sweep", "verify",
+    "SavedSweep", "analyse", "compare", "load", "open_run", "open_sweep", "parse", "plan", "required_physics",
+    "resume", "run", "sweep", "verify",
 ]  # fmt: skip
 
 _NAMES = {
@@ -34,6 +36,8 @@ _NAMES = {
     "store.run": ("MemoryRun", "Run", "SavedRun", "open_run"),
     "store.sweeps.run": ("SavedSweep", "open_sweep"),
     "workflows.analyse": ("analyse",),
+    "workflows.compare.compared": ("compare",),
+    "workflows.physics.required": ("required_physics",),
     "workflows.plan": ("plan",),
     "workflows.read": ("Experiment", "load", "parse"),
     "workflows.resume": ("resume",),

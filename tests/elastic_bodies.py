@@ -47,11 +47,14 @@ def followed(
     start: Sequence[Sequence[Any]],
     rates: Sequence[Any],
     times: Any,
+    *,
+    spins: bool = True,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Rates, matrices and angular momenta (space axes) at times, 80-bit numbers, without delay.
 
     Args:
         start: place and velocity of the source; the body starts unturned.
+        spins: whether its own spin distorts the body, too.
     """
     w = list(hy.make_vars("w0", "w1", "w2"))
     r = [list(hy.make_vars(*(f"r{i}{j}" for j in range(3)))) for i in range(3)]
@@ -65,7 +68,7 @@ def followed(
     cube = 1.0 / (squared * hy.sqrt(squared))
     fifth = cube / squared
     slope = -5.0 * _dot(x, v) / squared * fifth
-    size, rate = elastic * mu, exact(mean_rate)
+    size, rate, bulge = elastic * mu, exact(mean_rate), elastic * third if spins else exact(0)
     tensor, change, whole = ([[None] * 3 for _ in range(3)] for _ in range(3))
     own = [exact(m) for m in moments]
     for i in range(3):
@@ -74,14 +77,12 @@ def followed(
             tide = seen[i] * seen[j] * fifth - (third * cube if same else 0.0)
             spin = w[i] * w[j] - (third * _dot(w, w) if same else 0.0)
             known = rate * rate * ((third if same else exact(0)) - exact(float(i == j == 2)))
-            tensor[i][j] = own[i] * same - size * tide + elastic * third * (spin + known)
+            tensor[i][j] = own[i] * same - size * tide + bulge * (spin + known)
             grown = third * (-3.0 * _dot(x, v) / squared * cube) if same else 0.0
             change[i][j] = -size * (
                 slope * seen[i] * seen[j] + fifth * (seen[i] * moved[j] + moved[i] * seen[j]) - grown
             )
-            whole[i][j] = tensor[i][j] + elastic * third * (
-                (_dot(w, w) if same else 0.0) + third * (w[i] * w[j])
-            )
+            whole[i][j] = tensor[i][j] + bulge * ((_dot(w, w) if same else 0.0) + third * (w[i] * w[j]))
     momentum = [_dot(row, w) for row in tensor]
     torque = [3.0 * mu * fifth * y for y in _cross(seen, [_dot(row, seen) for row in tensor])]
     right = [n + y - _dot(c, w) for n, y, c in zip(torque, _cross(momentum, w), change, strict=True)]

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from experiments.coverage import carried, fields, known, real_bodies
+from experiments.coverage import carried, fields, known, real_bodies, satellites
 from experiments.coverage.hyperbolic import HYPERBOLIC, hyperbolic_average
 from experiments.coverage.moments import put_late, spike, switch
 from experiments.random_scenes import KINDS, Draw
@@ -271,13 +271,17 @@ FAMILIES: dict[str, Family] = {
     "gravity field in flight": Family(fields.gravity_field_in_flight, (0.3, 2.0)),
     "bodies of a kernel": Family(real_bodies.kernel, (1.0, 2.0), epochs=(1950, 2100), canonical=False),
     "elastic body": Family(real_bodies.elastic, (1.0, 3.0), canonical=False),
+    "light on plates": Family(satellites.light, (1.0, 2.5), canonical=False),
+    "plates in air": Family(satellites.plates_in_air, (0.3, 1.7), canonical=False),
+    "eddy currents": Family(satellites.eddy_currents, (1.0, 3.0), canonical=False),
+    "field of the attractor": Family(satellites.attractor, (0.3, 2.0), canonical=False),
 }
 """By the name under which the table shows them."""
 
 
-def coverage_scene(number: int, seed: int = 1) -> CoverageScene:
-    """Scene ``number`` of a seed."""
-    name = list(FAMILIES)[number % len(FAMILIES)]
+def coverage_scene(number: int, seed: int = 1, name: str = "") -> CoverageScene:
+    """Scene ``number`` of a seed, of a family by ``name`` or of the one whose turn it is."""
+    name = name or list(FAMILIES)[number % len(FAMILIES)]
     family = FAMILIES[name]
     draw = Draw(np.random.default_rng([7, seed, number]))
     family.draw(draw)

@@ -110,7 +110,8 @@ class _Kept(SampleReceiver):
 def judge(scene: CoverageScene) -> Judged:
     """Run a scene in memory, with its estimate, and then better."""
     started = time.process_time()
-    recorded = ["quaternion"] + (["position"] if "position = " in scene.text.split("[[loads]]")[0] else [])
+    start = scene.text.partition("[initial]")[2].partition("[[")[0]
+    recorded = ["quaternion"] + (["position"] if "position = " in start else [])
     asked = [f"output.record={recorded}".replace("'", '"')]
     begin = Judged(scene.number, scene.family, _setting(scene), "refused", scene.radians)
     try:

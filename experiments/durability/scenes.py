@@ -57,7 +57,7 @@ DAYS = 86400
 MOONS = {
     "moon_double": (1000 * DAYS, 251, "", "", ""),
     "moon_extended": (400 * DAYS, 101, 'precision = "extended"', "", ""),
-    "moon_quadruple": (40 * DAYS, 41, 'precision = "quadruple"', "", ""),
+    "moon_quadruple": (104 * DAYS, 105, 'precision = "quadruple"', "", ""),
 }
 SCENES = {
     "double_dense": (4000, 16001, "", "", ""),

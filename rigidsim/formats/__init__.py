@@ -1,6 +1,6 @@
 """Datasets in other tools' formats."""
 
-FORMATS = ("csv", "parquet", "zarr", "aem", "oem")
+FORMATS = ("csv", "parquet", "zarr", "aem", "oem", "ck", "pck")
 """All formats."""
 
 FOR_SWEEPS = ("csv", "parquet", "zarr")

@@ -185,7 +185,7 @@ def _opening(
         "",
         "META_START",
         _keyword("OBJECT_NAME", source.naming.object_name or source.title),
-        _keyword("OBJECT_ID", source.naming.object_id),
+        _keyword("OBJECT_ID", source.naming.object_id or "UNKNOWN"),
         *(_keyword(name, value) for name, value in frames),
         f"TIME_SYSTEM = {named.epoch.scale}",
         f"START_TIME = {start}",

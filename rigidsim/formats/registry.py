@@ -1,11 +1,14 @@
 """Formats: their description, their lookup by name, and what they are told of a run besides its numbers."""
 
 import importlib.util
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from fractions import Fraction
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
+
+import numpy as np
 
 from rigidsim.errors import RigidsimError
 from rigidsim.formats import FORMATS
@@ -30,7 +33,7 @@ class Naming:
     epoch: str = ""
     axes: str = ""
     object_name: str = ""
-    object_id: str = "UNKNOWN"
+    object_id: str = ""
     center: str = "UNKNOWN"
 
 
@@ -51,15 +54,31 @@ def named_epoch(naming: Naming, attributes: Mapping[str, Any]) -> Epoch:
     return epoch or parse_epoch(known)
 
 
+class RunMotion(Protocol):
+    """A run's motion at any time within its span, in double precision."""
+
+    @property
+    def host(self) -> str:
+        """The body that it is; empty if nothing says so."""
+
+    @property
+    def span(self) -> tuple[Fraction, Fraction]:
+        """Times of its first and its last sample, s."""
+
+    def at(self, times: Sequence[Fraction]) -> tuple[np.ndarray, np.ndarray]:
+        """Quaternions (rows, 4), body to space axes, and angular velocities (rows, 3), body axes, rad/s."""
+
+
 @dataclass(frozen=True)
 class TableSource:
-    """The run, or the sweep, that a table comes from."""
+    """The run, or the sweep, that a table comes from; ``motion`` is that of a run, for formats that ask."""
 
     title: str
     bits: int
     attributes: dict[str, Any]
     naming: Naming
     angle_unit: AngleUnit | None = None
+    motion: RunMotion | None = None
 
 
 @dataclass(frozen=True)
@@ -70,6 +89,9 @@ class Format:
         write: writes a table to a path that doesn't exist yet.
         angles: whether it takes angles in any unit.
         side_tables: whether tables along other dimensions than time get files of their own.
+        suffix: of its files; by default the format's name.
+        beside: files that it needs beside, by their suffixes, and what writes them.
+        between: whether it holds the motion between the samples, too.
         folder: what such a folder is called, and a file that identifies one; None if it writes a file.
     """
 
@@ -77,24 +99,31 @@ class Format:
     angles: bool = False
     side_tables: bool = False
     folder: tuple[str, str] | None = None
+    suffix: str = ""
+    beside: "Mapping[str, Callable[[Table, Path, TableSource], None]]" = field(default_factory=dict)
+    between: bool = False
 
 
 _PLACES = {
-    "csv": ("csv", "FORMAT", ""),
-    "parquet": ("parquet", "FORMAT", "pyarrow"),
-    "zarr": ("zarr", "FORMAT", "zarr"),
-    "aem": ("ccsds", "AEM", ""),
-    "oem": ("ccsds", "OEM", ""),
+    "csv": ("csv", "FORMAT", "", ""),
+    "parquet": ("parquet", "FORMAT", "pyarrow", "export"),
+    "zarr": ("zarr", "FORMAT", "zarr", "export"),
+    "aem": ("ccsds", "AEM", "", ""),
+    "oem": ("ccsds", "OEM", "", ""),
+    "ck": ("ck", "CK", "spiceypy", "spice"),
+    "pck": ("pck", "PCK", "spiceypy", "spice"),
 }
-"""Module and name of each ``Format``, and a package that it needs besides rigidsim's own requirements."""
+"""Module and name of each ``Format``, and a package that it needs besides rigidsim's own requirements, with
+the extra that brings it.
+"""
 
 
 def format_named(name: str) -> Format:
     """A format by its name; its module, and the package that it needs, are loaded."""
     if name not in FORMATS:
         raise RigidsimError(f'--format: given "{name[:40]}"; allowed: {", ".join(FORMATS)}')
-    module, attribute, package = _PLACES[name]
+    module, attribute, package, extra = _PLACES[name]
     if package and importlib.util.find_spec(package) is None:
-        raise RigidsimError(f'{name} needs {package}, which is missing: pip install "rigidsim[export]"')
+        raise RigidsimError(f'{name} needs {package}, which is missing: pip install "rigidsim[{extra}]"')
     found: Format = getattr(import_module(f"rigidsim.formats.{module}"), attribute)
     return found

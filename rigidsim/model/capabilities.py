@@ -130,6 +130,15 @@ class Attracting(Protocol):
 
 
 @runtime_checkable
+class AboutLine(Protocol):
+    """Point (mpf, m) and unit vector, space axes, of a line about which its force and torque leave the whole
+    angular momentum; None without one.
+    """
+
+    def symmetry_line(self) -> tuple[Vector, Vector] | None: ...
+
+
+@runtime_checkable
 class AtRest(Protocol):
     """Its source is at rest in space: 3 G M / R^3 (mpf, 1/s^2), and the unit vector to it in space axes."""
 
@@ -154,9 +163,12 @@ class Reacting(Protocol):
 
 @runtime_checkable
 class Ahead(Protocol):
-    """The time that it counts in is ahead of the scene's, which rounds it more."""
+    """The time that it counts in is ahead of the scene's, which rounds it more; ``of_time`` is True for
+    series, whose arguments are multiples of time.
+    """
 
     seconds_ahead: float
+    of_time: bool
 
 
 # --- axes and planes that it leaves alone -----------------------------------------------------------------
@@ -183,6 +195,13 @@ class TurnsAbout(Protocol):
     """Whether it may have a torque about a unit axis in space (mpf); not asked where its potential tells."""
 
     def turns_about(self, m: Kinematics, axis: Vector) -> bool: ...
+
+
+@runtime_checkable
+class Spares(Protocol):
+    """A unit axis in space (mpf) about which it has no torque; None without one."""
+
+    def spared_axis(self, scene: Scene) -> Vector | None: ...
 
 
 @runtime_checkable

@@ -29,7 +29,9 @@ from typing import Any
 import heyoka as hy
 
 from rigidsim.model.capabilities import (
+    AboutLine,
     Attracting,
+    Spares,
     TurnsAbout,
     fixed_source_of,
     having,
@@ -100,10 +102,13 @@ def _turns_about(m: Mechanics, load: Load, axis: Vector) -> bool:
 
 
 def field_axis(m: Mechanics) -> Vector | None:
-    """Unit vector along the one field to which the linear potentials combine; None if they don't."""
+    """Unit vector along the one field to which the linear potentials combine; None if they don't. Without
+    any it is the axis that another load spares.
+    """
     linear = _linear(m, m.turning)
     if not linear:
-        return None
+        spared = [load.spared_axis(m.scene) for load in having(Spares, m.turning)]
+        return next((axis for axis in spared if axis is not None), None)
     context = m.scene.context
     total = _added([_outer(a, f) for a, f in linear])
     tiny = negligible(context) * sum(_size(context, _outer(a, f)) for a, f in linear)
@@ -253,8 +258,14 @@ def attracting_line(m: Mechanics) -> Vector | None:
     points, context = _points(m), m.scene.context
     if not points or one_point(m):
         return None
+    about = [
+        (load, line) for load in having(AboutLine, m.loads) if (line := load.symmetry_line()) is not None
+    ]
+    points += [point for _, (point, _) in about]
     directions = [[x - y for x, y in zip(point, points[0], strict=True)] for point in points[1:]]
-    others = [load for load in m.loads if not isinstance(load, Attracting)]
+    directions += [axis for _, (_, axis) in about]
+    known = [id(load) for load, _ in about]
+    others = [x for x in m.loads if not isinstance(x, Attracting) and id(x) not in known]
     if m.scene.gravity is not None and any(load.uniform_field is not None for load in others):
         directions.append(m.scene.gravity)
     directions = [d for d in directions if any(x != 0 for x in d)]

@@ -32,7 +32,7 @@ class FlightNames(NameProvider):
 
     def names(self, config: Config) -> Iterable[Readable]:
         """See ``NameProvider``."""
-        source = _centre(config)
+        source = flown_about(config)
         if source is not None and source.extended:
             yield Readable("altitude", "m", _FLIGHT)
         if source is not None:
@@ -40,13 +40,13 @@ class FlightNames(NameProvider):
 
     def elsewhere(self, config: Config) -> str:
         """See ``NameProvider``."""
-        if (source := _centre(config)) is None:
+        if (source := flown_about(config)) is None:
             return "altitude, vrx, vry, vrz in flight, with central_gravity"
         return "" if source.extended else "altitude with a radius of the central_gravity"
 
     def at_start(self, scene: Scene) -> Mapping[str, Any]:
         """See ``NameProvider``."""
-        source, context = _centre(scene.config), scene.context
+        source, context = flown_about(scene.config), scene.context
         if source is None:
             return {}
         load = source.of(scene)
@@ -61,7 +61,7 @@ class FlightNames(NameProvider):
 
     def expressions(self, m: Kinematics, names: Collection[str]) -> Mapping[str, Any]:
         """See ``NameProvider``."""
-        source = _centre(m.scene.config)
+        source = flown_about(m.scene.config)
         if source is None or not set(names) & {"altitude", *RELATIVE_NAMES}:
             return {}
         load, found = source.of(m.scene), {}
@@ -80,7 +80,8 @@ class FlightNames(NameProvider):
         return found
 
 
-def _centre(config: Config) -> SeenSource | None:
+def flown_about(config: Config) -> SeenSource | None:
+    """The load about whose source the body flies through air; None without one."""
     if not free_flight(config):
         return None
     found = [x for x in sources_of(config) if hasattr(x.fields, "atmosphere_rate")]

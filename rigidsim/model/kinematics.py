@@ -56,6 +56,8 @@ class Kinematics:
     )
     seen_so_far: list[list[Symbolic]] = field(default_factory=list, init=False, repr=False, compare=False)
     """Results of ``seen``; some may be there several times."""
+    made: dict[Any, list[Symbolic]] = field(default_factory=dict, init=False, repr=False, compare=False)
+    """Long vectors that several expressions share, by what they are."""
 
     @cached_property
     def sides(self) -> Mapping[Node, Symbolic]:
@@ -188,7 +190,8 @@ class Kinematics:
         scene, sights = self.scene, [sight for load in self.scene.loads for sight in load.sights]
         if scene.ephemeris is None or not sights:
             return None
-        first = sum(place.parameters(orbit) for orbit, place in self.tables.items())
+        first = self.surfaces.parameters
+        first += sum(place.parameters(orbit) for orbit, place in self.tables.items())
         unit, context = self.scaling.time, scene.context
         return KernelStates(scene.ephemeris, sights, unit, scene.start, context, self.number, first)
 

@@ -34,6 +34,7 @@ from rigidsim.model.loads.uniform_gravity import UniformGravity
 from rigidsim.model.observables.observable import NEEDS
 from rigidsim.model.orbits.prescribed import places_of
 from rigidsim.model.own_states import own_units, refuse_odd_states
+from rigidsim.model.placements.kernel_body import refuse_same_sources
 from rigidsim.model.scaling import Scaling, amplitude_of, choose_scaling, scaled_numbers
 from rigidsim.model.state_blocks import BODY
 from rigidsim.scene.choices import AUTO, variables_named
@@ -73,6 +74,7 @@ def plan_model(
     loads: list[Load] = [*UniformGravity.of(scene), *loads_of(scene)]
     if like is None:
         refuse_second_orbits(scene, loads)
+        refuse_same_sources(scene.config.loads, scene.config.body.host)
     formulation, requirements = _choose_formulation(scene, loads, along)
     if scaling is None and like is not None:
         scaling = choose_scaling(scene, like.scaling.drive)
@@ -87,20 +89,12 @@ def plan_model(
     if not formulation.carries_rates:
         scaling = replace(scaling, rates=(0, 0, 0))
     tabulated = [(str(number), table_of(load)) for number, load in enumerate(loads_of(scene), start=1)]
-    tables = places_of([(tag, x) for tag, x in tabulated if x is not None], formulation.longitude)
     surfaces = surfaces_of(scene)
-    kernel = any(load.sights for load in scene.loads)
-    if (tables or kernel) and surfaces.found and formulation.resolves_rotation:
-        where, instead = "[[loads]] orbit.table", "give the orbit by elements"
-        if not tables:
-            where, instead = "[ephemeris] kernel", "give orbits by elements"
-        what = (
-            f'given beside {surfaces.found[0].where}, whose "{surfaces.found[0].text}" has a kink or jump: '
-            f"steps can't end at both; make the change smooth with tanh, or {instead}"
-        )
-        raise ConfigError(Problem(where, what))
+    first = surfaces.parameters if formulation.resolves_rotation else 0
+    tables = places_of([(tag, x) for tag, x in tabulated if x is not None], formulation.longitude, first)
+    piecewise = bool(tables) or any(load.sights for load in scene.loads)
     tags = orbit_tags(scene)
-    clocked = formulation.resolves_rotation and not (tables or kernel) and happens_at_a_moment(scene)
+    clocked = formulation.resolves_rotation and not piecewise and happens_at_a_moment(scene)
     numbers = scaled_numbers(scene, scaling)
     return ModelPlan(
         scene, loads, formulation, requirements, scaling, numbers, tags, surfaces, tables, clocked
@@ -136,7 +130,9 @@ def _choose_requirements(scene: Scene, loads: Sequence[Load]) -> Requirements:
     record = scene.config.output.record
     _check_recordable(scene, asked, record)
     refuse_without_plane(scene, loads)
-    readers = {need: [load.title for load in loads if need in load.reads] for need in ("attitude", "flight")}
+    readers = {
+        need: _each_once([load for load in loads if need in load.reads]) for need in ("attitude", "flight")
+    }
     others = [(f"event {event.name}", event.states) for event in scene.events]
     others += [(f"state {state.name}", states_read(state.derivative)) for state in scene.states]
     for who, states in others:
@@ -190,8 +186,22 @@ def _attitude(scene: Scene, asked: str, record: list[str] | None, readers: list[
     return f"{', '.join(recorded)} is recorded" if recorded else None
 
 
-def _read_by(readers: list[str]) -> str:
-    return f"{', '.join(readers)} reads it"
+def _each_once(loads: Sequence[Load]) -> list[str]:
+    """The kinds of loads, with how many of a kind there are, or of which bodies of a kernel."""
+    kinds: dict[str, list[Load]] = {}
+    for load in loads:
+        kinds.setdefault(load.title, []).append(load)
+    told = []
+    for title, alike in kinds.items():
+        # not what pictures tell: numbers that are looked at tell members of a sweep apart
+        sources = [name for load in alike if (name := getattr(getattr(load, "placement", None), "name", ""))]
+        of_which = ", ".join(sources) if len(sources) == len(alike) else f"{len(alike)} loads"
+        told.append(f"{title} ({of_which})" if len(alike) > 1 else title)
+    return told
+
+
+def _read_by(readers: list[str], them: str = "it") -> str:
+    return f"{', '.join(readers)} read{'s' if len(readers) == 1 else ''} {them}"
 
 
 def _names_that_take(scene: Scene, need: str) -> str:
@@ -211,7 +221,7 @@ def _flight(scene: Scene, record: list[str] | None, readers: list[str]) -> str |
     if recorded:
         return f"{', '.join(recorded)} is recorded"
     if readers:
-        return f"{', '.join(readers)} reads them"
+        return _read_by(readers, "them")
     return "the body moves, and nothing restricts what is recorded" if record is None else None
 
 

@@ -132,7 +132,7 @@ class BodyNames(NameProvider):
 
 
 def _flies(config: Config) -> bool:
-    return config.initial.position is not None or config.initial.velocity is not None
+    return config.initial.flies
 
 
 PROVIDERS.insert(0, BodyNames())  # the first, whoever else is loaded before

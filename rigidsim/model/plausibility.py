@@ -59,6 +59,28 @@ def about_strength(given: ExactNumber, distance: float, where: str) -> Iterator[
         yield _without_unit(f"{where} gravitational_parameter", given, "m^3/s^2", known, "km^3/s^2")
 
 
+def named_body(name: str) -> KnownBody | None:
+    """The known body that a kernel has by a name."""
+    return next((body for body in KNOWN if body.name.lower() == name), None)
+
+
+def about_named_strength(given: ExactNumber | None, name: str, where: str) -> Iterator[Caution]:
+    """A G M given for a body that is named: in km^3/s^2 without a unit, or that of another known body."""
+    body = named_body(name)
+    if body is None or given is None:
+        return
+    value, meant = float(given), known_body(float(given))
+    if given.assumed and abs(value * _CUBIC_KILOMETRE / body.gravitational_parameter - 1) < _AS_PUBLISHED:
+        known = f"{body.owner} is {body.gravitational_parameter / _CUBIC_KILOMETRE:.6g} km^3/s^2"
+        yield _without_unit(f"{where} gravitational_parameter", given, "m^3/s^2", known, "km^3/s^2")
+    elif meant is not None and meant is not body:
+        text = (
+            f"{where} gravitational_parameter: given {_number(given)} m^3/s^2, which is {meant.owner}, for "
+        )
+        text += f'"{name}", which has {body.gravitational_parameter:.6g}; correct one of them'
+        yield Caution(WarningCode.STRENGTH_CONTRADICTS, text)
+
+
 def attracting(given: ExactNumber, distance: float) -> KnownBody | None:
     """The known body that a gravitational parameter means, possibly by a number in km^3/s^2."""
     return _meant_body(given) or (_in_kilometres(float(given), distance) if given.assumed else None)
@@ -116,7 +138,7 @@ def about_distance(
 def about_start(scene: Scene, body: KnownBody | None, place: Vector, velocity: Vector) -> Iterator[Caution]:
     """Place and velocity of a body in flight at the start, relative to the attracting body (m, m/s)."""
     given = scene.config.initial
-    if body is None or given.position is None:
+    if body is None or given.position is None or given.frame is not None:
         return
     distance, speed = float(norm(scene.context, place)), float(norm(scene.context, velocity))
     yield from about_distance(body, distance, given.position, "[initial] position")

@@ -76,7 +76,7 @@ def sources_of(config: Config) -> list[SeenSource]:
 
 def free_flight(config: Config) -> bool:
     """Whether the body has a position."""
-    return config.initial.position is not None or config.initial.velocity is not None
+    return config.initial.flies
 
 
 def read_in(scene: Scene) -> frozenset[str]:

@@ -278,13 +278,25 @@ class System:
 
     @property
     def parameters(self) -> int:
-        """Number of parameters that equations and events may use."""
-        return len(self.surfaces) + len(self.turning) + bool(self.signed) + self.clocked
+        """Number of parameters that equations and events may use; of pieces alone, none."""
+        if self.switches and self.pieces is not None:
+            return self.first_of_pieces + len(self.pieces.parameters(0))
+        return self._sides + self.clocked
+
+    @property
+    def _sides(self) -> int:
+        """Number of parameters that tell sides, turns and the sign."""
+        return len(self.surfaces) + len(self.turning) + bool(self.signed)
+
+    @property
+    def first_of_pieces(self) -> int:
+        """Index of the first parameter of ``pieces``."""
+        return self.plan.surfaces.parameters if self.plan.formulation.resolves_rotation else 0
 
     @property
     def switches(self) -> bool:
         """Whether there are switching surfaces, or angles or a quaternion continued from step to step."""
-        return self.parameters > self.clocked
+        return self._sides > 0
 
 
 def build_system(plan: ModelPlan, number: Rounder) -> System:

@@ -5,7 +5,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 from fractions import Fraction
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -27,6 +27,9 @@ from rigidsim.store.provenance import RootAttributes
 from rigidsim.store.summary import Summary
 from rigidsim.store.summary_parts import EventTimes
 from rigidsim.store.variables import LABELS, OF_THE_RUN, SCHEMA_VERSION, Extra, Variable, time_variable
+
+if TYPE_CHECKING:
+    from rigidsim.session.published import PublishedAttitude
 
 LYAPUNOV_NAMES = ("lyapunov_time", "lyapunov_index", "lyapunov_exponents")
 """Names of variables and dimensions."""
@@ -53,6 +56,9 @@ def dataset_variables(prepared: InitialValueProblem) -> list[Variable]:
         *(_drift(invariant) for invariant in system.invariants),
         *(_put_back(invariant, projected) for invariant in system.invariants if invariant.name in projected),
     ]
+    beside_published = published_of(prepared)
+    if beside_published is not None:
+        found += beside_published.variables
     dates = dates_of(prepared)
     if dates is None:
         return [time, *found]
@@ -72,6 +78,21 @@ def dates_of(prepared: InitialValueProblem) -> Dates | None:
     """Dates of samples; None if the date of time 0 is unknown."""
     scene = prepared.scene
     return None if scene.epoch is None else Dates(scene.epoch, scene.samples)
+
+
+def published_of(prepared: InitialValueProblem) -> "PublishedAttitude | None":
+    """What is recorded of a published orientation; None without one."""
+    orientation, scene = prepared.scene.orientation, prepared.scene
+    if orientation is None:
+        return None
+    from rigidsim.session.published import QUATERNION, PublishedAttitude
+
+    if not any(recorded.name == QUATERNION for recorded in prepared.system.recorded):
+        named = scene.config.output.record
+        lacking = f"isn't recorded; name {QUATERNION} in record" if named else "this model hasn't"
+        what = f"needs the attitude, which {lacking}, or leave orientation out"
+        raise ConfigError(Problem("[output] orientation", what), prepared.experiment.source)
+    return PublishedAttitude(orientation, scene.figure)
 
 
 def labels_of_the_run(scene: Scene) -> dict[str, Sequence[str]]:
@@ -274,7 +295,19 @@ def root_attributes(
 
 
 def kernel_attributes(scene: Scene) -> dict[str, Any]:
-    """What tells the kernel of a scene: name, span of what was read of it, and SHA-256; empty without one."""
+    """What tells the kernels of a scene: names, span of what was read, and SHA-256; empty without one."""
+    return _of_ephemeris(scene) | _of_orientation(scene)
+
+
+def _of_orientation(scene: Scene) -> dict[str, Any]:
+    found = scene.orientation
+    if found is None:
+        return {}
+    names = {"orientation_kernel": found.name, "orientation_of": found.described}
+    return {**names, "orientation_sha256": found.digest}
+
+
+def _of_ephemeris(scene: Scene) -> dict[str, Any]:
     if scene.ephemeris is None or not scene.ephemeris.used:
         return {}
     first, last = zip(*(sight.span for sight in scene.ephemeris.used), strict=True)

@@ -13,7 +13,7 @@ from typing import ClassVar
 import numpy as np
 
 from rigidsim.errors import RunFolderError
-from rigidsim.session.dataset import dates_of, drift_name, put_back_name
+from rigidsim.session.dataset import dates_of, drift_name, published_of, put_back_name
 from rigidsim.solve.assembly import Assembly
 from rigidsim.solve.checkpoint import Arrays, SavedPart, check_versions, numbers, pack_versions
 from rigidsim.solve.corrected_stepper import Position
@@ -180,6 +180,7 @@ class Recorder(SampleReceiver):
         self._writer = writer
         self._checkpoints = checkpoints
         self._dates = dates_of(prepared)
+        self._published = published_of(prepared)
         self._events_saved = 0 if start is None else start.boundary.mark.events
         guard = prepared.scene.config.limits.max_drift
         self._max_drift = None if guard is None else float(guard)
@@ -212,6 +213,8 @@ class Recorder(SampleReceiver):
             self.statistics.see_undefined(variable.name, values, block.first, recorded["time"][0])
         if self._dates is not None:
             recorded |= self._dates.of_samples(block.first, len(block))
+        if self._published is not None:
+            recorded |= self._published.of_samples(recorded)
         for invariant in self._prepared.system.invariants:
             self.statistics.see(invariant.name, recorded[drift_name(invariant.name)][0][:, 0])
         for name, values in put_back.items():

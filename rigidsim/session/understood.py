@@ -3,6 +3,7 @@
 from typing import Any
 
 from rigidsim.model.load import Load, loads_of
+from rigidsim.model.plausibility import about_named_strength
 from rigidsim.scene import attitude
 from rigidsim.scene.arithmetic import Vector, working_bits
 from rigidsim.scene.readable import TimeWords
@@ -91,6 +92,11 @@ def cautions_of(scene: Scene) -> list[Caution]:
     for number, (fields, load) in enumerate(zip(scene.config.loads, scene.given_loads, strict=True), start=1):
         if isinstance(load, Load):
             found += load.cautions(fields, f"[[loads]] number {number}", scene)
+    for number, one in enumerate(scene.config.bodies, start=1):
+        if one.ephemeris:
+            found += about_named_strength(
+                one.gravitational_parameter, one.name, f"[[bodies]] number {number}"
+            )
     for load in loads_of(scene):
         if isinstance(load, tuple(OF_BODY.values())):
             found += load.cautions(scene.config.body, "[body]", scene)

@@ -56,6 +56,8 @@ LEAST: dict[WarningCode, Soundness] = {
     WarningCode.GRAVITY_UPWARDS: Soundness.SOUND,
     WarningCode.NEAR_RESONANCE: Soundness.SOUND,
     WarningCode.FRICTION_STIFF: Soundness.SOUND,
+    WarningCode.STRENGTH_CONTRADICTS: Soundness.SOUND,
+    WarningCode.HOST_WITHOUT_GRAVITY: Soundness.SOUND,
 }
 """The best that can be said of a run beside each warning; of a later version's warnings ``LIMITED``."""
 _DEGREES = list(Soundness)

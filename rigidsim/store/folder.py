@@ -5,7 +5,7 @@ import fcntl
 import json
 import os
 import shutil
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -153,13 +153,13 @@ class RunFolder(WorkFolder):
         """Default file of ``rigidsim plot --what`` for a figure of that name."""
         return self.path / f"figure_{what}.png"
 
-    def begin(self, config: str, *, force: bool, kernel: Path | None = None) -> None:
-        """Make the folder ready for a new run: write its config and its kernel's place; it is under way."""
+    def begin(self, config: str, *, force: bool, kernels: Sequence[Path] = ()) -> None:
+        """Make the folder ready for a new run: write its config and its kernels' places; it is under way."""
         self.create(force=force)
         try:
             atomic.write_bytes(self.config, config.encode())
-            if kernel is not None:
-                atomic.write_bytes(self.path / NOTE, f"{kernel}\n".encode())
+            if kernels:
+                atomic.write_bytes(self.path / NOTE, "".join(f"{place}\n" for place in kernels).encode())
             self.segments.mkdir()
         except OSError as error:
             raise self.unwritable(error) from None

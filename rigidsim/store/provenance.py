@@ -94,6 +94,8 @@ class RootAttributes(BaseModel):
         surroundings: objects around the body, for pictures (see ``rigidsim.look.surroundings``).
         ephemeris_kernel, ephemeris_span, ephemeris_sha256: name of the kernel that places bodies, dates
             between which it has them, and SHA-256 of its file, or of those read of a package in order.
+        orientation_kernel, orientation_of, orientation_sha256: name of the kernel of a published orientation,
+            what of it, and SHA-256 of its file.
         recorded: names of the variables along time, without drifts and residuals: if the config names none, a
             later version may record more by default.
         hold_from_step: natural steps after which invariants are projected; None if from the start.
@@ -145,6 +147,9 @@ class RootAttributes(BaseModel):
     ephemeris_kernel: Annotated[str | None, Use.REPEATED] = None
     ephemeris_span: Annotated[str | None, Use.REPEATED] = None
     ephemeris_sha256: Annotated[str | None, Use.SYSTEM, Use.SETTING, Use.REPEATED] = None
+    orientation_kernel: Annotated[str | None, Use.REPEATED] = None
+    orientation_of: Annotated[str | None, Use.REPEATED] = None
+    orientation_sha256: Annotated[str | None, Use.SYSTEM, Use.SETTING, Use.REPEATED] = None
     time_unit: str | None = None
     recorded: str | None = None
     python_loads: str = ""

@@ -82,6 +82,8 @@ class WarningCode(Enum):
     MODEL_UNMEASURED = "model_unmeasured"
     DELAY_TOO_LONG = "delay_too_long"
     FRICTION_STIFF = "friction_stiff"
+    STRENGTH_CONTRADICTS = "strength_contradicts"
+    HOST_WITHOUT_GRAVITY = "host_without_gravity"
 
 
 class UnmeasuredCode(Enum):

@@ -17,6 +17,7 @@ from rigidsim.store import atomic
 from rigidsim.store.run import SavedRun
 from rigidsim.store.sweeps.run import SavedSweep
 from rigidsim.store.variables import parts_in
+from rigidsim.workflows.again import MotionAgain
 from rigidsim.workflows.read import parse
 
 _PART_BITS = 53  # bits of a double: a value held by n of them has at most n times as many
@@ -37,11 +38,13 @@ def export(
 
     Args:
         file_format: one of ``rigidsim.formats.FORMATS``; csv, parquet or zarr of a sweep.
-        out: the file (for zarr the folder); ``NAME.FORMAT`` in the working folder by default. In csv and
+        out: the file (for zarr the folder); ``NAME.FORMAT`` in the working folder by default (``NAME.bc`` and
+            its clock ``NAME.tsc`` for ck, ``NAME.bpc`` and its frame ``NAME.tf`` for pck). In csv and
             parquet, events and Lyapunov estimates go to files of their own beside it, ``NAME.flip.csv``; of a
             sweep the file has a row per member, and whole series, occurrences of an event and spectral lines
             go to long tables beside it: ``NAME.time.csv``, ``NAME.flip_occurrence.csv``, ``NAME.line.csv``.
-        naming: epoch, axes and names that the run's config leaves open, for aem and oem; empty for sweeps.
+        naming: epoch, axes and names that the run's config leaves open, for
+            aem, oem, ck and pck; empty for sweeps.
         angle_unit: one of ``rigidsim.scene.readable.ANGLE_UNITS``; rad by default. For csv, parquet and zarr.
         block_numbers: numbers of a sweep held in memory at once; no digit depends on it.
     """
@@ -52,7 +55,7 @@ def export(
             f"--angle-unit: given {angle_unit}, but {file_format} prescribes its units; leave it out"
         )
     name = saved.folder.path.resolve().name
-    target = Path(f"{name}.{file_format}") if out is None else Path(out)
+    target = Path(f"{name}{found.suffix or f'.{file_format}'}") if out is None else Path(out)
     if isinstance(saved, SavedRun):
         opened = saved.opened(indexed=False)  # sample times are not loaded as an index
     else:
@@ -62,15 +65,24 @@ def export(
         bits = _bits(dataset) if isinstance(saved, SavedRun) else _bits_of_members(dataset)
         first, *others = tables_of(dataset, unit, bits, block_numbers)
         attributes = dict(dataset.attrs, status=saved.status)
-        source = TableSource(name, bits, attributes, naming or Naming(), unit)
-        kept = {target: first}
+        if found.between and isinstance(saved, SavedRun) and not saved.folder.dataset.exists():
+            raise RunFolderError(f"{saved.place}: the run is {saved.status}; {RESUME} completes it")
+        motion = MotionAgain(saved.folder.dataset) if found.between and isinstance(saved, SavedRun) else None
+        source = TableSource(name, bits, attributes, naming or Naming(), unit, motion)
+        kept = {target: (first, found.write)}
         if found.side_tables:
-            kept |= {target.with_name(f"{target.stem}.{t.dim}{target.suffix}"): t for t in others}
+            for table in others:
+                path = target.with_name(f"{target.stem}.{table.dim}{target.suffix}")
+                kept[path] = table, found.write
+        for suffix, write in found.beside.items():
+            if target.suffix == suffix:
+                raise RigidsimError(f"--out: given {target}, but {suffix} is that of a file beside it")
+            kept[target.with_suffix(suffix)] = first, write
         for path in kept:
             _refuse_existing(path, found, force)
-        for path, table in kept.items():
+        for path, (table, write) in kept.items():
             with _replacing(path, found) as new:
-                found.write(table, new, source)
+                write(table, new, source)
         return list(kept)
 
 
@@ -84,8 +96,8 @@ def _refuse_for_sweeps(sweep: SavedSweep, file_format: str, naming: Naming | Non
         )
     if naming not in (None, Naming()):
         raise RigidsimError(
-            "--epoch, --axes and --object-name are for single runs: tables of a sweep have times in s and no "
-            "dates; leave them out"
+            "--epoch, --axes, --object-name and --object-id are for single runs: tables of a sweep have "
+            "times in s and no dates; leave them out"
         )
     if not sweep.finished:
         raise RunFolderError(f"{sweep.place}: the sweep is {sweep.status}; {RESUME} completes it")

@@ -7,6 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import rigidsim.model.earth_frames
 import rigidsim.model.loads
 import rigidsim.model.partial_invariants
 import rigidsim.model.starts
@@ -67,22 +68,33 @@ def as_begun(experiment: Experiment, saved: Path) -> Experiment:
 
 
 def refuse_other_kernel(experiment: Experiment, saved: Path) -> None:
-    """Refuse to go on from a file with another kernel than the one that it was begun with.
+    """Refuse to go on from a file with other kernels than those that it was begun with.
 
     Raises:
         RunFolderError: its bytes differ.
         ConfigError: it is missing, or can't be read.
     """
-    begun = read_attributes(saved)
-    if experiment.config.ephemeris is None or begun.ephemeris_sha256 is None:
-        return
-    now = kernel_attributes(build_scene(experiment)).get("ephemeris_sha256")
-    if now != begun.ephemeris_sha256:
-        what = (
-            f'{saved}: begun with a kernel "{begun.ephemeris_kernel}" of SHA-256 {begun.ephemeris_sha256}, '
-        )
-        what += f"but the one found is of {now}; put the former in its place, or name its folder in the "
-        raise RunFolderError(f"{what}environment variable {FOLDERS}, and remove the other")
+    if reads_kernels(experiment):
+        refuse_others(read_attributes(saved).as_dict(), kernel_attributes(build_scene(experiment)), saved)
+
+
+def reads_kernels(experiment: Experiment) -> bool:
+    """Whether a config names kernels of SPICE or of JPL."""
+    return experiment.config.ephemeris is not None or experiment.config.output.orientation is not None
+
+
+def refuse_others(begun: Mapping[str, Any], now: Mapping[str, Any], place: Path) -> None:
+    """Refuse kernels other than those with which something was begun; both as ``kernel_attributes``.
+
+    Raises:
+        RunFolderError: the bytes of one differ.
+    """
+    for kind in ("ephemeris", "orientation"):
+        then, found = (known.get(f"{kind}_sha256") for known in (begun, now))
+        if then is not None and found is not None and found != then:
+            what = f'{place}: begun with a kernel "{begun[f"{kind}_kernel"]}" of SHA-256 {then}, but the one '
+            what += f"found is of {found}; put the former in its place, or name its folder in the "
+            raise RunFolderError(f"{what}environment variable {FOLDERS}, and remove the other")
 
 
 def text_difference(one: str, other: str) -> str:

@@ -149,8 +149,10 @@ def _place(
     folder = RunFolder(Path(out) / prepared.scene.name)
     refuse_too_large(prepared, folder.path)
     with folder.locked():
-        ephemeris = prepared.scene.ephemeris
-        folder.begin(config, force=force, kernel=None if ephemeris is None else ephemeris.kernel.place)
+        scene = prepared.scene
+        places = [None if scene.ephemeris is None else scene.ephemeris.kernel.place]
+        places.append(None if scene.orientation is None else scene.orientation.place)
+        folder.begin(config, force=force, kernels=[place for place in places if place is not None])
         yield folder
 
 

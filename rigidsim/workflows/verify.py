@@ -2,7 +2,7 @@
 
 import tempfile
 from collections.abc import Iterator, Mapping
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +22,8 @@ from rigidsim.store.run import Run, open_run
 from rigidsim.store.seal import check_seal
 from rigidsim.store.summary import Brief, Summary
 from rigidsim.store.summary_parts import Claim
-from rigidsim.workflows.read import as_begun, embedded, refuse_other_kernel, text_difference
+from rigidsim.workflows.again import experiment_again
+from rigidsim.workflows.read import text_difference
 from rigidsim.workflows.run import run
 
 _ROWS_AT_ONCE = 65536
@@ -81,19 +82,9 @@ def verify(path: str | Path, *, observer: Observer | None = None) -> Verdict:
     dataset, folder = _dataset(Path(path))
     problems = _file_problems(dataset, folder)
     saved = read_attributes(dataset)
-    if saved.python_loads:
-        raise RunFolderError(
-            f"{dataset}: the run had loads from Python ({saved.python_loads}), which its config lacks"
-        )
-    experiment = as_begun(embedded(dataset), dataset)
-    refuse_other_kernel(experiment, dataset)
+    experiment = experiment_again(dataset)
     with _scratch() as scratch:
-        quiet = experiment.config.output.model_copy(update={"timeline": False})
-        unguarded = type(experiment.config.limits).model_construct()
-        plain = experiment.config.integrator.model_copy(update={"accuracy": None})
-        replaced = {"output": quiet, "limits": unguarded, "integrator": plain}
-        config = experiment.config.model_copy(update=replaced)
-        again = run(replace(experiment, config=config), out=scratch, observer=observer)
+        again = run(experiment, out=scratch, observer=observer)
         if again.status == Status.INTERRUPTED.value:
             raise KeyboardInterrupt
         if not again.folder.dataset.exists():

@@ -33,6 +33,7 @@ GUIDE = ROOT / "experiments" / "README.md"
 CHECKS = ROOT / "experiments" / "checks.md"
 SLOW = {  # about how many seconds they take
     "apophis_flyby": 15,
+    "apophis_real_sky": 60,
     "averaged_motions": 100,
     "cassini_states": 40,
     "damped_averages": 30,
@@ -42,6 +43,10 @@ SLOW = {  # about how many seconds they take
     "heavy_top_regimes": 15,
     "hyperion": 40,
     "luni_solar_precession": 15,
+    "mars_rotation": 30,
+    "moon_free_librations": 80,
+    "mercury_librations": 25,
+    "phobos_and_vesta": 15,
     "precession_and_nutation": 40,
     "real_moon": 250,
     "rigid_earth": 60,

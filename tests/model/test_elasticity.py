@@ -49,9 +49,9 @@ def orbit_start(eccentricity: str = "0.1") -> list[list[Any]]:
     # rounding in some thousands of steps, amplified by librations
     [
         ("double", "quaternion", 50, 5e-13),
-        ("double", "rotation_matrix", 50, 5e-13),
-        ("double", "euler_angles", 50, 5e-13),
-        ("single", "quaternion", 50, 2e-4),
+        ("double", "rotation_matrix", 20, 5e-13),
+        ("double", "euler_angles", 20, 5e-13),
+        ("single", "quaternion", 20, 2e-4),
         ("quadruple", "quaternion", 20, 1e-18),
     ],
 )
@@ -85,13 +85,39 @@ def test_a_thousand_radians(precision: str, rates_within: float, attitude_within
     assert_sound(run)
 
 
+@pytest.mark.parametrize("formulation", ["quaternion", "euler_angles"])
+def test_tides_alone(formulation: str) -> None:
+    elastic = f"{ELASTIC}, spin = false"
+    run = run_text(scene(50, elastic, integrator=f'formulation = "{formulation}"'))
+    times = run.dataset["time"].values
+    size = strength("0.3", "0.002")
+    found = followed(MOMENTS, size, RATES[2], 1, orbit_start(), RATES, times, spins=False)
+    assert np.abs(wide(run.dataset, "angular_velocity") - found[0]).max() <= 5e-13
+    assert np.abs(matrices(run.dataset) - found[1]).max() <= 5e-13
+    assert np.abs(wide(run.dataset, "angular_momentum") - found[2]).max() <= 5e-13
+    assert_sound(run)
+
+
+@pytest.mark.parametrize("source", ["", "position = [0, 1, 0.3]", "orbit = {semi_major_axis = 1}"])
+def test_tides_alone_are_balanced(source: str) -> None:
+    """They aren't a minimum of any energy, so that none is claimed to be conserved."""
+    loads = f'kind = "gravity_gradient"\ngravitational_parameter = 1\n{source}' if source else ""
+    run = run_text(scene(50, f"{ELASTIC}, spin = false", loads=loads))
+    assert_sound(run)
+    found = {name for name, row in run.summary["invariants"].items() if not row["numerical"]}
+    assert not source or not found & {"energy", "jacobi_constant"}
+
+
 # --- with a delay -------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(("delay", "within"), [(0.01, 4e-8), (0.0025, 6e-10)])
-def test_with_a_delay_up_to_its_third_order(delay: float, within: float) -> None:
+@pytest.mark.parametrize(
+    ("delay", "end", "within"),
+    [(0.01, 8, 4e-8), pytest.param(0.0025, 30, 6e-10, marks=pytest.mark.slow)],
+)
+def test_with_a_delay_up_to_its_third_order(delay: float, end: float, within: float) -> None:
     """The bound falls with the delay to the third: (2 tau)^3 / 6 of the distortion, whose frequency is 2."""
-    run = run_text(scene(30, f"{ELASTIC}, delay = {delay}"))
+    run = run_text(scene(end, f"{ELASTIC}, delay = {delay}"))
     elastic = float(str(strength("0.3", "0.002")))
     truth = Delayed([float(x) for x in MOMENTS], elastic, delay, float(RATES[2]), 1.0, 1.0, 0.1)
     rates, attitudes, distortions = truth.followed([float(x) for x in RATES], run.dataset["time"].values)
@@ -241,10 +267,10 @@ def test_a_killed_run_is_resumed_bit_for_bit_and_verified(tmp_path: Path) -> Non
 
 def test_members_of_a_sweep_are_their_single_runs(tmp_path: Path) -> None:
     text = scene(20, f"{ELASTIC}, delay = 0.01")
-    axes = 'axes."body.elasticity.love_number" = {values = [0.1, 0.2, 0.3]}\n'
+    axes = 'axes."body.elasticity.love_number" = {values = [0.1, 0.3]}\n'
     axes += 'axes."body.elasticity.delay" = {values = [0.005, 0.01]}\n'
     found = rigidsim.sweep(rigidsim.parse(f'{text}[sweep]\nkeep = ["final"]\n{axes}'), out=tmp_path).dataset
-    for i, love in enumerate(("0.1", "0.2", "0.3")):
+    for i, love in enumerate(("0.1", "0.3")):
         keys = f"body.elasticity.love_number={love}", "body.elasticity.delay=0.005"
         alone = run_text(text, *keys).dataset
         # members of a batch are rounded otherwise

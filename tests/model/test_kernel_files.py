@@ -8,36 +8,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from kernel_scenes import STRENGTHS, moon
 from spk_files import FIRST, write_kernel
 from support import run_text
 
 import rigidsim
 from rigidsim.scene.kernels.kernel import KernelError
 from rigidsim.scene.kernels.reading import SpkKernel
-
-SCENE = """
-name = "moon"
-[body]
-principal_moments = ["0.999369252102309314", "0.999596982633729229", 1]
-host = "moon"
-[initial]
-euler_angles = [0.005, 0.38, 1.29]
-angular_velocity = [1e-8, -2e-8, 2.6617e-6]
-[ephemeris]
-kernel = "{kernel}"
-[[loads]]
-kind = "gravity_gradient"
-source = "earth"
-gravitational_parameter = 398600436233339.6
-[[loads]]
-kind = "gravity_gradient"
-source = "sun"
-gravitational_parameter = 1.3271244004127942e20
-[time]
-epoch = "1969-06-28T00:00:00 TDB"
-end = "40 day"
-every = "1 day"
-"""
 
 
 @pytest.fixture(scope="module")
@@ -51,8 +28,8 @@ def test_a_file_by_hand_places_bodies_as_the_package_does(tmp_path: Path, whole:
     """The file has the Moon about the barycentre with the Earth, the package about the Earth."""
     path = tmp_path / "moon.bsp"
     path.write_bytes(whole)
-    found = run_text(SCENE.format(kernel=path)).dataset
-    package = run_text(SCENE.format(kernel="de421")).dataset
+    found = run_text(moon(str(path), STRENGTHS)).dataset
+    package = run_text(moon("de421", STRENGTHS)).dataset
     for source in ("earth", "sun"):
         one, other = (x["source_position"].sel(source=source).values for x in (found, package))
         size = np.linalg.norm(one, axis=1)
@@ -96,7 +73,7 @@ def test_damage_is_told_beforehand(name: str, tmp_path: Path, whole: bytes) -> N
     path = tmp_path / "moon.bsp"
     path.write_bytes(change(whole))
     with pytest.raises(rigidsim.ConfigError) as caught:
-        rigidsim.plan(rigidsim.parse(SCENE.format(kernel=path)))
+        rigidsim.plan(rigidsim.parse(moon(str(path), STRENGTHS)))
     assert words in str(caught.value)
     assert "[ephemeris] kernel: given " in str(caught.value)
 
@@ -123,6 +100,6 @@ def test_a_run_beyond_the_file_is_refused_with_both_spans(tmp_path: Path, whole:
     path.write_bytes(whole)
     assert FIRST == 2440368.5  # 1969-05-27
     with pytest.raises(rigidsim.ConfigError) as caught:
-        run_text(SCENE.format(kernel=path), 'time.end="300 day"')
+        run_text(moon(str(path), STRENGTHS), 'time.end="300 day"')
     words = "from 1969-05-27 to 1970-02-07 (TDB), but the run goes from 1969-06-28"
     assert f'has "earth" {words}' in str(caught.value)

@@ -11,6 +11,7 @@ import de421
 import numpy as np
 import pytest
 from jplephem.ephem import Ephemeris
+from kernel_scenes import HEAVY, LANDING, TURNED, moon
 from mpmath import mp
 from scipy.integrate import DOP853
 from support import run_text
@@ -18,31 +19,8 @@ from support import run_text
 import rigidsim
 
 EPOCH = 2440423.0  # 1969-07-20T12:00 TDB
-MOON = """
-name = "moon"
-[body]
-principal_moments = [8.79e34, 8.7920e34, 8.7955e34]
-host = "moon"
-[initial]
-angular_velocity = [1e-8, -2e-8, 2.6617e-6]
-quaternion = [0.9, 0.1, 0.2, 0.3]
-[ephemeris]
-kernel = "de421"
-[[loads]]
-kind = "gravity_gradient"
-source = "earth"
-[[loads]]
-kind = "gravity_gradient"
-source = "sun"
-[[loads]]
-kind = "gravity_gradient"
-source = "venus"
-[time]
-epoch = "1969-07-20T12:00:00 TDB"
-end = "57 day"
-times = {times}
-"""
 SOURCES = ("earth", "sun", "venus")
+MOON = moon(sources=SOURCES, body=HEAVY, start=TURNED, epoch=LANDING, time='end = "57 day"\ntimes = {times}')
 KERNEL = Ephemeris(de421)
 
 
@@ -198,9 +176,10 @@ BAD = {
     "too early": ('time.epoch="1890-01-01T00:00:00 TDB"', "from 1899-12-04 to 2200-02-01 (TDB)"),
     "too long": ('time.end="400 yr"', "change [time] epoch, start or end, or take a longer kernel"),
     "host": ('body.host="mon"', 'given "mon"; did you mean "moon"'),
+    "elsewhere": ('body.host="titan"', "others are in SPK files, which [ephemeris] kernel"),
+    "number": ("body.host=606", 'given "606"; de421 has'),
     "no host": ("body.host=", "name that in [body] host"),
     "itself": ('body.host="earth"', 'given "earth", which is the body itself'),
-    "averaged": ('model.level="spin_averaged"', "set at the edges of its blocks"),
     "spectrum": ("output.lyapunov=true", "at the edges of whose blocks states are set"),
     "two places": ("loads[0].position=[1, 0, 0]", "exactly one of orbit, position, ephemeris and source"),
     "axes": ('frame.axes="EME2000"', "the bias of 0.02 arcsec"),

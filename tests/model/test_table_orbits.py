@@ -134,14 +134,21 @@ def test_a_run_is_verified_without_the_file(saved: rigidsim.Run) -> None:
 
 
 def test_what_a_table_can_not_be_combined_with() -> None:
-    for more, says in {
-        "[output]\nlyapunov = true": "an orbit goes by a table",
-        '[[loads]]\nkind = "torque"\ncomponents = ["abs(wx)", 0, 0]': "has a kink or jump",
-    }.items():
-        text = by_table(40.0).split("[output]")[0] + more + "\n[tables" + by_table(40.0).split("[tables")[1]
-        with pytest.raises(ConfigError, match="table") as caught:
-            prepare(rigidsim.parse(text))
-        assert says in str(caught.value)
+    more = "[output]\nlyapunov = true"
+    text = by_table(40.0).split("[output]")[0] + more + "\n[tables" + by_table(40.0).split("[tables")[1]
+    with pytest.raises(ConfigError, match="table") as caught:
+        prepare(rigidsim.parse(text))
+    assert "an orbit goes by a table" in str(caught.value)
+
+
+def test_steps_end_at_kinks_and_at_rows() -> None:
+    kinked = '[[loads]]\nkind = "torque"\ncomponents = ["1e-12*max(sin(t/1e5), 0)", "1e-11*sign(qx*qz)", 0]\n'
+    by_rows, by_elements = (
+        run_text(text.replace("[frame]", kinked + "[frame]")).dataset
+        for text in (by_table(4.0), PLANET % KEPLER)
+    )
+    assert apart(by_rows, by_elements) < 1e-10  # rows 4 days apart: interpolated to some 1e-11
+    assert apart(by_rows, run_text(by_table(4.0)).dataset) > 1e-3
 
 
 def test_mars_with_a_table_of_its_orbit_has_the_obliquity_of_almanacs() -> None:

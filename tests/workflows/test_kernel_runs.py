@@ -6,38 +6,21 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from kernel_scenes import HEAVY, LANDING, STRENGTHS, TURNED, moon
 from kernels import write_spk
+from support import IMPATIENT
 
 import rigidsim
 from rigidsim.scene.kernels.finding import FOLDERS
+from rigidsim.session.session import Tuning
+from rigidsim.solve.sampler import Pacing
 
-CONFIG = """
-name = "moon"
-[body]
-principal_moments = [8.79e34, 8.7920e34, 8.7955e34]
-host = "moon"
-[initial]
-angular_velocity = [1e-8, -2e-8, 2.6617e-6]
-quaternion = [0.9, 0.1, 0.2, 0.3]
-[ephemeris]
-kernel = "{kernel}"
-[[loads]]
-kind = "gravity_gradient"
-source = "earth"
-{strengths[0]}
-[[loads]]
-kind = "gravity_gradient"
-source = "sun"
-{strengths[1]}
-[time]
-epoch = "1969-07-20T12:00:00 TDB"
-end = "60 day"
-samples = 61
-[output]
-timeline = false
-"""
-STRENGTHS = [f"gravitational_parameter = {gm!r}" for gm in (3.986004356e14, 1.32712440041e20)]
+TIME = 'end = "60 day"\nsamples = 61'
 BEGIN, END = 2440420.0, 2440500.0
+
+
+def text_of(kernel: str) -> str:
+    return moon(kernel, STRENGTHS, body=HEAVY, start=TURNED, epoch=LANDING, time=TIME)
 
 
 @pytest.fixture
@@ -48,7 +31,7 @@ def scene(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     folder.mkdir()
     write_spk(folder / "small.bsp", BEGIN, END)
     path = folder / "moon.toml"
-    path.write_text(CONFIG.format(kernel="small.bsp", strengths=STRENGTHS))
+    path.write_text(text_of("small.bsp"))
     return path
 
 
@@ -63,7 +46,7 @@ def same(one: rigidsim.Run, other: rigidsim.Run) -> None:
 def test_a_file_says_what_the_package_does(scene: Path, tmp_path: Path, kind: int) -> None:
     write_spk(scene.parent / "small.bsp", BEGIN, END, kind=kind)
     by_file = rigidsim.run(scene, out=None).dataset
-    text = CONFIG.format(kernel="de421", strengths=STRENGTHS)
+    text = text_of("de421")
     by_package = rigidsim.run(rigidsim.parse(text), out=None).dataset
     for source in ("earth", "sun"):
         one, other = (x["source_position"].sel(source=source).values for x in (by_file, by_package))
@@ -73,14 +56,26 @@ def test_a_file_says_what_the_package_does(scene: Path, tmp_path: Path, kind: in
     assert by_file.attrs["ephemeris_kernel"] == "small.bsp"
 
 
+@pytest.mark.parametrize("samples", [13, 121, 4801])
+def test_samples_have_the_same_bits_however_many_steps_are_taken_at_once(scene: Path, samples: int) -> None:
+    """Those of several steps together, through edges, or step by step; and one alone as among many."""
+    changes = {"time.samples": samples, "output.estimate": False}
+    at_once = rigidsim.run(scene, out=None, changes=changes, tuning=Tuning(Pacing(chunk_seconds=1.0)))
+    one_by_one = rigidsim.run(scene, out=None, changes=changes, tuning=IMPATIENT)
+    same(at_once, one_by_one)
+    every = (samples - 1) // 12
+    fewer = rigidsim.run(scene, out=None, changes=changes | {"time.samples": 13})
+    np.testing.assert_array_equal(at_once.dataset["quaternion"][::every], fewer.dataset["quaternion"])
+
+
 @pytest.mark.parametrize("kernel", ["small.bsp", pytest.param("de421", marks=pytest.mark.slow)])
 def test_resumed_anywhere_it_has_the_same_bits(scene: Path, tmp_path: Path, kernel: str) -> None:
     """At each of many steps, among them those that end at edges."""
-    scene.write_text(CONFIG.format(kernel=kernel, strengths=STRENGTHS))
+    scene.write_text(text_of(kernel))
     whole = rigidsim.run(scene, out=tmp_path / "whole")
     steps = whole.summary["cost"]["steps"]
     edges = 0
-    for stop in range(1, steps, max(steps // 12, 1)):
+    for stop in range(1, steps, max(steps // 8, 1)):
         changes = {"limits.max_steps": stop}
         begun = rigidsim.run(scene, out=tmp_path / "begun", changes=changes, force=True)
         assert begun.status == "stopped: max_steps"
@@ -146,3 +141,16 @@ def test_damaged_files_are_refused(scene: Path, name: str) -> None:
 def test_mistakes_with_files_are_refused(scene: Path, changes: dict[str, object], words: str) -> None:
     with pytest.raises(rigidsim.ConfigError, match=words):
         rigidsim.run(rigidsim.load(scene).replace(changes), out=None)
+
+
+def test_a_swept_source_has_an_axis_of_another_name_than_the_sources(tmp_path: Path) -> None:
+    """Whose places every member records along a dimension of that name."""
+    text = moon(body=HEAVY, start=TURNED, epoch=LANDING, time=TIME.replace('"60 day"', '"2 day"'))
+    axis = '[sweep.axes]\n"loads[1].source" = {values = ["sun", "venus"]%s}\n'
+    path = tmp_path / "moon.toml"
+    path.write_text(text + axis % "")
+    with pytest.raises(rigidsim.ConfigError, match="a name that the dataset needs itself"):
+        rigidsim.sweep(path, out=tmp_path)
+    path.write_text(text + axis % ', name = "other"')
+    done = rigidsim.sweep(path, out=tmp_path)
+    assert done.dataset["source_position_final"].dims == ("other", "source", "space_axis")

@@ -5,32 +5,13 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from kernel_scenes import STRENGTHS, moon
 from spk_files import write_kernel
 from support import EAGER
 
 import rigidsim
 
-SCENE = """
-name = "moon"
-[body]
-principal_moments = ["0.999369252102309314", "0.999596982633729229", 1]
-host = "moon"
-[initial]
-euler_angles = [0.005, 0.38, 1.29]
-angular_velocity = [1e-8, -2e-8, 2.6617e-6]
-[ephemeris]
-kernel = "./moon.bsp"
-[[loads]]
-kind = "gravity_gradient"
-source = "earth"
-gravitational_parameter = 398600436233339.6
-[time]
-epoch = "1969-06-28T00:00:00 TDB"
-end = "200 day"
-every = "1 day"
-[output]
-timeline = false
-"""
+EARTH = {"earth": STRENGTHS["earth"]}
 SWEPT = '[sweep]\n[sweep.axes]\n"initial.angular_velocity[0]" = {linspace = [0, 1e-8, 3]}\n'
 
 
@@ -42,8 +23,9 @@ def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.chdir(tmp_path / "else")
     monkeypatch.setenv("RIGIDSIM_KERNELS", "")
     write_kernel(tmp_path / "place" / "moon.bsp")
-    (tmp_path / "place" / "moon.toml").write_text(SCENE)
-    (tmp_path / "place" / "sweep.toml").write_text(SCENE.replace('"200 day"', '"8 day"') + SWEPT)
+    text = moon("./moon.bsp", EARTH, time='end = "200 day"\nevery = "1 day"')
+    (tmp_path / "place" / "moon.toml").write_text(text)
+    (tmp_path / "place" / "sweep.toml").write_text(text.replace('"200 day"', '"8 day"') + SWEPT)
     return tmp_path / "place"
 
 

@@ -94,12 +94,6 @@ def refuse_scene(scene: Scene, loads: Sequence[Load]) -> None:
     elif scene.bodies is not None and scene.bodies.full:
         against = 'coupling = "full" makes the bodies feel every rotation of this one'
         raise refused(level, against, 'set [body] coupling to "one_way", or choose level = "full"')
-    elif any(load.sights for load in loads):
-        against = (
-            "places by an [ephemeris] kernel are set at the edges of its blocks, and what such resets do "
-        )
-        against += "to the errors of an average isn't known"
-        raise refused(level, against, 'choose "full", or give sources by orbit or by analytic series')
     elif level == ORBIT_AVERAGED and (unsuited := [x for x in map(_unsuited, sources) if x]):
         raise refused(level, *unsuited[0])
     if against:

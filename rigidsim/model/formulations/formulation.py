@@ -187,7 +187,7 @@ def rate_block(m: Mechanics, why: str) -> StateBlock:
     ]
     exponents = [e - scaling.time for e in scaling.rates]
     if m.slip is not None:
-        why += "; those of the undistorted body with the angular momentum of this one"
+        why += "; the states are the rates that the undistorted body would have with this angular momentum"
     return StateBlock(BODY.rates, m.accelerations, initial, exponents=exponents, why=why)
 
 

@@ -6,14 +6,14 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from pydantic import Field, StrictStr
+from pydantic import Field
 
 from rigidsim.errors import ConfigError, Problem
 from rigidsim.model.gradient import tidal_range
 from rigidsim.model.kinematics import Kinematics
 from rigidsim.model.load import Load, Term
 from rigidsim.model.load_words import length_text, reach_text, source_text, span_words, value_text
-from rigidsim.model.loads.gravity_field import AttractingFields
+from rigidsim.model.loads.attractor_keys import AttractorFieldTable
 from rigidsim.model.loads.kernel_attractor import KernelAttractor
 from rigidsim.model.loads.point_attraction import (
     MovingAttractor,
@@ -22,11 +22,18 @@ from rigidsim.model.loads.point_attraction import (
     kernel_strength,
     positive_strength,
 )
-from rigidsim.model.plausibility import about_start, about_strength, attracting
+from rigidsim.model.loads.source_figure import FigureFields
+from rigidsim.model.plausibility import (
+    about_named_strength,
+    about_start,
+    about_strength,
+    attracting,
+    named_body,
+)
 from rigidsim.model.rotations import Symbolic
 from rigidsim.scene.arithmetic import Vector, cross, norm, unit_vectors
 from rigidsim.scene.exact import ZERO
-from rigidsim.scene.fields import GravitationalParameter, Metre, Rate, Triple
+from rigidsim.scene.fields import BodyName, GravitationalParameter, Metre, Rate, Triple
 from rigidsim.scene.orbits import Orbit, attracting_body
 from rigidsim.scene.point_masses import closest
 from rigidsim.scene.registry import Surroundings, register_load
@@ -34,14 +41,14 @@ from rigidsim.scene.scene import Scene
 from rigidsim.store.summary_parts import Caution
 
 
-class CentralGravityFields(AttractingFields):
+class CentralGravityFields(FigureFields):
     """A point that attracts a freely flying body: force and torque to second degree."""
 
     kind: Literal["central_gravity"]
     gravitational_parameter: GravitationalParameter | None = Field(
         default=None, description="G M of the attracting point", examples=["3.986004418e14 m^3/s^2"]
     )
-    source: StrictStr | None = Field(
+    source: BodyName | None = Field(
         default=None,
         description="the attracting body of the [ephemeris] kernel, instead of position; a package gives its "
         "gravitational_parameter",
@@ -63,6 +70,11 @@ class CentralGravityFields(AttractingFields):
         default=None,
         description="angular velocity of its atmosphere, space axes, for vrx vry vrz in expressions",
         examples=[[0, 0, "7.292115e-5 rad/s"]],
+    )
+    gravity_field: AttractorFieldTable | None = Field(
+        default=None,
+        description="gravity of the attracting body beyond a point, in axes that turn with it: its force",
+        examples=[{"radius": "6378.1366 km", "C": {"3,0": 2.5e-6}, "pole": [0, 0, 1]}],
     )
 
     def placed_by(self, *, free_flight: bool) -> frozenset[str] | None:
@@ -188,9 +200,13 @@ class CentralGravity(PointAttraction):
         return f"central gravity of {source}, {path}; torque up to {value_text(self.amplitude(scene), 'N m')}"
 
     def cautions(self, fields: CentralGravityFields, where: str, scene: Scene) -> Iterator[Caution]:
-        given = fields.gravitational_parameter
-        if given is None:  # a kernel's
-            return
+        given, name = fields.gravitational_parameter, fields.source
         offset, distance, _ = self._start(scene)
-        yield from about_strength(given, float(distance), where)
-        yield from about_start(scene, attracting(given, float(distance)), offset, scene.velocity or [])
+        if name is not None:
+            yield from about_named_strength(given, name, where)
+            body = named_body(name)
+        else:
+            assert given is not None
+            yield from about_strength(given, float(distance), where)
+            body = attracting(given, float(distance))
+        yield from about_start(scene, body, offset, scene.velocity or [])

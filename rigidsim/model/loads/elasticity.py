@@ -20,11 +20,7 @@ from typing import Any, TypeVar
 
 import heyoka as hy
 
-from rigidsim.model.capabilities import (
-    corotating_orbit_of,
-    fixed_source_of,
-    gradient_source_of,
-)
+from rigidsim.model.capabilities import corotating_orbit_of, fixed_source_of, gradient_source_of
 from rigidsim.model.distortion import Distortion, SeenTide, total
 from rigidsim.model.gradient import GradientSource
 from rigidsim.model.inertia import ConstantInertia, MassDistribution
@@ -32,7 +28,9 @@ from rigidsim.model.kinematics import Kinematics, in_common_unit, inertia_times
 from rigidsim.model.load import Load, Term, loads_of
 from rigidsim.model.load_words import span_words, value_text
 from rigidsim.model.loads.elastic_keys import (
-    about_delay,
+    ElasticEffects,
+    about_keys,
+    causes,
     elastic_values,
     fault,
     refuse_delay,
@@ -59,7 +57,7 @@ _MOST = 0.1  # of a moment, up to which a linear response makes sense
 
 @register_of_body("elasticity")
 @dataclass(frozen=True)
-class Elasticity(Load):
+class Elasticity(ElasticEffects, Load):
     """The distortion; numbers are mpf, SI."""
 
     love_number: Any
@@ -68,6 +66,7 @@ class Elasticity(Load):
     mean_rate: Any | None
     raising: tuple[int, ...]  # places in [[loads]]
     sights: tuple[tuple[Sight, int], ...]  # of a kernel, with derivatives
+    spins: bool = True  # whether the spin distorts, too
 
     title = "elasticity"
     described = "a body that tides and its spin distort"
@@ -89,7 +88,7 @@ class Elasticity(Load):
         return self.love_number * self.radius**5 / self.radius.context.mpf(GRAVITATIONAL_CONSTANT)
 
     def acts(self) -> bool:
-        return bool(self.love_number != 0)
+        return bool(self.love_number != 0 and (self.raising or self.spins))
 
     @property
     def reads(self) -> frozenset[str]:  # type: ignore[override]
@@ -169,10 +168,9 @@ class Elasticity(Load):
     def _constants(self, scene: Scene, time: int, inertia: int) -> tuple[Any, Any, Any, Matrix]:
         """First members of ``Distortion``, in units of 2^time s and 2^inertia kg m^2."""
         context = scene.context
-        spin = context.ldexp(self.strength / 3, -inertia)
-        rate, pole = self.known_rate(scene), scene.figure.pole
+        spin = context.ldexp(self.strength / 3, -inertia) if self.spins else context.zero
+        rate, pole, third = self.known_rate(scene), scene.figure.pole, context.one / 3
         size = spin * rate * rate
-        third = context.one / 3
         offset = [
             [size * ((third if i == j else context.zero) - pole[i] * pole[j]) for j in range(3)]
             for i in range(3)
@@ -201,7 +199,7 @@ class Elasticity(Load):
         for load in self.sources(scene):
             nearest = load.placement.nearest(context)
             tide = tide + self.strength * load.gravitational_parameter / nearest**3 / least
-        return spin + tide, 2 * spin
+        return (spin + tide, 2 * spin) if self.spins else (tide, context.zero)
 
     def iterations(self, scene: Scene) -> int:
         """Of the rate without delay, until what is left is less than rounding."""
@@ -215,7 +213,7 @@ class Elasticity(Load):
         left = distorted * factor
         while left > least:
             left, count = left * factor, count + 1
-        return count
+        return count if self.spins else max(count, 1)  # the tide alone doesn't depend on the rate
 
     def turned_within(self, scene: Scene) -> float:
         """Radians by which the body and the fastest source turn within the delay."""
@@ -224,7 +222,7 @@ class Elasticity(Load):
         return float(plain(self.delay * (rate + fastest)))
 
     def cautions(self, fields: Any, where: str, scene: Scene) -> Iterator[Caution]:
-        yield from about_delay(plain(self.delay), self.turned_within(scene))
+        yield from about_keys(fields, scene, plain(self.delay), self.turned_within(scene))
 
     # --- at the start, in numbers ---------------------------------------------------------------------------
 
@@ -247,8 +245,7 @@ class Elasticity(Load):
             massive=lambda x: apply(massive, x),
             iterations=self.iterations(scene),
         )
-        rates = scene.angular_velocity
-        bare = list(rates)
+        rates, bare = scene.angular_velocity, list(scene.angular_velocity)
         tensor, _ = distortion.found(bare, tides)
         for _ in range(self.iterations(scene) + 2):
             added = apply(inverse_tensor, apply(tensor, rates))
@@ -301,7 +298,7 @@ class Elasticity(Load):
         return self._lends(m.scene)
 
     def _lends(self, scene: Scene) -> bool:
-        if self.delay != 0:
+        if self.delay != 0 or not self.spins:  # nor is the tide alone a minimum of the energy
             return True
         others = [load for load in loads_of(scene) if load is not self]
         raising = [scene.given_loads[n] for n in self.raising]
@@ -337,9 +334,9 @@ class Elasticity(Load):
         largest = max(abs(float(plain(x))) for row in tensor for x in row)
         share = largest / float(plain(max(scene.body.principal_moments)))
         names = [scene.config.loads[n].name or f"[[loads]] number {n + 1}" for n in self.raising]
-        raised = f"tides of {', '.join(names)} and the spin" if names else "the spin"
         late = f", {span_words(plain(self.delay))} late" if self.delay != 0 else ", without delay"
-        return told_elasticity(raised + " distort the tensor" + late, self.love_number, self.radius) + (
+        what = causes(names, self.spins) + " distort the tensor" + late
+        return told_elasticity(what, self.love_number, self.radius) + (
             f"; up to {value_text(largest, 'kg m^2')} at the start, {share:.3g} of the largest moment; the "
             "moments given contain the distortion by a spin of "
             f"{value_text(plain(self.known_rate(scene)), 'rad/s', 8)}"

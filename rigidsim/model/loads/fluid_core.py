@@ -32,6 +32,7 @@ from rigidsim.model.scaling import exponent, largest_rates
 from rigidsim.model.state_blocks import StateBlock
 from rigidsim.scene.arithmetic import Matrix, Vector, apply, cross, dot, norm, unit_vectors
 from rigidsim.scene.bodies.body import RigidBody
+from rigidsim.scene.effect_parts import EffectPart
 from rigidsim.scene.frame import unique_axis
 from rigidsim.scene.registry import Surroundings, register_of_body
 from rigidsim.scene.scene import Scene
@@ -41,6 +42,7 @@ from rigidsim.store.summary_parts import Caution, WarningCode
 
 STATES = ("core_wx", "core_wy", "core_wz")
 _ROUNDING_OF_INPUT = 1e-14  # relative, of moments that a double-precision program printed
+_MOST_DAMPED = 1e12  # times within a run that friction may take the core to the mantle's rate: as many steps
 _STIFF = 100.0  # by which friction may be faster than the rotation before it is told
 
 
@@ -67,10 +69,17 @@ class FluidCore(Load):
     described = "a fluid core"
     conservative = True  # what friction takes is told by ``supplied_power``
     loose = True  # see ``carriers.Loose``
+    nothing = {"moment": 0}  # noqa: RUF012
 
     @classmethod
     def brought_by(cls, config: Config) -> bool:
         return config.body.core is not None
+
+    @staticmethod
+    def effect_parts(fields: Config) -> Iterator[EffectPart]:
+        for key in ("friction", "flattening"):
+            missing = "" if getattr(fields.body.core, key).sign else "it is 0"
+            yield EffectPart(key, f"{key} of the fluid core", {key: 0}, missing=missing)
 
     @classmethod
     def resolve(cls, fields: Config, around: Surroundings) -> FluidCore:
@@ -112,6 +121,7 @@ class FluidCore(Load):
         made = cls(axis, moment * largest, flattening, friction * largest, rate)
         if made.acts():
             _refuse_odd_mantle(made, body, context)
+            _refuse_stiff(made, friction, around)
         return made
 
     def acts(self) -> bool:
@@ -284,6 +294,19 @@ def _refuse_odd_mantle(core: FluidCore, body: RigidBody, context: Any) -> None:
         "others); make the core smaller, or flatten it otherwise"
     )
     raise ConfigError(Problem("[body] core", what))
+
+
+def _refuse_stiff(core: FluidCore, friction: Any, around: Surroundings) -> None:
+    """Refuse a friction whose steps no run ends with."""
+    assert around.span is not None
+    begin, end = around.span
+    damping = core.friction / (core.polar * (1 - core.flattening))
+    if damping * (end - begin) > _MOST_DAMPED:
+        time = value_text(1 / plain(damping), "s")
+        what = (
+            f"given {_text(friction)} s^-1, which takes this core to the mantle's rate in {time}, and steps "
+        )
+        raise _fault("friction", what + "are as short: a smaller rate, or no core (moment = 0), is")
 
 
 def _text(number: Any) -> str:

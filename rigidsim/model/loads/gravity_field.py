@@ -12,6 +12,7 @@ G M being the source's, m the body's mass, a its acceleration in flight.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -29,13 +30,16 @@ from rigidsim.model.capabilities import (
     orbit_of,
     table_of,
 )
+from rigidsim.model.gradient import GradientSource
 from rigidsim.model.harmonics import Harmonics, Series, polynomial, turning
 from rigidsim.model.kinematics import Kinematics
 from rigidsim.model.load import Load, Term
 from rigidsim.model.load_words import length_text, value_text
 from rigidsim.model.rotations import Symbolic, apply
+from rigidsim.model.turning_harmonics import by_powers
 from rigidsim.scene.arithmetic import Vector, across, cross, negligible, norm, parallel, unit_vectors
 from rigidsim.scene.bodies.gravity_field import LEAST, MOST, GravityField, Harmonic
+from rigidsim.scene.effect_parts import EffectPart, degree_parts
 from rigidsim.scene.orbit_tables.pieces import TabulatedOrbit
 from rigidsim.scene.orbits import KeplerOrbit
 from rigidsim.scene.point_masses import PointMasses
@@ -151,7 +155,7 @@ class FieldAttraction(Load):
                 along = {key: size * vector[axis] for key, vector in vectors.items()}
                 if any(c != 0 for c in along.values()):
                     part.append((n, harmonics.summed(along)))
-        return [_by_powers(part, inverse, 1) for part in parts]
+        return [by_powers(part, inverse, 1) for part in parts]
 
     def _scalar(self, m: Kinematics, sizes: Any, above: int) -> Symbolic:
         """Sum of f_n times a constant (mpf) of each degree and ``inverse`` to the power of n + ``above``."""
@@ -161,7 +165,7 @@ class FieldAttraction(Load):
             size = sizes(unit, n)
             scaled = {key: size * c for key, c in polynomial(series, m.scene.context).items()}
             parts.append((n, harmonics.summed(scaled)))
-        return _by_powers(parts, inverse, above)
+        return by_powers(parts, inverse, above)
 
     # --- what it does ---------------------------------------------------------------------------------------
 
@@ -258,6 +262,10 @@ class FieldAttraction(Load):
             f"{value_text(plain(self._size(scene)), 'J')}"
         )
 
+    @staticmethod
+    def effect_parts(fields: AttractingFields) -> Iterator[EffectPart]:
+        return degree_parts(fields.degree, LEAST)
+
     @classmethod
     def beside_of(cls, load: Any, fields: AttractingFields, around: Surroundings) -> Load | None:
         """See ``Companion``."""
@@ -269,12 +277,12 @@ class FieldAttraction(Load):
             return None
         given = f"given {degree}, but "
         if field is None:
-            what = (
-                "[body] has no gravity_field; give it, or leave degree out (the inertia tensor is degree 2)"
-            )
-            raise around.fault("degree", given + what)
+            what = "[body] has no gravity_field; give it, or leave degree out (the inertia tensor "
+            raise around.fault("degree", f"{given}{what}is degree 2)")
         if degree > field.degree:
             raise around.fault("degree", f"{given}[body] gravity_field ends at degree {field.degree}")
+        if isinstance(load, GradientSource):
+            _refuse_within(load, field, around)
         kind = _Flown if isinstance(load, Attracting) else _Moving if isinstance(load, Reacting) else cls
         strength = getattr(load, "gravitational_parameter", None) or load.strength
         return kind(load, field, degree, strength, around.number + 1)
@@ -311,6 +319,17 @@ class _Moving(FieldAttraction):
         return self.beside.answered(self.acceleration(m), m) if self.beside.masses.full else []
 
 
+def _refuse_within(load: GradientSource, field: GravityField, around: Surroundings) -> None:
+    near = load.placement.nearest(around.context)
+    if near < field.radius:
+        far, radius = (length_text(float(plain(x))) for x in (near, field.radius))
+        what = f"given for a source that comes to {far} from the body's centre, within the radius of [body] "
+        what += (
+            f"gravity_field, {radius}, where its series doesn't hold; place it outside, or leave degree out"
+        )
+        raise around.fault("degree", what)
+
+
 def least_distance(load: Any, scene: Scene) -> Any:
     """Least distance of a load's source, m (mpf)."""
     if hasattr(load, "nearest_approach"):
@@ -318,15 +337,3 @@ def least_distance(load: Any, scene: Scene) -> Any:
     if hasattr(load, "encounter"):
         return load.encounter(scene)[0]
     return load.placement.nearest(scene.context)
-
-
-def _by_powers(parts: list[tuple[int, Symbolic]], inverse: Symbolic, above: int) -> Symbolic:
-    """Sum of expressions, each times ``inverse`` to the power of its degree + ``above``."""
-    if not parts:
-        return hy.expression(0.0)
-    constant = inverse == hy.expression(1.0)
-    (last, total), *others = reversed(parts)
-    for n, part in others:
-        total = part + (total if constant else inverse ** (last - n) * total)
-        last = n
-    return total if constant else inverse ** (last + above) * total

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 import heyoka as hy
-from pydantic import Field, StrictStr
+from pydantic import Field
 
 from rigidsim.errors import ConfigError, Problem
 from rigidsim.model.capabilities import SourcePlace
@@ -25,7 +25,7 @@ from rigidsim.model.rotations import Symbolic
 from rigidsim.model.two_part import as_factor
 from rigidsim.scene.arithmetic import Vector, norm
 from rigidsim.scene.epochs import J2000, Epoch
-from rigidsim.scene.fields import GravitationalParameter, Metre, Triple
+from rigidsim.scene.fields import BodyName, GravitationalParameter, Metre, Triple
 from rigidsim.scene.frame import ECLIPTIC
 from rigidsim.scene.kernels.kernel import Sight
 from rigidsim.scene.orbits import KeplerOrbit, Orbit, attracting_body, resolve_orbit, resolve_tabulated_orbit
@@ -57,7 +57,7 @@ class GravityGradientFields(FigureFields):
         default=None,
         description="geocentric position of Sun or Moon, from analytic series in the ecliptic of J2000",
     )
-    source: StrictStr | None = Field(
+    source: BodyName | None = Field(
         default=None,
         description="a body of the [ephemeris] kernel, as seen from [body] host; a package gives its "
         "gravitational_parameter",
@@ -155,6 +155,10 @@ class GravityGradient(GradientSource, Load):
     @property
     def seconds_ahead(self) -> float:
         return self.placement.seconds_ahead
+
+    @property
+    def of_time(self) -> bool:
+        return self.placement.of_time
 
     def source_direction(self, m: Kinematics) -> list[Symbolic]:
         if m.attitude is not None and m.attitude.orbital is not None:

@@ -80,7 +80,7 @@ class PointAttraction(Load):
         shift = scaling.time - scaling.speed
         ratio = self.scaled(m, 4, shift + scaling.inertia) * 3 / (2 * m.carried(m.scene.body.mass))
         second = m.number(ratio) * inverse**4
-        radial = second * (self._trace(m) - 5.0 * quadratic_form(m, body))
+        radial = second * (self.trace(m) - 5.0 * quadratic_form(m, body))
         if as_point:
             radial = m.number(self.scaled(m, 2, shift)) * inverse**2 + radial
         turned = apply(m.matrix, inertia_times(m, body))
@@ -90,7 +90,7 @@ class PointAttraction(Load):
         """Minus the potential energy by the body's shape."""
         body, inverse = self._seen_from_body(m)
         second = self.scaled(m, 3, m.scaling.inertia - m.scaling.energy) / 2
-        return m.number(second) * inverse**3 * (self._trace(m) - 3.0 * quadratic_form(m, body))
+        return m.number(second) * inverse**3 * (self.trace(m) - 3.0 * quadratic_form(m, body))
 
     def as_point(self, m: Kinematics) -> Symbolic:
         """Minus the potential energy of the body as a point."""
@@ -101,7 +101,7 @@ class PointAttraction(Load):
         space, inverse = self.seen(m)
         return apply(transpose(m.matrix), space), inverse
 
-    def _trace(self, m: Kinematics) -> Any:
+    def trace(self, m: Kinematics) -> Any:
         if m.shape is not None:
             return hy.sum([m.shape.matrix[i][i] for i in range(3)])
         return m.number(sum(m.numbers.inertia[i][i] for i in range(3)))

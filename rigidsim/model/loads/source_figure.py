@@ -11,6 +11,7 @@ figure against figure. It acts beside the load that has the key, which takes the
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Annotated, Any, Literal
 
@@ -19,13 +20,14 @@ from pydantic import Field, Tag, field_validator
 
 from rigidsim.model.capabilities import KeepsPlane, corotating_orbit_of, fixed_source_of, orbit_of, table_of
 from rigidsim.model.earth_pole import earth_pole
-from rigidsim.model.gradient import tensor_terms
+from rigidsim.model.gradient import GradientSource, tensor_terms
 from rigidsim.model.kinematics import Kinematics, inertia_times
 from rigidsim.model.load import Load, Term
 from rigidsim.model.load_words import length_text, value_text
 from rigidsim.model.loads.gravity_field import AttractingFields, least_distance
 from rigidsim.model.rotations import Symbolic
 from rigidsim.scene.arithmetic import Vector, across, cross, norm, parallel, unit_vectors
+from rigidsim.scene.effect_parts import EffectPart
 from rigidsim.scene.epochs import Epoch
 from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.fields import (
@@ -40,11 +42,14 @@ from rigidsim.scene.fields import (
 from rigidsim.scene.orbit_tables.pieces import TabulatedOrbit
 from rigidsim.scene.orbits import KeplerOrbit
 from rigidsim.scene.readable import number_text
-from rigidsim.scene.registry import Surroundings, register_beside
+from rigidsim.scene.registry import Surroundings
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.tracing.numbers import plain
 
 EARTH = "iau1976"
+_CENTURY = 36525 * 86400.0
+_MOST_CENTURIES = 20
+"""From J2000: the polynomials' last terms make a degree of the pole there."""
 
 
 class SourceFigure(ConfigTable):
@@ -61,6 +66,16 @@ class SourceFigure(ConfigTable):
     ] = Field(examples=["iau1976", [0, 0, 1]])
     """direction of its axis of figure: a vector in space axes, or iau1976, the Earth's of date"""
 
+    @field_validator("J2")
+    @classmethod
+    def _possible(cls, value: ExactNumber) -> ExactNumber:
+        if not -1 <= float(value) <= 0.5:
+            what = (
+                f"given {float(value):g}; -1 (a needle along the pole) to 0.5 (a ring) is allowed, such as "
+            )
+            raise refuse(what + "1.0826e-3 of the Earth (J2 = -C20, unnormalized)")
+        return value
+
     @field_validator("radius")
     @classmethod
     def _positive(cls, value: ExactNumber) -> ExactNumber:
@@ -74,7 +89,7 @@ class FigureFields(AttractingFields):
 
     figure: SourceFigure | None = Field(
         None,
-        description="oblateness of the source itself, for its torque on the body's figure",
+        description="oblateness of the source itself: torque on the body's figure, and force in flight",
         examples=[{"J2": 1.0826e-3, "radius": "6378.137 km", "pole": "iau1976"}],
     )
 
@@ -233,12 +248,23 @@ class FigureAttraction(Load):
             f"{value_text(plain(self.amplitude(scene)), 'N m')}"
         )
 
+    @staticmethod
+    def effect_parts(fields: FigureFields) -> Iterator[EffectPart]:
+        missing = "" if fields.figure else "no figure is given"
+        yield EffectPart("figure", "oblateness of the source itself", {"figure": None}, missing=missing)
+
     @classmethod
     def beside_of(cls, load: Any, fields: FigureFields, around: Surroundings) -> Load:
         """See ``Companion``."""
         given, context = fields.figure, around.context
         assert given is not None
         radius = given.radius.at(context)
+        if isinstance(load, GradientSource) and load.placement.nearest(context) < radius:
+            near = length_text(float(plain(load.placement.nearest(context))))
+            what = (
+                f"given {length_text(float(plain(radius)))}, but the source comes to {near} from the body, "
+            )
+            raise around.fault("figure.radius", what + "which would be within it; check both")
         strength = getattr(load, "gravitational_parameter", None) or load.strength
         made = cls(load, strength, given.J2.at(context) * radius**2, radius, None, around.number + 1, context)
         if isinstance(given.pole, str):
@@ -250,6 +276,7 @@ class FigureAttraction(Load):
                 if found is None:
                     why = f'given "{EARTH}", a pole of date, which takes {what}; give {example}, or a vector'
                     raise around.fault("figure.pole", why)
+            _refuse_other_pole(getattr(fields, "source", None), around)
             return replace(made, epoch=around.epoch, axes=around.axes)
         pole = [x.at(context) for x in given.pole]
         size = norm(context, pole)
@@ -258,4 +285,17 @@ class FigureAttraction(Load):
         return replace(made, pole=[x / size for x in pole])
 
 
-register_beside("figure")(FigureAttraction)
+def _refuse_other_pole(source: str | None, around: Surroundings) -> None:
+    """Refuse the Earth's pole for another body, and beyond the centuries that its polynomials are for."""
+    if source not in (None, "earth", "399", "earth_moon_barycenter"):
+        what = f'given "{EARTH}", the Earth\'s pole, for the source "{source}"; give its own as a vector'
+        raise around.fault("figure.pole", what)
+    if around.span is not None and around.epoch is not None:
+        ahead = float(around.epoch.since_j2000())
+        far = max(abs(float(plain(t)) + ahead) for t in around.span) / _CENTURY
+        if far > _MOST_CENTURIES:
+            what = (
+                f'given "{EARTH}" for a run that goes {far:.3g} centuries from J2000; its precession holds '
+            )
+            what += f"for {_MOST_CENTURIES}: give a shorter run, or a vector"
+            raise around.fault("figure.pole", what)

@@ -20,7 +20,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import Any
 
 import heyoka as hy
@@ -155,9 +155,9 @@ class KernelStates:
     @property
     def names(self) -> str:
         """What the series that are carried place, for reasons."""
-        return ", ".join(
-            series.target.replace("_", " ") for group in self._groups for series, _ in group.series
-        )
+        targets = [series.target for group in self._groups for series, _ in group.series]
+        words = {"earth_moon": "Earth-Moon barycentre", "earth_moon_barycenter": "Earth-Moon barycentre"}
+        return ", ".join(words.get(target, target.replace("_", " ").capitalize()) for target in targets)
 
     def block(self) -> StateBlock:
         """All states, with their equations and values at the start."""
@@ -218,49 +218,48 @@ class BlockPieces:
         }
         self._rounded_ends = {key: np.array(list(map(float, x))) for key, x in self._ends.items()}
         self._rows = [np.asarray(series.coefficients) for series, _ in group.series]  # a memmap is slow
-        self._begin = number(-context.one)
-        kind = type(number(context.one))
-        self._kind: Any = kind if issubclass(kind, float | np.floating) else None
+        self._kind: Any = type(number(context.one))
 
-    def parameters(self, number: int) -> list[Any]:
-        """See ``PieceSeries``: the coefficients, each of which is a double times a power of two."""
-        found: list[Any] = []
-        for (series, carried, first), rows in zip(self._series, self._rows, strict=True):
-            given = np.ldexp(rows[first + number, :, carried + 1 :], -series.exponent)
-            found += self._exact(given.ravel())
-        return found
-
-    def _exact(self, values: np.ndarray) -> list[Any]:
-        if self._kind is not None:
-            return (
-                values.astype(self._kind).tolist()
-                if self._kind in (float, np.float64)
-                else list(values.astype(self._kind))
-            )
-        return [self._number(self._context.mpf(float(x))) for x in values]
-
-    def states(self, number: int) -> dict[str, Any]:
+    @cached_property
+    def states(self) -> list[str]:
         """See ``PieceSeries``."""
-        found: dict[str, Any] = {self._group.past: self._begin}
-        for (series, carried, first), rows in zip(self._series, self._rows, strict=True):
-            for order in range(carried + 1):
-                values = self._at_edge(series, rows[first + number], order)
-                found |= {_name(series, axis, order): value for axis, value in enumerate(values)}
-        return found
+        names = [self._group.past]
+        for series, carried, _ in self._series:
+            names += [_name(series, axis, order) for order in range(carried + 1) for axis in range(3)]
+        return names
 
-    def _at_edge(self, series: BlockSeries, rows: np.ndarray, order: int) -> list[Any]:
-        """Values of three states where a block begins, u = -1, rounded once; derivatives in double precision
+    def numbers(self, first: int, stop: int) -> tuple[np.ndarray, np.ndarray]:
+        """See ``PieceSeries``: u is -1 where a block begins, and its parameters are the coefficients, each of
+        which is a double times a power of two.
+        """
+        parameters, states = [], [self._exact(np.full((stop - first, 1), -1.0))]
+        for (series, carried, begun), rows in zip(self._series, self._rows, strict=True):
+            blocks = rows[begun + first : begun + stop]
+            scaled = np.ldexp(blocks[:, :, carried + 1 :], -series.exponent)
+            parameters.append(self._exact(scaled.reshape(len(blocks), -1)))
+            states += [self._at_edges(series, blocks, order) for order in range(carried + 1)]
+        return np.concatenate(parameters, axis=1), np.concatenate(states, axis=1)
+
+    def _exact(self, values: np.ndarray) -> np.ndarray:
+        if issubclass(self._kind, float | np.floating):
+            return values.astype(self._kind)
+        numbers = [self._number(self._context.mpf(float(x))) for x in values.flat]
+        return np.array(numbers, dtype=self._kind).reshape(values.shape)
+
+    def _at_edges(self, series: BlockSeries, blocks: np.ndarray, order: int) -> np.ndarray:
+        """Values of three states where blocks begin, u = -1, rounded once; derivatives in double precision
         are sums of rounded products, since mpf take longer than all steps of a run.
         """
+        rows, shape = blocks.reshape(-1, series.terms), blocks.shape[:2]
         if self._kind in (float, np.float64):
-            products = (rows * self._rounded_ends[series.terms, order]).tolist()
-            return [math.ldexp(math.fsum(row), -series.exponent) for row in products]
+            sums = [math.fsum(row) for row in (rows * self._rounded_ends[series.terms, order]).tolist()]
+            return np.ldexp(sums, -series.exponent).reshape(shape)
         weights, context = self._ends[series.terms, order], self._context
         found = []
         for row in rows:
             total = sum((context.mpf(float(c)) * w for c, w in zip(row, weights, strict=True)), context.zero)
             found.append(self._number(context.ldexp(total, -series.exponent)))
-        return found
+        return np.array(found, dtype=self._kind).reshape(shape)
 
 
 @lru_cache(maxsize=512)

@@ -10,6 +10,11 @@ from bisect import bisect_right
 from collections.abc import Sequence
 from typing import Any, Protocol
 
+import numpy as np
+
+_AT_ONCE = 32  # pieces of a series whose numbers are worked out together
+_KEPT = 8  # such groups of each series: motions that are followed at the same time may be in different ones
+
 
 class PieceSeries(Protocol):
     """Pieces of one kind.
@@ -20,11 +25,14 @@ class PieceSeries(Protocol):
 
     knots: list[Any]
 
-    def parameters(self, number: int) -> Sequence[Any]:
-        """Its parameters in a piece, working precision; as many in each."""
+    @property
+    def states(self) -> list[str]:
+        """Names of the states that are set where a piece begins."""
 
-    def states(self, number: int) -> dict[str, Any]:
-        """Values, by name, of the states that are set where a piece begins, working precision."""
+    def numbers(self, first: int, stop: int) -> tuple[np.ndarray, np.ndarray]:
+        """Of pieces first ... stop-1, in working precision: their parameters, (pieces, parameters), and the
+        values on which states are set where they begin, (pieces, states).
+        """
 
 
 class Pieces:
@@ -44,29 +52,35 @@ class Pieces:
                 self.knots.append(knot)
                 self._numbers.append(list(self._numbers[-1]))
             self._numbers[-1][place] += 1
-        self._known: dict[int, tuple[int, Sequence[Any]]] = {}  # of each part the latest piece
+        self._known: dict[tuple[int, int], tuple[np.ndarray, np.ndarray]] = {}
 
     def number_at(self, time: Any) -> int:
         """Number of the piece that begins at or contains a time (internal units, working precision)."""
         return bisect_right(self.knots, time)
 
-    def parameters(self, number: int) -> list[Any]:
+    def parameters(self, number: int) -> np.ndarray:
         """All parameters of a piece, working precision."""
-        found: list[Any] = []
-        for place, own in enumerate(self._numbers[number]):
-            known = self._known.get(place)
-            if known is None or known[0] != own:  # the latest is asked for again and again
-                known = self._known[place] = own, self._parts[place].parameters(own)
-            found += known[1]
-        return found
+        return np.concatenate([self._of(place, own)[0] for place, own in enumerate(self._numbers[number])])
 
     def states(self, number: int) -> dict[str, Any]:
         """Values, by name, of the states that are set where a piece begins, working precision."""
         if number == 0:
             return {}
         changed: dict[str, Any] = {}
-        pairs = zip(self._numbers[number - 1], self._numbers[number], self._parts, strict=True)
-        for before, now, part in pairs:
+        pairs = zip(self._numbers[number - 1], self._numbers[number], strict=True)
+        for place, (before, now) in enumerate(pairs):
             if now != before:
-                changed |= part.states(now)
+                changed.update(zip(self._parts[place].states, self._of(place, now)[1], strict=True))
         return changed
+
+    def _of(self, place: int, own: int) -> tuple[np.ndarray, np.ndarray]:
+        """Parameters, and values of states, of one part's own piece."""
+        group, row = divmod(own, _AT_ONCE)
+        if (place, group) not in self._known:
+            if len(self._known) >= _KEPT * len(self._parts):
+                del self._known[next(iter(self._known))]
+            part, first = self._parts[place], group * _AT_ONCE
+            stop = min(first + _AT_ONCE, len(part.knots) + 1)
+            self._known[place, group] = part.numbers(first, stop)
+        parameters, states = self._known[place, group]
+        return parameters[row], states[row]

@@ -28,9 +28,11 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
+from functools import cached_property
 from typing import Any
 
 import heyoka as hy
+import numpy as np
 
 from rigidsim.model.orbits.kepler_motion import KeplerParts
 from rigidsim.model.rotations import Symbolic
@@ -144,11 +146,12 @@ class TablePlace:
 
 
 def places_of(
-    orbits: Sequence[tuple[str, TabulatedOrbit]], longitude: Carried
+    orbits: Sequence[tuple[str, TabulatedOrbit]], longitude: Carried, first: int
 ) -> dict[TabulatedOrbit, TablePlace]:
-    """Places of the given orbits, with their tags; an orbit that occurs twice gets one place."""
+    """Places of the given orbits, with their tags; an orbit that occurs twice gets one place. ``first`` is
+    the index of the first parameter.
+    """
     found: dict[TabulatedOrbit, TablePlace] = {}
-    first = 0
     for tag, orbit in orbits:
         if orbit not in found:
             found[orbit] = TablePlace(tag, first, longitude)
@@ -286,17 +289,25 @@ class TablePieces:
                     self.knots.append(knot)
                     self._rows.append(row)
 
-    def parameters(self, number: int) -> list[Any]:
+    @cached_property
+    def states(self) -> list[str]:
         """See ``PieceSeries``."""
-        orbit = self._orbit
-        least = orbit.context.ldexp(1, _LEAST * (orbit.context.prec - GUARD_BITS))
-        return [self._number(x if abs(x) > least else 0 * x) for x in self._of(self._rows[number])]
+        return list(self._begin(self._rows[0]))
 
-    def states(self, number: int) -> dict[str, Any]:
+    def numbers(self, first: int, stop: int) -> tuple[np.ndarray, np.ndarray]:
         """See ``PieceSeries``."""
+        rows, context = self._rows[first:stop], self._orbit.context
+        least = context.ldexp(1, _LEAST * (context.prec - GUARD_BITS))
+        parameters = [[self._number(x if abs(x) > least else 0 * x) for x in self._of(row)] for row in rows]
+        states = [[self._number(x) for x in self._begin(row).values()] for row in rows]
+        kind = type(parameters[0][0])
+        return np.array(parameters, dtype=kind), np.array(states, dtype=kind)
+
+    def _begin(self, row: int) -> dict[str, Any]:
+        """Values of states at a row, by name."""
         found: dict[str, Any] = {}
         orbit, place = self._orbit, self._place
-        begin, tag, elements = orbit.row(self._rows[number]), place.tag, place.elements(orbit)
+        begin, tag, elements = orbit.row(row), place.tag, place.elements(orbit)
         found[_name("part", tag)] = orbit.context.zero
         for element in elements:
             if element != LONGITUDE:
@@ -308,7 +319,7 @@ class TablePieces:
             turned = orbit.eccentric_longitude(begin, begin[LONGITUDE])
             found[f"cos_longitude{tag}"] = orbit.context.cos(turned)
             found[f"sin_longitude{tag}"] = orbit.context.sin(turned)
-        return {name: self._number(value) for name, value in found.items()}
+        return found
 
     def _of(self, row: int) -> list[Any]:
         orbit = self._orbit

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, ClassVar
@@ -9,21 +10,26 @@ from typing import Any, ClassVar
 import heyoka as hy
 import numpy as np
 
+from rigidsim.errors import ConfigError, Problem
 from rigidsim.model.kinematics import Kinematics
 from rigidsim.model.load_words import reach_text
 from rigidsim.model.placements.placement import Circuit, Placement, SourceMotion
+from rigidsim.model.plausibility import about_named_strength
 from rigidsim.model.rotations import Symbolic
 from rigidsim.scene.arithmetic import Vector
 from rigidsim.scene.kernels.ephemeris import Ephemeris
 from rigidsim.scene.kernels.kernel import Sight
 from rigidsim.scene.registry import Surroundings
 from rigidsim.scene.scene import Scene
+from rigidsim.store.summary_parts import Caution
 
 _LUNISOLAR = frozenset({"sun", "earth", "moon", "earth_moon_barycenter"})
+_BOTH, _PARTS = "earth_moon_barycenter", ("earth", "moon")
 _SAMPLES = 4000  # over a run
 _ROUNDS = 2  # of finer samples about the least distance
 _WINDOW = 100 * 365.25 * 86400.0  # s, in which a kernel tells the mean motion
 _TURN = 0.2  # of a block: samples by which the mean motion is followed
+_LEAST_SHAPE = 0.01  # eccentricity, or inclination (rad) to the mean plane, whose apsides and nodes are told
 
 
 @dataclass(frozen=True)
@@ -128,18 +134,32 @@ class PlacedByKernel(Placement):
         return context.mpf(self._reach[2])
 
     def circuit(self, context: Any) -> Circuit:
-        """From the kernel's positions of up to a century about the start."""
+        """From the kernel's positions of up to a century about the start: apsides and nodes go round by the
+        difference of the anomalistic and the draconic month to the sidereal one.
+        """
         first, last = map(float, self.sight.span)
         begin = float(self.ephemeris.run[0]) + float(self.ephemeris.ahead)
         low, high = max(first, begin - _WINDOW / 2), min(last, begin + _WINDOW / 2)
         finest = float(min(series.length for _, series in self.sight.links)) * _TURN
-        places = self.sight.sampled(np.linspace(low, high, max(int((high - low) / finest), 2)))
+        times = np.linspace(low, high, max(int((high - low) / finest), 2))
+        places = self.sight.sampled(times)
         far = np.linalg.norm(places, axis=1)
         units = places / far[:, None]
         turned = 2 * np.arcsin(np.clip(np.linalg.norm(np.diff(units, axis=0), axis=1) / 2, 0, 1))
         e = float((far.max() - far.min()) / (far.max() + far.min()))
         motion = float(turned.sum()) / (high - low)
-        return Circuit(motion, e, (2.0**self.sight.exponent / float(far.min())) ** 3)
+        normal = np.cross(units[:-1], units[1:]).sum(axis=0)
+        latitude = units @ normal / np.linalg.norm(normal)
+        nearer, above = np.diff(far) < 0, latitude > 0
+        slow = 0.0
+        if e > _LEAST_SHAPE:
+            slow += abs(_rate(times[1:-1][nearer[:-1] & ~nearer[1:]], motion) - motion)
+        if np.abs(latitude).max() > _LEAST_SHAPE:
+            slow += abs(_rate(times[1:][above[1:] & ~above[:-1]], motion) - motion)
+        return Circuit(motion, e, (2.0**self.sight.exponent / float(far.min())) ** 3, slow)
+
+    def cautions(self, fields: Any, given: Any, where: str, scene: Scene) -> Iterator[Caution]:
+        yield from about_named_strength(given, self.name, where)
 
     def pictured(self) -> dict[str, Any]:
         return {"kernel": self.name}
@@ -147,6 +167,32 @@ class PlacedByKernel(Placement):
     def told(self, context: Any, strength: Any) -> str:
         least, most, _ = self._reach
         return f"where {self.ephemeris.kernel.name} has it, {reach_text(strength, least, most)}"
+
+
+def _rate(times: np.ndarray, otherwise: float) -> float:
+    """Mean rate (rad/s) of what comes round at given times; too few of them tell none."""
+    return 2 * np.pi * (len(times) - 1) / float(times[-1] - times[0]) if len(times) > 2 else otherwise
+
+
+def refuse_same_sources(loads: Iterable[Any], host: str | None) -> None:
+    """Refuse loads of one kind (their keys) whose sources are, or contain, the same body of a kernel."""
+    seen: set[tuple[str, str]] = set()
+    for number, load in enumerate(loads, 1):
+        name = getattr(load, "source", None)
+        if name is None:
+            continue
+        where = f"[[loads]] number {number} source"
+        if (load.kind, name) in seen:
+            what = f'given "{name}", as in another {load.kind}, by which it acts twice; remove one of them'
+            raise ConfigError(Problem(where, what))
+        seen.add((load.kind, name))
+        parts = [x for x in _PARTS if (load.kind, x) in seen or x == host]
+        if (load.kind, _BOTH) in seen and parts:
+            what = (
+                f'given "{name}", but the mass of "{_BOTH}" contains that of "{parts[0]}", a source or the '
+            )
+            what += 'body as well; give "earth" and "moon", or one of them'
+            raise ConfigError(Problem(where, what))
 
 
 def kernel_body(source: str, around: Surroundings) -> Ephemeris:

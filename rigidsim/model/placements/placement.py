@@ -72,6 +72,7 @@ class Placement(ABC):
         plane: in which it moves, beside those of ``orbit`` and ``table``; None without one.
         without_plane: why it has an orbit, but no known plane; empty if it has one.
         seconds_ahead: time of the scene's epoch in the count of its own.
+        of_time: whether it is a series whose arguments are time.
         sights: bodies of a kernel that it is placed by, see ``SceneLoad``.
         untracked: why velocity and acceleration aren't known; empty if they are, by ``motion``.
         without_elements: why it has no ellipse to average over, and what to do; None if it has one, or rests.
@@ -89,6 +90,7 @@ class Placement(ABC):
     plane: OrbitPlane | None = None
     without_plane: str = ""
     seconds_ahead: float = 0.0
+    of_time: bool = False
     untracked: str = "only its place is known"
     without_elements: tuple[str, str] | None = None
     sights: tuple[tuple[Sight, int], ...] = ()

@@ -134,7 +134,7 @@ class PlacedByTable(Placement):
     """A source on a tabulated orbit."""
 
     table: TabulatedOrbit
-    untracked = "its orbit goes by a table, whose derivatives aren't carried"
+    untracked = "its orbit goes by a table, of whose elements no rates are carried"
 
     def distance(self, context: Any) -> Any:
         return self.table.semi_major_axis

@@ -67,6 +67,7 @@ class PlacedBySeries(Placement):
     moves: ClassVar[bool] = True
     lunisolar = True
     wide = True
+    of_time = True
     untracked = "its place is an analytic series"
     without_elements = (
         "the source of an ephemeris has no elements to average over",

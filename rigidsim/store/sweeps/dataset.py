@@ -15,7 +15,7 @@ from rigidsim.store.atomic import sink
 from rigidsim.store.netcdf import NetcdfFile, writing
 from rigidsim.store.seal import seal
 from rigidsim.store.sweeps.sources import Described, Gathered, Sources, TileReader, plain
-from rigidsim.store.variables import LABELS
+from rigidsim.store.variables import LABELS, OF_THE_RUN
 
 _GZIP = 4
 _BOX_NUMBERS = 1 << 22  # numbers of a variable that are gathered at once: 32 MB
@@ -23,7 +23,9 @@ _CHUNK_NUMBERS = 1 << 17
 _SAMPLES = "sample"
 
 RESERVED = {
-    *(*LABELS, "time", "sample", "member", "status", "steps", "warnings", "time_reached", "drift_bound"),
+    *LABELS,
+    *OF_THE_RUN,
+    *("time", "sample", "member", "status", "steps", "warnings", "time_reached", "drift_bound"),
     *(
         "attitude_error",
         "position_error",

@@ -10,10 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from rigidsim.errors import ConfigError, MemberError, Problem, RigidsimError, RunFolderError
+from rigidsim.errors import ConfigError, MemberError, Problem, RigidsimError
 from rigidsim.model.tangents import GROWTH
 from rigidsim.scene.config import Experiment
-from rigidsim.scene.kernels.finding import FOLDERS
 from rigidsim.scene.scene import build_scene
 from rigidsim.scene.sweep_table import INDICATORS
 from rigidsim.scene.sweeps.sweep import Sweep
@@ -25,7 +24,7 @@ from rigidsim.store.run import MemoryRun
 from rigidsim.store.sweeps.sources import plain
 from rigidsim.store.sweeps.tiles import Kept, KeptVariable, Tile
 from rigidsim.workflows.analyse import analyse
-from rigidsim.workflows.read import parse
+from rigidsim.workflows.read import parse, reads_kernels, refuse_others
 from rigidsim.workflows.run import run
 from rigidsim.workflows.sweeps.batch import Batched, BatchTiles, in_order, why_alone
 
@@ -41,9 +40,9 @@ def sweep_of(config: str) -> Sweep:
 
 @lru_cache(maxsize=4)
 def kernel_of_members(config: str) -> dict[str, Any]:
-    """What tells the kernel of a config's members; empty without one."""
+    """What tells the kernels of a config's members; empty without one."""
     sweep = sweep_of(config)
-    if sweep.base.config.ephemeris is None:
+    if not reads_kernels(sweep.base):
         return {}
     return kernel_attributes(build_scene(sweep.worked_out(first_possible(sweep))))
 
@@ -54,11 +53,7 @@ def refuse_other_kernel(config: str, begun: Mapping[str, Any], place: Path) -> N
     Raises:
         RunFolderError: its bytes differ.
     """
-    then, now = begun.get("ephemeris_sha256"), kernel_of_members(config).get("ephemeris_sha256")
-    if then is not None and now is not None and then != now:
-        what = f'{place}: begun with a kernel "{begun["ephemeris_kernel"]}" of SHA-256 {then}, but the one '
-        what += f"found is of {now}; put the former in its place, or name its folder in the environment "
-        raise RunFolderError(f"{what}variable {FOLDERS}, and remove the other")
+    refuse_others(begun, kernel_of_members(config), place)
 
 
 def first_possible(sweep: Sweep) -> int:

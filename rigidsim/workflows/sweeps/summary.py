@@ -8,6 +8,7 @@ from rigidsim.store.sweeps.run import ErrorsOfMembers, SweepCost, SweepSummary
 from rigidsim.store.sweeps.sources import Gathered, Sources, TileReader
 from rigidsim.store.sweeps.tiles import ALWAYS
 
+_DECIDING = ("version_", "cpu_model", "ephemeris_", "orientation_")  # what decides on bits
 _ERRORS = {
     "attitude": ("attitude_error", "rad"),
     "position": ("position_error", "m"),
@@ -56,10 +57,7 @@ def summary_of(
     for made in found.made:
         for engine, number in made["engines"].items():
             engines[engine] = engines.get(engine, 0) + number
-    kinds = [
-        {k: v for k, v in made.items() if k.startswith(("version_", "cpu_model", "ephemeris_"))}
-        for made in found.made
-    ]
+    kinds = [{k: v for k, v in made.items() if k.startswith(_DECIDING)} for made in found.made]
     differing = sorted({k for kind in kinds for k, v in kind.items() if v != kinds[0].get(k)})
     mixed = ", ".join(differing) or None
     if mixed:

@@ -20,7 +20,7 @@ from rigidsim.store.sweeps.run import SavedSweep, open_sweep
 from rigidsim.store.sweeps.sources import TileReader, gather, sources_of
 from rigidsim.store.sweeps.tiles import Generation
 from rigidsim.store.variables import SCHEMA_VERSION
-from rigidsim.workflows.read import Given, as_experiment
+from rigidsim.workflows.read import Given, as_experiment, reads_kernels
 from rigidsim.workflows.sweeps.batch import why_alone
 from rigidsim.workflows.sweeps.cluster import Cluster
 from rigidsim.workflows.sweeps.members import batches_of, recording, refuse_other_kernel, sweep_of
@@ -157,7 +157,7 @@ def run_sweep(
             if share is None:
                 folder.begin(force=force)
             _refuse_other(wanted, folder)
-            for begun in folder.generations() if wanted.base.config.ephemeris is not None else ():
+            for begun in folder.generations() if reads_kernels(wanted.base) else ():
                 for tile in folder.present(begun).nonzero()[0][:1].tolist():
                     made = folder.read(begun, tile).made
                     refuse_other_kernel(wanted.experiment.text, made, folder.tile(begun, tile))
@@ -294,7 +294,7 @@ def _completed(wanted: Sweep, folder: SweepFolder, wall: float, cpu: float) -> S
         "mixed_provenance": summary.mixed_provenance or "",
         **summary.provenance,
     }
-    if wanted.base.config.ephemeris is not None:  # of the first member, as the config's own values are
+    if reads_kernels(wanted.base):  # of the first member, as the config's own values are
         attributes |= kernel_attributes(build_scene(wanted.experiment_of(0)))
     digest = write_dataset(folder.dataset, wanted, sources, reader, found, attributes)
     summary = summary.having(dataset_sha256=digest)

@@ -1,0 +1,106 @@
+"""SIGKILL where the integrator stands at the edge of a kernel's block: by the run itself, and counted."""
+
+from __future__ import annotations
+
+import os
+import random
+import shutil
+import signal
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import rigidsim
+from experiments.durability.judging import Tally, check_after, check_complete, ended, saved_rows
+from experiments.durability.processes import child, exit_code
+from experiments.durability.scenes import DAYS, FREQUENT, MOONS, Undisturbed, text_of
+from rigidsim.session.session import Observer, Tuning
+from rigidsim.solve.sampler import Pacing, Progress
+from rigidsim.solve.solvers.taylor.ways import Ways
+from rigidsim.store.segments import SegmentLimits
+
+_BLOCK = 4 * DAYS  # of the Moon; the scenes begin at an edge
+_EACH_STEP = Tuning(
+    Pacing(chunk_seconds=0.0, patience=0.0, solver=Ways(block_steps=1, least_block_steps=2)),
+    SegmentLimits(seconds=0.0),
+)
+"""A look at the guards and a segment after every step or two."""
+
+
+class _DiesAtEdge(Observer):
+    """Kills its process at an edge, or when the run goes on from one; notes where it went on, and stands.
+
+    Attributes:
+        skipped: edges to pass first.
+        after: at the next look after the edge, which is saved by then.
+    """
+
+    def __init__(self, skipped: int, after: bool, note: Path) -> None:
+        self._skipped, self._after, self._note = skipped, after, note
+        self._ready = False
+
+    def resumed(self, progress: Progress) -> None:
+        self._tell("resumed", progress)
+
+    def progressed(self, progress: Progress) -> None:
+        if self._ready:
+            self._die(progress)
+        if progress.time <= 0 or progress.time % _BLOCK:
+            return
+        self._skipped -= 1
+        if self._skipped >= 0:
+            return
+        if not self._after:
+            self._die(progress)
+        self._ready = True
+
+    def _die(self, progress: Progress) -> None:
+        self._tell("killed", progress)
+        os.kill(os.getpid(), signal.SIGKILL)
+
+    def _tell(self, what: str, progress: Progress) -> None:
+        with self._note.open("a") as file:
+            file.write(f"{what} {'edge' if progress.time % _BLOCK == 0 else 'within'}\n")
+
+
+def kill_at_edges(tally: Tally, kills: int, draw: random.Random, folder: Path, deadline: float) -> None:
+    """Runs in each precision that are killed at one to four edges, and then left to finish."""
+    wholes = Undisturbed(folder / "undisturbed")
+    done, number = 0, 0
+    while done < kills and time.monotonic() < deadline:
+        name = list(MOONS)[number % len(MOONS)]
+        out = folder / f"edges{number}"
+        out.mkdir()
+        before, run, note = done, out / name, out / "note"
+        for _ in range(draw.randint(1, 4)):
+            if ended(run) or done >= kills:
+                break
+            observer = _DiesAtEdge(draw.randint(0, 5), draw.random() < 0.5, note)
+            code = exit_code(child(_going_on(run, observer, _EACH_STEP), out / "log"))
+            if code != -signal.SIGKILL:
+                tally.expect(code == 0, f"{name}: ended with {code}: {(out / 'log').read_text()[-300:]}")
+                break
+            done += 1
+            check_after(tally, run, wholes[name], saved_rows(run), f"{name}, kill {done}")
+        if not ended(run):
+            code = exit_code(child(_going_on(run, _DiesAtEdge(10**9, False, note), FREQUENT), out / "log"))
+            tally.expect(code == 0, f"{name}: {(out / 'log').read_text()[-400:]}")
+        check_complete(tally, run, wholes[name], f"{name}, complete")
+        for line in note.read_text().splitlines():
+            tally.counts[f"{line}, {name}"] += 1
+        shutil.rmtree(out)
+        number += 1
+        tally.tell(f"kills at edges: {done} of {kills}, run {number} {name} after {done - before}")
+
+
+def _going_on(run: Path, observer: Observer, tuning: Tuning) -> Callable[[], None]:
+    begun = (run / "segments").exists()
+
+    def work() -> None:
+        if begun:
+            rigidsim.resume(run, tuning=tuning, observer=observer)
+        else:
+            experiment = rigidsim.parse(text_of(run.name))
+            rigidsim.run(experiment, out=run.parent, force=True, tuning=tuning, observer=observer)
+
+    return work
