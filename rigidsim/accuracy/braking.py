@@ -32,15 +32,16 @@ _RATES = ("wx", "wy", "wz")
 
 
 def forecast_pace(prepared: InitialValueProblem, pilot: Pilot) -> float | None:
-    """Mean number of steps per second over the whole run, relative to that at its start, which torques change
-    that are functions of the rates: 1 for motions without any, and where the pilot saw the end; None if the
-    course of its average isn't known until the end.
+    """Mean number of steps per second over the whole run, relative to that over the pilot's part, which torques
+    change that are functions of the rates: 1 for motions without any, and where the pilot saw the end; None if
+    the course of its average isn't known until the end.
     """
     clock, plan = prepared.clock, prepared.system.plan
     whole = float(clock.at(clock.count - 1)) - float(clock.start)
     alone = [load for load in plan.loads if gradient_source_of(load) is None]
     braked = plan.formulation.resolves_rotation and alone and all(map(reads_rates_alone, alone))
-    if not prepared.has_steps or pilot.taken * pilot.step >= whole or not braked:
+    seen = pilot.taken * pilot.step / whole
+    if not prepared.has_steps or seen >= 1 or not braked:
         return 1.0
     moments, system = prepared.scene.body.principal_moments, prepared.system
     stepwise = bool(system.plan.surfaces.found) or system.stepwise
@@ -67,8 +68,11 @@ def forecast_pace(prepared: InitialValueProblem, pilot: Pilot) -> float | None:
         passed = float(stepper.time) - before
         return (stepper.steps - steps) / passed if going and passed > 0 else math.nan
 
-    places = times[0] + (times[-1] - times[0]) * (nodes + 1) / 2
-    found = float(weights / 2 @ [pace(time) for time in places]) / pace(times[0])
+    def mean_pace(share: float) -> float:
+        places = times[0] + share * (times[-1] - times[0]) * (nodes + 1) / 2
+        return float(weights / 2 @ [pace(time) for time in places])
+
+    found = mean_pace(1.0) / mean_pace(seen)
     return found if math.isfinite(found) else None
 
 
