@@ -32,9 +32,9 @@ _RATES = ("wx", "wy", "wz")
 
 
 def forecast_pace(prepared: InitialValueProblem, pilot: Pilot) -> float | None:
-    """Mean number of steps per second over the whole run, relative to that over the pilot's part, which torques
-    change that are functions of the rates: 1 for motions without any, and where the pilot saw the end; None if
-    the course of its average isn't known until the end.
+    """Mean number of steps per second over the whole run, relative to that over the pilot's part, which
+    torques change that are functions of the rates: 1 for motions without any, and where the pilot saw the
+    end; None if the course of its average isn't known until the end.
     """
     clock, plan = prepared.clock, prepared.system.plan
     whole = float(clock.at(clock.count - 1)) - float(clock.start)

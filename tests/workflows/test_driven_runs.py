@@ -116,7 +116,7 @@ def test_plan_says_which_states_there_are_and_why() -> None:
 
 @pytest.mark.parametrize("seen", [2, 100, 500, 1000, 2000])
 def test_steps_are_forecast_as_torques_change_the_rotation(seen: int) -> None:
-    """However much of the motion the pilot sees; from its part alone they would be up to half as many again."""
+    """However much of the motion the pilot sees; from its part alone they'd be up to half as many again."""
     given = text("full", viscous(4e-4), 2500.0)
     prepared = prepare(rigidsim.parse(given))
     stepper = stepper_of(prepared.system, prepared.precision, None, prepared.clock.start)

@@ -7,7 +7,6 @@ equations of its own, which are compiled when they are first needed.
 
 from __future__ import annotations
 
-import math
 from bisect import bisect_left
 from collections.abc import Callable, Mapping
 from dataclasses import replace
@@ -197,8 +196,8 @@ class SwitchedEngines(TaylorStepper):
         over: dict[int, int] | None = None,
         low: Scalar | None = None,
     ) -> np.ndarray:
-        modes = [(over or {}).get(j, mode) or 1 for j, mode in enumerate(self._modes)]
-        sides = [math.copysign(1.0, mode) for mode in modes]
+        modes = self._modes if over is None else [over.get(j, mode) for j, mode in enumerate(self._modes)]
+        sides = [-1.0 if mode < 0 else 1.0 for mode in modes]
         numbers = [*sides, *turns, *([sign] if self._probe.signed else [])]
         if (pieces := self.system.pieces) is not None:
             if self._piece is None:  # of those that meet at a boundary, the one that ends there
@@ -240,6 +239,8 @@ class SwitchedEngines(TaylorStepper):
         return self._integrator.dtime[1]
 
     def _array(self, numbers: list[float]) -> np.ndarray:
+        if issubclass(self.precision.scalar, float | np.floating):
+            return np.array(numbers, dtype=self.precision.scalar) + 0
         return np.array([self.precision.of_double(x) for x in numbers], dtype=self.precision.scalar)
 
     def _parameters(self, over: dict[int, int] | None = None) -> np.ndarray:
@@ -285,11 +286,13 @@ class SwitchedEngines(TaylorStepper):
         """
         pars = self._parameters()
         look = self._probe.look(self.state, self.time, pars)
-        moved = []
-        for j, mode in enumerate(self._modes):  # what a unit of time makes of the state tells its size
-            noise = self._probe.noise(look, j, [self.state, look.field])
-            near = abs(float(look.u[j])) <= noise and abs(mode) < HELD
-            moved.append(mode * noise if near else 0.0)
+        # what a unit of time makes of the state tells its size
+        noises = self._probe.noises(look, [self.state, look.field])
+        near = np.abs(look.u.astype(np.float64)) <= noises
+        moved = [
+            float(mode * noise) if beside and abs(mode) < HELD else 0.0
+            for mode, noise, beside in zip(self._modes, noises, near, strict=True)
+        ]
         if self.has_events:
             moved += [self._beside(*found) for found in self._probe.crossings(self.state, self.time, pars)]
         offsets = self._array(moved)
@@ -304,13 +307,8 @@ class SwitchedEngines(TaylorStepper):
 
     def _at_rest(self, on: list[int], look: Look) -> Continuation | None:
         """How to continue if swings about two surfaces have decayed to rounding; None otherwise."""
-        small = [
-            i
-            for i, mode in enumerate(self._modes)
-            if i in on
-            or abs(mode) >= HELD
-            or abs(float(look.u[i])) <= self._probe.swing_noise(look, i, self.state)
-        ]
+        resting = np.abs(look.u.astype(np.float64)) <= self._probe.swing_noises(look, self.state)
+        small = [i for i, mode in enumerate(self._modes) if i in on or abs(mode) >= HELD or resting[i]]
         if len(small) < 2:
             return None
 

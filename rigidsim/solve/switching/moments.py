@@ -34,7 +34,7 @@ class Moments:
     def __init__(self, system: System, precision: Precision, place: int) -> None:
         expression = system.plan.surfaces.found[place].expression
         self._system, self._precision, self._expression, self._place = system, precision, expression, place
-        self._context = system.scene.context
+        self._context, self._epsilon = system.scene.context, float(precision.epsilon)
         self.of_time = names_used(expression) == {"t"}
         known = system.clocked and self.of_time
         self.at_known_time = known and as_line(expression, self._context) is not None
@@ -48,11 +48,11 @@ class Moments:
         """The span of time (internal units) to which the argument's rounding is relative: from the farthest
         moment at which a line within it vanishes, or from the clock's zero if the equations see one number.
         """
-        rounding = float(self._precision.epsilon) * abs(float(time))
+        if not self.at_known_time and not self._from:
+            return abs(float(time))
+        rounding = self._epsilon * abs(float(time))
         if self.at_known_time:
             return rounding
-        if not self._from:
-            return abs(float(time))
         return max(abs(float(time - moment)) for moment in self._from) + rounding
 
     def near(self, time: Scalar, modes: Sequence[int]) -> tuple[Scalar, Scalar] | None:

@@ -9,6 +9,7 @@ crossing and sliding is tried, and the one that agrees with its own field is tak
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import product
 from typing import Any
 
@@ -43,18 +44,30 @@ class Look:
 
     def rate(self, j: int) -> Scalar:
         """Rate of an argument along the motion."""
-        return sum((g * f for g, f in zip(self.gradients[j], self.field, strict=True)), self.by_time[j])
+        if not issubclass(self.field.dtype.type, np.floating):
+            return sum((g * f for g, f in zip(self.gradients[j], self.field, strict=True)), self.by_time[j])
+        return in_order(self.by_time[j : j + 1], self.gradients[j] * self.field)
+
+    @cached_property
+    def _sizes(self) -> tuple[np.ndarray, np.ndarray]:
+        """Of the arguments' derivatives by time (surfaces) and by the states (states, surfaces), float64."""
+        return np.abs(self.by_time.astype(np.float64)), np.abs(self.gradients.astype(np.float64)).T
 
     def rate_size(self, j: int) -> float:
         """Size to which the rate's rounding is relative."""
-        pairs = zip(self.gradients[j], self.field, strict=True)
-        return sum((abs(float(g) * float(f)) for g, f in pairs), abs(float(self.by_time[j])))
+        by_time, by_state = self._sizes
+        return float(in_order(by_time[j : j + 1], by_state[:, j] * np.abs(self.field.astype(np.float64))))
 
-    def size(self, j: int, states: Sequence[np.ndarray], time: float) -> float:
-        """Size to which the argument's rounding is relative, for states before and a span of time."""
-        largest = [max(abs(float(x)) for x in row) for row in zip(*states, strict=True)]
-        terms = (abs(float(g)) * x for g, x in zip(self.gradients[j], largest, strict=True))
-        return sum(terms, abs(float(self.by_time[j]) * time))
+    def sizes(self, states: Sequence[np.ndarray], times: np.ndarray) -> np.ndarray:
+        """Sizes to which the rounding of the arguments is relative, by states and times (surfaces)."""
+        by_time, by_state = self._sizes
+        largest = np.abs(np.array([row.astype(np.float64) for row in states])).max(axis=0)
+        return in_order((by_time * times)[None], by_state * largest[:, None])
+
+
+def in_order(first: np.ndarray, terms: np.ndarray) -> Any:
+    """Sum along the first axis, term after term: what decides must not depend on how numpy groups terms."""
+    return np.concatenate([first, terms]).cumsum(axis=0)[-1]
 
 
 class Probe:
@@ -108,14 +121,19 @@ class Probe:
             found[:s], found[s : 2 * s], found[2 * s : 2 * s + s * n].reshape(s, n), found[-2 - n : -2], time
         )
 
-    def noise(self, look: Look, j: int, states: Sequence[np.ndarray]) -> float:
-        """Size below which an argument counts as zero because of rounding."""
-        return _ROUNDINGS * self._epsilon * look.size(j, states, self.moments[j].rounded_from(look.time))
+    def noises(self, look: Look, states: Sequence[np.ndarray]) -> np.ndarray:
+        """Sizes below which the arguments count as zero because of rounding."""
+        times = np.array([moments.rounded_from(look.time) for moments in self.moments])
+        return _ROUNDINGS * self._epsilon * look.sizes(states, times)
 
-    def swing_noise(self, look: Look, j: int, state: np.ndarray) -> float:
-        """The same for a small difference of states of order one, as when swings come to rest."""
-        gradient = math.hypot(*(float(x) for x in look.gradients[j]))
-        return _ROUNDINGS * self._epsilon * gradient * max(abs(float(x)) for x in state)
+    def noise(self, look: Look, j: int, states: Sequence[np.ndarray]) -> float:
+        """The same of one argument."""
+        return float(self.noises(look, states)[j])
+
+    def swing_noises(self, look: Look, state: np.ndarray) -> np.ndarray:
+        """The same for small differences of states of order one, as when swings come to rest."""
+        gradients = np.hypot.reduce(look.gradients.astype(np.float64), axis=1)
+        return _ROUNDINGS * self._epsilon * gradients * np.abs(state.astype(np.float64)).max()
 
     def rate_noise(self, look: Look, j: int) -> float:
         """Size below which an argument's rate counts as zero because of rounding."""
@@ -202,13 +220,13 @@ class Fields:
 
     def _slides(self, modes: Sequence[int]) -> bool:
         along = [i for i, mode in enumerate(modes) if mode == SLIDES]
+        if any(abs(self._parts[i, i]) <= self._noise[i] for i in along):
+            return False
         beside = [i for i, mode in enumerate(modes) if mode != SLIDES]
         across = self._parts[np.ix_(along, along)]
         right = -self._base[along] - self._parts[np.ix_(along, beside)] @ np.array(
             [float(modes[i]) for i in beside]
         )
-        if np.any(np.abs(np.diag(across)) <= [self._noise[i] for i in along]):
-            return False
         try:
             inner = np.linalg.solve(across, right)
         except np.linalg.LinAlgError:

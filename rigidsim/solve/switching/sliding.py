@@ -157,7 +157,7 @@ class Meeting:
         slope = self._slope(i, m, here)
         rates = [float(look.rate(i)) for look in looks.values()]
         noise = max(self.probe.rate_noise(look, i) for look in looks.values())
-        known = _NEAR * abs(slope) * self.probe.swing_noise(here, m, self.state) + noise
+        known = _NEAR * abs(slope) * float(self.probe.swing_noises(here, self.state)[m]) + noise
         if slope == 0 or max(map(abs, rates)) > known or max(rates) - min(rates) > noise:
             return 0
         # v = slope u_m near the surface, and v' by the sides of u and v

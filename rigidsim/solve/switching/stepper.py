@@ -139,11 +139,7 @@ class SwitchingStepper(SurfaceRoots):
     def _begin(self) -> None:
         """Find the sides at the start."""
         look = self._agree()
-        on = [
-            j
-            for j in range(len(self._modes))
-            if abs(float(look.u[j])) <= self._probe.noise(look, j, [self.state])
-        ]
+        on = self._lying_on(look, [self.state])
         if on:
             choice = self._at_rest(on, look) or self._chosen(on)
             if choice.modes is None:
@@ -151,6 +147,11 @@ class SwitchingStepper(SurfaceRoots):
                 self._unsettled = self.failure
             else:
                 self._take(choice)
+
+    def _lying_on(self, look: Look, states: list[np.ndarray]) -> list[int]:
+        """Surfaces whose arguments are zero but for rounding of these states."""
+        near = np.abs(look.u.astype(np.float64)) <= self._probe.noises(look, states)
+        return [int(j) for j in np.flatnonzero(near)]
 
     @property
     def _window(self) -> float:
@@ -176,9 +177,7 @@ class SwitchingStepper(SurfaceRoots):
             return True
         look = self._look(self.state, self.time, self._low)
         on = [j, *self._along, *self._held]
-        for i in range(len(self._modes)):
-            if i not in on and abs(float(look.u[i])) <= self._probe.noise(look, i, states):
-                on.append(i)
+        on += [i for i in self._lying_on(look, states) if i not in on]
         moments = [i for i in on if self._probe.moments[i].of_time]
         alone = len(moments) == 1
         if (again or not alone) and any(self._unresolved(i, alone) for i in moments):
@@ -217,9 +216,10 @@ class SwitchingStepper(SurfaceRoots):
         """
         for _ in range(len(self._modes) + 1):
             look, changed = self._look(self.state, self.time, self._low), False
+            noises = self._probe.noises(look, [self.state])
             for j, mode in enumerate(self._modes):
                 u = float(look.u[j])
-                beyond = mode * u < 0 and abs(u) > self._probe.noise(look, j, [self.state])
+                beyond = mode * u < 0 and abs(u) > noises[j]
                 if beyond and j not in known and abs(mode) < HELD:
                     self._modes[j], changed = -mode, True
             if not changed:
