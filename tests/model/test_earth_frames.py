@@ -1,6 +1,10 @@
 """Starts of flights by two-line elements and by dated states in frames of the Earth."""
 
 import math
+import re
+from datetime import datetime, timedelta
+from decimal import Decimal
+from importlib.resources import files
 from typing import Any
 
 import heyoka as hy
@@ -14,19 +18,11 @@ from rigidsim.workflows.read import as_experiment
 pytest.importorskip("sgp4")
 pytest.importorskip("erfa")
 
-# Vanguard 1, the first of SGP4's published test cases (Vallado et al. 2006, AIAA 2006-6753)
+# Vanguard 1, the first of SGP4's verification cases (Vallado et al. 2006, AIAA 2006-6753)
 LINES = [
     "1 00005U 58002B   00179.78495062  .00000023  00000-0  28098-4 0  4753",
     "2 00005  34.2682 348.7242 1859667 331.7664  19.3264 10.82419157413667",
 ]
-PUBLISHED = {  # date: position (km) and velocity (km/s) in TEME
-    "2000-06-27T18:50:19.733568 UTC": (
-        [7022.46529266, -1400.08296755, 0.03995155, 1.893841015, 6.405893759, 4.534807250]
-    ),
-    "2000-06-28T00:50:19.733568 UTC": (
-        [-7154.03120202, -3783.17682504, -3536.19412294, 4.741887409, -4.151817765, -2.093935425]
-    ),
-}
 # one state in three frames (Vallado, Fundamentals of Astrodynamics and Applications, example 3-15)
 DATE = "2004-04-06T07:51:28.386009 UTC"
 GCRF = [5102.5089592, 6123.0114036, 6378.1369247, -4.743220157, 0.790536497, 5.533755727]
@@ -58,9 +54,27 @@ def given(values: list[float], frame: str) -> dict[str, Any]:
     return {"position": texts[0], "velocity": texts[1], "frame": frame}
 
 
-def test_an_orbit_starts_where_sgp4_is_published_to_be() -> None:
-    for date, expected in PUBLISHED.items():
-        found = state(start({"tle": LINES}, time={"epoch": date}))
+def verification_cases(satellite: str) -> tuple[list[str], list[tuple[float, list[float]]]]:
+    """Elements and states in TEME (minutes; km, km/s) of a satellite in the files of AIAA 2006-6753."""
+    folder = files("sgp4")
+    texts = (folder / "SGP4-VER.TLE").read_text().splitlines()
+    lines = [next(x for x in texts if x.startswith(f"{n} {satellite}"))[:69] for n in (1, 2)]
+    blocks = re.split(r"(?m)^(\d+) xx\n", (folder / "tcppver.out").read_text())
+    rows = blocks[blocks.index(str(int(satellite))) + 1].splitlines()
+    numbers = [[float(x) for x in row.split()[:7]] for row in rows if row.strip()]
+    return lines, [(row[0], row[1:]) for row in numbers]
+
+
+@pytest.mark.parametrize("satellite", ["00005", "06251", "28057", "08195", "28129"])
+def test_an_orbit_starts_where_sgp4_is_published_to_be(satellite: str) -> None:
+    """Low with drag, sun-synchronous, a Molniya in resonance, and one of GPS."""
+    lines, states = verification_cases(satellite)
+    year, day = 2000 + int(lines[0][18:20]), Decimal(lines[0][20:32])
+    for minutes, expected in states[:: max(1, len(states) // 3)]:
+        seconds = float((day - 1) * 86400) + 60 * minutes
+        moment = datetime(year, 1, 1) + timedelta(seconds=seconds)
+        date = f"{moment.isoformat(timespec='microseconds')} UTC"
+        found = state(start({"tle": lines}, time={"epoch": date}))
         same = state(start(given(expected, "TEME"), time={"epoch": date}))
         assert np.abs(found - same)[:3].max() < 2e-8  # as printed, km
         assert np.abs(found - same)[3:].max() < 2e-9
