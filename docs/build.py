@@ -1,7 +1,8 @@
-"""Builds the documentation as a site: ``python docs/build.py [FOLDER]``, by default docs/_site.
+"""Builds the documentation as a site: ``python docs/build.py [FOLDER] [--code-only]``, by default docs/_site.
 
-Needs the extra "docs" (``pip install -c constraints.txt -e '.[docs]'``) and no network. Warnings and dead
-links are errors, also links to places within pages; the pages fetch nothing when they are read.
+Needs the extra "docs" (``pip install -c constraints.txt -e '.[docs]'``) and no network. Notebooks are run, and
+shown with what they print and draw; with ``--code-only`` they aren't. Warnings and dead links are errors, also
+links to places within pages; the pages fetch nothing when they are read.
 """
 
 from __future__ import annotations
@@ -21,8 +22,8 @@ import reference  # noqa: E402
 import staging  # noqa: E402
 
 
-def build(site: Path) -> int:
-    """Build the site into a folder, which is replaced.
+def build(site: Path, *, run: bool = True) -> int:
+    """Build the site into a folder, which is replaced; ``run`` the notebooks for it.
 
     Returns:
         How many pages it has.
@@ -33,7 +34,7 @@ def build(site: Path) -> int:
     with tempfile.TemporaryDirectory() as temporary:
         pages = Path(temporary)
         try:
-            staging.gather(pages)
+            staging.gather(pages, run=run)
         except staging.DeadLinkError as error:
             raise SystemExit(f"dead links\n{error}") from None
         reference.write(pages / "reference")
@@ -52,5 +53,6 @@ def build(site: Path) -> int:
 
 
 if __name__ == "__main__":
-    where = Path(sys.argv[1] if len(sys.argv) > 1 else HERE / "_site").resolve()
-    print(f"{build(where)} pages: {where / 'index.html'}")
+    given = [argument for argument in sys.argv[1:] if argument != "--code-only"]
+    where = Path(given[0] if given else HERE / "_site").resolve()
+    print(f"{build(where, run='--code-only' not in sys.argv)} pages: {where / 'index.html'}")

@@ -11,10 +11,6 @@ import pytest
 NOTEBOOKS = sorted((Path(__file__).parents[1] / "docs" / "notebooks").glob("*.ipynb"))
 
 
-def test_there_are_two() -> None:
-    assert len(NOTEBOOKS) >= 2
-
-
 @pytest.mark.parametrize("notebook", NOTEBOOKS, ids=lambda p: p.stem)
 def test_they_are_kept_without_outputs(notebook: Path) -> None:
     """What they print would grow old unnoticed."""
@@ -32,7 +28,7 @@ def test_they_run(notebook: Path, tmp_path: Path) -> None:
     nbformat = pytest.importorskip("nbformat", reason="pip install -e '.[docs]'")
     shutil.copy(notebook, tmp_path)
     book = nbformat.read(tmp_path / notebook.name, as_version=4)
-    nbclient.NotebookClient(book, timeout=120, resources={"metadata": {"path": tmp_path}}).execute()
+    nbclient.NotebookClient(book, timeout=600, resources={"metadata": {"path": tmp_path}}).execute()
     code = [cell for cell in book.cells if cell.cell_type == "code"]
     assert all(cell.execution_count for cell in code)
     pictures = [o for cell in code for o in cell.outputs if "image/png" in o.get("data", {})]

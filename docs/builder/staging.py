@@ -7,11 +7,12 @@ for a download; a folder or a module is named without a link, and what isn't the
 
 from __future__ import annotations
 
-import json
 import os
 import re
 import shutil
 from pathlib import Path
+
+import notebooks
 
 ROOT = Path(__file__).resolve().parents[2]
 ELSEWHERE = {
@@ -30,11 +31,12 @@ class DeadLinkError(Exception):
     """A page links what isn't there."""
 
 
-def gather(folder: Path, root: Path = ROOT) -> list[Path]:
+def gather(folder: Path, root: Path = ROOT, *, run: bool = False) -> list[Path]:
     """Write all pages, with what they show, into a folder.
 
     Args:
         root: of the repository.
+        run: whether to run the notebooks and to show what comes of them.
 
     Returns:
         The pages, without those that are generated.
@@ -46,9 +48,12 @@ def gather(folder: Path, root: Path = ROOT) -> list[Path]:
     pages = {page: str(place_of(page, root)) for page in found}
     dead: list[str] = []
     for page, place in pages.items():
-        text = _notebook_text(page) if page.suffix == ".ipynb" else page.read_text(encoding="utf-8")
         target = folder / place
         target.parent.mkdir(parents=True, exist_ok=True)
+        if page.suffix == ".ipynb":
+            text = notebooks.as_page(page, target.parent / "pictures" if run else None)
+        else:
+            text = page.read_text(encoding="utf-8")
         target.write_text(_linked(text, page, folder, root, dead), encoding="utf-8")
     if dead:
         raise DeadLinkError("\n".join(dead))
@@ -98,16 +103,6 @@ def sources(folder: Path) -> list[Path]:
     """The pages and notebooks below a folder, without those of a site that was built into it before."""
     found = [*sorted(folder.rglob("*.md")), *sorted(folder.rglob("*.ipynb"))]
     return [page for page in found if not any(p.startswith("_") for p in page.relative_to(folder).parts)]
-
-
-def _notebook_text(page: Path) -> str:
-    """A notebook as a page: its texts and its code."""
-    parts = [f"The same as a notebook: [{page.name}]({page.name})."]
-    for cell in json.loads(page.read_text(encoding="utf-8"))["cells"]:
-        source = "".join(cell["source"])
-        parts.append(source if cell["cell_type"] == "markdown" else f"```python\n{source}\n```")
-    parts[0], parts[1] = parts[1], parts[0]  # the title comes first
-    return "\n\n".join(parts) + "\n"
 
 
 def _linked(text: str, page: Path, folder: Path, root: Path, dead: list[str]) -> str:

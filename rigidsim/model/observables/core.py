@@ -23,7 +23,9 @@ def _units(m: Mechanics) -> list[int]:
 
 def _coreless(scene: Scene, _: str) -> str | None:
     return (
-        None if core_of(scene) else "the body has no fluid core; give it one by [body] core, or leave it out"
+        None
+        if core_of(scene)
+        else "the body has no fluid core, or one whose moment is 0; give it one by [body] core, or leave this out"
     )
 
 
