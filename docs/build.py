@@ -1,8 +1,8 @@
-"""Builds the documentation as a site: ``python docs/build.py [FOLDER] [--code-only]``, by default docs/_site.
+"""Builds the documentation as a site: ``python docs/build.py [FOLDER] [--code-only]``, by default _site.
 
-Needs the extra "docs" (``pip install -c constraints.txt -e '.[docs]'``) and no network. Notebooks are run, and
-shown with what they print and draw; with ``--code-only`` they aren't. Warnings and dead links are errors, also
-links to places within pages; the pages fetch nothing when they are read.
+Needs the extra "docs" (``pip install -c constraints.txt -e '.[docs]'``) and no network. Notebooks are run,
+and shown with what they print and draw; with ``--code-only`` they aren't. Warnings and dead links are errors,
+also links to places within pages; the pages fetch nothing when they are read.
 """
 
 from __future__ import annotations

@@ -20,8 +20,8 @@ def as_page(notebook: Path, pictures: Path | None = None) -> str:
     """A notebook in Markdown.
 
     Args:
-        pictures: folder for its pictures, beside which the page will lie; the notebook is run. None for texts and
-            code alone.
+        pictures: folder for its pictures, beside which the page will lie; the notebook is run. None for texts
+            and code alone.
 
     Raises:
         nbclient.exceptions.CellExecutionError: a cell failed.
