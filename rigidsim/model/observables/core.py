@@ -25,7 +25,7 @@ def _coreless(scene: Scene, _: str) -> str | None:
     return (
         None
         if core_of(scene)
-        else "the body has no fluid core, or one whose moment is 0; give it one by [body] core, or leave this out"
+        else "the body has no fluid core, or one of moment 0; give it one by [body] core, or leave this out"
     )
 
 
