@@ -6,9 +6,11 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import cached_property
 from itertools import pairwise
 from typing import Any
 
+import numpy as np
 from pydantic import Field, StrictInt
 
 from rigidsim.errors import ConfigError, Problem, either
@@ -17,6 +19,7 @@ from rigidsim.scene.fields import ConfigTable, Instant, Second, TimeUnitName
 from rigidsim.scene.validation_messages import shown
 
 _MOST_SAMPLES = 10**12
+_BITS, _MOST_BITS = 53, 1000  # of a significand, and of a denominator above which doubles lose digits
 
 
 class Time(ConfigTable):
@@ -70,12 +73,42 @@ class SampleTimes:
         """Time of the last sample (mpf)."""
         return rounded(self.exact_last, self.context)
 
-    @property
+    @cached_property
+    def doubles(self) -> np.ndarray:
+        """The doubles nearest to the times of a list."""
+        assert self.times is not None
+        return _doubles(self.times)
+
+    @cached_property
     def largest_spacing(self) -> float:
         """Largest spacing of neighbouring samples, s."""
         if self.times is None:
             return float(self.step)
+        if all(map(_is_double, self.times)):  # of which a difference is rounded once, too
+            return float(np.diff(self.doubles).max(initial=0.0))
         return max((float(b - a) for a, b in pairwise(self.times)), default=0.0)
+
+
+def _is_double(time: Fraction) -> bool:
+    whole = time.denominator
+    return (
+        whole & (whole - 1) == 0 and time.numerator.bit_length() <= _BITS and whole.bit_length() < _MOST_BITS
+    )
+
+
+def _doubles(times: Sequence[Fraction]) -> np.ndarray:
+    """The doubles nearest to times, those beyond all doubles infinite."""
+    try:
+        return np.array([time.numerator / time.denominator for time in times])
+    except OverflowError:
+        return np.array([_double(time) for time in times])
+
+
+def _double(time: Fraction) -> float:
+    try:
+        return time.numerator / time.denominator
+    except OverflowError:
+        return math.copysign(math.inf, time)
 
 
 def sample_times(table: Time, context: Any) -> tuple[Any, Any, SampleTimes]:
@@ -94,7 +127,10 @@ def sample_times(table: Time, context: Any) -> tuple[Any, Any, SampleTimes]:
         times = [t.fraction(context) for t in table.times]
         if not times:
             raise _fail("times", "given an empty array; at least one time is needed")
-        for i, (a, b) in enumerate(pairwise(times)):
+        doubles = _doubles(times)
+        # rounding to doubles keeps order, so that only those that aren't told apart need a closer look
+        for i in np.flatnonzero(~(doubles[1:] > doubles[:-1])).tolist():
+            a, b = times[i], times[i + 1]
             if not a < b:
                 raise _fail(f"times[{i + 1}]", f"given {shortly(b)} after {shortly(a)}; times must increase")
         if times[0] < start:
