@@ -114,7 +114,7 @@ def _made(
         if array.dtype.kind not in "fiu" or not array.ndim:
             continue
         narrow |= array.dtype == np.float32
-        array = array.astype(np.float64)
+        array = array.astype(np.float64, copy=False)
         if array.ndim == 1:
             columns[name] = array
             continue
@@ -170,10 +170,11 @@ def _of_xarray_file(path: Path) -> Trajectory:
 def _of_parquet(path: Path) -> Trajectory:
     if importlib.util.find_spec("pyarrow") is None:
         raise RigidsimError(f'{path}: needs pyarrow, which is missing: pip install "rigidsim[export]"')
-    from pyarrow.parquet import read_table
+    from pyarrow.parquet import ParquetFile
 
-    table = read_table(path)
-    given = ((name, table.column(name).to_numpy(), ()) for name in table.column_names)
+    with ParquetFile(path) as file:  # column by column: the whole of it isn't held twice
+        names = list(file.schema_arrow.names)
+        given = [(name, file.read([name]).column(0).to_numpy(), ()) for name in names]
     return _made(given, str(path))
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from decimal import Decimal
 from fractions import Fraction
 
@@ -124,7 +124,8 @@ def attitudes_of(found: Trajectory, epoch: Epoch | None) -> Attitudes:
         _resolution(attitude, found.narrow),
         0.0 if made.rates is None else _resolution(made.rates, found.narrow),
     )
-    return Attitudes(**{**made.__dict__, "resolution": resolution})
+    kept_rows = replace(found, columns={})  # what is used of them is held already
+    return replace(made, trajectory=kept_rows, resolution=resolution)
 
 
 def _plain(name: str) -> str:

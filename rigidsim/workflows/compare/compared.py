@@ -12,7 +12,7 @@ import xarray
 from rigidsim.errors import RigidsimError, RunFolderError
 from rigidsim.formats.trajectories import Trajectory, read_trajectory, trajectory_of
 from rigidsim.scene.config import Experiment
-from rigidsim.solve.from_states import FromStates, NotFromStates
+from rigidsim.solve.from_states import FromStates, NotFromStates, blocks_of
 from rigidsim.store.run import Run, open_run
 from rigidsim.workflows.compare import defects
 from rigidsim.workflows.compare.by_equations import ByEquations
@@ -67,8 +67,7 @@ def compare(
     """
     asked = as_experiment(experiment)
     quiet, scene = plain(asked)
-    found = _trajectory(table)
-    given = attitudes_of(found, scene.epoch)
+    given = attitudes_of(_trajectory(table), scene.epoch)
     if not 0 < within < np.pi:
         raise RigidsimError(f"within: given {within:g}; an angle above 0 and below pi, in rad, is allowed")
     try:
@@ -127,16 +126,16 @@ class _Judging:
             self.told.append(f"the experiment's motion {own.ended}; later rows aren't compared")
         count = len(own.rates)
         times, theirs = times[:count], found.quaternions(self.given)[:count]
-        errors = np.linalg.norm(
-            rotation_vectors([normalised(own.quaternions[0]), *own.quaternions[1:]], [theirs]), axis=1
-        )
-        rows = rows_compared(count)
+        errors = np.concatenate([_errors(own, theirs, rows) for rows in blocks_of(count)])
+        compared = rows_compared(count)
         rates: np.ndarray | None = None
         reading: RateReading | None = None
         more: list[str] = []
         if self.given.rates is not None:
-            reading, more = find_rates(self.given, found, rows, theirs[rows], own.rates[rows])
-            rates = reading.rates(self.given.rates[:count], found, theirs)
+            reading, more = find_rates(self.given, found, compared, theirs[compared], own.rates[compared])
+            rates = np.concatenate(
+                [reading.rates(self.given.rates[rows], found, theirs[rows]) for rows in blocks_of(count)]
+            )
         flight = self._flight(count)
         dataset = _dataset(times, errors, name, self.given.trajectory.source)
         rate_errors = None if rates is None else np.linalg.norm(rates - own.rates, axis=1)
@@ -259,7 +258,7 @@ class _Judging:
         )
         flight = self.equations.flight(states)
         place, speed = (None, None) if flight is None else (flight[:, :3], flight[:, 3:])
-        return OwnMotion([quaternions], rates, place, speed, max(own.uncertainty, float(apart)), "")
+        return OwnMotion([quaternions], rates, place, speed, max(own.uncertainty, float(apart)), "", states)
 
     def _flight(self, count: int) -> np.ndarray | None:
         if self.given.positions is None or self.given.velocities is None:
@@ -296,6 +295,12 @@ class _Judging:
             return None
         self.told += found.told
         return found
+
+
+def _errors(own: OwnMotion, theirs: np.ndarray, rows: slice) -> np.ndarray:
+    """Angles (rows,), rad, between attitudes."""
+    one = [part[rows] for part in own.quaternions]
+    return np.linalg.norm(rotation_vectors([normalised(one[0]), *one[1:]], [theirs[rows]]), axis=1)
 
 
 def _dataset(times: np.ndarray, errors: np.ndarray, name: str, source: str) -> xarray.Dataset:

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rigidsim.scene.rotations import quaternion_of
+from rigidsim.solve.from_states import blocks_of
 from rigidsim.workflows.compare.columns import Attitudes
 from rigidsim.workflows.compare.rotations import (
     SEQUENCES,
@@ -129,7 +130,12 @@ class FoundReading:
 
     def quaternions(self, given: Attitudes) -> np.ndarray:
         """All attitudes in the experiment's convention and axes."""
-        return self.frames.applied(self.reading.quaternions(given, slice(None)))
+        return np.concatenate(
+            [
+                self.frames.applied(self.reading.quaternions(given, rows))
+                for rows in blocks_of(len(given.times))
+            ]
+        )
 
 
 def rows_compared(count: int) -> np.ndarray:

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rigidsim.solve.from_states import FromStates
+from rigidsim.solve.from_states import FromStates, RowStates
 from rigidsim.workflows.compare.rotations import conjugated, multiplied, normalised, turned, vector_of
 
 _WINDOW = 0.5  # times the rate of the motion: length of a window, where the rows allow it
@@ -71,15 +71,15 @@ def motion_rate(times: np.ndarray, rates: np.ndarray) -> float:
     return max(size, bend / size if size else 0.0)
 
 
-def row_defects(equations: FromStates, times: np.ndarray, states: np.ndarray, rows: np.ndarray) -> RowDefects:
-    """Defects from some rows to the next ones; ``states`` (all rows, states) are the trajectory's."""
+def row_defects(equations: FromStates, times: np.ndarray, states: RowStates, rows: np.ndarray) -> RowDefects:
+    """Defects from some rows to the next ones; ``states`` are the trajectory's."""
     ends = np.stack([equations.after(states[n], times[n], times[n + 1 : n + 2])[0] for n in rows])
     attitude, rates = _apart(equations, states[rows + 1], ends)
     return RowDefects(rows, attitude, rates)
 
 
 def window_defects(
-    equations: FromStates, times: np.ndarray, states: np.ndarray, rate: float, most: int
+    equations: FromStates, times: np.ndarray, states: RowStates, rate: float, most: int
 ) -> WindowDefects | None:
     """Defects over at most so many windows; None where rows are too few or too far apart.
 
@@ -114,7 +114,7 @@ def window_defects(
 
 
 def _one(
-    equations: FromStates, times: np.ndarray, states: np.ndarray, rows: np.ndarray
+    equations: FromStates, times: np.ndarray, states: RowStates, rows: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, float] | None:
     """A window: rotation vector at its end, the integral of the rates' differences, these."""
     reference = equations.after(states[rows[0]], times[rows[0]], times[rows[1:]])
@@ -137,11 +137,11 @@ def _apart(equations: FromStates, theirs: np.ndarray, reference: np.ndarray) -> 
     return vector_of(turn), other[1] - one[1]
 
 
-def shot_rates(equations: FromStates, times: np.ndarray, states: np.ndarray, rows: np.ndarray) -> np.ndarray:
+def shot_rates(equations: FromStates, times: np.ndarray, states: RowStates, rows: np.ndarray) -> np.ndarray:
     """Rates (rows, 3) with which the equations lead from the attitude of each row to that of the next: for
     trajectories without rates, from the mean rate between the rows on, by three corrections.
     """
-    quaternions, near = equations.attitude(states)
+    quaternions, near = states.quaternions, states.rates
     spacing = times[rows + 1] - times[rows]
     mean = vector_of(multiplied(conjugated(quaternions[rows]), quaternions[rows + 1])) / spacing[:, None]
     fast = np.linalg.norm(near[rows], axis=1) * spacing > np.pi * 0.8

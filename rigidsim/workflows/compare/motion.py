@@ -26,6 +26,7 @@ class OwnMotion:
         rates: (rows, 3), rad/s, body axes. positions, velocities: (rows, 3), SI; None without flight.
         uncertainty: announced error of its attitude at the end, rad; 0 if unknown.
         ended: why the motion ended before the trajectory; empty if it didn't.
+        states: those of the scene's own motion by ``FromStates``, if it was found by these.
     """
 
     quaternions: list[np.ndarray]
@@ -34,6 +35,7 @@ class OwnMotion:
     velocities: np.ndarray | None
     uncertainty: float
     ended: str
+    states: np.ndarray | None = None
 
 
 def plain(experiment: Experiment) -> tuple[Experiment, Scene]:
