@@ -45,6 +45,7 @@ class ByEquations:
     windows: defects.WindowDefects | None = None
     missing: str = _NO_RATES
     told: list[str] = field(default_factory=list)
+    intervals: np.ndarray = field(default_factory=lambda: np.empty(0))  # of local defects, s
 
     def measure(self) -> None:
         """Measure all of it."""
@@ -100,6 +101,7 @@ class ByEquations:
     def _keep(self, starts: np.ndarray, sizes: np.ndarray, rates: np.ndarray | None) -> None:
         """Local defects as values, and along time in the dataset."""
         put, windows = self.dataset, self.windows
+        self.intervals = self.times[starts + 1] - self.times[starts]
         put["defect"] = ("start", sizes, {"units": "rad", "long_name": "local defect of the attitude"})
         put["defect_time"] = ("start", self.times[starts], {"units": "s", "long_name": "time of the row"})
         if rates is not None:

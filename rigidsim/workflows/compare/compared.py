@@ -25,7 +25,9 @@ from rigidsim.workflows.compare.conventions import (
     rows_compared,
 )
 from rigidsim.workflows.compare.motion import OwnMotion, own_motion, plain
+from rigidsim.workflows.compare.own_steps import own_steps
 from rigidsim.workflows.compare.result import (
+    INTEGRATION_ERROR,
     AttitudeError,
     Comparison,
     Disagreement,
@@ -157,6 +159,10 @@ class _Judging:
             missing,
         )
         verdict, why = judged(seen)
+        local = None if known is None else known.local
+        if known is not None and local is not None and verdict == INTEGRATION_ERROR:
+            steps = own_steps(known.intervals, dataset["defect"].values, attitude_noise)
+            local = local.having(order=steps.order, step_tolerance=steps.tolerance)
         if rate_errors is not None:
             dataset["rate_error"] = (
                 "time",
@@ -191,7 +197,7 @@ class _Judging:
             position_error=position_error,
             convention=_described(found, unit, reading, more),
             drifts=[] if known is None else known.drifts,
-            local_defects=None if known is None else known.local,
+            local_defects=local,
             first_disagreement=Disagreement(
                 time=float(times[apart_rows[0]]), row=trajectory.row(apart_rows[0])
             )

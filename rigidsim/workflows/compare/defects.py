@@ -22,6 +22,7 @@ from rigidsim.workflows.compare.rotations import conjugated, multiplied, normali
 
 _WINDOW = 0.5  # times the rate of the motion: length of a window, where the rows allow it
 _PARTS = 4  # of a window
+_MOST_RATES = 20_000  # rows that the rate of a motion is the mean of
 _COARSEST = 4.0  # times the rate: length of a window beyond which the integral isn't resolved
 
 
@@ -64,9 +65,10 @@ class WindowDefects:
 
 def motion_rate(times: np.ndarray, rates: np.ndarray) -> float:
     """The rate of a motion, rad/s: that of its turning, or of the change of its rates, if that is faster."""
-    size = float(np.sqrt(np.mean(np.sum(rates**2, axis=1))))
-    steps = np.diff(times)
-    change = np.diff(rates, axis=0) / steps[:, None]
+    rows = np.unique(np.linspace(0, len(times) - 2, min(len(times) - 1, _MOST_RATES)).astype(int))
+    size = float(np.sqrt(np.mean(np.sum(rates[np.append(rows, rows[-1] + 1)] ** 2, axis=1))))
+    steps = times[rows + 1] - times[rows]
+    change = (rates[rows + 1] - rates[rows]) / steps[:, None]
     bend = float(np.sqrt(np.sum(change**2, axis=1) @ steps / steps.sum()))
     return max(size, bend / size if size else 0.0)
 

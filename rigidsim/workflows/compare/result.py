@@ -77,6 +77,8 @@ class LocalDefects(SummaryPart):
         unexplained: of the windows' attitude defects, rms of what differences of the rates don't explain
             over rms of what they do.
         missing_acceleration: rms, rad/s^2, that would explain the rates' defects.
+        order: of the tool's method, and step_tolerance: rad, that errors of its steps are held to, if rows
+            are its steps; None where they don't show.
     """
 
     largest: float
@@ -87,6 +89,8 @@ class LocalDefects(SummaryPart):
     window_s: float | None
     unexplained: float | None
     missing_acceleration: float | None
+    order: float | None = None
+    step_tolerance: float | None = None
 
 
 class Disagreement(SummaryPart):
