@@ -96,13 +96,7 @@ class Model:
         h, y, found = step / parts, start, [start]
         for _ in times[1:]:
             for _ in range(parts):
-                a = f(0, y)
-                if method == "heun":
-                    y = y + h / 2 * (a + f(0, y + h * a))
-                    continue
-                b = f(0, y + h / 2 * a)
-                c = f(0, y + h / 2 * b)
-                y = y + h / 6 * (a + 2 * b + 2 * c + f(0, y + h * c))
+                y = heun(f, y, h) if method == "heun" else classical(f, y, h)
             found.append(y)
         return np.array(found)
 
@@ -124,6 +118,20 @@ principal_moments = {self.moments.tolist()}
             head += "mass = 1\ncenter_of_mass = [0, 0, 1]\n"
             head += f'[[loads]]\nkind = "uniform_gravity"\nacceleration = [0, 0, {-self.load!r}]\n'
         return head
+
+
+def heun(f: Callable[[float, np.ndarray], np.ndarray], y: np.ndarray, h: float) -> np.ndarray:
+    """A step of Heun's method, of order 2."""
+    a = f(0, y)
+    return y + h / 2 * (a + f(0, y + h * a))
+
+
+def classical(f: Callable[[float, np.ndarray], np.ndarray], y: np.ndarray, h: float) -> np.ndarray:
+    """A step of the classical Runge-Kutta method, of order 4."""
+    a = f(0, y)
+    b = f(0, y + h / 2 * a)
+    c = f(0, y + h / 2 * b)
+    return y + h / 6 * (a + 2 * b + 2 * c + f(0, y + h * c))
 
 
 def written(convention: Any, rows: np.ndarray, chance: random.Random) -> dict[str, np.ndarray]:

@@ -235,6 +235,7 @@ def compare(
     within: options.WithinOption = 1e-9,
     out: options.ComparisonOption = None,
     figure: options.ComparedFigureOption = None,
+    timeline: options.ComparedTimelineOption = None,
     as_json: options.JsonOption = False,
 ) -> None:
     """Judge another tool's trajectory: its convention, its error along time, and whether its model or its

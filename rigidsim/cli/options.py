@@ -125,6 +125,10 @@ ComparisonOption = Annotated[
     Path | None, _option("--out", "FILE", "Dataset of what was found along time, such as comparison.h5.")
 ]
 ComparedFigureOption = Annotated[Path | None, _option("--figure", "FILE", "Figure, a .png or a .svg.")]
+ComparedTimelineOption = Annotated[
+    Path | None,
+    _option("--timeline", "FILE", "Timeline (.rrd) of both bodies, with the angle between them."),
+]
 RunPaths = Annotated[
     list[Path],
     typer.Argument(

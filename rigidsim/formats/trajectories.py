@@ -57,6 +57,14 @@ class Trajectory:
         return f"{self.counted} {self.first + int(index)}"
 
 
+def is_trajectory(path: Path) -> bool:
+    """Whether a file holds a trajectory, by its name; what else lies in the folder of a run doesn't."""
+    suffix = path.suffix.lower()
+    if suffix in _XARRAY:
+        return not (path.parent / "dataset.h5").exists()
+    return suffix in {*_TEXT, ".parquet", ".pq", ".aem", ".oem", ".xml"}
+
+
 def read_trajectory(path: Path) -> Trajectory:
     """Read a file by the kind that its name and its first line say.
 

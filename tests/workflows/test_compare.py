@@ -16,6 +16,7 @@ from scipy.spatial.transform import Rotation
 
 import rigidsim
 from experiments import compare_conventions
+from rigidsim.workflows.compare.as_run import open_any
 
 MOMENTS = np.array([1.0, 2.0, 2.5])
 START = np.array([0.3, 1.0, -0.4])
@@ -65,10 +66,7 @@ def by_steps(step: float) -> Any:
     y, rows = np.concatenate([QUATERNION, START]), []
     for n in range(round(END / step) + 1):
         rows.append([n * step, *y])
-        a = slopes(0, y)
-        b = slopes(0, y + step / 2 * a)
-        c = slopes(0, y + step / 2 * b)
-        y = y + step / 6 * (a + 2 * b + 2 * c + slopes(0, y + step * c))
+        y = compare_conventions.classical(slopes, y, step)
     found = np.array(rows)
     return found[:, 0], found[:, 1:5], found[:, 5:]
 
@@ -125,6 +123,69 @@ def test_a_missing_load_is_a_wrong_model(experiment: rigidsim.Experiment) -> Non
     assert found.local_defects is not None
     missing = found.local_defects.missing_acceleration
     assert missing == pytest.approx(float(np.sqrt(np.mean(np.sum((0.001 * w / MOMENTS) ** 2, 1)))), rel=0.1)
+
+
+def test_unequal_steps_tell_the_order(experiment: rigidsim.Experiment) -> None:
+    """The classical method has order 4, Heun's 2; the attitude's error of a step goes like h^(p+1)."""
+    lengths = np.exp(np.random.default_rng(1).uniform(np.log(0.02), np.log(0.2), 120))
+    lengths *= END / lengths.sum()
+    for order, method in ((4, compare_conventions.classical), (2, compare_conventions.heun)):
+        y, rows = np.concatenate([QUATERNION, START]), [[0.0, *QUATERNION, *START]]
+        for n, step in enumerate(lengths, 1):
+            y = method(slopes, y, step)
+            rows.append([lengths[:n].sum(), *y])
+        table = np.array(rows)
+        found = rigidsim.compare(experiment, {"t": table[:, 0], "q": table[:, 1:5], "w": table[:, 5:]})
+        assert found.local_defects is not None
+        assert found.local_defects.order == pytest.approx(order, abs=0.2)
+        assert found.local_defects.step_tolerance is None
+
+
+def test_own_steps_tell_the_tolerance(experiment: rigidsim.Experiment) -> None:
+    """SciPy's steps keep errors below 1e-5 of the state, which is of order one."""
+    start = np.concatenate([QUATERNION, START])
+    steps = solve_ivp(slopes, (0, END), start, "RK23", rtol=1e-5, atol=1e-6)
+    found = rigidsim.compare(experiment, {"t": steps.t, "q": steps.y.T[:, :4], "w": steps.y.T[:, 4:]})
+    assert found.local_defects is not None
+    assert found.local_defects.order is None
+    assert found.local_defects.step_tolerance is not None
+    assert 3e-8 < found.local_defects.step_tolerance < 3e-5
+
+
+def test_a_file_is_read_as_a_run(tmp_path: Path) -> None:
+    """Its convention is the one in which the attitude turns at its rates, at any order or direction."""
+    times, q, w = theirs(1e-10)
+    body = Rotation.from_quat(q[:, [1, 2, 3, 0]])
+    written = {
+        "inverse": ("q0,q1,q2,q3", body.inv().as_quat()[:, [3, 0, 1, 2]], w),
+        "degrees": ("q1,q2,q3,q4", body.as_quat(), w * 180 / np.pi),
+        "euler": ("phi,theta,psi", body.as_euler("ZXZ", degrees=True), body.apply(w)),
+    }
+    for name, (columns, attitude, rates) in written.items():
+        path = tmp_path / f"{name}.csv"
+        table = np.column_stack([times, attitude, rates, times**2])
+        np.savetxt(path, table, "%.17g", ",", header=f"t,{columns},wx,wy,wz,more", comments="")
+        read = open_any(path).dataset
+        same = np.abs(np.einsum("ij,ij->i", read["quaternion"].values, q))
+        assert same == pytest.approx(np.linalg.norm(q, axis=1), abs=1e-12)
+        assert read["angular_velocity"].values == pytest.approx(w, abs=1e-12)
+        assert read["more"].values == pytest.approx(times**2)
+    found = rigidsim.analyse(tmp_path / "inverse.csv", "angular_velocity.z", lines=1)
+    assert len(found.signals) == 1
+    table = np.column_stack([times, body.as_euler("ZXZ")])
+    np.savetxt(path, table, delimiter=",", header="t,phi,theta,psi", comments="")
+    with pytest.raises(rigidsim.RigidsimError, match="without angular velocities its convention"):
+        _ = open_any(path).dataset
+
+
+def test_a_timeline_of_both(experiment: rigidsim.Experiment, tmp_path: Path) -> None:
+    times, q, w = theirs(1e-6, rows=31)
+    path = tmp_path / "both.rrd"
+    found = rigidsim.compare(experiment, {"t": times, "q": q, "w": w}, timeline=path)
+    assert found.timeline_file == str(path)
+    assert path.stat().st_size > 10_000
+    with pytest.raises(rigidsim.RigidsimError, match=r"ends in \.rrd"):
+        rigidsim.compare(experiment, {"t": times, "q": q, "w": w}, timeline=tmp_path / "both.png")
 
 
 def test_another_start_is_neither(experiment: rigidsim.Experiment) -> None:

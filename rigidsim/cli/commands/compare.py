@@ -10,8 +10,9 @@ from rigidsim.workflows.read import load
 
 def compare(
     config: Path, file: Path, overrides: list[str] | None, within: float, out: Path | None,
-    figure: Path | None, as_json: bool,
+    figure: Path | None, timeline: Path | None, as_json: bool,
 ) -> None:  # fmt: skip
     """Judge another tool's trajectory."""
-    found = compared(load(config, overrides=overrides or []), file, within=within, out=out, figure=figure)
+    given = load(config, overrides=overrides or [])
+    found = compared(given, file, within=within, out=out, figure=figure, timeline=timeline)
     answer(as_json, found.as_dict(), print_comparison, found)

@@ -74,7 +74,11 @@ def print_comparison(found: Comparison) -> None:
         on.line("first", f"beyond {_angle(found.within)} at {first.time:.6g} s, {first.row}")
     for text in found.told:
         on.line("note", text)
-    for label, name in (("dataset", found.dataset_file), ("figure", found.figure_file)):
+    for label, name in (
+        ("dataset", found.dataset_file),
+        ("figure", found.figure_file),
+        ("timeline", found.timeline_file),
+    ):
         if name:
             on.line(label, name)
 

@@ -40,6 +40,7 @@ class Attitudes:
     """The columns of a trajectory by what they are; each array has a row for each time.
 
     Attributes:
+        trajectory: with the columns that are none of the others here.
         times: as in the file, in ``time_unit``, which is None where the file doesn't say.
         quaternions: (rows, 4) in the order of their columns, or as w x y z where ``named`` says so.
         matrices: (rows, 3, 3). angles: (rows, 3), in ``angle_unit``.
@@ -124,8 +125,9 @@ def attitudes_of(found: Trajectory, epoch: Epoch | None) -> Attitudes:
         _resolution(attitude, found.narrow),
         0.0 if made.rates is None else _resolution(made.rates, found.narrow),
     )
-    kept_rows = replace(found, columns={})  # what is used of them is held already
-    return replace(made, trajectory=kept_rows, resolution=resolution)
+    taken = {name for names in used.values() for name in names}  # which is held already
+    others = {name: values for name, values in found.columns.items() if name not in taken}
+    return replace(made, trajectory=replace(found, columns=others), resolution=resolution)
 
 
 def _plain(name: str) -> str:

@@ -9,12 +9,11 @@ from typing import Any
 import numpy as np
 import xarray
 
-from rigidsim.errors import RigidsimError, RunFolderError
-from rigidsim.formats.trajectories import Trajectory, read_trajectory, trajectory_of
+from rigidsim.errors import RigidsimError
 from rigidsim.scene.config import Experiment
 from rigidsim.solve.from_states import FromStates, NotFromStates, blocks_of
-from rigidsim.store.run import Run, open_run
 from rigidsim.workflows.compare import defects
+from rigidsim.workflows.compare.as_run import dataset_of_rows, trajectory_given
 from rigidsim.workflows.compare.by_equations import ByEquations
 from rigidsim.workflows.compare.columns import Attitudes, attitudes_of, seconds_in
 from rigidsim.workflows.compare.conventions import (
@@ -24,7 +23,7 @@ from rigidsim.workflows.compare.conventions import (
     find_rates,
     rows_compared,
 )
-from rigidsim.workflows.compare.motion import OwnMotion, own_motion, plain
+from rigidsim.workflows.compare.motion import OwnMotion, own_motion, plain, sampled_run
 from rigidsim.workflows.compare.own_steps import own_steps
 from rigidsim.workflows.compare.result import (
     INTEGRATION_ERROR,
@@ -34,7 +33,7 @@ from rigidsim.workflows.compare.result import (
     FoundConvention,
 )
 from rigidsim.workflows.compare.rotations import angles_between, normalised
-from rigidsim.workflows.compare.saving import save_dataset, save_figure
+from rigidsim.workflows.compare.saving import DRAWN, MOST_SHOWN, save_dataset, save_figure, save_timeline
 from rigidsim.workflows.compare.verdict import Evidence, judged
 from rigidsim.workflows.physics.models import rotation_vectors
 from rigidsim.workflows.read import Given, as_experiment
@@ -53,6 +52,7 @@ def compare(
     within: float = WITHIN,
     out: str | Path | None = None,
     figure: str | Path | None = None,
+    timeline: str | Path | None = None,
 ) -> Comparison:
     """Judge a trajectory by how far it is from an experiment, at its own times.
 
@@ -62,6 +62,7 @@ def compare(
             a pandas DataFrame, or an xarray Dataset. Columns are known by their names (docs/compare.md).
         within: rad, what attitudes may differ by and agree.
         out: file for the dataset. figure: file for the figure, a .png or .svg.
+        timeline: file for a timeline (.rrd) of both bodies with the angle between them.
 
     Raises:
         ConfigError: the config can't be run.
@@ -69,7 +70,7 @@ def compare(
     """
     asked = as_experiment(experiment)
     quiet, scene = plain(asked)
-    given = attitudes_of(_trajectory(table), scene.epoch)
+    given = attitudes_of(trajectory_given(table), scene.epoch)
     if not 0 < within < np.pi:
         raise RigidsimError(f"within: given {within:g}; an angle above 0 and below pi, in rad, is allowed")
     try:
@@ -83,6 +84,8 @@ def compare(
         result = _with(result, dataset_file=str(save_dataset(result.dataset, Path(out))))
     if figure is not None:
         result = _with(result, figure_file=str(save_figure(result.dataset, Path(figure))))
+    if timeline is not None:
+        result = _with(result, timeline_file=str(judging.drawn(Path(timeline))))
     return result
 
 
@@ -90,21 +93,6 @@ def _with(result: Comparison, **values: str) -> Comparison:
     made, dataset = result.having(**values), result.dataset
     made._dataset = dataset
     return made
-
-
-def _trajectory(table: Any) -> Trajectory:
-    if isinstance(table, Run):
-        with table.dataset as dataset:
-            return trajectory_of(dataset, table.place)
-    if not isinstance(table, str | Path):
-        return trajectory_of(table)
-    path = Path(table)
-    if path.is_dir() and path.suffix != ".zarr":
-        try:
-            return _trajectory(open_run(path))
-        except RunFolderError:
-            raise
-    return read_trajectory(path)
 
 
 @dataclass
@@ -139,6 +127,7 @@ class _Judging:
                 [reading.rates(self.given.rates[rows], found, theirs[rows]) for rows in blocks_of(count)]
             )
         flight = self._flight(count)
+        self.read = times, found, reading
         dataset = _dataset(times, errors, name, self.given.trajectory.source)
         rate_errors = None if rates is None else np.linalg.norm(rates - own.rates, axis=1)
         known = self._by_equations(times, theirs, rates, own, flight, dataset)
@@ -207,6 +196,16 @@ class _Judging:
         )
         made._dataset = dataset
         return made
+
+    def drawn(self, path: Path) -> Path:
+        """Write the timeline of both, after ``compared``."""
+        times, found, reading = self.read
+        rows = np.unique(np.linspace(0, len(times) - 1, min(len(times), MOST_SHOWN)).astype(int))
+        own = sampled_run(self.experiment, times[rows]).dataset
+        name = Path(self.given.trajectory.source).stem
+        looks = {key: own.attrs[key] for key in DRAWN if key in own.attrs} | {"title": name}
+        theirs = dataset_of_rows(self.given, times, found, reading, looks).isel(time=rows)
+        return save_timeline(own, theirs, name, path)
 
     def _convention(self) -> tuple[str, FoundReading, tuple[np.ndarray, OwnMotion]]:
         """Unit of the times and convention of the attitude, with the motion at the rows compared."""

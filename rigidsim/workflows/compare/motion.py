@@ -12,6 +12,7 @@ from rigidsim.errors import ConfigError, Problem, RigidsimError
 from rigidsim.scene.config import Experiment
 from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.scene import Scene, build_scene
+from rigidsim.store.run import Run
 from rigidsim.workflows.run import run
 
 _FLIGHT = ("position", "velocity")
@@ -60,19 +61,23 @@ def plain(experiment: Experiment) -> tuple[Experiment, Scene]:
     return quiet, build_scene(quiet)
 
 
+def sampled_run(experiment: Experiment, times: np.ndarray) -> Run:
+    """Run the experiment in memory, sampled at exactly these doubles (s, ascending)."""
+    listed = [ExactNumber(Fraction(time)) for time in times.tolist()]
+    table = experiment.config.time.model_copy(
+        update={"times": listed, "end": None, "samples": None, "every": None}
+    )
+    sampled = replace(experiment, config=experiment.config.model_copy(update={"time": table}))
+    return run(sampled, out=None, progress=False)
+
+
 def own_motion(experiment: Experiment, times: np.ndarray) -> OwnMotion:
     """Run the experiment, sampled at exactly these doubles (s, ascending).
 
     Raises:
         RigidsimError: the motion ends before the third of them.
     """
-    listed = [ExactNumber(Fraction(time)) for time in times.tolist()]
-    sampled = {"times": listed, "end": None, "samples": None, "every": None}
-    config = experiment.config
-    table = config.time.model_copy(update=sampled)
-    made = run(
-        replace(experiment, config=config.model_copy(update={"time": table})), out=None, progress=False
-    )
+    made = sampled_run(experiment, times)
     found = made.dataset
     if found.sizes["time"] < min(3, len(times)):
         raise RigidsimError(f"the experiment's motion {made.outcome.message}, before the trajectory begins")

@@ -111,7 +111,7 @@ class Comparison(SummaryPart):
         rate_error: largest difference of angular velocities, rad/s; None without rates.
         position_error: the same of positions, m.
         told: what a user should know besides.
-        dataset_file, figure_file: where they were written; empty if nowhere.
+        dataset_file, figure_file, timeline_file: where they were written; empty if nowhere.
     """
 
     name: str
@@ -132,6 +132,7 @@ class Comparison(SummaryPart):
     told: list[str]
     dataset_file: str = ""
     figure_file: str = ""
+    timeline_file: str = ""
 
     _dataset: Any = PrivateAttr(default=None)
 
