@@ -295,6 +295,7 @@ def tradeoff(
     budget: options.BudgetOption = 90.0,
     repeats: options.RepeatsOption = 3,
     full: options.FullOption = False,
+    files: options.WithFilesOption = None,
     force: Annotated[bool, typer.Option("--force", help="Replace an earlier measurement.")] = False,
     as_json: options.JsonOption = False,
 ) -> None:
@@ -318,6 +319,7 @@ def export(
     axes: options.AxesOption = None,
     object_name: options.ObjectNameOption = None,
     object_id: options.ObjectIdOption = None,
+    variable: options.ExportedOption = None,
 ) -> None:
     """Write a run for other tools: tables with every digit, CCSDS messages, or kernels of SPICE.
 

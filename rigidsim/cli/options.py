@@ -115,6 +115,13 @@ RepeatsOption = Annotated[int, _option("--repeats", "N", "Fresh processes in whi
 FullOption = Annotated[
     bool, typer.Option("--full", help="Every tolerance in every formulation; needs a larger budget.")
 ]
+WithFilesOption = Annotated[
+    list[str] | None,
+    _option("--with", "FILE,SECONDS", "Another tool's trajectory, and the CPU time it took; repeatable."),
+]
+ExportedOption = Annotated[
+    list[str] | None, _option("--variable", "NAME", "Only this variable, along time; repeatable.")
+]
 TrajectoryPath = Annotated[
     Path, typer.Argument(metavar="FILE", help="CSV, Parquet, netCDF or AEM, or the folder of a run.")
 ]

@@ -36,12 +36,15 @@ def analyse(run_path: Path, variable: list[str] | None, lines: int, out: Path | 
 def export(
     run_path: Path, file_format: str, out: Path | None, force: bool, angle_unit: str | None,
     epoch: str | None, axes: str | None, object_name: str | None, object_id: str | None,
+    variable: list[str] | None,
 ) -> None:  # fmt: skip
     """Write a run or a sweep for other tools."""
     given = {"epoch": epoch, "axes": axes, "object_name": object_name, "object_id": object_id}
     naming = Naming(**{key: value for key, value in given.items() if value is not None})
     saved = open_sweep(run_path) if is_sweep(run_path) else open_run(run_path)
-    written = exporting.export(saved, file_format, out, force=force, naming=naming, angle_unit=angle_unit)
+    written = exporting.export(
+        saved, file_format, out, force=force, naming=naming, angle_unit=angle_unit, variables=variable or ()
+    )
     for path in written:
         print(path)
 

@@ -20,21 +20,9 @@ from rigidsim.formats.trajectories import Trajectory, is_trajectory, read_trajec
 from rigidsim.store.run import Run, SavedRun, open_run
 from rigidsim.store.summary import Brief
 from rigidsim.workflows.compare.columns import Attitudes, attitudes_of, seconds_in
-from rigidsim.workflows.compare.conventions import (
-    BODY_TO_SPACE,
-    NONE,
-    FoundReading,
-    RateReading,
-    Reading,
-    possible_rates,
-    readings,
-    rows_compared,
-)  # fmt: skip
-from rigidsim.workflows.compare.rotations import conjugated, multiplied, vector_of
+from rigidsim.workflows.compare.conventions import NONE, FoundReading, RateReading, Reading
+from rigidsim.workflows.compare.kinematics import turning_readings
 
-_LEAST, _ALIKE = 1e-9, 0.35  # as of conventions, for mean logarithms of rates
-_POOR = np.log(0.3)  # mean logarithm of the rates' mismatch, relative, above which no reading is right
-_FASTEST = 2.0  # rad from row to row, above which turns are no rates
 _AXES = {"body_axis": list("xyz"), "space_axis": list("XYZ"), "quaternion_component": list("wxyz")}
 
 
@@ -161,32 +149,16 @@ def _read(given: Attitudes, times: np.ndarray) -> tuple[Reading, RateReading | N
             )
         told.append("the attitude was taken from body axes to space axes")
         return Reading(order="wxyz" if given.named else ""), None, told
-    rows = rows_compared(len(times) - 1)
-    steps = times[rows + 1] - times[rows]
-    tried = []
-    for cost, reading in enumerate(readings(given)):
-        found = FoundReading(reading, NONE, 0.0, [])
-        before, after = reading.quaternions(given, rows), reading.quaternions(given, rows + 1)
-        turns = vector_of(multiplied(conjugated(before), after))
-        if reading.direction == BODY_TO_SPACE and np.median(np.linalg.norm(turns, axis=1)) > _FASTEST:
-            told.append("rows are far apart: the convention was chosen by turns that may be others")
-        for rates in possible_rates(given):
-            mean = (
-                rates.rates(given.rates[rows], found, before)
-                + rates.rates(given.rates[rows + 1], found, after)
-            ) / 2
-            apart = (
-                np.linalg.norm(turns / steps[:, None] - mean, axis=1) / np.linalg.norm(mean, axis=1).mean()
-            )
-            tried.append((float(np.mean(np.log(apart + _LEAST))), cost, reading, rates))
-    best = min(score for score, *_ in tried)
-    near = sorted((x for x in tried if x[0] <= best + _ALIKE), key=lambda x: x[1])
-    _, _, reading, rates = near[0]
+    near = turning_readings(given, times, signs=False)
+    if not near:
+        raise RigidsimError(
+            f"{source}: in no convention tried does its attitude turn at its rates, or its rows are too far "
+            "apart; rigidsim compare CONFIG FILE --timeline finds the convention beside an experiment"
+        )
+    reading, rates = near[0].reading, near[0].rates
     told.append(f"taken as {reading}, rates along {rates.axes} axes in {rates.unit}: it turns at these")
     if len(near) > 1:
         told.append(
-            f"{len(near) - 1} other conventions would fit as well, so that rigidsim compare may tell more"
+            f"{len(near) - 1} other conventions would fit as well; beside an experiment compare tells more"
         )
-    if best > _POOR:
-        told.append("in no convention tried does it turn at its rates: what is seen may be wrong")
     return reading, rates, told

@@ -23,6 +23,7 @@ from rigidsim.workflows.compare.conventions import (
     find_rates,
     rows_compared,
 )
+from rigidsim.workflows.compare.kinematics import Turning, turning_readings
 from rigidsim.workflows.compare.motion import OwnMotion, own_motion, plain, sampled_run
 from rigidsim.workflows.compare.own_steps import own_steps
 from rigidsim.workflows.compare.result import (
@@ -42,6 +43,7 @@ WITHIN = 1e-9
 """Largest angle (rad) between attitudes that agree, if nothing else is asked for."""
 _MOST_OWN = 20_000  # rows, up to which the experiment's own method gives the motion at all of them
 _UNITS = ("s", "ms", "min", "h", "day", "yr")
+_FAR = np.log(0.02)  # the same, above which only conventions are tried in which it turns at its rates
 _BAD = np.log(0.15)  # mean logarithm of mismatches (rad), above which times in another unit are tried
 
 
@@ -109,6 +111,7 @@ class _Judging:
     def compared(self, name: str, within: float) -> Comparison:
         """Everything, in order: unit of time, convention, errors, drifts, defects, verdict."""
         self.told = list(self.given.told)
+        self.turning: list[Turning] = []
         unit, found, sampled = self._convention()
         times = self.given.times * seconds_in(unit)
         own = self._own(times, sampled)
@@ -122,7 +125,10 @@ class _Judging:
         reading: RateReading | None = None
         more: list[str] = []
         if self.given.rates is not None:
-            reading, more = find_rates(self.given, found, compared, theirs[compared], own.rates[compared])
+            allowed = {one.rates for one in self.turning if one.reading == found.reading}
+            reading, more = find_rates(
+                self.given, found, compared, theirs[compared], own.rates[compared], allowed
+            )
             rates = np.concatenate(
                 [reading.rates(self.given.rates[rows], found, theirs[rows]) for rows in blocks_of(count)]
             )
@@ -239,10 +245,15 @@ class _Judging:
             self.told.append(
                 f"times were taken for {best[0]}, by which the attitudes fit best; name a unit: t [{best[0]}]"
             )
+        if best[1].score > _FAR:  # another model may be nearer in another convention: its rates tell
+            unit, found, (kept, own) = best
+            times = self.given.times * seconds_in(unit)
+            self.turning = turning_readings(self.given, times, signs=True)
+            allowed = {one.reading for one in self.turning}
+            best = unit, find_convention(self.given, kept, own.quaternions[0], allowed), (kept, own)
         if best[1].score > _BAD:
-            self.told.append(
-                "no convention tried brings it near the experiment: the convention found may be wrong"
-            )
+            why = "this is one in which it turns at its rates" if self.turning else "that found may be wrong"
+            self.told.append(f"no convention tried brings it near the experiment: {why}")
         return best
 
     def _own(self, times: np.ndarray, sampled: tuple[np.ndarray, OwnMotion]) -> OwnMotion:

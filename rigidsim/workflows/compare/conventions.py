@@ -8,7 +8,7 @@ named, since this motion can't tell them apart.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -145,10 +145,14 @@ def rows_compared(count: int) -> np.ndarray:
     return np.unique(np.concatenate([even, early]).astype(int))
 
 
-def find_convention(given: Attitudes, rows: np.ndarray, motion: np.ndarray) -> FoundReading:
-    """The reading nearest to the experiment's attitudes (rows, 4) at these rows."""
+def find_convention(
+    given: Attitudes, rows: np.ndarray, motion: np.ndarray, allowed: Collection[Reading] = ()
+) -> FoundReading:
+    """The reading nearest to the experiment's attitudes (rows, 4) at these rows; of those allowed, if any."""
     tried = []
     for cost, reading in enumerate(readings(given)):
+        if allowed and reading not in allowed:
+            continue
         read = reading.quaternions(given, rows)
         tried.append((_score(read, motion), cost, reading, NONE, read))
     best = min(tried, key=lambda x: x[0])[0]
@@ -237,12 +241,18 @@ def possible_rates(given: Attitudes) -> list[RateReading]:
 
 
 def find_rates(
-    given: Attitudes, found: FoundReading, rows: np.ndarray, quaternions: np.ndarray, motion: np.ndarray
+    given: Attitudes,
+    found: FoundReading,
+    rows: np.ndarray,
+    quaternions: np.ndarray,
+    motion: np.ndarray,
+    allowed: Collection[RateReading] = (),
 ) -> tuple[RateReading, list[str]]:
     """The reading of rates nearest to the experiment's (rows, 3), and others that are equally near.
 
     Args:
         quaternions: attitudes of these rows as the trajectory has them, in the experiment's convention.
+        allowed: readings that may be taken; any if there are none.
     """
     assert given.rates is not None
     size = float(np.sqrt(np.mean(np.sum(motion**2, axis=1)))) or 1.0
@@ -250,6 +260,8 @@ def find_rates(
     for reading in (
         RateReading(x.unit, x.axes, sign) for x in possible_rates(given) for sign in (False, True)
     ):
+        if allowed and reading not in allowed:
+            continue
         read = reading.rates(given.rates[rows], found, quaternions)
         apart = np.linalg.norm(read - motion, axis=1) / size
         tried.append((float(np.mean(np.log(apart + _LEAST))), reading))
