@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
 from itertools import pairwise
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
-from pydantic import Field, StrictInt
+from pydantic import Discriminator, Field, StrictInt, StrictStr, Tag
 
 from rigidsim.errors import ConfigError, Problem, either
 from rigidsim.scene.exact import ZERO, rounded
-from rigidsim.scene.fields import ConfigTable, Instant, Second, TimeUnitName
+from rigidsim.scene.fields import NAME_OR_VECTOR, ConfigTable, Instant, Second, TimeUnitName
+from rigidsim.scene.listed_times import times_in
 from rigidsim.scene.validation_messages import shown
 
 _MOST_SAMPLES = 10**12
@@ -35,8 +36,14 @@ class Time(ConfigTable):
     """number of samples, equally spaced from start to end, both included"""
     every: Second | None = Field(None, examples=[0.1, "1 day"])
     """interval between samples, instead of samples"""
-    times: list[Second] | None = Field(None, examples=[[0, 1, 10, 100]])
-    """sample times, ascending, instead of end"""
+    times: (
+        Annotated[
+            Annotated[StrictStr, Tag(NAME_OR_VECTOR[0])] | Annotated[list[Second], Tag(NAME_OR_VECTOR[1])],
+            Discriminator(lambda given: NAME_OR_VECTOR[0 if isinstance(given, str) else 1]),
+        ]
+        | None
+    ) = Field(None, examples=[[0, 1, 10, 100], "theirs.csv"])
+    """sample times, ascending, instead of end; or a CSV file beside the config with a column t or time"""
     epoch: Instant | None = Field(None, examples=["J2000", "2029-04-13T21:46:00 TDB"])
     """date of time 0; scales TDB, TT and UTC"""
     unit: TimeUnitName | None = Field(None, examples=["day"])
@@ -111,8 +118,25 @@ def _double(time: Fraction) -> float:
         return math.copysign(math.inf, time)
 
 
-def sample_times(table: Time, context: Any) -> tuple[Any, Any, SampleTimes]:
-    """Start and end of the motion (s, mpf) and the sample times from a config's ``[time]``."""
+def _listed(given: str | list[Any], context: Any, texts: Mapping[str, str]) -> list[Fraction]:
+    """Times of an array, or of the table of that name."""
+    if not isinstance(given, str):
+        return [time.fraction(context) for time in given]
+    if given not in texts:
+        what = "but this config was given as text, without files beside it; put the table's text into "
+        raise _fail("times", f'given "{given}", {what}[tables."{given}"] text')
+    try:
+        return times_in(texts[given], context)
+    except ValueError as error:
+        raise _fail("times", f'given "{given}", which {error}') from None
+
+
+def sample_times(table: Time, context: Any, texts: Mapping[str, str]) -> tuple[Any, Any, SampleTimes]:
+    """Start and end of the motion (s, mpf) and the sample times from a config's ``[time]``.
+
+    Args:
+        texts: of tables, by name.
+    """
     ways = [key for key in ("samples", "every", "times") if getattr(table, key) is not None]
     if len(ways) > 1:
         less = either(f"--set time.{ways[0]}= removes it", "Experiment.replace removes keys, too")
@@ -124,7 +148,7 @@ def sample_times(table: Time, context: Any) -> tuple[Any, Any, SampleTimes]:
 
     start = table.start.fraction(context)
     if table.times is not None:
-        times = [t.fraction(context) for t in table.times]
+        times = _listed(table.times, context, texts)
         if not times:
             raise _fail("times", "given an empty array; at least one time is needed")
         doubles = _doubles(times)
