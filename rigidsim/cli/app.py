@@ -236,6 +236,7 @@ def compare(
     out: options.ComparisonOption = None,
     figure: options.ComparedFigureOption = None,
     timeline: options.ComparedTimelineOption = None,
+    kernels: options.KernelsOption = None,
     as_json: options.JsonOption = False,
 ) -> None:
     """Judge another tool's trajectory: its convention, its error along time, and whether its model or its

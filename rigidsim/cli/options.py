@@ -123,7 +123,7 @@ ExportedOption = Annotated[
     list[str] | None, _option("--variable", "NAME", "Only this variable, along time; repeatable.")
 ]
 TrajectoryPath = Annotated[
-    Path, typer.Argument(metavar="FILE", help="CSV, Parquet, netCDF or AEM, or the folder of a run.")
+    Path, typer.Argument(metavar="FILE", help="CSV, Parquet, netCDF, AEM or CK, or the folder of a run.")
 ]
 WithinOption = Annotated[
     float, _option("--within", "RAD", "Largest angle between attitudes that agree, in rad.")
@@ -132,6 +132,10 @@ ComparisonOption = Annotated[
     Path | None, _option("--out", "FILE", "Dataset of what was found along time, such as comparison.h5.")
 ]
 ComparedFigureOption = Annotated[Path | None, _option("--figure", "FILE", "Figure, a .png or a .svg.")]
+KernelsOption = Annotated[
+    list[Path] | None,
+    _option("--kernels", "FILE", "Clock (SCLK) and leap seconds that a CK is read with; repeatable."),
+]
 ComparedTimelineOption = Annotated[
     Path | None,
     _option("--timeline", "FILE", "Timeline (.rrd) of both bodies, with the angle between them."),

@@ -16,7 +16,9 @@ from scipy.spatial.transform import Rotation
 
 import rigidsim
 from experiments import compare_conventions
+from rigidsim.accuracy.bench.plan import DEFAULT
 from rigidsim.workflows.compare.as_run import open_any
+from rigidsim.workflows.tradeoff import with_others
 
 MOMENTS = np.array([1.0, 2.0, 2.5])
 START = np.array([0.3, 1.0, -0.4])
@@ -324,13 +326,72 @@ def test_a_message(experiment: rigidsim.Experiment, tmp_path: Path) -> None:
         ['time.epoch="2024-04-13T21:46:00 UTC"', 'frame.axes="ICRF"', "time.samples=31"]
     )
     rigidsim.run(dated, out=tmp_path)
-    from rigidsim.workflows.export import export
-
-    [path] = export(rigidsim.open_run(tmp_path / "free"), "aem", tmp_path / "free.aem")
+    [path] = rigidsim.export(tmp_path / "free", "aem", tmp_path / "free.aem")
     found = rigidsim.compare(dated, path)
     assert found.verdict == "agrees"
     assert found.convention.order == "wxyz"
     assert found.rows == 31
+    # the same in XML
+    rows = [line.split() for line in path.read_text().splitlines() if line.startswith("2024") and " " in line]
+    names = ("EPOCH", "Q1", "Q2", "Q3", "QC")
+    states = "".join(
+        "<attitudeState><quaternionEphemeris>"
+        + "".join(f"<{name}>{value}</{name}>" for name, value in zip(names, row, strict=True))
+        + "</quaternionEphemeris></attitudeState>"
+        for row in rows
+    )
+    about = "<TIME_SYSTEM>UTC</TIME_SYSTEM><ATTITUDE_TYPE>quaternion</ATTITUDE_TYPE>"
+    xml = tmp_path / "free.xml"
+    xml.write_text(
+        '<?xml version="1.0"?><aem id="CCSDS_AEM_VERS" version="1.0"><body><segment>'
+        f"<metadata>{about}</metadata><data>{states}</data></segment></body></aem>"
+    )
+    again = rigidsim.compare(dated, xml)
+    assert again.attitude_error == found.attitude_error.having(row=again.attitude_error.row)
+    assert again.attitude_error.row.startswith("row ")
+
+
+def test_a_kernel(experiment: rigidsim.Experiment, tmp_path: Path) -> None:
+    """A CK that rigidsim exports is read at times between its rows, and comes back to rounding errors."""
+    pytest.importorskip("spiceypy")
+    dated = experiment.having(['time.epoch="J2000"', 'frame.axes="ICRF"', "time.samples=31"])
+    rigidsim.run(dated, out=tmp_path)
+    path, clock = rigidsim.export(tmp_path / "free", "ck", tmp_path / "free.bc")
+    found = rigidsim.compare(dated, path, kernels=[clock])
+    assert found.attitude_error.largest < 1e-12
+    assert found.rate_error is not None
+    assert found.rate_error < 1e-12
+    assert found.convention.rate_axes == "space"
+    with pytest.raises(rigidsim.RigidsimError, match="as --kernels FILE"):
+        rigidsim.compare(dated, path)
+    with pytest.raises(rigidsim.RigidsimError, match="date of time 0"):
+        rigidsim.compare(experiment, path, kernels=[clock])
+
+
+def test_points_of_the_tradeoff(experiment: rigidsim.Experiment, tmp_path: Path) -> None:
+    """A tool that took 40 times the default's CPU time for each simulated second stands there."""
+    times, q, w = theirs(1e-6, rows=61)
+    path = write(tmp_path / "theirs.csv", times, q, w)
+    found = rigidsim.compare(experiment, path)
+    measured = xarray.Dataset(
+        {"cpu_seconds": ("setting", [3.0]), "measured_time": ("setting", [2 * END])},
+        {"setting": [DEFAULT.title], "time": [0.0, END / 2]},
+    )
+    put = with_others(measured, [(found, 60.0)])
+    assert put["other_cpu_ratio"].item() == pytest.approx(60 / END / (3 / (2 * END)))
+    errors = found.dataset["attitude_error"]
+    assert put["other_error"].item() == errors[errors["time"] <= END / 2].max()
+    with pytest.raises(rigidsim.RigidsimError, match="positive CPU time"):
+        rigidsim.tradeoff(experiment, others=[(path, -1.0)])
+
+
+def test_variables_are_exported(experiment: rigidsim.Experiment, tmp_path: Path) -> None:
+    rigidsim.run(experiment, out=tmp_path)
+    [path] = rigidsim.export(tmp_path / "free", "csv", tmp_path / "some.csv", variables=["energy"])
+    assert list(pandas.read_csv(path, comment="#").columns) == ["time", "energy"]
+    for names, kind, told in ((["no"], "csv", "given no; allowed: "), (["energy"], "aem", "prescribes")):
+        with pytest.raises(rigidsim.RigidsimError, match=told):
+            rigidsim.export(tmp_path / "free", kind, tmp_path / "none", variables=names)
 
 
 def at(row: int, value: float, values: np.ndarray) -> np.ndarray:

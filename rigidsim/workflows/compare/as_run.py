@@ -6,7 +6,7 @@ names or matrices say by themselves is taken; the rest is refused, and ``compare
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -16,7 +16,9 @@ import numpy as np
 import xarray
 
 from rigidsim.errors import RigidsimError
+from rigidsim.formats import ck_reading
 from rigidsim.formats.trajectories import Trajectory, is_trajectory, read_trajectory, trajectory_of
+from rigidsim.scene.scene import Scene
 from rigidsim.store.run import Run, SavedRun, open_run
 from rigidsim.store.summary import Brief
 from rigidsim.workflows.compare.columns import Attitudes, attitudes_of, seconds_in
@@ -57,19 +59,26 @@ class TrajectoryRun(Run):
         return self.path.with_name(f"{self.path.stem}_{name}")
 
 
-def trajectory_given(table: Any) -> Trajectory:
-    """The columns of a file, of a run or its folder, or of arrays, a DataFrame or a Dataset."""
+def trajectory_given(table: Any, scene: Scene, kernels: Sequence[str | Path]) -> Trajectory:
+    """The columns of a file, of a run or its folder, or of arrays, a DataFrame or a Dataset.
+
+    Args:
+        kernels: that a CK is read with, at times of the scene.
+    """
     if isinstance(table, Run):
         with table.dataset as dataset:
             return trajectory_of(dataset, table.place)
     if not isinstance(table, str | Path):
         return trajectory_of(table)
     path = Path(table)
-    return (
-        trajectory_given(open_run(path))
-        if path.is_dir() and path.suffix != ".zarr"
-        else read_trajectory(path)
-    )
+    if path.suffix.lower() == ck_reading.SUFFIX or kernels:
+        if scene.epoch is None:
+            raise RigidsimError(f"{path}: a CK holds dates; give the date of time 0 as [time] epoch")
+        span = float(scene.start), float(scene.samples.last)
+        return ck_reading.read_ck(path, [Path(one) for one in kernels], scene.epoch.since_j2000(), *span)
+    if path.is_dir() and path.suffix != ".zarr":
+        return trajectory_given(open_run(path), scene, kernels)
+    return read_trajectory(path)
 
 
 def open_any(path: str | Path) -> SavedRun | TrajectoryRun:

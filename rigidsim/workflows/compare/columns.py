@@ -114,8 +114,8 @@ def attitudes_of(found: Trajectory, epoch: Epoch | None) -> Attitudes:
     )  # fmt: skip
     if made.quaternions is None and made.matrices is None and made.angles is None:
         raise RigidsimError(
-            f"{found.source}: no attitude among its columns ({', '.join(found.columns)}); name it "
-            "qw qx qy qz, q0 q1 q2 q3, r11 ... r33, or euler_1 euler_2 euler_3"
+            f"{found.source}: no attitude among its columns ({', '.join(found.columns)}), which all of a "
+            "comparison is about; name it qw qx qy qz, q0 q1 q2 q3, r11 ... r33, or euler_1 euler_2 euler_3"
         )
     _refuse_rows(made, used)
     _tell_gaps(made)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -55,6 +56,7 @@ def compare(
     out: str | Path | None = None,
     figure: str | Path | None = None,
     timeline: str | Path | None = None,
+    kernels: Sequence[str | Path] = (),
 ) -> Comparison:
     """Judge a trajectory by how far it is from an experiment, at its own times.
 
@@ -65,6 +67,7 @@ def compare(
         within: rad, what attitudes may differ by and agree.
         out: file for the dataset. figure: file for the figure, a .png or .svg.
         timeline: file for a timeline (.rrd) of both bodies with the angle between them.
+        kernels: SPICE's, that a CK is read with: its clock, and leap seconds.
 
     Raises:
         ConfigError: the config can't be run.
@@ -72,7 +75,7 @@ def compare(
     """
     asked = as_experiment(experiment)
     quiet, scene = plain(asked)
-    given = attitudes_of(trajectory_given(table), scene.epoch)
+    given = attitudes_of(trajectory_given(table, scene, kernels), scene.epoch)
     if not 0 < within < np.pi:
         raise RigidsimError(f"within: given {within:g}; an angle above 0 and below pi, in rad, is allowed")
     try:
