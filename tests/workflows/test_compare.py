@@ -143,6 +143,16 @@ def test_unequal_steps_tell_the_order(experiment: rigidsim.Experiment) -> None:
         assert found.local_defects.step_tolerance is None
 
 
+def test_a_norm_that_drifts_is_no_damage(experiment: rigidsim.Experiment) -> None:
+    """SciPy as it comes lets the norm drift by 1e-3 and more, and only the attitude counts."""
+    times, q, w = theirs(1e-13, rows=61)
+    drifting = q * (1 + 0.02 * times / END)[:, None]
+    found = rigidsim.compare(experiment, {"t": times, "q": drifting, "w": w})
+    assert found.verdict == "agrees"
+    [norm] = [drift for drift in found.drifts if drift.name == "quaternion_norm"]
+    assert norm.final == pytest.approx(0.02)
+
+
 def test_own_steps_tell_the_tolerance(experiment: rigidsim.Experiment) -> None:
     """SciPy's steps keep errors below 1e-5 of the state, which is of order one."""
     start = np.concatenate([QUATERNION, START])

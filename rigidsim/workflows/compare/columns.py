@@ -16,7 +16,9 @@ from rigidsim.scene.epochs import Epoch
 from rigidsim.scene.exact import parse_number
 
 LEAST_ROWS = 3
-_NORM = 1e-3  # that the norm of a quaternion may differ from the median, beyond which a row is damaged
+_NORM = 1e-3  # that the usual norm of a quaternion may differ from one, beyond which it is told
+_DAMAGED = 0.05  # that a norm may differ from those around it; integrators let it drift, and more slowly
+_AROUND = 2  # rows on each side
 _GAP = 1000.0  # times the median spacing, from which on a gap is told
 _FIXED = 0.6  # share of numbers with the same count of decimals that a fixed format makes
 _DOUBLE_DIGITS = 15
@@ -281,7 +283,7 @@ def _refuse_rows(made: Attitudes, used: Mapping[str, Sequence[str]]) -> None:
     if made.quaternions is not None:
         norms = np.linalg.norm(made.quaternions, axis=1)
         usual = float(np.median(norms))
-        bad = np.flatnonzero(np.abs(norms - usual) > _NORM * max(usual, 1e-300))
+        bad = np.flatnonzero(np.abs(norms - _smoothed(norms)) > _DAMAGED * max(usual, 1e-300))
         if (len(bad) and len(bad) < len(norms) / 10) or not usual:
             at = bad[0] if len(bad) else 0
             raise RigidsimError(
@@ -297,6 +299,12 @@ def _refuse_rows(made: Attitudes, used: Mapping[str, Sequence[str]]) -> None:
             raise RigidsimError(
                 f"{found.source}: {found.row(bad[0])}: the matrix is no rotation ({len(bad):,} such rows)"
             )
+
+
+def _smoothed(values: np.ndarray) -> np.ndarray:
+    """Median of each value and those around it."""
+    padded = np.pad(values, _AROUND, mode="edge")
+    return np.median([padded[n : n + len(values)] for n in range(2 * _AROUND + 1)], axis=0)
 
 
 def _tell_gaps(made: Attitudes) -> None:
