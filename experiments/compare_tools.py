@@ -67,7 +67,7 @@ def by_mujoco(integrator: str, step: float) -> Callable[[Model, np.ndarray], Row
         import mujoco
 
         lever = 1.0 if model.kind == "top" else 0.0
-        a, b, c = model.moments
+        a, b, c = model.moments.tolist()
         text = _MUJOCO.format(
             integrator=integrator, step=step, gravity=-model.load if lever else 0.0, lever=lever,
             damping=model.load if model.kind == "braked" else 0.0, a=a - lever, b=b - lever, c=c,

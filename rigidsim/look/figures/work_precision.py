@@ -144,6 +144,8 @@ def _legend(axes: Axes, dataset: xarray.Dataset, short: bool) -> None:
     handles.append(Line2D([], [], color=_FRONT, linewidth=1.1, label="best of all (numbered)"))
     # models are cheap, and not exact
     place: Any = "lower left" if "model" in dataset.sizes else "upper right"
+    if "other" in dataset.sizes:  # which may be anywhere
+        place = "best"
     axes.legend(handles=handles, loc=place, ncols=2, fontsize=8, frameon=True, framealpha=0.9)
 
 
