@@ -33,6 +33,14 @@ RunPath = Annotated[
         metavar="RUN", help="Run folder (runs/NAME) or its dataset.h5.", autocompletion=offered("runs")
     ),
 ]
+SeenPath = Annotated[
+    Path,
+    typer.Argument(
+        metavar="RUN",
+        help="Run folder (runs/NAME) or its dataset.h5; or another tool's file (CSV, Parquet, AEM ...).",
+        autocompletion=offered("runs"),
+    ),
+]
 SetOption = Annotated[
     list[str] | None,
     _option(
@@ -115,6 +123,11 @@ RepeatsOption = Annotated[int, _option("--repeats", "N", "Fresh processes in whi
 FullOption = Annotated[
     bool, typer.Option("--full", help="Every tolerance in every formulation; needs a larger budget.")
 ]
+MembersSeenOption = Annotated[
+    list[int] | None,
+    typer.Option("--member", metavar="N", min=0, help="Of a sweep: member N, from 0; repeatable."),
+]
+ExportPathOption = Annotated[Path | None, _option("--out", "PATH", "Default NAME.FORMAT in this folder.")]
 WithFilesOption = Annotated[
     list[str] | None,
     _option("--with", "FILE,SECONDS", "Another tool's trajectory, and the CPU time it took; repeatable."),
@@ -144,7 +157,7 @@ RunPaths = Annotated[
     list[Path],
     typer.Argument(
         metavar="RUN...",
-        help="Run folders (runs/NAME) or their dataset.h5; several are shown side by side.",
+        help="Run folders (runs/NAME), their dataset.h5, or other tools' files; several go side by side.",
         autocompletion=offered("runs"),
     ),
 ]
