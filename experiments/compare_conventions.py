@@ -33,6 +33,7 @@ if not __package__:  # as a script
     sys.path.insert(0, str(Path(__file__).parents[1]))
 
 import rigidsim
+from rigidsim.workflows.compare.result import Comparison
 
 SEQUENCES = ["zxz", "zyz", "xyx", "xzx", "yxy", "yzy", "zyx", "xyz", "xzy", "yxz", "yzx", "zxy"]
 QUATERNIONS = [
@@ -42,6 +43,7 @@ CONVENTIONS = [*QUATERNIONS, *SEQUENCES, "matrix", "transposed", "space turn", "
 METHODS = ["DOP853", "RK45", "RK23", "LSODA", "Radau", "rk4", "heun"]
 LEAST = 1e-9  # rad: errors below aren't held against each other
 WITHIN = 0.1
+QUANTILES = (0, 0.01, 0.05, 0.25, 0.5, 0.75, 0.95, 0.99, 1)
 KINDS = ("free", "braked", "top")
 
 
@@ -94,13 +96,7 @@ class Model:
         h, y, found = step / parts, start, [start]
         for _ in times[1:]:
             for _ in range(parts):
-                a = f(0, y)
-                if method == "heun":
-                    y = y + h / 2 * (a + f(0, y + h * a))
-                    continue
-                b = f(0, y + h / 2 * a)
-                c = f(0, y + h / 2 * b)
-                y = y + h / 6 * (a + 2 * b + 2 * c + f(0, y + h * c))
+                y = heun(f, y, h) if method == "heun" else classical(f, y, h)
             found.append(y)
         return np.array(found)
 
@@ -122,6 +118,20 @@ principal_moments = {self.moments.tolist()}
             head += "mass = 1\ncenter_of_mass = [0, 0, 1]\n"
             head += f'[[loads]]\nkind = "uniform_gravity"\nacceleration = [0, 0, {-self.load!r}]\n'
         return head
+
+
+def heun(f: Callable[[float, np.ndarray], np.ndarray], y: np.ndarray, h: float) -> np.ndarray:
+    """A step of Heun's method, of order 2."""
+    a = f(0, y)
+    return y + h / 2 * (a + f(0, y + h * a))
+
+
+def classical(f: Callable[[float, np.ndarray], np.ndarray], y: np.ndarray, h: float) -> np.ndarray:
+    """A step of the classical Runge-Kutta method, of order 4."""
+    a = f(0, y)
+    b = f(0, y + h / 2 * a)
+    c = f(0, y + h / 2 * b)
+    return y + h / 6 * (a + 2 * b + 2 * c + f(0, y + h * c))
 
 
 def written(convention: Any, rows: np.ndarray, chance: random.Random) -> dict[str, np.ndarray]:
@@ -153,8 +163,8 @@ def angles(one: np.ndarray, other: np.ndarray) -> np.ndarray:
     return 4 * np.arctan2(np.linalg.norm(p - sign * q, axis=1), np.linalg.norm(p + sign * q, axis=1))
 
 
-def a_file(chance: random.Random, convention: Any) -> tuple[str, str]:
-    """Judge the file of a loose or tight integration: the verdict, and what is wrong; empty for nothing."""
+def a_file(chance: random.Random, convention: Any) -> tuple[Comparison, str]:
+    """Judge the file of a loose or tight integration: the result, and what is wrong; empty for nothing."""
     model = Model.drawn(chance)
     method = chance.choice(METHODS)
     steps = method in ("rk4", "heun")
@@ -168,17 +178,17 @@ def a_file(chance: random.Random, convention: Any) -> tuple[str, str]:
     told = found.attitude_error.largest
     name = f"{model.kind} {method} {accuracy:.1e} {len(times)} rows {convention}"
     if max(true, told) > LEAST and abs(told - true) > WITHIN * true:
-        return found.verdict, f"{name}: {told:.3g} rad told, {true:.3g} true; {found.convention}"
+        return found, f"{name}: {told:.3g} rad told, {true:.3g} true; {found.convention}"
     assert found.rate_error is not None
     if found.rate_error > 1.1 * true_rates + 2 * size * true + LEAST:
-        return found.verdict, f"{name}: rates {found.rate_error:.3g} told, {true_rates:.3g} true"
+        return found, f"{name}: rates {found.rate_error:.3g} told, {true_rates:.3g} true"
     if found.verdict == "wrong_model":
-        return found.verdict, f"{name}: {found.why}"
-    return found.verdict, ""
+        return found, f"{name}: {found.why}"
+    return found, ""
 
 
-def a_model(chance: random.Random, convention: Any) -> tuple[str, str]:
-    """Judge the file of another model: the verdict, and what is wrong."""
+def a_model(chance: random.Random, convention: Any) -> tuple[Comparison, str]:
+    """Judge the file of another model: the result, and what is wrong."""
     model = Model.drawn(chance)
     wrong = chance.choice(["body", "moment", "load", "missing"])
     if model.kind == "free" and wrong in ("load", "missing"):
@@ -198,8 +208,8 @@ def a_model(chance: random.Random, convention: Any) -> tuple[str, str]:
     found = rigidsim.compare(rigidsim.parse(model.config), {"t": times, **written(convention, rows, chance)})
     if found.verdict in ("integration_error", "agrees"):
         name = f"{model.kind} {wrong} {accuracy:.1e} {len(times)} rows {convention}"
-        return found.verdict, f"{name}: {found.verdict}: {found.why}; {found.told}"
-    return found.verdict, ""
+        return found, f"{name}: {found.verdict}: {found.why}; {found.told}"
+    return found, ""
 
 
 def campaign(files: int, models: int, seed: int, told: Callable[[str], None] = print) -> int:
@@ -207,15 +217,22 @@ def campaign(files: int, models: int, seed: int, told: Callable[[str], None] = p
     failures = 0
     for what, judge, count in (("files", a_file, files), ("other models", a_model, models)):
         seen: Counter[str] = Counter()
+        shares: list[float] = []
         for number in range(count):
-            verdict, wrong = judge(
+            found, wrong = judge(
                 random.Random(f"{seed} {what} {number}"), CONVENTIONS[number % len(CONVENTIONS)]
             )
-            seen[verdict] += 1
+            seen[found.verdict] += 1
+            local = found.local_defects
+            if found.verdict != "agrees" and local is not None and local.unexplained is not None:
+                shares.append(local.unexplained)
             if wrong:
                 failures += 1
                 told(f"{what} {number}: {wrong}")
         told(f"{count} {what}: " + ", ".join(f"{verdict} {n}" for verdict, n in sorted(seen.items())))
+        if shares:
+            quantiles = ", ".join(f"{x:.2g}" for x in np.quantile(shares, QUANTILES))
+            told(f"  shares of {len(shares)}, by quantiles {', '.join(map(str, QUANTILES))}: {quantiles}")
     told(f"{failures} failures")
     return failures
 

@@ -15,20 +15,22 @@ if TYPE_CHECKING:
     from rigidsim.store.sweeps.run import SavedSweep, open_sweep
     from rigidsim.workflows.analyse import analyse
     from rigidsim.workflows.compare.compared import compare
+    from rigidsim.workflows.export import export
     from rigidsim.workflows.physics.required import required_physics
     from rigidsim.workflows.plan import plan
     from rigidsim.workflows.read import Experiment, load, parse
     from rigidsim.workflows.resume import resume
     from rigidsim.workflows.run import run
     from rigidsim.workflows.sweeps.sweep import sweep
+    from rigidsim.workflows.tradeoff import tradeoff
     from rigidsim.workflows.verify import verify
 
 __version__ = "0.1.0"
 
 __all__ = [
     "ConfigError", "Experiment", "MemoryRun", "RigidsimError", "Run", "RunFolderError", "SavedRun",
-    "SavedSweep", "analyse", "compare", "load", "open_run", "open_sweep", "parse", "plan", "required_physics",
-    "resume", "run", "sweep", "verify",
+    "SavedSweep", "analyse", "compare", "export", "load", "open_run", "open_sweep", "parse", "plan",
+    "required_physics", "resume", "run", "sweep", "tradeoff", "verify",
 ]  # fmt: skip
 
 _NAMES = {
@@ -37,12 +39,14 @@ _NAMES = {
     "store.sweeps.run": ("SavedSweep", "open_sweep"),
     "workflows.analyse": ("analyse",),
     "workflows.compare.compared": ("compare",),
+    "workflows.export": ("export",),
     "workflows.physics.required": ("required_physics",),
     "workflows.plan": ("plan",),
     "workflows.read": ("Experiment", "load", "parse"),
     "workflows.resume": ("resume",),
     "workflows.run": ("run",),
     "workflows.sweeps.sweep": ("sweep",),
+    "workflows.tradeoff": ("tradeoff",),
     "workflows.verify": ("verify",),
 }
 _MODULES = {name: f"rigidsim.{module}" for module, names in _NAMES.items() for name in names}

@@ -235,6 +235,8 @@ def compare(
     within: options.WithinOption = 1e-9,
     out: options.ComparisonOption = None,
     figure: options.ComparedFigureOption = None,
+    timeline: options.ComparedTimelineOption = None,
+    kernels: options.KernelsOption = None,
     as_json: options.JsonOption = False,
 ) -> None:
     """Judge another tool's trajectory: its convention, its error along time, and whether its model or its
@@ -260,10 +262,7 @@ def view(
     gif: options.FilmOption = None,
     mp4: options.VideoOption = None,
     seconds: options.FilmLengthOption = None,
-    member: Annotated[
-        list[int] | None,
-        typer.Option("--member", metavar="N", min=0, help="Of a sweep: member N, from 0; repeatable."),
-    ] = None,
+    member: options.MembersSeenOption = None,
 ) -> None:
     """Open timelines in the rerun viewer (drawn first, where a run has none), or draw them to a file.
 
@@ -278,7 +277,7 @@ _EACH_FIGURE = "\n".join(f"{name:17}{told}" for name, told in FIGURES.items())
 
 @_command("results", f"\n\n\b\nFigures:\n{_EACH_FIGURE}")
 def plot(
-    run_path: options.RunPath, what: options.WhatOption = None, out: options.FigureOption = None
+    run_path: options.SeenPath, what: options.WhatOption = None, out: options.FigureOption = None
 ) -> None:
     """Draw the page that suits the scene, or the figures named; of a sweep a variable over its axes.
 
@@ -294,6 +293,7 @@ def tradeoff(
     budget: options.BudgetOption = 90.0,
     repeats: options.RepeatsOption = 3,
     full: options.FullOption = False,
+    files: options.WithFilesOption = None,
     force: Annotated[bool, typer.Option("--force", help="Replace an earlier measurement.")] = False,
     as_json: options.JsonOption = False,
 ) -> None:
@@ -308,15 +308,14 @@ def tradeoff(
 def export(
     run_path: options.RunPath,
     file_format: options.FormatOption,
-    out: Annotated[
-        Path | None, typer.Option("--out", metavar="PATH", help="Default NAME.FORMAT in this folder.")
-    ] = None,
+    out: options.ExportPathOption = None,
     force: Annotated[bool, typer.Option("--force", help="Replace what is there.")] = False,
     angle_unit: options.AngleUnitOption = None,
     epoch: options.EpochOption = None,
     axes: options.AxesOption = None,
     object_name: options.ObjectNameOption = None,
     object_id: options.ObjectIdOption = None,
+    variable: options.ExportedOption = None,
 ) -> None:
     """Write a run for other tools: tables with every digit, CCSDS messages, or kernels of SPICE.
 
@@ -328,7 +327,7 @@ def export(
 
 @_command("results")
 def analyse(
-    run_path: options.RunPath,
+    run_path: options.SeenPath,
     variable: options.VariableOption = None,
     lines: Annotated[int, typer.Option("--lines", metavar="N", help="Of each signal at most.")] = 20,
     out: options.AnalysisOption = None,

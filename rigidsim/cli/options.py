@@ -33,6 +33,14 @@ RunPath = Annotated[
         metavar="RUN", help="Run folder (runs/NAME) or its dataset.h5.", autocompletion=offered("runs")
     ),
 ]
+SeenPath = Annotated[
+    Path,
+    typer.Argument(
+        metavar="RUN",
+        help="Run folder (runs/NAME) or its dataset.h5; or another tool's file (CSV, Parquet, AEM ...).",
+        autocompletion=offered("runs"),
+    ),
+]
 SetOption = Annotated[
     list[str] | None,
     _option(
@@ -115,8 +123,20 @@ RepeatsOption = Annotated[int, _option("--repeats", "N", "Fresh processes in whi
 FullOption = Annotated[
     bool, typer.Option("--full", help="Every tolerance in every formulation; needs a larger budget.")
 ]
+MembersSeenOption = Annotated[
+    list[int] | None,
+    typer.Option("--member", metavar="N", min=0, help="Of a sweep: member N, from 0; repeatable."),
+]
+ExportPathOption = Annotated[Path | None, _option("--out", "PATH", "Default NAME.FORMAT in this folder.")]
+WithFilesOption = Annotated[
+    list[str] | None,
+    _option("--with", "FILE,SECONDS", "Another tool's trajectory, and the CPU time it took; repeatable."),
+]
+ExportedOption = Annotated[
+    list[str] | None, _option("--variable", "NAME", "Only this variable, along time; repeatable.")
+]
 TrajectoryPath = Annotated[
-    Path, typer.Argument(metavar="FILE", help="CSV, Parquet, netCDF or AEM, or the folder of a run.")
+    Path, typer.Argument(metavar="FILE", help="CSV, Parquet, netCDF, AEM or CK, or the folder of a run.")
 ]
 WithinOption = Annotated[
     float, _option("--within", "RAD", "Largest angle between attitudes that agree, in rad.")
@@ -125,11 +145,19 @@ ComparisonOption = Annotated[
     Path | None, _option("--out", "FILE", "Dataset of what was found along time, such as comparison.h5.")
 ]
 ComparedFigureOption = Annotated[Path | None, _option("--figure", "FILE", "Figure, a .png or a .svg.")]
+KernelsOption = Annotated[
+    list[Path] | None,
+    _option("--kernels", "FILE", "Clock (SCLK) and leap seconds that a CK is read with; repeatable."),
+]
+ComparedTimelineOption = Annotated[
+    Path | None,
+    _option("--timeline", "FILE", "Timeline (.rrd) of both bodies, with the angle between them."),
+]
 RunPaths = Annotated[
     list[Path],
     typer.Argument(
         metavar="RUN...",
-        help="Run folders (runs/NAME) or their dataset.h5; several are shown side by side.",
+        help="Run folders (runs/NAME), their dataset.h5, or other tools' files; several go side by side.",
         autocompletion=offered("runs"),
     ),
 ]

@@ -17,16 +17,18 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rigidsim.errors import RigidsimError
-from rigidsim.scene.epochs import Epoch, parse_epoch
+from rigidsim.formats.messages import message_rows
+from rigidsim.scene.epochs import Epoch
 
 if TYPE_CHECKING:
     import pandas
     import xarray
 
-KINDS = "CSV (.csv, .txt, .dat, .tsv), Parquet, netCDF or HDF5 that xarray reads (.nc, .h5, .zarr), AEM, OEM"
+KINDS = (
+    "CSV (.csv, .txt, .dat, .tsv), Parquet, netCDF or HDF5 that xarray reads (.nc, .h5, .zarr), AEM, CK (.bc)"
+)
 _TEXT = {".csv", ".txt", ".dat", ".tsv"}
 _XARRAY = {".nc", ".nc4", ".cdf", ".h5", ".hdf5", ".zarr"}
-_DATE = re.compile(r"(\d{4})-(\d\d\d?)(?:-(\d\d))?T([\d:.]+)Z?")
 _MOST_COLUMNS = 500
 
 
@@ -57,6 +59,14 @@ class Trajectory:
         return f"{self.counted} {self.first + int(index)}"
 
 
+def is_trajectory(path: Path) -> bool:
+    """Whether a file holds a trajectory, by its name; what else lies in the folder of a run doesn't."""
+    suffix = path.suffix.lower()
+    if suffix in _XARRAY:
+        return not (path.parent / "dataset.h5").exists()
+    return suffix in {*_TEXT, ".parquet", ".pq", ".aem", ".oem", ".xml"}
+
+
 def read_trajectory(path: Path) -> Trajectory:
     """Read a file by the kind that its name and its first line say.
 
@@ -75,7 +85,8 @@ def read_trajectory(path: Path) -> Trajectory:
             with path.open(errors="replace") as file:
                 head = file.read(4096)
             if (found := re.search(r"CCSDS_(AEM|OEM)_VERS", head)) is not None:
-                return _of_message(path, found[1])
+                epochs, columns, counted, first = message_rows(path, found[1])
+                return Trajectory(columns, str(path), counted=counted, first=first, epochs=epochs)
             if suffix in _TEXT:
                 return _of_text(path)
     except (RigidsimError, MemoryError):
@@ -114,7 +125,7 @@ def _made(
         if array.dtype.kind not in "fiu" or not array.ndim:
             continue
         narrow |= array.dtype == np.float32
-        array = array.astype(np.float64)
+        array = array.astype(np.float64, copy=False)
         if array.ndim == 1:
             columns[name] = array
             continue
@@ -170,10 +181,11 @@ def _of_xarray_file(path: Path) -> Trajectory:
 def _of_parquet(path: Path) -> Trajectory:
     if importlib.util.find_spec("pyarrow") is None:
         raise RigidsimError(f'{path}: needs pyarrow, which is missing: pip install "rigidsim[export]"')
-    from pyarrow.parquet import read_table
+    from pyarrow.parquet import ParquetFile
 
-    table = read_table(path)
-    given = ((name, table.column(name).to_numpy(), ()) for name in table.column_names)
+    with ParquetFile(path) as file:  # column by column: the whole of it isn't held twice
+        names = list(file.schema_arrow.names)
+        given = [(name, file.read([name]).column(0).to_numpy(), ()) for name in names]
     return _made(given, str(path))
 
 
@@ -217,51 +229,3 @@ def _is_number(text: str) -> bool:
     except ValueError:
         return False
     return True
-
-
-def _of_message(path: Path, message: str) -> Trajectory:
-    """A CCSDS message in KVN: quaternions of an AEM, positions (m) and velocities (m/s) of an OEM."""
-    keys: dict[str, str] = {}
-    epochs: list[Epoch] = []
-    rows: list[list[float]] = []
-    first = 0
-    for number, line in enumerate(path.read_text(encoding="ascii", errors="replace").splitlines(), 1):
-        words = line.split()
-        if not words or words[0] == "COMMENT":
-            continue
-        if "=" in line:
-            key, _, value = line.partition("=")
-            keys[key.strip()] = value.strip()
-        elif words[0].startswith("COVARIANCE"):
-            break
-        elif _DATE.fullmatch(words[0]):
-            first = first or number
-            epochs.append(_date(words[0], keys.get("TIME_SYSTEM", ""), f"{path}, line {number}"))
-            rows.append([float(word) for word in words[1:]])
-    if not rows:
-        raise RigidsimError(f"{path}: the {message} holds no data lines")
-    if message == "AEM" and not keys.get("ATTITUDE_TYPE", "").startswith("QUATERNION"):
-        raise RigidsimError(
-            f"{path}: ATTITUDE_TYPE = {keys.get('ATTITUDE_TYPE', 'missing')}; QUATERNION is allowed: export "
-            "the attitude as quaternions, or as CSV"
-        )
-    if len({len(row) for row in rows}) > 1:
-        raise RigidsimError(f"{path}: data lines hold different numbers of values")
-    values = np.array(rows)
-    names = ["qx", "qy", "qz", "qw"] if message == "AEM" else ["x", "y", "z", "vx", "vy", "vz"]
-    if keys.get("QUATERNION_TYPE") == "FIRST":
-        names = ["qw", "qx", "qy", "qz"]
-    scale = 1.0 if message == "AEM" else 1000.0  # km
-    columns = {name: values[:, n] * scale for n, name in enumerate(names) if n < values.shape[1]}
-    return Trajectory(columns, str(path), counted="line", first=first, epochs=tuple(epochs))
-
-
-def _date(text: str, scale: str, where: str) -> Epoch:
-    match = _DATE.fullmatch(text)
-    assert match is not None
-    if match[3] is None:
-        raise RigidsimError(f"{where}: a day of the year ({text}); dates as 2029-04-13T21:46:00 are allowed")
-    try:
-        return parse_epoch(f"{match[1]}-{match[2]}-{match[3]}T{match[4]} {scale}")
-    except ValueError as error:
-        raise RigidsimError(f"{where}: {error}") from None

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from dataclasses import replace as exchanged
+from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, TextIO
 
 from pydantic import ValidationError
 
@@ -17,6 +18,7 @@ from rigidsim.scene import validation_messages as messages
 from rigidsim.scene.bodies.field_files import cut
 from rigidsim.scene.bodies.gravity_field import asked_degree
 from rigidsim.scene.fields import NAME_OR_VECTOR
+from rigidsim.scene.listed_times import time_column
 from rigidsim.scene.python_values import assignments_of, toml_text
 from rigidsim.scene.registry import LOAD_KINDS
 from rigidsim.scene.schema import Config, config_model
@@ -25,6 +27,7 @@ from rigidsim.scene.toml_text import FLAG, apply_overrides, long_integers, parse
 Overrides = Sequence[str] | Mapping[str, Any]
 """Values to replace: ``KEY=VALUE`` texts, or dotted keys with Python values."""
 NEW = "the command rigidsim new lists commented ones to start from"
+_TIMES = "[time] times"
 _LARGEST_TABLE = 3_000_000  # bytes
 _LARGEST_FILE = 4_000_000  # bytes; a body of tens of thousands of points still fits
 
@@ -201,26 +204,31 @@ def _table_sections(config: Config, folder: Path) -> str:
     found: dict[str, str] = {}
     for where, name in _named(config):
         if name not in found and name not in config.tables:
-            found[name] = _section(name, _text(where, name, folder / name))
+            cutting = time_column if where == _TIMES else None
+            found[name] = _section(name, _text(where, name, folder / name, cutting))
     field = config.body.gravity_field
     if field is not None and field.file is not None and field.file not in config.tables:
         degree = asked_degree(field, config.loads, config.sweep)
         where, path = "[body] gravity_field file", folder / field.file
-        found[field.file] = _section(field.file, _text(where, field.file, path, degree))
+        cut_field = partial(cut, degree=degree)
+        found[field.file] = _section(field.file, _text(where, field.file, path, cut_field, "text"))
     return "".join(found.values())
 
 
 def _named(config: Config) -> Iterator[tuple[str, str]]:
-    """Tables that loads name, with the place of each name in the config."""
+    """Tables that loads and sample times name, with the place of each name in the config."""
+    if isinstance(config.time.times, str):
+        yield _TIMES, config.time.times
     for number, load in enumerate(config.loads, 1):
         name = getattr(getattr(load, "orbit", None), "table", None)
         if name is not None:
             yield f"[[loads]] number {number} orbit.table", name
 
 
-def _text(where: str, name: str, path: Path, degree: int | None = None) -> str:
-    """Text of a table, or of a gravity field to a degree."""
-    kind = "CSV" if degree is None else "text"
+def _text(
+    where: str, name: str, path: Path, cutting: Callable[[TextIO], str] | None = None, kind: str = "CSV"
+) -> str:
+    """Text of a file, or what is cut from it."""
     try:
         if path.exists() and not path.is_file():
             what = (
@@ -228,21 +236,21 @@ def _text(where: str, name: str, path: Path, degree: int | None = None) -> str:
             )
             raise ConfigError(Problem(where, what))
         with path.open(encoding="utf-8-sig") as file:
-            if degree is None:
+            if cutting is None:
                 _refuse_size(where, name, path.stat().st_size)
                 text = file.read()
             else:
-                text = cut(file, degree)
+                text = cutting(file)
                 _refuse_size(where, name, len(text))
     except OSError as error:
         what = (
             f'given "{name}", which can\'t be read ({error.strerror or error}): {path} is looked for, beside '
         )
         raise ConfigError(Problem(where, what + "the config")) from None
-    except (UnicodeDecodeError, ValueError):
-        raise ConfigError(
-            Problem(where, f'given "{name}", which is not UTF-8 text; save it as {kind}')
-        ) from None
+    except ValueError as error:
+        text_error = where != _TIMES or isinstance(error, UnicodeDecodeError)
+        told = f"is not UTF-8 text; save it as {kind}" if text_error else error
+        raise ConfigError(Problem(where, f'given "{name}", which {told}')) from None
     text = text.replace("\r\n", "\n").replace("\r", "\n")
     if "'''" in text or any((ord(c) < 32 and c not in "\n\t") or ord(c) == 127 for c in text):
         what = f'given "{name}", which holds characters that no table has; save it as plain {kind}'

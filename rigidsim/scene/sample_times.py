@@ -3,20 +3,24 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import cached_property
 from itertools import pairwise
-from typing import Any
+from typing import Annotated, Any
 
-from pydantic import Field, StrictInt
+import numpy as np
+from pydantic import Discriminator, Field, StrictInt, StrictStr, Tag
 
 from rigidsim.errors import ConfigError, Problem, either
 from rigidsim.scene.exact import ZERO, rounded
-from rigidsim.scene.fields import ConfigTable, Instant, Second, TimeUnitName
+from rigidsim.scene.fields import NAME_OR_VECTOR, ConfigTable, Instant, Second, TimeUnitName
+from rigidsim.scene.listed_times import times_in
 from rigidsim.scene.validation_messages import shown
 
 _MOST_SAMPLES = 10**12
+_BITS, _MOST_BITS = 53, 1000  # of a significand, and of a denominator above which doubles lose digits
 
 
 class Time(ConfigTable):
@@ -32,8 +36,14 @@ class Time(ConfigTable):
     """number of samples, equally spaced from start to end, both included"""
     every: Second | None = Field(None, examples=[0.1, "1 day"])
     """interval between samples, instead of samples"""
-    times: list[Second] | None = Field(None, examples=[[0, 1, 10, 100]])
-    """sample times, ascending, instead of end"""
+    times: (
+        Annotated[
+            Annotated[StrictStr, Tag(NAME_OR_VECTOR[0])] | Annotated[list[Second], Tag(NAME_OR_VECTOR[1])],
+            Discriminator(lambda given: NAME_OR_VECTOR[0 if isinstance(given, str) else 1]),
+        ]
+        | None
+    ) = Field(None, examples=[[0, 1, 10, 100], "theirs.csv"])
+    """sample times, ascending, instead of end; or a CSV file beside the config with a column t or time"""
     epoch: Instant | None = Field(None, examples=["J2000", "2029-04-13T21:46:00 TDB"])
     """date of time 0; scales TDB, TT and UTC"""
     unit: TimeUnitName | None = Field(None, examples=["day"])
@@ -70,16 +80,63 @@ class SampleTimes:
         """Time of the last sample (mpf)."""
         return rounded(self.exact_last, self.context)
 
-    @property
+    @cached_property
+    def doubles(self) -> np.ndarray:
+        """The doubles nearest to the times of a list."""
+        assert self.times is not None
+        return _doubles(self.times)
+
+    @cached_property
     def largest_spacing(self) -> float:
         """Largest spacing of neighbouring samples, s."""
         if self.times is None:
             return float(self.step)
+        if all(map(_is_double, self.times)):  # of which a difference is rounded once, too
+            return float(np.diff(self.doubles).max(initial=0.0))
         return max((float(b - a) for a, b in pairwise(self.times)), default=0.0)
 
 
-def sample_times(table: Time, context: Any) -> tuple[Any, Any, SampleTimes]:
-    """Start and end of the motion (s, mpf) and the sample times from a config's ``[time]``."""
+def _is_double(time: Fraction) -> bool:
+    whole = time.denominator
+    return (
+        whole & (whole - 1) == 0 and time.numerator.bit_length() <= _BITS and whole.bit_length() < _MOST_BITS
+    )
+
+
+def _doubles(times: Sequence[Fraction]) -> np.ndarray:
+    """The doubles nearest to times, those beyond all doubles infinite."""
+    try:
+        return np.array([time.numerator / time.denominator for time in times])
+    except OverflowError:
+        return np.array([_double(time) for time in times])
+
+
+def _double(time: Fraction) -> float:
+    try:
+        return time.numerator / time.denominator
+    except OverflowError:
+        return math.copysign(math.inf, time)
+
+
+def _listed(given: str | list[Any], context: Any, texts: Mapping[str, str]) -> list[Fraction]:
+    """Times of an array, or of the table of that name."""
+    if not isinstance(given, str):
+        return [time.fraction(context) for time in given]
+    if given not in texts:
+        what = "but this config was given as text, without files beside it; put the table's text into "
+        raise _fail("times", f'given "{given}", {what}[tables."{given}"] text')
+    try:
+        return times_in(texts[given], context)
+    except ValueError as error:
+        raise _fail("times", f'given "{given}", which {error}') from None
+
+
+def sample_times(table: Time, context: Any, texts: Mapping[str, str]) -> tuple[Any, Any, SampleTimes]:
+    """Start and end of the motion (s, mpf) and the sample times from a config's ``[time]``.
+
+    Args:
+        texts: of tables, by name.
+    """
     ways = [key for key in ("samples", "every", "times") if getattr(table, key) is not None]
     if len(ways) > 1:
         less = either(f"--set time.{ways[0]}= removes it", "Experiment.replace removes keys, too")
@@ -91,10 +148,13 @@ def sample_times(table: Time, context: Any) -> tuple[Any, Any, SampleTimes]:
 
     start = table.start.fraction(context)
     if table.times is not None:
-        times = [t.fraction(context) for t in table.times]
+        times = _listed(table.times, context, texts)
         if not times:
             raise _fail("times", "given an empty array; at least one time is needed")
-        for i, (a, b) in enumerate(pairwise(times)):
+        doubles = _doubles(times)
+        # rounding to doubles keeps order, so that only those that aren't told apart need a closer look
+        for i in np.flatnonzero(~(doubles[1:] > doubles[:-1])).tolist():
+            a, b = times[i], times[i + 1]
             if not a < b:
                 raise _fail(f"times[{i + 1}]", f"given {shortly(b)} after {shortly(a)}; times must increase")
         if times[0] < start:

@@ -141,7 +141,8 @@ def build_scene(experiment: Experiment, context: Any = None) -> Scene:
 
     body = attempt(_body_at_start, config, context)
     attempt(starts.check_ways, config.initial, context)
-    times = attempt(sample_times, config.time, context)
+    texts = {name: table.text for name, table in config.tables.items()}
+    times = attempt(sample_times, config.time, context, texts)
     attempt(_check_limits, config.limits)
     if body is None or times is None or problems:
         raise ConfigError(problems, experiment.source)

@@ -6,7 +6,8 @@ In double precision at its epsilon, with the attitude as a quaternion. States th
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -26,6 +27,12 @@ from rigidsim.solve.compiled import compiled_engine, compiled_function, evaluate
 from rigidsim.solve.precision import precision_of
 
 _STEPS = 100_000
+_BLOCK = 65_536  # rows that are worked on together
+
+
+def blocks_of(count: int) -> Iterator[slice]:
+    """Blocks of rows, so that what is made of millions of rows on the way stays small."""
+    return (slice(begin, min(begin + _BLOCK, count)) for begin in range(0, count, _BLOCK))
 
 
 class NotFromStates(Exception):
@@ -88,26 +95,37 @@ class FromStates:
         engine.time = self._start
         engine.state[:] = self._precision.array(self._system.initial)
         internal = self._internal(times)
-        grid = internal if internal[0] == self._start else np.append(self._start, internal)
+        found = np.empty((len(times), len(engine.state)))
+        if internal[0] != self._start:
+            self._advance(internal[:1], found[:1])
+        for rows in blocks_of(len(times)):
+            self._advance(internal[rows], found[rows])
+        return found
+
+    def _advance(self, times: np.ndarray, found: np.ndarray) -> None:
+        """Go on to ascending times, and put the states there into an array."""
+        engine = self._engine
+        grid = times if times[0] == engine.time else np.append(engine.time, times)
         result = engine.propagate_grid(grid, max_steps=10**9)
         states = np.asarray(result[5] if len(result) > 5 else result[-1])
         if result[0] != hy.taylor_outcome.time_limit or len(states) != len(grid):
             raise NotFromStates("its motion ends before the trajectory does")
-        return states[len(grid) - len(internal) :].copy()
+        found[:] = states[len(grid) - len(times) :]
 
     def states(
         self, own: np.ndarray, quaternions: np.ndarray, rates: np.ndarray, flight: np.ndarray | None = None
     ) -> np.ndarray:
-        """States (rows, states), internal units, of attitudes and rates, with all else as in ``own``.
+        """States (rows, states), or of a single row, internal units, of attitudes and rates, with all else as
+        in ``own``.
 
         Args:
             flight: positions and velocities (rows, 6), SI, space axes.
         """
         made = own.copy()
-        made[:, self._places[:4]] = quaternions
-        made[:, self._places[4:]] = rates / self._scales[self._places[4:]]
+        made[..., self._places[:4]] = quaternions
+        made[..., self._places[4:]] = rates / self._scales[self._places[4:]]
         if flight is not None and self.flies:
-            made[:, self._flight] = flight / self._scales[self._flight]
+            made[..., self._flight] = flight / self._scales[self._flight]
         return made
 
     def after(self, start: np.ndarray, time: float, until: np.ndarray) -> np.ndarray:
@@ -125,15 +143,17 @@ class FromStates:
 
     def attitude(self, states: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Quaternions (rows, 4) and angular velocities (rows, 3), rad/s, of states in internal units."""
+        first, last = self._places[0], self._places[3]
+        together = self._places[:4] == [*range(first, last + 1)]  # a view, which copies nothing
         rates = states[..., self._places[4:]] * self._scales[self._places[4:]]
-        return states[..., self._places[:4]], rates
+        return states[..., slice(first, last + 1) if together else self._places[:4]], rates
 
     def flight(self, states: np.ndarray) -> np.ndarray | None:
         """Positions and velocities (rows, 6), SI, space axes, of states; None for a body that only turns."""
         return states[:, self._flight] * self._scales[self._flight] if self.flies else None
 
-    def drifts(self, states: np.ndarray, times: np.ndarray) -> dict[str, np.ndarray]:
-        """Drift of each invariant from the first of states (rows, states) on, relative to its scale."""
+    def drifts(self, states: RowStates, times: np.ndarray) -> dict[str, np.ndarray]:
+        """Drift of each invariant from the first row on, relative to its scale."""
         invariants = self._system.invariants
         if not invariants:
             return {}
@@ -141,8 +161,31 @@ class FromStates:
         options = dict(self._precision.options, compact_mode=self._system.wide)
         internal = self._internal(times)
         value = compiled_function(components, self._system.variables, **options)
-        begun = evaluate_rows(value, states[:1], times=internal[:1])[:, 0]
+        begun = evaluate_rows(value, states[slice(1)], times=internal[:1])[:, 0]
         expressions = drift_outputs(invariants, self._system.scene.context, self._precision.number)
         function = compiled_function(expressions, self._system.variables, **options)
-        found = evaluate_rows(function, states, begun, internal)
+        found = np.empty((len(expressions), len(times)))
+        for rows in blocks_of(len(times)):
+            found[:, rows] = evaluate_rows(function, states[rows], begun, internal[rows])
         return {invariant.name: found[n] for n, invariant in enumerate(invariants)}
+
+
+@dataclass(frozen=True)
+class RowStates:
+    """States of a trajectory's rows, made of those that are asked for alone.
+
+    Attributes:
+        own: states (rows, states) of the scene's own motion, internal units.
+        quaternions: (rows, 4), w x y z, of norm one. rates: (rows, 3), rad/s, body axes.
+        flight: positions and velocities (rows, 6), SI, space axes, if known.
+    """
+
+    equations: FromStates
+    own: np.ndarray
+    quaternions: np.ndarray
+    rates: np.ndarray
+    flight: np.ndarray | None
+
+    def __getitem__(self, rows: Any) -> np.ndarray:
+        flight = None if self.flight is None else self.flight[rows]
+        return self.equations.states(self.own[rows], self.quaternions[rows], self.rates[rows], flight)

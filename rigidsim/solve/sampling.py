@@ -17,6 +17,8 @@ from rigidsim.scene.exact import rounded
 from rigidsim.scene.sample_times import SampleTimes
 from rigidsim.solve.precision import Precision, Scalar, precision_of
 
+_BLOCK = 65536  # samples of a list that are looked at together
+
 
 class SampleClock:
     """Times of the samples, block by block; ``exponent`` is that of the internal unit of time.
@@ -76,6 +78,8 @@ class SampleClock:
         """The number of a precision nearest to each time, s."""
         if precision.bits < 53:
             return self._narrowed(self._seconds(first, stop, self._double), first, precision)
+        if precision.bits == 53 and self._samples.times is not None:
+            return self._samples.doubles[first:stop]
         if self._samples.times is None:
             whole = self._whole[precision.bits]
             if whole is not None and self._fits(max(stop - 1, 0), precision):
@@ -116,11 +120,16 @@ class SampleClock:
             yield from ((self._numerator(i), self._divisor) for i in range(first, stop))
 
     def _refuse_coinciding(self, samples: SampleTimes) -> None:
-        """Refuse samples that coincide; spacing is resolved worst at the time of largest size."""
-        places = {0, max(0, self.count - 2)} if samples.times is None else range(self.count - 1)
-        for i in places:
-            pair = self.internal(i, min(i + 2, self.count))
-            if len(pair) == 2 and not pair[0] < pair[1]:
+        """Refuse samples that coincide; spacing of a grid is resolved worst at the time of largest size."""
+        if samples.times is None:
+            spans = [(i, min(i + 2, self.count)) for i in sorted({0, max(0, self.count - 2)})]
+        else:  # blocks share their ends, so that all neighbours meet
+            spans = [(i, min(i + _BLOCK + 1, self.count)) for i in range(0, self.count, _BLOCK)]
+        for first, stop in spans:
+            times = self.internal(first, stop)
+            together = np.flatnonzero(~(times[:-1] < times[1:]))
+            if len(together):
+                i = first + int(together[0])
                 what = (
                     f"samples {i} and {i + 1} are closer together than {self._precision.name} precision "
                     f"resolves near {float(samples.last):g} s; sample less often, shift start, or choose a "

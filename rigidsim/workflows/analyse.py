@@ -14,7 +14,8 @@ from rigidsim.analysis.result import Analysis
 from rigidsim.errors import ConfigError, RigidsimError
 from rigidsim.scene.scene import build_scene
 from rigidsim.store import atomic
-from rigidsim.store.run import Run, open_run
+from rigidsim.store.run import Run
+from rigidsim.workflows.compare.as_run import open_any
 from rigidsim.workflows.known_frequencies import known_frequencies
 from rigidsim.workflows.read import parse
 
@@ -33,8 +34,8 @@ def analyse(
     """Secular rates and spectral lines of a run, or of any dataset with equidistant ``time`` in s.
 
     Args:
-        source: a dataset, a run, or the path of one. Lines are labelled with the frequencies of the scene
-            that the dataset's attribute ``config`` describes.
+        source: a dataset, a run, the path of one, or a trajectory of another tool (docs/compare.md). Lines
+            are labelled with the frequencies of the scene that the dataset's attribute ``config`` describes.
         variables: names of variables, or of their signals (``obliquity.figure``, ``polar_motion.m1+im2``); by
             default those that the scene is about.
         lines: largest number of lines per signal.
@@ -53,7 +54,7 @@ def analyse(
     chosen = (variables,) if isinstance(variables, str) else tuple(variables)
     options: dict[str, Any] = {"lines": lines, "floor": floor, "order": window}
     if isinstance(source, (str, Path)):
-        source = open_run(source)
+        source = open_any(source)
     if isinstance(source, Run):
         with source.dataset as dataset:
             names = _known(dataset, known)

@@ -1,6 +1,6 @@
 """``rigidsim export``: the dataset of a run or a sweep in other tools' formats."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -14,8 +14,9 @@ from rigidsim.formats.registry import Format, Naming, TableSource, format_named
 from rigidsim.formats.tables import BLOCK_NUMBERS, tables_of
 from rigidsim.scene.arithmetic import working_bits
 from rigidsim.store import atomic
-from rigidsim.store.run import SavedRun
-from rigidsim.store.sweeps.run import SavedSweep
+from rigidsim.store.run import SavedRun, open_run
+from rigidsim.store.sweeps.folder import is_sweep
+from rigidsim.store.sweeps.run import SavedSweep, open_sweep
 from rigidsim.store.variables import parts_in
 from rigidsim.workflows.again import MotionAgain
 from rigidsim.workflows.read import parse
@@ -24,19 +25,21 @@ _PART_BITS = 53  # bits of a double: a value held by n of them has at most n tim
 
 
 def export(
-    saved: SavedRun | SavedSweep,
+    saved: SavedRun | SavedSweep | str | Path,
     file_format: str,
     out: str | Path | None = None,
     *,
     force: bool = False,
     naming: Naming | None = None,
     angle_unit: str | None = None,
+    variables: Sequence[str] = (),
     block_numbers: int = BLOCK_NUMBERS,
 ) -> list[Path]:
     """Write a run, finished or partial, or the members of a finished sweep in another format, block by block
     so that memory stays small; returns the files written, the table along time, or of the members, first.
 
     Args:
+        saved: a run or a sweep, or the path of one.
         file_format: one of ``rigidsim.formats.FORMATS``; csv, parquet or zarr of a sweep.
         out: the file (for zarr the folder); ``NAME.FORMAT`` in the working folder by default (``NAME.bc`` and
             its clock ``NAME.tsc`` for ck, ``NAME.bpc`` and its frame ``NAME.tf`` for pck). In csv and
@@ -46,9 +49,16 @@ def export(
         naming: epoch, axes and names that the run's config leaves open, for
             aem, oem, ck and pck; empty for sweeps.
         angle_unit: one of ``rigidsim.scene.readable.ANGLE_UNITS``; rad by default. For csv, parquet and zarr.
+        variables: names of those that are written; all by default. For the same formats.
         block_numbers: numbers of a sweep held in memory at once; no digit depends on it.
     """
     found = format_named(file_format)
+    if isinstance(saved, str | Path):
+        saved = open_sweep(saved) if is_sweep(saved) else open_run(saved)
+    if variables and not found.angles:
+        raise RigidsimError(
+            f"--variable: {file_format} prescribes what it holds; csv, parquet and zarr don't"
+        )
     unit = None if angle_unit is None else angle_unit_named(angle_unit)
     if unit is not None and not found.angles:
         raise RigidsimError(
@@ -62,6 +72,7 @@ def export(
         _refuse_for_sweeps(saved, file_format, naming)
         opened = saved.dataset
     with opened as dataset:
+        dataset = _chosen(dataset, variables)
         bits = _bits(dataset) if isinstance(saved, SavedRun) else _bits_of_members(dataset)
         first, *others = tables_of(dataset, unit, bits, block_numbers)
         attributes = dict(dataset.attrs, status=saved.status)
@@ -84,6 +95,18 @@ def export(
             with _replacing(path, found) as new:
                 write(table, new, source)
         return list(kept)
+
+
+def _chosen(dataset: xarray.Dataset, names: Sequence[str]) -> xarray.Dataset:
+    """Only these variables, with the parts that hold their digits; all if none is named."""
+    if not names:
+        return dataset
+    allowed = [str(n) for n, variable in dataset.data_vars.items() if "residual_of" not in variable.attrs]
+    for name in names:
+        if name not in allowed:
+            raise RigidsimError(f"--variable: given {name[:60]}; allowed: {', '.join(allowed)}")
+    time = parts_in(dataset, "time")[1:] if "time" in dataset.variables else []
+    return dataset[[*time, *(part for name in dict.fromkeys(names) for part in parts_in(dataset, name))]]
 
 
 def _refuse_for_sweeps(sweep: SavedSweep, file_format: str, naming: Naming | None) -> None:

@@ -8,7 +8,7 @@ extrapolated.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -17,19 +17,24 @@ import numpy as np
 
 from rigidsim.accuracy.bench.dataset import TOLD, BestSetting, advice, dataset_of
 from rigidsim.accuracy.bench.measure import measure
-from rigidsim.errors import RunFolderError
+from rigidsim.accuracy.bench.plan import DEFAULT
+from rigidsim.errors import RigidsimError, RunFolderError
 from rigidsim.scene.choices import FULL
 from rigidsim.scene.config import Experiment
 from rigidsim.store import atomic
+from rigidsim.workflows.compare.compared import compare
+from rigidsim.workflows.compare.result import Comparison
 from rigidsim.workflows.plan_levels import compared_levels
+from rigidsim.workflows.read import Given, as_experiment
 
 if TYPE_CHECKING:
     import xarray
+    from matplotlib.figure import Figure
 
 DATASET, FIGURE = "tradeoff.h5", "tradeoff.png"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Tradeoff:
     """A measurement as labelled data (see ``dataset_of``), and the advice drawn from it."""
 
@@ -42,6 +47,16 @@ class Tradeoff:
         merged.
         """
         return advice(self.dataset)
+
+    def plot(self) -> Figure:
+        """The work-precision figure."""
+        from rigidsim.look.figures.work_precision import work_precision_figure
+
+        return work_precision_figure(self.dataset)
+
+    def __repr__(self) -> str:
+        best = "; ".join(f"{a.error:.1e} rad at {a.cost:.3g}: {', '.join(a.keys)}" for a in self.advice)
+        return f"<Tradeoff of {self.dataset.attrs['title']!r}: {best}>"
 
     def as_dict(self) -> dict[str, Any]:
         """Values for JSON."""
@@ -66,6 +81,15 @@ class Tradeoff:
                 }
                 for one in (data.isel(model=n) for n in range(data.sizes.get("model", 0)))
             ],
+            "others": [
+                {
+                    "name": str(one["other"].item()),
+                    "verdict": str(one["other_verdict"].item()),
+                    "error_rad": float(one["other_error"]),
+                    "cpu_ratio": float(one["other_cpu_ratio"]),
+                }
+                for one in (data.isel(other=n) for n in range(data.sizes.get("other", 0)))
+            ],
             **{key: _plain(value) for key, value in data.attrs.items() if key in TOLD},
             "advice": [asdict(a) for a in self.advice],
             "settings": rows,
@@ -80,8 +104,9 @@ def _plain(value: Any) -> Any:
 
 
 def tradeoff(
-    experiment: Experiment,
+    experiment: Given,
     *,
+    others: Sequence[tuple[str | Path, float]] = (),
     out: str | Path | None = None,
     budget: float = 90.0,
     repeats: int = 3,
@@ -91,8 +116,11 @@ def tradeoff(
 ) -> Tradeoff:
     """Measure an experiment's settings, of a ``full`` measurement every tolerance in every formulation and
     precision, in about ``budget`` seconds, speeds in ``repeats`` fresh processes; save dataset and figure in
-    ``out/NAME_tradeoff`` unless that is None. Raises ``ConfigError`` and ``RunFolderError``.
+    ``out/NAME_tradeoff`` unless that is None. ``others`` are trajectories of other tools with the CPU time
+    (s) that each took. Raises ``ConfigError`` and ``RunFolderError``.
     """
+    experiment = as_experiment(experiment)
+    judged = [_judged(experiment, file, seconds) for file, seconds in others]  # before what takes long
     folder = None
     if out is not None:
         folder = Path(out) / f"{experiment.config.name}_tradeoff"
@@ -109,11 +137,43 @@ def tradeoff(
     if experiment.config.model.level != FULL:
         resolved = experiment.having([f'model.level="{FULL}"', "model.short_period=false"])
     dataset = dataset_of(measure(resolved, budget=budget, repeats=repeats, full=full, told=told))
-    dataset = with_models(dataset, experiment)
+    dataset = with_others(with_models(dataset, experiment), judged)
     result = Tradeoff(dataset, folder)
     if folder is not None:
         save(dataset, folder)
     return result
+
+
+def _judged(experiment: Experiment, file: str | Path, seconds: float) -> tuple[Comparison, float]:
+    """A trajectory's comparison, and its CPU time."""
+    if not (math.isfinite(seconds) and seconds > 0):
+        raise RigidsimError(f"{file}: given {seconds:g} s; a positive CPU time, in s, is allowed")
+    return compare(experiment, Path(file)), seconds
+
+
+def with_others(dataset: xarray.Dataset, judged: Sequence[tuple[Comparison, float]]) -> xarray.Dataset:
+    """The dataset with trajectories of other tools, and their CPU times (s), as points of the figure.
+
+    Added along ``other``: ``other_error``, rad, the largest in the part of the motion that was measured;
+    ``other_cpu_ratio``, over the default setting, both per simulated second; ``other_verdict``.
+    """
+    if not judged:
+        return dataset
+    default = dataset.sel(setting=DEFAULT.title)
+    usual = float(default["cpu_seconds"]) / float(default["measured_time"])
+    end = float(dataset["time"].values[-1])
+    errors = []
+    for found, _ in judged:
+        error = found.dataset["attitude_error"]
+        errors.append(float((error[error["time"] <= end] if error["time"][0] <= end else error).max()))
+    ratios = [seconds / found.span_s / usual for found, seconds in judged]
+    what = "largest attitude error of another tool's trajectory"
+    relative = "CPU time, as it was given, relative to the default setting, per simulated second"
+    return dataset.assign(
+        other_error=("other", np.array(errors), {"units": "rad", "long_name": what}),
+        other_cpu_ratio=("other", np.array(ratios), {"units": "1", "long_name": relative}),
+        other_verdict=("other", np.array([found.verdict for found, _ in judged], dtype=object)),
+    ).assign_coords(other=("other", np.array([Path(found.source).stem for found, _ in judged], dtype=object)))
 
 
 def with_models(dataset: xarray.Dataset, experiment: Experiment) -> xarray.Dataset:

@@ -14,6 +14,7 @@ from rigidsim.store import atomic
 from rigidsim.store.run import Run, SavedRun, open_run
 from rigidsim.store.sweeps.folder import is_sweep
 from rigidsim.store.sweeps.run import open_sweep
+from rigidsim.workflows.compare.as_run import open_any
 from rigidsim.workflows.read import parse
 from rigidsim.workflows.run import run
 from rigidsim.workflows.sweeps.members import single_member
@@ -31,7 +32,7 @@ def runs_of(paths: Sequence[Path], members: Sequence[int] = ()) -> list[tuple[st
             f"{sweeps[0]}: is a sweep; choose members of it with --member N (repeatable, counted from 0); "
             "rigidsim plot draws a variable over its axes"
         )
-    runs = [open_run(path) for path in paths]
+    runs: list[Run] = [open_any(path) for path in paths]
     names = [run.outcome.name for run in runs]
     if len(set(names)) < len(names):
         names = [run.place for run in runs]

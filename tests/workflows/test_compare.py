@@ -16,6 +16,9 @@ from scipy.spatial.transform import Rotation
 
 import rigidsim
 from experiments import compare_conventions
+from rigidsim.accuracy.bench.plan import DEFAULT
+from rigidsim.workflows.compare.as_run import open_any
+from rigidsim.workflows.tradeoff import with_others
 
 MOMENTS = np.array([1.0, 2.0, 2.5])
 START = np.array([0.3, 1.0, -0.4])
@@ -65,10 +68,7 @@ def by_steps(step: float) -> Any:
     y, rows = np.concatenate([QUATERNION, START]), []
     for n in range(round(END / step) + 1):
         rows.append([n * step, *y])
-        a = slopes(0, y)
-        b = slopes(0, y + step / 2 * a)
-        c = slopes(0, y + step / 2 * b)
-        y = y + step / 6 * (a + 2 * b + 2 * c + slopes(0, y + step * c))
+        y = compare_conventions.classical(slopes, y, step)
     found = np.array(rows)
     return found[:, 0], found[:, 1:5], found[:, 5:]
 
@@ -125,6 +125,79 @@ def test_a_missing_load_is_a_wrong_model(experiment: rigidsim.Experiment) -> Non
     assert found.local_defects is not None
     missing = found.local_defects.missing_acceleration
     assert missing == pytest.approx(float(np.sqrt(np.mean(np.sum((0.001 * w / MOMENTS) ** 2, 1)))), rel=0.1)
+
+
+def test_unequal_steps_tell_the_order(experiment: rigidsim.Experiment) -> None:
+    """The classical method has order 4, Heun's 2; the attitude's error of a step goes like h^(p+1)."""
+    lengths = np.exp(np.random.default_rng(1).uniform(np.log(0.02), np.log(0.2), 120))
+    lengths *= END / lengths.sum()
+    for order, method in ((4, compare_conventions.classical), (2, compare_conventions.heun)):
+        y, rows = np.concatenate([QUATERNION, START]), [[0.0, *QUATERNION, *START]]
+        for n, step in enumerate(lengths, 1):
+            y = method(slopes, y, step)
+            rows.append([lengths[:n].sum(), *y])
+        table = np.array(rows)
+        found = rigidsim.compare(experiment, {"t": table[:, 0], "q": table[:, 1:5], "w": table[:, 5:]})
+        assert found.local_defects is not None
+        assert found.local_defects.order == pytest.approx(order, abs=0.2)
+        assert found.local_defects.step_tolerance is None
+
+
+def test_a_norm_that_drifts_is_no_damage(experiment: rigidsim.Experiment) -> None:
+    """SciPy as it comes lets the norm drift by 1e-3 and more, and only the attitude counts."""
+    times, q, w = theirs(1e-13, rows=61)
+    drifting = q * (1 + 0.02 * times / END)[:, None]
+    found = rigidsim.compare(experiment, {"t": times, "q": drifting, "w": w})
+    assert found.verdict == "agrees"
+    [norm] = [drift for drift in found.drifts if drift.name == "quaternion_norm"]
+    assert norm.final == pytest.approx(0.02)
+
+
+def test_own_steps_tell_the_tolerance(experiment: rigidsim.Experiment) -> None:
+    """SciPy's steps keep errors below 1e-5 of the state, which is of order one."""
+    start = np.concatenate([QUATERNION, START])
+    steps = solve_ivp(slopes, (0, END), start, "RK23", rtol=1e-5, atol=1e-6)
+    found = rigidsim.compare(experiment, {"t": steps.t, "q": steps.y.T[:, :4], "w": steps.y.T[:, 4:]})
+    assert found.local_defects is not None
+    assert found.local_defects.order is None
+    assert found.local_defects.step_tolerance is not None
+    assert 3e-8 < found.local_defects.step_tolerance < 3e-5
+
+
+def test_a_file_is_read_as_a_run(tmp_path: Path) -> None:
+    """Its convention is the one in which the attitude turns at its rates, at any order or direction."""
+    times, q, w = theirs(1e-10)
+    body = Rotation.from_quat(q[:, [1, 2, 3, 0]])
+    written = {
+        "inverse": ("q0,q1,q2,q3", body.inv().as_quat()[:, [3, 0, 1, 2]], w),
+        "degrees": ("q1,q2,q3,q4", body.as_quat(), w * 180 / np.pi),
+        "euler": ("phi,theta,psi", body.as_euler("ZXZ", degrees=True), body.apply(w)),
+    }
+    for name, (columns, attitude, rates) in written.items():
+        path = tmp_path / f"{name}.csv"
+        table = np.column_stack([times, attitude, rates, times**2])
+        np.savetxt(path, table, "%.17g", ",", header=f"t,{columns},wx,wy,wz,more", comments="")
+        read = open_any(path).dataset
+        same = np.abs(np.einsum("ij,ij->i", read["quaternion"].values, q))
+        assert same == pytest.approx(np.linalg.norm(q, axis=1), abs=1e-12)
+        assert read["angular_velocity"].values == pytest.approx(w, abs=1e-12)
+        assert read["more"].values == pytest.approx(times**2)
+    found = rigidsim.analyse(tmp_path / "inverse.csv", "angular_velocity.z", lines=1)
+    assert len(found.signals) == 1
+    table = np.column_stack([times, body.as_euler("ZXZ")])
+    np.savetxt(path, table, delimiter=",", header="t,phi,theta,psi", comments="")
+    with pytest.raises(rigidsim.RigidsimError, match="without angular velocities its convention"):
+        _ = open_any(path).dataset
+
+
+def test_a_timeline_of_both(experiment: rigidsim.Experiment, tmp_path: Path) -> None:
+    times, q, w = theirs(1e-6, rows=31)
+    path = tmp_path / "both.rrd"
+    found = rigidsim.compare(experiment, {"t": times, "q": q, "w": w}, timeline=path)
+    assert found.timeline_file == str(path)
+    assert path.stat().st_size > 10_000
+    with pytest.raises(rigidsim.RigidsimError, match=r"ends in \.rrd"):
+        rigidsim.compare(experiment, {"t": times, "q": q, "w": w}, timeline=tmp_path / "both.png")
 
 
 def test_another_start_is_neither(experiment: rigidsim.Experiment) -> None:
@@ -263,13 +336,72 @@ def test_a_message(experiment: rigidsim.Experiment, tmp_path: Path) -> None:
         ['time.epoch="2024-04-13T21:46:00 UTC"', 'frame.axes="ICRF"', "time.samples=31"]
     )
     rigidsim.run(dated, out=tmp_path)
-    from rigidsim.workflows.export import export
-
-    [path] = export(rigidsim.open_run(tmp_path / "free"), "aem", tmp_path / "free.aem")
+    [path] = rigidsim.export(tmp_path / "free", "aem", tmp_path / "free.aem")
     found = rigidsim.compare(dated, path)
     assert found.verdict == "agrees"
     assert found.convention.order == "wxyz"
     assert found.rows == 31
+    # the same in XML
+    rows = [line.split() for line in path.read_text().splitlines() if line.startswith("2024") and " " in line]
+    names = ("EPOCH", "Q1", "Q2", "Q3", "QC")
+    states = "".join(
+        "<attitudeState><quaternionEphemeris>"
+        + "".join(f"<{name}>{value}</{name}>" for name, value in zip(names, row, strict=True))
+        + "</quaternionEphemeris></attitudeState>"
+        for row in rows
+    )
+    about = "<TIME_SYSTEM>UTC</TIME_SYSTEM><ATTITUDE_TYPE>quaternion</ATTITUDE_TYPE>"
+    xml = tmp_path / "free.xml"
+    xml.write_text(
+        '<?xml version="1.0"?><aem id="CCSDS_AEM_VERS" version="1.0"><body><segment>'
+        f"<metadata>{about}</metadata><data>{states}</data></segment></body></aem>"
+    )
+    again = rigidsim.compare(dated, xml)
+    assert again.attitude_error == found.attitude_error.having(row=again.attitude_error.row)
+    assert again.attitude_error.row.startswith("row ")
+
+
+def test_a_kernel(experiment: rigidsim.Experiment, tmp_path: Path) -> None:
+    """A CK that rigidsim exports is read at times between its rows, and comes back to rounding errors."""
+    pytest.importorskip("spiceypy")
+    dated = experiment.having(['time.epoch="J2000"', 'frame.axes="ICRF"', "time.samples=31"])
+    rigidsim.run(dated, out=tmp_path)
+    path, clock = rigidsim.export(tmp_path / "free", "ck", tmp_path / "free.bc")
+    found = rigidsim.compare(dated, path, kernels=[clock])
+    assert found.attitude_error.largest < 1e-12
+    assert found.rate_error is not None
+    assert found.rate_error < 1e-12
+    assert found.convention.rate_axes == "space"
+    with pytest.raises(rigidsim.RigidsimError, match="as --kernels FILE"):
+        rigidsim.compare(dated, path)
+    with pytest.raises(rigidsim.RigidsimError, match="date of time 0"):
+        rigidsim.compare(experiment, path, kernels=[clock])
+
+
+def test_points_of_the_tradeoff(experiment: rigidsim.Experiment, tmp_path: Path) -> None:
+    """A tool that took 40 times the default's CPU time for each simulated second stands there."""
+    times, q, w = theirs(1e-6, rows=61)
+    path = write(tmp_path / "theirs.csv", times, q, w)
+    found = rigidsim.compare(experiment, path)
+    measured = xarray.Dataset(
+        {"cpu_seconds": ("setting", [3.0]), "measured_time": ("setting", [2 * END])},
+        {"setting": [DEFAULT.title], "time": [0.0, END / 2]},
+    )
+    put = with_others(measured, [(found, 60.0)])
+    assert put["other_cpu_ratio"].item() == pytest.approx(60 / END / (3 / (2 * END)))
+    errors = found.dataset["attitude_error"]
+    assert put["other_error"].item() == errors[errors["time"] <= END / 2].max()
+    with pytest.raises(rigidsim.RigidsimError, match="positive CPU time"):
+        rigidsim.tradeoff(experiment, others=[(path, -1.0)])
+
+
+def test_variables_are_exported(experiment: rigidsim.Experiment, tmp_path: Path) -> None:
+    rigidsim.run(experiment, out=tmp_path)
+    [path] = rigidsim.export(tmp_path / "free", "csv", tmp_path / "some.csv", variables=["energy"])
+    assert list(pandas.read_csv(path, comment="#").columns) == ["time", "energy"]
+    for names, kind, told in ((["no"], "csv", "given no; allowed: "), (["energy"], "aem", "prescribes")):
+        with pytest.raises(rigidsim.RigidsimError, match=told):
+            rigidsim.export(tmp_path / "free", kind, tmp_path / "none", variables=names)
 
 
 def at(row: int, value: float, values: np.ndarray) -> np.ndarray:

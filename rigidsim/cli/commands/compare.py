@@ -10,8 +10,11 @@ from rigidsim.workflows.read import load
 
 def compare(
     config: Path, file: Path, overrides: list[str] | None, within: float, out: Path | None,
-    figure: Path | None, as_json: bool,
+    figure: Path | None, timeline: Path | None, kernels: list[Path] | None, as_json: bool,
 ) -> None:  # fmt: skip
     """Judge another tool's trajectory."""
-    found = compared(load(config, overrides=overrides or []), file, within=within, out=out, figure=figure)
+    given = load(config, overrides=overrides or [])
+    found = compared(
+        given, file, within=within, out=out, figure=figure, timeline=timeline, kernels=kernels or ()
+    )
     answer(as_json, found.as_dict(), print_comparison, found)

@@ -11,7 +11,7 @@ from rigidsim.cli.screens.physics import print_physics
 from rigidsim.cli.screens.plan import print_plan, print_tradeoff
 from rigidsim.cli.screens.summary import print_checked
 from rigidsim.cli.screens.sweeps import print_sweep_plan
-from rigidsim.errors import ConfigError, Problem
+from rigidsim.errors import ConfigError, Problem, RigidsimError
 from rigidsim.scene.editor_schema import editor_schema
 from rigidsim.scene.sweeps.sweep import Sweep
 from rigidsim.workflows.physics.required import required_physics
@@ -79,7 +79,7 @@ def plan(
 
 def tradeoff(
     config: Path, overrides: list[str] | None, out: Path, budget: float, repeats: int, full: bool,
-    force: bool, as_json: bool,
+    files: list[str] | None, force: bool, as_json: bool,
 ) -> None:  # fmt: skip
     """Measure speed against accuracy of a scene."""
     experiment = load(config, overrides=overrides or [])
@@ -88,9 +88,20 @@ def tradeoff(
         print(f"{experiment.config.name}: {text}", file=sys.stderr, flush=True)
 
     result = measuring.tradeoff(
-        experiment, out=out, budget=budget, repeats=repeats, full=full, force=force, told=told
-    ).as_dict()
+        experiment, others=[_file_and_seconds(text) for text in files or ()],
+        out=out, budget=budget, repeats=repeats, full=full, force=force, told=told,
+    ).as_dict()  # fmt: skip
     answer(as_json, result, print_tradeoff, result)
+
+
+def _file_and_seconds(text: str) -> tuple[Path, float]:
+    file, _, seconds = text.rpartition(",")
+    try:
+        return Path(file), float(seconds)
+    except ValueError:
+        raise RigidsimError(
+            f"--with: given {text}; a file and its CPU time in s are allowed: theirs.csv,1.7"
+        ) from None
 
 
 def schema() -> None:

@@ -14,9 +14,10 @@ from rigidsim.look.figures import available, check_name, figure_format, save_fig
 from rigidsim.look.figures.spectrum import save_spectrum
 from rigidsim.look.figures.sweep_maps import drawable, save_sweep_figure
 from rigidsim.store import atomic
-from rigidsim.store.run import open_run
+from rigidsim.store.run import SavedRun, open_run
 from rigidsim.store.sweeps.folder import is_sweep
 from rigidsim.store.sweeps.run import SavedSweep, open_sweep
+from rigidsim.workflows.compare.as_run import TrajectoryRun, open_any
 from rigidsim.workflows.view import render, runs_of, show
 
 ALL = "all"
@@ -24,21 +25,26 @@ ALL = "all"
 
 def analyse(run_path: Path, variable: list[str] | None, lines: int, out: Path | None, as_json: bool) -> None:
     """Find lines, save them, print them."""
-    opened = open_run(run_path)
+    opened = open_any(run_path)
+    _tell_notes(opened)
     analysis = analysing.analyse(opened, variable or (), lines=lines)
-    saved = analysing.save(analysis, out or opened.folder.analysis)
+    usual = opened.folder.analysis if isinstance(opened, SavedRun) else opened.beside("analysis.h5")
+    saved = analysing.save(analysis, out or usual)
     answer(as_json, analysis.as_dict(), print_analysis, analysis, saved)
 
 
 def export(
     run_path: Path, file_format: str, out: Path | None, force: bool, angle_unit: str | None,
     epoch: str | None, axes: str | None, object_name: str | None, object_id: str | None,
+    variable: list[str] | None,
 ) -> None:  # fmt: skip
     """Write a run or a sweep for other tools."""
     given = {"epoch": epoch, "axes": axes, "object_name": object_name, "object_id": object_id}
     naming = Naming(**{key: value for key, value in given.items() if value is not None})
     saved = open_sweep(run_path) if is_sweep(run_path) else open_run(run_path)
-    written = exporting.export(saved, file_format, out, force=force, naming=naming, angle_unit=angle_unit)
+    written = exporting.export(
+        saved, file_format, out, force=force, naming=naming, angle_unit=angle_unit, variables=variable or ()
+    )
     for path in written:
         print(path)
 
@@ -46,7 +52,8 @@ def export(
 def plot(run_path: Path, what: list[str] | None, out: Path | None) -> None:
     """Draw figures of a run, or maps of a sweep."""
     swept = is_sweep(run_path)
-    saved = open_sweep(run_path) if swept else open_run(run_path)
+    saved = open_sweep(run_path) if swept else open_any(run_path)
+    _tell_notes(saved)
     wanted = list(dict.fromkeys(what or []))
     try:
         for name in () if swept else (one for one in wanted if one != ALL):
@@ -61,8 +68,13 @@ def plot(run_path: Path, what: list[str] | None, out: Path | None) -> None:
             wanted = [*(drawable(dataset) if swept else available(dataset))]
         for name in wanted or [OVERVIEW]:
             own = "" if name == OVERVIEW else "_" + name.replace("[", "_").replace("]", "")
-            folder = saved.folder.path if out is None else out
-            target = folder / f"figure{own}.png" if several or out is None else out
+            usual = f"figure{own}.png"
+            if isinstance(saved, TrajectoryRun):
+                usual = saved.beside(usual).name
+                folder = saved.path.parent if out is None else out
+            else:
+                folder = saved.folder.path if out is None else out
+            target = folder / usual if several or out is None else out
             try:
                 kind = figure_format(target)
                 with atomic.replacing(target) as new:
@@ -99,10 +111,18 @@ def view(
     if seconds is not None and not {".gif", ".mp4"} & set(asked):
         raise RigidsimError("view: --seconds is for --gif and --mp4: give one of them, too")
     named = runs_of(run_paths, member or ())
+    for _, one in named:
+        _tell_notes(one)
     for target in asked.values():
         render(named, target, seconds=seconds, told=_tell if sys.stderr.isatty() else None)
         print(target)
     return 0 if asked else show(named, web=web)
+
+
+def _tell_notes(opened: object) -> None:
+    """Say how the file of another tool was read."""
+    for text in opened.notes if isinstance(opened, TrajectoryRun) else ():
+        print(f"note: {text}", file=sys.stderr)
 
 
 def _tell(done: int, count: int) -> None:

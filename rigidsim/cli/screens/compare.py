@@ -64,13 +64,21 @@ def print_comparison(found: Comparison) -> None:
                     f"{words}, in windows of {span_text(local.window_s, 3)}",
                 ]
             )
+        if local.order is not None:
+            rows.append(["  order", f"{local.order:.2g}", "by their growth with the interval"])
+        if local.step_tolerance is not None:
+            rows.append(["  of its steps", _angle(local.step_tolerance), "held, if rows are its steps"])
     on.table(["", "largest", ""], rows)
     if found.first_disagreement is not None:
         first = found.first_disagreement
         on.line("first", f"beyond {_angle(found.within)} at {first.time:.6g} s, {first.row}")
     for text in found.told:
         on.line("note", text)
-    for label, name in (("dataset", found.dataset_file), ("figure", found.figure_file)):
+    for label, name in (
+        ("dataset", found.dataset_file),
+        ("figure", found.figure_file),
+        ("timeline", found.timeline_file),
+    ):
         if name:
             on.line(label, name)
 

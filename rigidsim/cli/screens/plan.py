@@ -128,6 +128,11 @@ def print_tradeoff(result: dict[str, Any]) -> None:
     if marked:
         less = next(row["seconds"] for row in result["advice"] if row["less"])
         on.say(f"  * over the first {span_text(less)} only: quadruple precision is slow")
+    for other in result["others"]:
+        on.line(
+            "with",
+            f"{other['name']}: {other['error_rad']:.1e} rad at {other['cpu_ratio']:.3g}, {other['verdict']}",
+        )
     part = over / result["horizon_seconds"]
     how_much = "all" if part >= 1 else f"the first {100 * part:.2g} %"
     on.line("measured", f"{how_much} of {span_text(result['horizon_seconds'])}; nothing is extrapolated")

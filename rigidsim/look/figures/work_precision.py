@@ -16,13 +16,21 @@ from rigidsim.scene.readable import span_text
 
 _COLORS = {"single": "#8c8c8c", "double": "#2166ac", "extended": "#e08214", "quadruple": "#762a83"}
 _OTHER = "#1b9e77"
+_OTHERS = "#c0392b"
 _MARKERS = {"quaternion": "o", "rotation_matrix": "s", "euler_angles": "^", "canonical": "D"}
 _STEPLESS = "*"
 _FRONT = "#1b2733"
 
 
 def save_work_precision(dataset: xarray.Dataset, path: Path) -> Path:
-    """Draw a tradeoff dataset as a page (PNG): the plot, and a key to its numbered points."""
+    """Draw a tradeoff dataset as a page (PNG)."""
+    with rc_context(STYLE):  # type: ignore[arg-type]
+        work_precision_figure(dataset).savefig(path, dpi=130, format="png")
+    return path
+
+
+def work_precision_figure(dataset: xarray.Dataset) -> Figure:
+    """The figure of a tradeoff dataset: the plot, and a key to its numbered points."""
     with rc_context(STYLE):  # type: ignore[arg-type]
         figure = ShownFigure(figsize=(12, 6.4), layout="constrained")
         left, right = figure.subplots(1, 2, width_ratios=(1.55, 1))
@@ -33,8 +41,7 @@ def save_work_precision(dataset: xarray.Dataset, path: Path) -> Path:
         figure.set_layout_engine("none")  # the numbers are placed by what is drawn now
         error, cost, front = _plotted(dataset)
         _number(left, cost[front], error[front])
-        figure.savefig(path, dpi=130, format="png")
-    return path
+    return figure
 
 
 def draw_points(axes: Axes, dataset: xarray.Dataset) -> None:
@@ -49,6 +56,7 @@ def draw_points(axes: Axes, dataset: xarray.Dataset) -> None:
             alpha=0.45 if short[n] else 1.0, linestyle="none", zorder=3,
         )  # fmt: skip
     _draw_models(axes, dataset)
+    _draw_others(axes, dataset)
     axes.set_xscale("log")
     axes.set_yscale("log")
     if len(front):
@@ -68,6 +76,18 @@ def _draw_models(axes: Axes, dataset: xarray.Dataset) -> None:
         axes.annotate(
             str(one["model"].item()).replace("_", " "), place, xytext=(9, 0), textcoords="offset points",
             va="center", fontsize=8.5, color=_OTHER,
+        )  # fmt: skip
+
+
+def _draw_others(axes: Axes, dataset: xarray.Dataset) -> None:
+    """Draw trajectories of other tools, with their names."""
+    for n in range(dataset.sizes.get("other", 0)):
+        one = dataset.isel(other=n)
+        place = float(one["other_cpu_ratio"]), float(one["other_error"])
+        axes.plot(*place, "X", markersize=9, color=_OTHERS, linestyle="none", zorder=3)
+        axes.annotate(
+            str(one["other"].item()), place, xytext=(-8, 0), textcoords="offset points",
+            ha="right", va="center", fontsize=8.5, color=_OTHERS,
         )  # fmt: skip
 
 
@@ -117,11 +137,15 @@ def _legend(axes: Axes, dataset: xarray.Dataset, short: bool) -> None:
     handles.append(handle("filled: invariants held", marker="o", color="#444444"))
     if "model" in dataset.sizes:
         handles.append(handle("averaged model: axes, to the end", marker="P", color=_OTHER))
+    if "other" in dataset.sizes:
+        handles.append(handle("another tool's file", marker="X", color=_OTHERS))
     if short:
         handles.append(handle("pale: over less of the motion", marker="o", color="#444444", alpha=0.45))
     handles.append(Line2D([], [], color=_FRONT, linewidth=1.1, label="best of all (numbered)"))
     # models are cheap, and not exact
     place: Any = "lower left" if "model" in dataset.sizes else "upper right"
+    if "other" in dataset.sizes:  # which may be anywhere
+        place = "best"
     axes.legend(handles=handles, loc=place, ncols=2, fontsize=8, frameon=True, framealpha=0.9)
 
 

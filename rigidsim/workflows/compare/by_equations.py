@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import xarray
 
-from rigidsim.solve.from_states import FromStates
+from rigidsim.solve.from_states import FromStates, RowStates
 from rigidsim.workflows.compare import defects
 from rigidsim.workflows.compare.motion import OwnMotion
 from rigidsim.workflows.compare.result import LocalDefects, TrajectoryDrift
@@ -45,15 +45,16 @@ class ByEquations:
     windows: defects.WindowDefects | None = None
     missing: str = _NO_RATES
     told: list[str] = field(default_factory=list)
+    intervals: np.ndarray = field(default_factory=lambda: np.empty(0))  # of local defects, s
 
     def measure(self) -> None:
         """Measure all of it."""
-        base = self.equations.motion(self.times)
+        base = self.equations.motion(self.times) if self.own.states is None else self.own.states
         if self.equations.others:
             names = ", ".join(self.equations.others)
             self.told.append(f"the file has no {names}: each interval begins with the experiment's own")
         rates = self.own.rates if self.rates is None else self.rates
-        states = self.equations.states(base, self.quaternions, rates, self.flight)
+        states = RowStates(self.equations, base, self.quaternions, rates, self.flight)
         self._drifts(states)
         count = len(self.times) - 1
         starts = np.unique(np.linspace(0, count - 1, min(count, _MOST_STARTS)).astype(int))
@@ -70,7 +71,7 @@ class ByEquations:
         self.missing = f"rows are too far apart ({spacing:.3g} s, at {rate:.3g} rad/s)"
         self._keep(starts, np.linalg.norm(rows.attitude, axis=1), np.linalg.norm(rows.rates, axis=1))
 
-    def _drifts(self, states: np.ndarray) -> None:
+    def _drifts(self, states: RowStates) -> None:
         found = {} if self.rates is None else self.equations.drifts(states, self.times)
         found.pop(_NORM, None)  # of quaternions that were normalised
         if self.norms is not None:
@@ -81,10 +82,10 @@ class ByEquations:
             attributes = {"units": "1", "long_name": f"drift of {name.replace('_', ' ')}"}
             self.dataset[f"{name}_drift"] = ("time", values, attributes)
 
-    def _by_shooting(self, states: np.ndarray, starts: np.ndarray) -> None:
+    def _by_shooting(self, states: RowStates, starts: np.ndarray) -> None:
         """Without rates in the file: those that lead to the next row also lead to the one beyond it."""
         shot = defects.shot_rates(self.equations, self.times, states, starts)
-        quaternions, _ = self.equations.attitude(states)
+        quaternions = self.quaternions
         begun = self.equations.states(states[starts], quaternions[starts], shot)
         ends = [
             self.equations.after(state, self.times[n], self.times[n + 2 : n + 3])[0]
@@ -100,6 +101,7 @@ class ByEquations:
     def _keep(self, starts: np.ndarray, sizes: np.ndarray, rates: np.ndarray | None) -> None:
         """Local defects as values, and along time in the dataset."""
         put, windows = self.dataset, self.windows
+        self.intervals = self.times[starts + 1] - self.times[starts]
         put["defect"] = ("start", sizes, {"units": "rad", "long_name": "local defect of the attitude"})
         put["defect_time"] = ("start", self.times[starts], {"units": "s", "long_name": "time of the row"})
         if rates is not None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from decimal import Decimal
 from fractions import Fraction
 
@@ -16,7 +16,9 @@ from rigidsim.scene.epochs import Epoch
 from rigidsim.scene.exact import parse_number
 
 LEAST_ROWS = 3
-_NORM = 1e-3  # that the norm of a quaternion may differ from the median, beyond which a row is damaged
+_NORM = 1e-3  # that the usual norm of a quaternion may differ from one, beyond which it is told
+_DAMAGED = 0.05  # that a norm may differ from those around it; integrators let it drift, and more slowly
+_AROUND = 2  # rows on each side
 _GAP = 1000.0  # times the median spacing, from which on a gap is told
 _FIXED = 0.6  # share of numbers with the same count of decimals that a fixed format makes
 _DOUBLE_DIGITS = 15
@@ -40,6 +42,7 @@ class Attitudes:
     """The columns of a trajectory by what they are; each array has a row for each time.
 
     Attributes:
+        trajectory: with the columns that are none of the others here.
         times: as in the file, in ``time_unit``, which is None where the file doesn't say.
         quaternions: (rows, 4) in the order of their columns, or as w x y z where ``named`` says so.
         matrices: (rows, 3, 3). angles: (rows, 3), in ``angle_unit``.
@@ -113,8 +116,8 @@ def attitudes_of(found: Trajectory, epoch: Epoch | None) -> Attitudes:
     )  # fmt: skip
     if made.quaternions is None and made.matrices is None and made.angles is None:
         raise RigidsimError(
-            f"{found.source}: no attitude among its columns ({', '.join(found.columns)}); name it "
-            "qw qx qy qz, q0 q1 q2 q3, r11 ... r33, or euler_1 euler_2 euler_3"
+            f"{found.source}: no attitude among its columns ({', '.join(found.columns)}), which all of a "
+            "comparison is about; name it qw qx qy qz, q0 q1 q2 q3, r11 ... r33, or euler_1 euler_2 euler_3"
         )
     _refuse_rows(made, used)
     _tell_gaps(made)
@@ -124,7 +127,9 @@ def attitudes_of(found: Trajectory, epoch: Epoch | None) -> Attitudes:
         _resolution(attitude, found.narrow),
         0.0 if made.rates is None else _resolution(made.rates, found.narrow),
     )
-    return Attitudes(**{**made.__dict__, "resolution": resolution})
+    taken = {name for names in used.values() for name in names}  # which is held already
+    others = {name: values for name, values in found.columns.items() if name not in taken}
+    return replace(made, trajectory=replace(found, columns=others), resolution=resolution)
 
 
 def _plain(name: str) -> str:
@@ -278,7 +283,7 @@ def _refuse_rows(made: Attitudes, used: Mapping[str, Sequence[str]]) -> None:
     if made.quaternions is not None:
         norms = np.linalg.norm(made.quaternions, axis=1)
         usual = float(np.median(norms))
-        bad = np.flatnonzero(np.abs(norms - usual) > _NORM * max(usual, 1e-300))
+        bad = np.flatnonzero(np.abs(norms - _smoothed(norms)) > _DAMAGED * max(usual, 1e-300))
         if (len(bad) and len(bad) < len(norms) / 10) or not usual:
             at = bad[0] if len(bad) else 0
             raise RigidsimError(
@@ -294,6 +299,12 @@ def _refuse_rows(made: Attitudes, used: Mapping[str, Sequence[str]]) -> None:
             raise RigidsimError(
                 f"{found.source}: {found.row(bad[0])}: the matrix is no rotation ({len(bad):,} such rows)"
             )
+
+
+def _smoothed(values: np.ndarray) -> np.ndarray:
+    """Median of each value and those around it."""
+    padded = np.pad(values, _AROUND, mode="edge")
+    return np.median([padded[n : n + len(values)] for n in range(2 * _AROUND + 1)], axis=0)
 
 
 def _tell_gaps(made: Attitudes) -> None:

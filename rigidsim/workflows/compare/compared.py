@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -9,12 +10,11 @@ from typing import Any
 import numpy as np
 import xarray
 
-from rigidsim.errors import RigidsimError, RunFolderError
-from rigidsim.formats.trajectories import Trajectory, read_trajectory, trajectory_of
+from rigidsim.errors import RigidsimError
 from rigidsim.scene.config import Experiment
-from rigidsim.solve.from_states import FromStates, NotFromStates
-from rigidsim.store.run import Run, open_run
+from rigidsim.solve.from_states import FromStates, NotFromStates, blocks_of
 from rigidsim.workflows.compare import defects
+from rigidsim.workflows.compare.as_run import dataset_of_rows, trajectory_given
 from rigidsim.workflows.compare.by_equations import ByEquations
 from rigidsim.workflows.compare.columns import Attitudes, attitudes_of, seconds_in
 from rigidsim.workflows.compare.conventions import (
@@ -24,15 +24,18 @@ from rigidsim.workflows.compare.conventions import (
     find_rates,
     rows_compared,
 )
-from rigidsim.workflows.compare.motion import OwnMotion, own_motion, plain
+from rigidsim.workflows.compare.kinematics import Turning, turning_readings
+from rigidsim.workflows.compare.motion import OwnMotion, own_motion, plain, sampled_run
+from rigidsim.workflows.compare.own_steps import own_steps
 from rigidsim.workflows.compare.result import (
+    INTEGRATION_ERROR,
     AttitudeError,
     Comparison,
     Disagreement,
     FoundConvention,
 )
 from rigidsim.workflows.compare.rotations import angles_between, normalised
-from rigidsim.workflows.compare.saving import save_dataset, save_figure
+from rigidsim.workflows.compare.saving import DRAWN, MOST_SHOWN, save_dataset, save_figure, save_timeline
 from rigidsim.workflows.compare.verdict import Evidence, judged
 from rigidsim.workflows.physics.models import rotation_vectors
 from rigidsim.workflows.read import Given, as_experiment
@@ -41,6 +44,7 @@ WITHIN = 1e-9
 """Largest angle (rad) between attitudes that agree, if nothing else is asked for."""
 _MOST_OWN = 20_000  # rows, up to which the experiment's own method gives the motion at all of them
 _UNITS = ("s", "ms", "min", "h", "day", "yr")
+_FAR = np.log(0.02)  # the same, above which only conventions are tried in which it turns at its rates
 _BAD = np.log(0.15)  # mean logarithm of mismatches (rad), above which times in another unit are tried
 
 
@@ -51,6 +55,8 @@ def compare(
     within: float = WITHIN,
     out: str | Path | None = None,
     figure: str | Path | None = None,
+    timeline: str | Path | None = None,
+    kernels: Sequence[str | Path] = (),
 ) -> Comparison:
     """Judge a trajectory by how far it is from an experiment, at its own times.
 
@@ -60,6 +66,8 @@ def compare(
             a pandas DataFrame, or an xarray Dataset. Columns are known by their names (docs/compare.md).
         within: rad, what attitudes may differ by and agree.
         out: file for the dataset. figure: file for the figure, a .png or .svg.
+        timeline: file for a timeline (.rrd) of both bodies with the angle between them.
+        kernels: SPICE's, that a CK is read with: its clock, and leap seconds.
 
     Raises:
         ConfigError: the config can't be run.
@@ -67,8 +75,7 @@ def compare(
     """
     asked = as_experiment(experiment)
     quiet, scene = plain(asked)
-    found = _trajectory(table)
-    given = attitudes_of(found, scene.epoch)
+    given = attitudes_of(trajectory_given(table, scene, kernels), scene.epoch)
     if not 0 < within < np.pi:
         raise RigidsimError(f"within: given {within:g}; an angle above 0 and below pi, in rad, is allowed")
     try:
@@ -82,6 +89,8 @@ def compare(
         result = _with(result, dataset_file=str(save_dataset(result.dataset, Path(out))))
     if figure is not None:
         result = _with(result, figure_file=str(save_figure(result.dataset, Path(figure))))
+    if timeline is not None:
+        result = _with(result, timeline_file=str(judging.drawn(Path(timeline))))
     return result
 
 
@@ -89,21 +98,6 @@ def _with(result: Comparison, **values: str) -> Comparison:
     made, dataset = result.having(**values), result.dataset
     made._dataset = dataset
     return made
-
-
-def _trajectory(table: Any) -> Trajectory:
-    if isinstance(table, Run):
-        with table.dataset as dataset:
-            return trajectory_of(dataset, table.place)
-    if not isinstance(table, str | Path):
-        return trajectory_of(table)
-    path = Path(table)
-    if path.is_dir() and path.suffix != ".zarr":
-        try:
-            return _trajectory(open_run(path))
-        except RunFolderError:
-            raise
-    return read_trajectory(path)
 
 
 @dataclass
@@ -120,6 +114,7 @@ class _Judging:
     def compared(self, name: str, within: float) -> Comparison:
         """Everything, in order: unit of time, convention, errors, drifts, defects, verdict."""
         self.told = list(self.given.told)
+        self.turning: list[Turning] = []
         unit, found, sampled = self._convention()
         times = self.given.times * seconds_in(unit)
         own = self._own(times, sampled)
@@ -127,17 +122,21 @@ class _Judging:
             self.told.append(f"the experiment's motion {own.ended}; later rows aren't compared")
         count = len(own.rates)
         times, theirs = times[:count], found.quaternions(self.given)[:count]
-        errors = np.linalg.norm(
-            rotation_vectors([normalised(own.quaternions[0]), *own.quaternions[1:]], [theirs]), axis=1
-        )
-        rows = rows_compared(count)
+        errors = np.concatenate([_errors(own, theirs, rows) for rows in blocks_of(count)])
+        compared = rows_compared(count)
         rates: np.ndarray | None = None
         reading: RateReading | None = None
         more: list[str] = []
         if self.given.rates is not None:
-            reading, more = find_rates(self.given, found, rows, theirs[rows], own.rates[rows])
-            rates = reading.rates(self.given.rates[:count], found, theirs)
+            allowed = {one.rates for one in self.turning if one.reading == found.reading}
+            reading, more = find_rates(
+                self.given, found, compared, theirs[compared], own.rates[compared], allowed
+            )
+            rates = np.concatenate(
+                [reading.rates(self.given.rates[rows], found, theirs[rows]) for rows in blocks_of(count)]
+            )
         flight = self._flight(count)
+        self.read = times, found, reading
         dataset = _dataset(times, errors, name, self.given.trajectory.source)
         rate_errors = None if rates is None else np.linalg.norm(rates - own.rates, axis=1)
         known = self._by_equations(times, theirs, rates, own, flight, dataset)
@@ -158,6 +157,10 @@ class _Judging:
             missing,
         )
         verdict, why = judged(seen)
+        local = None if known is None else known.local
+        if known is not None and local is not None and verdict == INTEGRATION_ERROR:
+            steps = own_steps(known.intervals, dataset["defect"].values, attitude_noise)
+            local = local.having(order=steps.order, step_tolerance=steps.tolerance)
         if rate_errors is not None:
             dataset["rate_error"] = (
                 "time",
@@ -192,7 +195,7 @@ class _Judging:
             position_error=position_error,
             convention=_described(found, unit, reading, more),
             drifts=[] if known is None else known.drifts,
-            local_defects=None if known is None else known.local,
+            local_defects=local,
             first_disagreement=Disagreement(
                 time=float(times[apart_rows[0]]), row=trajectory.row(apart_rows[0])
             )
@@ -202,6 +205,16 @@ class _Judging:
         )
         made._dataset = dataset
         return made
+
+    def drawn(self, path: Path) -> Path:
+        """Write the timeline of both, after ``compared``."""
+        times, found, reading = self.read
+        rows = np.unique(np.linspace(0, len(times) - 1, min(len(times), MOST_SHOWN)).astype(int))
+        own = sampled_run(self.experiment, times[rows]).dataset
+        name = Path(self.given.trajectory.source).stem
+        looks = {key: own.attrs[key] for key in DRAWN if key in own.attrs} | {"title": name}
+        theirs = dataset_of_rows(self.given, times, found, reading, looks).isel(time=rows)
+        return save_timeline(own, theirs, name, path)
 
     def _convention(self) -> tuple[str, FoundReading, tuple[np.ndarray, OwnMotion]]:
         """Unit of the times and convention of the attitude, with the motion at the rows compared."""
@@ -235,10 +248,15 @@ class _Judging:
             self.told.append(
                 f"times were taken for {best[0]}, by which the attitudes fit best; name a unit: t [{best[0]}]"
             )
+        if best[1].score > _FAR:  # another model may be nearer in another convention: its rates tell
+            unit, found, (kept, own) = best
+            times = self.given.times * seconds_in(unit)
+            self.turning = turning_readings(self.given, times, signs=True)
+            allowed = {one.reading for one in self.turning}
+            best = unit, find_convention(self.given, kept, own.quaternions[0], allowed), (kept, own)
         if best[1].score > _BAD:
-            self.told.append(
-                "no convention tried brings it near the experiment: the convention found may be wrong"
-            )
+            why = "this is one in which it turns at its rates" if self.turning else "that found may be wrong"
+            self.told.append(f"no convention tried brings it near the experiment: {why}")
         return best
 
     def _own(self, times: np.ndarray, sampled: tuple[np.ndarray, OwnMotion]) -> OwnMotion:
@@ -259,7 +277,7 @@ class _Judging:
         )
         flight = self.equations.flight(states)
         place, speed = (None, None) if flight is None else (flight[:, :3], flight[:, 3:])
-        return OwnMotion([quaternions], rates, place, speed, max(own.uncertainty, float(apart)), "")
+        return OwnMotion([quaternions], rates, place, speed, max(own.uncertainty, float(apart)), "", states)
 
     def _flight(self, count: int) -> np.ndarray | None:
         if self.given.positions is None or self.given.velocities is None:
@@ -296,6 +314,12 @@ class _Judging:
             return None
         self.told += found.told
         return found
+
+
+def _errors(own: OwnMotion, theirs: np.ndarray, rows: slice) -> np.ndarray:
+    """Angles (rows,), rad, between attitudes."""
+    one = [part[rows] for part in own.quaternions]
+    return np.linalg.norm(rotation_vectors([normalised(one[0]), *one[1:]], [theirs[rows]]), axis=1)
 
 
 def _dataset(times: np.ndarray, errors: np.ndarray, name: str, source: str) -> xarray.Dataset:

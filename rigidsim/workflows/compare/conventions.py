@@ -8,12 +8,13 @@ named, since this motion can't tell them apart.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
 from rigidsim.scene.rotations import quaternion_of
+from rigidsim.solve.from_states import blocks_of
 from rigidsim.workflows.compare.columns import Attitudes
 from rigidsim.workflows.compare.rotations import (
     SEQUENCES,
@@ -129,7 +130,12 @@ class FoundReading:
 
     def quaternions(self, given: Attitudes) -> np.ndarray:
         """All attitudes in the experiment's convention and axes."""
-        return self.frames.applied(self.reading.quaternions(given, slice(None)))
+        return np.concatenate(
+            [
+                self.frames.applied(self.reading.quaternions(given, rows))
+                for rows in blocks_of(len(given.times))
+            ]
+        )
 
 
 def rows_compared(count: int) -> np.ndarray:
@@ -139,10 +145,14 @@ def rows_compared(count: int) -> np.ndarray:
     return np.unique(np.concatenate([even, early]).astype(int))
 
 
-def find_convention(given: Attitudes, rows: np.ndarray, motion: np.ndarray) -> FoundReading:
-    """The reading nearest to the experiment's attitudes (rows, 4) at these rows."""
+def find_convention(
+    given: Attitudes, rows: np.ndarray, motion: np.ndarray, allowed: Collection[Reading] = ()
+) -> FoundReading:
+    """The reading nearest to the experiment's attitudes (rows, 4) at these rows; of those allowed, if any."""
     tried = []
-    for cost, reading in enumerate(_readings(given)):
+    for cost, reading in enumerate(readings(given)):
+        if allowed and reading not in allowed:
+            continue
         read = reading.quaternions(given, rows)
         tried.append((_score(read, motion), cost, reading, NONE, read))
     best = min(tried, key=lambda x: x[0])[0]
@@ -166,8 +176,8 @@ def _axes(frames: Frames) -> str:
     return "" if frames.side == "none" else f", other {frames.side} axes"
 
 
-def _readings(given: Attitudes) -> Iterator[Reading]:
-    """All readings, the plainest first."""
+def readings(given: Attitudes) -> Iterator[Reading]:
+    """All ways to read an attitude, the plainest first."""
     directions = (BODY_TO_SPACE, SPACE_TO_BODY)
     if given.quaternions is not None:
         orders = ("wxyz",) if given.named else ("wxyz", "xyzw")
@@ -224,25 +234,37 @@ class RateReading:
         return turned(conjugated(quaternions), values)
 
 
+def possible_rates(given: Attitudes) -> list[RateReading]:
+    """Units and axes in which rates may be written, the plainest first; none with the other sign."""
+    units = [given.rate_unit] if given.rate_unit in _RATE_UNITS else list(_RATE_UNITS)
+    return [RateReading(str(unit), axes, False) for unit in units for axes in ("body", "space")]
+
+
 def find_rates(
-    given: Attitudes, found: FoundReading, rows: np.ndarray, quaternions: np.ndarray, motion: np.ndarray
+    given: Attitudes,
+    found: FoundReading,
+    rows: np.ndarray,
+    quaternions: np.ndarray,
+    motion: np.ndarray,
+    allowed: Collection[RateReading] = (),
 ) -> tuple[RateReading, list[str]]:
     """The reading of rates nearest to the experiment's (rows, 3), and others that are equally near.
 
     Args:
         quaternions: attitudes of these rows as the trajectory has them, in the experiment's convention.
+        allowed: readings that may be taken; any if there are none.
     """
     assert given.rates is not None
-    units = [given.rate_unit] if given.rate_unit in _RATE_UNITS else list(_RATE_UNITS)
     size = float(np.sqrt(np.mean(np.sum(motion**2, axis=1)))) or 1.0
     tried = []
-    for unit in units:
-        for axes in ("body", "space"):
-            for negative in (False, True):
-                reading = RateReading(str(unit), axes, negative)
-                read = reading.rates(given.rates[rows], found, quaternions)
-                apart = np.linalg.norm(read - motion, axis=1) / size
-                tried.append((float(np.mean(np.log(apart + _LEAST))), reading))
+    for reading in (
+        RateReading(x.unit, x.axes, sign) for x in possible_rates(given) for sign in (False, True)
+    ):
+        if allowed and reading not in allowed:
+            continue
+        read = reading.rates(given.rates[rows], found, quaternions)
+        apart = np.linalg.norm(read - motion, axis=1) / size
+        tried.append((float(np.mean(np.log(apart + _LEAST))), reading))
     best = min(score for score, _ in tried)
     near = [reading for score, reading in tried if score <= best + _ALIKE]
     return near[0], [_rate_words(x) for x in near[1:]]

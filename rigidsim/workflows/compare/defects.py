@@ -17,11 +17,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rigidsim.solve.from_states import FromStates
+from rigidsim.solve.from_states import FromStates, RowStates
 from rigidsim.workflows.compare.rotations import conjugated, multiplied, normalised, turned, vector_of
 
 _WINDOW = 0.5  # times the rate of the motion: length of a window, where the rows allow it
 _PARTS = 4  # of a window
+_MOST_RATES = 20_000  # rows that the rate of a motion is the mean of
 _COARSEST = 4.0  # times the rate: length of a window beyond which the integral isn't resolved
 
 
@@ -64,22 +65,23 @@ class WindowDefects:
 
 def motion_rate(times: np.ndarray, rates: np.ndarray) -> float:
     """The rate of a motion, rad/s: that of its turning, or of the change of its rates, if that is faster."""
-    size = float(np.sqrt(np.mean(np.sum(rates**2, axis=1))))
-    steps = np.diff(times)
-    change = np.diff(rates, axis=0) / steps[:, None]
+    rows = np.unique(np.linspace(0, len(times) - 2, min(len(times) - 1, _MOST_RATES)).astype(int))
+    size = float(np.sqrt(np.mean(np.sum(rates[np.append(rows, rows[-1] + 1)] ** 2, axis=1))))
+    steps = times[rows + 1] - times[rows]
+    change = (rates[rows + 1] - rates[rows]) / steps[:, None]
     bend = float(np.sqrt(np.sum(change**2, axis=1) @ steps / steps.sum()))
     return max(size, bend / size if size else 0.0)
 
 
-def row_defects(equations: FromStates, times: np.ndarray, states: np.ndarray, rows: np.ndarray) -> RowDefects:
-    """Defects from some rows to the next ones; ``states`` (all rows, states) are the trajectory's."""
+def row_defects(equations: FromStates, times: np.ndarray, states: RowStates, rows: np.ndarray) -> RowDefects:
+    """Defects from some rows to the next ones; ``states`` are the trajectory's."""
     ends = np.stack([equations.after(states[n], times[n], times[n + 1 : n + 2])[0] for n in rows])
     attitude, rates = _apart(equations, states[rows + 1], ends)
     return RowDefects(rows, attitude, rates)
 
 
 def window_defects(
-    equations: FromStates, times: np.ndarray, states: np.ndarray, rate: float, most: int
+    equations: FromStates, times: np.ndarray, states: RowStates, rate: float, most: int
 ) -> WindowDefects | None:
     """Defects over at most so many windows; None where rows are too few or too far apart.
 
@@ -114,7 +116,7 @@ def window_defects(
 
 
 def _one(
-    equations: FromStates, times: np.ndarray, states: np.ndarray, rows: np.ndarray
+    equations: FromStates, times: np.ndarray, states: RowStates, rows: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, float] | None:
     """A window: rotation vector at its end, the integral of the rates' differences, these."""
     reference = equations.after(states[rows[0]], times[rows[0]], times[rows[1:]])
@@ -137,11 +139,11 @@ def _apart(equations: FromStates, theirs: np.ndarray, reference: np.ndarray) -> 
     return vector_of(turn), other[1] - one[1]
 
 
-def shot_rates(equations: FromStates, times: np.ndarray, states: np.ndarray, rows: np.ndarray) -> np.ndarray:
+def shot_rates(equations: FromStates, times: np.ndarray, states: RowStates, rows: np.ndarray) -> np.ndarray:
     """Rates (rows, 3) with which the equations lead from the attitude of each row to that of the next: for
     trajectories without rates, from the mean rate between the rows on, by three corrections.
     """
-    quaternions, near = equations.attitude(states)
+    quaternions, near = states.quaternions, states.rates
     spacing = times[rows + 1] - times[rows]
     mean = vector_of(multiplied(conjugated(quaternions[rows]), quaternions[rows + 1])) / spacing[:, None]
     fast = np.linalg.norm(near[rows], axis=1) * spacing > np.pi * 0.8

@@ -12,6 +12,7 @@ from rigidsim.errors import ConfigError, Problem, RigidsimError
 from rigidsim.scene.config import Experiment
 from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.scene import Scene, build_scene
+from rigidsim.store.run import Run
 from rigidsim.workflows.run import run
 
 _FLIGHT = ("position", "velocity")
@@ -26,6 +27,7 @@ class OwnMotion:
         rates: (rows, 3), rad/s, body axes. positions, velocities: (rows, 3), SI; None without flight.
         uncertainty: announced error of its attitude at the end, rad; 0 if unknown.
         ended: why the motion ended before the trajectory; empty if it didn't.
+        states: those of the scene's own motion by ``FromStates``, if it was found by these.
     """
 
     quaternions: list[np.ndarray]
@@ -34,6 +36,7 @@ class OwnMotion:
     velocities: np.ndarray | None
     uncertainty: float
     ended: str
+    states: np.ndarray | None = None
 
 
 def plain(experiment: Experiment) -> tuple[Experiment, Scene]:
@@ -58,19 +61,23 @@ def plain(experiment: Experiment) -> tuple[Experiment, Scene]:
     return quiet, build_scene(quiet)
 
 
+def sampled_run(experiment: Experiment, times: np.ndarray) -> Run:
+    """Run the experiment in memory, sampled at exactly these doubles (s, ascending)."""
+    listed = [ExactNumber(Fraction(time)) for time in times.tolist()]
+    table = experiment.config.time.model_copy(
+        update={"times": listed, "end": None, "samples": None, "every": None}
+    )
+    sampled = replace(experiment, config=experiment.config.model_copy(update={"time": table}))
+    return run(sampled, out=None, progress=False)
+
+
 def own_motion(experiment: Experiment, times: np.ndarray) -> OwnMotion:
     """Run the experiment, sampled at exactly these doubles (s, ascending).
 
     Raises:
         RigidsimError: the motion ends before the third of them.
     """
-    listed = [ExactNumber(Fraction(time)) for time in times.tolist()]
-    sampled = {"times": listed, "end": None, "samples": None, "every": None}
-    config = experiment.config
-    table = config.time.model_copy(update=sampled)
-    made = run(
-        replace(experiment, config=config.model_copy(update={"time": table})), out=None, progress=False
-    )
+    made = sampled_run(experiment, times)
     found = made.dataset
     if found.sizes["time"] < min(3, len(times)):
         raise RigidsimError(f"the experiment's motion {made.outcome.message}, before the trajectory begins")

@@ -77,6 +77,8 @@ class LocalDefects(SummaryPart):
         unexplained: of the windows' attitude defects, rms of what differences of the rates don't explain
             over rms of what they do.
         missing_acceleration: rms, rad/s^2, that would explain the rates' defects.
+        order: of the tool's method, and step_tolerance: rad, that errors of its steps are held to, if rows
+            are its steps; None where they don't show.
     """
 
     largest: float
@@ -87,6 +89,8 @@ class LocalDefects(SummaryPart):
     window_s: float | None
     unexplained: float | None
     missing_acceleration: float | None
+    order: float | None = None
+    step_tolerance: float | None = None
 
 
 class Disagreement(SummaryPart):
@@ -107,7 +111,7 @@ class Comparison(SummaryPart):
         rate_error: largest difference of angular velocities, rad/s; None without rates.
         position_error: the same of positions, m.
         told: what a user should know besides.
-        dataset_file, figure_file: where they were written; empty if nowhere.
+        dataset_file, figure_file, timeline_file: where they were written; empty if nowhere.
     """
 
     name: str
@@ -128,6 +132,7 @@ class Comparison(SummaryPart):
     told: list[str]
     dataset_file: str = ""
     figure_file: str = ""
+    timeline_file: str = ""
 
     _dataset: Any = PrivateAttr(default=None)
 

@@ -12,6 +12,9 @@ if TYPE_CHECKING:
     import xarray
 
 FIGURES = (".png", ".svg")
+DRAWN = ("drawing", "principal_moments", "principal_axes", "center_of_mass", "mass", "surroundings")
+"""Attributes of a run's dataset that its body is drawn by."""
+MOST_SHOWN = 20_000  # rows of a timeline
 
 
 def save_dataset(dataset: xarray.Dataset, path: Path) -> Path:
@@ -40,5 +43,23 @@ def save_figure(dataset: xarray.Dataset, path: Path) -> Path:
     except OSError as error:
         raise RigidsimError(
             f"{path}: can't be written: {error.strerror or error}; choose another name"
+        ) from None
+    return path
+
+
+def save_timeline(own: xarray.Dataset, theirs: xarray.Dataset, name: str, path: Path) -> Path:
+    """Write a timeline of the experiment and of a trajectory, side by side, and the angle between them."""
+    from rigidsim.look.timeline.comparison import write_comparison  # which loads rerun
+
+    if path.suffix.lower() != ".rrd":
+        raise RigidsimError(f"--timeline: given {path}; a name that ends in .rrd is allowed")
+    mine = str(own.attrs.get("title", "experiment"))
+    named = [(mine, own), (name if name != mine else f"{name} of the file", theirs)]
+    try:
+        with atomic.replacing(path) as temporary:
+            write_comparison(named, temporary)
+    except (OSError, RuntimeError) as error:
+        raise RigidsimError(
+            f"{path}: can't be written: {getattr(error, 'strerror', None) or error}; choose another name"
         ) from None
     return path

@@ -1,0 +1,173 @@
+"""A trajectory's file as a run, without an experiment beside it: to be viewed, plotted and analysed.
+
+Its convention is the one in which the attitude turns at the rates that the file has. Without rates only what
+names or matrices say by themselves is taken; the rest is refused, and ``compare`` finds it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any, Self
+
+import numpy as np
+import xarray
+
+from rigidsim.errors import RigidsimError
+from rigidsim.formats import ck_reading
+from rigidsim.formats.trajectories import Trajectory, is_trajectory, read_trajectory, trajectory_of
+from rigidsim.scene.scene import Scene
+from rigidsim.store.run import Run, SavedRun, open_run
+from rigidsim.store.summary import Brief
+from rigidsim.workflows.compare.columns import Attitudes, attitudes_of, seconds_in
+from rigidsim.workflows.compare.conventions import NONE, FoundReading, RateReading, Reading
+from rigidsim.workflows.compare.kinematics import turning_readings
+
+_AXES = {"body_axis": list("xyz"), "space_axis": list("XYZ"), "quaternion_component": list("wxyz")}
+
+
+@dataclass(frozen=True, repr=False)
+class TrajectoryRun(Run):
+    """A trajectory of another tool, shown as a run is."""
+
+    path: Path
+    outcome: Brief
+
+    @property
+    def place(self) -> str:
+        """The file."""
+        return str(self.path)
+
+    @cached_property
+    def dataset(self) -> xarray.Dataset:
+        """Attitude, rates and flight, in s, rad/s and SI, and all other columns as they are."""
+        return run_dataset(self.path)
+
+    @property
+    def notes(self) -> list[str]:
+        """What a user should know of how it was read."""
+        return str(self.dataset.attrs["comment"]).split("; ")
+
+    def concluded(self, outcome: Brief) -> Self:
+        """Nothing is saved of it."""
+        return self
+
+    def beside(self, name: str) -> Path:
+        """Where something that is made of it goes if nothing else is asked for."""
+        return self.path.with_name(f"{self.path.stem}_{name}")
+
+
+def trajectory_given(table: Any, scene: Scene, kernels: Sequence[str | Path]) -> Trajectory:
+    """The columns of a file, of a run or its folder, or of arrays, a DataFrame or a Dataset.
+
+    Args:
+        kernels: that a CK is read with, at times of the scene.
+    """
+    if isinstance(table, Run):
+        with table.dataset as dataset:
+            return trajectory_of(dataset, table.place)
+    if not isinstance(table, str | Path):
+        return trajectory_of(table)
+    path = Path(table)
+    if path.suffix.lower() == ck_reading.SUFFIX or kernels:
+        if scene.epoch is None:
+            raise RigidsimError(f"{path}: a CK holds dates; give the date of time 0 as [time] epoch")
+        span = float(scene.start), float(scene.samples.last)
+        return ck_reading.read_ck(path, [Path(one) for one in kernels], scene.epoch.since_j2000(), *span)
+    if path.is_dir() and path.suffix != ".zarr":
+        return trajectory_given(open_run(path), scene, kernels)
+    return read_trajectory(path)
+
+
+def open_any(path: str | Path) -> SavedRun | TrajectoryRun:
+    """A run's folder or dataset, or another tool's file.
+
+    Raises:
+        RunFolderError: neither, or a damaged run. RigidsimError: the file can't be read.
+    """
+    given = Path(path)
+    if not is_trajectory(given):
+        return open_run(given)
+    outcome = Brief(name=given.stem, status="finished", message=f"is the file {given.name}")
+    return TrajectoryRun(given, outcome)
+
+
+def run_dataset(path: Path) -> xarray.Dataset:
+    """The dataset of a trajectory's file.
+
+    Raises:
+        RigidsimError: the file can't be used, or its convention can't be told.
+    """
+    given = attitudes_of(read_trajectory(path), None)
+    times = given.times * seconds_in(given.time_unit or "s")
+    reading, rates, told = _read(given, times)
+    found = FoundReading(reading, NONE, 0.0, [])
+    return dataset_of_rows(given, times, found, rates, {"title": path.stem, "comment": "; ".join(told)})
+
+
+def dataset_of_rows(
+    given: Attitudes, times: np.ndarray, found: FoundReading, rates: RateReading | None,
+    attributes: Mapping[str, Any],
+) -> xarray.Dataset:  # fmt: skip
+    """A trajectory, read in a convention, as the dataset of a run.
+
+    Args:
+        times: (rows,), s; earlier rows than the file's are left out where they are fewer.
+    """
+    count = len(times)
+    quaternions = found.quaternions(given)[:count]
+    jumps = np.sum(quaternions[1:] * quaternions[:-1], axis=1) < 0  # of the sign, which means nothing
+    quaternions = quaternions * np.cumprod(np.concatenate([[1.0], np.where(jumps, -1.0, 1.0)]))[:, None]
+    made: dict[str, Any] = {
+        "quaternion": _variable(
+            quaternions, "quaternion_component", "1", "attitude quaternion, body to space"
+        )
+    }
+    if rates is not None and given.rates is not None:
+        turning = rates.rates(given.rates[:count], found, quaternions)
+        made["angular_velocity"] = _variable(turning, "body_axis", "rad s-1", "angular velocity")
+    for name, values, unit in (("position", given.positions, "m"), ("velocity", given.velocities, "m s-1")):
+        if values is not None:
+            made[name] = _variable(values[:count], "space_axis", unit, name)
+    for name, values in given.trajectory.columns.items():
+        if name not in made:
+            made[name] = ("time", values[:count], {"units": given.trajectory.units.get(name, "")})
+    used = {dim for dims, *_ in made.values() for dim in np.atleast_1d(dims)}
+    coordinates: dict[str, Any] = {"time": ("time", times, {"units": "s", "long_name": "time"})}
+    coordinates |= {dim: labels for dim, labels in _AXES.items() if dim in used}
+    source = f"a file of another tool: {given.trajectory.source}"
+    return xarray.Dataset(made, coordinates, {"source": source, **attributes})
+
+
+def _variable(values: np.ndarray, dim: str, unit: str, name: str) -> Any:
+    return ("time", dim), values, {"units": unit, "long_name": name}
+
+
+def _read(given: Attitudes, times: np.ndarray) -> tuple[Reading, RateReading | None, list[str]]:
+    """Readings of attitude and rates, and what a user should know of them."""
+    source, told = given.trajectory.source, list(given.told)
+    if given.time_unit is None:
+        told.append("times were taken for s; name a unit: t [day]")
+    if given.rates is None:
+        if given.angles is not None or not (given.named or given.matrices is not None):
+            raise RigidsimError(
+                f"{source}: without angular velocities its convention can't be told; name a quaternion "
+                "qw qx qy qz, add wx wy wz, or let rigidsim compare CONFIG FILE --timeline find it"
+            )
+        told.append("the attitude was taken from body axes to space axes")
+        return Reading(order="wxyz" if given.named else ""), None, told
+    near = turning_readings(given, times, signs=False)
+    if not near:
+        raise RigidsimError(
+            f"{source}: in no convention tried does its attitude turn at its rates, or its rows are too far "
+            "apart; rigidsim compare CONFIG FILE --timeline finds the convention beside an experiment"
+        )
+    reading, rates = near[0].reading, near[0].rates
+    told.append(f"taken as {reading}, rates along {rates.axes} axes in {rates.unit}: it turns at these")
+    if len(near) > 1:
+        told.append(
+            f"{len(near) - 1} other conventions would fit as well; beside an experiment compare tells more"
+        )
+    return reading, rates, told
