@@ -18,7 +18,6 @@ from rigidsim.scene import validation_messages as messages
 from rigidsim.scene.bodies.field_files import cut
 from rigidsim.scene.bodies.gravity_field import asked_degree
 from rigidsim.scene.fields import NAME_OR_VECTOR
-from rigidsim.scene.listed_times import time_column
 from rigidsim.scene.python_values import assignments_of, toml_text
 from rigidsim.scene.registry import LOAD_KINDS
 from rigidsim.scene.schema import Config, config_model
@@ -204,7 +203,7 @@ def _table_sections(config: Config, folder: Path) -> str:
     found: dict[str, str] = {}
     for where, name in _named(config):
         if name not in found and name not in config.tables:
-            cutting = time_column if where == _TIMES else None
+            cutting = _times_of if where == _TIMES else None
             found[name] = _section(name, _text(where, name, folder / name, cutting))
     field = config.body.gravity_field
     if field is not None and field.file is not None and field.file not in config.tables:
@@ -256,6 +255,12 @@ def _text(
         what = f'given "{name}", which holds characters that no table has; save it as plain {kind}'
         raise ConfigError(Problem(where, what))
     return text
+
+
+def _times_of(file: TextIO) -> str:
+    from rigidsim.scene.listed_times import time_column  # which few configs need
+
+    return time_column(file)
 
 
 def _refuse_size(where: str, name: str, size: int) -> None:

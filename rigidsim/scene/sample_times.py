@@ -16,7 +16,6 @@ from pydantic import Discriminator, Field, StrictInt, StrictStr, Tag
 from rigidsim.errors import ConfigError, Problem, either
 from rigidsim.scene.exact import ZERO, rounded
 from rigidsim.scene.fields import NAME_OR_VECTOR, ConfigTable, Instant, Second, TimeUnitName
-from rigidsim.scene.listed_times import times_in
 from rigidsim.scene.validation_messages import shown
 
 _MOST_SAMPLES = 10**12
@@ -122,6 +121,8 @@ def _listed(given: str | list[Any], context: Any, texts: Mapping[str, str]) -> l
     """Times of an array, or of the table of that name."""
     if not isinstance(given, str):
         return [time.fraction(context) for time in given]
+    from rigidsim.scene.listed_times import times_in  # which few configs need
+
     if given not in texts:
         what = "but this config was given as text, without files beside it; put the table's text into "
         raise _fail("times", f'given "{given}", {what}[tables."{given}"] text')
