@@ -10,6 +10,7 @@ FIGURES: dict[str, str] = {
     "nutation": "nutation ellipse: the pole about its mean motion",
     "obliquity": "obliquity and longitude of the node, less what would hide their swings",
     "libration": "libration, or roll, pitch and yaw, over time; the source seen from the body",
+    "pointing": "angle of a body axis from the oncoming air, or from the Sun or the planet, over time",
     "tip": "trace of a top's tip seen from above, its tilt and precession over time",
     "polhode": "polhode on the surfaces of energy and momentum, separatrix, Poinsot's rolling",
     "momentum_sphere": "the momentum's sphere in the body, levels of energy, stable and unstable spins",

@@ -58,6 +58,9 @@ KINDS: dict[str, Kind] = {
         ],
         [librations.nadir, librations.phases, librations.locking_phases],
     ),
+    "pointing": Kind(
+        "air_velocity, or nadir without libration or roll_pitch_yaw, recorded", [librations.pointing]
+    ),
     "tip": Kind(
         "a top: a body on a fixed point under uniform gravity",
         [timelines.tilt, timelines.precession],
@@ -158,7 +161,7 @@ def _of_body(rows: xarray.Dataset) -> tuple[Sequence[Panel], Sequence[Panel]]:
     attitude = [timelines.rates, timelines.attitude]
     tilting = [timelines.obliquity, timelines.longitude]
     if librates(rows):
-        swinging = [timelines.libration, timelines.roll_pitch_yaw]
+        swinging = [timelines.libration, timelines.roll_pitch_yaw, librations.pointing]
         if librations.latitude.shows(rows):  # its figure axis precesses, as the Moon's
             swinging = [librations.longitude, librations.latitude, timelines.libration]
         return swinging, [librations.nadir, *(moving or [librations.phases])]
@@ -179,6 +182,8 @@ def _of_body(rows: xarray.Dataset) -> tuple[Sequence[Panel], Sequence[Panel]]:
         if poles.precesses(rows) and not moving:
             return [timelines.braking, *tilting], [poles.nutation, poles.pole_path]
         return [timelines.braking, timelines.polar_motion], [poles.polar_motion, *moving]
+    if moving and librations.pointing.shows(rows):
+        return [librations.pointing, timelines.rates], [*moving, polhode.polhode]
     if moving:
         return attitude, [*moving, polhode.polhode]
     if not any(panel.shows(rows) for panel in attitude):  # only axes are known, as of an averaged model
