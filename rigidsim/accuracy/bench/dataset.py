@@ -112,7 +112,9 @@ def dataset_of(measured: Measurement) -> xarray.Dataset:
             "tolerance": variable(tolerances, "1", "of the step control"),
             "formulation": variable(words([r.setting.formulation for r in rows]), "1", "of the attitude"),
             "held": variable(
-                np.array([r.setting.hold_invariants for r in rows], dtype=np.int8), "1", "invariants put back"
+                np.array([r.setting.hold_invariants for r in rows], dtype=np.int8),
+                "1",
+                "invariants projected",
             ),
             "method": variable(words([r.setting.method for r in rows]), "1", " or ".join(METHODS)),
             "time": ("time", np.array(plan.times), {"units": "s", "long_name": "since start of the scene"}),

@@ -14,7 +14,7 @@ from rigidsim.look.figures import timelines
 from rigidsim.look.figures.panel import Panel
 from rigidsim.look.figures.style import GREY, INK, STYLE, blank
 from rigidsim.look.page import largest_drift
-from rigidsim.look.signals import by_role, is_averaged, read_config
+from rigidsim.look.signals import by_role, in_words, is_averaged, read_config
 from rigidsim.look.thinning import thin
 from rigidsim.scene.readable import unit_for
 
@@ -173,7 +173,7 @@ def facts_of(shown: Shown) -> list[tuple[str, str]]:
     bound = "" if shown.complete else "≥ "  # of the samples that were read
     for name, drift in shown.largest.items():
         largest = f"{drift:.1e}" if drift else "0"
-        lines.append((f"largest drift, {name.replace('_', ' ')}", bound + largest))
+        lines.append((f"largest drift, {in_words(name)}", bound + largest))
     return lines
 
 

@@ -110,7 +110,9 @@ register_all(
 def _no_resonance(m: Mechanics) -> str | None:
     if m.commensurable_angle is not None:
         return None
-    return 'is of [model] level = "orbit_averaged" where the body keeps pace with its source; leave it out'
+    return (
+        'is of [model] level = "orbit_averaged" where the body is in resonance with its source; leave it out'
+    )
 
 
 RESONANT_ANGLE = continuous_angles(
