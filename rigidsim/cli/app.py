@@ -278,8 +278,9 @@ _EACH_FIGURE = "\n".join(f"{name:17}{told}" for name, told in FIGURES.items())
 
 @_command("results", f"\n\n\b\nFigures:\n{_EACH_FIGURE}")
 def plot(
-    run_path: options.RunPath, what: options.WhatOption = None, out: options.FigureOption = None
-) -> None:
+    run_path: options.RunPath, what: options.WhatOption = None, out: options.FigureOption = None,
+    for_slides: options.SlidesOption = None,
+) -> None:  # fmt: skip
     """Draw the page that suits the scene, or the figures named; of a sweep a variable over its axes.
 
     Example: rigidsim plot runs/intermediate_axis --what polhode --out flip.svg

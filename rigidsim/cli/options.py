@@ -144,6 +144,10 @@ FigureOption = Annotated[
         "PNG or SVG, or a folder for several; default figure.png or figure_NAME.png in the run.",
     ),
 ]
+SlidesOption = Annotated[
+    str | None,
+    _option("--for-slides", "GROUND", "One panel in large letters on a light or dark ground: light or dark."),
+]
 FormatOption = Annotated[str, _option("--format", "FORMAT", f"{', '.join(FORMATS[:-1])} or {FORMATS[-1]}.")]
 ObjectNameOption = Annotated[
     str | None, _option("--object-name", "NAME", "For aem and oem; the frame's name for ck and pck.")

@@ -43,9 +43,11 @@ def export(
         print(path)
 
 
-def plot(run_path: Path, what: list[str] | None, out: Path | None) -> None:
+def plot(run_path: Path, what: list[str] | None, out: Path | None, for_slides: str | None) -> None:
     """Draw figures of a run, or maps of a sweep."""
     swept = is_sweep(run_path)
+    if for_slides is not None and (swept or SPECTRUM in (what or [])):
+        raise RigidsimError("--for-slides: is for figures of a single run other than spectrum; leave it out")
     saved = open_sweep(run_path) if swept else open_run(run_path)
     wanted = list(dict.fromkeys(what or []))
     try:
@@ -61,6 +63,7 @@ def plot(run_path: Path, what: list[str] | None, out: Path | None) -> None:
             wanted = [*(drawable(dataset) if swept else available(dataset))]
         for name in wanted or [OVERVIEW]:
             own = "" if name == OVERVIEW else "_" + name.replace("[", "_").replace("]", "")
+            own += "" if for_slides is None else "_slide"
             folder = saved.folder.path if out is None else out
             target = folder / f"figure{own}.png" if several or out is None else out
             try:
@@ -71,7 +74,7 @@ def plot(run_path: Path, what: list[str] | None, out: Path | None) -> None:
                     elif name == SPECTRUM:
                         save_spectrum(analysing.analyse(saved).dataset, new, file_format=kind)
                     else:
-                        save_figure(dataset, new, name, file_format=kind)
+                        save_figure(dataset, new, name, file_format=kind, slides=for_slides)
             except ValueError as error:
                 raise RigidsimError(f"plot: {error}" if swept else str(error)) from None
             except OSError as error:

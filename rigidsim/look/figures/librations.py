@@ -56,7 +56,7 @@ def nadir(axes: Axes, dataset: xarray.Dataset, directions: Array) -> None:
     key(axes, f"The source seen from the body (+: {sign}{'xyz'[k]} axis)")
 
 
-@panel(pointing_angle)
+@panel(pointing_angle, begins=True)
 def pointing(axes: Axes, dataset: xarray.Dataset, found: tuple[str, str, Array]) -> None:
     """How far a body axis points away from where the air or the light comes from."""
     axis, towards, angle = found

@@ -17,7 +17,7 @@ from rigidsim.look.stages.bodies import Subject
 from rigidsim.look.stages.parts import Picture, Plane, screen_seconds
 from rigidsim.look.stages.registry import build_picture
 from rigidsim.look.states import States, charts_of, sections_of, states_of
-from rigidsim.look.thinning import thin, thinned_indices
+from rigidsim.look.thinning import by_extremes, thin, thinned_indices
 from rigidsim.look.timeline import drawing, plotting
 from rigidsim.scene.readable import DAY, YEAR, TimeWords
 
@@ -105,7 +105,10 @@ class DrawnRun:
         start, end = float(seconds[0]), float(seconds[-1])
         clock = build_clock(seconds)
         picture, subject = build_picture(rows)
-        plots = plan_plots(rows.assign(picture.derived), picture.leading)
+        curves = rows
+        if dataset.sizes["time"] > rows.sizes["time"]:
+            curves = by_extremes(dataset, most).assign_attrs(dataset.attrs)
+        plots = plan_plots(curves.assign(picture.derived), picture.leading)
         notes = list(picture.notes)
         if not clock.duration:
             notes.append(f"the run doesn't fit nanoseconds: its timeline is `{clock.name}`")
