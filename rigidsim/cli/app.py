@@ -255,15 +255,14 @@ def info(run_path: options.RunPath, as_json: options.JsonOption = False) -> None
 @_command("results")
 def view(
     run_paths: options.RunPaths,
-    web: Annotated[bool, typer.Option("--web", help="In the browser, served on loopback only.")] = False,
+    web: options.WebOption = False,
     png: options.PictureOption = None,
     gif: options.FilmOption = None,
     mp4: options.VideoOption = None,
     seconds: options.FilmLengthOption = None,
-    member: Annotated[
-        list[int] | None,
-        typer.Option("--member", metavar="N", min=0, help="Of a sweep: member N, from 0; repeatable."),
-    ] = None,
+    member: options.ViewedMemberOption = None,
+    at: options.MomentOption = None,
+    part: options.PartOption = "page",
 ) -> None:
     """Open timelines in the rerun viewer (drawn first, where a run has none), or draw them to a file.
 

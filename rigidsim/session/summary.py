@@ -143,7 +143,7 @@ def _accuracy(found: Diagnostics) -> Accuracy:
         amplification_seconds=estimate.seconds,
         examined_share=estimate.share,
         amplification_how="of the estimated error over that of a stable motion, whose rounding errors grow "
-        "as (eps/2) sqrt(steps) sqrt(4 + (|w| t)^2 / 3), and what the tolerance cuts off; 1 for a stable motion",
+        "as (eps/2) sqrt(steps) sqrt(4 + (|w| t)^2 / 3), and what the tolerance cuts off; 1 for a stable one",
     )
 
 

@@ -85,7 +85,7 @@ def plot(run_path: Path, what: list[str] | None, out: Path | None, for_slides: s
 
 def view(
     run_paths: list[Path], web: bool, png: Path | None, gif: Path | None, mp4: Path | None,
-    seconds: float | None, member: list[int] | None,
+    seconds: float | None, member: list[int] | None, at: str | None, part: str,
 ) -> int:  # fmt: skip
     """Open the viewer, or draw to files."""
     targets = {".png": png, ".gif": gif, ".mp4": mp4}
@@ -101,9 +101,12 @@ def view(
         raise RigidsimError("view: --web opens the viewer, --png, --gif and --mp4 draw to a file: give one")
     if seconds is not None and not {".gif", ".mp4"} & set(asked):
         raise RigidsimError("view: --seconds is for --gif and --mp4: give one of them, too")
+    if at is not None and set(asked) != {".png"}:
+        raise RigidsimError("view: --at is the moment of a --png picture: give that alone")
     named = runs_of(run_paths, member or ())
     for target in asked.values():
-        render(named, target, seconds=seconds, told=_tell if sys.stderr.isatty() else None)
+        told = _tell if sys.stderr.isatty() else None
+        render(named, target, seconds=seconds, told=told, at=at, part=part)
         print(target)
     return 0 if asked else show(named, web=web)
 

@@ -138,7 +138,7 @@ def _curve_panel(figure: Figure, place: SubplotSpec, panel: Panel, shown: Shown,
         timelines.time_axis(axes, shown.rows, labelled=lowest)
         return
     parts = place.subgridspec(1, 2, width_ratios=[1.7, 1.0], wspace=0.03)
-    whole, first = (figure.add_subplot(part) for part in parts)
+    whole, first = (figure.add_subplot(parts[k]) for k in range(2))
     panel.draw(whole, shown.rows)
     _as_band(whole)
     timelines.time_axis(whole, shown.rows, labelled=True)

@@ -36,7 +36,8 @@ def slide(shown: Shown, panel: Panel, ground: str, *, over_time: bool) -> Figure
     if ground not in GROUNDS:
         raise ValueError(f"--for-slides: given {ground!r}; {' or '.join(GROUNDS)} is allowed")
     style = {key: _LETTERS * value if _is_size(key) else value for key, value in STYLE.items()}
-    with rc_context({**style, "lines.linewidth": _THICK * STYLE["lines.linewidth"]}):  # type: ignore[arg-type]
+    style["lines.linewidth"] = _THICK * STYLE["lines.linewidth"]
+    with rc_context(style):  # type: ignore[arg-type]
         figure = blank(shown.rows, _WIDE, _HIGH)
         axes = figure.add_subplot()
         if over_time:
@@ -101,4 +102,5 @@ def _readable(color: Any, share: float) -> str:
         return to_hex(rgb)
     grey = max(rgb) - min(rgb) < 0.2
     part = 1.0 if grey else min(share, 0.45)
-    return to_hex([(1 - part) * c + part * b for c, b in zip(rgb, to_rgb(_BRIGHT), strict=True)])
+    red, green, blue = ((1 - part) * c + part * b for c, b in zip(rgb, to_rgb(_BRIGHT), strict=True))
+    return to_hex((red, green, blue))
