@@ -166,7 +166,8 @@ def on_front(dataset: xarray.Dataset) -> np.ndarray:
 @dataclass(frozen=True)
 class BestSetting:
     """For an attitude error of at most ``at_most`` and more than ``more_than``: the cheapest setting, its
-    largest error (rad), and whether it was measured over less than the others, so that costs don't compare.
+    largest error (rad), its cost relative to the default setting's and in CPU seconds of the part measured,
+    and whether it was measured over less than the others, so that costs don't compare.
     """
 
     at_most: float
@@ -175,6 +176,7 @@ class BestSetting:
     error: float
     cost: float
     seconds: float
+    cpu_seconds: float
     less: bool
     keys: tuple[str, ...]
 
@@ -210,6 +212,7 @@ def advice(dataset: xarray.Dataset) -> list[BestSetting]:
                 error=float(error[n]),
                 cost=float(one["cpu_ratio"]),
                 seconds=float(one["measured_time"]),
+                cpu_seconds=float(one["cpu_seconds"]),
                 less=less,
                 keys=_keys(one),
             )

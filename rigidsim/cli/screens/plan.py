@@ -121,8 +121,10 @@ def print_tradeoff(result: dict[str, Any]) -> None:
             reach += f" to {row['more_than'] * 10:.0e}"
         marked = marked or row["less"]
         star = " *" if row["less"] else ""
-        rows.append([reach, f"{row['cost']:.3g}", f"{row['error']:.1e}{star}", ", ".join(row["keys"])])
-    on.table(["attitude error, rad", "cost", "error reached", "keys of [integrator]"], rows)
+        spent = "" if row["cpu_seconds"] is None else span_text(row["cpu_seconds"])
+        cost = [f"{row['cost']:.3g}", spent]
+        rows.append([reach, *cost, f"{row['error']:.1e}{star}", ", ".join(row["keys"])])
+    on.table(["attitude error, rad", "cost", "CPU", "error reached", "keys of [integrator]"], rows)
     if marked:
         less = next(row["seconds"] for row in result["advice"] if row["less"])
         on.say(f"  * over the first {span_text(less)} only: quadruple precision is slow")
@@ -133,8 +135,8 @@ def print_tradeoff(result: dict[str, Any]) -> None:
     on.line("against", result["reference"])
     on.line(
         "cost",
-        f"CPU time of integration over that of double precision in quaternions, {result['processes']} fresh "
-        f"processes, medians; recording not counted",
+        "CPU time of integration over that of double precision in quaternions, and in seconds on this "
+        f"machine for what was measured; {result['processes']} fresh processes, medians, without recording",
     )
     if result["closed_form"] != "yes":
         on.line("exact", f"no: {result['closed_form'].removeprefix('none: ')}")
