@@ -88,10 +88,9 @@ def _raise(artist: Any) -> None:
             getattr(effect, "_gc", {}).update(foreground=_DARK)
     else:
         color = artist.get_color()
-        if color == PALE:  # what others stand out from
-            artist.set_color(_FADED)
-        elif isinstance(color, str) and color != "none":
-            artist.set_color(_readable(color, 0.4))
+        if not isinstance(color, str) or color == "none":
+            return  # of a collection, coloured by a map
+        artist.set_color(_FADED if color == PALE else _readable(color, 0.4))  # what others stand out from
 
 
 def _readable(color: Any, share: float) -> str:
