@@ -65,7 +65,7 @@ def _frames(
     viewer: HeadlessViewer, count: int, told: Callable[[int, int], None] | None
 ) -> Iterator[Image.Image]:
     viewer.seek(0.0)
-    viewer.settled_picture(2.0)  # the plots are read by then
+    viewer.settled_picture(5.0)  # the plots are read by then, and the opening notes have gone
     for number in range(count):
         viewer.seek(number / (count - 1))
         yield _without_bar(viewer.picture())
@@ -174,7 +174,7 @@ class HeadlessViewer:
         """PNG of the window as it is."""
         return bytes(self.client.take_screenshot())
 
-    def settled_picture(self, least: float = 4.0) -> bytes:
+    def settled_picture(self, least: float = 7.0) -> bytes:
         """PNG of the window once it no longer changes, after so many seconds at least: plots are read then,
         and the opening notes have gone.
         """
