@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Self
 
 from rigidsim.errors import FORCE, RESUME, RunFolderError, either
 from rigidsim.look import viewer
-from rigidsim.store import atomic, netcdf, pictures, segments
+from rigidsim.store import atomic, netcdf, segments
 from rigidsim.store.folder import RunFolder, find_run
 from rigidsim.store.netcdf import Block
 from rigidsim.store.seal import refuse_damaged
@@ -86,6 +86,8 @@ class Run:
             RunFolderError: the timeline can't be drawn, no viewer is installed, or there is no screen for it.
         """
         if png is not None:
+            from rigidsim.store import pictures  # which loads Pillow
+
             with self.dataset as dataset:
                 pictures.draw(dataset, Path(png), at=None if at is None else str(at), part=part)
             return 0
