@@ -198,7 +198,7 @@ def _legend(axes, colors: dict[float, str]) -> None:  # type: ignore[no-untyped-
         Line2D([], [], marker=m, markerfacecolor="white", label=p, **grey) for p, m in _MARKERS.items()
     ]
     handles += [
-        Line2D([], [], marker="o", label="filled: invariants held", **grey),
+        Line2D([], [], marker="o", label="filled: invariants projected", **grey),
         Line2D([], [], marker="*", markersize=10, label=f"closed form, {SAMPLES} samples", **grey),
     ]
     axes.legend(handles=handles, loc="center", fontsize=10.5, frameon=False)

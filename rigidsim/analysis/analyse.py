@@ -106,10 +106,11 @@ def _raw(signal: Signal, clock: EquidistantTimes, lines: int, floor: float, orde
 def _with_precession(known: Sequence[Known], raws: Sequence[_Raw], clock: EquidistantTimes) -> list[Known]:
     """The known frequencies with the equinox's, unless known: it moves back with the measured precession.
 
-    Where an axis follows the node of an orbit, its rate is that node's.
+    Where an axis follows the node of an orbit, its rate is that node's. Of samples that don't span 1.5
+    turns of the slowest known frequency no precession is told: its rate is partly theirs.
     """
     names = list(known)
-    if not known or any(k.name == "precession" for k in known):
+    if not known or any(k.name == "precession" for k in known) or _slow(known, clock):
         return names
     for raw in raws:
         if raw.signal.name in (_SECULAR, "node_longitude"):
@@ -205,19 +206,22 @@ def _wrapped(context: Any, angle: Any) -> Any:
     return -angle if angle + context.pi < 1e-6 else angle
 
 
+def _slow(known: Sequence[Known], clock: EquidistantTimes) -> list[Known]:
+    """Known frequencies of which the samples span less than 1.5 turns."""
+    most = 2 * math.pi * 1.5 / float(clock.length)
+    return [k for k in known if k.name != "precession" and 0 < abs(float(k.value)) < most]
+
+
 def _notes(
     raw: _Raw, clock: EquidistantTimes, known: Sequence[Known], lines: Sequence[SpectralLine]
 ) -> list[str]:
     notes = []
-    length = float(clock.length)
     if raw.found.close:
         notes.append(
             "something is left closer than a bin to a line or to the secular part: errors tell its size, "
             "a longer run tells it apart"
         )
-    slow = [
-        k for k in known if k.name != "precession" and 0 < abs(float(k.value)) * length < 2 * math.pi * 1.5
-    ]
+    slow = _slow(known, clock)
     if slow and raw.signal.degree > 0:
         names = ", ".join(k.name for k in slow)
         notes.append(

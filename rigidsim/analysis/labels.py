@@ -6,6 +6,7 @@ nearly as simple.
 """
 
 import math
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -18,6 +19,8 @@ Reals = NDArray[np.float64]
 
 _ORDERS = {1: 60, 2: 40, 3: 16, 4: 10, 5: 8, 6: 7}
 """Largest sum of abs(multipliers), by the number of known frequencies; 6 beyond."""
+_ARGUMENTS = ("l", "lp", "F", "D", "Om")  # of nutation, in the order of the tables (IERS Conventions 2010)
+_ALONE = re.compile(r"([+-])1(?=[A-Za-z])")
 _SIGMAS = 5.0
 _ROUNDING = 1e-13  # of a combination, relative to its largest term
 _CHANCE = 0.05  # labels that as many combinations would fit by chance aren't given
@@ -58,10 +61,16 @@ class Label:
 
 
 def named(multipliers: Sequence[int], known: Sequence[Known]) -> str:
-    """A combination as text, the positive terms first."""
+    """A combination as text, the positive terms first; of the arguments of nutation as tables write it,
+    ``2F-2D+2Om``.
+    """
     if not any(multipliers):
         return "0"
     terms = [(m, k.name) for m, k in zip(multipliers, known, strict=True) if m]
+    if all(name in _ARGUMENTS for _, name in terms):
+        ordered = sorted(terms, key=lambda term: _ARGUMENTS.index(term[1]))
+        text = "".join(f"{m:+d}{name}" for m, name in ordered)
+        return _ALONE.sub(r"\1", text).lstrip("+")
     words = []
     for n, (m, name) in enumerate(sorted(terms, key=lambda term: term[0] < 0)):
         sign = "- " if m < 0 else "+ "

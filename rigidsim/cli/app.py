@@ -257,12 +257,14 @@ def info(run_path: options.RunPath, as_json: options.JsonOption = False) -> None
 @_command("results")
 def view(
     run_paths: options.RunPaths,
-    web: Annotated[bool, typer.Option("--web", help="In the browser, served on loopback only.")] = False,
+    web: options.WebOption = False,
     png: options.PictureOption = None,
     gif: options.FilmOption = None,
     mp4: options.VideoOption = None,
     seconds: options.FilmLengthOption = None,
     member: options.MembersSeenOption = None,
+    at: options.MomentOption = None,
+    part: options.PartOption = "page",
 ) -> None:
     """Open timelines in the rerun viewer (drawn first, where a run has none), or draw them to a file.
 
@@ -277,8 +279,9 @@ _EACH_FIGURE = "\n".join(f"{name:17}{told}" for name, told in FIGURES.items())
 
 @_command("results", f"\n\n\b\nFigures:\n{_EACH_FIGURE}")
 def plot(
-    run_path: options.SeenPath, what: options.WhatOption = None, out: options.FigureOption = None
-) -> None:
+    run_path: options.SeenPath, what: options.WhatOption = None, out: options.FigureOption = None,
+    for_slides: options.SlidesOption = None,
+) -> None:  # fmt: skip
     """Draw the page that suits the scene, or the figures named; of a sweep a variable over its axes.
 
     Example: rigidsim plot runs/intermediate_axis --what polhode --out flip.svg

@@ -113,6 +113,17 @@ ResumeWorkersOption = Annotated[
 ]
 MembersOption = Annotated[int, _option("--members", "N", "Of a sweep: how many members, drawn at random.")]
 PictureOption = Annotated[Path | None, _option("--png", "FILE", "Draw a picture, without a display.")]
+WebOption = Annotated[bool, typer.Option("--web", help="In the browser, served on loopback only.")]
+ViewedMemberOption = Annotated[
+    list[int] | None,
+    typer.Option("--member", metavar="N", min=0, help="Of a sweep: member N, from 0; repeatable."),
+]
+MomentOption = Annotated[
+    str | None, _option("--at", "TIME", 'Moment of a picture, in the scene\'s unit or as "2.4 hr".')
+]
+PartOption = Annotated[
+    str, _option("--part", "PART", "Of the page, in pictures and films: page, scene or plots.")
+]
 FilmOption = Annotated[Path | None, _option("--gif", "FILE", "Draw a film, without a display.")]
 FilmLengthOption = Annotated[
     float | None, typer.Option("--seconds", min=0.5, max=120.0, help="That a film lasts; default 6.")
@@ -171,6 +182,10 @@ FigureOption = Annotated[
         "FILE",
         "PNG or SVG, or a folder for several; default figure.png or figure_NAME.png in the run.",
     ),
+]
+SlidesOption = Annotated[
+    str | None,
+    _option("--for-slides", "GROUND", "One panel in large letters on a light or dark ground: light or dark."),
 ]
 FormatOption = Annotated[str, _option("--format", "FORMAT", f"{', '.join(FORMATS[:-1])} or {FORMATS[-1]}.")]
 ObjectNameOption = Annotated[

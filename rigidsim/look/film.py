@@ -11,17 +11,18 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, Self
 
+import numpy as np
 from PIL import Image
 
 from rigidsim.look.viewer import LOOPBACK, QUIET, existing, free_port, viewer_binary
 
 FORMATS = (".png", ".gif", ".mp4")
 SIZE = (1600, 900)
-GIF_WIDTH = 1000
-FRAMES_PER_SECOND = {".gif": 12, ".mp4": 30}
+FRAMES_PER_SECOND = {".gif": 8, ".mp4": 30}
 SECONDS = 6.0
 PICTURED_AT = 0.4  # time of a single picture, as a fraction of the run: trails have begun, and curves go on
 _GIF_COLORS = 128
+_BAR, _CORNER, _ALIKE = 37, 16, 6  # points of the window's bar, of its rounded corners; levels of one colour
 _PATIENCE = 120.0  # seconds until a picture is given up
 
 
@@ -30,11 +31,12 @@ class NoGraphics(RuntimeError):
 
 
 def render(
-    path: Path, target: Path, *, seconds: float = SECONDS, told: Callable[[int, int], None] | None = None
-) -> Path:
-    """Draw a recording (``.rrd``) as a PNG picture, or a GIF or MP4 film of the whole run lasting so many
-    seconds, as the suffix of `target` says, which it returns; `told` is given the numbers of frames drawn and
-    in all.
+    path: Path, target: Path, *, seconds: float = SECONDS, told: Callable[[int, int], None] | None = None,
+    at: float = PICTURED_AT, size: tuple[int, int] = SIZE,
+) -> Path:  # fmt: skip
+    """Draw a recording (``.rrd``) as a PNG picture at a fraction of the run, or a GIF or MP4 film of all of
+    it lasting so many seconds, as the suffix of `target` says, which it returns; `told` is given the numbers
+    of frames drawn and in all. ``size``: of the picture, points.
 
     Raises:
     ValueError: another suffix.
@@ -45,10 +47,10 @@ def render(
     if suffix not in FORMATS:
         raise ValueError(f"{target}: a picture or film must end in {', '.join(FORMATS)}")
     encoder = _encoder() if suffix == ".mp4" else None
-    with HeadlessViewer(path, size=SIZE) as viewer:
+    with HeadlessViewer(path, size=size) as viewer:
         if suffix == ".png":
-            viewer.seek(PICTURED_AT)
-            target.write_bytes(viewer.settled_picture())
+            viewer.seek(at)
+            _without_bar(viewer.settled_picture()).save(target)
             return target
         rate = FRAMES_PER_SECOND[suffix]
         frames = _frames(viewer, max(round(seconds * rate), 2), told)
@@ -63,19 +65,25 @@ def _frames(
     viewer: HeadlessViewer, count: int, told: Callable[[int, int], None] | None
 ) -> Iterator[Image.Image]:
     viewer.seek(0.0)
-    viewer.settled_picture()  # the plots are read by then
+    viewer.settled_picture(5.0)  # the plots are read by then, and the opening notes have gone
     for number in range(count):
         viewer.seek(number / (count - 1))
-        yield Image.open(io.BytesIO(viewer.picture())).convert("RGB")
+        yield _without_bar(viewer.picture())
         if told is not None:
             told(number + 1, count)
 
 
+def _without_bar(picture: bytes) -> Image.Image:
+    """A picture without the window's bar, for which the viewer leaves room even if it is hidden and empty."""
+    image = Image.open(io.BytesIO(picture)).convert("RGB")
+    inner = image.crop((_CORNER, 2, image.width - _CORNER, _BAR - 2))
+    empty = bool(np.ptp(np.asarray(inner), axis=(0, 1)).max() <= _ALIKE)
+    return image.crop((0, _BAR, image.width, image.height)) if empty else image
+
+
 def _write_gif(target: Path, frames: Iterator[Image.Image], rate: int) -> None:
     first, *rest = (
-        frame.resize(
-            (GIF_WIDTH, round(GIF_WIDTH * frame.height / frame.width)), Image.Resampling.LANCZOS
-        ).quantize(_GIF_COLORS, method=Image.Quantize.FASTOCTREE, dither=Image.Dither.NONE)
+        frame.quantize(_GIF_COLORS, method=Image.Quantize.FASTOCTREE, dither=Image.Dither.NONE)
         for frame in frames
     )
     first.save(target, save_all=True, append_images=rest, duration=round(1000 / rate), loop=0)
@@ -166,9 +174,11 @@ class HeadlessViewer:
         """PNG of the window as it is."""
         return bytes(self.client.take_screenshot())
 
-    def settled_picture(self) -> bytes:
-        """PNG of the window once it no longer changes: plots are read, and the opening notes have gone."""
-        settled, last = time.monotonic() + 4.0, b""
+    def settled_picture(self, least: float = 7.0) -> bytes:
+        """PNG of the window once it no longer changes, after so many seconds at least: plots are read then,
+        and the opening notes have gone.
+        """
+        settled, last = time.monotonic() + least, b""
         while time.monotonic() < self._deadline:
             time.sleep(0.4)
             picture = self.picture()

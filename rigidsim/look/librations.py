@@ -125,6 +125,24 @@ def toward(dataset: xarray.Dataset) -> Array | None:
     return nadir
 
 
+def pointing_angle(dataset: xarray.Dataset) -> tuple[str, str, Array] | None:
+    """A body axis, a direction in words, and the angle (rows,), rad, between them: of the axis nearest to the
+    oncoming air or, where no other angles tell of it, to the source.
+    """
+    ways, towards = signals.values(dataset, "air_velocity"), "the oncoming air"
+    if ways is None and not any(name in dataset for name in ("libration", "roll_pitch_yaw")):
+        ways, one = signals.values(dataset, "nadir"), seen(dataset)
+        towards = "the direction of " + surroundings.called(None if one is None else one.body, "source")
+    if ways is None or not np.isfinite(ways).any():
+        return None
+    ways = ways / signals.norms(ways)[:, None]
+    mean = np.nanmean(ways, axis=0)
+    k = int(np.abs(mean).argmax())
+    axis = np.eye(3)[k] * (1.0 if mean[k] > 0 else -1.0)
+    name = ("" if mean[k] > 0 else "−") + "xyz"[k]
+    return name, towards, signals.angle_between(ways, axis)
+
+
 def _faces(dataset: xarray.Dataset) -> bool:
     """Whether the axis of least moment stays near the source, or opposite to it."""
     swing, ways = signals.values(dataset, "libration"), toward(dataset)

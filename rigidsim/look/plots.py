@@ -262,7 +262,7 @@ def _series(variable: xarray.DataArray, position: int, floor: float) -> Series:
     count = values.shape[1]
     drifting, projected = (variable.attrs.get(role) for role in ("drift_of", "put_back_of"))
     if drifting or projected:  # the latter: what the drift would have been
-        labels = [in_words(drifting) if drifting else f"{in_words(str(projected))} put back"]
+        labels = [in_words(drifting) if drifting else f"correction of {in_words(str(projected))}"]
         values = np.log10(np.maximum(np.abs(values), floor))
     elif variable.ndim == 1:
         labels = [name.replace("_", " ")]

@@ -17,6 +17,7 @@ from rigidsim.look.solids import Array, rotation_matrix
 from rigidsim.look.surroundings import carries_within
 
 _ORBIT_NORM = re.compile(r"orbit_norm_(\d+)")
+_IN_WORDS = {"energy_balance": "energy less work"}
 _AVERAGED = ("spin_averaged", "orbit_averaged")  # model levels whose datasets have axes but no attitude
 
 
@@ -46,7 +47,7 @@ def is_own_state(variable: xarray.DataArray) -> bool:
 def in_words(name: str) -> str:
     """A variable's name as people read it."""
     orbit = _ORBIT_NORM.fullmatch(name)
-    return f"norm of orbit {orbit[1]}'s cosine and sine" if orbit else name.replace("_", " ")
+    return f"cos² + sin² of orbit {orbit[1]}" if orbit else _IN_WORDS.get(name, name.replace("_", " "))
 
 
 def is_averaged(attributes: Mapping[str, Any]) -> bool:

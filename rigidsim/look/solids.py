@@ -30,6 +30,7 @@ _DARKER = 0.62
 _LIGHT = (232, 224, 206)
 _UPPER = (70, 118, 190)
 _LOWER = (200, 96, 62)
+_BARE = (92, 94, 100)  # the back of a plate that light and air meet from its front alone
 
 
 @dataclass(frozen=True)
@@ -98,7 +99,7 @@ def solid_mesh(solid: str, dimensions: Mapping[str, Any]) -> Mesh:
     )
     match outline:
         case shapes.Box(x, y, z):
-            return _box(x, y, z)
+            return _box(x, y, z) if solid != "plate" else _two_sided(_box(x, y, z), _LOWER)
         case shapes.Ellipsoid(x, y, z):
             return ball(x, y, z)
         case shapes.Revolved(pieces):
@@ -115,10 +116,7 @@ def body_meshes(drawing: str | None) -> list[Mesh]:
     `solid_mesh`.
     """
     solids = [(entry, *_placement(entry)) for entry in _parse(drawing)]
-    meshes = [
-        None if one["solid"] == POINT else solid_mesh(one["solid"], one.get("dimensions", {})).moved(*place)
-        for one, *place in solids
-    ]
+    meshes = [None if one["solid"] == POINT else _solid(one).moved(*place) for one, *place in solids]
     reach = max(
         float(np.linalg.norm(shift)) if mesh is None else mesh.reach()
         for mesh, (_, _, shift) in zip(meshes, solids, strict=True)
@@ -131,6 +129,20 @@ def body_meshes(drawing: str | None) -> list[Mesh]:
         return ball(radius, radius, radius, segments=32, rings=16).moved(turn, shift)
 
     return [mesh or point(*solid) for mesh, solid in zip(meshes, solids, strict=True)]
+
+
+def _solid(entry: Mapping[str, Any]) -> Mesh:
+    mesh = solid_mesh(entry["solid"], entry.get("dimensions", {}))
+    return _two_sided(mesh, _BARE) if entry.get("one_sided") else mesh
+
+
+def _two_sided(plate: Mesh, back: Color) -> Mesh:
+    """A plate with its front (+z) in one colour, its back in another, and pale edges."""
+    colors = plate.colors.copy()
+    colors[:] = _LIGHT
+    colors[plate.normals[:, 2] > 0.5] = _UPPER
+    colors[plate.normals[:, 2] < -0.5] = back
+    return replace(plate, colors=colors)
 
 
 def point_positions(drawing: str | None) -> Array:

@@ -231,6 +231,13 @@ class Ending(Protocol):
 
 
 @runtime_checkable
+class Ranged(Protocol):
+    """Quantities of order one whose passing below zero leaves the range of a model, each with the reason."""
+
+    def range_ends(self, m: Kinematics) -> list[tuple[str, Symbolic]]: ...
+
+
+@runtime_checkable
 class Beside(Protocol):
     """It acts beside another load, on the same source, which that one places."""
 

@@ -10,7 +10,7 @@ from typing import Any
 import heyoka as hy
 
 from rigidsim.model.assembly import assemble_states
-from rigidsim.model.capabilities import Ending, having
+from rigidsim.model.capabilities import Ending, Ranged, having
 from rigidsim.model.formulations.formulation import Formulation, ModelPlan
 from rigidsim.model.heyoka_expressions import carries_sign, plain_angles, to_heyoka
 from rigidsim.model.mechanics import Mechanics
@@ -37,6 +37,7 @@ class Crossing:
     direction: int  # -1, 0 (any) or 1
     stop: bool
     impossible: str = ""  # why the motion can't go on past it; empty for events of the config
+    leaves_range: bool = False  # whether that is because the range of a model ends there
 
 
 class System:
@@ -221,16 +222,18 @@ class System:
 
     @cached_property
     def crossings(self) -> list[Crossing]:
-        """Events to be located along the motion, and then what ends it because no body can go on; the time
-        that events read is a single number.
+        """Events to be located along the motion, and then what ends it because no body can go on or the range
+        of a model ends; the time that events read is a single number.
         """
         m, found = self.mechanics, []
         for event in self.scene.events:
             names = state_names(m, event.reads, clocked=False)
             expression = to_heyoka(event.expression, names, m.number, m.scene.context, m.sides)
             found.append(Crossing(event.name, expression, _DIRECTIONS[event.direction], event.stop))
-        endings = [found for load in having(Ending, m.loads) for found in load.endings(m)]
-        return found + [Crossing("", x, _DIRECTIONS["down"], stop=True, impossible=why) for why, x in endings]
+        endings = [(*one, False) for load in having(Ending, m.loads) for one in load.endings(m)]
+        endings += [(*one, True) for load in having(Ranged, m.loads) for one in load.range_ends(m)]
+        down = _DIRECTIONS["down"]
+        return found + [Crossing("", x, down, True, why, leaves_range) for why, x, leaves_range in endings]
 
     @property
     def events(self) -> list[Crossing]:

@@ -11,7 +11,7 @@ from rigidsim.scene import schema, starts
 from rigidsim.scene.arithmetic import Matrix, Vector, context_for
 from rigidsim.scene.bodies.body import RigidBody, build_body, inverse_inertia
 from rigidsim.scene.bodies.gravity_field import asked_degree, gravity_field_of
-from rigidsim.scene.bodies.outside import surfaces_of
+from rigidsim.scene.bodies.outside import surfaces_of, with_surfaces
 from rigidsim.scene.config import Experiment
 from rigidsim.scene.epochs import Epoch
 from rigidsim.scene.events import Event, resolve_events
@@ -245,7 +245,9 @@ def _body_at_start(config: schema.Config, context: Any) -> RigidBody:
     moments = moments_at_start(config, context, config.time.start.at(context))
     body = build_body(config.body, context, config.integrator.euler_sequence, moments)
     outside = surfaces_of(config.body.surfaces, body.center_of_mass, context)
-    body = replace(body, surfaces=outside) if outside else body
+    if outside:
+        drawing = with_surfaces(body.drawing, config.body.surfaces, outside)
+        body = replace(body, surfaces=outside, drawing=drawing)
     if config.body.gravity_field is None:
         return body
     texts = {name: table.text for name, table in config.tables.items()}

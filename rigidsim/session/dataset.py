@@ -140,7 +140,7 @@ def _put_back(invariant: Invariant, projected: Sequence[str]) -> Variable:
         "each sample: to first order what the drift would have been without them"
     )
     name = put_back_name(invariant.name)
-    return _of_invariant(name, invariant, "what was put back of", definition, "put_back_of")
+    return _of_invariant(name, invariant, "correction of", definition, "put_back_of")
 
 
 def _of_invariant(name: str, invariant: Invariant, what: str, definition: str, of: str) -> Variable:

@@ -121,7 +121,7 @@ class Diagnostics:
             if not abs(size) <= self.drift_bound:
                 yield Caution(
                     WarningCode.DRIFT,
-                    f"{name} was put back by {abs(size):.2g} in all, more than {self.drift_bound:.2g} = 50 "
+                    f"{name} was corrected by {abs(size):.2g} in all, more than {self.drift_bound:.2g} = 50 "
                     "tolerance sqrt(steps), which rounding alone explains; choose a tighter tolerance or a "
                     "higher precision, or set hold_invariants = false to see how it drifts",
                 )

@@ -35,7 +35,7 @@ def time_reached(prepared: InitialValueProblem, progress: Progress, log: EventLo
     sample.
     """
     clock = prepared.clock
-    if progress.status in (Status.EVENT, Status.IMPOSSIBLE) and log.stop is not None:
+    if progress.status in (Status.EVENT, Status.IMPOSSIBLE, Status.OUT_OF_RANGE) and log.stop is not None:
         return clock.seconds(log.stop)
     done = progress.next_sample
     return float(clock.labels(done - 1, done)[0]) if done else clock.seconds(clock.start)
@@ -50,7 +50,7 @@ def closing_words(prepared: InitialValueProblem, progress: Progress, parts: Asse
         assert ending is not None
         name, when = prepared.system.crossings[ending.index].name, prepared.clock.seconds(ending.time)
         return f"{text}: {name} at {words.moment(when)}"
-    if progress.status is Status.IMPOSSIBLE and log.stop is not None:
+    if progress.status in (Status.IMPOSSIBLE, Status.OUT_OF_RANGE) and log.stop is not None:
         return f"{text}: {log.why_impossible} at {words.moment(prepared.clock.seconds(log.stop))}"
     if progress.status is Status.UNRESOLVED:
         return f"{text}: {progress.detail} (at {words.moment(progress.time)}, after {progress.steps} steps)"

@@ -142,8 +142,8 @@ def _accuracy(found: Diagnostics) -> Accuracy:
         predictable_seconds=estimate.predictable_seconds,
         amplification_seconds=estimate.seconds,
         examined_share=estimate.share,
-        amplification_how="of the estimated error over that of a stable motion: the round-off law "
-        "(eps/2) sqrt(steps) sqrt(4 + (|w| t)^2 / 3), and what the tolerance cuts off; 1 for a stable motion",
+        amplification_how="of the estimated error over that of a stable motion, whose rounding errors grow "
+        "as (eps/2) sqrt(steps) sqrt(4 + (|w| t)^2 / 3), and what the tolerance cuts off; 1 for a stable one",
     )
 
 

@@ -66,7 +66,10 @@ def _assembled(prepared: InitialValueProblem, stride: int) -> Assembly:
     system, precision = prepared.system, prepared.precision
     wrapping = AngleWrapping(system.angle_states, precision, prepared.scene.context, system.angle_unit)
     log = EventLog(
-        [c.stop for c in system.crossings], [c.impossible for c in system.crossings], lambda: wrapping.angles
+        [c.stop for c in system.crossings],
+        [c.impossible for c in system.crossings],
+        [c.leaves_range for c in system.crossings],
+        lambda: wrapping.angles,
     )
     corrected = _stepping(prepared, prepared.algorithm, wrapping, log, stride)
     countable = not system.turning  # samples alone can't tell what such a load does

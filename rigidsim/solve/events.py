@@ -20,6 +20,7 @@ from rigidsim.solve.checkpoint import Arrays, pack, unpack
 from rigidsim.solve.compiled import TaylorEngine, compiled_function
 from rigidsim.solve.precision import Precision, Scalar
 from rigidsim.solve.sample_block import AngleState, SampleBlock, pack_angles, unpack_angles
+from rigidsim.solve.status import Status
 
 MOST_EVENTS = 1_000_000
 BESIDE = 60
@@ -49,6 +50,7 @@ class EventLog:
 
     stops: list[bool] = field(default_factory=list)
     impossible: list[str] = field(default_factory=list)  # why none can go on past each; empty if it can
+    leaving: list[bool] = field(default_factory=list)  # whether that is the end of a model's range
     angles: Callable[[], AngleState] = AngleState
     found: list[FoundEvent] = field(default_factory=list)
     stop: Scalar | None = None  # time of the first crossing that ends the run, or None
@@ -80,6 +82,15 @@ class EventLog:
         """Why the motion can't go on past the crossing that ends the run; empty if that is an event."""
         ending = self.ending
         return "" if ending is None or not self.impossible else self.impossible[ending.index]
+
+    @property
+    def status(self) -> Status:
+        """The status of a run that the first crossing that stops it has ended."""
+        if not self.why_impossible:
+            return Status.EVENT
+        ending = self.ending
+        leaves = ending is not None and bool(self.leaving) and self.leaving[ending.index]
+        return Status.OUT_OF_RANGE if leaves else Status.IMPOSSIBLE
 
     def occurrences(self, index: int, last: float) -> list[FoundEvent]:
         """The crossings of one event up to a time, internal units."""

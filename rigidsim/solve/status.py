@@ -17,6 +17,7 @@ class Status(Enum):
     COLLAPSED = "stopped: step size collapsed"
     UNRESOLVED = "stopped: switching unresolved"
     IMPOSSIBLE = "stopped: impossible body"
+    OUT_OF_RANGE = "stopped: out of range"
 
     @property
     def message(self) -> str:
@@ -36,7 +37,7 @@ class Status(Enum):
         return self in (Status.FINISHED, Status.EVENT, *_BROKEN)
 
 
-_BROKEN = (Status.NON_FINITE, Status.COLLAPSED, Status.UNRESOLVED, Status.IMPOSSIBLE)
+_BROKEN = (Status.NON_FINITE, Status.COLLAPSED, Status.UNRESOLVED, Status.IMPOSSIBLE, Status.OUT_OF_RANGE)
 _MESSAGES = {
     Status.RUNNING: "the run is under way, or was killed",
     Status.FINISHED: "the run reached its last sample",
@@ -49,4 +50,5 @@ _MESSAGES = {
     Status.COLLAPSED: "the steps became too small to ever arrive; the samples so far are kept",
     Status.UNRESOLVED: "the motion can't be continued past a switching surface; the samples so far are kept",
     Status.IMPOSSIBLE: "no body can go on like this; the samples so far are kept",
+    Status.OUT_OF_RANGE: "the motion left the range in which a model is known; the samples so far are kept",
 }

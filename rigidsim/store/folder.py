@@ -167,7 +167,8 @@ class RunFolder(WorkFolder):
     def create(self, *, force: bool) -> None:
         """Create the folder, or clear it of an earlier run."""
         files = [self.config, self.dataset, self.timeline, self.summary, self.checkpoint, self.figure]
-        files += [self.figure_of(name) for name in FIGURES]
+        files += [self.figure_of(name + end) for name in FIGURES for end in ("", "_slide")]
+        files.append(self.figure_of("slide"))
         files += [self.analysis, self.spectrum, self.path / NOTE]
         folders = [self.segments, self.set_aside]
         try:

@@ -67,16 +67,30 @@ class Run:
         with self.dataset as dataset:
             return figure(dataset, what)
 
-    def view(self, *, web: bool = False) -> int:
+    def view(
+        self, *, web: bool = False, png: str | Path | None = None, at: float | str | None = None,
+        part: str = "page",
+    ) -> int:  # fmt: skip
         """Open the timeline in the viewer, or in the browser (served on loopback, until Ctrl-C), and wait
-        until it is closed.
+        until it is closed; or draw a picture of it without a display.
+
+        Args:
+            png: file of the picture.
+            at: its moment, in the scene's unit of time or with a unit (``"2.4 hr"``); else 40 % of the run.
+            part: what it shows: "page", "scene" or "plots".
 
         Returns:
-            The viewer's exit code; 130 after Ctrl-C.
+            The viewer's exit code; 130 after Ctrl-C; 0 for a picture.
 
         Raises:
             RunFolderError: the timeline can't be drawn, no viewer is installed, or there is no screen for it.
         """
+        if png is not None:
+            from rigidsim.store import pictures  # which loads Pillow
+
+            with self.dataset as dataset:
+                pictures.draw(dataset, Path(png), at=None if at is None else str(at), part=part)
+            return 0
         with self.recording() as timeline:
             try:
                 return viewer.open_viewer(timeline, web=web)

@@ -1,16 +1,17 @@
 """``rigidsim view``: runs in the viewer, a running one followed as it goes on, or drawn to a file."""
 
 import tempfile
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 import xarray
 
 from rigidsim.errors import RigidsimError, RunFolderError
-from rigidsim.look import film, viewer
+from rigidsim.look import viewer
 from rigidsim.scene.sweeps.sweep import Sweep
-from rigidsim.store import atomic
+from rigidsim.store import pictures
+from rigidsim.store.pictures import Told
 from rigidsim.store.run import Run, SavedRun, open_run
 from rigidsim.store.sweeps.folder import is_sweep
 from rigidsim.store.sweeps.run import open_sweep
@@ -18,8 +19,6 @@ from rigidsim.workflows.compare.as_run import open_any
 from rigidsim.workflows.read import parse
 from rigidsim.workflows.run import run
 from rigidsim.workflows.sweeps.members import single_member
-
-Told = Callable[[int, int], None]
 
 
 def runs_of(paths: Sequence[Path], members: Sequence[int] = ()) -> list[tuple[str, Run]]:
@@ -67,28 +66,21 @@ def show(named: Sequence[tuple[str, Run]], *, web: bool = False) -> int:
 
 
 def render(
-    named: Sequence[tuple[str, Run]], target: Path, *, seconds: float | None = None, told: Told | None = None
-) -> Path:
-    """Draw runs to a PNG picture, or a GIF or MP4 film, without a screen."""
-    with _recording_of(named) as timeline, _new(target) as new:
-        try:
-            film.render(timeline, new, seconds=seconds or film.SECONDS, told=told)
-        except (FileNotFoundError, RuntimeError, ValueError) as error:
-            raise RunFolderError(f"{target}: can't be drawn: {error}") from None
+    named: Sequence[tuple[str, Run]], target: Path, *, seconds: float | None = None, told: Told | None = None,
+    at: str | None = None, part: str = "page",
+) -> Path:  # fmt: skip
+    """Draw a run to a PNG picture, or a GIF or MP4 film, without a screen; or several runs side by side, of
+    which there is the page alone. See ``store.pictures.draw``.
+    """
+    if len(named) == 1:
+        with named[0][1].dataset as dataset:
+            pictures.draw(dataset, target, seconds=seconds, told=told, at=at, part=part)
+        return target
+    if at is not None or part != "page":
+        raise RunFolderError("--at and --part: are for the picture of a single run; leave them out")
+    with _recording_of(named) as timeline:
+        pictures.draw_recording(timeline, target, seconds=seconds, told=told)
     return target
-
-
-@contextmanager
-def _new(target: Path) -> Iterator[Path]:
-    """A temporary file of the target's suffix that replaces the target once complete."""
-    try:
-        with tempfile.TemporaryDirectory(prefix="rigidsim-view-") as scratch:
-            new = Path(scratch) / f"new{target.suffix}"
-            yield new
-            with atomic.replacing(target) as placed:
-                placed.write_bytes(new.read_bytes())
-    except OSError as error:
-        raise RunFolderError(f"{target}: can't be written: {error.strerror or error}") from None
 
 
 @contextmanager

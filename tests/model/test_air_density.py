@@ -84,7 +84,8 @@ def test_the_density_is_that_of_the_model_within_the_network(case: tuple[float, 
 
 def test_a_run_ends_where_the_network_does() -> None:
     run = run_text(text(place=np.array([6535e3, 0, 0]), end=20000.0, mass=0.2))
-    assert run.summary["status"] != "finished"
+    assert run.status == "stopped: out of range"
+    assert "no body" not in str(run.summary)
     assert "below 150 km" in str(run.summary)
     assert run.dataset["time"].values[-1] < 20000
 

@@ -239,7 +239,10 @@ def test_the_slow_energy_is_kept_on_an_orbit_that_rests() -> None:
     ("given", "said"),
     [
         ({"level": "spin_averaged"}, 'choose level = "orbit_averaged", which keeps its angle'),
-        ({"more": "short_period = true"}, r"keeps pace with \[\[loads\]\] number 1 \(1:1\).*set it to false"),
+        (
+            {"more": "short_period = true"},
+            r"in resonance with \[\[loads\]\] number 1 \(1:1\).*set it to false",
+        ),
         ({"record": '"quaternion"'}, 'given "quaternion": needs every rotation'),
     ],
 )

@@ -160,7 +160,7 @@ def test_what_is_not_conserved_after_all_is_not_put_back_in_silence() -> None:
     energy = run.summary["invariants"]["energy"]
     assert abs(energy["put_back"]) > energy["bound"]
     assert "drift" in run.summary["warning_codes"]
-    assert any("energy was put back by" in warning for warning in run.summary["warnings"])
+    assert any("energy was corrected by" in warning for warning in run.summary["warnings"])
     assert verdict_on(run.outcome).soundness is Soundness.DRIFTED
     guarded = wrong.having(["limits.max_drift=1e-12", "time.samples=1001", f"time.end={4 * end}"])
     stopped = rigidsim.run(guarded, loads=[WrongPotential()], out=None)

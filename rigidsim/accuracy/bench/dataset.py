@@ -112,7 +112,9 @@ def dataset_of(measured: Measurement) -> xarray.Dataset:
             "tolerance": variable(tolerances, "1", "of the step control"),
             "formulation": variable(words([r.setting.formulation for r in rows]), "1", "of the attitude"),
             "held": variable(
-                np.array([r.setting.hold_invariants for r in rows], dtype=np.int8), "1", "invariants put back"
+                np.array([r.setting.hold_invariants for r in rows], dtype=np.int8),
+                "1",
+                "invariants projected",
             ),
             "method": variable(words([r.setting.method for r in rows]), "1", " or ".join(METHODS)),
             "time": ("time", np.array(plan.times), {"units": "s", "long_name": "since start of the scene"}),
@@ -164,7 +166,8 @@ def on_front(dataset: xarray.Dataset) -> np.ndarray:
 @dataclass(frozen=True)
 class BestSetting:
     """For an attitude error of at most ``at_most`` and more than ``more_than``: the cheapest setting, its
-    largest error (rad), and whether it was measured over less than the others, so that costs don't compare.
+    largest error (rad), its cost relative to the default setting's and in CPU seconds of the part measured,
+    and whether it was measured over less than the others, so that costs don't compare.
     """
 
     at_most: float
@@ -173,6 +176,7 @@ class BestSetting:
     error: float
     cost: float
     seconds: float
+    cpu_seconds: float
     less: bool
     keys: tuple[str, ...]
 
@@ -208,6 +212,7 @@ def advice(dataset: xarray.Dataset) -> list[BestSetting]:
                 error=float(error[n]),
                 cost=float(one["cpu_ratio"]),
                 seconds=float(one["measured_time"]),
+                cpu_seconds=float(one["cpu_seconds"]),
                 less=less,
                 keys=_keys(one),
             )

@@ -49,9 +49,11 @@ def export(
         print(path)
 
 
-def plot(run_path: Path, what: list[str] | None, out: Path | None) -> None:
+def plot(run_path: Path, what: list[str] | None, out: Path | None, for_slides: str | None) -> None:
     """Draw figures of a run, or maps of a sweep."""
     swept = is_sweep(run_path)
+    if for_slides is not None and (swept or SPECTRUM in (what or [])):
+        raise RigidsimError("--for-slides: is for figures of a single run other than spectrum; leave it out")
     saved = open_sweep(run_path) if swept else open_any(run_path)
     _tell_notes(saved)
     wanted = list(dict.fromkeys(what or []))
@@ -68,6 +70,7 @@ def plot(run_path: Path, what: list[str] | None, out: Path | None) -> None:
             wanted = [*(drawable(dataset) if swept else available(dataset))]
         for name in wanted or [OVERVIEW]:
             own = "" if name == OVERVIEW else "_" + name.replace("[", "_").replace("]", "")
+            own += "" if for_slides is None else "_slide"
             usual = f"figure{own}.png"
             if isinstance(saved, TrajectoryRun):
                 usual = saved.beside(usual).name
@@ -83,7 +86,7 @@ def plot(run_path: Path, what: list[str] | None, out: Path | None) -> None:
                     elif name == SPECTRUM:
                         save_spectrum(analysing.analyse(saved).dataset, new, file_format=kind)
                     else:
-                        save_figure(dataset, new, name, file_format=kind)
+                        save_figure(dataset, new, name, file_format=kind, slides=for_slides)
             except ValueError as error:
                 raise RigidsimError(f"plot: {error}" if swept else str(error)) from None
             except OSError as error:
@@ -94,7 +97,7 @@ def plot(run_path: Path, what: list[str] | None, out: Path | None) -> None:
 
 def view(
     run_paths: list[Path], web: bool, png: Path | None, gif: Path | None, mp4: Path | None,
-    seconds: float | None, member: list[int] | None,
+    seconds: float | None, member: list[int] | None, at: str | None, part: str,
 ) -> int:  # fmt: skip
     """Open the viewer, or draw to files."""
     targets = {".png": png, ".gif": gif, ".mp4": mp4}
@@ -110,11 +113,14 @@ def view(
         raise RigidsimError("view: --web opens the viewer, --png, --gif and --mp4 draw to a file: give one")
     if seconds is not None and not {".gif", ".mp4"} & set(asked):
         raise RigidsimError("view: --seconds is for --gif and --mp4: give one of them, too")
+    if at is not None and set(asked) != {".png"}:
+        raise RigidsimError("view: --at is the moment of a --png picture: give that alone")
     named = runs_of(run_paths, member or ())
     for _, one in named:
         _tell_notes(one)
     for target in asked.values():
-        render(named, target, seconds=seconds, told=_tell if sys.stderr.isatty() else None)
+        told = _tell if sys.stderr.isatty() else None
+        render(named, target, seconds=seconds, told=told, at=at, part=part)
         print(target)
     return 0 if asked else show(named, web=web)
 

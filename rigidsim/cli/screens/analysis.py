@@ -15,6 +15,7 @@ from rigidsim.scene.readable import YEAR, span_text, unit_for
 from rigidsim.workflows.analyse import Saved
 
 _WIDE = 100  # columns, from which the tables of lines have all of theirs
+_ROUNDINGS = 256.0  # spacings of a value: what rounding leaves of a constant over many steps
 _SURE = 5.0  # errors, from which a secular rate is told once more
 _DEGREE = math.pi / 180
 _ANGLES = (
@@ -54,8 +55,8 @@ def print_analysis(analysis: Analysis, saved: Saved) -> None:
     periods = f"periods from {span_text(2 * math.pi / analysis.nyquist)}"
     on.say((analysis.title or "dataset", "bold"), f"  {span} of samples, one every {spacing}: {periods}")
     for signal in analysis.signals:
-        _print_signal(signal, on)
-    _print_secular(analysis.signals, on)
+        _print_signal(signal, on, analysis.length)
+    _print_secular([one for one in analysis.signals if not _is_constant(one, analysis.length)], on)
     rows = []
     for one in analysis.known:
         period = span_text(2 * math.pi / abs(float(one.value)), 8)
@@ -86,12 +87,24 @@ def _digits(signal: SignalAnalysis) -> int:
     return max(int(signal.bits * 0.30103), 15)
 
 
-def _print_signal(signal: SignalAnalysis, on: Page) -> None:
+def _is_constant(signal: SignalAnalysis, length: float) -> bool:
+    """Whether nothing of a signal but its value is more than rounding, over so many seconds."""
+    if signal.value is None or signal.lines:
+        return False
+    rounding = _ROUNDINGS * 2.0**-signal.bits * max(abs(float(signal.value.real)), 2.0**-1074)
+    moved = 0.0 if signal.rate is None else abs(float(signal.rate.real)) * length
+    return max(signal.left, moved) <= rounding
+
+
+def _print_signal(signal: SignalAnalysis, on: Page, length: float) -> None:
     angle, digits = signal.units == "rad", _digits(signal)
     on.say("")
+    if _is_constant(signal, length):
+        on.say((signal.name, "bold"), f"  {_value(signal, angle, digits)}, constant to rounding", whole=True)
+        return
     on.say((signal.name, "bold"), f"  {_secular(signal, angle, digits)}", whole=True)
     if signal.lines:
-        on.console.print(_lines(signal, angle, digits, narrow=on.width < _WIDE))
+        on.console.print(_lines(signal, angle, digits, length, narrow=on.width < _WIDE))
     else:
         on.say(("  no line stands out of what is left", "dim"))
     left, level = (_with_unit(size, signal.units) for size in (signal.left, signal.level))
@@ -101,12 +114,17 @@ def _print_signal(signal: SignalAnalysis, on: Page) -> None:
         on.say((f"  {note}", "yellow"), whole=True)
 
 
+def _value(signal: SignalAnalysis, angle: bool, digits: int) -> str:
+    """Its secular part in the middle of the samples."""
+    unit, symbol = angle_unit(float(signal.value.real)) if angle else (1.0, signal.units)
+    value = justified(signal.value.real / unit, signal.value_error / unit, digits)
+    return value if symbol in ("", "1") else f"{value} {symbol}"
+
+
 def _secular(signal: SignalAnalysis, angle: bool, digits: int) -> str:
     if signal.value is None:
         return ""
-    unit, symbol = angle_unit(float(signal.value.real)) if angle else (1.0, signal.units)
-    value = justified(signal.value.real / unit, signal.value_error / unit, digits)
-    text = f"{value} {symbol} at mid-span".replace(" 1 at", " at")
+    text = f"{_value(signal, angle, digits)} at mid-span"
     return text if signal.rate is None else f"{text}; secular rate {_rate(signal, angle, digits)}"
 
 
@@ -120,7 +138,7 @@ def _with_unit(value: float, units: str) -> str:
     return f"{value:.1e}" + (f" {units}" if units not in ("", "1") else "")
 
 
-def _lines(signal: SignalAnalysis, angle: bool, digits: int, *, narrow: bool) -> Table:
+def _lines(signal: SignalAnalysis, angle: bool, digits: int, length: float, *, narrow: bool) -> Table:
     """Table of a signal's lines; ``narrow`` without the errors of frequencies, which their digits imply."""
     table = Table(box=SIMPLE_HEAD, pad_edge=False, show_edge=False)
     largest = float(signal.lines[0].amplitude)
@@ -131,7 +149,7 @@ def _lines(signal: SignalAnalysis, angle: bool, digits: int, *, narrow: bool) ->
     table.add_column("line", overflow="fold")
     for line in signal.lines:
         table.add_row(
-            _period(line),
+            _period(line, length),
             justified(line.frequency, line.frequency_error, digits),
             *(() if narrow else (f"{line.frequency_error:.0e}",)),
             justified(line.amplitude / unit, line.amplitude_error / unit, 7),
@@ -141,10 +159,13 @@ def _lines(signal: SignalAnalysis, angle: bool, digits: int, *, narrow: bool) ->
     return table
 
 
-def _period(line: SpectralLine) -> str:
+def _period(line: SpectralLine, length: float) -> str:
+    """The period; of a line without a label that hasn't come round once there is none to be told."""
     period = line.period
     if not math.isfinite(period):
         return "-"
+    if period > length and not line.label.text:
+        return "beyond the span"
     unit = unit_for(period)
     own = line.frequency_error / abs(float(line.frequency)) * period / unit.seconds
     return f"{justified(period / unit.seconds, own, 9)} {unit.symbol}"

@@ -61,7 +61,7 @@ def print_comparison(found: Comparison) -> None:
                 [
                     "  share",
                     f"{local.unexplained:.2g}",
-                    f"{words}, in windows of {span_text(local.window_s, 3)}",
+                    f"{words}, over spans of {span_text(local.window_s, 3)}",
                 ]
             )
         if local.order is not None:

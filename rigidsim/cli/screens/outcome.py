@@ -39,7 +39,7 @@ def print_errors(accuracy: Accuracy, on: Page, what: str, *, brief: bool = False
         on.line(what, f"{text}{accuracy.times_compared} times)")
     elif estimate is not None:
         factor = accuracy.amplification or 1.0
-        unstable = f" ({factor:.1g} times the round-off law)" if factor > 1 and not brief else ""
+        unstable = f" ({factor:.1g} times that of a stable motion)" if factor > 1 and not brief else ""
         size = f"uncertain by about {estimate:.1e} rad at the end{unstable}"
         if what == "axis":
             size = f"momentum's direction integrated to about {estimate:.1e} rad at the end{unstable}"
@@ -79,7 +79,7 @@ def print_modelling(found: Modelling | None, on: Page, *, brief: bool = False) -
         on.line("", text + f"rotation within {found.energy:.1e}")
     if not found.whole and found.growth is not None and found.oscillation is not None:
         span = found.windows[0].end - found.windows[0].start
-        text = f"{len(found.windows)} windows of {span_text(span)} with every rotation: "
+        text = f"{len(found.windows)} spans of {span_text(span)} integrated with every rotation: "
         text += f"{found.oscillation:.1e} rad in each, growing by {found.growth * YEAR:.1e} rad/yr"
         on.line("", text)
     if not (found.short_period or found.resonance or found.energy is not None):

@@ -19,7 +19,7 @@ _PIPED_WIDTH = 110  # columns, where there is no terminal and COLUMNS says nothi
 _LEAST_WIDTH = 40
 _LABEL = 8
 _BETWEEN = 3  # columns between those of a table
-_NUMBERS = ("largest drift", "final", "bound", "initial", "put back")
+_NUMBERS = ("largest drift", "final", "bound", "initial", "correction")
 
 
 class Page:

@@ -34,7 +34,7 @@ def print_plan(plan: RunPlan) -> None:
     on.table(["invariant", "holds because"], [[row.name, row.why] for row in plan.invariants])
     on.line("recorded", ", ".join(plan.recorded))
     predicted, pilot = plan.predicted, plan.pilot
-    held = ", invariants held" + from_step(plan.hold_from_step) if plan.hold_invariants else ""
+    held = ", invariants projected" + from_step(plan.hold_from_step) if plan.hold_invariants else ""
     order = "" if plan.taylor_order is None else f", Taylor order {plan.taylor_order}"
     on.line("settings", f"{plan.precision} precision, tolerance {plan.tolerance:.3g}{order}{held}")
     if not method_named(plan.method).has_steps:
@@ -53,9 +53,7 @@ def print_plan(plan: RunPlan) -> None:
         f"timeline {bytes_text(predicted.timeline_bytes)}",
     )
     if predicted.pace is None:
-        on.line(
-            "", "at the pace of the start, which torques change: fewer steps where they brake the rotation"
-        )
+        on.line("", "with steps as at the start, which torques change: fewer where they brake the rotation")
     elif predicted.pace != 1:
         told = f"{predicted.pace:.2g} times as many a second as at first"
         on.line("", f"torques change the rotation: steps are {told}, on average")
@@ -65,7 +63,7 @@ def print_plan(plan: RunPlan) -> None:
     if error is not None and math.isfinite(error):
         factor = predicted.amplification
         unstable = f", {factor:.1g} times amplified by the motion" if factor > 1 else ""
-        law = "invariants held" if predicted.held else "round-off law"
+        law = "invariants projected" if predicted.held else "rounding that grows as t^1.5"
         averaged = plan.formulation.endswith("_averaged")
         words = "momentum's direction integrated to" if averaged else "attitude uncertain by"
         on.line("accuracy", f"{words} about {error:.1e} rad at the end ({law}{unstable})")
@@ -123,8 +121,10 @@ def print_tradeoff(result: dict[str, Any]) -> None:
             reach += f" to {row['more_than'] * 10:.0e}"
         marked = marked or row["less"]
         star = " *" if row["less"] else ""
-        rows.append([reach, f"{row['cost']:.3g}", f"{row['error']:.1e}{star}", ", ".join(row["keys"])])
-    on.table(["attitude error, rad", "cost", "error reached", "keys of [integrator]"], rows)
+        spent = "" if row["cpu_seconds"] is None else span_text(row["cpu_seconds"])
+        cost = [f"{row['cost']:.3g}", spent]
+        rows.append([reach, *cost, f"{row['error']:.1e}{star}", ", ".join(row["keys"])])
+    on.table(["attitude error, rad", "cost", "CPU", "error reached", "keys of [integrator]"], rows)
     if marked:
         less = next(row["seconds"] for row in result["advice"] if row["less"])
         on.say(f"  * over the first {span_text(less)} only: quadruple precision is slow")
@@ -140,8 +140,8 @@ def print_tradeoff(result: dict[str, Any]) -> None:
     on.line("against", result["reference"])
     on.line(
         "cost",
-        f"CPU time of integration over that of double precision in quaternions, {result['processes']} fresh "
-        f"processes, medians; recording not counted",
+        "CPU time of integration over that of double precision in quaternions, and in seconds on this "
+        f"machine for what was measured; {result['processes']} fresh processes, medians, without recording",
     )
     if result["closed_form"] != "yes":
         on.line("exact", f"no: {result['closed_form'].removeprefix('none: ')}")

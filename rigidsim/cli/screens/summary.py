@@ -123,7 +123,9 @@ def _print_ended(summary: Summary, loads: Sequence[str], on: Page) -> None:
     _print_invariants(summary, on)
     on.line("drifts", "relative to: " + _scales(summary.invariants))
     if summary.held:
-        on.line("held", "put back: what the drift would have been; held drifts are no independent check")
+        on.line(
+            "projected", "correction: what the drift would have been; what is left is no independent check"
+        )
     print_errors(summary.accuracy, on, "attitude" if summary.modelling is None else "axis")
     print_modelling(summary.modelling, on)
     for number, (name, found) in enumerate(summary.tables.items()):
@@ -147,7 +149,7 @@ def _print_ended(summary: Summary, loads: Sequence[str], on: Page) -> None:
 
 def _print_invariants(summary: Summary, on: Page) -> None:
     """Print the invariants, without the final drifts if the table doesn't fit."""
-    held = ["put back"] if summary.held else []
+    held = ["correction"] if summary.held else []
     columns = ["invariant", "initial", "largest drift", "final", "bound", *held]
     rows: list[list[Styled]] = []
     for name, row in summary.invariants.items():

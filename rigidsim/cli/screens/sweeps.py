@@ -89,9 +89,9 @@ def print_sweep(result: SavedSweep) -> None:
         done = f"{told.tiles_done:,} of {told.tiles:,}" if told.tiles is not None else ""
         if told.members_per_second:
             left = clock_text(told.seconds_left)
-            on.line("tiles", f"{done}; {told.members_per_second:.3g} members a second, {left} left")
+            on.line("blocks", f"{done}; {told.members_per_second:.3g} members a second, {left} left")
         elif done:
-            on.line("tiles", done)
+            on.line("blocks", done)
         if result.status == "interrupted":
             on.line("next", f"rigidsim resume {place}")
         return
@@ -100,10 +100,12 @@ def print_sweep(result: SavedSweep) -> None:
     on.table(["ended", "members"], ended, ruled=False)
     cost = told.cost
     assert cost is not None
-    engines = ", ".join(f"{number:,} {engine}" for engine, number in told.engines.items())
+    engines = ", ".join(f"{n:,} {_ENGINES.get(engine, engine)}" for engine, n in told.engines.items())
     errors = f", {cost.estimate_cpu_seconds:.3g} s of them for errors" if cost.estimate_cpu_seconds else ""
-    spent = f"{cost.steps:,} steps, {cost.cpu_seconds:.3g} s of CPU in {cost.tiles:,} tiles"
+    spent = f"{cost.steps:,} steps, {cost.cpu_seconds:.3g} s of CPU in {cost.tiles:,} blocks of members"
     on.line("cost", f"{spent} ({engines}){errors}")
+    if told.why_alone is not None and told.engines.get("alone"):
+        on.line("", _one_by_one(told.why_alone))
     for name, error in told.estimated_errors.items():
         averaged = name == "attitude" and "modelling" in told.estimated_errors
         words = _INTEGRATED if averaged else _ERRORS.get(name, name)
@@ -119,6 +121,33 @@ def print_sweep(result: SavedSweep) -> None:
     on.line("", f"rigidsim export {place} --format csv")
 
 
+_ENGINES = {"alone": "one by one"}
+_CURES = {
+    "asked": "[sweep] batch = false says so: leave it out, and they run four or eight at once",
+    "wall_time": "[limits] wall_time is watched run by run: leave it out, and they run in batches",
+    "frequencies": "frequencies need whole runs: keep something else, or take fewer members",
+    "precision": 'precision = "double" runs in batches',
+    "closed_form": 'method = "taylor" runs in batches',
+    "held": "hold_invariants = false runs in batches",
+    "accuracy": "give a tolerance in place of accuracy, and they run in batches",
+    "chart": 'formulation = "quaternion" runs in batches',
+    "angles": "record quaternion in place of those angles, and they run in batches",
+    "key": "members that differ in a number of the body, the start or a load run in batches",
+    "families": "sweep a number of the body, the start or a load, or take more members of each kind",
+}
+"""What to do about it, by the code of why members run one by one."""
+
+
+def _one_by_one(code: str) -> str:
+    """Why members were run one by one, and the cure where there is one."""
+    from rigidsim.solve.batch.family import Alone
+
+    known = {one.name.lower(): one.value for one in Alone}
+    cure = _CURES.get(code, "")
+    said = [words for words in (known.get(code, ""), cure) if words]
+    return "one by one, several times as slow as in batches: " + ("; ".join(said) or code)
+
+
 def print_sweep_plan(made: SweepPlan) -> None:
     """Print what a sweep would run, and what it would cost."""
     on = Page()
@@ -131,10 +160,10 @@ def print_sweep_plan(made: SweepPlan) -> None:
     on.table(["axis", "key", "values", "from", "to"], rows, ruled=False)
     predicted = made.predicted
     on.line("keep", ", ".join(made.keep))
-    on.line("tiles", f"{made.tiles:,} of {made.tile:,} members")
+    on.line("blocks", f"{made.tiles:,} of {made.tile:,} members (--tiles runs some of them)")
     each = f"{predicted.seconds_per_member:.2g} s a member"
     on.line("time", f"{clock_text(predicted.total_seconds)} on one core, {each}")
-    on.line("disk", f"about {predicted.dataset_bytes / 1e6:.3g} MB, and as much for the tiles")
+    on.line("disk", f"about {predicted.dataset_bytes / 1e6:.3g} MB, and as much for the blocks (tiles/)")
     on.say("")
     on.say("one member:")
 

@@ -115,7 +115,7 @@ _SOUND = "sound: every drift is within what rounding explains{share}"
 _WORDS = {
     Soundness.SOUND: _SOUND,
     Soundness.AMPLIFIED: _SOUND + "; the motion itself amplifies errors",
-    Soundness.HELD: "sound: what was put back is within what rounding explains{share}; "
+    Soundness.HELD: "sound: the corrections of invariants are within what rounding explains{share}; "
     "drifts themselves are projected away",
     Soundness.LIMITED: "sound except for what the warning tells: every drift is within what rounding "
     "explains{share}",

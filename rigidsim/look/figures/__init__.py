@@ -12,11 +12,21 @@ panels (``panel.Panel``: what it finds in a dataset, and how that is drawn).
 | `poles`, `polhode` | where axes point, and a body's path; polhode, herpolhode, Poinsot's motion |
 | `eye` | bodies in three dimensions on plain axes |
 | `librations` | panels of a body that turns one face to its source |
+| `slides` | one panel in large letters, on a light or a dark ground |
 | `style` | colours, fonts, the page's heading, keys |
 | `spectrum`, `work_precision`, `sweep_maps`, `sweep_axes` | figures of `analyse`, `tradeoff` and `sweep` |
 """
 
 from rigidsim.look.figure_names import FIGURES, OVERVIEW
-from rigidsim.look.figures.catalogue import available, check_name, figure, figure_format, save_figure
+from rigidsim.look.figures.catalogue import (
+    available,
+    check_name,
+    figure,
+    figure_format,
+    for_slides,
+    save_figure,
+)
 
-__all__ = ["FIGURES", "OVERVIEW", "available", "check_name", "figure", "figure_format", "save_figure"]
+__all__ = [
+    "FIGURES", "OVERVIEW", "available", "check_name", "figure", "figure_format", "for_slides", "save_figure",
+]  # fmt: skip

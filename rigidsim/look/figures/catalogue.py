@@ -16,10 +16,11 @@ from rigidsim.look.figures import changing, gyrostat, librations, poles, polhode
 from rigidsim.look.figures.composing import compose, shown_rows
 from rigidsim.look.figures.drift import drift
 from rigidsim.look.figures.panel import Panel
+from rigidsim.look.figures.slides import slide
 from rigidsim.look.figures.style import STYLE
 
 SUFFIXES = (".png", ".svg")
-_DOTS = 160  # per inch
+_DOTS, _SLIDE_DOTS = 160, 250  # per inch
 
 
 @dataclass(frozen=True)
@@ -58,6 +59,9 @@ KINDS: dict[str, Kind] = {
         ],
         [librations.nadir, librations.phases, librations.locking_phases],
     ),
+    "pointing": Kind(
+        "air_velocity, or nadir without libration or roll_pitch_yaw, recorded", [librations.pointing]
+    ),
     "tip": Kind(
         "a top: a body on a fixed point under uniform gravity",
         [timelines.tilt, timelines.precession],
@@ -82,6 +86,10 @@ KINDS: dict[str, Kind] = {
         [published.angles, published.rotation],
     ),
     "attitude": Kind(_ATTITUDE, [timelines.attitude, timelines.wobble]),
+    "wobble": Kind(
+        "a free symmetric body, its attitude, angular_velocity and angular_momentum recorded",
+        [poles.wobble_and_spin],
+    ),
     "states": Kind("states of one's own ([[states]]) recorded", changing.OWN_STATES),
     "drift": Kind("invariants", [drift]),
 }
@@ -115,6 +123,28 @@ def figure(dataset: xarray.Dataset, what: str = OVERVIEW) -> Figure:
     return compose(shown, kind.curves, kind.planes)
 
 
+def for_slides(dataset: xarray.Dataset, what: str = OVERVIEW, ground: str = "light") -> Figure:
+    """The leading panel of a figure of a run, alone and in large letters, on a light or a dark ground.
+
+    Raises:
+    ValueError: as for ``figure``, or another ground.
+    """
+    check_name(what)
+    shown = shown_rows(dataset)
+    curves, planes = _leading(shown.rows) if what == OVERVIEW else ((), ())
+    if what in KINDS:
+        curves, planes = KINDS[what].curves, KINDS[what].planes
+    panels = [*((panel, True) for panel in curves), *((panel, False) for panel in planes)]
+    if what != OVERVIEW:  # what it is named for
+        panels.sort(key=lambda found: found[1])
+    for panel, over_time in panels:
+        if panel.shows(shown.rows):
+            return slide(shown, panel, ground, over_time=over_time)
+    raise ValueError(
+        f"figure {what!r}: this run has no panel of it for a slide; it has {', '.join(available(dataset))}"
+    )
+
+
 def check_name(what: str) -> None:
     """Refuse an unknown name by ``ValueError``, with a list of the figures."""
     if what not in FIGURES:
@@ -124,13 +154,19 @@ def check_name(what: str) -> None:
 
 
 def save_figure(
-    dataset: xarray.Dataset, path: str | Path, what: str = OVERVIEW, *, file_format: str | None = None
-) -> Path:
+    dataset: xarray.Dataset, path: str | Path, what: str = OVERVIEW, *, file_format: str | None = None,
+    slides: str | None = None,
+) -> Path:  # fmt: skip
     """Draw a figure of a run to a file (see `figure`), which is whole when this returns its path, in the
-    format given or that of its suffix; ``ValueError`` for another suffix, too.
+    format given or that of its suffix; with ``slides``, a ground, its leading panel alone (see `for_slides`).
+    ``ValueError`` for another suffix, too.
     """
     path = Path(path)
     file_format = file_format or figure_format(path)
+    if slides is not None:
+        page = for_slides(dataset, what, slides)
+        page.savefig(path, dpi=_SLIDE_DOTS, format=file_format, facecolor=page.get_facecolor())
+        return path
     with rc_context(STYLE):  # type: ignore[arg-type]
         figure(dataset, what).savefig(path, dpi=_DOTS, format=file_format)
     return path
@@ -158,7 +194,7 @@ def _of_body(rows: xarray.Dataset) -> tuple[Sequence[Panel], Sequence[Panel]]:
     attitude = [timelines.rates, timelines.attitude]
     tilting = [timelines.obliquity, timelines.longitude]
     if librates(rows):
-        swinging = [timelines.libration, timelines.roll_pitch_yaw]
+        swinging = [timelines.libration, timelines.roll_pitch_yaw, librations.pointing]
         if librations.latitude.shows(rows):  # its figure axis precesses, as the Moon's
             swinging = [librations.longitude, librations.latitude, timelines.libration]
         return swinging, [librations.nadir, *(moving or [librations.phases])]
@@ -178,7 +214,10 @@ def _of_body(rows: xarray.Dataset) -> tuple[Sequence[Panel], Sequence[Panel]]:
     if signals.near_axis(rows):
         if poles.precesses(rows) and not moving:
             return [timelines.braking, *tilting], [poles.nutation, poles.pole_path]
-        return [timelines.braking, timelines.polar_motion], [poles.polar_motion, *moving]
+        wobbling = [poles.wobble_and_spin] if moving else []
+        return [timelines.braking, *wobbling, timelines.polar_motion], [poles.polar_motion, *moving]
+    if moving and librations.pointing.shows(rows):
+        return [librations.pointing, timelines.rates], [*moving, polhode.polhode]
     if moving:
         return attitude, [*moving, polhode.polhode]
     if not any(panel.shows(rows) for panel in attitude):  # only axes are known, as of an averaged model

@@ -8,20 +8,22 @@ import xarray
 from matplotlib import rc_context
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.gridspec import SubplotSpec
 
 from rigidsim.look import signals
 from rigidsim.look.figures import timelines
-from rigidsim.look.figures.panel import Panel
-from rigidsim.look.figures.style import GREY, INK, STYLE, blank
+from rigidsim.look.figures.panel import Panel, clock
+from rigidsim.look.figures.style import GREY, INK, STYLE, ShownFigure, blank
 from rigidsim.look.page import largest_drift
-from rigidsim.look.signals import by_role, is_averaged, read_config
+from rigidsim.look.signals import by_role, in_words, is_averaged, read_config
 from rigidsim.look.thinning import thin
-from rigidsim.scene.readable import unit_for
+from rigidsim.scene.readable import span_text, unit_for
 
 ROWS, FULL_READ = 20_000, 2_000_000  # that a figure draws; that are read for the largest drift
 
 _TELLING = 0.5  # changes of sign to a sample: four samples a swing
 _CYCLES, _MANY = 14, 60  # swings shown of the start, where there are more than so many
+_BANDS = 400  # parts of a panel's width, each with the least and the largest value in it
 _CURVE, _PLANE, _FACT = 2.55, 4.7, 0.235  # heights, inches
 _WIDE, _NARROW = 12.4, 8.2
 _PLANES_WIDE = 5.2  # width of a plane where only planes stand side by side
@@ -52,7 +54,7 @@ def shown_rows(dataset: xarray.Dataset) -> Shown:
     return Shown(rows, start, largest, complete)
 
 
-def beginning(axes: Axes, shown: Shown) -> float:
+def _beginning(axes: Axes, shown: Shown) -> float:
     """Seconds that hold `_CYCLES` swings of the curves drawn of `shown.start`; 0 if the run has few more."""
     seconds, whole = signals.seconds(shown.start), signals.seconds(shown.rows)
     length, span = float(seconds[-1] - seconds[0]), float(whole[-1] - whole[0])
@@ -110,10 +112,8 @@ def _two_columns(
     )
     if curves:
         grid = outer[0].subgridspec(len(curves), 1)
-        drawn = [_curve_panel(figure.add_subplot(grid[k]), panel, shown) for k, panel in enumerate(curves)]
-        for row, (axes, data, begins) in enumerate(drawn):
-            lowest = row == len(drawn) - 1 or drawn[row + 1][2] != begins
-            timelines.time_axis(axes, data, labelled=lowest, begins=begins)
+        for k, panel in enumerate(curves):
+            _curve_panel(figure, grid[k], panel, shown, lowest=k == len(curves) - 1)
     if right:
         heights = [_PLANE] * len(planes) + ([below] if table else [])
         spare = height - sum(heights)
@@ -127,27 +127,62 @@ def _two_columns(
     return figure
 
 
-def _curve_panel(axes: Axes, panel: Panel, shown: Shown) -> tuple[Axes, xarray.Dataset, float]:
-    """Draw it; returns its axes, the samples drawn, and the seconds to be shown of the start alone, or 0."""
-    if panel.begins:
-        panel.draw(axes, shown.start)
-        begins = beginning(axes, shown)
-        if begins:
-            axes.clear()
-            start = shown.start
-            if not str(start.attrs.get("time_unit") or ""):
-                start = start.assign_attrs(time_unit=unit_for(begins).symbol)
-            panel.draw(axes, start)
-            legend = axes.get_legend()
-            for line in (*axes.get_lines(), *(legend.get_lines() if legend else ())):
-                if line.get_linestyle() == "None":  # few enough now to be told apart, and to be followed
-                    line.set(linestyle="-", linewidth=0.6, markersize=5.0)
-            return axes, start, begins
-        if shown.start is shown.rows:
-            return axes, shown.rows, 0.0
-        axes.clear()
-    panel.draw(axes, shown.rows)
-    return axes, shown.rows, 0.0
+def _curve_panel(figure: Figure, place: SubplotSpec, panel: Panel, shown: Shown, *, lowest: bool) -> None:
+    """Draw it over the whole run; of more swings than can be seen there as a band between the extremes, with
+    the first of them beside it.
+    """
+    begins = first_swings(panel, shown)
+    if not begins:
+        axes = figure.add_subplot(place)
+        panel.draw(axes, shown.rows)
+        timelines.time_axis(axes, shown.rows, labelled=lowest)
+        return
+    parts = place.subgridspec(1, 2, width_ratios=[1.7, 1.0], wspace=0.03)
+    whole, first = (figure.add_subplot(parts[k]) for k in range(2))
+    panel.draw(whole, shown.rows)
+    _as_band(whole)
+    timelines.time_axis(whole, shown.rows, labelled=True)
+    draw_first(first, panel, shown, begins)
+    legend = first.get_legend()
+    if legend is not None:
+        legend.remove()
+    first.set(ylabel="")
+    first.set_title(f"the first {span_text(begins, 2)}", fontweight="normal", color=GREY)
+
+
+def first_swings(panel: Panel, shown: Shown) -> float:
+    """Seconds of the start that a panel shows by itself; 0 if the whole run can be followed."""
+    if not panel.begins:
+        return 0.0
+    trial = ShownFigure(figsize=(6.0, 3.0)).add_subplot()
+    panel.draw(trial, shown.start)
+    return _beginning(trial, shown)
+
+
+def draw_first(axes: Axes, panel: Panel, shown: Shown, begins: float) -> None:
+    """Draw a panel over so many seconds of the start, in a unit of time that suits them."""
+    start = shown.start.assign_attrs(time_unit=unit_for(begins).symbol)
+    panel.draw(axes, start)
+    for line in axes.get_lines():
+        if line.get_linestyle() == "None":  # few enough now to be told apart, and to be followed
+            line.set(linestyle="-", linewidth=0.6, markersize=5.0)
+    time, unit, _ = clock(start)
+    axes.set(xlim=(time[0], time[0] + begins / unit.seconds), xlabel=f"time [{unit.symbol}]")
+
+
+def _as_band(axes: Axes) -> None:
+    """Replace curves that are denser than the panel by the band between their extremes."""
+    for line in list(axes.get_lines()):
+        x, y = (np.asarray(values, dtype=np.float64) for values in (line.get_xdata(), line.get_ydata()))
+        per_part = len(x) // _BANDS
+        if per_part < 4:
+            continue
+        parts = np.arange(0, len(x), per_part)
+        low, high = np.fmin.reduceat(y, parts), np.fmax.reduceat(y, parts)
+        places = np.append(x[parts[:-1]], x[-1]) if len(parts) > 1 else x[parts]
+        color = line.get_color()
+        axes.fill_between(places, low, high, color=color, alpha=0.35, lw=0.6)
+        line.set(visible=False)
 
 
 def facts_of(shown: Shown) -> list[tuple[str, str]]:
@@ -173,7 +208,7 @@ def facts_of(shown: Shown) -> list[tuple[str, str]]:
     bound = "" if shown.complete else "≥ "  # of the samples that were read
     for name, drift in shown.largest.items():
         largest = f"{drift:.1e}" if drift else "0"
-        lines.append((f"largest drift, {name.replace('_', ' ')}", bound + largest))
+        lines.append((f"largest drift, {in_words(name)}", bound + largest))
     return lines
 
 

@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from rigidsim.look import signals
 from rigidsim.look.figures.panel import clock, panel
 from rigidsim.look.figures.style import GREY, PALETTE, key, note
-from rigidsim.look.signals import by_role
+from rigidsim.look.signals import by_role, in_words
 from rigidsim.look.solids import Array
 
 TYPICAL, MOST = 0.5, 50.0
@@ -43,7 +43,7 @@ def drift(axes: Axes, dataset: xarray.Dataset, found: dict[str, xarray.DataArray
     still: list[str] = []
     for (name, variable), hue in zip(found.items(), cycle(PALETTE), strict=False):
         shown = _magnitude(variable, len(time))
-        label = name.replace("_", " ")
+        label = in_words(name)
         if not np.isfinite(shown).any():  # zero has no place on a logarithmic axis
             still.append(label)
         else:
@@ -70,7 +70,7 @@ def drift(axes: Axes, dataset: xarray.Dataset, found: dict[str, xarray.DataArray
     else:
         axes.set_yticks([0.0])
     remarks = ["grey: what rounding explains"] if band is not None else []
-    remarks += ["dashed: what was put back"] if projected else []
+    remarks += ["dashed: corrections by projection"] if projected else []
     key(axes, "Drift of invariants" + (f" ({', '.join(remarks)})" if remarks else ""))
     axes.set_ylabel("relative drift")
 

@@ -12,7 +12,7 @@ from rigidsim.look.figures.panel import angle_scale, panel
 from rigidsim.look.figures.poles import flat, path_about
 from rigidsim.look.figures.style import BLUE, ORANGE, VIOLET, curve, key, titled
 from rigidsim.look.figures.timelines import angles_over_time
-from rigidsim.look.librations import Librations, librations, seen, toward
+from rigidsim.look.librations import Librations, librations, pointing_angle, seen, toward
 from rigidsim.look.solids import Array
 from rigidsim.scene.readable import si_scale
 
@@ -54,6 +54,15 @@ def nadir(axes: Axes, dataset: xarray.Dataset, directions: Array) -> None:
     labels = (f"towards {sign}{'xyz'[axis]} [{unit}]" for axis in (i, j))
     path_about(axes, plane / scale, *labels)
     key(axes, f"The source seen from the body (+: {sign}{'xyz'[k]} axis)")
+
+
+@panel(pointing_angle, begins=True)
+def pointing(axes: Axes, dataset: xarray.Dataset, found: tuple[str, str, Array]) -> None:
+    """How far a body axis points away from where the air or the light comes from."""
+    axis, towards, angle = found
+    title = f"Angle between the body's {axis} axis and {towards}"
+    angles_over_time(axes, dataset, angle[:, None], title, hues=(BLUE,))
+    axes.set_ylim(bottom=0.0)
 
 
 _LAST_TURNS = 10  # before a body is locked, in the phase plane

@@ -8,11 +8,12 @@ from rigidsim.look import fits, signals
 from rigidsim.look.figures import eye as eyes
 from rigidsim.look.figures import style, timelines
 from rigidsim.look.figures.panel import angle_scale, angle_text, panel, recorded
-from rigidsim.look.figures.style import INK, Z, curve, key, square, titled
+from rigidsim.look.figures.style import BLUE, INK, ORANGE, Z, curve, key, square, titled
 from rigidsim.look.solids import Array
 from rigidsim.scene.readable import si_scale, span_text
 
 _TURN = 2 * np.pi
+_ROUND = 1e-6  # relative difference of two moments, below which a body is symmetric
 _SMALL = 0.05  # rad: sines of smaller angles read as angles
 _FAR = 0.5  # rad from its mean motion, up to which a pole's path is as on a plane to a tenth
 
@@ -122,6 +123,34 @@ def pole_path(axes: Axes, dataset: xarray.Dataset, found: tuple[dict[str, Array]
     if rate is not None:
         title += f", once round in {span_text(_TURN / abs(rate), 4)}"
     key(axes, title)
+
+
+def _wobble_and_spin(dataset: xarray.Dataset) -> Array | None:
+    """Turns (rows, 2) of a symmetric body's figure axis about the momentum, which is fixed, and of the body
+    about its figure axis; None for others, and where samples are too far apart to count them.
+    """
+    moments, rates = signals.moments(dataset), signals.values(dataset, "angular_velocity")
+    pole, along = signals.pole(dataset, "figure"), signals.steady_momentum(dataset)
+    if moments is None or rates is None or pole is None or along is None:
+        return None
+    k = signals.figure_index(moments)
+    a, b = moments[(k + 1) % 3], moments[(k + 2) % 3]
+    first, second = signals.across(along)
+    if abs(a - b) > _ROUND * a or not np.abs(pole - along).max() > _ROUND or not signals.joined(pole):
+        return None
+    azimuth = np.unwrap(np.arctan2(pole @ second, pole @ first))
+    rate, seconds = rates @ signals.figure_direction(dataset), signals.seconds(dataset)
+    spin = np.concatenate([[0.0], np.cumsum(np.diff(seconds) * (rate[1:] + rate[:-1]) / 2)])
+    return np.abs(np.stack([azimuth - azimuth[0], spin], axis=1)) / _TURN
+
+
+@panel(_wobble_and_spin)
+def wobble_and_spin(axes: Axes, dataset: xarray.Dataset, turns: Array) -> None:
+    """Turns of the wobble in space, and of the body about its axis: two for one of a thin plate."""
+    labels = ("the axis about the angular momentum: the wobble", "the body about its axis: the spin")
+    timelines.lines(axes, dataset, turns, labels, (BLUE, ORANGE))
+    key(axes, f"In space: {turns[-1, 0] / turns[-1, 1]:.3f} turns of the wobble to one of the spin")
+    axes.set_ylabel("turns")
 
 
 def precesses(dataset: xarray.Dataset) -> bool:

@@ -19,6 +19,7 @@ from matplotlib.figure import Figure
 from rigidsim.look.figures import sweep_axes
 from rigidsim.look.figures.style import GREY, MOST_VECTOR_POINTS, PALE, PALETTE, STYLE, blank, key, titled
 from rigidsim.look.figures.sweep_axes import along, label_of, named, title_of, value_text
+from rigidsim.look.figures.sweep_units import in_units, tells_nothing
 from rigidsim.look.solids import Array
 
 INDICATORS = ("megno", "fli", "lyapunov")
@@ -52,6 +53,12 @@ def drawable(dataset: xarray.Dataset) -> list[str]:
     return sorted(found, key=lambda name: (_rank(dataset, name), found.index(name)))
 
 
+def default_of(dataset: xarray.Dataset) -> str:
+    """What a sweep's figure shows where nothing is named: the first that tells its members apart."""
+    names = drawable(dataset)
+    return next((name for name in names if not tells_nothing(dataset, name)), names[0])
+
+
 def _rank(dataset: xarray.Dataset, name: str) -> int:
     if name in INDICATORS:
         return INDICATORS.index(name)
@@ -61,6 +68,11 @@ def _rank(dataset: xarray.Dataset, name: str) -> int:
         return 30 + _ALWAYS.index(name)
     if any(str(dim).endswith(_SECTION) for dim in dataset[name].dims):
         return 12
+    told = str(dataset[name].attrs.get("long_name", ""))
+    if told.startswith("secular rate"):
+        return 8
+    if " of the lines of " in told:
+        return 14
     return 20 if name.endswith(_LAST) else 10
 
 
@@ -72,16 +84,18 @@ def save_sweep_figure(dataset: xarray.Dataset, path: Any, what: str | None, *, f
 
 def sweep_figure(dataset: xarray.Dataset, what: str | None = None) -> Figure:
     """A sweep's page: one variable over its axes, by its name, with ``[INDEX]`` for one component; by default
-    the first indicator, else the first time of an event, else the first quantity kept.
+    the first indicator, else the first time of an event, else a secular rate, else the first quantity kept
+    that isn't the same in all members. Times are in the scene's unit, angles in a readable one.
     ``ValueError`` names the variables there are where there is none of that name.
     """
     names = drawable(dataset)
-    name, bracket, index = (what or names[0]).partition("[")
+    name, bracket, index = (what or default_of(dataset)).partition("[")
     if name not in names or (bracket and not index.removesuffix("]").isdigit()):
         raise ValueError(
             f"{what!r} is nothing that this sweep kept; allowed: {', '.join(names)}, of a vector "
             "with [0], [1] ... for one component"
         )
+    dataset = in_units(dataset, name)
     variable = dataset[name]
     with rc_context(STYLE):  # type: ignore[arg-type]
         if any(str(dim).endswith(_SECTION) for dim in variable.dims):

@@ -134,7 +134,7 @@ def _legend(axes: Axes, dataset: xarray.Dataset, short: bool) -> None:
     grey = {"color": "#444444", "markerfacecolor": "white", "markeredgewidth": 1.3}
     handles += [handle(k.replace("_", " "), marker=m, **grey) for k, m in _MARKERS.items() if k in kinds]
     handles += [handle(m.title, marker=_STEPLESS, color="#444444") for m in methods if not m.has_steps]
-    handles.append(handle("filled: invariants held", marker="o", color="#444444"))
+    handles.append(handle("filled: invariants projected", marker="o", color="#444444"))
     if "model" in dataset.sizes:
         handles.append(handle("averaged model: axes, to the end", marker="P", color=_OTHER))
     if "other" in dataset.sizes:

@@ -6,6 +6,7 @@ import numpy as np
 import xarray
 
 from rigidsim.look import signals, surroundings
+from rigidsim.look.librations import pointing_angle
 from rigidsim.look.solids import rotation_matrix
 from rigidsim.look.stages import bodies, parts
 from rigidsim.look.stages.bodies import FIELD, Subject, column, direction_of, plane_view, vectors_of
@@ -22,6 +23,8 @@ FORWARD: tuple[int, int, int] = (150, 205, 110)
 _ALMOST = 0.93  # of the least distance: a larger planet would swallow the enlarged body
 _LARGE = 1e5  # m: a larger body is a planet, and what pulls it is far away
 _HORIZON, _BELOW = 9.0, 2.2  # radius of the planet drawn near the body, and its distance
+_FAR = 30.0  # radii of a planet, beyond which it is no horizon
+_DOT = 0.05  # radius of a planet in the view of an orbit, at least
 
 
 def free_orbit(dataset: xarray.Dataset, subject: Subject) -> Picture | None:
@@ -34,11 +37,16 @@ def free_orbit(dataset: xarray.Dataset, subject: Subject) -> Picture | None:
     arrows, trails, notes = vectors_of(dataset, subject, paths=False)
     name = called(planet, "attracting point")
     down = -position / np.linalg.norm(position, axis=1, keepdims=True)
-    arrows.append(Arrow("nadir", f"to {name}", parts.SOURCE, 1.35 * down, False, f"direction of {name}"))
+    arrows.append(Arrow("nadir", f"to {name}", parts.SOURCE, 1.6 * down, False, f"direction of {name}"))
+    air = column(dataset, "air_velocity", 3)
+    if air is not None:
+        oncoming = 1.6 * air / signals.norms(air)[:, None]
+        arrows.append(Arrow("air", "air", FORWARD, oncoming, True, "where the air comes from"))
     close = subject.stage(arrows, trails, "Body, seen in space axes")
     stages = [close, _orbit(subject, position, planet, notes)]
-    leading = ("libration", "angular_velocity")
-    return Picture("orbit about an attracting point", stages, [], leading, notes)
+    pointing = _pointing(dataset)
+    leading = ("libration", *pointing, "angular_velocity")
+    return Picture("orbit about an attracting point", stages, [], leading, notes, pointing)
 
 
 def satellite(dataset: xarray.Dataset, subject: Subject) -> Picture | None:
@@ -62,10 +70,37 @@ def satellite(dataset: xarray.Dataset, subject: Subject) -> Picture | None:
         quaternion = quaternion_of(local @ _turned(angles))
     planet = surroundings.body_of(listed[0])
     known = replace(subject, quaternion=quaternion, attitude=rotation_matrix(quaternion))
-    notes = ["in the local frame the planet's surface is drawn near the body, and not to scale"]
-    stages = [_in_local_frame(dataset, known, local, planet), _orbit(known, -source, planet, notes)]
-    leading = ("libration", "roll_pitch_yaw", "angular_velocity")
-    return Picture("satellite on its orbit", stages, [], leading, notes)
+    notes = []
+    if not _is_far(source, planet):
+        notes.append("in the local frame the planet's surface is drawn near the body, and not to scale")
+    whole = -surroundings.kepler_path(orbit, _revolution(orbit))
+    stages = [
+        _in_local_frame(dataset, known, local, planet, far=_is_far(source, planet)),
+        _orbit(known, -source, planet, notes, whole),
+    ]
+    pointing = _pointing(dataset)
+    leading = ("libration", "roll_pitch_yaw", *pointing, "angular_velocity")
+    return Picture("satellite on its orbit", stages, [], leading, notes, pointing)
+
+
+def _pointing(dataset: xarray.Dataset) -> dict[str, xarray.DataArray]:
+    """The angle of a body axis from the oncoming air or the source, for a plot."""
+    found = pointing_angle(dataset)
+    if found is None:
+        return {}
+    axis, towards, angle = found
+    name = f"angle of {axis} from {towards}".replace(" ", "_")
+    return {name: xarray.DataArray(angle, dims="time", attrs={"units": "rad"})}
+
+
+def _is_far(path: Array, planet: _Planet) -> bool:
+    """Whether a planet is so far away that it is no horizon below the body."""
+    return planet is not None and float(np.nanmin(signals.norms(path))) > _FAR * planet.radius
+
+
+def _revolution(orbit: dict[str, float]) -> Array:
+    """Times (361,), s, of one revolution from time zero."""
+    return np.linspace(0.0, 2 * np.pi / orbit["mean_motion"], 361)
 
 
 def local_frame(position: Array, normal: Array) -> Array:
@@ -92,14 +127,21 @@ def _turned(angles: Array) -> Array:
     return np.asarray(found)
 
 
-def _orbit(subject: Subject, position: Array, planet: _Planet, notes: list[str]) -> Stage:
-    """The orbit (rows, 3), m, from the planet, and the planet, both to one scale, with the body enlarged."""
-    distance = np.linalg.norm(position, axis=1)
+def _orbit(
+    subject: Subject, position: Array, planet: _Planet, notes: list[str], whole: Array | None = None
+) -> Stage:
+    """The orbit (rows, 3), m, from the planet, and the planet, both to one scale, with the body enlarged; of
+    a run that covers a part of a revolution alone, faintly the ``whole`` of it (points, 3), too.
+    """
+    distance = np.linalg.norm(position if whole is None else whole, axis=1)
     unit = float(np.nanmax(distance))
     places = position / unit
     nearest = float(np.nanmin(distance)) / unit
-    radius = 0.02 if planet is None else min(planet.radius / unit, _ALMOST * nearest)
-    elevation, azimuth = plane_view(places)
+    true = 0.0 if planet is None else planet.radius / unit
+    radius = max(min(true, _ALMOST * nearest), _DOT)
+    if planet is not None and true < _DOT:
+        notes.append(f"in the view of the orbit {planet.called} is drawn {_DOT / true:.2g} times too large")
+    elevation, azimuth = plane_view(places if whole is None else whole)
     direction = direction_of(max(elevation, float(np.deg2rad(28.0))), azimuth)
     notes.append(
         f"in the view of the orbit 1 unit = {unit:.6g} m; the body is drawn "
@@ -111,14 +153,19 @@ def _orbit(subject: Subject, position: Array, planet: _Planet, notes: list[str])
     return replace(
         subject.enlarged(ORBIT_BODY, title, unit, places, "orbit"),
         solids=[Solid("planet", globe(np.full(3, radius), color_of(planet)))],
-        spots=[Spot("planet", name, parts.PALE, np.array([0.0, 0.0, radius + 0.06]))],
-        lines=[Line(f"graticule/{k}", (20, 24, 30), ring, SPACE, 0.7, 0.5) for k, ring in enumerate(rings)],
+        spots=[Spot("planet", name, parts.PALE, np.array([0.0, 0.0, radius + 0.14]))],
+        lines=[
+            *(Line(f"graticule/{k}", (20, 24, 30), ring, SPACE, 0.7, 0.5) for k, ring in enumerate(rings)),
+            *([] if whole is None else [Line("revolution", parts.FAINT, whole / unit, SPACE, 1.2, 0.7)]),
+        ],
         camera=Camera(1.3 / np.sin(FIELD / 2) * direction, np.zeros(3), np.array([0.0, 0.0, 1.0])),
     )
 
 
-def _in_local_frame(dataset: xarray.Dataset, subject: Subject, local: Array, planet: _Planet) -> Stage:
-    """The body above its planet, whose surface is drawn near it, not to scale, z down."""
+def _in_local_frame(
+    dataset: xarray.Dataset, subject: Subject, local: Array, planet: _Planet, *, far: bool
+) -> Stage:
+    """The body above its planet, whose surface is drawn near it unless it is far, not to scale, z down."""
     attitude = subject.attitude
     assert attitude is not None
     relative = np.einsum("tji,tjk->tik", local, attitude)
@@ -128,11 +175,11 @@ def _in_local_frame(dataset: xarray.Dataset, subject: Subject, local: Array, pla
     axis = signals.principal_axes(dataset)[k] * (1.0 if along[k] >= 0 else -1.0)
     # in space, as all moving parts are; the view looks from the local frame
     tip = 1.3 * np.einsum("tij,tj->ti", relative, np.broadcast_to(axis, (len(relative), 3)))
-    words = "trace of the body axis that points down"
+    name = f"to {called(planet, 'source')}"
+    words = f"trace of the body axis that points {name if far else 'down'}"
     trails = [parts.Trail("local/axis_trace", parts.FIGURE, tip, words=words, head=True)]
     center = np.array([0.0, 0.0, _BELOW + _HORIZON])
     surface = globe(np.full(3, _HORIZON), color_of(planet))
-    name = f"to {called(planet, 'source')}"
     vectors = [
         ("nadir", name, parts.SOURCE, (0, 0, 1.75), f"nadir: {name}"),
         ("forward", "forward", FORWARD, (1.75, 0, 0), "along the orbit"),
@@ -143,10 +190,10 @@ def _in_local_frame(dataset: xarray.Dataset, subject: Subject, local: Array, pla
     target = np.array([0.0, 0.0, 0.35])
     return replace(
         subject.stage([], trails, "Body in the local frame"),
-        solids=[Solid("horizon", surface.moved(np.eye(3), center), "local")],
+        solids=[] if far else [Solid("horizon", surface.moved(np.eye(3), center), "local")],
         lines=[
             Line(f"horizon/{k}", parts.FAINT, line + center, "local", 0.6, 0.35)
-            for k, line in enumerate(graticule(np.full(3, _HORIZON), 15.0))
+            for k, line in enumerate([] if far else graticule(np.full(3, _HORIZON), 15.0))
         ],
         vectors=[
             Vector(key, label, color, np.zeros(3), np.array(way), "local", words)

@@ -34,6 +34,9 @@ _ALIKE = 1e-3  # of a radius, for a body to be taken for one that is known
 _UNKNOWN: Color = (128, 148, 170)
 EQUATOR: Color = (150, 205, 110)
 _X_AXIS_WEST = {"earth_rigid": 14.93}  # deg from Greenwich, of presets whose x axis is that of least moment
+_SUN, _MOON = 0.11, 0.07  # radii of the balls that stand for sources, in radii of the globe
+_AWAY = 0.2  # of an arrow's length, by which its label stands beyond the ball
+_OPPOSITE = 1e-6
 _CIRCLING = "Figure axis in space"
 _LEADING = ("polar_motion", "obliquity", "node_longitude", "wobble_angle", "rotation_angle")
 
@@ -99,6 +102,7 @@ def picture(dataset: xarray.Dataset, subject: Subject) -> Picture | None:
     if turns:
         arrows = source_arrows(dataset, subject, precession.SOURCE_REACH)
         stage.arrows.extend(arrows)
+        stage = _with_balls(stage, arrows)
         if len(arrows) < len(surroundings.told(dataset, "source")) and "source_position" in dataset:
             notes.append(
                 "directions are shown of sources whose tide is a thousandth of the strongest or more"
@@ -117,6 +121,25 @@ def picture(dataset: xarray.Dataset, subject: Subject) -> Picture | None:
             notes.append(f"samples are {step:.3g} rad of rotation apart: {words}")
     stage = replace(stage, camera=precession.eye_of_pole())
     return Picture(f"rotation of {called} in space", [*faces, stage], planes, leading, notes, derived)
+
+
+def _with_balls(stage: Stage, arrows: list[Arrow]) -> Stage:
+    """The sources as small balls at the tips of the arrows to them, the Sun larger; not to scale."""
+    frames, solids = dict(stage.frames), list(stage.solids)
+    for arrow in arrows:
+        way = arrow.vectors / signals.norms(arrow.vectors)[:, None]
+        # the least rotation from x to the direction; opposite to x about z
+        half = np.stack([1 + way[:, 0], 0 * way[:, 0], -way[:, 2], way[:, 1]], axis=1)
+        half[signals.norms(half) < _OPPOSITE] = (0.0, 0.0, 0.0, 1.0)
+        name = f"towards_{arrow.name}"
+        frames[name] = parts.viewer_quaternion(half)
+        radius = _SUN if arrow.label.endswith("Sun") else _MOON
+        far = float(np.nanmean(signals.norms(arrow.vectors))) + radius
+        ball = globe(np.full(3, radius), arrow.color).moved(np.eye(3), np.array([far, 0.0, 0.0]))
+        solids.append(Solid("ball", ball, name))
+    away = [replace(arrow, label_at=1.0 + _AWAY) for arrow in arrows]
+    kept = [arrow for arrow in stage.arrows if all(arrow is not one for one in arrows)]
+    return replace(stage, frames=frames, solids=solids, arrows=[*kept, *away])
 
 
 def _lines(half: Array, figure: Array, west: float, *, prime: bool) -> list[Line]:

@@ -15,7 +15,7 @@ from rigidsim.look.stages import parts
 from rigidsim.look.stages.bodies import Subject, direction_of, eye_at, source_arrows
 from rigidsim.look.stages.parts import SPACE, Array, Arrow, Camera, Color, Line, Picture, Plane, Spot, Stage
 from rigidsim.look.symbols import graticule
-from rigidsim.scene.readable import angle_unit, span_text
+from rigidsim.scene.readable import DAY, YEAR, angle_unit, span_text
 from rigidsim.scene.rotations import quaternion_of
 
 ECLIPTIC: Color = (226, 196, 90)
@@ -23,6 +23,8 @@ PRECESSION: Color = (190, 150, 255)
 POLE_REACH = 1.45  # length of a pole's arrow, in units of the body's reach
 SOURCE_REACH = 1.75  # length of an arrow to a source
 PLANE = "plane"  # frame of the plane of reference, where that isn't XY of space
+_MONTH = 27.3 * DAY
+_ALMOST_WHOLE = 0.98  # of a revolution, from which it counts as one: the last sample may be short of it
 _APART = 0.02  # rad, from which two arrows are told apart
 _UPRIGHT = 1e-9  # sine of the tilt, below which a pole has no node
 _SPARSE = 1.0  # rad of an orbit from one row to the next, from which a source can't be followed
@@ -180,11 +182,22 @@ def circle_of_precession(
         advance = abs(rate) * elapsed[-1]
         if float(np.abs(found[1] - start - rate * elapsed).max()) > max(advance, 1e-6):
             return  # it strays as far as it advances: it goes about another pole
-        if advance > 1e-9:
+        if advance > 1e-9 and _whole_revolution(dataset, float(elapsed[-1])):
             words += f": once in {span_text(2 * np.pi / abs(rate), 3)}"
             which = "pole" if axis == "figure" else axis
             notes.append(f"the {which}'s longitude moves by {rate:.6g} rad/s on the mean (straight line)")
     stage.lines.append(Line("precession", PRECESSION, ring, stage.looked_from, 2.0, 1.0, words))
+
+
+def _whole_revolution(dataset: xarray.Dataset, span: float) -> bool:
+    """Whether a run is as long as a revolution of each source: of less, what a line fits is nutation too."""
+    known = {"sun": YEAR, "moon": _MONTH}
+    for one in surroundings.told(dataset, "source"):
+        rate = (one.get("orbit") or {}).get("mean_motion")
+        period = 2 * np.pi / abs(rate) if rate else known.get(str(one.get("ephemeris", "")).lower(), 0.0)
+        if span < _ALMOST_WHOLE * period:
+            return False
+    return True
 
 
 def nutation_planes(dataset: xarray.Dataset, axis: str) -> list[Plane]:

@@ -19,20 +19,27 @@ TRAIL_ROWS = 1500  # at most in a sliding trail, and never more than a fifth of 
 RECENT = 0.3  # of a sliding trail: its bright part
 PIXELS = 800.0  # about the height of the page
 _DARK = (18, 20, 26)
+PARTS = ("page", "scene", "plots")
+"""What a picture can show: the scene and its plots, or one of them."""
 
 
-def build_blueprint(run: DrawnRun, *, following: bool = False) -> rrb.Blueprint:
-    """The layout for a run, which opens at its start and plays, or stays at the end of one that goes on."""
+def build_blueprint(run: DrawnRun, *, following: bool = False, part: str | None = None) -> rrb.Blueprint:
+    """The layout for a run, which opens at its start and plays, or stays at the end of one that goes on; of a
+    picture one of ``PARTS``, without the viewer's own bars.
+    """
     stages, planes, clock = run.picture.stages, run.planes, run.clock
     narrow, facing = len(stages) > 1, stages[0].flat
-    spaces: list[rrb.View | rrb.Container] = [space_view(stage, run, narrow=narrow) for stage in stages]
+    titled = part is None or narrow
+    spaces: list[rrb.View | rrb.Container]
+    spaces = [space_view(stage, run, narrow=narrow, titled=titled) for stage in stages]
     beside = [tabs([plane_view(plane) for plane in planes])] if planes else []
     if facing and planes:  # the disc, and beside it where its source is seen, and how it moves in space
         first, *others = map(plane_view, planes)
         spaces, beside = spaces[:1], [tabs([first, *spaces[1:], *others])]
     shares = [3.0] * len(spaces) + [2.6 if facing else 1.6] * len(beside)
     scene = spaces[0] if len(shares) == 1 else rrb.Horizontal(*spaces, *beside, column_shares=shares)
-    left = left_side(scene, plotting.legend_of(stages), {page.lower(): page for page in run.pages})
+    pages = {page.lower(): page for page in run.pages if part is None or (part, page) == ("page", "Summary")}
+    left = left_side(scene, plotting.legend_of(stages), pages)
     views = {
         place: [plot_view(plot, clock) for plot in run.plots if plot.place == place]
         for place in ("leading", "drift", "more")
@@ -45,7 +52,23 @@ def build_blueprint(run: DrawnRun, *, following: bool = False) -> rrb.Blueprint:
     if run.states:
         right.append(rrb.StateTimelineView(origin="/states", name="Events"))
         heights.append(1.2)
-    return page_of(left, right, time_panel(clock, run.screen_seconds, following=following), heights)
+    panel = time_panel(clock, run.screen_seconds, following=following)
+    if part is None:
+        return page_of(left, right, panel, heights)
+    return bare(left, rrb.Vertical(*right, row_shares=heights) if right else None, clock, part)
+
+
+def bare(left: rrb.Container, right: rrb.Container | None, clock: Clock, part: str) -> rrb.Blueprint:
+    """A part of the page, without the viewer's own bars."""
+    both = left if right is None else rrb.Horizontal(left, right, column_shares=[5, 3.4])
+    content = {"page": both, "scene": left, "plots": right or left}[part]
+    return rrb.Blueprint(
+        content,
+        rrb.TopPanel(state="hidden"),
+        rrb.BlueprintPanel(state="hidden"),
+        rrb.SelectionPanel(state="hidden"),
+        rrb.TimePanel(state="hidden", timeline=clock.name),
+    )
 
 
 def build_comparison(
@@ -104,12 +127,15 @@ def left_side(
     key = rrb.Spatial2DView(
         origin="/legend",
         name="What is shown",
+        titlebar=bool(pages),
         background=_DARK,
         visual_bounds=rrb.VisualBounds2D(x_range=(0.0, 30.0), y_range=(0.0, plotting.LEGEND_LINE * lines)),
     )
     texts: list[rrb.View] = [
         rrb.TextDocumentView(origin=f"/{entity}", name=name) for entity, name in pages.items()
     ]
+    if not texts:
+        return rrb.Vertical(scene, key, row_shares=[PIXELS - height, height])
     return rrb.Vertical(scene, key, tabs(texts), row_shares=[PIXELS * 0.7 - height, height, PIXELS * 0.3])
 
 
@@ -125,14 +151,14 @@ def time_panel(clock: Clock, screen: float, *, following: bool) -> rrb.TimePanel
         state="collapsed",
         timeline=clock.name,
         # A duration plays in its seconds per second, a sequence in ticks per second.
-        playback_speed=span * clock.seconds_per_tick / screen if clock.duration else 1.0,
-        fps=None if clock.duration else span / screen,
+        playback_speed=span * clock.seconds_per_tick / screen if clock.in_nanoseconds else 1.0,
+        fps=None if clock.in_nanoseconds else span / screen,
         play_state="following" if following else "playing",
         loop_mode="off" if following else "all",
     )
 
 
-def space_view(stage: Stage, run: DrawnRun, *, narrow: bool) -> rrb.Spatial3DView:
+def space_view(stage: Stage, run: DrawnRun, *, narrow: bool, titled: bool = True) -> rrb.Spatial3DView:
     """A view of one stage of a run."""
     eye = camera(stage, narrow=narrow, subject=run.subject)
     rows = max(min(TRAIL_ROWS, len(run.steps) // 5), 2)
@@ -150,6 +176,7 @@ def space_view(stage: Stage, run: DrawnRun, *, narrow: bool) -> rrb.Spatial3DVie
         origin=origin,
         contents=f"/{stage.root}/**",
         name=stage.title,
+        titlebar=titled,
         background=_DARK,
         line_grid=rrb.LineGrid3D(visible=False),
         eye_controls=rrb.EyeControls3D(

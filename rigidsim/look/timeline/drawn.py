@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass
+from fractions import Fraction
 from typing import Self
 
 import numpy as np
@@ -17,26 +18,52 @@ from rigidsim.look.stages.bodies import Subject
 from rigidsim.look.stages.parts import Picture, Plane, screen_seconds
 from rigidsim.look.stages.registry import build_picture
 from rigidsim.look.states import States, charts_of, sections_of, states_of
-from rigidsim.look.thinning import thin, thinned_indices
+from rigidsim.look.thinning import by_extremes, thin, thinned_indices
 from rigidsim.look.timeline import drawing, plotting
-from rigidsim.scene.readable import DAY, YEAR, TimeWords
+from rigidsim.scene.epochs import Epoch
+from rigidsim.scene.readable import DAY, YEAR, TimeWords, epoch_of
 
 _LARGEST = 2.0**62  # int64 with room for differences and for the viewer's own sentinels
 _LARGEST_NANOSECONDS = 9.2e18  # 291.5 years, just below 2**63 ns
 _UNITS = {0: "s", -3: "ms", -6: "µs", -9: "ns", -12: "ps", -15: "fs", -18: "as"}
 _WHOLE = (("yr", YEAR), ("d", DAY))
 _EXACT = 4 * np.finfo(np.float64).eps
+_UNIX_EPOCH = Fraction(4881175, 2)  # Julian date of 1970-01-01
+_DATED_NANOSECONDS = 8.5e18  # from 1970, 270 years: what the viewer's calendar surely holds
 _RESOLUTION = 1e-3  # of the smallest step: what a tick of the timeline may be at most
 
 
 @dataclass(frozen=True)
 class Clock:
-    """Times of the rows as integers (rows,) of a viewer timeline: nanoseconds, or ticks named by it."""
+    """Times of the rows as integers (rows,) of a viewer timeline: nanoseconds of a duration or, with
+    ``since``, of dates (counted from 1970, of which time 0 is so many), or ticks named by it.
+    """
 
     name: str
     ticks: NDArray[np.int64]
     seconds_per_tick: float
     duration: bool
+    since: int | None = None
+
+    @property
+    def in_nanoseconds(self) -> bool:
+        """Whether the viewer knows how long a tick is."""
+        return self.duration or self.since is not None
+
+
+def dated(clock: Clock, epoch: Epoch | None) -> Clock:
+    """The clock with dates in the epoch's scale (TT for UTC) in place of durations, if they are those of a
+    calendar that the viewer has (1700 to 2240); the same clock otherwise.
+    """
+    if epoch is None or not clock.duration:
+        return clock
+    epoch = epoch.uniform()  # leap seconds of UTC have no place on an axis
+    days = epoch.julian_date() - _UNIX_EPOCH
+    since = round(days * 86_400_000_000_000)
+    first, last = since + int(clock.ticks.min()), since + int(clock.ticks.max())
+    if not all(abs(x) < _DATED_NANOSECONDS for x in (first, last)):
+        return clock
+    return Clock(f"date ({epoch.scale})", clock.ticks + since, clock.seconds_per_tick, False, since)
 
 
 def build_clock(seconds: NDArray[np.float64]) -> Clock:
@@ -103,11 +130,14 @@ class DrawnRun:
         rows = thin(dataset, most).assign_attrs(dataset.attrs)
         seconds = signals.seconds(rows)
         start, end = float(seconds[0]), float(seconds[-1])
-        clock = build_clock(seconds)
+        clock = dated(build_clock(seconds), epoch_of(rows.attrs))
         picture, subject = build_picture(rows)
-        plots = plan_plots(rows.assign(picture.derived), picture.leading)
+        curves = rows
+        if dataset.sizes["time"] > rows.sizes["time"]:
+            curves = by_extremes(dataset, most).assign_attrs(dataset.attrs)
+        plots = plan_plots(curves.assign(picture.derived), picture.leading)
         notes = list(picture.notes)
-        if not clock.duration:
+        if not clock.in_nanoseconds:
             notes.append(f"the run doesn't fit nanoseconds: its timeline is `{clock.name}`")
             series = Series("time_seconds", ["time"], [(170, 170, 175)], seconds[:, None])
             plots.append(Plot("time_seconds", "Time [s]", "more", [series]))
@@ -142,6 +172,7 @@ class DrawnRun:
         plotting.draw_planes(recording, self.planes)
         for lane in self.states:
             ticks = np.rint(lane.seconds / self.clock.seconds_per_tick).astype(np.int64)
+            ticks += self.clock.since or 0
             plotting.draw_states(recording, lane, [self._clock_column(ticks)])
         if not legend:
             return
@@ -163,6 +194,8 @@ class DrawnRun:
         return [self._clock_column(self.clock.ticks[rows]), rr.TimeColumn("step", sequence=self.steps[rows])]
 
     def _clock_column(self, ticks: NDArray[np.int64]) -> rr.TimeColumn:
+        if self.clock.since is not None:
+            return rr.TimeColumn(self.clock.name, timestamp=ticks.astype("datetime64[ns]"))
         if self.clock.duration:
             return rr.TimeColumn(self.clock.name, duration=ticks.astype("timedelta64[ns]"))
         return rr.TimeColumn(self.clock.name, sequence=ticks)

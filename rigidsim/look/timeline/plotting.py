@@ -13,6 +13,7 @@ from rigidsim.look.stages.parts import NEAR, Arrow, Color, Line, Plane, Stage, T
 from rigidsim.look.states import States
 
 PIXELS = 500  # about the width of a plot
+_SMOOTH = 0.01  # of a curve's range, by which it may move within a pixel
 CLOCK_ROWS = 2000  # largest number of rows of the clock on the screen
 _INK: Color = (205, 210, 218)
 _FAINT: Color = (90, 96, 108)
@@ -74,23 +75,22 @@ def draw_levels(recording: rr.RecordingStream, plots: Sequence[Plot], ends: list
 
 
 def aggregation(plot: Plot, values: Array) -> rr.components.AggregationPolicy:
-    """Which of the rows that fall into one pixel the viewer draws: by default their average, which is smooth,
-    but shows a fast rotation with a vanishing amplitude: then the extremes. Of a drift only the largest
+    """Which of the rows (rows, components) that fall into one pixel the viewer draws: their average, which is
+    smooth, where no component moves by more than a hundredth of its own range within a pixel; else the
+    extremes, as an average would show a fast rotation with a vanishing amplitude. Of a drift only the largest
     counts.
     """
-    if plot.place == "drift":
-        return rr.components.AggregationPolicy.Max
-    step = max(len(values) // PIXELS, 1)
-    steps = {1, step} if len(values) > step else set()  # a fast motion may look slow a pixel apart
-    change = np.concatenate([np.zeros(1), *(np.abs(values[k:] - values[:-k]).ravel() for k in steps)])
-    largest, range_ = float(change.max(initial=0.0)), float(np.ptp(values)) if values.size else 0.0
-    if not np.isfinite(largest + range_):
-        finite = values[np.isfinite(values)]
-        range_ = float(np.ptp(finite)) if len(finite) else 0.0
-        largest = float(change[np.isfinite(change)].max(initial=0.0))
-    smooth = largest <= 0.1 * range_
     policies = rr.components.AggregationPolicy
-    return policies.Average if smooth else policies.MinMax
+    if plot.place == "drift":
+        return policies.Max
+    step = len(values) // PIXELS
+    if step < 2:
+        return policies.Average  # each row has a pixel of its own
+    parts = np.arange(0, len(values), step)
+    low, high = np.fmin.reduceat(values, parts), np.fmax.reduceat(values, parts)
+    ranges = np.fmax.reduce(high) - np.fmin.reduce(low)
+    moved = np.fmax.reduce(high - low)
+    return policies.Average if (moved <= _SMOOTH * ranges)[np.isfinite(moved)].all() else policies.MinMax
 
 
 def draw_planes(recording: rr.RecordingStream, planes: Sequence[Plane]) -> None:

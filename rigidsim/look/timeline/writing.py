@@ -23,7 +23,9 @@ _ROW_BYTES = 600  # at most: some twenty variables
 _FIRST_BYTES = 1024 * _ROW_BYTES  # bodies, layout, page
 
 
-def write_timeline(dataset: xarray.Dataset, path: Path, *, rows: int = 100_000) -> int:
+def write_timeline(
+    dataset: xarray.Dataset, path: Path, *, rows: int = 100_000, part: str | None = None
+) -> int:
     """Write a dataset as a rerun recording with its own layout; returns the number of rows written.
 
     Args:
@@ -31,6 +33,7 @@ def write_timeline(dataset: xarray.Dataset, path: Path, *, rows: int = 100_000) 
     time gets a plot. It may be lazy: only the rows shown are read.
     path: the file; it is whole when this returns.
     rows: at most so many rows are shown, evenly strided, with the first and the last.
+    part: of the page that a picture shows, "page", "scene" or "plots", without the viewer's own bars.
 
     Raises:
     ValueError: no samples, a time that isn't finite, `rows` < 2 or an unreadable `drawing`.
@@ -39,11 +42,11 @@ def write_timeline(dataset: xarray.Dataset, path: Path, *, rows: int = 100_000) 
     """
     run = DrawnRun.of(dataset, rows)
     count = len(run.steps)
-    with recording_to(path, title_of(dataset), count, build_blueprint(run)) as recording:
+    with recording_to(path, title_of(dataset), count, build_blueprint(run, part=part)) as recording:
         run.draw_static(recording)
-        for part in chunks(0, count):
-            check_room(path, count - part.start)
-            run.draw_rows(recording, part)
+        for piece in chunks(0, count):
+            check_room(path, count - piece.start)
+            run.draw_rows(recording, piece)
     return count
 
 

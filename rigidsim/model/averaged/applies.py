@@ -124,14 +124,14 @@ def refuse_frequencies(
     found = [_refuse_resonance(scene, spectrum, source, moving) for source in sources]
     kept = [resonance for resonance in found if resonance is not None]
     if len(kept) > 1:
-        what = f"the body keeps pace with [[loads]] number {kept[0].source.number} ({kept[0].name}) and "
+        what = f"the body is in resonance with [[loads]] number {kept[0].source.number} ({kept[0].name}) and "
         what += f"number {kept[1].source.number} ({kept[1].name}) at once"
         raise refused(scene.config.model.level, what)
     for source, resonance in zip(sources, found, strict=True):
         if resonance is None:
             _refuse_forced(scene, spectrum, source)
     if kept and scene.config.model.short_period:
-        what = f"given true, but the body keeps pace with [[loads]] number {kept[0].source.number} "
+        what = f"given true, but the body is in resonance with [[loads]] number {kept[0].source.number} "
         what += f"({kept[0].name}), and what goes round with that orbit isn't added back; set it to false"
         raise ConfigError(Problem("[model] short_period", what))
     if scene.config.model.level == ORBIT_AVERAGED:

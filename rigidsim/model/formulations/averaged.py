@@ -97,9 +97,9 @@ class Averaged(Formulation):
         attitude = AttitudeStates(SLOW[:4], [], initial[:4], [], q, "state", defect=defect)
         m: ResonantMechanics = self._mechanics(ResonantMechanics, plan, number, q[:3], attitude)
         why = (
-            f"the body keeps pace with [[loads]] number {resonance.source.number}, {resonance.name}: its "
-            "axes turned back by so many turns to a revolution, and the momentum beyond that, under torques "
-            "averaged over rotation and orbits"
+            f"the body is in resonance with [[loads]] number {resonance.source.number}, {resonance.name}: rw "
+            "to rz are the quaternion of its axes turned back by so many turns to a revolution, la, lb and "
+            "excess the momentum beyond that rotation, under torques averaged over rotation and orbits"
         )
         exponents = [0] * 4 + [unit] * 3
         return m, [StateBlock(SLOW, m.slow_derivatives, initial, exponents=exponents, why=why)]

@@ -99,8 +99,8 @@ class DragInThermosphere(Drag):
 
     described = "drag in NRLMSISE-00"
 
-    def endings(self, m: Kinematics) -> list[tuple[str, Symbolic]]:
-        why = f"it has come below {LEAST:g} km, where the network of NRLMSISE-00 doesn't hold"
+    def range_ends(self, m: Kinematics) -> list[tuple[str, Symbolic]]:
+        why = f"the altitude fell below {LEAST:g} km, from which NRLMSISE-00 is known here"
         return [(why, (height(m) - (LEAST - 1.0)) / LEAST)]
 
     def _words(self) -> str:

@@ -18,10 +18,12 @@ from collections.abc import Callable, Mapping
 
 import heyoka as hy
 
+from rigidsim.model.flight_names import RELATIVE_NAMES, FlightNames, flown_about
 from rigidsim.model.frames import local_frame, moves_slowly_in_orbit
+from rigidsim.model.loads.drag import Drag
 from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.observables.observable import BODY, Angle, Observable, continuous_angles, register_all
-from rigidsim.model.rotations import along
+from rigidsim.model.rotations import Symbolic, along
 from rigidsim.scene.frame import unique_axis
 
 
@@ -51,6 +53,22 @@ def _told(convention: str) -> Callable[[Mechanics], Mapping[str, str]]:
     return lambda m: {"convention": convention, "local_frame": local_frame(m).described}
 
 
+def air_velocity(m: Mechanics) -> list[Symbolic]:
+    """Velocity relative to the air that turns with the body flown about, body axes, m/s."""
+    found = FlightNames().expressions(m, RELATIVE_NAMES)
+    return [found[name] for name in RELATIVE_NAMES]
+
+
+def _no_air(m: Mechanics) -> str | None:
+    if flown_about(m.scene.config) is not None:
+        return None
+    return "the body flies about nothing whose air it would meet; give a central_gravity, or leave it out"
+
+
+def _dragged(m: Mechanics) -> bool:
+    return any(isinstance(load, Drag) for load in m.loads)
+
+
 _NEEDS = ("attitude", "source")
 
 register_all(
@@ -75,6 +93,14 @@ register_all(
         "nadir", BODY, "1", "direction to the source", lambda m: local_frame(m).down,
         frame="body axes", needs=_NEEDS, by_default=moves_slowly_in_orbit, attributes=_told("unit vector"),
     ),
+    Observable(
+        "air_velocity", BODY, "m s-1", "velocity relative to the air", air_velocity,
+        frame="body axes", needs=("attitude", "flight"), by_default=_dragged, absent=_no_air,
+        attributes=lambda m: {
+            "convention": "of the centre of mass, in air that turns at the atmosphere_rate of the load flown "
+            "about; the air comes from this direction"
+        },
+    ),
 )  # fmt: skip
 
 
@@ -84,7 +110,9 @@ register_all(
 def _no_resonance(m: Mechanics) -> str | None:
     if m.commensurable_angle is not None:
         return None
-    return 'is of [model] level = "orbit_averaged" where the body keeps pace with its source; leave it out'
+    return (
+        'is of [model] level = "orbit_averaged" where the body is in resonance with its source; leave it out'
+    )
 
 
 RESONANT_ANGLE = continuous_angles(

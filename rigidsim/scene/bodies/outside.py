@@ -11,12 +11,15 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Annotated, Any
 
+import numpy as np
 from pydantic import Field, StrictBool
 
 from rigidsim.errors import ConfigError, Problem
 from rigidsim.scene.arithmetic import Vector, norm
 from rigidsim.scene.exact import ZERO, ExactNumber
 from rigidsim.scene.fields import ConfigTable, Dimensionless, InUnit, Metre, Triple
+from rigidsim.scene.rotations import quaternion_of
+from rigidsim.scene.tracing.numbers import plain
 
 Area = Annotated[ExactNumber, InUnit("m^2")]
 _DRAG = ExactNumber(Fraction(11, 5))
@@ -146,6 +149,44 @@ def _plates(
     area = _positive(table.area, f"{place}.area", "area", context)
     for side in (1, -1) if table.both_sides else (1,):
         yield Plate(place, area, center, **coefficients, normal=tuple(table.normal), side=side)
+
+
+def with_surfaces(
+    drawing: list[dict[str, Any]], tables: Sequence[SurfaceTable] | None, found: Sequence[OuterSurface]
+) -> list[dict[str, Any]]:
+    """Solids for pictures of a body with these surfaces, as plain JSON values: beside known solids the plates
+    alone, else all surfaces in the place of a body of which only the moments are known.
+
+    Of a plate the outline isn't known: it is drawn as a square. With ``one_sided`` its back has no part.
+    """
+    known = not any(solid.get("equivalent") for solid in drawing)
+    first = {surface.place: surface for surface in reversed(found)}
+    solids = list(drawing) if known else []
+    for number, table in enumerate(tables or []):
+        surface = first[f"surfaces[{number}]"]
+        position = [float(plain(x)) for x in surface.position]
+        placed: dict[str, Any] = {"position": position, "quaternion": [1.0, 0.0, 0.0, 0.0]}
+        if isinstance(surface, Plate) and table.size is None:
+            edge = float(plain(surface.area)) ** 0.5
+            placed["quaternion"] = _facing([float(x) for x in surface.normal])
+            placed["one_sided"] = not table.both_sides
+            solids.append({"solid": "plate", "dimensions": {"size": [edge, edge]}, **placed})
+        elif not known and table.size is not None:
+            size = [float(x) for x in table.size]
+            solids.append({"solid": "cuboid", "dimensions": {"size": size}, **placed})
+        elif not known and table.radius is not None:
+            solids.append({"solid": "sphere", "dimensions": {"radius": float(table.radius)}, **placed})
+    return solids
+
+
+def _facing(normal: Sequence[float]) -> list[float]:
+    """Quaternion w x y z that turns z to a direction, and x across the body axis farthest from it."""
+    n = np.array(normal) / np.linalg.norm(normal)
+    first = np.eye(3)[np.abs(n).argmin()]
+    first = first - (first @ n) * n
+    first /= np.linalg.norm(first)
+    matrix = np.stack([first, np.cross(n, first), n], axis=1)
+    return [float(x) for x in quaternion_of(matrix[None])[0]]
 
 
 def _positive(number: ExactNumber | None, key: str, what: str, context: Any) -> Any:

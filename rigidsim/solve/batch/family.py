@@ -37,7 +37,7 @@ class Alone(Enum):
     CLOSED_FORM = "the closed form takes no steps"
     METHOD = "batches take the steps of Taylor series only"
     EFFECT = "a registered effect acts between steps"
-    HELD = "invariants are held between steps, which batches can't do"
+    HELD = "invariants are projected between steps, which batches can't do"
     ACCURACY = "the accuracy asked for is settled run by run"
     CHART = "Euler angles may have to change their sequence on the way"
     ANGLES = "full turns of recorded angles are counted along the motion"

@@ -79,7 +79,7 @@ class StepwiseSolver(Solver):
         stop = self.stepper.log.stop
         if stop is not None and self._reach is None:
             self.settle(boundary, stop)
-            return Status.IMPOSSIBLE if self.stepper.log.why_impossible else Status.EVENT
+            return self.stepper.log.status
         if self.corrected.collapsed:
             self.progress.last_good, self._before = self.corrected.boundary(), boundary
             return Status.COLLAPSED

@@ -84,7 +84,7 @@ def judged(known: Evidence) -> tuple[str, str]:
         return UNDECIDED, "its rates are not the rates at which its attitude turns, in any convention tried"
     share = unexplained_share(windows)
     told = (
-        f"of the attitude's defects ({_rms(windows.attitude):.2g} rad in windows of {windows.length:.3g} s) "
+        f"of the attitude's defects ({_rms(windows.attitude):.2g} rad over spans of {windows.length:.3g} s) "
         f"differences of the rates explain {_rms(windows.explained):.2g} rad and leave {left:.2g} rad"
     )
     if share <= _MODEL or left <= 2 * noise:

@@ -1,0 +1,99 @@
+"""Pictures and films of a run's timeline, drawn without a screen: at which moment, and of which part."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from rigidsim.errors import RunFolderError
+from rigidsim.look import film
+from rigidsim.scene.exact import parse_number
+from rigidsim.scene.readable import TimeWords
+from rigidsim.store import atomic
+
+if TYPE_CHECKING:
+    import xarray
+
+PARTS = ("page", "scene", "plots")
+_SIZES = {"page": film.SIZE, "scene": (1600, 800), "plots": (900, 900)}
+_GIF_SIZES = {"page": (1000, 600), "scene": (720, 420), "plots": (640, 640)}
+"""Points of pictures and MP4 films, and of GIF films, by the part of the page that they show."""
+
+Told = Callable[[int, int], None]
+
+
+def draw(
+    dataset: xarray.Dataset, target: Path, *, seconds: float | None = None, told: Told | None = None,
+    at: str | None = None, part: str = "page",
+) -> None:  # fmt: skip
+    """Draw a run to a PNG picture, or a GIF or MP4 film, without the viewer's own bars.
+
+    Args:
+        dataset: of the run, possibly lazy.
+        seconds: that a film lasts.
+        told: is given the numbers of frames drawn and in all.
+        at: moment of a picture: a number in the scene's unit of time, or with its own (``"2.4 hr"``).
+        part: of the page, one of ``PARTS``.
+
+    Raises:
+        RunFolderError: no such moment or part, nothing to draw with, or the target can't be written.
+    """
+    if part not in PARTS:
+        raise RunFolderError(f"--part: given {part}; {', '.join(PARTS)} is allowed")
+    share = film.PICTURED_AT if at is None else _share(dataset, at)
+    from rigidsim.look.timeline import write_timeline  # which loads rerun, see look.viewer
+
+    with tempfile.TemporaryDirectory(prefix="rigidsim-view-") as scratch:
+        recording = Path(scratch) / "timeline.rrd"
+        try:
+            write_timeline(dataset, recording, part=part)
+        except (OSError, RuntimeError, ValueError) as error:
+            raise RunFolderError(f"{target}: can't be drawn: {error}") from None
+        size = (_GIF_SIZES if target.suffix.lower() == ".gif" else _SIZES)[part]
+        draw_recording(recording, target, seconds=seconds, told=told, at=share, size=size)
+
+
+def draw_recording(
+    recording: Path, target: Path, *, seconds: float | None = None, told: Told | None = None,
+    at: float = film.PICTURED_AT, size: tuple[int, int] = film.SIZE,
+) -> None:  # fmt: skip
+    """Draw a recording at a fraction of the run, or a film of it; see ``draw``."""
+    with _new(target) as new:
+        try:
+            film.render(recording, new, seconds=seconds or film.SECONDS, told=told, at=at, size=size)
+        except (FileNotFoundError, RuntimeError, ValueError) as error:
+            raise RunFolderError(f"{target}: can't be drawn: {error}") from None
+
+
+def _share(dataset: xarray.Dataset, at: str) -> float:
+    """The fraction of a run at a moment."""
+    start, end = (float(dataset["time"].values[k]) for k in (0, -1))
+    words = TimeWords.of(dataset.attrs, start, end)
+    try:
+        moment = float(at) * words.unit.seconds
+    except ValueError:
+        try:
+            moment = float(parse_number(at, "s"))
+        except ValueError as error:
+            raise RunFolderError(f"--at: given {at!r}; {error}") from None
+    share = (moment - start) / (end - start) if end != start else 0.0
+    if not 0 <= share <= 1:
+        span = f"{words.short(start)} to {words.short(end)}"
+        raise RunFolderError(f"--at: given {at!r}, outside of the run; {span} is allowed")
+    return share
+
+
+@contextmanager
+def _new(target: Path) -> Iterator[Path]:
+    """A temporary file of the target's suffix that replaces the target once complete."""
+    try:
+        with tempfile.TemporaryDirectory(prefix="rigidsim-view-") as scratch:
+            new = Path(scratch) / f"new{target.suffix}"
+            yield new
+            with atomic.replacing(target) as placed:
+                placed.write_bytes(new.read_bytes())
+    except OSError as error:
+        raise RunFolderError(f"{target}: can't be written: {error.strerror or error}") from None

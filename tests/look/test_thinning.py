@@ -1,0 +1,60 @@
+"""Long runs as pictures show them: fast motions keep their amplitude, whole spans their extremes."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import xarray
+
+pytest.importorskip("matplotlib")
+
+from rigidsim.look.figures.composing import compose, shown_rows
+from rigidsim.look.figures.timelines import rates
+from rigidsim.look.plots import Plot
+from rigidsim.look.thinning import by_extremes, thin
+from rigidsim.look.timeline.plotting import aggregation
+
+FAST = 0.039
+
+
+def long_run(count: int = 400_001) -> xarray.Dataset:
+    """A slow growth to 2, beside a swing of 0.039 with 37 samples to each."""
+    row = np.arange(count)
+    table = np.stack([2 * row / count, FAST * np.sin(2 * np.pi * row / 37), 0 * row], axis=1)
+    data = {"angular_velocity": (("time", "body_axis"), table, {"units": "rad s-1"})}
+    return xarray.Dataset(data, coords={"time": row * 0.1, "body_axis": list("xyz")})
+
+
+def test_extremes_of_two_strides_stand_in_two_rows() -> None:
+    dataset = long_run()
+    found, plain = by_extremes(dataset, 4001), thin(dataset, 4001)
+    np.testing.assert_array_equal(found["time"], plain["time"])
+    swing = found["angular_velocity"].values[1:-1, 1]  # 5 swings in two strides
+    assert np.abs(np.abs(swing) - FAST).max() < 0.01 * FAST
+    np.testing.assert_array_equal(found["angular_velocity"][[0, -1]], dataset["angular_velocity"][[0, -1]])
+    growth = found["angular_velocity"].values[:, 0] - plain["angular_velocity"].values[:, 0]
+    assert np.abs(growth).max() <= 2 * 100 * 2 / 400_001 * 1.01
+    part = dataset.isel(time=slice(0, 4001))
+    np.testing.assert_array_equal(by_extremes(part, 4001)["angular_velocity"], part["angular_velocity"])
+
+
+def test_the_viewer_draws_extremes_where_any_component_is_fast_within_a_pixel() -> None:
+    plot = Plot("angular_velocity", "", "leading")
+    table = by_extremes(long_run(), 100_001)["angular_velocity"].values
+    assert aggregation(plot, table).name == "MinMax"  # beside the large one the small one is fast, too
+    assert aggregation(plot, table[:, :1]).name == "Average"
+
+
+def test_a_panel_of_many_swings_shows_the_whole_run_and_its_beginning() -> None:
+    dataset = long_run(100_001)
+    figure = compose(shown_rows(dataset), [rates])
+    whole, first = figure.axes
+    seconds = {"s": 1.0, "min": 60.0, "h": 3600.0}
+    unit = whole.get_xlabel().partition("[")[2].rstrip("]")
+    assert whole.get_xlim()[1] * seconds[unit] == pytest.approx(10_000)
+    (low, high) = whole.get_ylim()
+    assert low < -FAST
+    assert high > 1.99
+    assert len(whole.collections) == 3  # bands between extremes
+    assert first.get_title(loc="left").startswith("the first")
+    assert first.get_xlim()[1] < 0.01 * 10_000
