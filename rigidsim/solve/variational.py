@@ -71,7 +71,9 @@ class Variational:
         options = dict(precision.options, compact_mode=self._wide)
         self._engine: TaylorEngine = compiled_engine(equations, precision.zeros((len(equations),)), **options)
         self._longest = precision.of_double(longest_step(self._engine.order, precision.scalar))
-        self._first = self._place = self._entered = None  # type: ignore[var-annotated]
+        self._first: Place | None = None
+        self._place: Place | None = None
+        self._entered: int | None = None
         self.use(parametrised.coefficients)
 
     def _all_set_states(self) -> list[str]:
@@ -181,7 +183,7 @@ class Variational:
         engine.dtime = place.time
         engine.state[:] = place.state
         self._exponents, self._steps, self._place = place.exponents.copy(), place.steps, place
-        self._entered = None
+        self._entered, self._fresh = None, True
         engine.pars[:] = self._numbers[: len(engine.pars)]
         self._set_slopes()
 
@@ -204,6 +206,8 @@ class Variational:
             KeyboardInterrupt: ``go_on`` says no.
         """
         engine, count, stuck = self._engine, 0, 0
+        if self._fresh and engine.time == time:
+            self._meet()
         while engine.time < time:
             before = engine.time
             self._step()
@@ -221,9 +225,7 @@ class Variational:
         engine = self._engine
         self._place = Place(engine.dtime, self._here(), self._exponents.copy(), self._steps)
         self._scale()
-        until = self._enter()
-        if self._clock is not None:
-            engine.pars[self._clock] = self._numbers[self._clock] = engine.dtime[1]
+        until = self._meet()
         if until is None:
             outcome, *_ = engine.step(self._longest, write_tc=True)
         else:
@@ -262,6 +264,13 @@ class Variational:
             scaled = self._numbers[where] * self._power(-int(self._exponents[j]))
             read = pars[where]  # the last ones are no parameters where only outputs read them
             read[:] = scaled[: len(read)]
+
+    def _meet(self) -> Scalar | None:
+        """Set what the equations need here; the time at which a step has to end."""
+        if self._clock is not None:
+            self._engine.pars[self._clock] = self._numbers[self._clock] = self._engine.dtime[1]
+        self._fresh = False
+        return self._enter()
 
     def _enter(self) -> Scalar | None:
         """Set what begins at or before this boundary, as the rows of a table; the time at which to stop."""

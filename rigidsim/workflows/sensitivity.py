@@ -1,4 +1,4 @@
-"""Derivatives of a motion by numbers of its config, without a run: for fits, and for questions of one's own."""
+"""Derivatives of a motion by numbers of its config, without a run: for fits, and at any values of these."""
 
 from __future__ import annotations
 
@@ -87,6 +87,7 @@ class Tangents:
         except ConfigError as error:
             raise error.at(experiment.source) from None
         self._precision, self._source = prepared.precision, experiment.source
+        self._at = list(self._parametrised.values)
         self._variational = self._compiled()
 
     @property
@@ -145,7 +146,6 @@ class Tangents:
         self._at = wanted
 
     def _compiled(self) -> Variational:
-        self._at = list(self._parametrised.values)
         return interruptible(lambda: Variational(self._parametrised, self._precision))
 
     def _internal(self, times: np.ndarray) -> np.ndarray:
