@@ -249,7 +249,14 @@ def _of_motion(experiment: Experiment, more: Sequence[str]) -> Experiment:
     record += ["core_angular_velocity"] if config.body.core is not None else []
     record += [name for name in more if name not in record]
     output = config.output.model_copy(
-        update={"record": record, "lyapunov": False, "orientation": None, "orientation_of": None, "tip": None}
+        update={
+            "record": record,
+            "lyapunov": False,
+            "sensitivity": None,
+            "orientation": None,
+            "orientation_of": None,
+            "tip": None,
+        }
     )
     integrator = config.integrator.model_copy(
         update={"formulation": "quaternion", "hold_invariants": False, "method": "taylor"}

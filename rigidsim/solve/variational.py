@@ -330,8 +330,9 @@ def turned(quaternion: np.ndarray, slopes: np.ndarray) -> np.ndarray:
     a, b = slopes[:, :, :1], slopes[:, :, 1:]
     (vx, vy, vz), (bx, by, bz) = (np.moveaxis(x, 2, 0) for x in (v, b))
     crossed = np.stack([by * vz - bz * vy, bz * vx - bx * vz, bx * vy - by * vx], axis=2)
-    square = (quaternion * quaternion).sum(axis=1)[:, None, None]
-    return (w * b - a * v - crossed) * (2.0 / square)
+    square = w * w + sum(v[:, :, i : i + 1] * v[:, :, i : i + 1] for i in range(3))
+    half = w * b - a * v - crossed
+    return (half + half) / square
 
 
 def _jacobian(expressions: Sequence[Symbolic], by: Sequence[Symbolic]) -> list[dict[int, Symbolic]]:

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from support import run_text
 
-from experiments.sensitivity_campaign import BOUND, case, checked
+from experiments.sensitivity_campaign import BOUND, checked
+from experiments.sensitivity_scenes import case
 from rigidsim import ConfigError
 from rigidsim.scene.rotations import rotation_matrix
 from rigidsim.solve.problem import prepare
