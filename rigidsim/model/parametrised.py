@@ -63,6 +63,11 @@ class _Pass:
     outputs: list[Symbolic]
     equations: list[Symbolic]
 
+    @property
+    def form(self) -> list[int]:
+        """Hashes, since wide expressions share parts that a comparison would walk through again and again."""
+        return [hash(x) for x in (*self.equations, *self.outputs)]
+
 
 class Parametrised:
     """A scene's full motion in rates and quaternion, whose coefficients that depend on keys are parameters.
@@ -90,10 +95,10 @@ class Parametrised:
     ) -> None:
         self.keys, self._number, self._bits, self._loads = tuple(keys), number, bits, tuple(loads)
         self._experiment = _of_motion(experiment, record)
-        digits = int((3 * bits + _OFF + _STEP + 64) * 0.30103) + 1
-        self.context = context_for(digits)
+        precision = experiment.config.integrator.precision
+        self.context = context_for(precision, more=2 * bits + _OFF + _STEP)
         self.values = [key.value(self.context) for key in self.keys] if values is None else list(values)
-        own = scene_of(self._experiment, self.keys, self.values, context_for(_digits_of(bits)))
+        own = scene_of(self._experiment, self.keys, self.values, context_for(precision))
         self._plan: ModelPlan = plan_model(own, self._loads)
         base, found, moved = self._passes(self.values)
         self.plain = System(base.system.plan, number)  # with all that acts once no number is exactly zero
@@ -233,7 +238,7 @@ class Parametrised:
             same = len(looked.noted) == len(base.noted) and not any(
                 self._differ(looked.noted[i], x) for i, x in self._fixed.items()
             )
-            if same and looked.equations == made.equations and looked.outputs == made.outputs:
+            if same and looked.form == made.form:
                 return
         names = ", ".join(key.name for key in self.keys)
         what = f"names {names}, of which one changes the form of the equations; leave it out"
@@ -263,11 +268,6 @@ def _of_motion(experiment: Experiment, more: Sequence[str]) -> Experiment:
     )
     tables = {"output": output, "integrator": integrator, "events": []}
     return replace(experiment, config=config.model_copy(update=tables))
-
-
-def _digits_of(bits: int) -> int:
-    """Decimal digits whose scenes have guard bits for a precision of so many bits."""
-    return int(bits * 0.30103) + 1
 
 
 def _parameters(system: System) -> int:
