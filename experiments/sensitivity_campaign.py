@@ -5,8 +5,8 @@
 Each case draws a scene (free bodies, tops, torques with parameters, gravity gradients along orbits, flight,
 rotors, cores, elastic bodies, dipoles, states of one's own; written in any formulation, with and without held
 invariants) and one number of its config. A run in double precision records the derivatives. Four runs with
-this number moved, in quadruple precision, give the central difference of fourth order: steps h of 1e-4 leave
-some h^4 = 1e-16, and 1e-15 for the 80 bits in which they are subtracted. They share nothing with the
+this number moved, in quadruple precision, give the central difference of fourth order: steps h of 1e-6 leave
+some h^4 = 1e-24, and 1e-13 for the 80 bits in which they are subtracted. They share nothing with the
 variational equations but the way from a config to equations. The largest difference along the run, relative
 to the derivative's largest value there, may be 1e-9. ``--quick`` takes the four motions from one compiled
 system with other coefficients, in a quarter of the time; ``--only N`` repeats a case; the exit code is 1 if
@@ -33,7 +33,7 @@ from rigidsim.workflows.read import parse
 from rigidsim.workflows.sensitivity import Tangents
 
 BOUND = 1e-9
-_MOVED = Fraction(1, 1 << 13)  # of a number's size
+_MOVED, _MOVED_QUICKLY = Fraction(1, 1 << 20), Fraction(1, 1 << 13)  # of a number's size
 _WEIGHTS = {1: 8.0, -1: -8.0, 2: -1.0, -2: 1.0}  # times 1 / 12 h
 
 
@@ -75,7 +75,7 @@ def _quick_differences(one: Case, times: np.ndarray) -> dict[str, np.ndarray]:
     text = parse(one.text, overrides=['integrator.precision="quadruple"', *_QUIET])
     motion = Tangents(text, [one.key])
     (value,) = motion.values
-    step = (abs(value) or 1.0) * float(_MOVED)
+    step = (abs(value) or 1.0) * float(_MOVED_QUICKLY)
     base, found = motion.at({}, times), {}
     sides = {n: motion.at({motion.keys[0]: value + n * step}, times) for n in _WEIGHTS}
     width = 12 * ((value + step) - value)

@@ -41,7 +41,7 @@ _IN_ORBIT = ["semi_major_axis", "eccentricity", "inclination", "ascending_node",
 def _orbit(draw: random.Random) -> str:
     return _ORBIT.format(
         a=draw.uniform(1, 2),
-        e=draw.choice([0.0, draw.uniform(0.01, 0.4)]),
+        e=draw.choice([0.01, draw.uniform(0.01, 0.4)]),
         i=draw.uniform(0, 180),
         n=draw.uniform(0, 6),
         p=draw.uniform(0, 6),
@@ -88,7 +88,7 @@ def _torque(draw: random.Random) -> tuple[str, list[str]]:
 
 
 def _viscous(draw: random.Random) -> tuple[str, list[str]]:
-    load = f'[[loads]]\nkind = "viscous_torque"\ncoefficients = [0.1, 0, {draw.uniform(0, 0.2):.4f}]\n'
+    load = f'[[loads]]\nkind = "viscous_torque"\ncoefficients = [0.1, 0.02, {draw.uniform(0.01, 0.2):.4f}]\n'
     text = f"[body]\nprincipal_moments = {_moments(draw)}\n{_start(draw)}{load}"
     return text, _MOMENTS[:1] + [f"loads[0].coefficients[{i}]" for i in range(3)]
 
