@@ -59,6 +59,10 @@ def dataset_variables(prepared: InitialValueProblem) -> list[Variable]:
     beside_published = published_of(prepared)
     if beside_published is not None:
         found += beside_published.variables
+    if prepared.sensitivity_keys:
+        from rigidsim.session.sensitivity import sensitivity_variables  # which few runs need
+
+        found += sensitivity_variables(prepared)
     dates = dates_of(prepared)
     if dates is None:
         return [time, *found]

@@ -71,7 +71,13 @@ class _ActiveRun:
         statistics = SampleStatistics([i.name for i in system.invariants], [r.name for r in system.recorded])
         trail = SampleTrail(prepared.precision)
         cost = RunCost(session.effort, progress)
-        self.checkpoints = Checkpoints(parts, statistics=statistics, cost=cost, trail=trail)
+        beside = None
+        if prepared.sensitivity_keys:
+            from rigidsim.session.sensitivity import Sensitivity  # which few runs need
+
+            beside = Sensitivity(prepared)
+        more = {} if beside is None else {"sensitivity": beside}
+        self.checkpoints = Checkpoints(parts, statistics=statistics, cost=cost, trail=trail, **more)
         start = None if chain is None else self.checkpoints.restore(chain)
         self._run_id = os.urandom(8).hex() if chain is None else chain.run
         self.attributes = dataset.root_attributes(prepared, parts, self._run_id, session.mixed)
@@ -81,9 +87,11 @@ class _ActiveRun:
             described, limits = self.attributes.as_dict(), session.tuning.segments
             self.writer = SegmentWriter(folder.segments, self.variables, described, chain, limits)
         self.recorder = Recorder(
-            prepared, parts.evaluator, self.writer, statistics, trail, self.checkpoints, start
+            prepared, parts.evaluator, self.writer, statistics, trail, self.checkpoints, start, beside
         )
         self.interruption = Interruption()
+        if beside is not None:
+            beside.go_on = self._wanted
         session.phases.next("build")
         session.observer.started(prepared, None if folder is None else folder.path)
         session.observer.phase("integrate")

@@ -8,7 +8,7 @@ import math
 import sys
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
@@ -28,6 +28,9 @@ from rigidsim.store import netcdf
 from rigidsim.store.netcdf import CHUNK_ROWS
 from rigidsim.store.run import MemoryWriter
 from rigidsim.store.segments import Chain, SegmentWriter
+
+if TYPE_CHECKING:
+    from rigidsim.session.sensitivity import Sensitivity
 
 
 @dataclass(frozen=True)
@@ -174,7 +177,9 @@ class Recorder(SampleReceiver):
         trail: SampleTrail,
         checkpoints: Checkpoints,
         start: Position | None,
+        sensitivity: "Sensitivity | None" = None,
     ) -> None:
+        self.sensitivity = sensitivity
         self._prepared = prepared
         self._evaluator = evaluator
         self._writer = writer
@@ -190,6 +195,9 @@ class Recorder(SampleReceiver):
 
     def take(self, block: SampleBlock) -> None:
         """Evaluate and collect samples, up to the first past the guard ``max_drift``."""
+        tangents = self.sensitivity  # first of all, because Ctrl-C may end it
+        place = None if tangents is None else tangents.place
+        beside = {} if tangents is None else tangents.take(block)
         before = (
             self._evaluator.continuity
             if self._max_drift is None
@@ -205,6 +213,10 @@ class Recorder(SampleReceiver):
             block = block.rows(0, wanted)
             recorded = self._evaluator.evaluate(block)
             put_back = {name: values[:wanted] for name, values in put_back.items()}
+            if tangents is not None and place is not None:
+                tangents.back_to(place)
+                beside = tangents.take(block)
+        recorded |= beside
         if self._prepared.scene.config.output.estimate:
             self.trail.take(block)
         recorded["time"] = self._prepared.clock.parts(block.first, block.times)

@@ -30,6 +30,7 @@ from rigidsim.solve.solvers.algorithm import Algorithm, algorithm_of
 
 if TYPE_CHECKING:
     from rigidsim.model.averaged.average import Average
+    from rigidsim.model.parametrised import Parametrised
 
 DRIFT_FACTOR = 50.0
 """A sound run keeps relative drifts below this times tolerance times sqrt(steps): rounding errors of the
@@ -81,6 +82,21 @@ class InitialValueProblem:
         return tuple(h.name for h in projected)
 
     @property
+    def sensitivity_keys(self) -> tuple[str, ...]:
+        """Keys by which derivatives are recorded, as the config names them."""
+        return tuple(self.scene.config.output.sensitivity or ())
+
+    @cached_property
+    def parametrised(self) -> Parametrised:
+        """The system with these keys as parameters; ConfigError if its equations have no derivatives."""
+        from rigidsim.solve.differentiable import parametrised  # which few runs need
+
+        try:
+            return parametrised(self.experiment, self.sensitivity_keys, self.python_loads)
+        except ConfigError as error:
+            raise error.at(self.experiment.source) from None
+
+    @property
     def effective_tolerance(self) -> float:
         """Tolerance that the step control works with."""
         epsilon = float(self.precision.epsilon)
@@ -107,7 +123,17 @@ def prepare(experiment: Experiment, *, loads: Sequence[Load] = ()) -> InitialVal
             "experiment without it"
         )
         raise ConfigError(Problem("[sweep]", what), experiment.source)
-    return prepare_scene(experiment, build_scene(experiment), loads=loads)
+    prepared = prepare_scene(experiment, build_scene(experiment), loads=loads)
+    if prepared.sensitivity_keys:
+        from rigidsim.scene.varied_keys import varied_keys
+        from rigidsim.solve.differentiable import refuse_without_derivatives
+
+        try:
+            refuse_without_derivatives(prepared.scene, prepared.system, has_steps=prepared.has_steps)
+            varied_keys(experiment, prepared.sensitivity_keys)
+        except ConfigError as error:
+            raise error.at(experiment.source) from None
+    return prepared
 
 
 def prepare_scene(
