@@ -15,9 +15,9 @@ _ROUNDING = 1e-13  # rad: what references in double precision, and quaternions o
 _ABOVE = 5.0  # times what the digits of the file allow, from which on defects tell something
 _MODEL, _INTEGRATOR = 0.2, 0.5
 """Unexplained over explained attitude defects. Another model's are explained up to the integral's own error,
-some 1e-3 and less, and more in long windows of few rows; an integrator's unexplained ones exceed the explained
-by 2 / (rate T), 4 for the usual window, and 0.5 for the longest. In experiments/compare_conventions they are
-0.86 and more in 264 loose integrations, and up to 0.14 in 99 % of 200 other models (0.3 in one, undecided).
+some 1e-3 and less, and more in long windows of few rows; an integrator's unexplained ones exceed the
+explained by 2 / (rate T), 4 for the usual window, and 0.5 for the longest. In experiments/compare_conventions
+they are 0.86 and more in 264 loose integrations, and up to 0.12 in 200 other models (0.14 with another seed).
 """
 _START = 3.0  # times what defects add up to, from which on another start is what the error comes from
 _NO_RATES = 0.3  # of the turn in a window: unexplained defects beyond that mean that rates are something else
