@@ -114,10 +114,6 @@ ResumeWorkersOption = Annotated[
 MembersOption = Annotated[int, _option("--members", "N", "Of a sweep: how many members, drawn at random.")]
 PictureOption = Annotated[Path | None, _option("--png", "FILE", "Draw a picture, without a display.")]
 WebOption = Annotated[bool, typer.Option("--web", help="In the browser, served on loopback only.")]
-ViewedMemberOption = Annotated[
-    list[int] | None,
-    typer.Option("--member", metavar="N", min=0, help="Of a sweep: member N, from 0; repeatable."),
-]
 MomentOption = Annotated[
     str | None, _option("--at", "TIME", 'Moment of a picture, in the scene\'s unit or as "2.4 hr".')
 ]
