@@ -1,0 +1,164 @@
+"""What an experiment predicts at given times, and how that changes with the numbers that are fitted."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from fractions import Fraction
+from typing import Protocol
+
+import numpy as np
+
+from rigidsim.errors import ConfigError, RigidsimError
+from rigidsim.scene.config import Experiment
+from rigidsim.scene.exact import ExactNumber
+from rigidsim.workflows.compare.rotations import conjugated, multiplied, vector_of
+from rigidsim.workflows.fit.keys import ATTITUDE, FitKeys
+from rigidsim.workflows.fit.observed import Quantity
+from rigidsim.workflows.run import run
+
+CHANGE = 1e-4
+"""Change of what is observed (of attitudes in rad, of others relative to their size) that the steps of central
+differences make: those of third order are a share of 1e-8 of it, rounding of double runs 1e-8 at most.
+"""
+_ROUNDING = 1e-12  # of runs in double precision, relative to the size of what is observed
+_FIRST = 1e-4  # first steps, relative to the size of each number
+
+
+class NotPredicted(RigidsimError):
+    """The motion at these values ends before the last observation, or has no finite values there."""
+
+
+@dataclass
+class Predicted:
+    """Predictions at some times.
+
+    Attributes:
+        values: by variable, (times, components), SI; quaternions for attitudes.
+        slopes: by variable, (times, components, numbers) derivatives; of attitudes by rotation vectors in
+            space axes, rad, (times, 3, numbers).
+        noise: by variable, (numbers,): of slopes, below which they tell nothing.
+    """
+
+    values: dict[str, np.ndarray]
+    slopes: dict[str, np.ndarray] = field(default_factory=dict)
+    noise: dict[str, np.ndarray] = field(default_factory=dict)
+
+
+class Predictor(Protocol):
+    """Something that predicts; ``how`` says in words where its derivatives come from."""
+
+    how: str
+
+    def at(self, values: Sequence[float], times: np.ndarray) -> Predicted:
+        """Predictions with derivatives, at ascending times (s).
+
+        Raises:
+            NotPredicted: the motion doesn't get there.
+        """
+
+
+class ByDifferences:
+    """Runs of the experiment, and central differences between them."""
+
+    how = "central differences of runs"
+
+    def __init__(self, keys: FitKeys, quiet: Experiment, quantities: Sequence[Quantity]) -> None:
+        self._keys, self._quiet = keys, quiet
+        self._variables = {one.variable: one for one in quantities}
+        self.sizes = sizes_of(keys)
+        self._steps = _FIRST * self.sizes
+        self._adapted = False
+
+    def at(self, values: Sequence[float], times: np.ndarray) -> Predicted:
+        """See ``Predictor.at``."""
+        centre = self.values(values, times)
+        found = self._differences(values, times, centre)
+        if not self._adapted:
+            self._adapt(found)
+            found = self._differences(values, times, centre)
+        return found
+
+    def values(self, values: Sequence[float], times: np.ndarray) -> dict[str, np.ndarray]:
+        """Predictions alone."""
+        listed = [ExactNumber(Fraction(time)) for time in times.tolist()]
+        try:
+            changed = self._keys.experiment(values, self._quiet)
+            table = changed.config.time.model_copy(
+                update={"times": listed, "end": None, "samples": None, "every": None}
+            )
+            changed = replace(changed, config=_quiet_like(changed, self._quiet, table))
+            made = run(changed, out=None, progress=False)
+        except ConfigError as error:
+            raise NotPredicted(f"the experiment can't be run at these values: {error}") from None
+        dataset = made.dataset
+        if dataset.sizes["time"] != len(times):
+            raise NotPredicted(f"the motion {made.outcome.message} before the last observation")
+        found = {}
+        for name in self._variables:
+            value = dataset[name].values
+            found[name] = value.reshape(len(times), -1)
+            if not np.isfinite(found[name]).all():
+                raise NotPredicted(f"{name} has no finite value at each observation")
+        return found
+
+    def _differences(
+        self, values: Sequence[float], times: np.ndarray, centre: dict[str, np.ndarray]
+    ) -> Predicted:
+        found = Predicted(centre)
+        slopes: dict[str, list[np.ndarray]] = {name: [] for name in self._variables}
+        for n, step in enumerate(self._steps):
+            ends = []
+            for sign in (-1, 1):
+                moved = np.array(values, dtype=float)
+                moved[n] += sign * step
+                ends.append((moved[n], self.values(moved, times)))
+            width = ends[1][0] - ends[0][0]
+            for name, one in self._variables.items():
+                before, after = ends[0][1][name], ends[1][1][name]
+                slopes[name].append(difference(one, before, after) / width)
+        for name, parts in slopes.items():
+            found.slopes[name] = np.stack(parts, axis=2)
+            size = self._size(name, centre)
+            found.noise[name] = _ROUNDING * size / self._steps
+        return found
+
+    def _size(self, name: str, centre: dict[str, np.ndarray]) -> float:
+        one = self._variables[name]
+        return 1.0 if one.rotation or one.form == "angle" else float(np.abs(centre[name]).max()) or 1.0
+
+    def _adapt(self, found: Predicted) -> None:
+        """Steps that change what is observed by ``CHANGE``."""
+        for n, step in enumerate(self._steps):
+            largest = max(
+                float(np.abs(found.slopes[name][:, :, n]).max()) / self._size(name, found.values)
+                for name in self._variables
+            )
+            wanted = CHANGE / largest if largest > 0 else np.inf
+            self._steps[n] = min(max(wanted, 1e-4 * step), 100 * step)
+        self._adapted = True
+
+
+def difference(quantity: Quantity, one: np.ndarray, other: np.ndarray) -> np.ndarray:
+    """From one value to another, (rows, components); of attitudes the rotation vector in space axes."""
+    if quantity.rotation:
+        return vector_of(multiplied(other, conjugated(one)))
+    apart = other - one
+    return np.asarray(np.remainder(apart + np.pi, 2 * np.pi) - np.pi) if quantity.form == "angle" else apart
+
+
+def sizes_of(keys: FitKeys) -> np.ndarray:
+    """By how much each number may be thought to change: its value, or that of its vector's components."""
+    found = []
+    for one in keys.all:
+        stem = one.key.rpartition("[")[0]
+        family = [abs(other.start) for other in keys.all if stem and other.key.rpartition("[")[0] == stem]
+        size = abs(one.start) or max(family, default=0.0) or (one.sigma or 0.0) or 1.0
+        found.append(1.0 if one.key.startswith(ATTITUDE) else size)
+    return np.array(found)
+
+
+def _quiet_like(changed: Experiment, quiet: Experiment, time: object) -> object:
+    """The config of changed values with what is recorded of another."""
+    kept = {name: getattr(quiet.config, name) for name in ("output", "events", "fit")}
+    return changed.config.model_copy(update={**kept, "time": time})

@@ -1,0 +1,110 @@
+"""Residuals of a fit in units of their sigmas, with the rows that are left out."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from rigidsim.workflows.fit.estimation import Linear
+from rigidsim.workflows.fit.keys import FitKeys
+from rigidsim.workflows.fit.predictions import NotPredicted, Predicted, Predictor, difference
+from rigidsim.workflows.fit.readings import Readings
+
+_SMALL = 1e-4  # rad, below which the series of a function of an angle is right to rounding
+
+
+@dataclass(frozen=True)
+class Compared:
+    """Readings beside a prediction, one array for each set.
+
+    Attributes:
+        residuals: (rows, components), observed less computed, SI; rotation vectors for attitudes.
+        slopes: (rows, components, numbers), of what is computed. noise: (numbers,), of these.
+    """
+
+    residuals: list[np.ndarray]
+    slopes: list[np.ndarray]
+    noise: list[np.ndarray]
+
+
+class Weighing:
+    """Readings of all sets, and what an experiment predicts for them."""
+
+    def __init__(self, keys: FitKeys, readings: Sequence[Readings], predictor: Predictor) -> None:
+        self.keys, self.readings, self._predictor = keys, list(readings), predictor
+        self.times, places = np.unique(np.concatenate([r.times for r in readings]), return_inverse=True)
+        self._places = np.split(places, np.cumsum([len(r.times) for r in readings])[:-1])
+        self.used = [np.ones(len(r.times), dtype=bool) for r in readings]
+        self._count = len(keys.estimated)
+        self._start = np.array([one.start for one in keys.estimated])
+        self._fixed = np.array([one.start for one in keys.considered])
+        self._weights = np.array([0.0 if k.sigma is None else 1.0 / k.sigma for k in keys.estimated])
+        self.failure = ""
+
+    def compared(self, values: np.ndarray) -> Compared:
+        """Residuals and slopes of all rows, used or not.
+
+        Raises:
+            NotPredicted: the motion doesn't reach them.
+        """
+        found = self._predictor.at([*values, *self._fixed], self.times)
+        parts = [self._set(r, p, found) for r, p in zip(self.readings, self._places, strict=True)]
+        residuals, slopes, noise = zip(*parts, strict=True)
+        return Compared(list(residuals), list(slopes), list(noise))
+
+    def _set(
+        self, readings: Readings, places: np.ndarray, found: Predicted
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        name = readings.quantity.variable
+        computed, slopes = found.values[name][places], found.slopes[name][places]
+        residuals = difference(readings.quantity, computed, readings.values)
+        if readings.quantity.rotation:
+            slopes = np.einsum("nij,njk->nik", inverse_right_jacobian(residuals), slopes)
+        return residuals, slopes, found.noise[name]
+
+    def linearised(self, values: np.ndarray) -> Linear | None:
+        """The fit at some values, by the rows that are used; None where the motion can't be computed."""
+        try:
+            return self.linear(self.compared(values), values)
+        except NotPredicted as error:
+            self.failure = str(error)
+            return None
+
+    def linear(self, compared: Compared, values: np.ndarray) -> Linear:
+        """The same of a comparison."""
+        residuals, slopes, noise = [], [], np.zeros(len(self.keys.all))
+        for n, readings in enumerate(self.readings):
+            used, sigmas = self.used[n], readings.sigmas[self.used[n]]
+            residuals.append((compared.residuals[n][used] / sigmas).ravel())
+            slope = compared.slopes[n][used] / sigmas[:, :, None]
+            slopes.append(slope.reshape(-1, slope.shape[2]))
+            noise += compared.noise[n] ** 2 * np.sum(sigmas**-2.0)
+        every = np.concatenate(slopes)
+        k = self._count
+        return Linear(
+            np.concatenate(residuals), every[:, :k], every[:, k:], np.sqrt(noise)[:k],
+            self._start - values, self._weights,
+        )  # fmt: skip
+
+    def sizes(self, compared: Compared) -> list[np.ndarray]:
+        """Of each row the largest residual of its components, in sigmas, (rows,) for each set."""
+        return [
+            np.abs(residuals / readings.sigmas).max(axis=1)
+            for residuals, readings in zip(compared.residuals, self.readings, strict=True)
+        ]
+
+
+def inverse_right_jacobian(vectors: np.ndarray) -> np.ndarray:
+    """How rotation vectors (rows, 3) from computed to observed attitudes shrink as the computed ones turn,
+    (rows, 3, 3): 1 + [v]/2 + (1/a^2 - (1 + cos a)/(2 a sin a)) [v]^2, a = |v| (Chirikjian 2012, eq. 10.86).
+    """
+    angle = np.linalg.norm(vectors, axis=1)
+    safe = np.where(angle > _SMALL, angle, 1.0)
+    factor = 1 / safe**2 - 0.5 / (safe * np.tan(0.5 * safe))  # (1 + cos a)/sin a = cot(a/2)
+    factor = np.where(angle > _SMALL, factor, 1.0 / 12.0)
+    x, y, z = vectors.T
+    zero = np.zeros_like(x)
+    cross = np.array([[zero, -z, y], [z, zero, -x], [-y, x, zero]]).transpose(2, 0, 1)
+    return np.asarray(np.eye(3) + 0.5 * cross + factor[:, None, None] * (cross @ cross))
