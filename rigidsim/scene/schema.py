@@ -167,6 +167,10 @@ class Output(ConfigTable):
     """
     lyapunov: StrictBool = False
     """Lyapunov exponents from variational equations; costs tens of times the plain run"""
+    sensitivity: EachOnce[StrictStr] | None = Field(None, examples=[["initial.angular_velocity[0]"]])
+    """keys of numbers in the config by which attitude, rates and position are differentiated along the motion,
+    vectors component by component; initial.attitude stands for a turn of the start, body axes
+    """
     orientation: StrictStr | None = Field(None, examples=["./pck00011.tpc"])
     """a published orientation beside which the attitude is recorded: the path of a PCK of SPICE, text or
     binary, from the config's folder; its SHA-256 is kept in the dataset
@@ -180,7 +184,7 @@ class Output(ConfigTable):
     of mass of a body that turns about another point
     """
 
-    @field_validator("record")
+    @field_validator("record", "sensitivity")
     @classmethod
     def _some(cls, value: list[str] | None) -> list[str] | None:
         if value is not None and not value:

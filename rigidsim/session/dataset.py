@@ -16,6 +16,7 @@ from rigidsim.model.outputs import Invariant
 from rigidsim.scene.kernels.ephemeris import date_of
 from rigidsim.scene.scene import Scene
 from rigidsim.session.dates import Dates
+from rigidsim.session.sensitivity import sensitivity_variables
 from rigidsim.solve.assembly import Assembly
 from rigidsim.solve.evaluate import Evaluator, RecordedParts
 from rigidsim.solve.events import EventLog, samples_at
@@ -59,6 +60,7 @@ def dataset_variables(prepared: InitialValueProblem) -> list[Variable]:
     beside_published = published_of(prepared)
     if beside_published is not None:
         found += beside_published.variables
+    found += sensitivity_variables(prepared)
     dates = dates_of(prepared)
     if dates is None:
         return [time, *found]

@@ -12,6 +12,7 @@ from rigidsim.session import dataset, lyapunov
 from rigidsim.session.diagnostics import Diagnostics, cheaper_model
 from rigidsim.session.ending import chart_changes, closing_words, time_reached
 from rigidsim.session.recorder import Checkpoints, Recorder, SampleStatistics
+from rigidsim.session.sensitivity import Sensitivity
 from rigidsim.session.session import Guards, Interruption, Observer, RunCost, Session
 from rigidsim.session.summary import cost_so_far, summarise
 from rigidsim.solve.assembly import assemble, sampler
@@ -71,7 +72,9 @@ class _ActiveRun:
         statistics = SampleStatistics([i.name for i in system.invariants], [r.name for r in system.recorded])
         trail = SampleTrail(prepared.precision)
         cost = RunCost(session.effort, progress)
-        self.checkpoints = Checkpoints(parts, statistics=statistics, cost=cost, trail=trail)
+        beside = Sensitivity(prepared) if prepared.sensitivity_keys else None
+        more = {} if beside is None else {"sensitivity": beside}
+        self.checkpoints = Checkpoints(parts, statistics=statistics, cost=cost, trail=trail, **more)
         start = None if chain is None else self.checkpoints.restore(chain)
         self._run_id = os.urandom(8).hex() if chain is None else chain.run
         self.attributes = dataset.root_attributes(prepared, parts, self._run_id, session.mixed)
@@ -81,9 +84,11 @@ class _ActiveRun:
             described, limits = self.attributes.as_dict(), session.tuning.segments
             self.writer = SegmentWriter(folder.segments, self.variables, described, chain, limits)
         self.recorder = Recorder(
-            prepared, parts.evaluator, self.writer, statistics, trail, self.checkpoints, start
+            prepared, parts.evaluator, self.writer, statistics, trail, self.checkpoints, start, beside
         )
         self.interruption = Interruption()
+        if beside is not None:
+            beside.go_on = self._wanted
         session.phases.next("build")
         session.observer.started(prepared, None if folder is None else folder.path)
         session.observer.phase("integrate")

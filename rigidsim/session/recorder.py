@@ -14,6 +14,7 @@ import numpy as np
 
 from rigidsim.errors import RunFolderError
 from rigidsim.session.dataset import dates_of, drift_name, published_of, put_back_name
+from rigidsim.session.sensitivity import Sensitivity
 from rigidsim.solve.assembly import Assembly
 from rigidsim.solve.checkpoint import Arrays, SavedPart, check_versions, numbers, pack_versions
 from rigidsim.solve.corrected_stepper import Position
@@ -174,7 +175,9 @@ class Recorder(SampleReceiver):
         trail: SampleTrail,
         checkpoints: Checkpoints,
         start: Position | None,
+        sensitivity: Sensitivity | None = None,
     ) -> None:
+        self.sensitivity = sensitivity
         self._prepared = prepared
         self._evaluator = evaluator
         self._writer = writer
@@ -190,6 +193,9 @@ class Recorder(SampleReceiver):
 
     def take(self, block: SampleBlock) -> None:
         """Evaluate and collect samples, up to the first past the guard ``max_drift``."""
+        tangents = self.sensitivity  # first of all, because Ctrl-C may end it
+        place = None if tangents is None else tangents.place
+        beside = {} if tangents is None else tangents.take(block)
         before = (
             self._evaluator.continuity
             if self._max_drift is None
@@ -205,6 +211,10 @@ class Recorder(SampleReceiver):
             block = block.rows(0, wanted)
             recorded = self._evaluator.evaluate(block)
             put_back = {name: values[:wanted] for name, values in put_back.items()}
+            if tangents is not None and place is not None:
+                tangents.back_to(place)
+                beside = tangents.take(block)
+        recorded |= beside
         if self._prepared.scene.config.output.estimate:
             self.trail.take(block)
         recorded["time"] = self._prepared.clock.parts(block.first, block.times)

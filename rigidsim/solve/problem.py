@@ -15,6 +15,7 @@ from rigidsim.errors import ConfigError, Problem, either
 from rigidsim.model.carriers import carried_beside
 from rigidsim.model.load import Load, own_loads
 from rigidsim.model.model_plan import plan_model
+from rigidsim.model.parametrised import Parametrised
 from rigidsim.model.projected_invariants import conserves, projected_invariants
 from rigidsim.model.scaling import gyroscopic_rate
 from rigidsim.model.system import System, build_system
@@ -23,6 +24,8 @@ from rigidsim.scene.choices import AUTO, FORMULATIONS
 from rigidsim.scene.config import Experiment
 from rigidsim.scene.initial_values import check_start
 from rigidsim.scene.scene import Scene, build_scene
+from rigidsim.scene.varied_keys import varied_keys
+from rigidsim.solve.differentiable import parametrised, refuse_without_derivatives
 from rigidsim.solve.first_step import refuse_non_finite_start, refuse_roots_of_zero
 from rigidsim.solve.precision import Precision, Scalar, precision_of
 from rigidsim.solve.sampling import SampleClock
@@ -81,6 +84,19 @@ class InitialValueProblem:
         return tuple(h.name for h in projected)
 
     @property
+    def sensitivity_keys(self) -> tuple[str, ...]:
+        """Keys by which derivatives are recorded, as the config names them."""
+        return tuple(self.scene.config.output.sensitivity or ())
+
+    @cached_property
+    def parametrised(self) -> Parametrised:
+        """The system with these keys as parameters; ConfigError if its equations have no derivatives."""
+        try:
+            return parametrised(self.experiment, self.sensitivity_keys, self.python_loads)
+        except ConfigError as error:
+            raise error.at(self.experiment.source) from None
+
+    @property
     def effective_tolerance(self) -> float:
         """Tolerance that the step control works with."""
         epsilon = float(self.precision.epsilon)
@@ -107,7 +123,14 @@ def prepare(experiment: Experiment, *, loads: Sequence[Load] = ()) -> InitialVal
             "experiment without it"
         )
         raise ConfigError(Problem("[sweep]", what), experiment.source)
-    return prepare_scene(experiment, build_scene(experiment), loads=loads)
+    prepared = prepare_scene(experiment, build_scene(experiment), loads=loads)
+    if prepared.sensitivity_keys:
+        try:
+            refuse_without_derivatives(prepared.scene, prepared.system, has_steps=prepared.has_steps)
+            varied_keys(experiment, prepared.sensitivity_keys)
+        except ConfigError as error:
+            raise error.at(experiment.source) from None
+    return prepared
 
 
 def prepare_scene(

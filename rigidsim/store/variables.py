@@ -25,9 +25,9 @@ LABELS: dict[str, list[str]] = {
 }
 """Coordinates besides time, with their labels."""
 
-OF_THE_RUN = ("point_mass", "rotor", "source")
-"""Coordinates whose labels depend on the run: names of ``[[bodies]]``, ``[[rotors]]``, and of bodies of a
-kernel that loads see.
+OF_THE_RUN = ("point_mass", "rotor", "source", "parameter")
+"""Coordinates whose labels depend on the run: names of ``[[bodies]]``, ``[[rotors]]``, of bodies of a kernel
+that loads see, and the keys of sensitivities.
 """
 
 SCHEMA_VERSION = 4

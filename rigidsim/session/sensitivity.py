@@ -1,0 +1,143 @@
+"""Sensitivities beside a run's samples: derivatives of attitude, rates and position by keys of its config.
+
+The run's own integrator knows nothing of them. A second one carries the motion with its tangents from sample
+to sample, and is set on the run's own state every few steps, so that the derivatives are those of the motion
+that is recorded however long that is. All depends on the samples' numbers and states alone: a resumed run
+has the same bits.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any, ClassVar
+
+import numpy as np
+
+from rigidsim.solve.checkpoint import Arrays, pack, unpack
+from rigidsim.solve.compiled import interruptible
+from rigidsim.solve.problem import InitialValueProblem
+from rigidsim.solve.sample_block import SampleBlock
+from rigidsim.solve.settled import SettledStates
+from rigidsim.solve.variational import LostTangents, Place, Rows, Variational, turned
+from rigidsim.store.variables import Variable
+
+_SET_AFTER = 8  # steps of the second integrator, after which it is set on the run's state at a sample
+
+NAMES = {
+    "attitude_sensitivity": ("space_axis", "rad", "attitude, as a rotation vector", "space axes"),
+    "angular_velocity_sensitivity": ("body_axis", "rad s-1", "angular velocity", "body axes"),
+    "position_sensitivity": ("space_axis", "m", "position", "space axes"),
+}
+"""Dimension beside the parameter's, unit for one SI unit of a key, what is differentiated, and its frame."""
+
+Columns = dict[str, list[np.ndarray]]
+
+
+def sensitivity_variables(prepared: InitialValueProblem) -> list[Variable]:
+    """What is recorded of sensitivities; empty if none are asked for."""
+    if not prepared.sensitivity_keys:
+        return []
+    keys, parts = prepared.parametrised.keys, prepared.precision.part_count
+    labels = {"parameter": [key.name for key in keys]}
+    found = []
+    for name, (axes, unit, what, frame) in NAMES.items():
+        if name == "position_sensitivity" and not prepared.scene.free_flight:
+            continue
+        attributes = {
+            "units": unit,
+            "long_name": f"partial derivative of the {what}",
+            "frame": frame,
+            "convention": "per SI unit of each parameter, a key of the config; parameter_units names these",
+            "parameter_units": ", ".join(key.unit for key in keys),
+        }
+        found.append(Variable(name, ("parameter", axes), attributes, parts, labels))
+    return found
+
+
+class Sensitivity:
+    """The second integrator of a run, as a part of its checkpoints."""
+
+    version: ClassVar[int] = 1
+
+    def __init__(self, prepared: InitialValueProblem) -> None:
+        self._precision = prepared.precision
+        self._engine = interruptible(lambda: Variational(prepared.parametrised, prepared.precision))
+        self._flies = prepared.scene.free_flight
+        self._settled = SettledStates.of(prepared.system, self._engine.system, prepared.precision)
+        shift = prepared.system.scaling.time - self._engine.system.scaling.time
+        self._unit = prepared.precision.of_double(2.0**shift)
+        self._lost = False
+        self.go_on: Callable[[], bool] = lambda: True
+
+    @property
+    def place(self) -> tuple[Place, bool]:
+        """Where it is, to go back to."""
+        return self._engine.place, self._lost
+
+    def back_to(self, place: tuple[Place, bool]) -> None:
+        """Return to where it was."""
+        self._lost = place[1]
+        self._engine.back_to(place[0])
+
+    def take(self, block: SampleBlock) -> Columns:
+        """Columns of the variables for samples that follow those before; NaN once the tangents are lost.
+
+        Raises:
+            KeyboardInterrupt: ``go_on`` says no; it is then where it was before.
+        """
+        before = self.place
+        samples: list[Any] = []
+        times = block.times.astype(self._precision.scalar) * self._unit
+        try:
+            for row in range(len(block) if not self._lost else 0):
+                samples.append(self._engine.sample(times[row], self.go_on))
+                if self._engine.steps >= _SET_AFTER and self._settled is not None:
+                    self._engine.set(times[row], self._settled.at(block, row, samples[-1][0]))
+        except LostTangents:
+            self._lost = True
+        except KeyboardInterrupt:
+            self.back_to(before)
+            raise
+        rows = self._engine.rows(times[: len(samples)], samples) if samples else None
+        return self._columns(rows, len(block))
+
+    def _columns(self, rows: Rows | None, count: int) -> Columns:
+        found = {}
+        if rows is not None:
+            found["attitude_sensitivity"] = turned(rows.values["quaternion"], rows.slopes["quaternion"])
+            found["angular_velocity_sensitivity"] = rows.slopes["angular_velocity"]
+            if self._flies:
+                found["position_sensitivity"] = rows.slopes["position"]
+        columns: Columns = {}
+        for name in NAMES:
+            if name == "position_sensitivity" and not self._flies:
+                continue
+            size = 3 * self._engine.keys
+            known = self._precision.parts(found[name].reshape(-1)) if name in found else []
+            parts = [part.reshape(-1, size) for part in known]
+            filled = [np.full((count, size), np.nan) for _ in range(self._precision.part_count)]
+            for n, whole in enumerate(filled):
+                whole[:, :] = np.nan if n == 0 else 0.0
+                if parts:
+                    whole[: len(parts[n])] = parts[n]
+            columns[name] = filled
+        return columns
+
+    def pack(self) -> Arrays:
+        """See ``rigidsim.solve.checkpoint.SavedPart``."""
+        place, precision = self._engine.place, self._precision
+        arrays = pack(np.array(place.time, dtype=precision.scalar), precision, "tangent_time")
+        arrays |= pack(place.state, precision, "tangent_state")
+        arrays["tangent_exponents"] = place.exponents
+        arrays["tangent_counts"] = np.array([place.steps, self._lost], dtype=np.int64)
+        return arrays
+
+    def restore(self, arrays: Mapping[str, np.ndarray]) -> None:
+        """See ``rigidsim.solve.checkpoint.SavedPart``."""
+        time, state = (unpack(arrays, self._precision, name) for name in ("tangent_time", "tangent_state"))
+        here = self._engine.place
+        exponents = np.asarray(arrays["tangent_exponents"])
+        if time.shape != (2,) or state.shape != here.state.shape or exponents.shape != here.exponents.shape:
+            raise ValueError("its tangents belong to other equations")
+        steps, lost = (int(n) for n in arrays["tangent_counts"])
+        self.back_to((Place((time[0], time[1]), state, exponents.astype(np.int64), steps), bool(lost)))
