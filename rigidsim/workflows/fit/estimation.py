@@ -15,7 +15,7 @@ SINGULAR = 1e-7
 """Singular values of scaled columns below this share of the largest are taken for zero: correlations that
 differ from one by less than its square are rounding in the derivatives.
 """
-WITHIN = 1e-5
+WITHIN = 1e-4
 """A fit has converged once its next step is shorter than so many sigmas."""
 MOST_ITERATIONS = 60
 _FIRST_DAMPING, _AFTER_FAILURE = 1e-6, 1e-3

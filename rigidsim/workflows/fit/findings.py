@@ -10,7 +10,7 @@ import xarray
 
 from rigidsim.workflows.fit.estimation import consider_covariance
 from rigidsim.workflows.fit.keys import FitKey, FitKeys
-from rigidsim.workflows.fit.predictions import Predicted, sizes_of
+from rigidsim.workflows.fit.predictions import Predicted
 from rigidsim.workflows.fit.result import (
     Considered,
     FitResult,
@@ -122,7 +122,7 @@ class Findings:
     def _undetermined(self) -> list[Undetermined]:
         """Directions, each as the changes of the numbers that make it."""
         found = []
-        sizes = sizes_of(self.keys)[: len(self.keys.estimated)]
+        sizes = np.array([one.size for one in self.keys.estimated])
         for direction in _simplest(self.null / sizes):
             part = np.abs(direction) > _SHOWN * np.abs(direction).max()
             keys = [one for one, p in zip(self.keys.estimated, part, strict=True) if p]

@@ -20,7 +20,7 @@ from rigidsim.workflows.fit.findings import ALONG, Findings
 from rigidsim.workflows.fit.folder import FitFolder, Remembered
 from rigidsim.workflows.fit.keys import FitKeys
 from rigidsim.workflows.fit.observed import Quantity, observing, recording
-from rigidsim.workflows.fit.predictions import ByDifferences, NotPredicted, Predicted, Predictor
+from rigidsim.workflows.fit.predictions import ByDifferences, ByTangents, NotPredicted, Predicted, Predictor
 from rigidsim.workflows.fit.readings import Readings, read_readings
 from rigidsim.workflows.fit.result import FitResult
 from rigidsim.workflows.fit.searching import search
@@ -145,14 +145,20 @@ def _fitted(experiment: Experiment, places: list[Path], memory: Path | None, tol
         predictor = _predictor(keys, quiet, quantities)
         weighing = Weighing(keys, readings, predictor if memory is None else Remembered(predictor, memory))
         found = search(weighing, experiment.config.fit.starts, told)
-        notes = [text for one in readings for text in one.told]
+        notes = list(dict.fromkeys(text for one in readings for text in one.told))
         findings = Findings(experiment.config.name, keys, weighing, found, predictor.how, notes)
         along, times = _along(keys, experiment, found.ended.values)
         return findings.result(along, times)
 
 
 def _predictor(keys: FitKeys, quiet: Experiment, quantities: list[Quantity]) -> Predictor:
-    return ByDifferences(keys, quiet, quantities)
+    """Variational equations, or differences of runs where a scene has none."""
+    try:
+        return ByTangents(keys, quiet, quantities)
+    except ConfigError as error:
+        made = ByDifferences(keys, quiet, quantities)
+        made.how += f" ({error.problems[0].what})"
+        return made
 
 
 def _refuse_few(keys: FitKeys, readings: list[Readings]) -> None:

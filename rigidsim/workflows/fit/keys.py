@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import copy
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -12,19 +11,16 @@ import numpy as np
 
 from rigidsim.errors import ConfigError, Problem
 from rigidsim.scene.config import Experiment, validated
-from rigidsim.scene.exact import in_its_unit, parse_number, with_unit
+from rigidsim.scene.exact import Quantity, parse_number, parse_quantity
 from rigidsim.scene.fit_table import KnownWithin
 from rigidsim.scene.scene import Scene, build_scene
-from rigidsim.scene.sweeps.axes import refuse_unsettable, unit_and_length
-from rigidsim.scene.toml_text import apply_overrides, key_steps, parse_toml
+from rigidsim.scene.toml_text import apply_overrides, parse_toml
 from rigidsim.scene.units import powers, unit_text
 from rigidsim.scene.validation_messages import shown
+from rigidsim.scene.varied_keys import ATTITUDE, VariedKey, varied_keys
 from rigidsim.workflows.compare.rotations import multiplied, of_vector
 
-ATTITUDE = "initial.attitude"
-"""Key of a rotation vector, rad, in body axes, that turns the attitude at the start."""
 _FORMS = ("euler_angles", "pole", "prime_meridian", "obliquity", "node_longitude")
-_NOT_FITTED = ("name", "description", "fit", "sweep", "output", "tables", "limits", "integrator", "model")
 
 
 @dataclass(frozen=True)
@@ -36,6 +32,7 @@ class FitKey:
         unit: SI unit of its values, "1" for none.
         start: the config's value, SI. sigma: known beforehand, SI; None for nothing.
         suffix: unit with which values are written into the config, where they have one there.
+        places: keys of the config where it stands. size: against which changes of it are small or not.
     """
 
     key: str
@@ -43,6 +40,8 @@ class FitKey:
     start: float
     sigma: float | None = None
     suffix: str = ""
+    places: tuple[str, ...] = ()
+    size: float = 1.0
 
 
 class FitKeys:
@@ -85,74 +84,34 @@ class FitKeys:
     ) -> tuple[FitKey, ...]:
         found: list[FitKey] = []
         for key in keys:
-            place = f'[fit] {where} "{key[:60]}"'
             try:
-                found += self._of(key, sigmas)
+                for index, one in enumerate(varied_keys(self._experiment, [key], f"[fit] {where}")):
+                    found.append(self._one(one, _sigma(sigmas, one, key, index)))
             except ValueError as error:
-                self._problems.append(Problem(place, str(error)))
+                self._problems.append(Problem(f'[fit] {where} "{key[:60]}"', str(error)))
             except ConfigError as error:
-                self._problems += [Problem(place, problem.what) for problem in error.problems]
+                self._problems += error.problems
         names = [one.key for one in found]
         for name in sorted({name for name in names if names.count(name) > 1}):
             self._problems.append(Problem(f"[fit] {where}", f'"{name}" is given twice; give it once'))
         return tuple(found)
 
-    def _of(self, key: str, sigmas: Mapping[str, KnownWithin]) -> list[FitKey]:
-        """The numbers of one key, each with what is known of it."""
-        plain = ".".join(part.strip() for part in key.split("."))
-        steps = key_steps(plain, "parameters")
-        if str(steps[0]) in _NOT_FITTED:
-            raise ValueError(
-                "can't be fitted; keys of [body], [initial], [[loads]], [parameters] and the like are allowed"
-            )
-        if plain == ATTITUDE or re.fullmatch(rf"{ATTITUDE}\[[012]\]", plain):
-            indices = range(3) if plain == ATTITUDE else [int(plain[-2])]
-            return [self._turn(i, _sigma(sigmas, plain, i, ATTITUDE, "rad")) for i in indices]
-        unit, _ = unit_and_length(plain, self._tables)
-        refuse_unsettable(plain, copy.deepcopy(self._tables))  # which it changes
-        value = self._value(plain, steps)
-        if not isinstance(value, list):
-            return [self._number(plain, value, unit, _sigma(sigmas, plain, 0, "", unit))]
-        return [
-            self._number(f"{plain}[{i}]", entry, unit, _sigma(sigmas, f"{plain}[{i}]", i, plain, unit))
-            for i, entry in enumerate(value)
-        ]
-
-    def _turn(self, index: int, sigma: float | None) -> FitKey:
-        if self._scene.config.initial.equilibrium is not None:
-            raise ValueError("the start is an equilibrium, which is found; give an attitude instead")
-        return FitKey(f"{ATTITUDE}[{index}]", "rad", 0.0, sigma)
-
-    def _value(self, key: str, steps: Sequence[str | int]) -> Any:
-        """The value that stands in the config."""
-        value: Any = self._tables
-        for step in steps:
-            try:
-                value = value[step]
-            except (LookupError, TypeError):
-                raise ValueError(
-                    "has no value in the config, where a fit starts from; write one, such as "
-                    f"{key} = {'[...]' if key.endswith(('angular_velocity', 'moments')) else '...'}"
-                ) from None
-        return value
-
-    def _number(self, key: str, value: Any, unit: str, sigma: float | None) -> FitKey:
-        suffix = ""
-        if unit == "1":  # constants of expressions have units of their own
-            number, own = in_its_unit(value)
-            if own:
-                number, unit = with_unit(number, own, value), unit_text(powers(own)) or "rad"
-                suffix = unit
-        else:
-            number = parse_number(value, unit)
-        return FitKey(key, unit, float(number), sigma, suffix)
+    def _one(self, varied: VariedKey, sigma: float | None) -> FitKey:
+        suffix, unit = "", varied.unit
+        table, _, name = varied.name.partition(".")
+        given = self._experiment.config.parameters.get(name) if table == "parameters" else None
+        if isinstance(given, Quantity):  # constants of expressions have units of their own
+            suffix = unit = unit_text(powers(given.unit)) or "rad"
+        places = [written_key(place) for place in varied.places]
+        size = abs(float(varied.number)) or abs(float(varied.size)) or 1.0
+        return FitKey(varied.name, unit, float(varied.number), sigma, suffix, tuple(places), size)
 
     def _refuse_rest(self, prior: Mapping[str, KnownWithin]) -> None:
         """A prior of something that isn't estimated would be without effect."""
         known = {one.key for one in self.estimated}
+        known |= {key.rpartition("[")[0] for key in known}
         for key in prior:
-            plain = ".".join(part.strip() for part in key.split("."))
-            if plain not in known and f"{plain}[0]" not in known:
+            if key.replace(" ", "") not in known:
                 what = "is not among the parameters; name it there, or remove its prior"
                 self._problems.append(Problem(f'[fit] prior."{key[:60]}"', what))
 
@@ -166,8 +125,9 @@ class FitKeys:
             if one.key.startswith(ATTITUDE):
                 turn[int(one.key[-2])] = value
             else:
-                text = repr(float(value))
-                found.append(f'{one.key}="{text} {one.suffix}"' if one.suffix else f"{one.key}={text}")
+                number = repr(float(value))
+                text = f'"{number} {one.suffix}"' if one.suffix else number
+                found += [f"{place}={text}" for place in one.places]
         return [*(self._start(turn) if self._turned else ()), *found]
 
     def _start(self, turn: np.ndarray) -> list[str]:
@@ -194,11 +154,18 @@ class FitKeys:
         return self._experiment.having(["fit=", *self.overrides(everything)])
 
 
+def written_key(place: Sequence[str | int]) -> str:
+    """A key of such steps, as it is given to replace a value."""
+    parts = [f"[{step}]" if isinstance(step, int) else f'."{step}"' for step in place]
+    return "".join(parts)[1:].replace('"', "") if all("." not in str(x) for x in place) else "".join(parts)[1:]
+
+
 def _sigma(
-    sigmas: Mapping[str, KnownWithin], key: str, index: int, whole: str, unit: str
+    sigmas: Mapping[str, KnownWithin], varied: VariedKey, key: str, index: int
 ) -> float | None:
-    """What is known beforehand of a number, by its own key or by that of its vector."""
-    table = sigmas.get(key) or sigmas.get(whole)
+    """What is known beforehand of a number, by its own key or by that of its vector, SI."""
+    plain = {name.replace(" ", ""): table for name, table in sigmas.items()}
+    table = plain.get(varied.name) or plain.get(key.replace(" ", "")) or plain.get(varied.name.rpartition("[")[0])
     if table is None:
         return None
     given = table.sigma
@@ -206,10 +173,7 @@ def _sigma(
         if index >= len(given):
             raise ValueError(f"given {shown(given)} as sigma; one for each component is needed")
         given = given[index]
-    value = float(in_its_unit(given)[0] if unit == "1" else parse_number(given, unit))
-    if unit == "1" and isinstance(given, str):
-        number, own = in_its_unit(given)
-        value = float(with_unit(number, own, given)) if own else value
-    if not value > 0:
+    number = parse_quantity(given) if varied.unit == "1" else parse_number(given, varied.unit)
+    if not float(number) > 0:
         raise ValueError(f"given {shown(given)} as sigma; a standard deviation above zero is allowed")
-    return value
+    return float(number)

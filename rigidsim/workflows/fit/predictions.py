@@ -10,12 +10,14 @@ from typing import Protocol
 import numpy as np
 
 from rigidsim.errors import ConfigError, RigidsimError
+from rigidsim.scene.choices import DEFAULT_METHOD
 from rigidsim.scene.config import Experiment
 from rigidsim.scene.exact import ExactNumber
 from rigidsim.workflows.compare.rotations import conjugated, multiplied, vector_of
-from rigidsim.workflows.fit.keys import ATTITUDE, FitKeys
+from rigidsim.workflows.fit.keys import FitKeys
 from rigidsim.workflows.fit.observed import Quantity
 from rigidsim.workflows.run import run
+from rigidsim.workflows.sensitivity import Tangents
 
 CHANGE = 1e-4
 """Change of what is observed (of attitudes in rad, of others relative to their size) that the steps of central
@@ -66,8 +68,7 @@ class ByDifferences:
     def __init__(self, keys: FitKeys, quiet: Experiment, quantities: Sequence[Quantity]) -> None:
         self._keys, self._quiet = keys, quiet
         self._variables = {one.variable: one for one in quantities}
-        self.sizes = sizes_of(keys)
-        self._steps = _FIRST * self.sizes
+        self._steps = _FIRST * np.array([one.size for one in keys.all])
         self._adapted = False
 
     def at(self, values: Sequence[float], times: np.ndarray) -> Predicted:
@@ -139,23 +140,53 @@ class ByDifferences:
         self._adapted = True
 
 
+class ByTangents:
+    """Variational equations beside the motion, compiled once for all values."""
+
+    how = "variational equations"
+
+    def __init__(self, keys: FitKeys, quiet: Experiment, quantities: Sequence[Quantity]) -> None:
+        names = [one.variable for one in quantities]
+        self._names = list(dict.fromkeys(names))
+        self._keys = [one.key for one in keys.all]
+        self._sizes = np.array([one.size for one in keys.all])
+        integrator = quiet.config.integrator.model_copy(update={"method": DEFAULT_METHOD})
+        stepping = replace(quiet, config=quiet.config.model_copy(update={"integrator": integrator}))
+        self._tangents = Tangents(stepping, self._keys, record=self._names)
+
+    def at(self, values: Sequence[float], times: np.ndarray) -> Predicted:
+        """See ``Predictor.at``."""
+        given = {key: float(value) for key, value in zip(self._keys, values, strict=True)}
+        try:
+            found = self._tangents.at(given, times)
+        except ConfigError as error:
+            raise NotPredicted("; ".join(problem.what for problem in error.problems)) from None
+        every = {
+            "quaternion": (found.attitude, found.d_attitude),
+            "angular_velocity": (found.angular_velocity, found.d_angular_velocity),
+            "position": (found.position, found.d_position),
+            "velocity": (found.velocity, found.d_velocity),
+            **found.extra,
+        }
+        made = Predicted({})
+        for name in self._names:
+            value, slopes = every[name]
+            assert value is not None
+            assert slopes is not None
+            if not (np.isfinite(value).all() and np.isfinite(slopes).all()):
+                raise NotPredicted(f"{name} has no finite value at each observation")
+            made.values[name], made.slopes[name] = value, np.ascontiguousarray(slopes.transpose(0, 2, 1))
+            size = 1.0 if name == "quaternion" else float(np.abs(value).max()) or 1.0
+            made.noise[name] = _ROUNDING * size / self._sizes
+        return made
+
+
 def difference(quantity: Quantity, one: np.ndarray, other: np.ndarray) -> np.ndarray:
     """From one value to another, (rows, components); of attitudes the rotation vector in space axes."""
     if quantity.rotation:
         return vector_of(multiplied(other, conjugated(one)))
     apart = other - one
     return np.asarray(np.remainder(apart + np.pi, 2 * np.pi) - np.pi) if quantity.form == "angle" else apart
-
-
-def sizes_of(keys: FitKeys) -> np.ndarray:
-    """By how much each number may be thought to change: its value, or that of its vector's components."""
-    found = []
-    for one in keys.all:
-        stem = one.key.rpartition("[")[0]
-        family = [abs(other.start) for other in keys.all if stem and other.key.rpartition("[")[0] == stem]
-        size = abs(one.start) or max(family, default=0.0) or (one.sigma or 0.0) or 1.0
-        found.append(1.0 if one.key.startswith(ATTITUDE) else size)
-    return np.array(found)
 
 
 def _quiet_like(changed: Experiment, quiet: Experiment, time: object) -> object:
