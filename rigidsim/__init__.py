@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from rigidsim.store.sweeps.run import SavedSweep, open_sweep
     from rigidsim.workflows.analyse import analyse
     from rigidsim.workflows.compare.compared import compare
+    from rigidsim.workflows.fit.fitting import fit
     from rigidsim.workflows.physics.required import required_physics
     from rigidsim.workflows.plan import plan
     from rigidsim.workflows.read import Experiment, load, parse
@@ -27,8 +28,8 @@ __version__ = "0.1.0"
 
 __all__ = [
     "ConfigError", "Experiment", "MemoryRun", "RigidsimError", "Run", "RunFolderError", "SavedRun",
-    "SavedSweep", "analyse", "compare", "load", "open_run", "open_sweep", "parse", "plan", "required_physics",
-    "resume", "run", "sweep", "verify",
+    "SavedSweep", "analyse", "compare", "fit", "load", "open_run", "open_sweep", "parse", "plan",
+    "required_physics", "resume", "run", "sweep", "verify",
 ]  # fmt: skip
 
 _NAMES = {
@@ -37,6 +38,7 @@ _NAMES = {
     "store.sweeps.run": ("SavedSweep", "open_sweep"),
     "workflows.analyse": ("analyse",),
     "workflows.compare.compared": ("compare",),
+    "workflows.fit.fitting": ("fit",),
     "workflows.physics.required": ("required_physics",),
     "workflows.plan": ("plan",),
     "workflows.read": ("Experiment", "load", "parse"),

@@ -1,4 +1,4 @@
-"""Tables of observations: columns by their names, numbers or dates, each row known by its place in the file."""
+"""Tables of observations: columns of numbers or dates by their names, and what the file calls each row."""
 
 from __future__ import annotations
 
@@ -57,8 +57,8 @@ class Observations:
         if len(bad):
             given = f' ("{self.texts[name][bad[0]][:40]}")' if name in self.texts else ""
             raise RigidsimError(
-                f"{self.source}: {self.rows[bad[0]]}: {name} is no finite number{given}, as in {len(bad):,} of "
-                f"{len(found):,} rows; remove these rows, or write their values"
+                f"{self.source}: {self.rows[bad[0]]}: {name} is no finite number{given}, as in "
+                f"{len(bad):,} of {len(found):,} rows; remove these rows, or write their values"
             )
         return found
 
@@ -124,7 +124,9 @@ def _of_text(path: Path) -> Observations:
             continue
         if not names:
             separator = next((c for c in ",;\t" if c in line), " ")
-        cells = [cell.strip() for cell in next(csv.reader([line], delimiter=separator, skipinitialspace=True))]
+        cells = [
+            cell.strip() for cell in next(csv.reader([line], delimiter=separator, skipinitialspace=True))
+        ]
         if not names:
             names, columns = cells, [[] for _ in cells]
             if all(np.isfinite(_number(cell)) for cell in cells):

@@ -54,9 +54,7 @@ class FitDataTable(ConfigTable):
     @classmethod
     def _sigma(cls, value: Any) -> Any:
         if isinstance(value, bool | dict | list) or value is None:
-            raise refuse(
-                f"given {shown(value)}; a standard deviation, or the name of a column, is allowed"
-            )
+            raise refuse(f"given {shown(value)}; a standard deviation, or the name of a column, is allowed")
         return value
 
     @field_validator("outliers")

@@ -61,7 +61,7 @@ class Solution:
         norms = np.linalg.norm(matrix, axis=0)
         empty = norms <= 10 * linear.noise
         self.scales = np.where(empty, 1.0, norms)
-        triangle = np.linalg.qr(
+        triangle: np.ndarray = np.linalg.qr(
             np.concatenate([np.where(empty, 0.0, matrix / self.scales), right[:, None]], axis=1), mode="r"
         )
         count = matrix.shape[1]

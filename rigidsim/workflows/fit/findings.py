@@ -11,6 +11,7 @@ import xarray
 from rigidsim.workflows.fit.estimation import consider_covariance
 from rigidsim.workflows.fit.keys import FitKey, FitKeys
 from rigidsim.workflows.fit.predictions import Predicted
+from rigidsim.workflows.fit.readings import Readings
 from rigidsim.workflows.fit.result import (
     Considered,
     FitResult,
@@ -52,7 +53,7 @@ class Findings:
         self.scale = float(np.sqrt(ended.linear.cost / self.freedom)) if self.freedom > 0 else None
 
     @property
-    def _sets(self) -> tuple[list[np.ndarray], list]:  # type: ignore[type-arg]
+    def _sets(self) -> tuple[list[np.ndarray], list[Readings]]:
         return self.weighing.used, self.weighing.readings
 
     def sigmas(self) -> np.ndarray:
@@ -62,7 +63,7 @@ class Findings:
         return np.where(self.determined, found, np.nan)
 
     def scaled(self) -> np.ndarray:
-        """The same with the data's sigmas multiplied by ``scale``; priors and considered numbers keep theirs."""
+        """The same with the data's sigmas times ``scale``; priors and considered numbers keep theirs."""
         if self.scale is None:
             return np.full(len(self.keys.estimated), np.nan)
         formal = self._solution.covariance * self.scale**2
@@ -167,10 +168,10 @@ class Findings:
 
     def _dataset(self, made: FitResult, along: Predicted | None, times: np.ndarray) -> xarray.Dataset:
         names = [one.key for one in self.keys.estimated]
-        count = len(names)
+        count, starts = len(names), [one.start for one in self.keys.estimated]
         values = {
             "value": ("parameter", self.search.ended.values, {"long_name": "estimate, in parameter_unit"}),
-            "start": ("parameter", [one.start for one in self.keys.estimated], {"long_name": "config's value"}),
+            "start": ("parameter", starts, {"long_name": "value in the config"}),
             "sigma": ("parameter", self.sigmas(), {"long_name": "standard deviation; nan if undetermined"}),
             "scaled_sigma": ("parameter", self.scaled(), {"long_name": "the same, scaled by the residuals"}),
             "covariance": (
@@ -190,7 +191,7 @@ class Findings:
             "parameter": names,
             "other_parameter": names,
             "parameter_unit": ("parameter", [one.unit for one in self.keys.estimated]),
-            "considered": [one.key for one in self.keys.considered],
+            "considered": np.array([one.key for one in self.keys.considered], dtype=str),
         }
         attributes = {
             "title": f"fit of {self.name}",
@@ -217,7 +218,11 @@ class Findings:
             dataset.coords[f"component_{n}"] = labels
             dataset.coords[f"time_{n}"] = (f"row_{n}", readings.times, {"units": "s"})
             dataset[f"residual_{n}"] = ((f"row_{n}", f"component_{n}"), residuals, words)
-            dataset[f"residual_sigma_{n}"] = ((f"row_{n}", f"component_{n}"), readings.sigmas, {"units": unit})
+            dataset[f"residual_sigma_{n}"] = (
+                (f"row_{n}", f"component_{n}"),
+                readings.sigmas,
+                {"units": unit},
+            )
             dataset[f"used_{n}"] = (f"row_{n}", used.astype(np.int8), {"long_name": "1: used, 0: outlier"})
 
     def _put_along(self, dataset: xarray.Dataset, along: Predicted, times: np.ndarray) -> None:
@@ -225,7 +230,11 @@ class Findings:
         dataset.coords["time"] = ("time", times, {"units": "s"})
         if "quaternion" in along.values:
             found = self._spread(along.slopes["quaternion"])
-            words = {"units": "rad", "long_name": "predicted standard deviation, space axes", "frame": "space axes"}
+            words = {
+                "units": "rad",
+                "long_name": "predicted standard deviation, space axes",
+                "frame": "space axes",
+            }
             dataset.coords["space_axis"] = ["X", "Y", "Z"]
             dataset["attitude_sigma"] = (("time", "space_axis"), _roots(found), words)
             more = {"units": "rad2", "long_name": "predicted covariance of the attitude as a rotation vector"}
@@ -278,9 +287,9 @@ def _simplest(directions: np.ndarray) -> np.ndarray:
     for n in range(len(rows)):
         free = [j for j in range(rows.shape[1]) if j not in lead]
         rest = np.abs(rows[n:, free])
-        i, j = np.unravel_index(int(np.argmax(rest)), rest.shape)
+        i, j = divmod(int(np.argmax(rest)), len(free))
         rows[[n, n + i]] = rows[[n + i, n]]
-        column = free[int(j)]
+        column = free[j]
         rows[n] /= rows[n, column]
         for other in range(len(rows)):
             if other != n:
@@ -292,7 +301,9 @@ def _simplest(directions: np.ndarray) -> np.ndarray:
 def _direction_text(keys: Sequence[FitKey], parts: np.ndarray, amounts: np.ndarray) -> str:
     if len(keys) == 1:
         return f"{keys[0].key}: no row depends on it"
-    relative = [amount / one.start if one.start else np.nan for one, amount in zip(keys, amounts, strict=True)]
+    relative = [
+        amount / one.start if one.start else np.nan for one, amount in zip(keys, amounts, strict=True)
+    ]
     names = " and ".join([", ".join(one.key for one in keys[:-1]), keys[-1].key])
     if np.isfinite(relative).all() and np.ptp(relative) < 1e-3 * np.abs(relative).max():
         return f"{names}: only their ratios show"

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from contextlib import ExitStack
-
 from pathlib import Path
 from typing import Any
 
@@ -166,14 +165,12 @@ def _refuse_few(keys: FitKeys, readings: list[Readings]) -> None:
     known = sum(one.sigma is not None for one in keys.estimated)
     if numbers + known < len(keys.estimated):
         raise RigidsimError(
-            f"fit: {numbers} numbers are observed, fewer than the {len(keys.estimated)} that are estimated; add "
-            "data or priors, or estimate fewer"
+            f"fit: {numbers} numbers are observed, fewer than the {len(keys.estimated)} that are "
+            "estimated; add data or priors, or estimate fewer"
         )
 
 
-def _along(
-    keys: FitKeys, experiment: Experiment, values: np.ndarray
-) -> tuple[Predicted | None, np.ndarray]:
+def _along(keys: FitKeys, experiment: Experiment, values: np.ndarray) -> tuple[Predicted | None, np.ndarray]:
     """Predictions along the run, for the uncertainty there; None where a scene has no attitude."""
     scene = keys.scene
     times = np.linspace(float(scene.start), float(scene.samples.last), _ALONG_ROWS)

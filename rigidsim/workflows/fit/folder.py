@@ -17,15 +17,24 @@ import heyoka
 import numpy as np
 
 from rigidsim import __version__
-from rigidsim.errors import FORCE, OUT, RunFolderError
+from rigidsim.errors import FORCE, OUT, RESUME, RunFolderError
 from rigidsim.scene.config import Experiment
 from rigidsim.store import atomic
+from rigidsim.store.fits import BEGUN
 from rigidsim.store.folder import FileOf, WorkFolder
 from rigidsim.workflows.fit.predictions import Predicted, Predictor
-from rigidsim.workflows.fit.result import KIND
+from rigidsim.workflows.fit.result import KIND, FitResult
 
-_BEGUN = "begun.json"
-_NAMES = ("config.toml", "dataset.h5", "summary.json", "fitted.toml", "figure.png", "data", "evaluations", _BEGUN)
+_NAMES = (
+    "config.toml",
+    "dataset.h5",
+    "summary.json",
+    "fitted.toml",
+    "figure.png",
+    "data",
+    "evaluations",
+    BEGUN,
+)
 
 
 @dataclass(frozen=True)
@@ -45,7 +54,7 @@ class FitFolder(WorkFolder):
     """Copies of the data."""
     evaluations = FileOf("evaluations")
     """Predictions so far, while the fit isn't finished."""
-    begun = FileOf(_BEGUN)
+    begun = FileOf(BEGUN)
     """What it was begun with."""
 
     @property
@@ -67,13 +76,15 @@ class FitFolder(WorkFolder):
         there = self.content(_NAMES)
         now = {
             "kind": KIND,
-            "config_sha256": experiment.sha256,
-            "data_sha256": [_digest(path) for path in sources],
+            "text_sha256": hashlib.sha256(experiment.text.encode()).hexdigest(),
+            "data_sha256": [digest(path) for path in sources],
             "versions": versions(),
         }
         if there and not force:
             if self.finished:
-                raise RunFolderError(f"{self.path}: a finished fit is there; {FORCE} replaces it, or choose {OUT}")
+                raise RunFolderError(
+                    f"{self.path}: a finished fit is there; {FORCE} replaces it, or choose {OUT}"
+                )
             if not self.is_fit or json.loads(self.begun.read_text()) != now:
                 raise RunFolderError(
                     f"{self.path}: a fit of another config, other data or other versions was begun there; "
@@ -89,6 +100,19 @@ class FitFolder(WorkFolder):
             atomic.write_bytes(self.copy(number, path.name), _content(path))
         atomic.write_bytes(self.config, experiment.text.encode())
         atomic.write_bytes(self.begun, json.dumps(now, indent=2).encode())
+
+    def read_result(self) -> FitResult:
+        """The result as it was saved, without its dataset.
+
+        Raises:
+            RunFolderError: the fit isn't finished, or its summary can't be read.
+        """
+        if not self.finished:
+            raise RunFolderError(f"{self.path}: an unfinished fit; {RESUME} goes on with it")
+        try:
+            return FitResult.model_validate_json(self.summary.read_text(encoding="utf-8"))
+        except (OSError, ValueError) as error:
+            raise RunFolderError(f"{self.summary}: can't be read ({error})") from None
 
     def copy(self, number: int, name: str) -> Path:
         """Where the data of a ``[[fit.data]]`` are kept."""
@@ -147,10 +171,6 @@ def _content(path: Path) -> bytes:
     return (path / "dataset.h5" if path.is_dir() else path).read_bytes()
 
 
-def _digest(path: Path) -> str:
+def digest(path: Path) -> str:
+    """SHA-256 of a file, or of the dataset of a run's folder."""
     return hashlib.sha256(_content(path)).hexdigest()
-
-
-def is_fit(path: Path) -> bool:
-    """Whether a folder, or the one that a file lies in, holds a fit."""
-    return FitFolder(path if path.is_dir() else path.parent).is_fit

@@ -1,11 +1,10 @@
-"""The parameters of a fit: keys of the config as single numbers, and the experiment at other values of them."""
+"""The parameters of a fit: keys of the config as single numbers, and the experiment at other values."""
 
 from __future__ import annotations
 
 import copy
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
@@ -79,9 +78,7 @@ class FitKeys:
 
     # --- reading --------------------------------------------------------------------------------------------
 
-    def _all(
-        self, where: str, keys: Sequence[str], sigmas: Mapping[str, KnownWithin]
-    ) -> tuple[FitKey, ...]:
+    def _all(self, where: str, keys: Sequence[str], sigmas: Mapping[str, KnownWithin]) -> tuple[FitKey, ...]:
         found: list[FitKey] = []
         for key in keys:
             try:
@@ -117,7 +114,7 @@ class FitKeys:
 
     # --- other values ---------------------------------------------------------------------------------------
 
-    def overrides(self, values: Sequence[float]) -> list[str]:
+    def overrides(self, values: Sequence[float] | np.ndarray) -> list[str]:
         """``KEY=VALUE`` texts of values in the order of ``all``, every digit of the doubles written."""
         found = []
         turn = np.zeros(3)
@@ -142,13 +139,13 @@ class FitKeys:
         shown_values = ", ".join(repr(float(x)) for x in quaternion)
         return [*texts, f"initial.quaternion=[{shown_values}]"]
 
-    def experiment(self, values: Sequence[float], base: Experiment) -> Experiment:
+    def experiment(self, values: Sequence[float] | np.ndarray, base: Experiment) -> Experiment:
         """An experiment at other values, without a text of its own: for runs that nobody keeps."""
         tables = copy.deepcopy(self._tables)
         apply_overrides(tables, self.overrides(values), "fit")
         return replace(base, config=validated(tables, base.source))
 
-    def fitted(self, values: Sequence[float]) -> Experiment:
+    def fitted(self, values: Sequence[float] | np.ndarray) -> Experiment:
         """The config with estimated values written in, and without ``[fit]``."""
         everything = [*values, *(one.start for one in self.considered)]
         return self._experiment.having(["fit=", *self.overrides(everything)])
@@ -157,15 +154,17 @@ class FitKeys:
 def written_key(place: Sequence[str | int]) -> str:
     """A key of such steps, as it is given to replace a value."""
     parts = [f"[{step}]" if isinstance(step, int) else f'."{step}"' for step in place]
-    return "".join(parts)[1:].replace('"', "") if all("." not in str(x) for x in place) else "".join(parts)[1:]
+    return (
+        "".join(parts)[1:].replace('"', "") if all("." not in str(x) for x in place) else "".join(parts)[1:]
+    )
 
 
-def _sigma(
-    sigmas: Mapping[str, KnownWithin], varied: VariedKey, key: str, index: int
-) -> float | None:
+def _sigma(sigmas: Mapping[str, KnownWithin], varied: VariedKey, key: str, index: int) -> float | None:
     """What is known beforehand of a number, by its own key or by that of its vector, SI."""
     plain = {name.replace(" ", ""): table for name, table in sigmas.items()}
-    table = plain.get(varied.name) or plain.get(key.replace(" ", "")) or plain.get(varied.name.rpartition("[")[0])
+    table = (
+        plain.get(varied.name) or plain.get(key.replace(" ", "")) or plain.get(varied.name.rpartition("[")[0])
+    )
     if table is None:
         return None
     given = table.sigma

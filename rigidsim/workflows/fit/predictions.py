@@ -13,6 +13,8 @@ from rigidsim.errors import ConfigError, RigidsimError
 from rigidsim.scene.choices import DEFAULT_METHOD
 from rigidsim.scene.config import Experiment
 from rigidsim.scene.exact import ExactNumber
+from rigidsim.scene.sample_times import Time
+from rigidsim.scene.schema import Config
 from rigidsim.workflows.compare.rotations import conjugated, multiplied, vector_of
 from rigidsim.workflows.fit.keys import FitKeys
 from rigidsim.workflows.fit.observed import Quantity
@@ -20,8 +22,8 @@ from rigidsim.workflows.run import run
 from rigidsim.workflows.sensitivity import Tangents
 
 CHANGE = 1e-4
-"""Change of what is observed (of attitudes in rad, of others relative to their size) that the steps of central
-differences make: those of third order are a share of 1e-8 of it, rounding of double runs 1e-8 at most.
+"""Change of what is observed (of attitudes in rad, of others relative to their size) that the steps of
+central differences make: what is cut off and the rounding of double runs are a share of 1e-8 of it each.
 """
 _ROUNDING = 1e-12  # of runs in double precision, relative to the size of what is observed
 _FIRST = 1e-4  # first steps, relative to the size of each number
@@ -80,7 +82,7 @@ class ByDifferences:
             found = self._differences(values, times, centre)
         return found
 
-    def values(self, values: Sequence[float], times: np.ndarray) -> dict[str, np.ndarray]:
+    def values(self, values: Sequence[float] | np.ndarray, times: np.ndarray) -> dict[str, np.ndarray]:
         """Predictions alone."""
         listed = [ExactNumber(Fraction(time)) for time in times.tolist()]
         try:
@@ -189,7 +191,7 @@ def difference(quantity: Quantity, one: np.ndarray, other: np.ndarray) -> np.nda
     return np.asarray(np.remainder(apart + np.pi, 2 * np.pi) - np.pi) if quantity.form == "angle" else apart
 
 
-def _quiet_like(changed: Experiment, quiet: Experiment, time: object) -> object:
+def _quiet_like(changed: Experiment, quiet: Experiment, time: Time) -> Config:
     """The config of changed values with what is recorded of another."""
     kept = {name: getattr(quiet.config, name) for name in ("output", "events", "fit")}
     return changed.config.model_copy(update={**kept, "time": time})

@@ -54,9 +54,7 @@ class Readings:
         return f"{self.quantity.text} (data {self.number})"
 
 
-def read_readings(
-    number: int, table: FitDataTable, quantity: Quantity, scene: Scene, path: Path
-) -> Readings:
+def read_readings(number: int, table: FitDataTable, quantity: Quantity, scene: Scene, path: Path) -> Readings:
     """Read the file of a table of ``[[fit.data]]``, which is at a path.
 
     Raises:
@@ -70,7 +68,13 @@ class _Reading:
     """One table with its file."""
 
     def __init__(
-        self, number: int, table: FitDataTable, quantity: Quantity, scene: Scene, found: Observations, path: Path
+        self,
+        number: int,
+        table: FitDataTable,
+        quantity: Quantity,
+        scene: Scene,
+        found: Observations,
+        path: Path,
     ) -> None:
         self.number, self.table, self.quantity, self.scene = number, table, quantity, scene
         self.found, self.path = found, path
@@ -136,8 +140,8 @@ class _Reading:
             bad = np.flatnonzero(np.abs(norms - 1) > _NORM)
             if len(bad):
                 raise RigidsimError(
-                    f"{self.found.source}: {self.found.rows[bad[0]]}: a quaternion of norm {norms[bad[0]]:.6g}; "
-                    "norms within 0.01 of 1 are allowed: mend or remove these rows"
+                    f"{self.found.source}: {self.found.rows[bad[0]]}: a quaternion of norm "
+                    f"{norms[bad[0]]:.6g}; norms within 0.01 of 1 are allowed: mend or remove these rows"
                 )
             return normalised(values)
         if self.quantity.form == "euler_angles":
@@ -180,8 +184,8 @@ class _Reading:
         inside = (times >= begin) & (times <= end)
         if not inside.any():
             raise RigidsimError(
-                f"{self.found.source}: no row lies within the run ({begin:.6g} to {end:.6g} s): its rows are at "
-                f"{times.min():.6g} to {times.max():.6g} s; change [time], or check epoch and scale"
+                f"{self.found.source}: no row lies within the run ({begin:.6g} to {end:.6g} s): its rows "
+                f"are at {times.min():.6g} to {times.max():.6g} s; change [time], or check epoch and scale"
             )
         if not inside.all():
             first = int(np.flatnonzero(~inside)[0])
@@ -193,12 +197,12 @@ class _Reading:
 
     def _refuse_repeated(self, times: np.ndarray, values: np.ndarray, rows: Sequence[str]) -> None:
         again = np.flatnonzero(np.diff(times) == 0)
-        same = [n for n in again if (values[n] == values[n + 1]).all()]
+        same = [int(n) for n in again if (values[n] == values[n + 1]).all()]
         if same:
             one, other = rows[same[0]], rows[same[0] + 1]
             raise RigidsimError(
-                f"{self.found.source}: {other} repeats {one}, with the same time and values ({len(same)} such "
-                "rows); it would count twice: remove it"
+                f"{self.found.source}: {other} repeats {one}, with the same time and values ({len(same)} "
+                "such rows); it would count twice: remove it"
             )
         if len(again):
             self.told.append(

@@ -168,7 +168,8 @@ class FitResult(SummaryPart):
 
     def _repr_html_(self) -> str:
         rows = "".join(
-            f"<tr><th>{escape(one.key)}</th><td>{escape(value_text(one))}</td></tr>" for one in self.parameters
+            f"<tr><th>{escape(one.key)}</th><td>{escape(value_text(one))}</td></tr>"
+            for one in self.parameters
         )
         unknown = "".join(f"<p>undetermined: {escape(one.text)}</p>" for one in self.undetermined)
         return f"<b>{escape(self.name)}</b>: {escape(self.sentence)}<table>{rows}</table>{unknown}"

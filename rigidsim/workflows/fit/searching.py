@@ -55,8 +55,8 @@ def search(weighing: Weighing, starts: int, told: Callable[[str], None]) -> Sear
     for readings, used in zip(weighing.readings, weighing.used, strict=True):
         if used.sum() < 0.5 * len(used):
             notes.append(
-                f"{readings.label}: more than half of its rows were left out as outliers; its sigmas may be too "
-                "small, or the fit ended far from the truth: try more starts"
+                f"{readings.label}: more than half of its rows were left out as outliers; its sigmas may be "
+                "too small, or the fit ended far from the truth: try more starts"
             )
     return Search(ended, compared, costs, rounds, notes)
 
