@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -61,7 +62,7 @@ class Solution:
         norms = np.linalg.norm(matrix, axis=0)
         empty = norms <= 10 * linear.noise
         self.scales = np.where(empty, 1.0, norms)
-        triangle: np.ndarray = np.linalg.qr(
+        triangle: Any = np.linalg.qr(
             np.concatenate([np.where(empty, 0.0, matrix / self.scales), right[:, None]], axis=1), mode="r"
         )
         count = matrix.shape[1]

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import xarray
 
+from rigidsim.workflows.compare.rotations import turned
 from rigidsim.workflows.fit.estimation import consider_covariance
 from rigidsim.workflows.fit.keys import FitKey, FitKeys
 from rigidsim.workflows.fit.predictions import Predicted
@@ -25,8 +26,6 @@ from rigidsim.workflows.fit.weighing import Weighing
 
 _PART = 1e-3  # of a direction of norm one, below which a number takes no part in it
 _SHOWN = 3e-2  # the same, below which it isn't named
-ALONG = ("quaternion", "angular_velocity", "position", "figure_axis")
-"""Variables whose uncertainty along time is predicted, where a scene has them."""
 
 
 @dataclass
@@ -79,7 +78,7 @@ class Findings:
 
     # --- typed ----------------------------------------------------------------------------------------------
 
-    def result(self, along: Predicted | None, times: np.ndarray) -> FitResult:
+    def result(self, along: Predicted, times: np.ndarray) -> FitResult:
         """The result, with its dataset."""
         ended = self.search.ended
         sigmas, scaled = self.sigmas(), self.scaled()
@@ -141,7 +140,7 @@ class Findings:
         sizes = self.weighing.sizes(self.search.compared)
         return [
             Outlier(
-                data=readings.number, observable=readings.quantity.text, row=readings.rows[n],
+                data=readings.number, observable=readings.quantity.text, row=readings.rows[int(n)],
                 time=float(readings.times[n]), sigmas=float(size[n]),
             )
             for used, readings, size in zip(*self._sets, sizes, strict=True)
@@ -166,7 +165,7 @@ class Findings:
 
     # --- dataset --------------------------------------------------------------------------------------------
 
-    def _dataset(self, made: FitResult, along: Predicted | None, times: np.ndarray) -> xarray.Dataset:
+    def _dataset(self, made: FitResult, along: Predicted, times: np.ndarray) -> xarray.Dataset:
         names = [one.key for one in self.keys.estimated]
         count, starts = len(names), [one.start for one in self.keys.estimated]
         values = {
@@ -204,8 +203,7 @@ class Findings:
         }
         dataset = xarray.Dataset(values, coordinates, attributes)
         self._put_residuals(dataset)
-        if along is not None:
-            self._put_along(dataset, along, times)
+        self._put_along(dataset, along, times)
         return dataset
 
     def _put_residuals(self, dataset: xarray.Dataset) -> None:
@@ -243,6 +241,8 @@ class Findings:
             values = along.values["quaternion"]
             dataset.coords["quaternion_component"] = ["w", "x", "y", "z"]
             dataset["quaternion"] = (("time", "quaternion_component"), values, {"units": "1"})
+            pole = turned(values, np.array([[float(x) for x in self.keys.scene.figure.pole]]))
+            dataset["figure_axis"] = (("time", "space_axis"), pole, {"units": "1"})
         for name, dim, unit, labels in (
             ("angular_velocity", "body_axis", "rad s-1", ["x", "y", "z"]),
             ("position", "space_axis", "m", ["X", "Y", "Z"]),
@@ -252,8 +252,6 @@ class Findings:
                 dataset[name] = (("time", dim), along.values[name], {"units": unit})
                 words = {"units": unit, "long_name": "predicted standard deviation"}
                 dataset[f"{name}_sigma"] = (("time", dim), _roots(self._spread(along.slopes[name])), words)
-        if "figure_axis" in along.values:
-            dataset["figure_axis"] = (("time", "space_axis"), along.values["figure_axis"], {"units": "1"})
 
     def _spread(self, slopes: np.ndarray) -> np.ndarray:
         """Covariances (times, components, components) by slopes (times, components, numbers)."""

@@ -11,14 +11,12 @@ import numpy as np
 
 from rigidsim.errors import ConfigError, Problem, RigidsimError, RunFolderError
 from rigidsim.scene.config import Experiment
-from rigidsim.scene.registry import OBSERVABLES
-from rigidsim.solve.problem import prepare
 from rigidsim.store import atomic
 from rigidsim.workflows.compare.saving import save_dataset
-from rigidsim.workflows.fit.findings import ALONG, Findings
+from rigidsim.workflows.fit.findings import Findings
 from rigidsim.workflows.fit.folder import FitFolder, Remembered
 from rigidsim.workflows.fit.keys import FitKeys
-from rigidsim.workflows.fit.observed import Quantity, observing, recording
+from rigidsim.workflows.fit.observed import Quantity, observing
 from rigidsim.workflows.fit.predictions import ByDifferences, ByTangents, NotPredicted, Predicted, Predictor
 from rigidsim.workflows.fit.readings import Readings, read_readings
 from rigidsim.workflows.fit.result import FitResult
@@ -146,7 +144,7 @@ def _fitted(experiment: Experiment, places: list[Path], memory: Path | None, tol
         found = search(weighing, experiment.config.fit.starts, told)
         notes = list(dict.fromkeys(text for one in readings for text in one.told))
         findings = Findings(experiment.config.name, keys, weighing, found, predictor.how, notes)
-        along, times = _along(keys, experiment, found.ended.values)
+        along, times = _along(keys, predictor, found.ended.values)
         return findings.result(along, times)
 
 
@@ -170,30 +168,14 @@ def _refuse_few(keys: FitKeys, readings: list[Readings]) -> None:
         )
 
 
-def _along(keys: FitKeys, experiment: Experiment, values: np.ndarray) -> tuple[Predicted | None, np.ndarray]:
-    """Predictions along the run, for the uncertainty there; None where a scene has no attitude."""
-    scene = keys.scene
-    times = np.linspace(float(scene.start), float(scene.samples.last), _ALONG_ROWS)
-    names = []
-    for name in ALONG:
-        try:
-            prepare(recording(experiment, [name]))
-        except ConfigError:
-            continue
-        names.append(name)
-    if "quaternion" not in names:
-        return None, times
-    quantities = [
-        Quantity(name, name, "quaternion" if name == "quaternion" else "plain", (), None)
-        for name in names
-        if name in OBSERVABLES
-    ]
-    predictor = _predictor(keys, recording(experiment, names), quantities)
+def _along(keys: FitKeys, predictor: Predictor, values: np.ndarray) -> tuple[Predicted, np.ndarray]:
+    """Predictions along the run, for the uncertainty there."""
+    times = np.linspace(float(keys.scene.start), float(keys.scene.samples.last), _ALONG_ROWS)
     fixed = [one.start for one in keys.considered]
     try:
-        return predictor.at([*values, *fixed], times), times
+        return predictor.along([*values, *fixed], times), times
     except NotPredicted:
-        return None, times
+        return Predicted({}), times
 
 
 def _silent(_: str) -> None:

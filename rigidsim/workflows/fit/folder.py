@@ -149,6 +149,10 @@ class Remembered:
         atomic.write_bytes(path, buffer.getvalue())
         return found
 
+    def along(self, values: Sequence[float], times: np.ndarray) -> Predicted:
+        """See ``Predictor.along``; it is computed once, and not kept."""
+        return self._predictor.along(values, times)
+
 
 def _read(path: Path) -> Predicted:
     found = Predicted({})

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -15,9 +15,10 @@ from rigidsim.scene.config import Experiment
 from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.sample_times import Time
 from rigidsim.scene.schema import Config
+from rigidsim.solve.problem import prepare
 from rigidsim.workflows.compare.rotations import conjugated, multiplied, vector_of
 from rigidsim.workflows.fit.keys import FitKeys
-from rigidsim.workflows.fit.observed import Quantity
+from rigidsim.workflows.fit.observed import Quantity, recording
 from rigidsim.workflows.run import run
 from rigidsim.workflows.sensitivity import Tangents
 
@@ -25,6 +26,8 @@ CHANGE = 1e-4
 """Change of what is observed (of attitudes in rad, of others relative to their size) that the steps of
 central differences make: what is cut off and the rounding of double runs are a share of 1e-8 of it each.
 """
+ALONG = ("quaternion", "angular_velocity", "position")
+"""What is predicted along the whole run."""
 _ROUNDING = 1e-12  # of runs in double precision, relative to the size of what is observed
 _FIRST = 1e-4  # first steps, relative to the size of each number
 
@@ -61,6 +64,9 @@ class Predictor(Protocol):
             NotPredicted: the motion doesn't get there.
         """
 
+    def along(self, values: Sequence[float], times: np.ndarray) -> Predicted:
+        """The same of attitude, angular velocity and position, as far as the scene has them."""
+
 
 class ByDifferences:
     """Runs of the experiment, and central differences between them."""
@@ -81,6 +87,21 @@ class ByDifferences:
             self._adapt(found)
             found = self._differences(values, times, centre)
         return found
+
+    def along(self, values: Sequence[float], times: np.ndarray) -> Predicted:
+        """See ``Predictor.along``."""
+        names = []
+        for name in ALONG:
+            try:
+                prepare(recording(self._quiet, [name]))
+            except ConfigError:
+                continue
+            names.append(name)
+        if not names:
+            return Predicted({})
+        forms = {"quaternion": "quaternion"}
+        found = [Quantity(name, name, forms.get(name, "plain"), (), None) for name in names]
+        return ByDifferences(self._keys, recording(self._quiet, names), found).at(values, times)
 
     def values(self, values: Sequence[float] | np.ndarray, times: np.ndarray) -> dict[str, np.ndarray]:
         """Predictions alone."""
@@ -158,23 +179,32 @@ class ByTangents:
 
     def at(self, values: Sequence[float], times: np.ndarray) -> Predicted:
         """See ``Predictor.at``."""
+        every = self._every(values, times)
+        return self._made({name: every[name] for name in self._names})
+
+    def along(self, values: Sequence[float], times: np.ndarray) -> Predicted:
+        """See ``Predictor.along``."""
+        every = self._every(values, times)
+        return self._made({name: every[name] for name in ALONG if every[name][0] is not None})
+
+    def _every(self, values: Sequence[float], times: np.ndarray) -> dict[str, tuple[Any, Any]]:
+        """Values and derivatives of all that there is."""
         given = {key: float(value) for key, value in zip(self._keys, values, strict=True)}
         try:
             found = self._tangents.at(given, times)
         except ConfigError as error:
             raise NotPredicted("; ".join(problem.what for problem in error.problems)) from None
-        every = {
+        return {
             "quaternion": (found.attitude, found.d_attitude),
             "angular_velocity": (found.angular_velocity, found.d_angular_velocity),
             "position": (found.position, found.d_position),
             "velocity": (found.velocity, found.d_velocity),
             **found.extra,
         }
+
+    def _made(self, every: Mapping[str, tuple[Any, Any]]) -> Predicted:
         made = Predicted({})
-        for name in self._names:
-            value, slopes = every[name]
-            assert value is not None
-            assert slopes is not None
+        for name, (value, slopes) in every.items():
             if not (np.isfinite(value).all() and np.isfinite(slopes).all()):
                 raise NotPredicted(f"{name} has no finite value at each observation")
             made.values[name], made.slopes[name] = value, np.ascontiguousarray(slopes.transpose(0, 2, 1))
