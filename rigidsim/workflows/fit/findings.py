@@ -25,7 +25,6 @@ from rigidsim.workflows.fit.searching import Search
 from rigidsim.workflows.fit.weighing import Weighing
 
 _PART = 1e-3  # of a direction of norm one, below which a number takes no part in it
-_SHOWN = 3e-2  # the same, below which it isn't named
 
 
 @dataclass
@@ -124,7 +123,8 @@ class Findings:
         found = []
         sizes = np.array([one.size for one in self.keys.estimated])
         for direction in _simplest(self.null / sizes):
-            part = np.abs(direction) > _SHOWN * np.abs(direction).max()
+            scaled = np.abs(direction * sizes * self._solution.scales)
+            part = scaled > _PART * scaled.max()
             keys = [one for one, p in zip(self.keys.estimated, part, strict=True) if p]
             amounts = (direction * sizes)[part]
             found.append(
