@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from rigidsim.cli.screens.page import Page, Styled
+from rigidsim.scene.readable import span_text
 from rigidsim.workflows.fit.result import FitResult, FittedData, digits_text
 from rigidsim.workflows.fit.verifying import FitVerdict
 
@@ -33,7 +34,7 @@ def print_fit(found: FitResult) -> None:
         on.line("consider", f"{effect.key} = {effect.value:.6g} +- {effect.sigma:.2g}, not estimated")
     on.table(["data", "observable", "used", "rms", "in sigmas"], [_of_data(one) for one in found.data])
     for outlier in found.outliers[:_MOST_OUTLIERS]:
-        place = f"data {outlier.data}, {outlier.row}, at {outlier.time:.9g} s"
+        place = f"data {outlier.data}, {outlier.row}, at {span_text(outlier.time)}"
         on.line("left out", f"{place}: {outlier.observable}, {outlier.sigmas:.3g} sigmas")
     if len(found.outliers) > _MOST_OUTLIERS:
         on.line("", f"and {len(found.outliers) - _MOST_OUTLIERS} more")

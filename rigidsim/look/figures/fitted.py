@@ -33,7 +33,7 @@ def fitted_figure(dataset: xarray.Dataset) -> Figure:
         bands = [name for name in ("attitude", "angular_velocity") if f"{name}_sigma" in dataset]
         rows = len(sets) + len(bands)
         figure = ShownFigure(figsize=(12.5, max(6.0, 2.1 * rows + 0.8)), layout="constrained")
-        left, right = np.ravel(figure.subfigures(1, 2, width_ratios=[1.45, 1], squeeze=False))
+        left, right = np.ravel(figure.subfigures(1, 2, width_ratios=[1.3, 1], squeeze=False))
         unit, length = _time_unit(dataset)
         panels = left.subplots(rows, 1, sharex=True, squeeze=False)[:, 0]
         for axes, number in zip(panels, sets, strict=False):
@@ -197,14 +197,18 @@ def _pole(axes: Axes, dataset: xarray.Dataset, unit: str, length: float) -> None
                 )
             )
         reach = max(reach, _WITHIN_95 * wide)
+    if not reach:
+        axes.set_axis_off()
+        axes.set_title("pole: none of the parameters moves it")
+        return
     axes.axhline(0, color=PALE, linewidth=0.8)
     axes.axvline(0, color=PALE, linewidth=0.8)
-    axes.set_xlim(-1.15 * reach, 1.15 * reach)
-    axes.set_ylim(-1.15 * reach, 1.15 * reach)
+    axes.set_xlim(-1.3 * reach, 1.3 * reach)
+    axes.set_ylim(-1.3 * reach, 1.3 * reach)
     axes.set_aspect("equal")
     axes.set_xlabel(f"east of the predicted pole, {name}")
     axes.set_ylabel(f"north, {name}")
-    axes.set_title("pole (figure axis): 1 sigma filled, 95 % outlined")
+    axes.set_title("pole: 1 sigma filled, 95 % outlined")
     axes.legend(loc="upper right")
 
 

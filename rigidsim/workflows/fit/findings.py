@@ -131,7 +131,7 @@ class Findings:
                 Undetermined(
                     keys=[one.key for one in keys],
                     amounts=[float(x) for x in amounts],
-                    text=_direction_text(keys, direction[part], amounts),
+                    text=_direction_text(keys, self.search.ended.values[part], amounts),
                 )
             )
         return found
@@ -296,12 +296,10 @@ def _simplest(directions: np.ndarray) -> np.ndarray:
     return rows / np.abs(rows).max(axis=1, keepdims=True) if len(rows) else rows
 
 
-def _direction_text(keys: Sequence[FitKey], parts: np.ndarray, amounts: np.ndarray) -> str:
+def _direction_text(keys: Sequence[FitKey], values: np.ndarray, amounts: np.ndarray) -> str:
     if len(keys) == 1:
         return f"{keys[0].key}: no row depends on it"
-    relative = [
-        amount / one.start if one.start else np.nan for one, amount in zip(keys, amounts, strict=True)
-    ]
+    relative = np.divide(amounts, values, out=np.full(len(keys), np.nan), where=values != 0)
     names = " and ".join([", ".join(one.key for one in keys[:-1]), keys[-1].key])
     if np.isfinite(relative).all() and np.ptp(relative) < 1e-3 * np.abs(relative).max():
         return f"{names}: only their ratios show"
