@@ -24,7 +24,6 @@ from rigidsim.solve.compiled import TaylorEngine, compiled_engine, compiled_func
 from rigidsim.solve.precision import Precision, Scalar
 from rigidsim.solve.stepper import longest_step
 
-_MOST_UNROLLED = 40  # equations; more are compiled in compact mode
 _LARGE, _SMALL = 1, -2  # binary exponents between which a tangent's largest component is left as it is
 _LOOK = 64  # steps between two looks at whether to go on
 _SINGLE_STEPS_LOST = 1000  # steps without progress in time, before the motion is given up
@@ -67,8 +66,7 @@ class Variational:
         self._set = set() if self._pieces is None else set(self._all_set_states())
         equations, self._output, self.moving = self._equations()
         self._places = {name: place for place, name in enumerate(names)}
-        self._wide = precision.compact or self.system.wide or len(equations) > _MOST_UNROLLED
-        options = dict(precision.options, compact_mode=self._wide)
+        options = dict(precision.options, compact_mode=True)
         self._engine: TaylorEngine = compiled_engine(equations, precision.zeros((len(equations),)), **options)
         self._longest = precision.of_double(longest_step(self._engine.order, precision.scalar))
         self._first: Place | None = None
@@ -309,7 +307,7 @@ class Variational:
         number, scalar = self.precision.number, self.precision.scalar
         states = np.array([state for state, _ in samples], dtype=scalar)
         parameters = np.array([one for _, one in samples], dtype=scalar).T
-        options = dict(self.precision.options, compact_mode=self._wide)
+        options = dict(self.precision.options, compact_mode=True)
         function = compiled_function(self._output, self._variables, **options)
         given = np.ascontiguousarray(parameters[: function.nparams]) if function.nparams else None
         found = evaluate_rows(function, states, given, times).T

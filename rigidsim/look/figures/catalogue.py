@@ -12,7 +12,16 @@ from matplotlib.figure import Figure
 
 from rigidsim.look import signals
 from rigidsim.look.figure_names import FIGURES, OVERVIEW, SPECTRUM
-from rigidsim.look.figures import changing, gyrostat, librations, poles, polhode, published, timelines
+from rigidsim.look.figures import (
+    changing,
+    gyrostat,
+    librations,
+    poles,
+    polhode,
+    published,
+    sensitivity,
+    timelines,
+)
 from rigidsim.look.figures.composing import compose, shown_rows
 from rigidsim.look.figures.drift import drift
 from rigidsim.look.figures.panel import Panel
@@ -83,6 +92,10 @@ KINDS: dict[str, Kind] = {
     ),
     "attitude": Kind(_ATTITUDE, [timelines.attitude, timelines.wobble]),
     "states": Kind("states of one's own ([[states]]) recorded", changing.OWN_STATES),
+    "sensitivity": Kind(
+        "sensitivities ([output] sensitivity)",
+        [sensitivity.attitude, sensitivity.rates, sensitivity.position],
+    ),
     "drift": Kind("invariants", [drift]),
 }
 
