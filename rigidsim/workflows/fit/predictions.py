@@ -15,8 +15,11 @@ from rigidsim.scene.config import Experiment
 from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.sample_times import Time
 from rigidsim.scene.schema import Config
+from rigidsim.solve.differentiable import parametrised, refuse_without_derivatives
 from rigidsim.solve.problem import prepare
-from rigidsim.workflows.compare.rotations import conjugated, multiplied, vector_of
+from rigidsim.solve.tangent_lanes import TangentLanes, fits_lanes
+from rigidsim.solve.variational import LostTangents, turned
+from rigidsim.workflows.compare.rotations import conjugated, multiplied, normalised, vector_of
 from rigidsim.workflows.fit.keys import FitKeys
 from rigidsim.workflows.fit.observed import Quantity, recording
 from rigidsim.workflows.run import run
@@ -164,52 +167,86 @@ class ByDifferences:
 
 
 class ByTangents:
-    """Variational equations beside the motion, compiled once for all values."""
+    """Variational equations beside the motion, compiled once for all values: side by side where a motion
+    allows it, otherwise one step after the other.
+    """
 
     how = "variational equations"
 
     def __init__(self, keys: FitKeys, quiet: Experiment, quantities: Sequence[Quantity]) -> None:
-        names = [one.variable for one in quantities]
-        self._names = list(dict.fromkeys(names))
+        self._names = list(dict.fromkeys(one.variable for one in quantities))
         self._keys = [one.key for one in keys.all]
         self._sizes = np.array([one.size for one in keys.all])
         integrator = quiet.config.integrator.model_copy(update={"method": DEFAULT_METHOD})
         stepping = replace(quiet, config=quiet.config.model_copy(update={"integrator": integrator}))
-        self._tangents = Tangents(stepping, self._keys, record=self._names)
+        prepared = prepare(stepping)
+        refuse_without_derivatives(
+            prepared.scene, prepared.system, has_steps=prepared.has_steps, where="[fit] parameters"
+        )
+        made = parametrised(stepping, self._keys, (), "[fit] parameters", self._names)
+        self._source: TangentLanes | Tangents
+        if fits_lanes(made, prepared.precision):
+            self._source, self._made = TangentLanes(made), made
+        else:
+            self._source = Tangents(stepping, self._keys, record=self._names)
 
-    def at(self, values: Sequence[float], times: np.ndarray) -> Predicted:
+    def at(self, values: Sequence[float], times: np.ndarray, *, slopes: bool = True) -> Predicted:
         """See ``Predictor.at``."""
-        every = self._every(values, times)
-        return self._made({name: every[name] for name in self._names})
+        every = self._every(values, times, slopes)
+        return self._predicted({name: every[name] for name in self._names})
 
     def along(self, values: Sequence[float], times: np.ndarray) -> Predicted:
         """See ``Predictor.along``."""
-        every = self._every(values, times)
-        return self._made({name: every[name] for name in ALONG if every[name][0] is not None})
+        every = self._every(values, times, True)
+        return self._predicted({name: every[name] for name in ALONG if name in every})
 
-    def _every(self, values: Sequence[float], times: np.ndarray) -> dict[str, tuple[Any, Any]]:
-        """Values and derivatives of all that there is."""
-        given = {key: float(value) for key, value in zip(self._keys, values, strict=True)}
+    def _every(self, values: Sequence[float], times: np.ndarray, slopes: bool) -> dict[str, tuple[Any, Any]]:
+        """Values and derivatives, (n, keys, components), of all that there is; without derivatives, None."""
         try:
-            found = self._tangents.at(given, times)
+            if isinstance(self._source, TangentLanes):
+                return self._by_lanes(values, times, slopes)
+            given = {key: float(value) for key, value in zip(self._keys, values, strict=True)}
+            found = self._source.at(given, times)
+        except LostTangents as error:
+            raise NotPredicted(f"{error}") from None
         except ConfigError as error:
             raise NotPredicted("; ".join(problem.what for problem in error.problems)) from None
-        return {
+        every = {
             "quaternion": (found.attitude, found.d_attitude),
             "angular_velocity": (found.angular_velocity, found.d_angular_velocity),
             "position": (found.position, found.d_position),
             "velocity": (found.velocity, found.d_velocity),
             **found.extra,
         }
+        return {name: parts for name, parts in every.items() if parts[0] is not None}
 
-    def _made(self, every: Mapping[str, tuple[Any, Any]]) -> Predicted:
+    def _by_lanes(
+        self, values: Sequence[float], times: np.ndarray, slopes: bool
+    ) -> dict[str, tuple[np.ndarray, np.ndarray | None]]:
+        wanted = [Fraction(float(value)) for value in values]
+        coefficients = self._made.at(wanted)
+        if coefficients is None:  # the equations have another form here
+            self._made = self._made.made_at(wanted)
+            self._source = TangentLanes(self._made)
+        else:
+            assert isinstance(self._source, TangentLanes)
+            self._source.use(coefficients)
+        rows = self._source.rows(np.ldexp(times, -self._made.plain.scaling.time), slopes=slopes)
+        found = {name: (value, rows.slopes.get(name)) for name, value in rows.values.items()}
+        quaternion = found["quaternion"][0]
+        turning = turned(quaternion, rows.slopes["quaternion"]) if slopes else None
+        return {**found, "quaternion": (normalised(quaternion), turning)}
+
+    def _predicted(self, every: Mapping[str, tuple[Any, Any]]) -> Predicted:
         made = Predicted({})
         for name, (value, slopes) in every.items():
-            if not (np.isfinite(value).all() and np.isfinite(slopes).all()):
+            if not (np.isfinite(value).all() and (slopes is None or np.isfinite(slopes).all())):
                 raise NotPredicted(f"{name} has no finite value at each observation")
-            made.values[name], made.slopes[name] = value, np.ascontiguousarray(slopes.transpose(0, 2, 1))
-            size = 1.0 if name == "quaternion" else float(np.abs(value).max()) or 1.0
-            made.noise[name] = _ROUNDING * size / self._sizes
+            made.values[name] = value
+            if slopes is not None:
+                made.slopes[name] = np.ascontiguousarray(slopes.transpose(0, 2, 1))
+                size = 1.0 if name == "quaternion" else float(np.abs(value).max()) or 1.0
+                made.noise[name] = _ROUNDING * size / self._sizes
         return made
 
 
