@@ -82,9 +82,9 @@ def test_a_uniform_spin_is_a_straight_line_with_the_covariance_of_one(here: Path
     covariance = SIGMA**2 * expected
     assert found.converged
     assert not found.undetermined
-    # steps end below 1e-4 sigmas; derivatives of this linear problem are right to rounding
+    # steps end below 1e-3 sigmas; derivatives of this linear problem are right to rounding
     apart = np.array([one.value for one in found.parameters]) - values
-    assert np.sqrt(apart @ np.linalg.solve(covariance, apart)) < 1e-4
+    assert np.sqrt(apart @ np.linalg.solve(covariance, apart)) < 1e-3
     np.testing.assert_allclose(found.dataset["covariance"].values, covariance, rtol=1e-9)
     correlation = covariance[0, 1] / np.sqrt(covariance[0, 0] * covariance[1, 1])
     assert found.correlations[0][1] == pytest.approx(correlation, rel=1e-9)
@@ -183,9 +183,9 @@ def test_differences_of_runs_give_the_same_fit_as_variational_equations(
     assert other.derivatives.startswith("central differences")
     for first, second in zip(one.parameters, other.parameters, strict=True):
         assert first.sigma is not None
-        # differences err by 1e-8 of the derivatives, and steps end below 1e-4 sigmas
+        # differences err by 1e-8 of the derivatives, and steps end below 1e-3 sigmas
         assert second.sigma == pytest.approx(first.sigma, rel=1e-6)
-        assert abs(first.value - second.value) < 1e-3 * first.sigma
+        assert abs(first.value - second.value) < 2e-3 * first.sigma
         assert abs(first.value - {"i": 1.0, "b": 2.0}[first.key[0]]) < 4 * first.sigma
 
 

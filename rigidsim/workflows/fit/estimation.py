@@ -8,7 +8,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from functools import cached_property
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -16,12 +17,14 @@ SINGULAR = 1e-7
 """Singular values of scaled columns below this share of the largest are taken for zero: correlations that
 differ from one by less than its square are rounding in the derivatives.
 """
-WITHIN = 1e-4
+WITHIN = 1e-3
 """A fit has converged once its next step is shorter than so many sigmas."""
 MOST_ITERATIONS = 60
 _FIRST_DAMPING, _AFTER_FAILURE = 1e-6, 1e-3
 _LARGEST_DAMPING = 1e12
 _LEAST_DAMPING = 1e-12
+_SHORTER = 0.1  # of a step: the next one may have the same derivatives
+_ROUNDED = 1e-11  # relative change of a sum of squares that rounding makes
 
 
 @dataclass(frozen=True)
@@ -41,7 +44,7 @@ class Linear:
     pull: np.ndarray
     weights: np.ndarray
 
-    @property
+    @cached_property
     def cost(self) -> float:
         """Sum of squares, with the priors'."""
         return float(self.residuals @ self.residuals + np.sum((self.weights * self.pull) ** 2))
@@ -128,48 +131,79 @@ class Ended:
     iterations: int
 
 
+class Linearised(Protocol):
+    """The fit at some values, with derivatives there if they are to be ``fresh``, otherwise with the latest;
+    None where the motion can't be computed.
+    """
+
+    def __call__(self, values: np.ndarray, fresh: bool = True) -> Linear | None:
+        """See the class."""
+
+
 def iterate(
     begin: np.ndarray,
-    linearised: Callable[[np.ndarray], Linear | None],
+    linearised: Linearised,
     told: Callable[[int, float, float], None] = lambda iteration, cost, step: None,
     most: int = MOST_ITERATIONS,
 ) -> Ended | None:
     """Damped Gauss-Newton steps until they are shorter than ``WITHIN`` sigmas.
 
+    Derivatives cost several times as much as a motion: they are worked out anew where the next step hasn't
+    become much shorter, and at the end.
+
     Args:
         begin: (estimated,) first values.
-        linearised: the fit at some values; None where the motion can't be computed.
         told: receives number, cost and undamped step (sigmas) of each iteration.
 
     Returns:
         Where it ended; None if the motion can't be computed at the first values.
     """
-    values, linear = np.array(begin, dtype=float), linearised(begin)
+    values, linear, fresh = np.array(begin, dtype=float), linearised(begin), True
     if linear is None:
         return None
-    damping, iterations, growth = _FIRST_DAMPING, 1, 2.0
+    damping, iterations, growth, settled = _FIRST_DAMPING, 1, 2.0, False
     solution = Solution(linear)
     told(iterations, linear.cost, solution.step_sigmas)
-    while solution.step_sigmas > WITHIN and iterations < most and damping < _LARGEST_DAMPING:
-        step = solution.step(damping)
-        if (values + step == values).all():
+    while iterations < most and damping < _LARGEST_DAMPING:
+        settled = settled or solution.step_sigmas <= WITHIN
+        if settled and fresh:
             break
-        trial = linearised(values + step)
-        iterations += 1
-        foreseen = _foreseen(linear, step)
-        gained = -np.inf if trial is None else (linear.cost - trial.cost) / max(foreseen, 1e-300)
-        small = trial is not None and abs(linear.cost - trial.cost) <= 1e-11 * linear.cost
-        if trial is not None and (gained > 0 or small):
-            values, linear = values + step, trial
-            solution = Solution(linear)
-            damping = 0.0 if damping < _LEAST_DAMPING else damping * max(1e-2, 1 - (2 * gained - 1) ** 3)
-            growth = 2.0
-            told(iterations, linear.cost, solution.step_sigmas)
-            if small and foreseen <= 1e-11 * linear.cost:  # rounding is all that changes any more
-                return Ended(values, linear, solution, True, iterations)
+        if settled:
+            trial, step = linearised(values), np.zeros_like(values)
         else:
+            step = solution.step(damping)
+            trial = None if (values + step == values).all() else linearised(values + step, fresh=False)
+        iterations += 1
+        if settled or trial is None or trial.cost >= linear.cost:
+            if not fresh:  # perhaps it is the old derivatives
+                again = trial if settled else linearised(values)
+                assert again is not None  # the motion was computed there
+                linear, fresh, settled = again, True, False
+                solution = Solution(linear)
+                told(iterations, linear.cost, solution.step_sigmas)
+                continue
+            if trial is not None and trial.cost <= linear.cost * (1 + _ROUNDED):
+                settled = True  # rounding is all that changes any more
+                continue
             damping, growth = max(damping, _AFTER_FAILURE) * growth, 2 * growth
-    return Ended(values, linear, solution, solution.step_sigmas <= WITHIN, iterations)
+            continue
+        gained = (linear.cost - trial.cost) / max(_foreseen(linear, step), 1e-300)
+        before = solution.step_sigmas
+        values, linear, fresh = values + step, trial, False
+        damping = 0.0 if damping < _LEAST_DAMPING else damping * max(1e-2, 1 - (2 * gained - 1) ** 3)
+        growth = 2.0
+        solution = Solution(linear)
+        if _SHORTER * before < solution.step_sigmas:
+            again = linearised(values)
+            assert again is not None
+            linear, fresh = again, True
+            solution = Solution(linear)
+        told(iterations, linear.cost, solution.step_sigmas)
+    if not fresh:
+        again = linearised(values)
+        assert again is not None
+        linear, solution = again, Solution(again)
+    return Ended(values, linear, solution, settled or solution.step_sigmas <= WITHIN, iterations)
 
 
 def _foreseen(linear: Linear, step: np.ndarray) -> float:

@@ -17,7 +17,7 @@ from rigidsim.workflows.fit.findings import Findings
 from rigidsim.workflows.fit.folder import FitFolder, Remembered
 from rigidsim.workflows.fit.keys import FitKeys
 from rigidsim.workflows.fit.observed import Quantity, observing
-from rigidsim.workflows.fit.predictions import ByDifferences, ByTangents, NotPredicted, Predicted, Predictor
+from rigidsim.workflows.fit.predictions import ByDifferences, ByTangents, Predictor
 from rigidsim.workflows.fit.readings import Readings, read_readings
 from rigidsim.workflows.fit.result import FitResult
 from rigidsim.workflows.fit.searching import search
@@ -140,12 +140,13 @@ def _fitted(experiment: Experiment, places: list[Path], memory: Path | None, tol
             raise error.at(experiment.source) from None
         _refuse_few(keys, readings)
         predictor = _predictor(keys, quiet, quantities)
-        weighing = Weighing(keys, readings, predictor if memory is None else Remembered(predictor, memory))
+        times = np.linspace(float(keys.scene.start), float(keys.scene.samples.last), _ALONG_ROWS)
+        kept = predictor if memory is None else Remembered(predictor, memory)
+        weighing = Weighing(keys, readings, kept, times)
         found = search(weighing, experiment.config.fit.starts, told)
         notes = list(dict.fromkeys(text for one in readings for text in one.told))
         findings = Findings(experiment.config.name, keys, weighing, found, predictor.how, notes)
-        along, times = _along(keys, predictor, found.ended.values)
-        return findings.result(along, times)
+        return findings.result(weighing.along(found.ended.values), times)
 
 
 def _predictor(keys: FitKeys, quiet: Experiment, quantities: list[Quantity]) -> Predictor:
@@ -166,16 +167,6 @@ def _refuse_few(keys: FitKeys, readings: list[Readings]) -> None:
             f"fit: {numbers} numbers are observed, fewer than the {len(keys.estimated)} that are "
             "estimated; add data or priors, or estimate fewer"
         )
-
-
-def _along(keys: FitKeys, predictor: Predictor, values: np.ndarray) -> tuple[Predicted, np.ndarray]:
-    """Predictions along the run, for the uncertainty there."""
-    times = np.linspace(float(keys.scene.start), float(keys.scene.samples.last), _ALONG_ROWS)
-    fixed = [one.start for one in keys.considered]
-    try:
-        return predictor.along([*values, *fixed], times), times
-    except NotPredicted:
-        return Predicted({}), times
 
 
 def _silent(_: str) -> None:

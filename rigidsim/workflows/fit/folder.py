@@ -134,13 +134,13 @@ class Remembered:
         self._predictor, self._folder = predictor, folder
         self.how = predictor.how
 
-    def at(self, values: Sequence[float], times: np.ndarray) -> Predicted:
+    def at(self, values: Sequence[float], times: np.ndarray, *, slopes: bool = True) -> Predicted:
         """See ``Predictor.at``."""
-        said = np.asarray(values, dtype=float).tobytes() + times.tobytes()
+        said = np.asarray([*values, slopes], dtype=float).tobytes() + times.tobytes()
         path = self._folder / f"{hashlib.sha256(said).hexdigest()[:32]}.npz"
         if path.is_file():
             return _read(path)
-        found = self._predictor.at(values, times)
+        found = self._predictor.at(values, times, slopes=slopes)
         buffer = io.BytesIO()
         parts: dict[str, Any] = {}
         for kind in ("values", "slopes", "noise"):

@@ -60,8 +60,8 @@ class Predictor(Protocol):
 
     how: str
 
-    def at(self, values: Sequence[float], times: np.ndarray) -> Predicted:
-        """Predictions with derivatives, at ascending times (s).
+    def at(self, values: Sequence[float], times: np.ndarray, *, slopes: bool = True) -> Predicted:
+        """Predictions, with derivatives if these are asked for, at ascending times (s).
 
         Raises:
             NotPredicted: the motion doesn't get there.
@@ -82,9 +82,11 @@ class ByDifferences:
         self._steps = _FIRST * np.array([one.size for one in keys.all])
         self._adapted = False
 
-    def at(self, values: Sequence[float], times: np.ndarray) -> Predicted:
+    def at(self, values: Sequence[float], times: np.ndarray, *, slopes: bool = True) -> Predicted:
         """See ``Predictor.at``."""
         centre = self.values(values, times)
+        if not slopes:
+            return Predicted(centre)
         found = self._differences(values, times, centre)
         if not self._adapted:
             self._adapt(found)
@@ -187,18 +189,19 @@ class ByTangents:
         self._source: TangentLanes | Tangents
         if fits_lanes(made, prepared.precision):
             self._source, self._made = TangentLanes(made), made
+            self._at = list(made.values)
         else:
             self._source = Tangents(stepping, self._keys, record=self._names)
 
     def at(self, values: Sequence[float], times: np.ndarray, *, slopes: bool = True) -> Predicted:
         """See ``Predictor.at``."""
         every = self._every(values, times, slopes)
-        return self._predicted({name: every[name] for name in self._names})
+        names = dict.fromkeys([*self._names, *(name for name in ALONG if name in every)])
+        return self._predicted({name: every[name] for name in names})
 
     def along(self, values: Sequence[float], times: np.ndarray) -> Predicted:
         """See ``Predictor.along``."""
-        every = self._every(values, times, True)
-        return self._predicted({name: every[name] for name in ALONG if name in every})
+        return self.at(values, times)
 
     def _every(self, values: Sequence[float], times: np.ndarray, slopes: bool) -> dict[str, tuple[Any, Any]]:
         """Values and derivatives, (n, keys, components), of all that there is; without derivatives, None."""
@@ -224,6 +227,9 @@ class ByTangents:
         self, values: Sequence[float], times: np.ndarray, slopes: bool
     ) -> dict[str, tuple[np.ndarray, np.ndarray | None]]:
         wanted = [Fraction(float(value)) for value in values]
+        if wanted == self._at:
+            return self._rows(times, slopes)
+        self._at = wanted
         coefficients = self._made.at(wanted)
         if coefficients is None:  # the equations have another form here
             self._made = self._made.made_at(wanted)
@@ -231,6 +237,10 @@ class ByTangents:
         else:
             assert isinstance(self._source, TangentLanes)
             self._source.use(coefficients)
+        return self._rows(times, slopes)
+
+    def _rows(self, times: np.ndarray, slopes: bool) -> dict[str, tuple[np.ndarray, np.ndarray | None]]:
+        assert isinstance(self._source, TangentLanes)
         rows = self._source.rows(np.ldexp(times, -self._made.plain.scaling.time), slopes=slopes)
         found = {name: (value, rows.slopes.get(name)) for name, value in rows.values.items()}
         quaternion = found["quaternion"][0]

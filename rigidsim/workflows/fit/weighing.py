@@ -9,9 +9,10 @@ import numpy as np
 
 from rigidsim.workflows.fit.estimation import Linear
 from rigidsim.workflows.fit.keys import FitKeys
-from rigidsim.workflows.fit.predictions import NotPredicted, Predicted, Predictor, difference
+from rigidsim.workflows.fit.predictions import ALONG, NotPredicted, Predicted, Predictor, difference
 from rigidsim.workflows.fit.readings import Readings
 
+_FURTHER = 1.5  # times the span of the data, up to which predictions along the run come with them
 _SMALL = 1e-4  # rad, below which the series of a function of an angle is right to rounding
 
 
@@ -32,24 +33,65 @@ class Compared:
 class Weighing:
     """Readings of all sets, and what an experiment predicts for them."""
 
-    def __init__(self, keys: FitKeys, readings: Sequence[Readings], predictor: Predictor) -> None:
+    def __init__(
+        self, keys: FitKeys, readings: Sequence[Readings], predictor: Predictor, along: np.ndarray
+    ) -> None:
         self.keys, self.readings, self._predictor = keys, list(readings), predictor
-        self.times, places = np.unique(np.concatenate([r.times for r in readings]), return_inverse=True)
-        self._places = np.split(places, np.cumsum([len(r.times) for r in readings])[:-1])
+        begin, last = float(keys.scene.start), max(float(r.times[-1]) for r in readings)
+        near = along[-1] - begin <= _FURTHER * (last - begin)  # a longer way isn't gone in each evaluation
+        parts = [*(r.times for r in readings), along if near else along[:0]]
+        self.times, places = np.unique(np.concatenate(parts), return_inverse=True)
+        *self._places, self._along = np.split(places, np.cumsum([len(part) for part in parts])[:-1])
+        self._along_times = along
         self.used = [np.ones(len(r.times), dtype=bool) for r in readings]
         self._count = len(keys.estimated)
         self._start = np.array([one.start for one in keys.estimated])
         self._fixed = np.array([one.start for one in keys.considered])
         self._weights = np.array([0.0 if k.sigma is None else 1.0 / k.sigma for k in keys.estimated])
         self.failure = ""
+        self._sloped: Predicted | None = None  # the latest prediction with derivatives
+        self._latest: tuple[bytes, Compared] | None = None  # the same beside the readings, with its values
 
-    def compared(self, values: np.ndarray) -> Compared:
-        """Residuals and slopes of all rows, used or not.
+    def compared(self, values: np.ndarray, *, fresh: bool = True) -> Compared:
+        """Residuals and slopes of all rows, used or not; the latest slopes unless they are to be ``fresh``.
 
         Raises:
             NotPredicted: the motion doesn't reach them.
         """
-        found = self._predictor.at([*values, *self._fixed], self.times)
+        if fresh and self._latest is not None and self._latest[0] == values.tobytes():
+            return self._latest[1]
+        found = self._predictor.at([*values, *self._fixed], self.times, slopes=fresh)
+        if fresh:
+            self._sloped = found
+        assert self._sloped is not None
+        found = Predicted(found.values, self._sloped.slopes, self._sloped.noise)
+        made = self._beside(found)
+        if fresh:
+            self._latest = values.tobytes(), made
+        return made
+
+    def along(self, values: np.ndarray) -> Predicted:
+        """Predictions with derivatives along the run, as far as the scene has them: of the latest evaluation
+        with derivatives, which is that of the values where a fit ends.
+        """
+        found = self._sloped
+        if (
+            found is None
+            or not len(self._along)
+            or "quaternion" not in found.values
+            or "angular_velocity" not in found.values
+        ):
+            try:
+                return self._predictor.along([*values, *self._fixed], self._along_times)
+            except NotPredicted:
+                return Predicted({})
+        names = [name for name in ALONG if name in found.values]
+        return Predicted(
+            {name: found.values[name][self._along] for name in names},
+            {name: found.slopes[name][self._along] for name in names},
+        )
+
+    def _beside(self, found: Predicted) -> Compared:
         parts = [self._set(r, p, found) for r, p in zip(self.readings, self._places, strict=True)]
         residuals, slopes, noise = zip(*parts, strict=True)
         return Compared(list(residuals), list(slopes), list(noise))
@@ -64,10 +106,12 @@ class Weighing:
             slopes = np.einsum("nij,njk->nik", inverse_right_jacobian(residuals), slopes)
         return residuals, slopes, found.noise[name]
 
-    def linearised(self, values: np.ndarray) -> Linear | None:
-        """The fit at some values, by the rows that are used; None where the motion can't be computed."""
+    def linearised(self, values: np.ndarray, fresh: bool = True) -> Linear | None:
+        """The fit at some values, by the rows that are used, with the latest slopes unless they are to be
+        ``fresh``; None where the motion can't be computed.
+        """
         try:
-            return self.linear(self.compared(values), values)
+            return self.linear(self.compared(values, fresh=fresh), values)
         except NotPredicted as error:
             self.failure = str(error)
             return None
