@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import heyoka as hy
 import numpy as np
@@ -31,7 +32,7 @@ TOLERANCE = 1e-9
 _SMALL = -80  # binary exponent of tangents in their lanes
 _MOST = 20  # states, beyond which unrolled code takes long to compile
 _BLOCK = 20_000  # rows that are held at once
-_engines: Kept[object] = Kept(8)
+_engines: Kept[Any] = Kept(8)
 
 
 def fits_lanes(parametrised: Parametrised, precision: Precision) -> bool:
@@ -52,8 +53,8 @@ class _Numbers:
 
     @classmethod
     def of(cls, found: Coefficients, keys: int) -> _Numbers:
-        def table(rows: list[list[object]]) -> np.ndarray:
-            return np.array([[float(x) for x in row] for row in rows]).reshape(len(rows), keys)  # type: ignore[arg-type]
+        def table(rows: list[list[Any]]) -> np.ndarray:
+            return np.array([[float(x) for x in row] for row in rows]).reshape(len(rows), keys)
 
         values, initial = ([float(x) for x in row] for row in (found.values, found.initial))
         return cls(np.array(values), table(found.slopes), np.array(initial), table(found.initial_slopes))
@@ -148,7 +149,8 @@ class TangentLanes:
         engine.set_time(self._start)
         engine.state[:] = state
         engine.pars[:] = pars[: len(engine.pars)]
-        variables, found = [*self._x, *self._d], [[] for _ in keys]
+        variables = [*self._x, *self._d]
+        found: list[list[np.ndarray]] = [[] for _ in keys]
         for begin in range(0, len(times), _BLOCK):
             block = times[begin : begin + _BLOCK]
             first = float(engine.time[0])
@@ -164,11 +166,11 @@ class TangentLanes:
                 )
         return [np.concatenate(part) for part in found]
 
-    def _engine(self) -> object:
+    def _engine(self) -> Any:
         options = dict(self._options, tol=TOLERANCE)
         shape = (2 * self._states, WIDTH)
 
-        def make() -> object:
+        def make() -> Any:
             return hy.taylor_adaptive_batch(self._both, np.zeros(shape), **options)
 
         return _engines.get((self._both, WIDTH, sorted(options.items())), make)
