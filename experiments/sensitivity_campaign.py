@@ -139,7 +139,9 @@ def _top(draw: random.Random) -> tuple[str, list[str]]:
     body = f"[body]\nprincipal_moments = {_moments(draw)}\nmass = 1.5\ncenter_of_mass = {center}\n"
     load = '[[loads]]\nkind = "uniform_gravity"\nacceleration = [0, 0, -1.3]\n'
     keys = ["body.mass", "loads[0].acceleration[2]", "loads[0].acceleration[0]"]
-    return body + _start(draw) + load, _STARTS + _MOMENTS + keys + [f"body.center_of_mass[{i}]" for i in (0, 2)]
+    return body + _start(draw) + load, _STARTS + _MOMENTS + keys + [
+        f"body.center_of_mass[{i}]" for i in (0, 2)
+    ]
 
 
 def _gradient(draw: random.Random) -> tuple[str, list[str]]:
@@ -165,7 +167,9 @@ def _wheels(draw: random.Random) -> tuple[str, list[str]]:
 
 
 def _core(draw: random.Random) -> tuple[str, list[str]]:
-    core = "[body.core]\nmoment = 0.2\nflattening = 0.05\nfriction = 0.03\nangular_velocity = [0.1, 0.2, 0.9]\n"
+    core = (
+        "[body.core]\nmoment = 0.2\nflattening = 0.05\nfriction = 0.03\nangular_velocity = [0.1, 0.2, 0.9]\n"
+    )
     keys = [f"body.core.{key}" for key in ("moment", "flattening", "friction", "angular_velocity[0]")]
     body = f"[body]\nprincipal_moments = [1.6, 1.7, {draw.uniform(1.8, 2):.4f}]\n{core}"
     return body + _start(draw), _MOMENTS[::2] + keys
@@ -288,9 +292,13 @@ def _moved(given: Any, key: Any, step: Fraction) -> list[str]:
         text = f'"{value.numerator}/{value.denominator}"'
         return [f"{'.'.join(_written(place))}={text}" for place in key.places]
     with mpmath.workdps(60):
-        q = [mpmath.mpf(x.rational.numerator) / x.rational.denominator for x in given.config.initial.quaternion]
+        q = [
+            mpmath.mpf(x.rational.numerator) / x.rational.denominator for x in given.config.initial.quaternion
+        ]
         half = mpmath.mpf(step.numerator) / step.denominator / 2
-        turn = [mpmath.cos(half)] + [mpmath.sin(half) if i == key.component else mpmath.mpf(0) for i in range(3)]
+        turn = [mpmath.cos(half)] + [
+            mpmath.sin(half) if i == key.component else mpmath.mpf(0) for i in range(3)
+        ]
         (a, b, c, d), (e, f, g, h) = q, turn
         turned = [
             a * e - b * f - c * g - d * h,
@@ -318,7 +326,9 @@ def _whole(dataset: Any, name: str) -> np.ndarray:
 
 def main(arguments: list[str] | None = None) -> int:
     """Run the campaign."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--scenes", type=int, default=200)
     parser.add_argument("--first", type=int, default=0)
     parser.add_argument("--only", type=int)

@@ -19,10 +19,11 @@ differ from one by less than its square are rounding in the derivatives.
 """
 WITHIN = 1e-3
 """A fit has converged once its next step is shorter than so many sigmas."""
-MOST_ITERATIONS = 60
+MOST_ITERATIONS = 100
 _FIRST_DAMPING, _AFTER_FAILURE = 1e-6, 1e-3
 _LARGEST_DAMPING = 1e12
 _LEAST_DAMPING = 1e-12
+_CALM = 3  # steps in a row that didn't fail, after which damping falls fast
 _SHORTER = 0.1  # of a step: the next one may have the same derivatives
 _ROUNDED = 1e-11  # relative change of a sum of squares that rounding makes
 
@@ -161,7 +162,7 @@ def iterate(
     values, linear, fresh = np.array(begin, dtype=float), linearised(begin), True
     if linear is None:
         return None
-    damping, iterations, growth, settled = _FIRST_DAMPING, 1, 2.0, False
+    damping, iterations, growth, calm, settled = _FIRST_DAMPING, 1, 2.0, _CALM, False
     solution = Solution(linear)
     told(iterations, linear.cost, solution.step_sigmas)
     while iterations < most and damping < _LARGEST_DAMPING:
@@ -185,12 +186,14 @@ def iterate(
             if trial is not None and trial.cost <= linear.cost * (1 + _ROUNDED):
                 settled = True  # rounding is all that changes any more
                 continue
-            damping, growth = max(damping, _AFTER_FAILURE) * growth, 2 * growth
+            damping, growth, calm = max(damping, _AFTER_FAILURE) * growth, 2 * growth, 0
             continue
         gained = (linear.cost - trial.cost) / max(_foreseen(linear, step), 1e-300)
         before = solution.step_sigmas
         values, linear, fresh = values + step, trial, False
-        damping = 0.0 if damping < _LEAST_DAMPING else damping * max(1e-2, 1 - (2 * gained - 1) ** 3)
+        calm += 1
+        least = 1e-2 if calm > _CALM else 1 / 3  # just after a step that failed, not back to where it did
+        damping = 0.0 if damping < _LEAST_DAMPING else damping * max(least, 1 - (2 * gained - 1) ** 3)
         growth = 2.0
         solution = Solution(linear)
         if _SHORTER * before < solution.step_sigmas:
