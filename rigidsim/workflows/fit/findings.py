@@ -24,6 +24,7 @@ from rigidsim.workflows.fit.result import (
 from rigidsim.workflows.fit.searching import Search
 from rigidsim.workflows.fit.weighing import Weighing
 
+_ROUNDING = 1e-6  # of it, below which a part may be rounding
 _PART = 1e-3  # of a direction of norm one, below which a number takes no part in it
 
 
@@ -44,7 +45,14 @@ class Findings:
         self._known = np.array([one.sigma or 0.0 for one in self.keys.considered])
         self.covariance, self.sensitivity = consider_covariance(self._linear, self._solution, self._known)
         self.null = self._solution.null / self._solution.scales  # rows in the numbers' own units
-        self.determined = (np.abs(self._solution.null) < _PART).all(axis=0)
+        sizes = np.array([one.size for one in self.keys.estimated])
+        self._directions = _simplest(self.null / sizes) * sizes  # one a row, in the numbers' own units
+        scaled = np.abs(self._directions * self._solution.scales)
+        scaled /= np.maximum(scaled.max(axis=1, keepdims=True), 1e-300)
+        relative = np.abs(self._directions / sizes)
+        # what data hardly depend on has a small part of its column's size, and all the same moves along
+        self._parts = (scaled > _PART) | ((relative > _PART) & (scaled > _ROUNDING))
+        self.determined = ~self._parts.any(axis=0)
         used = sum(int(u.sum()) * r.sigmas.shape[1] for u, r in zip(*self._sets, strict=True))
         priors = int((self._linear.weights > 0).sum())
         self.freedom = used + priors - len(self.determined) + len(self.null)
@@ -121,12 +129,9 @@ class Findings:
     def _undetermined(self) -> list[Undetermined]:
         """Directions, each as the changes of the numbers that make it."""
         found = []
-        sizes = np.array([one.size for one in self.keys.estimated])
-        for direction in _simplest(self.null / sizes):
-            scaled = np.abs(direction * sizes * self._solution.scales)
-            part = scaled > _PART * scaled.max()
+        for direction, part in zip(self._directions, self._parts, strict=True):
             keys = [one for one, p in zip(self.keys.estimated, part, strict=True) if p]
-            amounts = (direction * sizes)[part]
+            amounts = direction[part]
             found.append(
                 Undetermined(
                     keys=[one.key for one in keys],

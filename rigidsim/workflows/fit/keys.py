@@ -98,7 +98,8 @@ class FitKeys:
         table, _, name = varied.name.partition(".")
         given = self._experiment.config.parameters.get(name) if table == "parameters" else None
         if isinstance(given, Quantity):  # constants of expressions have units of their own
-            suffix = unit = unit_text(powers(given.unit)) or "rad"
+            found = unit_text(powers(given.unit)) or "rad"
+            suffix = unit = f"rad{found[1:]}" if found.startswith("1/") else found
         places = [written_key(place) for place in varied.places]
         size = abs(float(varied.number)) or abs(float(varied.size)) or 1.0
         return FitKey(varied.name, unit, float(varied.number), sigma, suffix, tuple(places), size)
