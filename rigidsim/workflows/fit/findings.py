@@ -11,6 +11,7 @@ import xarray
 from rigidsim.workflows.compare.rotations import turned
 from rigidsim.workflows.fit.estimation import consider_covariance
 from rigidsim.workflows.fit.keys import FitKey, FitKeys
+from rigidsim.workflows.fit.observed import QUATERNION
 from rigidsim.workflows.fit.predictions import Predicted
 from rigidsim.workflows.fit.readings import Readings
 from rigidsim.workflows.fit.result import (
@@ -231,7 +232,7 @@ class Findings:
     def _put_along(self, dataset: xarray.Dataset, along: Predicted, times: np.ndarray) -> None:
         """Predicted uncertainty along time; nan where an undetermined direction would show."""
         dataset.coords["time"] = ("time", times, {"units": "s"})
-        if "quaternion" in along.values:
+        if QUATERNION in along.values:
             found = self._spread(along.slopes["quaternion"])
             words = {
                 "units": "rad",

@@ -24,7 +24,9 @@ from rigidsim.solve.problem import prepare
 from rigidsim.store.variables import LABELS
 
 _PREFIX = "fit_expression_"
-_ROTATIONS = ("quaternion", "euler_angles")
+QUATERNION, EULER_ANGLES = "quaternion", "euler_angles"
+"""Variables that are attitudes; what is computed of any is the former."""
+_ROTATIONS = (QUATERNION, EULER_ANGLES)
 _STATES = ("attitude", "flight")
 
 
@@ -89,11 +91,11 @@ def observing(experiment: Experiment) -> Iterator[tuple[list[Quantity], Experime
             one = recorded[name]
             labels = [LABELS.get(dim, [str(i) for i in range(one.count)]) for dim in one.dims]
             suffixes = ["_" + "_".join(parts) if parts else "" for parts in product(*labels)]
-            if text == "euler_angles":
+            if text == EULER_ANGLES:
                 components = tuple(f"{text}_{angle}" for angle in LABELS["euler_angle"])
                 found.append(Quantity(text, text, text, components, "rad"))
                 continue
-            form = "quaternion" if text == "quaternion" else "angle" if one.units == "rad" else "plain"
+            form = QUATERNION if text == QUATERNION else "angle" if one.units == "rad" else "plain"
             expression = name.startswith(_PREFIX)
             shown = name if not expression else "value"
             components = tuple(f"{shown}{suffix}" for suffix in suffixes)

@@ -21,7 +21,7 @@ from rigidsim.solve.tangent_lanes import TangentLanes, fits_lanes
 from rigidsim.solve.variational import LostTangents, turned
 from rigidsim.workflows.compare.rotations import conjugated, multiplied, normalised, vector_of
 from rigidsim.workflows.fit.keys import FitKeys
-from rigidsim.workflows.fit.observed import Quantity, recording
+from rigidsim.workflows.fit.observed import QUATERNION, Quantity, recording
 from rigidsim.workflows.run import run
 from rigidsim.workflows.sensitivity import Tangents
 
@@ -255,7 +255,7 @@ class ByTangents:
             made.values[name] = value
             if slopes is not None:
                 made.slopes[name] = np.ascontiguousarray(slopes.transpose(0, 2, 1))
-                size = 1.0 if name == "quaternion" else float(np.abs(value).max()) or 1.0
+                size = 1.0 if name == QUATERNION else float(np.abs(value).max()) or 1.0
                 made.noise[name] = _ROUNDING * size / self._sizes
         return made
 

@@ -20,7 +20,7 @@ from rigidsim.scene.fit_table import FitDataTable
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.units import UnitError, conversion
 from rigidsim.workflows.compare.rotations import SEQUENCES, normalised, of_euler
-from rigidsim.workflows.fit.observed import Quantity
+from rigidsim.workflows.fit.observed import EULER_ANGLES, QUATERNION, Quantity
 
 _NORM = 1e-2  # by which the norm of a quaternion may differ from 1
 
@@ -135,7 +135,7 @@ class _Reading:
             plain = config_unit(unit)
             self.factor = self._factor("unit", plain, expected) if expected is not None else self._si(plain)
         values = given * self.factor
-        if self.quantity.form == "quaternion":
+        if self.quantity.form == QUATERNION:
             norms = np.linalg.norm(values, axis=1)
             bad = np.flatnonzero(np.abs(norms - 1) > _NORM)
             if len(bad):
@@ -144,7 +144,7 @@ class _Reading:
                     f"{norms[bad[0]]:.6g}; norms within 0.01 of 1 are allowed: mend or remove these rows"
                 )
             return normalised(values)
-        if self.quantity.form == "euler_angles":
+        if self.quantity.form == EULER_ANGLES:
             sequence = self.scene.config.integrator.euler_sequence
             assert sequence in SEQUENCES
             return of_euler(sequence, values)
@@ -161,7 +161,7 @@ class _Reading:
         own = self.quantity.unit
         unit = "rad" if self.quantity.rotation else own and config_unit(own)
         if isinstance(given, str) and given in self.found.names:
-            factor = self.factor if self.quantity.form != "quaternion" else 1.0
+            factor = self.factor if self.quantity.form != QUATERNION else 1.0
             column = self.found.column(given) * factor
             if (column <= 0).any():
                 at = int(np.flatnonzero(column <= 0)[0])

@@ -9,6 +9,7 @@ import numpy as np
 
 from rigidsim.workflows.fit.estimation import Linear
 from rigidsim.workflows.fit.keys import FitKeys
+from rigidsim.workflows.fit.observed import QUATERNION
 from rigidsim.workflows.fit.predictions import ALONG, NotPredicted, Predicted, Predictor, difference
 from rigidsim.workflows.fit.readings import Readings
 
@@ -78,7 +79,7 @@ class Weighing:
         if (
             found is None
             or not len(self._along)
-            or "quaternion" not in found.values
+            or QUATERNION not in found.values
             or "angular_velocity" not in found.values
         ):
             try:
