@@ -43,7 +43,7 @@ def fits_lanes(parametrised: Parametrised, precision: Precision) -> bool:
 
 
 @dataclass
-class _Numbers:
+class _Doubles:
     """Doubles of coefficients: (m,), (m, keys), (states,), (states, keys)."""
 
     values: np.ndarray
@@ -52,7 +52,7 @@ class _Numbers:
     initial_slopes: np.ndarray
 
     @classmethod
-    def of(cls, found: Coefficients, keys: int) -> _Numbers:
+    def of(cls, found: Coefficients, keys: int) -> _Doubles:
         def table(rows: list[list[Any]]) -> np.ndarray:
             return np.array([[float(x) for x in row] for row in rows]).reshape(len(rows), keys)
 
@@ -83,7 +83,7 @@ class TangentLanes:
 
     def use(self, coefficients: Coefficients) -> None:
         """Take coefficients and initial values."""
-        self._numbers = _Numbers.of(coefficients, self._keys)
+        self._numbers = _Doubles.of(coefficients, self._keys)
         self._moved: tuple[bytes, np.ndarray] | None = None
 
     def _derivatives(self, expressions: list[Symbolic]) -> list[Symbolic]:

@@ -12,17 +12,17 @@ from rigidsim.workflows.compare.rotations import turned
 from rigidsim.workflows.fit.estimation import consider_covariance
 from rigidsim.workflows.fit.keys import FitKey, FitKeys
 from rigidsim.workflows.fit.observed import QUATERNION
-from rigidsim.workflows.fit.predictions import Predicted
+from rigidsim.workflows.fit.predictions import Prediction
 from rigidsim.workflows.fit.readings import Readings
 from rigidsim.workflows.fit.result import (
-    Considered,
+    ConsideredNumber,
     FitResult,
     FittedData,
     FittedParameter,
     Outlier,
     Undetermined,
 )
-from rigidsim.workflows.fit.searching import Search
+from rigidsim.workflows.fit.searching import FoundFit
 from rigidsim.workflows.fit.weighing import Weighing
 
 _ROUNDING = 1e-6  # of it, below which a part may be rounding
@@ -36,7 +36,7 @@ class Findings:
     name: str
     keys: FitKeys
     weighing: Weighing
-    search: Search
+    search: FoundFit
     derivatives: str
     told: list[str]
 
@@ -86,7 +86,7 @@ class Findings:
 
     # --- typed ----------------------------------------------------------------------------------------------
 
-    def result(self, along: Predicted, times: np.ndarray) -> FitResult:
+    def result(self, along: Prediction, times: np.ndarray) -> FitResult:
         """The result, with its dataset."""
         ended = self.search.ended
         sigmas, scaled = self.sigmas(), self.scaled()
@@ -108,7 +108,7 @@ class Findings:
             undetermined=self._undetermined(),
             outliers=self._outliers(),
             considered=[
-                Considered(
+                ConsideredNumber(
                     key=one.key, unit=one.unit, value=one.start, sigma=one.sigma or 0.0,
                     effect=[float(x) for x in self.sensitivity[:, n]],
                 )
@@ -171,7 +171,7 @@ class Findings:
 
     # --- dataset --------------------------------------------------------------------------------------------
 
-    def _dataset(self, made: FitResult, along: Predicted, times: np.ndarray) -> xarray.Dataset:
+    def _dataset(self, made: FitResult, along: Prediction, times: np.ndarray) -> xarray.Dataset:
         names = [one.key for one in self.keys.estimated]
         count, starts = len(names), [one.start for one in self.keys.estimated]
         values = {
@@ -229,8 +229,8 @@ class Findings:
             )
             dataset[f"used_{n}"] = (f"row_{n}", used.astype(np.int8), {"long_name": "1: used, 0: outlier"})
 
-    def _put_along(self, dataset: xarray.Dataset, along: Predicted, times: np.ndarray) -> None:
-        """Predicted uncertainty along time; nan where an undetermined direction would show."""
+    def _put_along(self, dataset: xarray.Dataset, along: Prediction, times: np.ndarray) -> None:
+        """Prediction uncertainty along time; nan where an undetermined direction would show."""
         dataset.coords["time"] = ("time", times, {"units": "s"})
         if QUATERNION in along.values:
             found = self._spread(along.slopes["quaternion"])

@@ -16,7 +16,7 @@ from rigidsim.workflows.compare.saving import save_dataset
 from rigidsim.workflows.fit.findings import Findings
 from rigidsim.workflows.fit.folder import FitFolder, Remembered
 from rigidsim.workflows.fit.keys import FitKeys
-from rigidsim.workflows.fit.observed import Quantity, observing
+from rigidsim.workflows.fit.observed import Observed, observing
 from rigidsim.workflows.fit.predictions import ByDifferences, ByTangents, Predictor
 from rigidsim.workflows.fit.readings import Readings, read_readings
 from rigidsim.workflows.fit.result import FitResult
@@ -149,7 +149,7 @@ def _fitted(experiment: Experiment, places: list[Path], memory: Path | None, tol
         return findings.result(weighing.along(found.ended.values), times)
 
 
-def _predictor(keys: FitKeys, quiet: Experiment, quantities: list[Quantity]) -> Predictor:
+def _predictor(keys: FitKeys, quiet: Experiment, quantities: list[Observed]) -> Predictor:
     """Variational equations, or differences of runs where a scene has none."""
     try:
         return ByTangents(keys, quiet, quantities)

@@ -22,7 +22,7 @@ from rigidsim.scene.config import Experiment
 from rigidsim.store import atomic
 from rigidsim.store.fits import BEGUN
 from rigidsim.store.folder import FileOf, WorkFolder
-from rigidsim.workflows.fit.predictions import Predicted, Predictor
+from rigidsim.workflows.fit.predictions import Prediction, Predictor
 from rigidsim.workflows.fit.result import KIND, FitResult
 
 _NAMES = (
@@ -134,7 +134,7 @@ class Remembered:
         self._predictor, self._folder = predictor, folder
         self.how = predictor.how
 
-    def at(self, values: Sequence[float], times: np.ndarray, *, slopes: bool = True) -> Predicted:
+    def at(self, values: Sequence[float], times: np.ndarray, *, slopes: bool = True) -> Prediction:
         """See ``Predictor.at``."""
         said = np.asarray([*values, slopes], dtype=float).tobytes() + times.tobytes()
         path = self._folder / f"{hashlib.sha256(said).hexdigest()[:32]}.npz"
@@ -149,13 +149,13 @@ class Remembered:
         atomic.write_bytes(path, buffer.getvalue())
         return found
 
-    def along(self, values: Sequence[float], times: np.ndarray) -> Predicted:
+    def along(self, values: Sequence[float], times: np.ndarray) -> Prediction:
         """See ``Predictor.along``; it is computed once, and not kept."""
         return self._predictor.along(values, times)
 
 
-def _read(path: Path) -> Predicted:
-    found = Predicted({})
+def _read(path: Path) -> Prediction:
+    found = Prediction({})
     with np.load(path, allow_pickle=False) as arrays:
         for key in arrays.files:
             kind, _, name = key.partition(":")

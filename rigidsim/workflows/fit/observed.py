@@ -31,7 +31,7 @@ _STATES = ("attitude", "flight")
 
 
 @dataclass(frozen=True)
-class Quantity:
+class Observed:
     """One observable.
 
     Attributes:
@@ -58,7 +58,7 @@ class Quantity:
 
 
 @contextmanager
-def observing(experiment: Experiment) -> Iterator[tuple[list[Quantity], Experiment]]:
+def observing(experiment: Experiment) -> Iterator[tuple[list[Observed], Experiment]]:
     """What each ``[[fit.data]]`` observes, with the experiment that records it; expressions can be recorded
     inside the block only.
 
@@ -93,7 +93,7 @@ def observing(experiment: Experiment) -> Iterator[tuple[list[Quantity], Experime
             suffixes = ["_" + "_".join(parts) if parts else "" for parts in product(*labels)]
             if text == EULER_ANGLES:
                 components = tuple(f"{text}_{angle}" for angle in LABELS["euler_angle"])
-                found.append(Quantity(text, text, text, components, "rad"))
+                found.append(Observed(text, text, text, components, "rad"))
                 continue
             form = QUATERNION if text == QUATERNION else "angle" if one.units == "rad" else "plain"
             expression = name.startswith(_PREFIX)
@@ -101,7 +101,7 @@ def observing(experiment: Experiment) -> Iterator[tuple[list[Quantity], Experime
             components = tuple(f"{shown}{suffix}" for suffix in suffixes)
             if expression:
                 form = "plain"
-            found.append(Quantity(text, name, form, components, None if expression else one.units))
+            found.append(Observed(text, name, form, components, None if expression else one.units))
         yield found, quiet
     finally:
         for name in entered:

@@ -21,7 +21,7 @@ from rigidsim.solve.tangent_lanes import TangentLanes, fits_lanes
 from rigidsim.solve.variational import LostTangents, turned
 from rigidsim.workflows.compare.rotations import conjugated, multiplied, normalised, vector_of
 from rigidsim.workflows.fit.keys import FitKeys
-from rigidsim.workflows.fit.observed import QUATERNION, Quantity, recording
+from rigidsim.workflows.fit.observed import QUATERNION, Observed, recording
 from rigidsim.workflows.run import run
 from rigidsim.workflows.sensitivity import Tangents
 
@@ -40,7 +40,7 @@ class NotPredicted(RigidsimError):
 
 
 @dataclass
-class Predicted:
+class Prediction:
     """Predictions at some times.
 
     Attributes:
@@ -60,14 +60,14 @@ class Predictor(Protocol):
 
     how: str
 
-    def at(self, values: Sequence[float], times: np.ndarray, *, slopes: bool = True) -> Predicted:
+    def at(self, values: Sequence[float], times: np.ndarray, *, slopes: bool = True) -> Prediction:
         """Predictions, with derivatives if these are asked for, at ascending times (s).
 
         Raises:
             NotPredicted: the motion doesn't get there.
         """
 
-    def along(self, values: Sequence[float], times: np.ndarray) -> Predicted:
+    def along(self, values: Sequence[float], times: np.ndarray) -> Prediction:
         """The same of attitude, angular velocity and position, as far as the scene has them."""
 
 
@@ -76,24 +76,24 @@ class ByDifferences:
 
     how = "central differences of runs"
 
-    def __init__(self, keys: FitKeys, quiet: Experiment, quantities: Sequence[Quantity]) -> None:
+    def __init__(self, keys: FitKeys, quiet: Experiment, quantities: Sequence[Observed]) -> None:
         self._keys, self._quiet = keys, quiet
         self._variables = {one.variable: one for one in quantities}
         self._steps = _FIRST * np.array([one.size for one in keys.all])
         self._adapted = False
 
-    def at(self, values: Sequence[float], times: np.ndarray, *, slopes: bool = True) -> Predicted:
+    def at(self, values: Sequence[float], times: np.ndarray, *, slopes: bool = True) -> Prediction:
         """See ``Predictor.at``."""
         centre = self.values(values, times)
         if not slopes:
-            return Predicted(centre)
+            return Prediction(centre)
         found = self._differences(values, times, centre)
         if not self._adapted:
             self._adapt(found)
             found = self._differences(values, times, centre)
         return found
 
-    def along(self, values: Sequence[float], times: np.ndarray) -> Predicted:
+    def along(self, values: Sequence[float], times: np.ndarray) -> Prediction:
         """See ``Predictor.along``."""
         names = []
         for name in ALONG:
@@ -103,9 +103,9 @@ class ByDifferences:
                 continue
             names.append(name)
         if not names:
-            return Predicted({})
+            return Prediction({})
         forms = {"quaternion": "quaternion"}
-        found = [Quantity(name, name, forms.get(name, "plain"), (), None) for name in names]
+        found = [Observed(name, name, forms.get(name, "plain"), (), None) for name in names]
         return ByDifferences(self._keys, recording(self._quiet, names), found).at(values, times)
 
     def values(self, values: Sequence[float] | np.ndarray, times: np.ndarray) -> dict[str, np.ndarray]:
@@ -133,8 +133,8 @@ class ByDifferences:
 
     def _differences(
         self, values: Sequence[float], times: np.ndarray, centre: dict[str, np.ndarray]
-    ) -> Predicted:
-        found = Predicted(centre)
+    ) -> Prediction:
+        found = Prediction(centre)
         slopes: dict[str, list[np.ndarray]] = {name: [] for name in self._variables}
         for n, step in enumerate(self._steps):
             ends = []
@@ -156,7 +156,7 @@ class ByDifferences:
         one = self._variables[name]
         return 1.0 if one.rotation or one.form == "angle" else float(np.abs(centre[name]).max()) or 1.0
 
-    def _adapt(self, found: Predicted) -> None:
+    def _adapt(self, found: Prediction) -> None:
         """Steps that change what is observed by ``CHANGE``."""
         for n, step in enumerate(self._steps):
             largest = max(
@@ -175,7 +175,7 @@ class ByTangents:
 
     how = "variational equations"
 
-    def __init__(self, keys: FitKeys, quiet: Experiment, quantities: Sequence[Quantity]) -> None:
+    def __init__(self, keys: FitKeys, quiet: Experiment, quantities: Sequence[Observed]) -> None:
         self._names = list(dict.fromkeys(one.variable for one in quantities))
         self._keys = [one.key for one in keys.all]
         self._sizes = np.array([one.size for one in keys.all])
@@ -193,13 +193,13 @@ class ByTangents:
         else:
             self._source = Tangents(stepping, self._keys, record=self._names)
 
-    def at(self, values: Sequence[float], times: np.ndarray, *, slopes: bool = True) -> Predicted:
+    def at(self, values: Sequence[float], times: np.ndarray, *, slopes: bool = True) -> Prediction:
         """See ``Predictor.at``."""
         every = self._every(values, times, slopes)
         names = dict.fromkeys([*self._names, *(name for name in ALONG if name in every)])
         return self._predicted({name: every[name] for name in names})
 
-    def along(self, values: Sequence[float], times: np.ndarray) -> Predicted:
+    def along(self, values: Sequence[float], times: np.ndarray) -> Prediction:
         """See ``Predictor.along``."""
         return self.at(values, times)
 
@@ -247,8 +247,8 @@ class ByTangents:
         turning = turned(quaternion, rows.slopes["quaternion"]) if slopes else None
         return {**found, "quaternion": (normalised(quaternion), turning)}
 
-    def _predicted(self, every: Mapping[str, tuple[Any, Any]]) -> Predicted:
-        made = Predicted({})
+    def _predicted(self, every: Mapping[str, tuple[Any, Any]]) -> Prediction:
+        made = Prediction({})
         for name, (value, slopes) in every.items():
             if not (np.isfinite(value).all() and (slopes is None or np.isfinite(slopes).all())):
                 raise NotPredicted(f"{name} has no finite value at each observation")
@@ -260,7 +260,7 @@ class ByTangents:
         return made
 
 
-def difference(quantity: Quantity, one: np.ndarray, other: np.ndarray) -> np.ndarray:
+def difference(quantity: Observed, one: np.ndarray, other: np.ndarray) -> np.ndarray:
     """From one value to another, (rows, components); of attitudes the rotation vector in space axes."""
     if quantity.rotation:
         return vector_of(multiplied(other, conjugated(one)))

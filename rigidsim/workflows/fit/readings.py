@@ -20,7 +20,7 @@ from rigidsim.scene.fit_table import FitDataTable
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.units import UnitError, conversion
 from rigidsim.workflows.compare.rotations import SEQUENCES, normalised, of_euler
-from rigidsim.workflows.fit.observed import EULER_ANGLES, QUATERNION, Quantity
+from rigidsim.workflows.fit.observed import EULER_ANGLES, QUATERNION, Observed
 
 _NORM = 1e-2  # by which the norm of a quaternion may differ from 1
 
@@ -38,7 +38,7 @@ class Readings:
     """
 
     number: int
-    quantity: Quantity
+    quantity: Observed
     source: str
     sha256: str
     times: np.ndarray
@@ -54,24 +54,24 @@ class Readings:
         return f"{self.quantity.text} (data {self.number})"
 
 
-def read_readings(number: int, table: FitDataTable, quantity: Quantity, scene: Scene, path: Path) -> Readings:
+def read_readings(number: int, table: FitDataTable, quantity: Observed, scene: Scene, path: Path) -> Readings:
     """Read the file of a table of ``[[fit.data]]``, which is at a path.
 
     Raises:
         ConfigError: a key of the table doesn't suit. RigidsimError: a row of the file can't be used.
     """
     found = read_observations(path)
-    return _Reading(number, table, quantity, scene, found, path).made()
+    return _ReadTable(number, table, quantity, scene, found, path).made()
 
 
-class _Reading:
+class _ReadTable:
     """One table with its file."""
 
     def __init__(
         self,
         number: int,
         table: FitDataTable,
-        quantity: Quantity,
+        quantity: Observed,
         scene: Scene,
         found: Observations,
         path: Path,

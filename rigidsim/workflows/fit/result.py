@@ -75,7 +75,7 @@ class FittedData(SummaryPart):
     sigmas: float
 
 
-class Considered(SummaryPart):
+class ConsideredNumber(SummaryPart):
     """A number that wasn't estimated, and by how much each estimated one follows it, SI."""
 
     key: str
@@ -104,7 +104,7 @@ class FitResult(SummaryPart):
     correlations: list[list[float | None]]
     undetermined: list[Undetermined]
     outliers: list[Outlier]
-    considered: list[Considered]
+    considered: list[ConsideredNumber]
     data: list[FittedData]
     chi_square: float
     freedom: int

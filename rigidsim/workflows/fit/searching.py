@@ -9,7 +9,7 @@ import numpy as np
 
 from rigidsim.errors import RigidsimError
 from rigidsim.workflows.fit.estimation import Ended, iterate
-from rigidsim.workflows.fit.weighing import Compared, Weighing
+from rigidsim.workflows.fit.weighing import Residuals, Weighing
 
 _ROUNDS = 25
 _FROM_START = 40  # iterations from each of several starts
@@ -17,19 +17,19 @@ _SAME = 1e-6  # relative difference of the sums of squares of starts that end in
 
 
 @dataclass
-class Search:
+class FoundFit:
     """What was done to find the best fit; ``costs``: sums of squares where each start ended, nan for those
     from which the motion couldn't be computed.
     """
 
     ended: Ended
-    compared: Compared
+    compared: Residuals
     costs: list[float]
     rounds: int
     told: list[str] = field(default_factory=list)
 
 
-def search(weighing: Weighing, starts: int, told: Callable[[str], None]) -> Search:
+def search(weighing: Weighing, starts: int, told: Callable[[str], None]) -> FoundFit:
     """Fit from each start, and then again without rows beyond their limit until these stay the same.
 
     Raises:
@@ -58,7 +58,7 @@ def search(weighing: Weighing, starts: int, told: Callable[[str], None]) -> Sear
                 f"{readings.label}: more than half of its rows were left out as outliers; its sigmas may be "
                 "too small, or the fit ended far from the truth: try more starts"
             )
-    return Search(ended, compared, costs, rounds, notes)
+    return FoundFit(ended, compared, costs, rounds, notes)
 
 
 def _from_starts(
@@ -100,7 +100,7 @@ def drawn(weighing: Weighing, starts: int) -> list[np.ndarray]:
     ]
 
 
-def _sort_out(weighing: Weighing, compared: Compared) -> bool:
+def _sort_out(weighing: Weighing, compared: Residuals) -> bool:
     """Leave out rows beyond their limit, the worst first, and take back those within; whether any changed.
 
     A large outlier draws the fit to itself and makes good rows look bad: a round leaves out only rows that

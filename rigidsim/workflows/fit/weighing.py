@@ -10,7 +10,7 @@ import numpy as np
 from rigidsim.workflows.fit.estimation import Linear
 from rigidsim.workflows.fit.keys import FitKeys
 from rigidsim.workflows.fit.observed import QUATERNION
-from rigidsim.workflows.fit.predictions import ALONG, NotPredicted, Predicted, Predictor, difference
+from rigidsim.workflows.fit.predictions import ALONG, NotPredicted, Prediction, Predictor, difference
 from rigidsim.workflows.fit.readings import Readings
 
 _FURTHER = 1.5  # times the span of the data, up to which predictions along the run come with them
@@ -18,7 +18,7 @@ _SMALL = 1e-4  # rad, below which the series of a function of an angle is right 
 
 
 @dataclass(frozen=True)
-class Compared:
+class Residuals:
     """Readings beside a prediction, one array for each set.
 
     Attributes:
@@ -50,10 +50,10 @@ class Weighing:
         self._fixed = np.array([one.start for one in keys.considered])
         self._weights = np.array([0.0 if k.sigma is None else 1.0 / k.sigma for k in keys.estimated])
         self.failure = ""
-        self._sloped: Predicted | None = None  # the latest prediction with derivatives
-        self._latest: tuple[bytes, Compared] | None = None  # the same beside the readings, with its values
+        self._sloped: Prediction | None = None  # the latest prediction with derivatives
+        self._latest: tuple[bytes, Residuals] | None = None  # the same beside the readings, with its values
 
-    def compared(self, values: np.ndarray, *, fresh: bool = True) -> Compared:
+    def compared(self, values: np.ndarray, *, fresh: bool = True) -> Residuals:
         """Residuals and slopes of all rows, used or not; the latest slopes unless they are to be ``fresh``.
 
         Raises:
@@ -65,13 +65,13 @@ class Weighing:
         if fresh:
             self._sloped = found
         assert self._sloped is not None
-        found = Predicted(found.values, self._sloped.slopes, self._sloped.noise)
+        found = Prediction(found.values, self._sloped.slopes, self._sloped.noise)
         made = self._beside(found)
         if fresh:
             self._latest = values.tobytes(), made
         return made
 
-    def along(self, values: np.ndarray) -> Predicted:
+    def along(self, values: np.ndarray) -> Prediction:
         """Predictions with derivatives along the run, as far as the scene has them: of the latest evaluation
         with derivatives, which is that of the values where a fit ends.
         """
@@ -85,20 +85,20 @@ class Weighing:
             try:
                 return self._predictor.along([*values, *self._fixed], self._along_times)
             except NotPredicted:
-                return Predicted({})
+                return Prediction({})
         names = [name for name in ALONG if name in found.values]
-        return Predicted(
+        return Prediction(
             {name: found.values[name][self._along] for name in names},
             {name: found.slopes[name][self._along] for name in names},
         )
 
-    def _beside(self, found: Predicted) -> Compared:
+    def _beside(self, found: Prediction) -> Residuals:
         parts = [self._set(r, p, found) for r, p in zip(self.readings, self._places, strict=True)]
         residuals, slopes, noise = zip(*parts, strict=True)
-        return Compared(list(residuals), list(slopes), list(noise))
+        return Residuals(list(residuals), list(slopes), list(noise))
 
     def _set(
-        self, readings: Readings, places: np.ndarray, found: Predicted
+        self, readings: Readings, places: np.ndarray, found: Prediction
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         name = readings.quantity.variable
         computed, slopes = found.values[name][places], found.slopes[name][places]
@@ -117,7 +117,7 @@ class Weighing:
             self.failure = str(error)
             return None
 
-    def linear(self, compared: Compared, values: np.ndarray) -> Linear:
+    def linear(self, compared: Residuals, values: np.ndarray) -> Linear:
         """The same of a comparison."""
         residuals, slopes, noise = [], [], np.zeros(len(self.keys.all))
         for n, readings in enumerate(self.readings):
@@ -133,7 +133,7 @@ class Weighing:
             self._start - values, self._weights,
         )  # fmt: skip
 
-    def sizes(self, compared: Compared) -> list[np.ndarray]:
+    def sizes(self, compared: Residuals) -> list[np.ndarray]:
         """Of each row the largest residual of its components, in sigmas, (rows,) for each set."""
         return [
             np.abs(residuals / readings.sigmas).max(axis=1)
