@@ -51,6 +51,7 @@ STUDIES = (
     "phobos_and_vesta",
     "moon_free_librations",
     "apophis_real_sky",
+    "fitted_bodies",
 )
 
 

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from rigidsim.workflows.analyse import analyse
     from rigidsim.workflows.compare.compared import compare
     from rigidsim.workflows.export import export
+    from rigidsim.workflows.fit.fitting import fit
     from rigidsim.workflows.physics.required import required_physics
     from rigidsim.workflows.plan import plan
     from rigidsim.workflows.read import Experiment, load, parse
@@ -29,7 +30,7 @@ __version__ = "0.1.0"
 
 __all__ = [
     "ConfigError", "Experiment", "MemoryRun", "RigidsimError", "Run", "RunFolderError", "SavedRun",
-    "SavedSweep", "analyse", "compare", "export", "load", "open_run", "open_sweep", "parse", "plan",
+    "SavedSweep", "analyse", "compare", "export", "fit", "load", "open_run", "open_sweep", "parse", "plan",
     "required_physics", "resume", "run", "sweep", "tradeoff", "verify",
 ]  # fmt: skip
 
@@ -40,6 +41,7 @@ _NAMES = {
     "workflows.analyse": ("analyse",),
     "workflows.compare.compared": ("compare",),
     "workflows.export": ("export",),
+    "workflows.fit.fitting": ("fit",),
     "workflows.physics.required": ("required_physics",),
     "workflows.plan": ("plan",),
     "workflows.read": ("Experiment", "load", "parse"),

@@ -5,9 +5,6 @@ A command is declared here, with its arguments and help, and does its work in a 
 """
 
 import gc
-import os
-import signal
-import sys
 from collections.abc import Callable
 from functools import wraps
 from importlib import import_module
@@ -19,7 +16,7 @@ import typer
 
 from rigidsim import __version__
 from rigidsim.cli import options
-from rigidsim.errors import RigidsimError
+from rigidsim.cli.exits import exit_code
 from rigidsim.look.figure_names import FIGURES
 
 app = typer.Typer(
@@ -38,53 +35,6 @@ def main() -> None:
         app(prog_name="rigidsim")
     finally:
         gc.freeze()  # what is freed with the process isn't searched for garbage: a fifth of a tiny run
-
-
-def exit_code(command: Callable[[], int]) -> int:
-    """Run a command that returns its exit code; an error meant for the user is printed and has one, too."""
-    # SIGTERM ends like Ctrl-C, and so does SIGINT where a script's background job starts with it ignored:
-    # later on the run itself heeds both, and one that comes before that mustn't be lost
-    ending = (signal.SIGINT, signal.SIGTERM)
-    before = {number: signal.signal(number, signal.default_int_handler) for number in ending}
-    try:
-        code = command()
-    except RigidsimError as error:
-        print(f"rigidsim: {error.for_command_line()}", file=sys.stderr)
-        return error.exit_code
-    except BrokenPipeError:
-        sys.stderr.close()
-        return 0
-    except (KeyboardInterrupt, ImportError) as error:
-        if not _is_interruption(error):
-            raise
-        print("rigidsim: interrupted", file=sys.stderr)
-        _leave_builds(130)
-        return 130
-    else:
-        _leave_builds(code)  # of a run that was interrupted, and saved meanwhile
-        return code
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
-
-
-def _is_interruption(error: BaseException | None) -> bool:
-    """Whether it comes from Ctrl-C, which libraries make an ImportError of while they are loaded."""
-    while error is not None and not isinstance(error, KeyboardInterrupt):
-        error = error.__cause__ or error.__context__
-    return error is not None
-
-
-def _leave_builds(code: int) -> None:
-    """End the process at once if something is still being compiled: it can't be waited for (it may take
-    seconds, and Ctrl-C promises half a second), and the usual way of ending would unload the compiler's own
-    library beneath it.
-    """
-    threads = sys.modules.get("rigidsim.solve.compiled")  # not loaded, nothing was compiled
-    if threads is not None and threads.building():
-        sys.stdout.flush()
-        sys.stderr.flush()
-        os._exit(code)
 
 
 def _command(module: str, more: str = "") -> Callable[[Callable[..., None]], Callable[..., None]]:
@@ -243,6 +193,22 @@ def compare(
     integration differs.
 
     Example: rigidsim compare configs/intermediate_axis.toml theirs.csv --figure theirs.png
+    """
+
+
+@_command("fit")
+def fit(
+    config: options.ConfigPath,
+    out: options.FitsOption = Path("fits"),
+    overrides: options.SetOption = None,
+    write: options.FittedOption = None,
+    force: Annotated[bool, typer.Option("--force", help="Replace a fit of the same name.")] = False,
+    as_json: options.JsonOption = False,
+) -> None:
+    """Estimate the parameters of the config's [fit] from its data: values, sigmas, correlations, residuals,
+    and what the data can't tell. Exit code 1 if the fit doesn't converge.
+
+    Example: rigidsim fit configs/toutatis_1992.toml
     """
 
 

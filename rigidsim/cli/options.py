@@ -229,3 +229,9 @@ AnalysisOption = Annotated[
     Path | None,
     _option("--out", "FILE", "Dataset; default analysis.h5 in the run. The figure goes beside it."),
 ]
+FitsOption = Annotated[
+    Path, _option("--out", "DIR", "Folder of the fits' folders; an interrupted fit there goes on.")
+]
+FittedOption = Annotated[
+    Path | None, _option("--write", "FILE", "Config with the estimated values, ready to be run.")
+]

@@ -46,6 +46,7 @@ from rigidsim.scene.fields import (
     named,
     refuse,
 )
+from rigidsim.scene.fit_table import FitTable
 from rigidsim.scene.frame import Frame
 from rigidsim.scene.integrator_table import Integrator
 from rigidsim.scene.kernels.ephemeris import EphemerisTable
@@ -272,6 +273,8 @@ class Config(ConfigTable):
     """guards that stop the run; it can be resumed"""
     sweep: SweepTable | None = None
     """the sweep: many members of one experiment"""
+    fit: FitTable | None = None
+    """the fit: parameters that rigidsim fit estimates from data"""
     tables: dict[StrictStr, TableText] = Field(
         default_factory=dict, examples=[{"elements.csv": {"text": "time [yr], eccentricity\n0, 0.01\n"}}]
     )

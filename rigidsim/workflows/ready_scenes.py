@@ -45,6 +45,7 @@ SUBJECTS: Mapping[str, tuple[str, ...]] = {
         "moon_since_1969", "rigid_moon", "rigid_earth_nutation", "mars_nutation", "mercury_libration",
         "apophis_2029",
     ),
+    "Fits to observations: rigidsim fit": ("toutatis_1992",),
     "Sweeps: rigidsim sweep": ("first_flip", "flip_sphere", "hyperion_map", "apophis_flyby", "round_off"),
 }  # fmt: skip
 """Names of all scenes by what they are about, the simplest first."""
@@ -70,6 +71,7 @@ ALIASES: Mapping[str, str] = {
     "sail": "sun_pointing_sail",
     "shuttlecock": "aerostable_cubesat",
     "tle": "tumbling_rocket_body",
+    "toutatis": "toutatis_1992",
     "vesta": "vesta_nutation",
 }
 """Names by which scenes are known, too."""

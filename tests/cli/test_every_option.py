@@ -47,6 +47,9 @@ QUICK = {
     "compare free.toml runs/free --set time.end=2 --timeline both.rrd": 0,
     "tradeoff free.toml --with runs/free,long": 2,
     "compare free.toml missing.bc --kernels missing.tsc": 2,
+    "fit watched.toml --out fits --set time.end=3 --write watched_again.toml --force --json": 0,
+    "info fits/watched --json": 0,
+    "verify fits/watched --json": 0,
     "info runs/free --json": 0,
     "info runs/swept --json": 0,
     "plot runs/free --what drift --out drift.png": 0,
@@ -76,6 +79,13 @@ FLYING = {
     "initial": "angular_velocity = [0.3, 1.0, 0.5]\nposition = [0, 0, 0]\nvelocity = [1, 0, 0]",
     "output": 'record = ["quaternion", "angular_velocity", "obliquity", "position", "velocity"]',
 }
+FIT = """[fit]
+parameters = ["initial.angular_velocity[0]"]
+[[fit.data]]
+file = "seen.csv"
+observable = "angular_velocity"
+columns = ["x", "y", "z"]
+sigma = 0.01"""
 SWEEP = "[sweep]\naxes.'initial.angular_velocity[0]' = {values = [0.1, 0.2]}"
 
 
@@ -87,12 +97,15 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
         "free": support.config(body="principal_moments = [1, 2, 2.5]\nmass = 1", **FLYING, name="free"),
         "stopped": support.config(more="[limits]\nmax_steps = 3", name="stopped"),
         "swept": support.config(more=SWEEP, name="swept"),
+        "watched": support.config(more=FIT, name="watched"),
         "wrong": support.config(body="principal_moments = [1, 2, 9]", name="wrong"),
     }
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(folder)
         for name, text in texts.items():
             Path(f"{name}.toml").write_text(text)
+        Path("seen.csv").write_text("time,x,y,z\n0,0.1,1,0.05\n0.1,0.1,1,0.05\n")
+        called("fit watched.toml", 0)
         called("run free.toml", 0)
         called("run stopped.toml", 3)
         called("sweep swept.toml", 0)

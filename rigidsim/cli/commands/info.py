@@ -8,6 +8,7 @@ import numpy as np
 from rigidsim.cli.screens.page import Page, print_json
 from rigidsim.cli.screens.summary import print_summary
 from rigidsim.cli.screens.words import arcsec_text
+from rigidsim.store.fits import is_fit
 from rigidsim.store.run import open_run
 from rigidsim.store.sweeps.folder import is_sweep
 
@@ -21,6 +22,11 @@ def info(run_path: Path, as_json: bool) -> None:
         from rigidsim.cli.commands import sweep
 
         sweep.info(run_path, as_json)
+        return
+    if is_fit(run_path):
+        from rigidsim.cli.commands import fit
+
+        fit.info(run_path, as_json)
         return
     opened = open_run(run_path)
     if as_json:

@@ -14,6 +14,7 @@ from rigidsim.errors import RigidsimError
 from rigidsim.scene.config import Experiment
 from rigidsim.scene.sweeps.values import scanned
 from rigidsim.session import progress
+from rigidsim.store.fits import is_fit
 from rigidsim.store.sweeps.folder import is_sweep
 from rigidsim.store.sweeps.run import SavedSweep, open_sweep
 from rigidsim.workflows.read import load
@@ -53,7 +54,13 @@ def run_scanned(
 def resume(
     run_path: Path, until: str | None, overrides: list[str] | None, workers: int, as_json: bool, verbose: bool
 ) -> int:
-    """Go on with a run or a sweep."""
+    """Go on with a run, a sweep or a fit."""
+    if is_fit(run_path):
+        if until is not None or overrides:
+            raise RigidsimError("resume: --until and --set are for runs; a fit goes on as it was begun")
+        from rigidsim.cli.commands import fit  # which few need
+
+        return fit.resume(run_path, as_json)
     if not is_sweep(run_path):
         with progress.observer() as observer:
             run = resuming.resume(run_path, until=until, overrides=overrides or [], observer=observer)
@@ -70,6 +77,10 @@ def resume(
 
 def verify(run_path: Path, members: int, as_json: bool) -> int:
     """Integrate again and compare."""
+    if is_fit(run_path):
+        from rigidsim.cli.commands import fit
+
+        return fit.verify(run_path, as_json)
     if is_sweep(run_path):
         verdict, what = verify_sweep(run_path, members=members), "member"
     else:

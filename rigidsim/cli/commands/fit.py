@@ -1,0 +1,57 @@
+"""The command ``fit``, and what ``resume``, ``verify`` and ``info`` do with a fit's folder."""
+
+import sys
+from pathlib import Path
+
+from rigidsim.cli.screens.fit import print_again, print_fit, print_saved
+from rigidsim.cli.screens.page import answer
+from rigidsim.errors import RigidsimError
+from rigidsim.store import atomic
+from rigidsim.workflows.fit import fitting
+from rigidsim.workflows.fit.folder import FitFolder
+from rigidsim.workflows.fit.result import FitResult
+from rigidsim.workflows.fit.verifying import verify_fit
+from rigidsim.workflows.read import load
+
+
+def fit(
+    config: Path, out: Path, overrides: list[str] | None, write: Path | None, force: bool, as_json: bool
+) -> int:
+    """Fit, save, print."""
+    result = fitting.fit(load(config, overrides=overrides or []), out=out, force=force, told=_tell)
+    if write is not None:
+        try:
+            atomic.write_bytes(write, result.experiment.text.encode())
+        except OSError as error:
+            raise RigidsimError(
+                f"{write}: can't be written: {error.strerror or error}; choose another name"
+            ) from None
+    return _print(result, as_json)
+
+
+def resume(path: Path, as_json: bool) -> int:
+    """Go on with an interrupted fit."""
+    return _print(fitting.resume_fit(path, told=_tell), as_json)
+
+
+def verify(path: Path, as_json: bool) -> int:
+    """Fit again and compare every number."""
+    verdict = verify_fit(path, told=_tell)
+    answer(as_json, verdict.as_dict(), print_again, verdict)
+    return 0 if verdict.identical else 1
+
+
+def info(path: Path, as_json: bool) -> None:
+    """Print a fit's summary as it was saved."""
+    folder = FitFolder(path if path.is_dir() else path.parent)
+    saved = folder.read_result()
+    answer(as_json, saved.as_dict(), print_saved, saved)
+
+
+def _print(result: FitResult, as_json: bool) -> int:
+    answer(as_json, result.as_dict(), print_fit, result)
+    return 0 if result.converged else 1
+
+
+def _tell(line: str) -> None:
+    print(f"fit: {line}", file=sys.stderr, flush=True)

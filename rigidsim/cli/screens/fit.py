@@ -1,0 +1,89 @@
+"""Output of ``rigidsim fit``: values with sigmas, what is undetermined, outliers, residuals of each set."""
+
+from __future__ import annotations
+
+import math
+
+from rigidsim.cli.screens.page import Page, Styled
+from rigidsim.scene.readable import span_text
+from rigidsim.workflows.fit.result import FitResult, FittedData, digits_text
+from rigidsim.workflows.fit.verifying import FitVerdict
+
+_MOST_OUTLIERS = 10
+_CLOSE = 0.95  # correlations from which on two parameters are named together
+_MOST_CLOSE = 6
+
+
+def print_fit(found: FitResult) -> None:
+    """Print a fit."""
+    on = Page()
+    on.say((found.name, "bold"), f"  {found.sentence}")
+    if not found.converged:
+        on.line("warning", "the fit hasn't converged: start nearer, or try several starts", "bold yellow")
+    rows: list[list[Styled]] = []
+    for one in found.parameters:
+        sigma = "undetermined" if one.sigma is None else f"{one.sigma:.2g}"
+        scaled = "" if one.scaled_sigma is None else f"{one.scaled_sigma:.2g}"
+        value = digits_text(one.value, one.sigma or 0.0) if one.sigma else f"{one.value:.6g}"
+        rows.append([one.key, value, sigma, scaled, f"{one.start:.6g}", "" if one.unit == "1" else one.unit])
+    on.table(["parameter", "value", "sigma", "scaled", "start", ""], rows)
+    for unknown in found.undetermined:
+        on.line("unknown", unknown.text, "bold yellow")
+    _tell_correlations(on, found)
+    for effect in found.considered:
+        on.line("consider", f"{effect.key} = {effect.value:.6g} +- {effect.sigma:.2g}, not estimated")
+    on.table(["data", "observable", "used", "rms", "in sigmas"], [_of_data(one) for one in found.data])
+    for outlier in found.outliers[:_MOST_OUTLIERS]:
+        place = f"data {outlier.data}, {outlier.row}, at {span_text(outlier.time)}"
+        on.line("left out", f"{place}: {outlier.observable}, {outlier.sigmas:.3g} sigmas")
+    if len(found.outliers) > _MOST_OUTLIERS:
+        on.line("", f"and {len(found.outliers) - _MOST_OUTLIERS} more")
+    for text in found.told:
+        on.line("note", text)
+    if found.derivatives != "variational equations":
+        on.line("note", f"derivatives by {found.derivatives}")
+    if found.folder:
+        on.line("folder", found.folder)
+
+
+print_saved = print_fit
+
+
+def print_again(verdict: FitVerdict) -> None:
+    """Print what a second fit showed."""
+    on = Page()
+    if verdict.identical:
+        on.say(("identical", "bold"), f"  {verdict.path}: {verdict.variables} variables, every bit")
+        return
+    on.say(("differs", "bold yellow"), f"  {verdict.path}")
+    for text in (*verdict.problems, *(f"variable {name} differs" for name in verdict.differing)):
+        on.line("", text)
+    for text in verdict.environment:
+        on.line("changed", text)
+
+
+def _tell_correlations(on: Page, found: FitResult) -> None:
+    """Pairs that are nearly one: what the data tell of them together is more than of each."""
+    pairs = []
+    for i, row in enumerate(found.correlations):
+        for j, value in enumerate(row[:i]):
+            if value is not None and abs(value) >= _CLOSE:
+                pairs.append(
+                    (abs(value), f"{found.parameters[j].key} and {found.parameters[i].key} {value:.4f}")
+                )
+    if pairs:
+        pairs.sort(reverse=True)
+        on.line("together", "correlations: " + "; ".join(text for _, text in pairs[:_MOST_CLOSE]))
+
+
+def _of_data(one: FittedData) -> list[Styled]:
+    rms = f"{one.rms:.3g} {one.unit}"
+    if one.unit == "rad":
+        rms += f" ({math.degrees(one.rms):.3g} deg)"
+    return [
+        f"{one.number} {one.file}",
+        one.observable,
+        f"{one.used:,} of {one.rows:,}",
+        rms,
+        f"{one.sigmas:.3g}",
+    ]

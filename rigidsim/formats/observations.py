@@ -1,0 +1,151 @@
+"""Tables of observations: columns of numbers or dates by their names, and what the file calls each row."""
+
+from __future__ import annotations
+
+import csv
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from rigidsim.errors import RigidsimError
+from rigidsim.formats.trajectories import KINDS, Trajectory, read_trajectory
+from rigidsim.scene.epochs import Epoch, parse_epoch
+from rigidsim.scene.validation_messages import nearest
+
+_TEXT = {".csv", ".txt", ".dat", ".tsv"}
+_A_DATE = re.compile(r"\d{4}-\d\d-\d\d")
+
+
+@dataclass(frozen=True)
+class Observations:
+    """Columns of one file.
+
+    Attributes:
+        texts: of a text file, by name, as they are written; empty for others.
+        numbers: of others, by name, (rows,) float64.
+        units: as far as the file tells.
+        rows: what each row is called: "line 12".
+        epochs: dates of a message's rows.
+    """
+
+    source: str
+    texts: dict[str, list[str]] = field(default_factory=dict)
+    numbers: dict[str, np.ndarray] = field(default_factory=dict)
+    units: dict[str, str] = field(default_factory=dict)
+    rows: Sequence[str] = ()
+    epochs: tuple[Epoch, ...] = ()
+
+    @property
+    def names(self) -> list[str]:
+        """Names of all columns."""
+        return [*self.texts, *self.numbers]
+
+    def column(self, name: str) -> np.ndarray:
+        """Numbers of a column, (rows,) float64.
+
+        Raises:
+            RigidsimError: there is no such column, or a row holds no finite number.
+        """
+        if name in self.numbers:
+            found = self.numbers[name]
+        else:
+            found = np.array([_number(text) for text in self._texts(name)])
+        bad = np.flatnonzero(~np.isfinite(found))
+        if len(bad):
+            given = f' ("{self.texts[name][bad[0]][:40]}")' if name in self.texts else ""
+            raise RigidsimError(
+                f"{self.source}: {self.rows[bad[0]]}: {name} is no finite number{given}, as in "
+                f"{len(bad):,} of {len(found):,} rows; remove these rows, or write their values"
+            )
+        return found
+
+    def dates(self, name: str, scale: str) -> list[Epoch] | None:
+        """Dates of a column in a time scale; None if it holds numbers.
+
+        Raises:
+            RigidsimError: there is no such column, or a row holds no date.
+        """
+        if self.epochs:
+            return list(self.epochs)
+        if name in self.numbers or not any(_A_DATE.match(text) for text in self._texts(name)):
+            return None
+        found = []
+        for text, row in zip(self._texts(name), self.rows, strict=True):
+            try:
+                found.append(parse_epoch(f"{text.removesuffix('Z')} {scale}"))
+            except ValueError as error:
+                raise RigidsimError(f"{self.source}: {row}: {error}") from None
+        return found
+
+    def _texts(self, name: str) -> list[str]:
+        if name not in self.texts:
+            near = nearest(name, self.names)
+            raise RigidsimError(
+                f'{self.source}: has no column "{name}"{near}; its columns are {", ".join(self.names)[:400]}'
+            )
+        return self.texts[name]
+
+
+def read_observations(path: Path) -> Observations:
+    """Read a table by the kind that its name says.
+
+    Raises:
+        RigidsimError: there is no such file, it is of no known kind, or it can't be read.
+    """
+    if path.is_file() and path.suffix.lower() in _TEXT:
+        return _of_text(path)
+    if not path.exists():
+        raise RigidsimError(f"{path}: there is no such file; allowed: {KINDS}")
+    if path.is_dir() and (path / "dataset.h5").is_file():  # the folder of a run
+        path = path / "dataset.h5"
+    found = read_trajectory(path)
+    rows = [found.row(n) for n in range(_count(found))]
+    return Observations(str(path), {}, dict(found.columns), dict(found.units), rows, found.epochs)
+
+
+def _count(found: Trajectory) -> int:
+    return len(next(iter(found.columns.values()), ()))
+
+
+def _of_text(path: Path) -> Observations:
+    names: list[str] = []
+    columns: list[list[str]] = []
+    rows = []
+    separator = ","
+    try:
+        lines = path.read_text(encoding="utf-8-sig").splitlines()
+    except (OSError, UnicodeDecodeError) as error:
+        raise RigidsimError(f"{path}: can't be read ({error}); save it as UTF-8 text") from None
+    for number, line in enumerate(lines, start=1):
+        if not line.strip() or line.lstrip().startswith("#"):
+            continue
+        if not names:
+            separator = next((c for c in ",;\t" if c in line), " ")
+        cells = [
+            cell.strip() for cell in next(csv.reader([line], delimiter=separator, skipinitialspace=True))
+        ]
+        if not names:
+            names, columns = cells, [[] for _ in cells]
+            if all(np.isfinite(_number(cell)) for cell in cells):
+                raise RigidsimError(f"{path}: line {number} holds numbers; put a line of names above")
+            continue
+        if len(cells) != len(names):
+            raise RigidsimError(
+                f"{path}: line {number} has {len(cells)} values, where the line of names has {len(names)}"
+            )
+        rows.append(f"line {number}")
+        for column, cell in zip(columns, cells, strict=True):
+            column.append(cell)
+    if not rows:
+        raise RigidsimError(f"{path}: no rows; a line of names and rows of values are needed")
+    return Observations(str(path), dict(zip(names, columns, strict=True)), rows=rows)
+
+
+def _number(text: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        return float("nan")

@@ -1,0 +1,221 @@
+"""A fit: residuals, correlations, predicted uncertainty along time as bands, and ellipses of the pole."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib import rc_context
+from matplotlib.axes import Axes
+from matplotlib.colors import to_rgb
+from matplotlib.patches import Ellipse
+
+from rigidsim.look.figures.style import BLUE, GREY, INK, ORANGE, PALE, STYLE, VIOLET, ShownFigure, X, Y, Z
+
+if TYPE_CHECKING:
+    import xarray
+    from matplotlib.figure import Figure
+
+_UNITS = (("s", 1.0), ("h", 3600.0), ("day", 86400.0), ("yr", 31557600.0))
+_LONGEST = 60.0  # of a unit of time that aren't shown in the next one
+_MOST_SETS = 4
+_WITHIN_95 = np.sqrt(-2 * np.log(0.05))  # sigmas of an ellipse that holds 95 % of a plane normal distribution
+_COLORS = (X, Y, Z, ORANGE, VIOLET, GREY)
+_MOST_NUMBERS = 12  # parameters whose correlations are written into their cells
+_EDGES = {"parameters": "", "initial": "", "body": ""}
+
+
+def fitted_figure(dataset: xarray.Dataset) -> Figure:
+    """The figure of a fit's dataset."""
+    with rc_context(STYLE):  # type: ignore[arg-type]
+        sets = [n for n in range(1, 1 + _MOST_SETS) if f"residual_{n}" in dataset]
+        bands = [name for name in ("attitude", "angular_velocity") if f"{name}_sigma" in dataset]
+        rows = len(sets) + len(bands)
+        figure = ShownFigure(figsize=(12.5, max(6.0, 2.1 * rows + 0.8)), layout="constrained")
+        left, right = np.ravel(figure.subfigures(1, 2, width_ratios=[1.3, 1], squeeze=False))
+        unit, length = _time_unit(dataset)
+        panels = left.subplots(rows, 1, sharex=True, squeeze=False)[:, 0]
+        for axes, number in zip(panels, sets, strict=False):
+            _residuals(axes, dataset, number, length)
+        for axes, name in zip(panels[len(sets) :], bands, strict=True):
+            _band(axes, dataset, name, length)
+        panels[-1].set_xlabel(f"time, {unit}")
+        pole = "figure_axis" in dataset and "attitude_covariance" in dataset
+        beside = right.subplots(1 + pole, 1, squeeze=False)[:, 0]
+        _correlations(beside[0], dataset)
+        if pole:
+            _pole(beside[1], dataset, unit, length)
+        figure.suptitle(
+            f"{dataset.attrs.get('title', '')}: {dataset.attrs.get('sentence', '')}", x=0.01, ha="left",
+            fontsize=12.5, fontweight="bold", color=INK,
+        )  # fmt: skip
+    return figure
+
+
+def save_fitted(dataset: xarray.Dataset, path: Path, file_format: str = "png") -> Path:
+    """Draw the figure to a file."""
+    with rc_context(STYLE):  # type: ignore[arg-type]
+        fitted_figure(dataset).savefig(path, dpi=130, format=file_format)
+    return path
+
+
+def _time_unit(dataset: xarray.Dataset) -> tuple[str, float]:
+    times = np.concatenate([x.values for name, x in dataset.coords.items() if str(name).startswith("time_")])
+    span = float(np.ptp(times))
+    return next((x for x in _UNITS if span <= _LONGEST * x[1]), _UNITS[-1])
+
+
+def _residuals(axes: Axes, dataset: xarray.Dataset, number: int, length: float) -> None:
+    """Residuals in their sigmas; rows that were left out as crosses, at the edge where they are far off."""
+    residuals = (dataset[f"residual_{number}"] / dataset[f"residual_sigma_{number}"]).values
+    times = dataset[f"time_{number}"].values / length
+    used = dataset[f"used_{number}"].values.astype(bool)
+    observable = str(dataset[f"residual_{number}"].attrs["observable"])
+    labels = [str(x).removeprefix(f"{observable}_") for x in dataset[f"component_{number}"].values]
+    top = max(4.0, 1.15 * float(np.abs(residuals[used]).max(initial=0.0)))
+    for share, shade in ((3, "#f1f5fa"), (1, "#dfe9f5")):
+        axes.axhspan(-share, share, color=shade, zorder=0)
+    size = 16 if len(times) < 300 else 4
+    for n, (label, color) in enumerate(zip(labels, _COLORS, strict=False)):
+        axes.scatter(times[used], residuals[used, n], s=size, color=color, label=label, linewidths=0)
+        left = np.clip(residuals[~used, n], -0.92 * top, 0.92 * top)
+        axes.scatter(times[~used], left, s=34, marker="x", color=color, linewidths=1.2)
+    axes.set_ylim(-top, top)
+    axes.set_ylabel("sigmas")
+    left_out = int((~used).sum())
+    more = f", {left_out} left out (crosses)" if left_out else ""
+    axes.set_title(f"residuals of {dataset[f'residual_{number}'].attrs['long_name']}{more}")
+    _above(axes, len(labels))
+
+
+def _band(axes: Axes, dataset: xarray.Dataset, name: str, length: float) -> None:
+    """One and two standard deviations of a prediction, to either side."""
+    sigma = dataset[f"{name}_sigma"].values
+    times = dataset["time"].values / length
+    unit, factor = _readable(sigma, name)
+    labels = [str(x) for x in dataset[dataset[f"{name}_sigma"].dims[1]].values]
+    for n, (label, color) in enumerate(zip(labels, _COLORS, strict=False)):
+        for times_sigma, alpha in ((2, 0.10), (1, 0.22)):
+            half = times_sigma * sigma[:, n] * factor
+            axes.fill_between(times, -half, half, color=color, alpha=alpha, linewidth=0)
+        for sign in (-1, 1):
+            axes.plot(times, sign * sigma[:, n] * factor, color=color, linewidth=0.9,
+                      label=label if sign > 0 else None)  # fmt: skip
+    for key, found in dataset.coords.items():
+        if str(key).startswith("time_"):
+            axes.plot(found.values / length, np.zeros(found.size), "|", color=INK, markersize=5, alpha=0.5)
+    axes.set_ylabel(unit)
+    where = "space axes" if name == "attitude" else "body axes"
+    if np.isfinite(sigma).any():
+        axes.set_title(f"predicted {name.replace('_', ' ')} ({where}): 1 and 2 sigmas")
+        _above(axes, len(labels))
+    else:
+        axes.set_title(f"uncertainty of the {name.replace('_', ' ')}: unbounded, by undetermined parameters")
+
+
+def _above(axes: Axes, count: int) -> None:
+    """A key beside the title, where it hides nothing."""
+    axes.legend(
+        loc="lower right", bbox_to_anchor=(1.0, 0.98), ncols=count, handlelength=1.0, handletextpad=0.3,
+        columnspacing=0.8, borderpad=0.1,
+    )  # fmt: skip
+
+
+def _readable(sigma: np.ndarray, name: str) -> tuple[str, float]:
+    """A unit in which values are read easily, and the factor to it."""
+    largest = float(np.nanmax(sigma, initial=0.0))
+    if name == "attitude":
+        for unit, factor in (("deg", 180 / np.pi), ("arcsec", 648000 / np.pi), ("mas", 648e6 / np.pi)):
+            if largest * factor > 0.05:
+                return unit, factor
+        return "uas", 648e9 / np.pi
+    return ("deg/s", 180 / np.pi) if largest > 1e-4 else ("deg/day", 86400 * 180 / np.pi)
+
+
+def _correlations(axes: Axes, dataset: xarray.Dataset) -> None:
+    names = [_short(str(x)) for x in dataset["parameter"].values]
+    values = dataset["correlation"].values
+    image = axes.imshow(values, cmap="RdBu_r", vmin=-1, vmax=1)
+    axes.set_facecolor(PALE)
+    axes.grid(visible=False)
+    axes.set_xticks(range(len(names)), names, rotation=40, ha="right")
+    axes.set_yticks(range(len(names)), names)
+    if len(names) <= _MOST_NUMBERS:
+        for i, row in enumerate(values):
+            for j, value in enumerate(row):
+                text = (
+                    "?" if not np.isfinite(value) else f"{value:.2f}".replace("-0.", "-.").replace("0.", ".")
+                )
+                color = "white" if abs(value) > 0.6 else INK
+                axes.text(j, i, text, ha="center", va="center", fontsize=7, color=color)
+    unknown = " (? undetermined)" if not np.isfinite(values).all() else ""
+    axes.set_title(f"correlations{unknown}")
+    axes.figure.colorbar(image, ax=axes, shrink=0.7)
+
+
+def _short(key: str) -> str:
+    """A key without the name of its table."""
+    table, dot, rest = key.partition(".")
+    return rest if dot and table in _EDGES else key
+
+
+def _pole(axes: Axes, dataset: xarray.Dataset, unit: str, length: float) -> None:
+    """Ellipses of the figure axis, about where it is predicted, seen from outside: the first and last
+    observation, and where it is known best.
+    """
+    axis, covariances = dataset["figure_axis"].values, dataset["attitude_covariance"].values
+    times = dataset["time"].values
+    observed = np.concatenate([x.values for n, x in dataset.coords.items() if str(n).startswith("time_")])
+    tangents = [_tangent(a, c) for a, c in zip(axis, covariances, strict=True)]
+    sizes = np.array([np.trace(x) for x in tangents])
+    if not np.isfinite(sizes).any():
+        axes.set_axis_off()
+        axes.set_title("pole: unbounded, by undetermined parameters")
+        return
+    inside = (times >= observed.min()) & (times <= observed.max())
+    best = int(np.nanargmin(np.where(inside, sizes, np.inf))) if inside.any() else int(np.nanargmin(sizes))
+    first, last = (int(np.argmin(np.abs(times - t))) for t in (observed.min(), observed.max()))
+    name, factor = _readable(np.sqrt(sizes[[first, best, last]]), "attitude")
+    reach = 0.0
+    for index, color in {first: ORANGE, last: BLUE, best: Y}.items():
+        values, vectors = np.linalg.eigh(tangents[index])
+        angle = float(np.degrees(np.arctan2(vectors[1, 1], vectors[0, 1])))
+        wide, narrow = (np.sqrt(max(x, 0.0)) * factor for x in values[::-1])
+        label = f"at {times[index] / length:.4g} {unit}"
+        for scale, alpha, line in ((1.0, 0.30, 0.0), (_WITHIN_95, 0.0, 1.2)):
+            axes.add_patch(
+                Ellipse(
+                    (0, 0),
+                    2 * scale * wide,
+                    2 * scale * narrow,
+                    angle=angle,
+                    facecolor=(*to_rgb(color), alpha),
+                    edgecolor=color if line else "none",
+                    linewidth=line,
+                    label=label if line else None,
+                )
+            )
+        reach = max(reach, _WITHIN_95 * wide)
+    if not reach:
+        axes.set_axis_off()
+        axes.set_title("pole: none of the parameters moves it")
+        return
+    axes.axhline(0, color=PALE, linewidth=0.8)
+    axes.axvline(0, color=PALE, linewidth=0.8)
+    axes.set_xlim(-1.3 * reach, 1.3 * reach)
+    axes.set_ylim(-1.3 * reach, 1.3 * reach)
+    axes.set_aspect("equal")
+    axes.set_xlabel(f"east of the predicted pole, {name}")
+    axes.set_ylabel(f"north, {name}")
+    axes.set_title("pole: 1 sigma filled, 95 % outlined")
+    axes.legend(loc="upper right")
+
+
+def _tangent(axis: np.ndarray, covariance: np.ndarray) -> np.ndarray:
+    """Covariance (2, 2), rad^2, of a direction by that of the attitude, east and north about space Z."""
+    east = np.cross([0.0, 0.0, 1.0], axis)
+    east = np.array([0.0, 1.0, 0.0]) if np.linalg.norm(east) < 1e-9 else east / np.linalg.norm(east)
+    north = np.cross(axis, east)
+    moved = np.stack([np.cross(axis, east), np.cross(axis, north)])  # (turn x axis).east = turn.(axis x east)
+    return np.asarray(moved @ covariance @ moved.T)

@@ -1,0 +1,216 @@
+"""Weighted least squares: damped Gauss-Newton steps, covariances, and what the data leave undetermined.
+
+Levenberg (1944) and Marquardt (1963), in columns scaled to norm one. Covariances with considered parameters:
+Tapley, Schutz and Born 2004, Statistical Orbit Determination, section 6.2 (eqs. 6.2.9 and 6.3.15 ff.).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, Protocol
+
+import numpy as np
+
+SINGULAR = 1e-7
+"""Singular values of scaled columns below this share of the largest are taken for zero: correlations that
+differ from one by less than its square are rounding in the derivatives.
+"""
+WITHIN = 1e-3
+"""A fit has converged once its next step is shorter than so many sigmas."""
+MOST_ITERATIONS = 100
+_FIRST_DAMPING, _AFTER_FAILURE = 1e-6, 1e-3
+_LARGEST_DAMPING = 1e12
+_LEAST_DAMPING = 1e-12
+_CALM = 3  # steps in a row that didn't fail, after which damping falls fast
+_SHORTER = 0.1  # of a step: the next one may have the same derivatives
+_ROUNDED = 1e-11  # relative change of a sum of squares that rounding makes
+
+
+@dataclass(frozen=True)
+class Linear:
+    """A fit linearised at some values; rows are in units of their sigmas.
+
+    Attributes:
+        residuals: (rows,) observed less computed. slopes: (rows, estimated). considered: (rows, considered).
+        noise: (estimated,) norms of columns below which they tell nothing.
+        pull: (estimated,) prior value less value. weights: (estimated,) 1/sigma of the prior; 0 for none.
+    """
+
+    residuals: np.ndarray
+    slopes: np.ndarray
+    considered: np.ndarray
+    noise: np.ndarray
+    pull: np.ndarray
+    weights: np.ndarray
+
+    @cached_property
+    def cost(self) -> float:
+        """Sum of squares, with the priors'."""
+        return float(self.residuals @ self.residuals + np.sum((self.weights * self.pull) ** 2))
+
+
+class Solution:
+    """Steps and covariances of a linearised fit, by singular values of its scaled columns.
+
+    Attributes:
+        null: (directions, estimated) that nothing determines, in scaled numbers; rows of norm one.
+        scales: (estimated,) norms of the columns, with the priors; 1 for those without effect.
+    """
+
+    def __init__(self, linear: Linear) -> None:
+        known = linear.weights > 0
+        matrix = np.concatenate([linear.slopes, np.diag(linear.weights)[known]])
+        right = np.concatenate([linear.residuals, (linear.weights * linear.pull)[known]])
+        norms = np.linalg.norm(matrix, axis=0)
+        empty = norms <= 10 * linear.noise
+        self.scales = np.where(empty, 1.0, norms)
+        triangle: Any = np.linalg.qr(
+            np.concatenate([np.where(empty, 0.0, matrix / self.scales), right[:, None]], axis=1), mode="r"
+        )
+        count = matrix.shape[1]
+        self._left, values, right_vectors = np.linalg.svd(triangle[:, :count], full_matrices=True)
+        if len(values) < count:  # fewer rows than numbers
+            values = np.append(values, np.zeros(count - len(values)))
+        rounding = 10 * np.max(np.where(empty, 0.0, linear.noise / self.scales), initial=0.0)
+        least = max(SINGULAR, rounding) * max(float(values[0]), 1e-300)
+        self._kept = values > least
+        self._values = values
+        self._vectors = right_vectors
+        self.null = right_vectors[~self._kept]
+        reduced = self._left.T @ triangle[:, count]
+        self._reduced = np.zeros(count)
+        self._reduced[: min(count, len(reduced))] = reduced[:count]
+
+    @property
+    def step_sigmas(self) -> float:
+        """Length of the undamped step, in sigmas of the estimate."""
+        return float(np.linalg.norm(self._reduced[self._kept]))
+
+    def step(self, damping: float) -> np.ndarray:
+        """The damped step, (estimated,); nothing moves along undetermined directions."""
+        values = self._values[self._kept]
+        parts = values / (values**2 + damping) * self._reduced[self._kept]
+        return np.asarray(self._vectors[self._kept].T @ parts / self.scales)
+
+    @property
+    def covariance(self) -> np.ndarray:
+        """(estimated, estimated), without undetermined directions."""
+        half = self._vectors[self._kept].T / self._values[self._kept] / self.scales[:, None]
+        return np.asarray(half @ half.T)
+
+
+def consider_covariance(
+    linear: Linear, solution: Solution, considered: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Covariance of all numbers, estimated ones first, with the considered ones' sigmas; and the sensitivity
+    of the estimate to these.
+
+    P = M + S C S', S = -M H' Hc, cov(x, c) = S C, with M the covariance of the data and priors alone, C that
+    of the considered (Tapley, Schutz and Born, eqs. 6.3.22 to 6.3.27).
+    """
+    formal = solution.covariance
+    sensitivity = -formal @ (linear.slopes.T @ linear.considered)
+    own = np.diag(considered**2)
+    cross = sensitivity @ own
+    return np.block([[formal + cross @ sensitivity.T, cross], [cross.T, own]]), sensitivity
+
+
+@dataclass(frozen=True)
+class Ended:
+    """Where an iteration ended.
+
+    Attributes:
+        values: (estimated,). iterations: evaluations of the motion.
+    """
+
+    values: np.ndarray
+    linear: Linear
+    solution: Solution
+    converged: bool
+    iterations: int
+
+
+class Linearised(Protocol):
+    """The fit at some values, with derivatives there if they are to be ``fresh``, otherwise with the latest;
+    None where the motion can't be computed.
+    """
+
+    def __call__(self, values: np.ndarray, fresh: bool = True) -> Linear | None:
+        """See the class."""
+
+
+def iterate(
+    begin: np.ndarray,
+    linearised: Linearised,
+    told: Callable[[int, float, float], None] = lambda iteration, cost, step: None,
+    most: int = MOST_ITERATIONS,
+) -> Ended | None:
+    """Damped Gauss-Newton steps until they are shorter than ``WITHIN`` sigmas.
+
+    Derivatives cost several times as much as a motion: they are worked out anew where the next step hasn't
+    become much shorter, and at the end.
+
+    Args:
+        begin: (estimated,) first values.
+        told: receives number, cost and undamped step (sigmas) of each iteration.
+
+    Returns:
+        Where it ended; None if the motion can't be computed at the first values.
+    """
+    values, linear, fresh = np.array(begin, dtype=float), linearised(begin), True
+    if linear is None:
+        return None
+    damping, iterations, growth, calm, settled = _FIRST_DAMPING, 1, 2.0, _CALM, False
+    solution = Solution(linear)
+    told(iterations, linear.cost, solution.step_sigmas)
+    while iterations < most and damping < _LARGEST_DAMPING:
+        settled = settled or solution.step_sigmas <= WITHIN
+        if settled and fresh:
+            break
+        if settled:
+            trial, step = linearised(values), np.zeros_like(values)
+        else:
+            step = solution.step(damping)
+            trial = None if (values + step == values).all() else linearised(values + step, fresh=False)
+        iterations += 1
+        if settled or trial is None or trial.cost >= linear.cost:
+            if not fresh:  # perhaps it is the old derivatives
+                again = trial if settled else linearised(values)
+                assert again is not None  # the motion was computed there
+                linear, fresh, settled = again, True, False
+                solution = Solution(linear)
+                told(iterations, linear.cost, solution.step_sigmas)
+                continue
+            if trial is not None and trial.cost <= linear.cost * (1 + _ROUNDED):
+                settled = True  # rounding is all that changes any more
+                continue
+            damping, growth, calm = max(damping, _AFTER_FAILURE) * growth, 2 * growth, 0
+            continue
+        gained = (linear.cost - trial.cost) / max(_foreseen(linear, step), 1e-300)
+        before = solution.step_sigmas
+        values, linear, fresh = values + step, trial, False
+        calm += 1
+        least = 1e-2 if calm > _CALM else 1 / 3  # just after a step that failed, not back to where it did
+        damping = 0.0 if damping < _LEAST_DAMPING else damping * max(least, 1 - (2 * gained - 1) ** 3)
+        growth = 2.0
+        solution = Solution(linear)
+        if _SHORTER * before < solution.step_sigmas:
+            again = linearised(values)
+            assert again is not None
+            linear, fresh = again, True
+            solution = Solution(linear)
+        told(iterations, linear.cost, solution.step_sigmas)
+    if not fresh:
+        again = linearised(values)
+        assert again is not None
+        linear, solution = again, Solution(again)
+    return Ended(values, linear, solution, settled or solution.step_sigmas <= WITHIN, iterations)
+
+
+def _foreseen(linear: Linear, step: np.ndarray) -> float:
+    """By how much a step would lower the cost if the fit were linear."""
+    left = linear.residuals - linear.slopes @ step
+    prior = linear.weights * (linear.pull - step)
+    return linear.cost - float(left @ left + prior @ prior)

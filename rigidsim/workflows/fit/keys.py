@@ -1,0 +1,179 @@
+"""The parameters of a fit: keys of the config as single numbers, and the experiment at other values."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from rigidsim.errors import ConfigError, Problem
+from rigidsim.scene.config import Experiment, validated
+from rigidsim.scene.exact import Quantity, parse_number, parse_quantity
+from rigidsim.scene.fit_table import KnownWithin
+from rigidsim.scene.scene import Scene, build_scene
+from rigidsim.scene.toml_text import apply_overrides, parse_toml
+from rigidsim.scene.units import powers, unit_text
+from rigidsim.scene.validation_messages import shown
+from rigidsim.scene.varied_keys import ATTITUDE, VariedKey, varied_keys
+from rigidsim.workflows.compare.rotations import multiplied, of_vector
+
+_FORMS = ("euler_angles", "pole", "prime_meridian", "obliquity", "node_longitude")
+
+
+@dataclass(frozen=True)
+class FitKey:
+    """One number that is estimated or considered.
+
+    Attributes:
+        key: dotted, with its index: ``initial.angular_velocity[2]``.
+        unit: SI unit of its values, "1" for none.
+        start: the config's value, SI. sigma: known beforehand, SI; None for nothing.
+        suffix: unit with which values are written into the config, where they have one there.
+        places: keys of the config where it stands. size: against which changes of it are small or not.
+    """
+
+    key: str
+    unit: str
+    start: float
+    sigma: float | None = None
+    suffix: str = ""
+    places: tuple[str, ...] = ()
+    size: float = 1.0
+
+
+class FitKeys:
+    """All numbers of a fit, estimated ones first, each in the order of the config.
+
+    Attributes:
+        estimated: those of ``[fit] parameters``. considered: those of ``[fit] consider``.
+    """
+
+    def __init__(self, experiment: Experiment) -> None:
+        table = experiment.config.fit
+        if table is None:
+            what = "missing; it names parameters and data, see docs/fits.md"
+            raise ConfigError(Problem("[fit]", what), experiment.source)
+        self._experiment = experiment
+        self._tables = parse_toml(experiment.text, experiment.source)
+        self._scene = build_scene(experiment)
+        self._problems: list[Problem] = []
+        self.estimated = self._all("parameters", table.parameters, table.prior)
+        self.considered = self._all("consider", list(table.consider), table.consider)
+        self._refuse_rest(table.prior)
+        if self._problems:
+            raise ConfigError(self._problems, experiment.source)
+        self._turned = any(one.key.startswith(ATTITUDE) for one in self.all)
+
+    @property
+    def all(self) -> tuple[FitKey, ...]:
+        """Estimated ones, then considered ones."""
+        return (*self.estimated, *self.considered)
+
+    @property
+    def scene(self) -> Scene:
+        """The scene of the config's values."""
+        return self._scene
+
+    # --- reading --------------------------------------------------------------------------------------------
+
+    def _all(self, where: str, keys: Sequence[str], sigmas: Mapping[str, KnownWithin]) -> tuple[FitKey, ...]:
+        found: list[FitKey] = []
+        for key in keys:
+            try:
+                for index, one in enumerate(varied_keys(self._experiment, [key], f"[fit] {where}")):
+                    found.append(self._one(one, _sigma(sigmas, one, key, index)))
+            except ValueError as error:
+                self._problems.append(Problem(f'[fit] {where} "{key[:60]}"', str(error)))
+            except ConfigError as error:
+                self._problems += error.problems
+        names = [one.key for one in found]
+        for name in sorted({name for name in names if names.count(name) > 1}):
+            self._problems.append(Problem(f"[fit] {where}", f'"{name}" is given twice; give it once'))
+        return tuple(found)
+
+    def _one(self, varied: VariedKey, sigma: float | None) -> FitKey:
+        suffix, unit = "", varied.unit
+        table, _, name = varied.name.partition(".")
+        given = self._experiment.config.parameters.get(name) if table == "parameters" else None
+        if isinstance(given, Quantity):  # constants of expressions have units of their own
+            found = unit_text(powers(given.unit)) or "rad"
+            suffix = unit = f"rad{found[1:]}" if found.startswith("1/") else found
+        places = [written_key(place) for place in varied.places]
+        size = abs(float(varied.number)) or abs(float(varied.size)) or 1.0
+        return FitKey(varied.name, unit, float(varied.number), sigma, suffix, tuple(places), size)
+
+    def _refuse_rest(self, prior: Mapping[str, KnownWithin]) -> None:
+        """A prior of something that isn't estimated would be without effect."""
+        known = {one.key for one in self.estimated}
+        known |= {key.rpartition("[")[0] for key in known}
+        for key in prior:
+            if key.replace(" ", "") not in known:
+                what = "is not among the parameters; name it there, or remove its prior"
+                self._problems.append(Problem(f'[fit] prior."{key[:60]}"', what))
+
+    # --- other values ---------------------------------------------------------------------------------------
+
+    def overrides(self, values: Sequence[float] | np.ndarray) -> list[str]:
+        """``KEY=VALUE`` texts of values in the order of ``all``, every digit of the doubles written."""
+        found = []
+        turn = np.zeros(3)
+        for one, value in zip(self.all, values, strict=True):
+            if one.key.startswith(ATTITUDE):
+                turn[int(one.key[-2])] = value
+            else:
+                number = repr(float(value))
+                text = f'"{number} {one.suffix}"' if one.suffix else number
+                found += [f"{place}={text}" for place in one.places]
+        return [*(self._start(turn) if self._turned else ()), *found]
+
+    def _start(self, turn: np.ndarray) -> list[str]:
+        """The attitude at the start turned by a rotation vector, instead of whatever gives it."""
+        initial = self._scene.config.initial
+        given = np.array([float(x) for x in self._scene.quaternion])
+        quaternion = multiplied(given[None, :], of_vector(turn[None, :]))[0]
+        texts = [f"initial.{name}=" for name in _FORMS if getattr(initial, name) is not None]
+        if initial.spin_period is not None:
+            rates = ", ".join(repr(float(w)) for w in self._scene.angular_velocity)
+            texts += ["initial.spin_period=", f"initial.angular_velocity=[{rates}]"]
+        shown_values = ", ".join(repr(float(x)) for x in quaternion)
+        return [*texts, f"initial.quaternion=[{shown_values}]"]
+
+    def experiment(self, values: Sequence[float] | np.ndarray, base: Experiment) -> Experiment:
+        """An experiment at other values, without a text of its own: for runs that nobody keeps."""
+        tables = copy.deepcopy(self._tables)
+        apply_overrides(tables, self.overrides(values), "fit")
+        return replace(base, config=validated(tables, base.source))
+
+    def fitted(self, values: Sequence[float] | np.ndarray) -> Experiment:
+        """The config with estimated values written in, and without ``[fit]``."""
+        everything = [*values, *(one.start for one in self.considered)]
+        return self._experiment.having(["fit=", *self.overrides(everything)])
+
+
+def written_key(place: Sequence[str | int]) -> str:
+    """A key of such steps, as it is given to replace a value."""
+    parts = [f"[{step}]" if isinstance(step, int) else f'."{step}"' for step in place]
+    return (
+        "".join(parts)[1:].replace('"', "") if all("." not in str(x) for x in place) else "".join(parts)[1:]
+    )
+
+
+def _sigma(sigmas: Mapping[str, KnownWithin], varied: VariedKey, key: str, index: int) -> float | None:
+    """What is known beforehand of a number, by its own key or by that of its vector, SI."""
+    plain = {name.replace(" ", ""): table for name, table in sigmas.items()}
+    table = (
+        plain.get(varied.name) or plain.get(key.replace(" ", "")) or plain.get(varied.name.rpartition("[")[0])
+    )
+    if table is None:
+        return None
+    given = table.sigma
+    if isinstance(given, list):
+        if index >= len(given):
+            raise ValueError(f"given {shown(given)} as sigma; one for each component is needed")
+        given = given[index]
+    number = parse_quantity(given) if varied.unit == "1" else parse_number(given, varied.unit)
+    if not float(number) > 0:
+        raise ValueError(f"given {shown(given)} as sigma; a standard deviation above zero is allowed")
+    return float(number)

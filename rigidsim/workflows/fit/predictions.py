@@ -1,0 +1,274 @@
+"""What an experiment predicts at given times, and how that changes with the numbers that are fitted."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from fractions import Fraction
+from typing import Any, Protocol
+
+import numpy as np
+
+from rigidsim.errors import ConfigError, RigidsimError
+from rigidsim.scene.choices import DEFAULT_METHOD
+from rigidsim.scene.config import Experiment
+from rigidsim.scene.exact import ExactNumber
+from rigidsim.scene.sample_times import Time
+from rigidsim.scene.schema import Config
+from rigidsim.solve.differentiable import parametrised, refuse_without_derivatives
+from rigidsim.solve.problem import prepare
+from rigidsim.solve.tangent_lanes import TangentLanes, fits_lanes
+from rigidsim.solve.variational import LostTangents, turned
+from rigidsim.workflows.compare.rotations import conjugated, multiplied, normalised, vector_of
+from rigidsim.workflows.fit.keys import FitKeys
+from rigidsim.workflows.fit.observed import QUATERNION, Observed, recording
+from rigidsim.workflows.run import run
+from rigidsim.workflows.sensitivity import Tangents
+
+CHANGE = 1e-4
+"""Change of what is observed (of attitudes in rad, of others relative to their size) that the steps of
+central differences make: what is cut off and the rounding of double runs are a share of 1e-8 of it each.
+"""
+ALONG = ("quaternion", "angular_velocity", "position")
+"""What is predicted along the whole run."""
+_ROUNDING = 1e-12  # of runs in double precision, relative to the size of what is observed
+_FIRST = 1e-4  # first steps, relative to the size of each number
+
+
+class NotPredicted(RigidsimError):
+    """The motion at these values ends before the last observation, or has no finite values there."""
+
+
+@dataclass
+class Prediction:
+    """Predictions at some times.
+
+    Attributes:
+        values: by variable, (times, components), SI; quaternions for attitudes.
+        slopes: by variable, (times, components, numbers) derivatives; of attitudes by rotation vectors in
+            space axes, rad, (times, 3, numbers).
+        noise: by variable, (numbers,): of slopes, below which they tell nothing.
+    """
+
+    values: dict[str, np.ndarray]
+    slopes: dict[str, np.ndarray] = field(default_factory=dict)
+    noise: dict[str, np.ndarray] = field(default_factory=dict)
+
+
+class Predictor(Protocol):
+    """Something that predicts; ``how`` says in words where its derivatives come from."""
+
+    how: str
+
+    def at(self, values: Sequence[float], times: np.ndarray, *, slopes: bool = True) -> Prediction:
+        """Predictions, with derivatives if these are asked for, at ascending times (s).
+
+        Raises:
+            NotPredicted: the motion doesn't get there.
+        """
+
+    def along(self, values: Sequence[float], times: np.ndarray) -> Prediction:
+        """The same of attitude, angular velocity and position, as far as the scene has them."""
+
+
+class ByDifferences:
+    """Runs of the experiment, and central differences between them."""
+
+    how = "central differences of runs"
+
+    def __init__(self, keys: FitKeys, quiet: Experiment, quantities: Sequence[Observed]) -> None:
+        self._keys, self._quiet = keys, quiet
+        self._variables = {one.variable: one for one in quantities}
+        self._steps = _FIRST * np.array([one.size for one in keys.all])
+        self._adapted = False
+
+    def at(self, values: Sequence[float], times: np.ndarray, *, slopes: bool = True) -> Prediction:
+        """See ``Predictor.at``."""
+        centre = self.values(values, times)
+        if not slopes:
+            return Prediction(centre)
+        found = self._differences(values, times, centre)
+        if not self._adapted:
+            self._adapt(found)
+            found = self._differences(values, times, centre)
+        return found
+
+    def along(self, values: Sequence[float], times: np.ndarray) -> Prediction:
+        """See ``Predictor.along``."""
+        names = []
+        for name in ALONG:
+            try:
+                prepare(recording(self._quiet, [name]))
+            except ConfigError:
+                continue
+            names.append(name)
+        if not names:
+            return Prediction({})
+        forms = {"quaternion": "quaternion"}
+        found = [Observed(name, name, forms.get(name, "plain"), (), None) for name in names]
+        return ByDifferences(self._keys, recording(self._quiet, names), found).at(values, times)
+
+    def values(self, values: Sequence[float] | np.ndarray, times: np.ndarray) -> dict[str, np.ndarray]:
+        """Predictions alone."""
+        listed = [ExactNumber(Fraction(time)) for time in times.tolist()]
+        try:
+            changed = self._keys.experiment(values, self._quiet)
+            table = changed.config.time.model_copy(
+                update={"times": listed, "end": None, "samples": None, "every": None}
+            )
+            changed = replace(changed, config=_quiet_like(changed, self._quiet, table))
+            made = run(changed, out=None, progress=False)
+        except ConfigError as error:
+            raise NotPredicted(f"the experiment can't be run at these values: {error}") from None
+        dataset = made.dataset
+        if dataset.sizes["time"] != len(times):
+            raise NotPredicted(f"the motion {made.outcome.message} before the last observation")
+        found = {}
+        for name in self._variables:
+            value = dataset[name].values
+            found[name] = value.reshape(len(times), -1)
+            if not np.isfinite(found[name]).all():
+                raise NotPredicted(f"{name} has no finite value at each observation")
+        return found
+
+    def _differences(
+        self, values: Sequence[float], times: np.ndarray, centre: dict[str, np.ndarray]
+    ) -> Prediction:
+        found = Prediction(centre)
+        slopes: dict[str, list[np.ndarray]] = {name: [] for name in self._variables}
+        for n, step in enumerate(self._steps):
+            ends = []
+            for sign in (-1, 1):
+                moved = np.array(values, dtype=float)
+                moved[n] += sign * step
+                ends.append((moved[n], self.values(moved, times)))
+            width = ends[1][0] - ends[0][0]
+            for name, one in self._variables.items():
+                before, after = ends[0][1][name], ends[1][1][name]
+                slopes[name].append(difference(one, before, after) / width)
+        for name, parts in slopes.items():
+            found.slopes[name] = np.stack(parts, axis=2)
+            size = self._size(name, centre)
+            found.noise[name] = _ROUNDING * size / self._steps
+        return found
+
+    def _size(self, name: str, centre: dict[str, np.ndarray]) -> float:
+        one = self._variables[name]
+        return 1.0 if one.rotation or one.form == "angle" else float(np.abs(centre[name]).max()) or 1.0
+
+    def _adapt(self, found: Prediction) -> None:
+        """Steps that change what is observed by ``CHANGE``."""
+        for n, step in enumerate(self._steps):
+            largest = max(
+                float(np.abs(found.slopes[name][:, :, n]).max()) / self._size(name, found.values)
+                for name in self._variables
+            )
+            wanted = CHANGE / largest if largest > 0 else np.inf
+            self._steps[n] = min(max(wanted, 1e-4 * step), 100 * step)
+        self._adapted = True
+
+
+class ByTangents:
+    """Variational equations beside the motion, compiled once for all values: side by side where a motion
+    allows it, otherwise one step after the other.
+    """
+
+    how = "variational equations"
+
+    def __init__(self, keys: FitKeys, quiet: Experiment, quantities: Sequence[Observed]) -> None:
+        self._names = list(dict.fromkeys(one.variable for one in quantities))
+        self._keys = [one.key for one in keys.all]
+        self._sizes = np.array([one.size for one in keys.all])
+        integrator = quiet.config.integrator.model_copy(update={"method": DEFAULT_METHOD})
+        stepping = replace(quiet, config=quiet.config.model_copy(update={"integrator": integrator}))
+        prepared = prepare(stepping)
+        refuse_without_derivatives(
+            prepared.scene, prepared.system, has_steps=prepared.has_steps, where="[fit] parameters"
+        )
+        made = parametrised(stepping, self._keys, (), "[fit] parameters", self._names)
+        self._source: TangentLanes | Tangents
+        if fits_lanes(made, prepared.precision):
+            self._source, self._made = TangentLanes(made), made
+            self._at = list(made.values)
+        else:
+            self._source = Tangents(stepping, self._keys, record=self._names)
+
+    def at(self, values: Sequence[float], times: np.ndarray, *, slopes: bool = True) -> Prediction:
+        """See ``Predictor.at``."""
+        every = self._every(values, times, slopes)
+        names = dict.fromkeys([*self._names, *(name for name in ALONG if name in every)])
+        return self._predicted({name: every[name] for name in names})
+
+    def along(self, values: Sequence[float], times: np.ndarray) -> Prediction:
+        """See ``Predictor.along``."""
+        return self.at(values, times)
+
+    def _every(self, values: Sequence[float], times: np.ndarray, slopes: bool) -> dict[str, tuple[Any, Any]]:
+        """Values and derivatives, (n, keys, components), of all that there is; without derivatives, None."""
+        try:
+            if isinstance(self._source, TangentLanes):
+                return self._by_lanes(values, times, slopes)
+            given = {key: float(value) for key, value in zip(self._keys, values, strict=True)}
+            found = self._source.at(given, times)
+        except LostTangents as error:
+            raise NotPredicted(f"{error}") from None
+        except ConfigError as error:
+            raise NotPredicted("; ".join(problem.what for problem in error.problems)) from None
+        every = {
+            "quaternion": (found.attitude, found.d_attitude),
+            "angular_velocity": (found.angular_velocity, found.d_angular_velocity),
+            "position": (found.position, found.d_position),
+            "velocity": (found.velocity, found.d_velocity),
+            **found.extra,
+        }
+        return {name: parts for name, parts in every.items() if parts[0] is not None}
+
+    def _by_lanes(
+        self, values: Sequence[float], times: np.ndarray, slopes: bool
+    ) -> dict[str, tuple[np.ndarray, np.ndarray | None]]:
+        wanted = [Fraction(float(value)) for value in values]
+        if wanted == self._at:
+            return self._rows(times, slopes)
+        self._at = wanted
+        coefficients = self._made.at(wanted)
+        if coefficients is None:  # the equations have another form here
+            self._made = self._made.made_at(wanted)
+            self._source = TangentLanes(self._made)
+        else:
+            assert isinstance(self._source, TangentLanes)
+            self._source.use(coefficients)
+        return self._rows(times, slopes)
+
+    def _rows(self, times: np.ndarray, slopes: bool) -> dict[str, tuple[np.ndarray, np.ndarray | None]]:
+        assert isinstance(self._source, TangentLanes)
+        rows = self._source.rows(np.ldexp(times, -self._made.plain.scaling.time), slopes=slopes)
+        found = {name: (value, rows.slopes.get(name)) for name, value in rows.values.items()}
+        quaternion = found["quaternion"][0]
+        turning = turned(quaternion, rows.slopes["quaternion"]) if slopes else None
+        return {**found, "quaternion": (normalised(quaternion), turning)}
+
+    def _predicted(self, every: Mapping[str, tuple[Any, Any]]) -> Prediction:
+        made = Prediction({})
+        for name, (value, slopes) in every.items():
+            if not (np.isfinite(value).all() and (slopes is None or np.isfinite(slopes).all())):
+                raise NotPredicted(f"{name} has no finite value at each observation")
+            made.values[name] = value
+            if slopes is not None:
+                made.slopes[name] = np.ascontiguousarray(slopes.transpose(0, 2, 1))
+                size = 1.0 if name == QUATERNION else float(np.abs(value).max()) or 1.0
+                made.noise[name] = _ROUNDING * size / self._sizes
+        return made
+
+
+def difference(quantity: Observed, one: np.ndarray, other: np.ndarray) -> np.ndarray:
+    """From one value to another, (rows, components); of attitudes the rotation vector in space axes."""
+    if quantity.rotation:
+        return vector_of(multiplied(other, conjugated(one)))
+    apart = other - one
+    return np.asarray(np.remainder(apart + np.pi, 2 * np.pi) - np.pi) if quantity.form == "angle" else apart
+
+
+def _quiet_like(changed: Experiment, quiet: Experiment, time: Time) -> Config:
+    """The config of changed values with what is recorded of another."""
+    kept = {name: getattr(quiet.config, name) for name in ("output", "events", "fit")}
+    return changed.config.model_copy(update={**kept, "time": time})

@@ -1,0 +1,236 @@
+"""Observations of a fit: their times in seconds of the run, values and standard deviations in SI."""
+
+from __future__ import annotations
+
+import hashlib
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from rigidsim.errors import ConfigError, Problem, RigidsimError
+from rigidsim.formats.observations import Observations, read_observations
+from rigidsim.scene.epochs import Epoch
+from rigidsim.scene.exact import parse_number, parse_quantity
+from rigidsim.scene.fit_table import FitDataTable
+from rigidsim.scene.scene import Scene
+from rigidsim.scene.units import UnitError, conversion
+from rigidsim.workflows.compare.rotations import SEQUENCES, normalised, of_euler
+from rigidsim.workflows.fit.observed import EULER_ANGLES, QUATERNION, Observed
+
+_NORM = 1e-2  # by which the norm of a quaternion may differ from 1
+
+
+@dataclass(frozen=True)
+class Readings:
+    """One set of observations, rows ascending in time.
+
+    Attributes:
+        number: of its ``[[fit.data]]``, from 1.
+        times: (rows,), s. values: (rows, components), SI; attitudes as quaternions (rows, 4).
+        sigmas: (rows, components) of residuals, SI. rows: what the file calls them.
+        outliers: beyond how many sigmas rows are left out; None: never.
+        sha256: of the file. told: what a user should know.
+    """
+
+    number: int
+    quantity: Observed
+    source: str
+    sha256: str
+    times: np.ndarray
+    values: np.ndarray
+    sigmas: np.ndarray
+    rows: Sequence[str]
+    outliers: float | None
+    told: list[str] = field(default_factory=list)
+
+    @property
+    def label(self) -> str:
+        """For people: the observable, with the number of its set."""
+        return f"{self.quantity.text} (data {self.number})"
+
+
+def read_readings(number: int, table: FitDataTable, quantity: Observed, scene: Scene, path: Path) -> Readings:
+    """Read the file of a table of ``[[fit.data]]``, which is at a path.
+
+    Raises:
+        ConfigError: a key of the table doesn't suit. RigidsimError: a row of the file can't be used.
+    """
+    found = read_observations(path)
+    return _ReadTable(number, table, quantity, scene, found, path).made()
+
+
+class _ReadTable:
+    """One table with its file."""
+
+    def __init__(
+        self,
+        number: int,
+        table: FitDataTable,
+        quantity: Observed,
+        scene: Scene,
+        found: Observations,
+        path: Path,
+    ) -> None:
+        self.number, self.table, self.quantity, self.scene = number, table, quantity, scene
+        self.found, self.path = found, path
+        self.told: list[str] = []
+
+    def made(self) -> Readings:
+        times = self._times()
+        values = self._values()
+        sigmas = self._sigmas(len(times))
+        kept = self._within(times)
+        order = kept[np.argsort(times[kept], kind="stable")]
+        rows = [self.found.rows[n] for n in order]
+        times, values, sigmas = times[order], values[order], sigmas[order]
+        self._refuse_repeated(times, values, rows)
+        limit = None if self.table.outliers is None else float(self.table.outliers)
+        file = self.path / "dataset.h5" if self.path.is_dir() else self.path
+        digest = hashlib.sha256(file.read_bytes()).hexdigest()
+        return Readings(
+            self.number, self.quantity, self.table.file, digest, times, values, sigmas, rows, limit, self.told
+        )
+
+    def fault(self, key: str, what: str) -> ConfigError:
+        return ConfigError(Problem(f"[[fit.data]] number {self.number} {key}", what))
+
+    def _times(self) -> np.ndarray:
+        dates = self.found.dates(self.table.time, self.table.scale)
+        if dates is None:
+            unit = self.found.units.get(self.table.time, "s")
+            return self.found.column(self.table.time) * self._factor("time", unit, "s")
+        if self.scene.epoch is None:
+            raise self.fault(
+                "time", f'"{self.table.time}" holds dates, but the config has no [time] epoch; give it one'
+            )
+        return seconds_since(self.scene.epoch, dates)
+
+    def _factor(self, key: str, unit: str, expected: str) -> float:
+        try:
+            factor, turns = conversion(unit, expected)
+        except UnitError as error:
+            raise self.fault(key, f'given "{unit}": {error}') from None
+        return float(factor) * float(np.pi) ** turns
+
+    def _values(self) -> np.ndarray:
+        components = self.quantity.components
+        names = self.table.columns or [*components]
+        if len(names) != len(components):
+            raise self.fault(
+                "columns",
+                f"given {len(names)}; {self.quantity.text} has {len(components)} "
+                f"({', '.join(components)}): name a column for each",
+            )
+        given = np.stack([self.found.column(name) for name in names], axis=1)
+        units = {self.found.units.get(name) for name in names} - {None, "1"}
+        unit = self.table.unit or (units.pop() if len(units) == 1 else None)
+        self.factor = 1.0
+        if unit is not None:
+            expected = None if self.quantity.unit is None else config_unit(self.quantity.unit)
+            plain = config_unit(unit)
+            self.factor = self._factor("unit", plain, expected) if expected is not None else self._si(plain)
+        values = given * self.factor
+        if self.quantity.form == QUATERNION:
+            norms = np.linalg.norm(values, axis=1)
+            bad = np.flatnonzero(np.abs(norms - 1) > _NORM)
+            if len(bad):
+                raise RigidsimError(
+                    f"{self.found.source}: {self.found.rows[bad[0]]}: a quaternion of norm "
+                    f"{norms[bad[0]]:.6g}; norms within 0.01 of 1 are allowed: mend or remove these rows"
+                )
+            return normalised(values)
+        if self.quantity.form == EULER_ANGLES:
+            sequence = self.scene.config.integrator.euler_sequence
+            assert sequence in SEQUENCES
+            return of_euler(sequence, values)
+        return values
+
+    def _si(self, unit: str) -> float:
+        """Factor to SI for an expression, whose dimension isn't known."""
+        number: Any = parse_any(f"1 {unit}", self.fault)
+        return float(number)
+
+    def _sigmas(self, count: int) -> np.ndarray:
+        given = self.table.sigma
+        width = 3 if self.quantity.rotation else len(self.quantity.components)
+        own = self.quantity.unit
+        unit = "rad" if self.quantity.rotation else own and config_unit(own)
+        if isinstance(given, str) and given in self.found.names:
+            factor = self.factor if self.quantity.form != QUATERNION else 1.0
+            column = self.found.column(given) * factor
+            if (column <= 0).any():
+                at = int(np.flatnonzero(column <= 0)[0])
+                raise RigidsimError(
+                    f"{self.found.source}: {self.found.rows[at]}: {given} is {column[at] / factor:g}; a "
+                    "standard deviation above zero is allowed"
+                )
+            return np.repeat(column[:, None], width, axis=1)
+        try:
+            value = float(parse_any(given, self.fault) if unit is None else parse_number(given, unit))
+        except ValueError as error:
+            raise self.fault("sigma", f"{error}; or the name of a column of {self.table.file}") from None
+        if not value > 0:
+            raise self.fault("sigma", f"given {given}; a standard deviation above zero is allowed")
+        return np.full((count, width), value)
+
+    def _within(self, times: np.ndarray) -> np.ndarray:
+        """Rows in the span of the run; others are told of."""
+        begin, end = float(self.scene.start), float(max(self.scene.end, self.scene.samples.last))
+        inside = (times >= begin) & (times <= end)
+        if not inside.any():
+            raise RigidsimError(
+                f"{self.found.source}: no row lies within the run ({begin:.6g} to {end:.6g} s): its rows "
+                f"are at {times.min():.6g} to {times.max():.6g} s; change [time], or check epoch and scale"
+            )
+        if not inside.all():
+            first = int(np.flatnonzero(~inside)[0])
+            self.told.append(
+                f"{self.table.file}: {int((~inside).sum())} of {len(times)} rows lie outside the run "
+                f"({begin:.6g} to {end:.6g} s) and were left out, first {self.found.rows[first]}"
+            )
+        return np.flatnonzero(inside)
+
+    def _refuse_repeated(self, times: np.ndarray, values: np.ndarray, rows: Sequence[str]) -> None:
+        again = np.flatnonzero(np.diff(times) == 0)
+        same = [int(n) for n in again if (values[n] == values[n + 1]).all()]
+        if same:
+            one, other = rows[same[0]], rows[same[0] + 1]
+            raise RigidsimError(
+                f"{self.found.source}: {other} repeats {one}, with the same time and values ({len(same)} "
+                "such rows); it would count twice: remove it"
+            )
+        if len(again):
+            self.told.append(
+                f"{self.table.file}: {len(again)} rows have the time of another one with other values; each "
+                "counts as an observation"
+            )
+
+
+def config_unit(unit: str) -> str:
+    """A unit of a dataset ("kg m2 s-1") as configs write it ("kg m^2 s^-1")."""
+    return "rad/s" if unit == "rad s-1" else re.sub(r"(?<=[A-Za-z])(-?\d)", r"^\1", unit)
+
+
+def parse_any(value: Any, fault: Any) -> Any:
+    """A number with any unit, in SI."""
+    try:
+        return parse_quantity(value)
+    except ValueError as error:
+        raise fault("unit", str(error)) from None
+
+
+def seconds_since(epoch: Epoch, dates: Sequence[Epoch]) -> np.ndarray:
+    """Seconds from an epoch, which is time 0, to dates (rows,); leap seconds of UTC count."""
+    zero_scale = epoch.uniform().scale
+    found = []
+    for date in dates:
+        if date.uniform().scale == zero_scale:
+            found.append(float((date.julian_date() - epoch.julian_date()) * 86400))
+        else:
+            found.append(float(Fraction(date.since_j2000() - epoch.since_j2000())))
+    return np.array(found)

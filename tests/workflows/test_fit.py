@@ -1,0 +1,337 @@
+"""``rigidsim.fit``: closed forms, symmetries, differences against variational equations, kills, bad data."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import xarray
+
+import rigidsim
+from experiments import fit_campaign
+from rigidsim.errors import ConfigError, RigidsimError, RunFolderError
+from rigidsim.workflows.fit import fitting
+from rigidsim.workflows.fit.predictions import ByDifferences
+from rigidsim.workflows.fit.weighing import inverse_right_jacobian
+
+SPIN = 0.7  # rad/s about z
+SIGMA = 0.01  # rad
+TIMES = np.linspace(0.5, 9.5, 19)
+BALL = """
+name = "ball"
+[body]
+principal_moments = [2, 2, 2]
+[initial]
+angular_velocity = [0, 0, 0.69]
+[time]
+end = 10
+"""
+FREE = """
+name = "free"
+[body]
+principal_moments = [1, 2, 2.5]
+[initial]
+angular_velocity = [0.3, 1.0, -0.4]
+[time]
+end = 10
+epoch = "2016-12-31T23:59:55 UTC"
+"""
+
+
+def data(file: str, observable: str, columns: list[str], sigma: float | str, more: str = "") -> str:
+    return (
+        f'[[fit.data]]\nfile = "{file}"\nobservable = "{observable}"\nsigma = {sigma}\n'
+        f"columns = {json.dumps(columns)}\n{more}\n"
+    )
+
+
+def table(path: Path, names: list[str], columns: list[Any]) -> None:
+    rows = [",".join(names), *(",".join(map(str, row)) for row in zip(*columns, strict=True))]
+    path.write_text("# observed\n" + "\n".join(rows) + "\n")
+
+
+@pytest.fixture
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def turning(folder: Path, shift: float = 0.0) -> np.ndarray:
+    """Noisy phases of a spin about z, as Euler angles in degrees across full turns."""
+    noise = SIGMA * np.random.default_rng(5).standard_normal(len(TIMES))
+    phases = SPIN * TIMES + noise + shift
+    zero = np.zeros(len(TIMES))
+    table(folder / "turn.csv", ["time", "a", "b", "c"], [TIMES, np.rad2deg(phases) % 360, zero, zero])
+    return phases
+
+
+TURN = data("turn.csv", "euler_angles", ["a", "b", "c"], f'"{SIGMA} rad"', 'unit = "deg"')
+LINE = np.stack([np.ones(len(TIMES)), TIMES], axis=1)  # phase = offset + rate t
+
+
+def test_a_uniform_spin_is_a_straight_line_with_the_covariance_of_one(here: Path) -> None:
+    phases = turning(here)
+    keys = '[fit]\nparameters = ["initial.attitude[2]", "initial.angular_velocity[2]"]\n'
+    found = rigidsim.fit(rigidsim.parse(BALL + keys + TURN))
+    expected = np.linalg.inv(LINE.T @ LINE)
+    values = expected @ LINE.T @ phases
+    covariance = SIGMA**2 * expected
+    assert found.converged
+    assert not found.undetermined
+    # steps end below 1e-3 sigmas; derivatives of this linear problem are right to rounding
+    apart = np.array([one.value for one in found.parameters]) - values
+    assert np.sqrt(apart @ np.linalg.solve(covariance, apart)) < 1e-3
+    np.testing.assert_allclose(found.dataset["covariance"].values, covariance, rtol=1e-9)
+    correlation = covariance[0, 1] / np.sqrt(covariance[0, 0] * covariance[1, 1])
+    assert found.correlations[0][1] == pytest.approx(correlation, rel=1e-9)
+    # the predicted uncertainty of the phase is that of the line, within the data and beyond
+    along = np.stack([np.ones(201), found.dataset["time"].values], axis=1)
+    spread = np.sqrt(np.einsum("ni,ij,nj->n", along, covariance, along))
+    np.testing.assert_allclose(found.dataset["attitude_sigma"].values[:, 2], spread, rtol=1e-9)
+    assert found.freedom == 3 * len(TIMES) - 2
+    again = rigidsim.run(found.experiment, out=None).dataset
+    assert float(again["angular_velocity"][0, 2]) == found.value("initial.angular_velocity[2]")
+    assert found.experiment.config.fit is None
+
+
+def test_a_considered_rate_and_a_prior_enter_as_their_formulas_say(here: Path) -> None:
+    turning(here)
+    known, prior = 0.02, 0.015
+    text = (
+        BALL + '[fit]\nparameters = ["initial.attitude[2]"]\n'
+        f'consider."initial.angular_velocity[2]" = {{sigma = "{known} rad/s"}}\n'
+        f'prior."initial.attitude" = {{sigma = {prior}}}\n'
+    )
+    found = rigidsim.fit(rigidsim.parse(text + TURN))
+    plain = 1 / (len(TIMES) / SIGMA**2 + 1 / prior**2)
+    effect = -plain * TIMES.sum() / SIGMA**2  # S = -M H' W H_c
+    assert found.sigma("initial.attitude[2]") == pytest.approx(
+        np.sqrt(plain + (effect * known) ** 2), rel=1e-9
+    )
+    assert found.considered[0].effect == [pytest.approx(effect, rel=1e-9)]
+
+
+def test_residuals_of_attitudes_turn_as_the_logarithm_does() -> None:
+    from scipy.spatial.transform import Rotation
+
+    vectors = np.random.default_rng(1).uniform(-1.7, 1.7, (20, 3))  # below half a turn
+    vectors[:2] *= 1e-6
+    turn, step = np.array([0.3, -0.5, 0.8]), 1e-6
+    ends = [
+        (Rotation.from_rotvec(vectors) * Rotation.from_rotvec(-sign * step * turn)).as_rotvec()
+        for sign in (1, -1)
+    ]
+    slopes = (ends[1] - ends[0]) / (2 * step)
+    # central differences of 1e-6: 1e-12 cut off, some 1e-10 of rounding
+    np.testing.assert_allclose(inverse_right_jacobian(vectors) @ turn, slopes, atol=2e-9)
+
+
+def seen_free(folder: Path, seed: int = 3, rows: int = 30) -> None:
+    """Rates, their kinetic energy and a direction of a free body, with noise of 1e-3."""
+    noise = np.random.default_rng(seed)
+    times = np.sort(noise.uniform(0, 10, rows))
+    listed = rigidsim.parse(FREE, overrides=["time.end=", f"time.times={times.tolist()}"])
+    made = rigidsim.run(listed.replace({"output.record": ["angular_velocity", "quaternion"]}), out=None)
+    rates = made.dataset["angular_velocity"].values + 1e-3 * noise.standard_normal((rows, 3))
+    table(folder / "rates.csv", ["time", "x", "y", "z"], [times, *rates.T])
+    energy = 0.5 * rates**2 @ np.array([1, 2, 2.5])
+    table(folder / "energy.csv", ["time", "value"], [times, energy])
+    q = made.dataset["quaternion"].values
+    table(folder / "attitude.csv", ["time", "w", "x", "y", "z"], [times, *q.T])
+
+
+RATES = data("rates.csv", "angular_velocity", ["x", "y", "z"], 1e-3)
+
+
+def test_of_a_free_body_only_ratios_of_moments_show_and_no_attitude_by_rates_alone(here: Path) -> None:
+    seen_free(here)
+    keys = '[fit]\nparameters = ["initial.angular_velocity", "body.principal_moments", "initial.attitude"]\n'
+    found = rigidsim.fit(rigidsim.parse(FREE + keys + RATES))
+    directions = {tuple(one.keys): one for one in found.undetermined}
+    moments = tuple(f"body.principal_moments[{i}]" for i in range(3))
+    assert set(directions) == {moments, *((f"initial.attitude[{i}]",) for i in range(3))}
+    relative = np.array(directions[moments].amounts) / [found.value(key) for key in moments]
+    np.testing.assert_allclose(relative, relative[0], rtol=1e-6)
+    assert "only their ratios" in directions[moments].text
+    assert [one.sigma is None for one in found.parameters] == [False] * 3 + [True] * 6
+    assert np.isnan(found.dataset["attitude_sigma"].values).all()  # a band would be a lie
+    assert np.isfinite(found.dataset["angular_velocity_sigma"].values).all()
+    told = json.loads(json.dumps(found.as_dict(), allow_nan=False))
+    assert told["parameters"][8]["sigma"] is None
+    assert told["correlations"][0][8] is None
+    assert "undetermined" in repr(found)
+    assert "undetermined" in found._repr_html_()
+
+
+@pytest.mark.slow(40)
+def test_differences_of_runs_give_the_same_fit_as_variational_equations(
+    here: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    seen_free(here)
+    keys = '[fit]\nparameters = ["initial.angular_velocity[1]", "body.principal_moments[1]"]\n'
+    energy = data("energy.csv", "0.5*wx^2 + wy^2 + 1.25*wz^2", ["value"], 2e-3)
+    axis = data("attitude.csv", "quaternion", ["w", "x", "y", "z"], 1e-3)
+    experiment = rigidsim.parse(FREE + keys + RATES + energy + axis)
+    one = rigidsim.fit(experiment)
+    monkeypatch.setattr(fitting, "ByTangents", ByDifferences)
+    other = rigidsim.fit(experiment)
+    assert one.derivatives == "variational equations"
+    assert other.derivatives.startswith("central differences")
+    for first, second in zip(one.parameters, other.parameters, strict=True):
+        assert first.sigma is not None
+        # differences err by 1e-8 of the derivatives, and steps end below 1e-3 sigmas
+        assert second.sigma == pytest.approx(first.sigma, rel=1e-6)
+        assert abs(first.value - second.value) < 2e-3 * first.sigma
+        assert abs(first.value - {"i": 1.0, "b": 2.0}[first.key[0]]) < 4 * first.sigma
+
+
+def test_two_misprints_of_toutatis_are_found_and_its_published_moments(here: Path) -> None:
+    config = Path(__file__).parents[2] / "configs" / "fits" / "toutatis_1992.toml"
+    found = rigidsim.fit(config)
+    assert found.converged
+    assert [(one.data, one.row) for one in found.outliers] == [(2, "line 8"), (2, "line 15")]
+    assert np.rad2deg(found.data[0].rms) < 7.7  # the published solution's
+    for index, published in enumerate((3.0836, 3.235)):
+        one = found.parameters[6 + index]
+        assert one.scaled_sigma is not None
+        assert abs(one.value - published) < 3 * one.scaled_sigma
+
+
+def killed_after(lines: int) -> Callable[[str], None]:
+    left = [lines]
+
+    def told(_: str) -> None:
+        left[0] -= 1
+        if not left[0]:
+            raise KeyboardInterrupt
+
+    return told
+
+
+def test_a_killed_fit_goes_on_with_the_same_bits_and_verifies(here: Path) -> None:
+    turning(here)
+    keys = '[fit]\nparameters = ["initial.attitude[2]", "initial.angular_velocity[2]"]\n'
+    (here / "ball.toml").write_text(BALL.replace("0.69", "0.6") + keys + TURN)
+    whole = rigidsim.fit("ball.toml", out="whole")
+    with pytest.raises(KeyboardInterrupt):
+        rigidsim.fit("ball.toml", out="fits", told=killed_after(2))
+    folder = here / "fits" / "ball"
+    assert len(list((folder / "evaluations").iterdir())) == 2
+    with pytest.raises(RunFolderError, match="resume"):
+        fitting.FitFolder(folder).read_result()
+    (here / "turn.csv").unlink()  # it has its own copy
+    again = fitting.resume_fit(folder)
+    assert again.parameters == whole.parameters
+    with xarray.open_dataset(folder / "dataset.h5") as saved:
+        xarray.testing.assert_identical(saved.load(), xarray.load_dataset(here / "whole/ball/dataset.h5"))
+    assert not (folder / "evaluations").exists()
+    from rigidsim.workflows.fit.verifying import verify_fit
+
+    assert verify_fit(folder).identical
+    copy = folder / "data" / "1_turn.csv"
+    copy.write_text(copy.read_text().replace("\n0.5,", "\n0.501,"))
+    verdict = verify_fit(folder)
+    assert not verdict.identical
+    assert "data 1: not the bytes" in verdict.problems[0]
+    assert "residual_1" in verdict.differing
+    with pytest.raises(RigidsimError, match="no such file"):
+        rigidsim.fit("ball.toml", out="fits")
+    turning(here)
+    with pytest.raises(RunFolderError, match="finished fit"):
+        rigidsim.fit("ball.toml", out="fits")
+
+
+def test_several_starts_find_what_one_misses(here: Path) -> None:
+    turning(here)
+    # a rate so far off that the phase slips by whole turns between rows: a local minimum
+    far = BALL.replace("0.69", "1.9")
+    keys = '[fit]\nparameters = ["initial.attitude[2]", "initial.angular_velocity[2]"]\n'
+    keys += 'prior."initial.angular_velocity" = {sigma = 1.0}\n'
+    one = rigidsim.fit(rigidsim.parse(far + keys + TURN))
+    many = rigidsim.fit(rigidsim.parse(far + keys + "starts = 12\n" + TURN))
+    assert abs(one.value("initial.angular_velocity[2]") - SPIN) > 0.1
+    assert many.value("initial.angular_velocity[2]") == pytest.approx(SPIN, abs=0.02)
+    assert len(many.starts) == 12
+    assert any("of 12 starts" in text for text in many.told)
+
+
+def test_dates_count_leap_seconds_and_rows_outside_are_told(here: Path) -> None:
+    dates = ["2016-12-31T23:59:58", "2016-12-31T23:59:60.5Z", "2017-01-01T00:00:01", "2017-01-01T00:01"]
+    table(here / "dates.csv", ["utc", "value"], [dates, [1.5, 2.75, 3.5, 99]])
+    more = 'time = "utc"'
+    text = FREE + '[fit]\nparameters = ["initial.angular_velocity[0]"]\n'
+    found = rigidsim.fit(rigidsim.parse(text + data("dates.csv", "t/2", ["value"], 0.1, more)))
+    np.testing.assert_array_equal(found.dataset["time_1"].values, [3.0, 5.5, 7.0])
+    np.testing.assert_allclose(found.dataset["residual_1"].values[:, 0], 0.0, atol=1e-12)
+    assert "1 of 4 rows lie outside the run" in found.told[0]
+    assert "line 6" in found.told[0]
+    assert found.undetermined[0].text == "initial.angular_velocity[0]: no row depends on it"
+
+
+BAD: dict[str, tuple[list[Any], str, str]] = {
+    "not finite": ([[0, 1], [1, "nan"]], "", r"line 3: x is no finite number \(\"nan\"\)"),
+    "a word": ([[0, "?"], [1, 2]], "", r"line 2: x is no finite number \(\"\?\"\)"),
+    "repeated": ([[0, 1], [2, 2], [0, 1]], "", r"line 4 repeats line 2"),
+    "outside": ([[20, 1], [21, 2]], "", r"no row lies within the run \(0 to 10 s\)"),
+    "a unit of another kind": ([[0, 1], [1, 2]], 'unit = "kg"', "kg"),
+    "an unknown unit": ([[0, 1], [1, 2]], 'unit = "furlong"', "unknown unit"),
+    "no column": ([[0, 1], [1, 2]], 'time = "utc"', 'has no column "utc"; its columns are time, x'),
+    "no leap second": ([["2015-12-31T23:59:60", 1], ["2016-12-31T23:59:58", 1]], "", "no leap second then"),
+}
+
+
+@pytest.mark.parametrize("name", BAD)
+def test_bad_rows_are_refused_by_their_line(name: str, here: Path) -> None:
+    rows, more, message = BAD[name]
+    table(here / "bad.csv", ["time", "x"], list(zip(*rows, strict=True)))
+    text = (here / "bad.csv").read_text().removeprefix("# observed\n")
+    (here / "bad.csv").write_text(text)
+    config = FREE + '[fit]\nparameters = ["initial.angular_velocity[0]"]\n'
+    with pytest.raises(RigidsimError, match=message):
+        rigidsim.fit(rigidsim.parse(config + data("bad.csv", "energy", ["x"], 0.1, more)))
+
+
+WRONG = {
+    'parameters = ["body.moments"]': "principal_moments",
+    'parameters = ["time.end"]': "no number of the motion",
+    'parameters = ["initial.angular_velocity", "initial.angular_velocity[1]"]': "given twice",
+    'parameters = ["initial.angular_velocity[0]"]\nprior."body.principal_moments" = {sigma = 1}': (
+        "not among the parameters"
+    ),
+    'parameters = ["initial.angular_velocity[0]"]\nprior."initial.angular_velocity" = {sigma = "1 kg"}': "kg",
+    'parameters = ["initial.angular_velocity[0]"]\nstarts = 3': "nothing to draw them from",
+    'parameters = ["initial.position"]': "isn't given in the config",
+}
+
+
+@pytest.mark.parametrize("table_of_fit", WRONG)
+def test_wrong_keys_are_refused(table_of_fit: str, here: Path) -> None:
+    (here / "x.csv").write_text("time,x\n1,1\n2,2\n")
+    with pytest.raises(ConfigError, match=WRONG[table_of_fit]):
+        rigidsim.fit(rigidsim.parse(FREE + f"[fit]\n{table_of_fit}\n" + data("x.csv", "energy", ["x"], 1)))
+
+
+def test_what_cannot_be_observed_is_refused(here: Path) -> None:
+    (here / "x.csv").write_text("time,x\n1,1\n2,2\n")
+    text = FREE + '[fit]\nparameters = ["initial.angular_velocity[0]"]\n'
+    for observable, message in (("enrgy", "no variable that can be recorded"), ("position", "no position"),
+                                ("quaternion", "has 4"), ("2*pi", "never changes")):  # fmt: skip
+        with pytest.raises(ConfigError, match=message):
+            rigidsim.fit(rigidsim.parse(text + data("x.csv", observable, ["x"], 1)))
+    dates = data("x.csv", "energy", ["x"], 1, 'time = "day"')
+    (here / "x.csv").write_text("day,x\n2017-01-01T00:00,1\n2017-01-01T00:00:02,2\n")
+    undated = text.replace('epoch = "2016-12-31T23:59:55 UTC"', "")
+    with pytest.raises(ConfigError, match="give it one"):
+        rigidsim.fit(rigidsim.parse(undated + dates))
+    with pytest.raises(ConfigError, match="it names parameters"):
+        rigidsim.fit(rigidsim.parse(FREE))
+
+
+@pytest.mark.slow(120)
+def test_errors_of_random_fits_are_as_large_as_their_sigmas_say() -> None:
+    told: list[str] = []
+    assert fit_campaign.campaign(40, 10, 2, told.append) == 0, told
