@@ -177,7 +177,13 @@ def test_completion(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, rigidsim_co
         (tmp_path / "runs" / name / "config.toml").touch()
     assert completion.runs("") == ["runs/one", "runs/two"]
     assert completion.runs("runs/t") == ["runs/two"]
-    assert [name for name, _ in completion.scenes("to")] == ["top", "torque", "tossed_plate", "toutatis_1992", "toutatis"]
+    assert [name for name, _ in completion.scenes("to")] == [
+        "top",
+        "torque",
+        "tossed_plate",
+        "toutatis_1992",
+        "toutatis",
+    ]
     assert [name for name, _ in completion.scenes("cas")] == ["cassini"]
     assert completion.settings("integrator.euler_s") == ["integrator.euler_sequence"]
     methods = completion.settings("integrator.method=")
