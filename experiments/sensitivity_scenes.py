@@ -74,7 +74,7 @@ def _shape(draw: random.Random) -> tuple[str, list[str]]:
     size = [round(draw.uniform(0.5, 1.5), 4) for _ in range(3)]
     text = f'[body]\nshape = "cuboid"\nmass = {draw.uniform(1, 3):.4f}\nsize = {size}\n{_start(draw)}'
     torque = '[[loads]]\nkind = "torque"\ncomponents = ["0.1", "-0.05*wy", "0"]\n'
-    return text + torque, [*_STARTS[:1], "body.mass", "body.size[0]", "body.size[2]"]
+    return text + torque, [_STARTS[0], "body.mass", "body.size[0]", "body.size[2]"]
 
 
 def _torque(draw: random.Random) -> tuple[str, list[str]]:

@@ -65,7 +65,12 @@ def context_for(precision: str | int, more: int = 0) -> Any:
 
 def working_epsilon(context: Any) -> Any:
     """Spacing of the working precision's numbers just above 1, for a scene's context."""
-    return context.mpf(2) ** (1 + context.guard_bits - context.prec)
+    return context.mpf(2) ** (1 - bits_in_use(context))
+
+
+def bits_in_use(context: Any) -> int:
+    """Bits of the working precision, for a scene's context."""
+    return int(context.prec - getattr(context, "guard_bits", GUARD_BITS))
 
 
 def negligible(context: Any) -> Any:
