@@ -5,17 +5,17 @@
 Each case draws a scene (free bodies, tops, torques with parameters, gravity gradients along orbits, flight,
 rotors, cores, elastic bodies, dipoles, states of one's own; written in any formulation, with and without held
 invariants) and one number of its config. A run in double precision records the derivatives. Four runs with
-this number moved, in quadruple precision, give the central difference of fourth order: steps h of 1e-4 leave
-some h^4 = 1e-16, and 1e-15 for the 80 bits in which they are subtracted. They share nothing with the
+this number moved, in quadruple precision, give the central difference of fourth order: steps h of 1e-6 leave
+some h^4 = 1e-24, and 1e-13 for the 80 bits in which they are subtracted. They share nothing with the
 variational equations but the way from a config to equations. The largest difference along the run, relative
-to the derivative's largest value there, may be 1e-9. ``--only N`` repeats a case; the exit code is 1 if one
-is off.
+to the derivative's largest value there, may be 1e-9. ``--quick`` takes the four motions from one compiled
+system with other coefficients, in a quarter of the time; ``--only N`` repeats a case; the exit code is 1 if
+one is off.
 """
 
 from __future__ import annotations
 
 import argparse
-import random
 import sys
 import warnings
 from dataclasses import dataclass
@@ -26,23 +26,15 @@ import mpmath
 import numpy as np
 
 import rigidsim
+from experiments.sensitivity_scenes import Case, case
 from rigidsim.scene.varied_keys import varied_keys
 from rigidsim.store.variables import parts_in
 from rigidsim.workflows.read import parse
+from rigidsim.workflows.sensitivity import Tangents
 
 BOUND = 1e-9
-_MOVED = Fraction(1, 1 << 13)  # of a number's size
+_MOVED, _MOVED_QUICKLY = Fraction(1, 1 << 20), Fraction(1, 1 << 13)  # of a number's size
 _WEIGHTS = {1: 8.0, -1: -8.0, 2: -1.0, -2: 1.0}  # times 1 / 12 h
-
-
-@dataclass(frozen=True)
-class Case:
-    """A scene, and the number of its config that derivatives are by."""
-
-    number: int
-    family: str
-    text: str
-    key: str
 
 
 @dataclass(frozen=True)
@@ -57,181 +49,14 @@ class Found:
         return max(self.errors.values(), default=float("inf"))
 
 
-def _moments(draw: random.Random) -> str:
-    a, b = draw.uniform(1, 2), draw.uniform(1, 2)
-    return f"[{a:.6f}, {b:.6f}, {draw.uniform(max(a, b), 0.95 * (a + b)):.6f}]"
-
-
-def _vector(draw: random.Random, size: float = 1.0) -> str:
-    return "[" + ", ".join(f"{draw.uniform(-size, size):.6f}" for _ in range(3)) + "]"
-
-
-def _start(draw: random.Random) -> str:
-    q = [draw.gauss(0, 1) for _ in range(4)]
-    return f"[initial]\nangular_velocity = {_vector(draw)}\nquaternion = {[round(x, 6) for x in q]}\n"
-
-
-_STARTS = [f"initial.angular_velocity[{i}]" for i in range(3)] + [f"initial.attitude[{i}]" for i in range(3)]
-_MOMENTS = [f"body.principal_moments[{i}]" for i in range(3)]
-_ORBIT = """orbit = {{semi_major_axis = {a:.6f}, eccentricity = {e:.6f}, inclination = "{i:.4f} deg",
-  ascending_node = {n:.5f}, periapsis = {p:.5f}, mean_anomaly = {m:.5f}}}
-""".replace("\n  ", " ")
-_IN_ORBIT = ["semi_major_axis", "eccentricity", "inclination", "ascending_node", "periapsis", "mean_anomaly"]
-
-
-def _orbit(draw: random.Random) -> str:
-    return _ORBIT.format(
-        a=draw.uniform(1, 2),
-        e=draw.choice([0.0, draw.uniform(0.01, 0.4)]),
-        i=draw.uniform(0, 180),
-        n=draw.uniform(0, 6),
-        p=draw.uniform(0, 6),
-        m=draw.uniform(0, 6),
-    )
-
-
-def _free(draw: random.Random) -> tuple[str, list[str]]:
-    if draw.random() < 0.5:
-        return f"[body]\nprincipal_moments = {_moments(draw)}\n{_start(draw)}", _STARTS + _MOMENTS
-    off = [draw.choice([0.0, draw.uniform(-0.2, 0.2)]) for _ in range(3)]
-    a, b, c = (draw.uniform(1.5, 2) for _ in range(3))
-    rows = [[a, off[0], off[1]], [off[0], b, off[2]], [off[1], off[2], c]]
-    shown = [[round(x, 6) for x in row] for row in rows]
-    keys = [f"body.inertia_tensor[{i}][{j}]" for i in range(3) for j in range(i, 3)]
-    return f"[body]\ninertia_tensor = {shown}\n{_start(draw)}", _STARTS[:2] + keys
-
-
-def _symmetric(draw: random.Random) -> tuple[str, list[str]]:
-    return f"[body]\nprincipal_moments = [1.5, 1.5, {draw.uniform(1, 2):.5f}]\n{_start(draw)}", _MOMENTS
-
-
-def _momentum(draw: random.Random) -> tuple[str, list[str]]:
-    keys = [f"initial.angular_momentum[{i}]" for i in range(3)] + _STARTS[3:] + _MOMENTS
-    text = f"[body]\nprincipal_moments = {_moments(draw)}\n{_start(draw)}"
-    return text.replace("angular_velocity", "angular_momentum"), keys
-
-
-def _shape(draw: random.Random) -> tuple[str, list[str]]:
-    size = [round(draw.uniform(0.5, 1.5), 4) for _ in range(3)]
-    text = f'[body]\nshape = "cuboid"\nmass = {draw.uniform(1, 3):.4f}\nsize = {size}\n{_start(draw)}'
-    torque = '[[loads]]\nkind = "torque"\ncomponents = ["0.1", "-0.05*wy", "0"]\n'
-    return text + torque, _STARTS[:1] + ["body.mass", "body.size[0]", "body.size[2]"]
-
-
-def _torque(draw: random.Random) -> tuple[str, list[str]]:
-    k = [draw.choice([0.0, draw.uniform(-0.5, 0.5)]), draw.uniform(0.1, 1), draw.uniform(0.5, 2)]
-    names = f"[parameters]\na = {k[0]:.5f}\nb = {k[1]:.5f}\nc = {k[2]:.5f}\n"
-    frame = draw.choice(["body", "space"])
-    parts = '["a*wx + b*sin(c*t)", "-b*wy*exp(-c*wz^2)", "a*b*cos(c*t)"]'
-    load = f'[[loads]]\nkind = "torque"\nframe = "{frame}"\ncomponents = {parts}\n'
-    text = f"{names}[body]\nprincipal_moments = {_moments(draw)}\n{_start(draw)}{load}"
-    return text, _STARTS[::2] + _MOMENTS[:1] + 2 * ["parameters.a", "parameters.b", "parameters.c"]
-
-
-def _viscous(draw: random.Random) -> tuple[str, list[str]]:
-    load = f'[[loads]]\nkind = "viscous_torque"\ncoefficients = [0.1, 0, {draw.uniform(0, 0.2):.4f}]\n'
-    text = f"[body]\nprincipal_moments = {_moments(draw)}\n{_start(draw)}{load}"
-    return text, _MOMENTS[:1] + [f"loads[0].coefficients[{i}]" for i in range(3)]
-
-
-def _top(draw: random.Random) -> tuple[str, list[str]]:
-    center = draw.choice([_vector(draw, 0.3), "[0, 0, 0.4]"])
-    body = f"[body]\nprincipal_moments = {_moments(draw)}\nmass = 1.5\ncenter_of_mass = {center}\n"
-    load = '[[loads]]\nkind = "uniform_gravity"\nacceleration = [0, 0, -1.3]\n'
-    keys = ["body.mass", "loads[0].acceleration[2]", "loads[0].acceleration[0]"]
-    return body + _start(draw) + load, _STARTS + _MOMENTS + keys + [
-        f"body.center_of_mass[{i}]" for i in (0, 2)
-    ]
-
-
-def _gradient(draw: random.Random) -> tuple[str, list[str]]:
-    load = f'[[loads]]\nkind = "gravity_gradient"\ngravitational_parameter = 1.2\n{_orbit(draw)}'
-    keys = ["loads[0].gravitational_parameter", *(f"loads[0].orbit.{key}" for key in _IN_ORBIT)]
-    return f"[body]\nprincipal_moments = {_moments(draw)}\n{_start(draw)}{load}", [*_STARTS[::3], *keys]
-
-
-def _flight(draw: random.Random) -> tuple[str, list[str]]:
-    place = f"position = [5, 0.3, -0.2]\nvelocity = [0.05, {draw.uniform(0.4, 0.5):.4f}, 0.1]\n"
-    load = '[[loads]]\nkind = "central_gravity"\ngravitational_parameter = 1.1\n'
-    body = f"[body]\nprincipal_moments = {_moments(draw)}\nmass = {draw.uniform(1, 2):.4f}\n"
-    keys = ["initial.position[0]", "initial.velocity[1]", "loads[0].gravitational_parameter", "body.mass"]
-    return body + _start(draw) + place + load, [*_STARTS[1:5], *keys, _MOMENTS[1]]
-
-
-def _wheels(draw: random.Random) -> tuple[str, list[str]]:
-    wheel = '[[rotors]]\nname = "wheel"\naxis = [0.2, 0.3, 1]\nmoment = 0.08\nrate = 4\ntorque = "-k*wz"\n'
-    fixed = '[[rotors]]\nname = "second"\naxis = [1, 0, 0]\nmoment = 0.05\nrate = -3\nfixed = true\n'
-    text = f"[parameters]\nk = {draw.uniform(0.05, 0.2):.4f}\n[body]\nprincipal_moments = {_moments(draw)}\n"
-    keys = ["rotors[0].moment", "rotors[0].rate", "rotors[1].rate", "rotors[0].axis[0]", "parameters.k"]
-    return text + _start(draw) + wheel + fixed, _MOMENTS[:2] + keys
-
-
-def _core(draw: random.Random) -> tuple[str, list[str]]:
-    core = (
-        "[body.core]\nmoment = 0.2\nflattening = 0.05\nfriction = 0.03\nangular_velocity = [0.1, 0.2, 0.9]\n"
-    )
-    keys = [f"body.core.{key}" for key in ("moment", "flattening", "friction", "angular_velocity[0]")]
-    body = f"[body]\nprincipal_moments = [1.6, 1.7, {draw.uniform(1.8, 2):.4f}]\n{core}"
-    return body + _start(draw), _MOMENTS[::2] + keys
-
-
-def _own(draw: random.Random) -> tuple[str, list[str]]:
-    state = '[[states]]\nname = "integral"\ninitial = 0.2\nderivative = "wz - g*integral"\n'
-    load = '[[loads]]\nkind = "torque"\ncomponents = ["-0.2*wx", "0", "-g*integral"]\n'
-    text = f"[parameters]\ng = {draw.uniform(0.2, 0.6):.4f}\n[body]\nprincipal_moments = {_moments(draw)}\n"
-    return text + _start(draw) + load + state, ["parameters.g", "states[0].initial", *_MOMENTS[1:]]
-
-
-def _elastic(draw: random.Random) -> tuple[str, list[str]]:
-    part = "[body.elasticity]\nlove_number = 0.02\ndelay = 0.05\nradius = 1.2\nmean_rate = 0.8\n"
-    load = f'[[loads]]\nkind = "gravity_gradient"\ngravitational_parameter = 1.2\n{_orbit(draw)}'
-    keys = [f"body.elasticity.{key}" for key in ("love_number", "delay", "radius")]
-    body = f"[body]\nprincipal_moments = [1.6, 1.7, 1.9]\nmass = 1.5\n{part}"
-    return body + _start(draw) + load, [*keys, "loads[0].orbit.semi_major_axis", _STARTS[0], _STARTS[3]]
-
-
-def _dipole(draw: random.Random) -> tuple[str, list[str]]:
-    load = f'[[loads]]\nkind = "magnetic_dipole"\nmoment = {_vector(draw)}\nfield = {_vector(draw)}\n'
-    keys = ["loads[0].moment[0]", "loads[0].field[2]"]
-    return f"[body]\nprincipal_moments = {_moments(draw)}\n{_start(draw)}{load}", _STARTS[1:4] + keys
-
-
-FAMILIES = {
-    "free": _free, "symmetric": _symmetric, "momentum": _momentum, "shape": _shape, "torque": _torque,
-    "viscous": _viscous, "top": _top, "gradient": _gradient, "flight": _flight, "wheels": _wheels,
-    "core": _core, "own": _own, "elastic": _elastic, "dipole": _dipole,
-}  # fmt: skip
-
-
-def case(number: int) -> Case:
-    """The case of a number."""
-    draw = random.Random(f"sensitivity {number}")
-    family = list(FAMILIES)[number % len(FAMILIES)]
-    body, keys = FAMILIES[family](draw)
-    formulation = draw.choice(["auto", "auto", "euler_angles", "rotation_matrix"])
-    sequence = draw.choice(["zxz", "zyx"])
-    held = draw.choice(["true", "false"]) if family in ("free", "symmetric", "momentum", "top") else "false"
-    end = draw.uniform(5, 15)
-    text = f"""name = "case-{number}"
-{body}
-[time]
-end = {end:.4f}
-samples = {draw.choice([4, 9, 60])}
-[integrator]
-formulation = "{formulation}"
-euler_sequence = "{sequence}"
-hold_invariants = {held}
-"""
-    return Case(number, family, text, draw.choice(keys))
-
-
-def checked(one: Case, precision: str = "quadruple") -> Found:
-    """The errors of one case."""
+def checked(one: Case, *, quick: bool = False) -> Found:
+    """The errors of one case; ``quick`` differences share what is compiled, and have 1e-12."""
     base = parse(one.text, overrides=[f'output.sensitivity=["{one.key}"]', *_QUIET])
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         found = rigidsim.run(base, out=None, progress=False).dataset
-        differences = _differences(one, precision)
+        times = found["time"].to_numpy()
+        differences = _quick_differences(one, times) if quick else _differences(one)
     errors = {}
     for name, difference in differences.items():
         largest = np.abs(difference).max()
@@ -245,13 +70,43 @@ _QUIET = ["output.timeline=false", "output.estimate=false"]
 _NONE = 1e-12
 
 
-def _differences(one: Case, precision: str) -> dict[str, np.ndarray]:
+def _quick_differences(one: Case, times: np.ndarray) -> dict[str, np.ndarray]:
+    """As ``_differences``, of motions whose coefficients alone were worked out anew, given in double."""
+    text = parse(one.text, overrides=['integrator.precision="quadruple"', *_QUIET])
+    motion = Tangents(text, [one.key])
+    (value,) = motion.values
+    step = (abs(value) or 1.0) * float(_MOVED_QUICKLY)
+    base, found = motion.at({}, times), {}
+    sides = {n: motion.at({motion.keys[0]: value + n * step}, times) for n in _WEIGHTS}
+    width = 12 * ((value + step) - value)
+
+    def difference(name: str) -> np.ndarray:
+        parts = {n: getattr(side, name) for n, side in sides.items()}
+        if name == "attitude":
+            middle = base.attitude
+            parts = {n: q * np.sign((q * middle).sum(axis=1))[:, None] for n, q in parts.items()}
+        return np.asarray(sum(weight * parts[n] for n, weight in _WEIGHTS.items()) / width)
+
+    found["angular_velocity_sensitivity"] = difference("angular_velocity")
+    found["attitude_sensitivity"] = _turned(base.attitude, difference("attitude"))
+    if base.position is not None:
+        found["position_sensitivity"] = difference("position")
+    return found
+
+
+def _turned(quaternion: np.ndarray, change: np.ndarray) -> np.ndarray:
+    """Rotation vectors, space axes, of small changes of unit quaternions."""
+    w, v = quaternion[:, :1], quaternion[:, 1:]
+    return 2 * (w * change[:, 1:] - change[:, :1] * v - np.cross(change[:, 1:], v))
+
+
+def _differences(one: Case) -> dict[str, np.ndarray]:
     """Central differences of fourth order of attitude (rotation vector, space axes), rates and position."""
     given = parse(one.text)
     (key,) = varied_keys(given, [one.key])
     step = Fraction(abs(float(key.number)) or 1.0) * _MOVED
     record = ["quaternion", "angular_velocity"] + (["position"] if "position" in one.text else [])
-    plain = [f'integrator.precision="{precision}"', "integrator.hold_invariants=false", *_QUIET]
+    plain = ['integrator.precision="quadruple"', "integrator.hold_invariants=false", *_QUIET]
     plain += ['integrator.formulation="quaternion"', f"output.record={record}".replace("'", '"')]
     totals: dict[str, Any] = {}
     middle = None
@@ -271,9 +126,7 @@ def _differences(one: Case, precision: str) -> dict[str, np.ndarray]:
     base = rigidsim.run(parse(one.text, overrides=plain), out=None, progress=False).dataset
     q = _whole(base, "quaternion")
     q = (q * np.sign((q * middle).sum(axis=1).astype(float))[:, None]).astype(float)
-    w, v = q[:, :1], q[:, 1:]
-    cross = np.cross(change[:, 1:], v)
-    found["attitude_sensitivity"] = 2 * (w * change[:, 1:] - change[:, :1] * v - cross)
+    found["attitude_sensitivity"] = _turned(q, change)
     if "position" in made:
         found["position_sensitivity"] = made["position"]
     return found
@@ -332,14 +185,14 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--scenes", type=int, default=200)
     parser.add_argument("--first", type=int, default=0)
     parser.add_argument("--only", type=int)
-    parser.add_argument("--precision", default="quadruple")
+    parser.add_argument("--quick", action="store_true")
     chosen = parser.parse_args(arguments)
     numbers = range(chosen.first, chosen.first + chosen.scenes) if chosen.only is None else [chosen.only]
     off, worst = [], 0.0
     for number in numbers:
         one = case(number)
         try:
-            found = checked(one, chosen.precision)
+            found = checked(one, quick=chosen.quick)
         except rigidsim.RigidsimError as error:
             print(f"{number:4d} {one.family:10s} {one.key:34s} refused: {error}", flush=True)
             off.append(number)

@@ -29,7 +29,7 @@ from rigidsim.model.outputs import recorded_variables
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.scaling import Rounder
 from rigidsim.model.system import System
-from rigidsim.scene.arithmetic import context_for
+from rigidsim.scene.arithmetic import context_for, negligible
 from rigidsim.scene.config import Experiment
 from rigidsim.scene.varied_keys import VariedKey, scene_of
 
@@ -63,6 +63,11 @@ class _Pass:
     outputs: list[Symbolic]
     equations: list[Symbolic]
 
+    @property
+    def form(self) -> list[int]:
+        """Hashes, since wide expressions share parts that a comparison would walk through again and again."""
+        return [hash(x) for x in (*self.equations, *self.outputs)]
+
 
 class Parametrised:
     """A scene's full motion in rates and quaternion, whose coefficients that depend on keys are parameters.
@@ -90,15 +95,17 @@ class Parametrised:
     ) -> None:
         self.keys, self._number, self._bits, self._loads = tuple(keys), number, bits, tuple(loads)
         self._experiment = _of_motion(experiment, record)
-        digits = int((3 * bits + _OFF + _STEP + 64) * 0.30103) + 1
-        self.context = context_for(digits)
+        precision = experiment.config.integrator.precision
+        self.context = context_for(precision, more=2 * bits + _OFF + _STEP)
         self.values = [key.value(self.context) for key in self.keys] if values is None else list(values)
-        own = scene_of(self._experiment, self.keys, self.values, context_for(_digits_of(bits)))
+        own = scene_of(self._experiment, self.keys, self.values, context_for(precision))
         self._plan: ModelPlan = plan_model(own, self._loads)
         base, found, moved = self._passes(self.values)
         self.plain = System(base.system.plan, number)  # with all that acts once no number is exactly zero
         self.first = _parameters(self.plain)
-        self._varied = [i for i, value in enumerate(base.noted) if any(m.noted[i] != value for m in moved)]
+        self._varied = [
+            i for i, x in enumerate(base.noted) if any(self._differ(m.noted[i], x) for m in moved)
+        ]
         self._fixed = {i: x for i, x in enumerate(base.noted) if i not in set(self._varied)}
         made = self._pass(found, self._as_parameters())
         self.equations, self.outputs = made.equations, made.outputs
@@ -125,8 +132,9 @@ class Parametrised:
         base, _, moved = self._passes(values)
         if len(base.noted) != len(self._varied) + len(self._fixed):
             return None
-        if any(base.noted[i] != x or any(m.noted[i] != x for m in moved) for i, x in self._fixed.items()):
-            return None
+        for i, x in self._fixed.items():
+            if any(self._differ(one.noted[i], x) for one in (base, *moved)):
+                return None
         return self._coefficients(base, moved)
 
     @property
@@ -195,14 +203,19 @@ class Parametrised:
 
     def _as_parameters(self) -> Callable[[int, Any], Any]:
         places = {i: self.first + n for n, i in enumerate(self._varied)}
-        return lambda i, value: hy.par[places[i]] if i in places else self._number(value)
+        return lambda i, value: hy.par[places[i]] if i in places else self._number(self._fixed.get(i, value))
+
+    def _differ(self, one: Any, other: Any) -> bool:
+        """Whether two numbers differ by more than the arithmetic's own rounding."""
+        return bool(abs(one - other) > abs(other) * negligible(self.context))
 
     def _coefficients(self, base: _Pass, moved: Sequence[_Pass]) -> Coefficients:
         context = self.context
         steps = [context.mpf(step.numerator) / context.mpf(step.denominator) for step in self._steps]
 
         def slopes(value: Any, others: Sequence[Any]) -> list[Any]:
-            return [(x - value) / step for x, step in zip(others, steps, strict=True)]
+            pairs = zip(others, steps, strict=True)
+            return [(x - value) / step if self._differ(x, value) else context.zero for x, step in pairs]
 
         initial = list(base.system.initial)
         starts = [list(m.system.initial) for m in moved]
@@ -222,10 +235,10 @@ class Parametrised:
                 looked = self._pass(there, self._as_parameters())
             except ConfigError:
                 continue
-            same = len(looked.noted) == len(base.noted) and all(
-                looked.noted[i] == x for i, x in self._fixed.items()
+            same = len(looked.noted) == len(base.noted) and not any(
+                self._differ(looked.noted[i], x) for i, x in self._fixed.items()
             )
-            if same and looked.equations == made.equations and looked.outputs == made.outputs:
+            if same and looked.form == made.form:
                 return
         names = ", ".join(key.name for key in self.keys)
         what = f"names {names}, of which one changes the form of the equations; leave it out"
@@ -241,18 +254,20 @@ def _of_motion(experiment: Experiment, more: Sequence[str]) -> Experiment:
     record += ["core_angular_velocity"] if config.body.core is not None else []
     record += [name for name in more if name not in record]
     output = config.output.model_copy(
-        update={"record": record, "lyapunov": False, "orientation": None, "orientation_of": None, "tip": None}
+        update={
+            "record": record,
+            "lyapunov": False,
+            "sensitivity": None,
+            "orientation": None,
+            "orientation_of": None,
+            "tip": None,
+        }
     )
     integrator = config.integrator.model_copy(
         update={"formulation": "quaternion", "hold_invariants": False, "method": "taylor"}
     )
     tables = {"output": output, "integrator": integrator, "events": []}
     return replace(experiment, config=config.model_copy(update=tables))
-
-
-def _digits_of(bits: int) -> int:
-    """Decimal digits whose scenes have guard bits for a precision of so many bits."""
-    return int(bits * 0.30103) + 1
 
 
 def _parameters(system: System) -> int:

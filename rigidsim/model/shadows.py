@@ -28,7 +28,7 @@ import heyoka as hy
 from rigidsim.model.kinematics import Kinematics
 from rigidsim.model.sources import SeenSource, read_in, sources_of
 from rigidsim.model.two_part import rounded
-from rigidsim.scene.arithmetic import GUARD_BITS, norm
+from rigidsim.scene.arithmetic import bits_in_use, norm
 from rigidsim.scene.expressions.names import NameProvider, Readable, provides
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.schema import Config
@@ -146,7 +146,7 @@ class _Share:
 
     def __init__(self, context: Any) -> None:
         self._context = context
-        self._edge = context.ldexp(context.one, -((context.prec - GUARD_BITS) // 2))
+        self._edge = context.ldexp(context.one, -(bits_in_use(context) // 2))
 
     def number(self, value: Any) -> Any:
         raise NotImplementedError

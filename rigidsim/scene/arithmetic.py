@@ -38,6 +38,8 @@ def working_bits(precision: str | int) -> int:
 class _Context(mpmath.MPContext):
     """An mpmath context that inherits its special functions, which each plain one would wrap again."""
 
+    guard_bits: int = GUARD_BITS  # that it has beyond the working precision
+
     @classmethod
     def _wrap_specfun(cls, *_: Any) -> None:
         """Wrap the special functions once; contexts inherit them as wrapped for ``mpmath.mp``."""
@@ -53,16 +55,22 @@ class _Context(mpmath.MPContext):
         return min(values)
 
 
-def context_for(precision: str | int) -> Any:
-    """An mpmath context of its own (never the global one) with guard bits."""
+def context_for(precision: str | int, more: int = 0) -> Any:
+    """An mpmath context of its own (never the global one) with guard bits, and so many more of them."""
     context = _Context()
-    context.prec = working_bits(precision) + GUARD_BITS
+    context.guard_bits = GUARD_BITS + more
+    context.prec = working_bits(precision) + context.guard_bits
     return context
 
 
 def working_epsilon(context: Any) -> Any:
     """Spacing of the working precision's numbers just above 1, for a scene's context."""
-    return context.mpf(2) ** (1 + GUARD_BITS - context.prec)
+    return context.mpf(2) ** (1 - bits_in_use(context))
+
+
+def bits_in_use(context: Any) -> int:
+    """Bits of the working precision, for a scene's context."""
+    return int(context.prec - getattr(context, "guard_bits", GUARD_BITS))
 
 
 def negligible(context: Any) -> Any:

@@ -168,7 +168,7 @@ class Output(ConfigTable):
     lyapunov: StrictBool = False
     """Lyapunov exponents from variational equations; costs tens of times the plain run"""
     sensitivity: EachOnce[StrictStr] | None = Field(None, examples=[["initial.angular_velocity[0]"]])
-    """keys of numbers in the config by which attitude, rates and position are differentiated along the motion,
+    """keys of numbers in the config by which attitude, rates and position are differentiated along the way,
     vectors component by component; initial.attitude stands for a turn of the start, body axes
     """
     orientation: StrictStr | None = Field(None, examples=["./pck00011.tpc"])

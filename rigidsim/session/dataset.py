@@ -16,7 +16,6 @@ from rigidsim.model.outputs import Invariant
 from rigidsim.scene.kernels.ephemeris import date_of
 from rigidsim.scene.scene import Scene
 from rigidsim.session.dates import Dates
-from rigidsim.session.sensitivity import sensitivity_variables
 from rigidsim.solve.assembly import Assembly
 from rigidsim.solve.evaluate import Evaluator, RecordedParts
 from rigidsim.solve.events import EventLog, samples_at
@@ -60,7 +59,10 @@ def dataset_variables(prepared: InitialValueProblem) -> list[Variable]:
     beside_published = published_of(prepared)
     if beside_published is not None:
         found += beside_published.variables
-    found += sensitivity_variables(prepared)
+    if prepared.sensitivity_keys:
+        from rigidsim.session.sensitivity import sensitivity_variables  # which few runs need
+
+        found += sensitivity_variables(prepared)
     dates = dates_of(prepared)
     if dates is None:
         return [time, *found]

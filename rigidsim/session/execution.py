@@ -12,7 +12,6 @@ from rigidsim.session import dataset, lyapunov
 from rigidsim.session.diagnostics import Diagnostics, cheaper_model
 from rigidsim.session.ending import chart_changes, closing_words, time_reached
 from rigidsim.session.recorder import Checkpoints, Recorder, SampleStatistics
-from rigidsim.session.sensitivity import Sensitivity
 from rigidsim.session.session import Guards, Interruption, Observer, RunCost, Session
 from rigidsim.session.summary import cost_so_far, summarise
 from rigidsim.solve.assembly import assemble, sampler
@@ -72,7 +71,11 @@ class _ActiveRun:
         statistics = SampleStatistics([i.name for i in system.invariants], [r.name for r in system.recorded])
         trail = SampleTrail(prepared.precision)
         cost = RunCost(session.effort, progress)
-        beside = Sensitivity(prepared) if prepared.sensitivity_keys else None
+        beside = None
+        if prepared.sensitivity_keys:
+            from rigidsim.session.sensitivity import Sensitivity  # which few runs need
+
+            beside = Sensitivity(prepared)
         more = {} if beside is None else {"sensitivity": beside}
         self.checkpoints = Checkpoints(parts, statistics=statistics, cost=cost, trail=trail, **more)
         start = None if chain is None else self.checkpoints.restore(chain)

@@ -8,13 +8,12 @@ import math
 import sys
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
 from rigidsim.errors import RunFolderError
 from rigidsim.session.dataset import dates_of, drift_name, published_of, put_back_name
-from rigidsim.session.sensitivity import Sensitivity
 from rigidsim.solve.assembly import Assembly
 from rigidsim.solve.checkpoint import Arrays, SavedPart, check_versions, numbers, pack_versions
 from rigidsim.solve.corrected_stepper import Position
@@ -29,6 +28,9 @@ from rigidsim.store import netcdf
 from rigidsim.store.netcdf import CHUNK_ROWS
 from rigidsim.store.run import MemoryWriter
 from rigidsim.store.segments import Chain, SegmentWriter
+
+if TYPE_CHECKING:
+    from rigidsim.session.sensitivity import Sensitivity
 
 
 @dataclass(frozen=True)
@@ -175,7 +177,7 @@ class Recorder(SampleReceiver):
         trail: SampleTrail,
         checkpoints: Checkpoints,
         start: Position | None,
-        sensitivity: Sensitivity | None = None,
+        sensitivity: "Sensitivity | None" = None,
     ) -> None:
         self.sensitivity = sensitivity
         self._prepared = prepared

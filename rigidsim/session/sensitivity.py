@@ -18,7 +18,7 @@ from rigidsim.solve.compiled import interruptible
 from rigidsim.solve.problem import InitialValueProblem
 from rigidsim.solve.sample_block import SampleBlock
 from rigidsim.solve.settled import SettledStates
-from rigidsim.solve.variational import LostTangents, Place, Rows, Variational, turned
+from rigidsim.solve.variational import LostTangents, Rows, TangentPlace, Variational, turned
 from rigidsim.store.variables import Variable
 
 _SET_AFTER = 8  # steps of the second integrator, after which it is set on the run's state at a sample
@@ -70,11 +70,11 @@ class Sensitivity:
         self.go_on: Callable[[], bool] = lambda: True
 
     @property
-    def place(self) -> tuple[Place, bool]:
+    def place(self) -> tuple[TangentPlace, bool]:
         """Where it is, to go back to."""
         return self._engine.place, self._lost
 
-    def back_to(self, place: tuple[Place, bool]) -> None:
+    def back_to(self, place: tuple[TangentPlace, bool]) -> None:
         """Return to where it was."""
         self._lost = place[1]
         self._engine.back_to(place[0])
@@ -140,4 +140,4 @@ class Sensitivity:
         if time.shape != (2,) or state.shape != here.state.shape or exponents.shape != here.exponents.shape:
             raise ValueError("its tangents belong to other equations")
         steps, lost = (int(n) for n in arrays["tangent_counts"])
-        self.back_to((Place((time[0], time[1]), state, exponents.astype(np.int64), steps), bool(lost)))
+        self.back_to((TangentPlace((time[0], time[1]), state, exponents.astype(np.int64), steps), bool(lost)))

@@ -15,7 +15,6 @@ from rigidsim.errors import ConfigError, Problem, either
 from rigidsim.model.carriers import carried_beside
 from rigidsim.model.load import Load, own_loads
 from rigidsim.model.model_plan import plan_model
-from rigidsim.model.parametrised import Parametrised
 from rigidsim.model.projected_invariants import conserves, projected_invariants
 from rigidsim.model.scaling import gyroscopic_rate
 from rigidsim.model.system import System, build_system
@@ -24,8 +23,6 @@ from rigidsim.scene.choices import AUTO, FORMULATIONS
 from rigidsim.scene.config import Experiment
 from rigidsim.scene.initial_values import check_start
 from rigidsim.scene.scene import Scene, build_scene
-from rigidsim.scene.varied_keys import varied_keys
-from rigidsim.solve.differentiable import parametrised, refuse_without_derivatives
 from rigidsim.solve.first_step import refuse_non_finite_start, refuse_roots_of_zero
 from rigidsim.solve.precision import Precision, Scalar, precision_of
 from rigidsim.solve.sampling import SampleClock
@@ -33,6 +30,7 @@ from rigidsim.solve.solvers.algorithm import Algorithm, algorithm_of
 
 if TYPE_CHECKING:
     from rigidsim.model.averaged.average import Average
+    from rigidsim.model.parametrised import Parametrised
 
 DRIFT_FACTOR = 50.0
 """A sound run keeps relative drifts below this times tolerance times sqrt(steps): rounding errors of the
@@ -91,6 +89,8 @@ class InitialValueProblem:
     @cached_property
     def parametrised(self) -> Parametrised:
         """The system with these keys as parameters; ConfigError if its equations have no derivatives."""
+        from rigidsim.solve.differentiable import parametrised  # which few runs need
+
         try:
             return parametrised(self.experiment, self.sensitivity_keys, self.python_loads)
         except ConfigError as error:
@@ -125,6 +125,9 @@ def prepare(experiment: Experiment, *, loads: Sequence[Load] = ()) -> InitialVal
         raise ConfigError(Problem("[sweep]", what), experiment.source)
     prepared = prepare_scene(experiment, build_scene(experiment), loads=loads)
     if prepared.sensitivity_keys:
+        from rigidsim.scene.varied_keys import varied_keys
+        from rigidsim.solve.differentiable import refuse_without_derivatives
+
         try:
             refuse_without_derivatives(prepared.scene, prepared.system, has_steps=prepared.has_steps)
             varied_keys(experiment, prepared.sensitivity_keys)

@@ -34,7 +34,7 @@ class LostTangents(Exception):
 
 
 @dataclass(frozen=True)
-class Place:
+class TangentPlace:
     """A boundary of the second integrator's steps, all of it: to continue with the same bits."""
 
     time: tuple[Scalar, Scalar]
@@ -69,8 +69,8 @@ class Variational:
         options = dict(precision.options, compact_mode=True)
         self._engine: TaylorEngine = compiled_engine(equations, precision.zeros((len(equations),)), **options)
         self._longest = precision.of_double(longest_step(self._engine.order, precision.scalar))
-        self._first: Place | None = None
-        self._place: Place | None = None
+        self._first: TangentPlace | None = None
+        self._place: TangentPlace | None = None
         self._entered: int | None = None
         self.use(parametrised.coefficients)
 
@@ -148,7 +148,7 @@ class Variational:
             state[self._of_key(j)] = precision.array(scaled)
         zero = precision.of_double(0.0)
         start = number(self.system.scene.context.ldexp(self.system.scene.start, -self.system.scaling.time))
-        self._first = Place((start, zero), state, exponents, 0)
+        self._first = TangentPlace((start, zero), state, exponents, 0)
         self._begin_at(self._first)
 
     def begin(self) -> None:
@@ -157,12 +157,12 @@ class Variational:
         self._begin_at(self._first)
 
     @property
-    def place(self) -> Place:
+    def place(self) -> TangentPlace:
         """Where the latest step began, from which all that follows is done again with the same bits."""
         assert self._place is not None
         return self._place
 
-    def back_to(self, place: Place) -> None:
+    def back_to(self, place: TangentPlace) -> None:
         """Return to a place."""
         self._begin_at(place)
 
@@ -170,13 +170,13 @@ class Variational:
         """Continue, at a time within the latest step, in another state of the motion with its tangents."""
         here = np.array(self._engine.update_d_output(time)) if time != self._engine.time else self._here()
         here[: self.states] = state
-        place = Place((time, self.precision.of_double(0.0)), here, self._exponents.copy(), 0)
+        place = TangentPlace((time, self.precision.of_double(0.0)), here, self._exponents.copy(), 0)
         self._begin_at(place)
 
     def _here(self) -> np.ndarray:
         return np.array(self._engine.state)
 
-    def _begin_at(self, place: Place) -> None:
+    def _begin_at(self, place: TangentPlace) -> None:
         engine = self._engine
         engine.dtime = place.time
         engine.state[:] = place.state
@@ -221,7 +221,7 @@ class Variational:
 
     def _step(self) -> None:
         engine = self._engine
-        self._place = Place(engine.dtime, self._here(), self._exponents.copy(), self._steps)
+        self._place = TangentPlace(engine.dtime, self._here(), self._exponents.copy(), self._steps)
         self._scale()
         until = self._meet()
         if until is None:
@@ -330,8 +330,9 @@ def turned(quaternion: np.ndarray, slopes: np.ndarray) -> np.ndarray:
     a, b = slopes[:, :, :1], slopes[:, :, 1:]
     (vx, vy, vz), (bx, by, bz) = (np.moveaxis(x, 2, 0) for x in (v, b))
     crossed = np.stack([by * vz - bz * vy, bz * vx - bx * vz, bx * vy - by * vx], axis=2)
-    square = (quaternion * quaternion).sum(axis=1)[:, None, None]
-    return (w * b - a * v - crossed) * (2.0 / square)
+    square = w * w + sum(v[:, :, i : i + 1] * v[:, :, i : i + 1] for i in range(3))
+    half = w * b - a * v - crossed
+    return (half + half) / square
 
 
 def _jacobian(expressions: Sequence[Symbolic], by: Sequence[Symbolic]) -> list[dict[int, Symbolic]]:

@@ -53,8 +53,8 @@ class MotionAgain:
 
     @cached_property
     def _experiment(self) -> Experiment:
-        apart = {"orientation": None, "orientation_of": None, "lyapunov": False, "estimate": False}
-        found = experiment_again(self.dataset, **apart)
+        none = dict.fromkeys(("orientation", "orientation_of", "sensitivity"))
+        found = experiment_again(self.dataset, **none, lyapunov=False, estimate=False)
         names = list(found.config.output.record or (read_attributes(self.dataset).recorded or "").split())
         names += [RATES] if RATES not in names else []
         return _with(found, {"output": found.config.output.model_copy(update={"record": names})})

@@ -17,7 +17,7 @@ Found = tuple[Array, list[str], str]
 
 
 def _sizes(name: str) -> Find:
-    """Sizes of the derivatives (rows, parameters), the parameters with their units, and the variable's unit."""
+    """Sizes of the derivatives (rows, parameters), the parameters with units, and the variable's unit."""
 
     def find(dataset: xarray.Dataset) -> Found | None:
         table = signals.values(dataset, name)

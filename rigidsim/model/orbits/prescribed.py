@@ -39,7 +39,7 @@ from rigidsim.model.rotations import Symbolic
 from rigidsim.model.scaling import Rounder
 from rigidsim.model.state_blocks import StateBlock
 from rigidsim.model.two_part import as_factor, rounded
-from rigidsim.scene.arithmetic import GUARD_BITS
+from rigidsim.scene.arithmetic import bits_in_use
 from rigidsim.scene.orbit_tables.pieces import AXIS, LONGITUDE, TabulatedOrbit
 from rigidsim.scene.orbits import KeplerOrbit
 
@@ -297,7 +297,7 @@ class TablePieces:
     def numbers(self, first: int, stop: int) -> tuple[np.ndarray, np.ndarray]:
         """See ``PieceSeries``."""
         rows, context = self._rows[first:stop], self._orbit.context
-        least = context.ldexp(1, _LEAST * (context.prec - GUARD_BITS))
+        least = context.ldexp(1, _LEAST * bits_in_use(context))
         parameters = [[self._number(x if abs(x) > least else 0 * x) for x in self._of(row)] for row in rows]
         states = [[self._number(x) for x in self._begin(row).values()] for row in rows]
         kind = type(parameters[0][0])

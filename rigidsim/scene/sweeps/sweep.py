@@ -65,6 +65,9 @@ class Sweep:
                 problems += [Problem(where, problem.what) for problem in error.problems]
         events = [event.name for event in experiment.config.events]
         problems += clashes(axes, events, product=table.mode == "product")
+        if experiment.config.output.sensitivity:
+            what = "given beside [sweep], which keeps none; leave it out, or run its members by themselves"
+            problems.append(Problem("[output] sensitivity", what))
         if not problems:
             problems += _counts(table, axes)
         if problems:

@@ -48,6 +48,7 @@ def plain(experiment: Experiment) -> tuple[Experiment, Scene]:
         "record": names,
         "timeline": False,
         "lyapunov": False,
+        "sensitivity": None,
         "orientation": None,
         "orientation_of": None,
     }

@@ -14,7 +14,7 @@ from rigidsim.scene.tracing.numbers import plain
 from rigidsim.solve.problem import prepare
 from rigidsim.workflows.physics.table import ARCSEC, AveragedLevel, UnassessedEffect
 
-_OTHER = ("record", "accuracy", "method", "formulation", "hold_invariants", "lyapunov", "tip")
+_OTHER = ("record", "accuracy", "method", "formulation", "hold_invariants", "lyapunov", "sensitivity", "tip")
 """Keys that an average may refuse, and that don't matter for what it errs by."""
 _LIGHT = 299792458.0  # m/s
 

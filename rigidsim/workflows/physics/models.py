@@ -130,7 +130,11 @@ class Models:
         config = self.given.config
         settled, _ = chosen(self.given)
         asked = [f"integrator.{key}=" for key in _ACCURACY if key in config.integrator.model_fields_set]
-        shown = [f"output.{key}=" for key in ("tip", "lyapunov") if key in config.output.model_fields_set]
+        shown = [
+            f"output.{key}="
+            for key in ("tip", "lyapunov", "sensitivity")
+            if key in config.output.model_fields_set
+        ]
         kept = [f'output.record=["{self.compared}"]', "output.timeline=false", "output.estimate=true"]
         return settled.having([*asked, *shown, *kept])
 

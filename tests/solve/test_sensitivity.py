@@ -1,0 +1,130 @@
+"""Sensitivities: identities of mechanics, differences in higher precision, bits of the motion, refusals."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from support import run_text
+
+from experiments.sensitivity_campaign import BOUND, checked
+from experiments.sensitivity_scenes import case
+from rigidsim import ConfigError
+from rigidsim.scene.rotations import rotation_matrix
+from rigidsim.solve.problem import prepare
+from rigidsim.workflows.read import parse
+from rigidsim.workflows.sensitivity import Tangents, sensitivities
+
+FREE = """
+name = "free"
+[body]
+principal_moments = [1, 2, 2.5]
+[initial]
+angular_velocity = [0.3, 1.0, 0.05]
+quaternion = [0.8, 0.1, -0.3, 0.5]
+[time]
+end = 30
+samples = 61
+"""
+KEYS = '["initial.angular_velocity", "body.principal_moments", "initial.attitude"]'
+TORQUE = '[[loads]]\nkind = "torque"\ncomponents = ["{}", "0", "0"]\n'
+ROUNDING = 1e-12
+"""Relative: some hundred steps of 1e-16, grown as far as a free body's motion grows, like the time."""
+
+
+def test_a_free_bodys_derivatives_obey_its_scaling_laws() -> None:
+    """Faster rates are the same motion run through sooner: w0 . d/dw0 gives t times the motion's own pace.
+    Larger moments, all in proportion, change nothing. A turned start turns the whole motion.
+    """
+    times = np.linspace(0, 30, 13)
+    found = sensitivities(
+        parse(FREE), ["initial.angular_velocity", "body.principal_moments", "initial.attitude"], times
+    )
+    start, moments = np.array([0.3, 1.0, 0.05]), np.array([1, 2, 2.5])
+    w = found.angular_velocity
+    matrix = np.moveaxis(np.array(rotation_matrix([*found.attitude.T])), 2, 0)
+    in_space = np.einsum("nij,nj->ni", matrix, w)
+    size = np.abs(found.d_attitude[:, :6]).max()
+    by_scale = np.einsum("nki,k->ni", found.d_attitude[:, :3], start)
+    assert np.abs(by_scale - times[:, None] * in_space).max() < ROUNDING * size
+    pull = -np.cross(w, w * moments) / moments  # Euler's equations
+    by_scale = np.einsum("nki,k->ni", found.d_angular_velocity[:, :3], start)
+    assert np.abs(by_scale - w - times[:, None] * pull).max() < ROUNDING * size
+    for slopes in (found.d_attitude, found.d_angular_velocity):
+        assert np.abs(np.einsum("nki,k->ni", slopes[:, 3:6], moments)).max() < ROUNDING * size
+    assert np.abs(found.d_angular_velocity[:, 6:]).max() == 0
+    turned = np.einsum("ij,nkj->nki", matrix[0].T, found.d_attitude[:, 6:])
+    assert np.abs(turned - np.eye(3)).max() < ROUNDING
+
+
+@pytest.mark.slow(600)
+@pytest.mark.parametrize("number", range(100, 128))
+def test_random_keys_and_scenes_agree_with_higher_precision(number: int) -> None:
+    assert checked(case(number)).worst < BOUND
+
+
+@pytest.mark.parametrize(
+    "integrator",
+    ['formulation = "euler_angles"\nhold_invariants = true', 'precision = "extended"'],
+    ids=["charts and projection", "80 bits"],
+)
+def test_the_motions_bits_are_those_of_the_plain_run(integrator: str) -> None:
+    """And the derivatives are those without a run, which begins nowhere anew."""
+    text = FREE + f"[integrator]\n{integrator}\n"
+    plain = run_text(text).dataset
+    beside = run_text(text + f"[output]\nsensitivity = {KEYS}\n").dataset
+    for name in plain.variables:
+        assert plain[name].values.tobytes() == beside[name].values.tobytes(), name
+    added = set(beside.variables) - set(plain.variables) - {"parameter", "space_axis"}
+    assert {name.removesuffix("_lo") for name in added} == {
+        "attitude_sensitivity",
+        "angular_velocity_sensitivity",
+    }
+    assert beside["attitude_sensitivity"].dims == ("time", "parameter", "space_axis")
+    assert list(beside["parameter"].values[:4]) == [
+        *(f"initial.angular_velocity[{i}]" for i in range(3)), "body.principal_moments[0]",
+    ]  # fmt: skip
+    alone = sensitivities(parse(text), [str(key) for key in beside["parameter"].values], plain["time"].values)
+    size = np.abs(alone.d_attitude).max()
+    assert np.abs(beside["attitude_sensitivity"].values - alone.d_attitude).max() < 10 * ROUNDING * size
+
+
+def test_other_values_need_no_other_code_until_the_equations_change() -> None:
+    """Steps of a fit; where a parameter is zero its load stays in the equations."""
+    text = FREE + TORQUE.format("k*sin(t)") + "[parameters]\nk = 0\n"
+    found = Tangents(parse(text), ["parameters.k", "initial.attitude[0]"])
+    assert found.keys == ("parameters.k", "initial.attitude[0]")
+    at_zero = found.at({}, [0.0, 10.0])
+    step = 1e-4
+    plus, minus = (found.at({"parameters.k": k}, [0.0, 10.0]) for k in (step, -step))
+    difference = (plus.angular_velocity - minus.angular_velocity)[1] / (2 * step)
+    # a central difference errs by step^2 times a third derivative of some t^3
+    assert (
+        np.abs(at_zero.d_angular_velocity[1, 0] - difference).max() < 1e3 * step**2 * np.abs(difference).max()
+    )
+    again = found.at({}, [0.0, 10.0])
+    assert (again.d_attitude == at_zero.d_attitude).all()
+    fresh = Tangents(parse(text.replace("k = 0", "k = 1e-4")), ["parameters.k"]).at({}, [10.0])
+    assert (
+        np.abs(fresh.d_attitude[0, 0] - plus.d_attitude[1, 0]).max()
+        < ROUNDING * np.abs(plus.d_attitude).max()
+    )
+
+
+@pytest.mark.parametrize(
+    ("keys", "more", "words"),
+    [
+        ('["initial.angular_velocitty[0]"]', "", 'unknown key "angular_velocitty"'),
+        ('["time.end"]', "", "no number of the motion"),
+        ('["body.mass"]', "", "isn't given in the config"),
+        ('["initial.attitude[3]"]', "", "indices 0, 1 and 2"),
+        ('["initial.attitude", "initial.attitude[1]"]', "", "another key stands for"),
+        ('["loads[0].components[0]"]', TORQUE.format("0.1"), "has no number there"),
+        ('["initial.attitude"]', '[integrator]\nprecision = "single"\n', "single precision"),
+        ('["initial.attitude"]', '[integrator]\nmethod = "closed_form"\n', "takes no steps"),
+        ('["initial.attitude"]', TORQUE.format("-0.1*sign(wx)"), "make the change smooth with tanh"),
+    ],
+)
+def test_what_has_no_derivative_is_refused_in_words(keys: str, more: str, words: str) -> None:
+    with pytest.raises(ConfigError, match=r"\[output\] sensitivity") as refused:
+        prepare(parse(FREE + more + f"[output]\nsensitivity = {keys}\n"))
+    assert words in str(refused.value)
