@@ -43,7 +43,7 @@ def fits_lanes(parametrised: Parametrised, precision: Precision) -> bool:
 
 
 @dataclass
-class _Doubles:
+class _LaneNumbers:
     """Doubles of coefficients: (m,), (m, keys), (states,), (states, keys)."""
 
     values: np.ndarray
@@ -52,7 +52,7 @@ class _Doubles:
     initial_slopes: np.ndarray
 
     @classmethod
-    def of(cls, found: Coefficients, keys: int) -> _Doubles:
+    def of(cls, found: Coefficients, keys: int) -> _LaneNumbers:
         def table(rows: list[list[Any]]) -> np.ndarray:
             return np.array([[float(x) for x in row] for row in rows]).reshape(len(rows), keys)
 
@@ -83,7 +83,7 @@ class TangentLanes:
 
     def use(self, coefficients: Coefficients) -> None:
         """Take coefficients and initial values."""
-        self._numbers = _Doubles.of(coefficients, self._keys)
+        self._numbers = _LaneNumbers.of(coefficients, self._keys)
         self._moved: tuple[bytes, np.ndarray] | None = None
 
     def _derivatives(self, expressions: list[Symbolic]) -> list[Symbolic]:

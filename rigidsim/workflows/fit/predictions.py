@@ -9,7 +9,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from rigidsim.errors import ConfigError, RigidsimError
+from rigidsim.errors import ConfigError, Problem, RigidsimError
 from rigidsim.scene.choices import DEFAULT_METHOD
 from rigidsim.scene.config import Experiment
 from rigidsim.scene.exact import ExactNumber
@@ -182,6 +182,9 @@ class ByTangents:
         integrator = quiet.config.integrator.model_copy(update={"method": DEFAULT_METHOD})
         stepping = replace(quiet, config=quiet.config.model_copy(update={"integrator": integrator}))
         prepared = prepare(stepping)
+        if prepared.system.wide:
+            what = "its equations are so many that to differentiate them takes longer than the runs"
+            raise ConfigError(Problem("[fit] parameters", what))
         refuse_without_derivatives(
             prepared.scene, prepared.system, has_steps=prepared.has_steps, where="[fit] parameters"
         )
