@@ -38,6 +38,7 @@ SLOW = {  # about how many seconds they take
     "cassini_states": 40,
     "damped_averages": 30,
     "earth_obliquity": 25,
+    "fitted_bodies": 30,
     "flip_period": 15,
     "flip_sphere": 10,
     "heavy_top_regimes": 15,
