@@ -36,6 +36,7 @@ def made_up(error: list[float], cost: list[float], status: list[str]) -> xarray.
         "attitude_error_largest": ("setting", np.array(error)),
         "reference_error": ("setting", np.full(n, 1e-45)),
         "cpu_ratio": ("setting", np.array(cost)),
+        "cpu_seconds": ("setting", np.array(cost)),
         "status": ("setting", np.array(status, dtype=object)),
         "measured_time": ("setting", np.full(n, 10.0)),
     }

@@ -91,6 +91,7 @@ SCENES = [
 ]
 
 
+@pytest.mark.slow
 def test_announced_errors_are_true() -> None:
     """The Moon with a core, without and in momenta, tumbling bodies and a flight, tight and loose."""
     truths = [

@@ -64,6 +64,7 @@ def attraction(x: np.ndarray) -> np.ndarray:
     return radial * up + north * np.cross(up, eastward) + east * eastward
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rate", [0.0, 7.292115e-5])
 def test_a_field_in_axes_that_turn_agrees_with_another_integrator_and_formula(rate: float) -> None:
     pole, meridian = np.array([0.3, -0.2, 0.9]), 0.7

@@ -88,7 +88,7 @@ def open_any(path: str | Path) -> SavedRun | TrajectoryRun:
         RunFolderError: neither, or a damaged run. RigidsimError: the file can't be read.
     """
     given = Path(path)
-    if not is_trajectory(given):
+    if not is_trajectory(given) or not given.exists():
         return open_run(given)
     outcome = Brief(name=given.stem, status="finished", message=f"is the file {given.name}")
     return TrajectoryRun(given, outcome)
