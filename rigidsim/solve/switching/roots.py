@@ -6,6 +6,7 @@ import numpy as np
 
 from rigidsim.solve.precision import Scalar
 from rigidsim.solve.switching.engines import Root, SwitchedEngines
+from rigidsim.solve.switching.moments import later
 from rigidsim.solve.switching.sides import HELD, SLIDES
 
 _NEAR = 2.0**-12  # of a step: within it Newton's method improves a root
@@ -64,26 +65,26 @@ class SurfaceRoots(SwitchedEngines):
         size: Scalar,
         moment: tuple[Scalar, Scalar] | None,
     ) -> Scalar:
-        """Repeat the step up to a root, closer to it, or to its known moment; returns the step's size."""
+        """Repeat the step up to a root, to its last digits, or to its known moment; returns the step's size.
+
+        Args:
+            size: of the step to the root as the engine found it, within the step just taken.
+        """
         engine = self._integrator
+        if moment is None and root[1] not in self._along:  # by that step's own polynomials
+            high, low = later(time, size)
+            look = self._look(np.array(engine.update_d_output(high)), high, low)
+            rate = look.rate(root[1])
+            correction = look.u[root[1]] / rate if rate != 0 else rate
+            if 0 < abs(float(correction)) < _NEAR * float(size):
+                size = size - correction
         muted, self.log.muted = self.log.muted, True
         try:
-            for attempt in range(2):
-                engine.dtime = time
-                engine.state[:] = before
-                engine.step(size, write_tc=True)
-                if moment is not None:
-                    engine.dtime = moment
-                if attempt or moment is not None or root[1] in self._along:
-                    break
-                look = self._look(engine.state, engine.time, self._low)
-                rate = look.rate(root[1])
-                if rate == 0:
-                    break
-                correction = look.u[root[1]] / rate
-                if not 0 < abs(float(correction)) < _NEAR * float(size):
-                    break
-                size = size - correction
+            engine.dtime = time
+            engine.state[:] = before
+            engine.step(size, write_tc=True)
+            if moment is not None:
+                engine.dtime = moment
         finally:
             self.log.muted = muted
         return size

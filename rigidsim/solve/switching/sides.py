@@ -27,6 +27,7 @@ HELD = 2
 """Mode in place of a side: the motion keeps to the surface while it slides along surface number m, whose side
 it has (``HELD + m``) or the opposite one (``-HELD - m``); see ``rigidsim.solve.switching.sliding``.
 """
+_MOST_KEPT = 4  # looks: from both sides, at a boundary and within the step before it
 _ROUNDINGS = 32.0  # units of rounding of an argument's terms, below which it is zero
 PARALLEL = 1e-9  # relative difference of fields that count as equal
 _RATE_ROUNDINGS = 1024.0  # the same for its rate, whose terms are products of derivatives
@@ -98,6 +99,7 @@ class Probe:
         self._crossings = hy.cfunc([*found, *lengths, *named], variables, **options)
         outputs = [*system.surfaces, *by_time, *gradients, *field, *named]
         self._everything = hy.cfunc(outputs, variables, **options)
+        self._latest: dict[tuple[bytes, ...], Look] = {}
 
     def values(
         self, state: np.ndarray, time: Scalar, pars: np.ndarray
@@ -114,7 +116,20 @@ class Probe:
         return [(value, noise * size) for value, size in zip(found[:half], found[half:], strict=True)]
 
     def look(self, state: np.ndarray, time: Scalar, pars: np.ndarray) -> Look:
-        """Surfaces and field at a state."""
+        """Surfaces and field at a state; those of the latest states are kept, since a step that ends on a
+        surface asks for them several times.
+        """
+        asked = [state, np.array([time]), pars]
+        if not all(issubclass(array.dtype.type, np.floating) for array in asked):  # numbers behind pointers
+            return self._evaluated(state, time, pars)
+        key = tuple(array.tobytes() for array in asked)
+        if key not in self._latest:
+            self._latest[key] = self._evaluated(state, time, pars)
+            if len(self._latest) > _MOST_KEPT:
+                del self._latest[next(iter(self._latest))]
+        return self._latest[key]
+
+    def _evaluated(self, state: np.ndarray, time: Scalar, pars: np.ndarray) -> Look:
         found = self._everything(np.array(state), pars=pars, time=time)
         s, n = self.surfaces, self._states
         return Look(
