@@ -85,16 +85,16 @@ def test_a_body_on_its_intermediate_axis_stays_there(formulation: str) -> None:
 
 @pytest.mark.slow
 def test_bodies_on_their_principal_axes_stay_there() -> None:
-    """30 of them, held from the start, and one in each formulation from step 8192 on."""
+    """21 of them, held from the start, and one in each formulation from step 8192 on."""
     random, number = np.random.default_rng(2509), 0
     for axis in range(3):
         for formulation in CARRIED:
-            for precision in ("double", "double", "single", *["extended"] * (formulation == "quaternion")):
+            for precision in ("double", "single", *["extended"] * (formulation == "quaternion")):
                 rate, number = f"{random.uniform(0.3, 1.5):.5f}", number + 1
                 check_spun(
-                    spun(axis, rate, formulation, precision, "true", number, 500), axis, rate, precision
+                    spun(axis, rate, formulation, precision, "true", number, 250), axis, rate, precision
                 )
-    assert number == 30
+    assert number == 21
     for formulation, end in zip(CARRIED, (2.1e4, 1.1e4, 1.1e4), strict=True):
         run = spun(1, "1", formulation, "double", '"auto"', 25, end)
         assert steps(run) > LATE + 1000
@@ -126,7 +126,7 @@ def test_motions_in_a_plane_or_at_rest_stay_in_it(name: str) -> None:
     for formulation in formulations:
         for precision in ("double", *["single", "extended"] * (formulation == "quaternion")):
             run = run_text(
-                config(body, f"{rates}\nquaternion = {attitude}", load, "end = 300\nsamples = 9",
+                config(body, f"{rates}\nquaternion = {attitude}", load, "end = 100\nsamples = 9",
                        f'formulation = "{formulation}"\nprecision = "{precision}"\nhold_invariants = true')
             )  # fmt: skip
             assert np.all(run.dataset.angular_velocity.values[:, zero] == 0), (formulation, precision)
@@ -176,9 +176,9 @@ def test_a_libration_near_its_equilibrium_is_held() -> None:
 
 @pytest.mark.slow
 def test_librations_of_any_amplitude_are_held() -> None:
-    """50 bodies over 5e3 radians, from 1e-8 to 1 rad, held in two states or in full."""
+    """15 bodies over 5e3 radians, from 1e-8 to 1 rad, held in two states or in full."""
     random, ratios = np.random.default_rng(259), []
-    for number in range(50):
+    for number in range(15):
         offset = repr(float(10 ** random.uniform(-8, 0)))
         first = round(float(random.uniform(0.5, 1.2)), 6)
         second = round(first + float(10 ** random.uniform(-3, -0.3)), 6)

@@ -56,8 +56,8 @@ def test_a_free_bodys_derivatives_obey_its_scaling_laws() -> None:
     assert np.abs(turned - np.eye(3)).max() < ROUNDING
 
 
-@pytest.mark.slow(600)
-@pytest.mark.parametrize("number", range(100, 128))
+@pytest.mark.slow
+@pytest.mark.parametrize("number", range(100, 110))
 def test_random_keys_and_scenes_agree_with_higher_precision(number: int) -> None:
     assert checked(case(number)).worst < BOUND
 

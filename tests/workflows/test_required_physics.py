@@ -102,7 +102,7 @@ def test_no_cheaper_model_is_within_the_error(tmp_path: Path) -> None:
         if code not in errors:
             errors[code] = float(angles_between(full, attitudes(satellite(*flags))).max()) * ARCSEC
     assert len(errors) == 30
-    for error in (0.03, 0.4, 3.0, 20.0):
+    for error in (0.4, 20.0):
         plan = required(satellite(), f"{error} arcsec", tmp_path)
         for row in plan.effects:
             assert row.largest_arcsec == pytest.approx(errors[frozenset([row.code])], rel=1e-6, abs=1e-9)
@@ -455,16 +455,16 @@ PLANETS = {"venus", "jupiter", "mercury", "mars", "saturn", "uranus", "neptune"}
 
 @pytest.mark.slow(400)
 def test_the_moons_ladder(tmp_path: Path) -> None:
+    """Within 20 % of what leaving each effect out is worth, and the least model for an arcsecond keeps its word."""
     pytest.importorskip("de421")
     moon = rigidsim.load(Path(__file__).parents[2] / "configs/kernels/moon_since_1969.toml")
-    for error in (10.0, 1.0, 0.5):
-        plan = rigidsim.required_physics(moon, f"{error} arcsec", out=tmp_path)
-        rms = {row.code: row.rms_arcsec for row in plan.effects}
-        for code, expected in PUBLISHED.items():
-            assert rms[code] == pytest.approx(expected, rel=0.2), code
-        assert plan.effects[0].code == "earth"
-        assert sum(rms[code] for code in PLANETS) < 0.01
-        assert plan.least.largest_arcsec <= error
-        required = {row.code for row in plan.effects if row.required}
-        assert required >= {code for code, expected in PUBLISHED.items() if expected > error}
-        assert not required & PLANETS
+    plan = rigidsim.required_physics(moon, "1 arcsec", out=tmp_path)
+    rms = {row.code: row.rms_arcsec for row in plan.effects}
+    for code, expected in PUBLISHED.items():
+        assert rms[code] == pytest.approx(expected, rel=0.2), code
+    assert plan.effects[0].code == "earth"
+    assert sum(rms[code] for code in PLANETS) < 0.01
+    assert plan.least.largest_arcsec <= 1.0
+    required = {row.code for row in plan.effects if row.required}
+    assert required >= {code for code, expected in PUBLISHED.items() if expected > 1.0}
+    assert not required & PLANETS
