@@ -28,9 +28,8 @@ MODELLING = {
     # resolve growth by less than their own 1e-5 rad in each, twice (the margin)
     "detumbling_cubesat": 6 * 2e-6 / 0.25 + 2 * 1e-5 * 90 / 0.3,
 }
-UNSTABLE = ("intermediate_axis", "heavy_top_sleeping_unstable", "water_molecule")
 GROWING = (
-    *UNSTABLE,
+    *("intermediate_axis", "heavy_top_sleeping_unstable", "water_molecule"),  # unstable
     "j2_orbit",  # an error of the semi-major axis moves the place along the orbit, and so the gradient's torque
     "lageos_spin_decay",  # an error of the first fast turns stays while the rate, the law's measure, decays
 )
