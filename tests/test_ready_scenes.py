@@ -30,11 +30,11 @@ MODELLING = {
 }
 GROWING = (
     *("intermediate_axis", "heavy_top_sleeping_unstable", "water_molecule"),  # unstable
-    "j2_orbit",  # an error of the semi-major axis moves the place along the orbit, and so the gradient's torque
+    "j2_orbit",  # an error of the semi-major axis moves the place along the orbit, and so the torque
     "lageos_spin_decay",  # an error of the first fast turns stays while the rate, the law's measure, decays
 )
 SPARSE = {"earth_free_nutation": "0.25 day", "lageos_spin_decay": "2 min"}
-"""Intervals of samples that the sign of a rotation matrix's quaternion needs, where those of the scene are longer
+"""Intervals of samples that the sign of a matrix's quaternion needs, where those of the scene are longer
 than a turn.
 """
 
