@@ -454,8 +454,8 @@ PLANETS = {"venus", "jupiter", "mercury", "mars", "saturn", "uranus", "neptune"}
 
 
 def test_the_moons_ladder() -> None:
-    """Within 20 % of what leaving each effect out is worth, and the least model for half an arcsecond keeps its
-    word: by the output that docs/what_a_scene_requires.md shows, which a long test prints anew.
+    """Within 20 % of what leaving each effect out is worth, and the least model for half an arcsecond keeps
+    its word: by the output that docs/what_a_scene_requires.md shows, which a long test prints anew.
     """
     unit = {"°": 3600.0, "″": 1.0}
     shown = (Path(__file__).parents[2] / "docs/what_a_scene_requires.md").read_text(encoding="utf-8")
