@@ -8,6 +8,7 @@ import numpy as np
 import xarray
 
 from rigidsim.solve.from_states import FromStates, RowStates
+from rigidsim.store.many_rows import largest, picked, usual_step
 from rigidsim.workflows.compare import defects
 from rigidsim.workflows.compare.motion import OwnMotion
 from rigidsim.workflows.compare.result import LocalDefects, TrajectoryDrift
@@ -28,7 +29,7 @@ class ByEquations:
     Attributes:
         times: (rows,), s. quaternions: (rows, 4), w x y z, of norm one. rates: (rows, 3), rad/s, if there.
         flight: positions and velocities (rows, 6), SI, if there.
-        norms: of the quaternions as they are written; None for other attitudes.
+        norm_drift: relative, of the quaternions as they are written; None for other attitudes.
         windows: None where models can't be told from integrators; ``missing`` says why.
     """
 
@@ -37,7 +38,7 @@ class ByEquations:
     quaternions: np.ndarray
     rates: np.ndarray | None
     flight: np.ndarray | None
-    norms: np.ndarray | None
+    norm_drift: np.ndarray | None
     own: OwnMotion
     dataset: xarray.Dataset
     drifts: list[TrajectoryDrift] = field(default_factory=list)
@@ -67,32 +68,27 @@ class ByEquations:
         rows = defects.row_defects(self.equations, self.times, states, starts)
         rate = defects.motion_rate(self.times, self.rates)
         self.windows = defects.window_defects(self.equations, self.times, states, rate, _MOST_WINDOWS)
-        spacing = float(np.median(np.diff(self.times)))
+        spacing = usual_step(self.times)
         self.missing = f"rows are too far apart ({spacing:.3g} s, at {rate:.3g} rad/s)"
         self._keep(starts, np.linalg.norm(rows.attitude, axis=1), np.linalg.norm(rows.rates, axis=1))
 
     def _drifts(self, states: RowStates) -> None:
         found = {} if self.rates is None else self.equations.drifts(states, self.times)
         found.pop(_NORM, None)  # of quaternions that were normalised
-        if self.norms is not None:
-            found[_NORM] = self.norms / self.norms[0] - 1
+        if self.norm_drift is not None:
+            found[_NORM] = self.norm_drift
         for name, values in found.items():
-            largest, final = float(np.abs(values).max()), float(values[-1])
-            self.drifts.append(TrajectoryDrift(name=name, largest=largest, final=final))
+            self.drifts.append(TrajectoryDrift(name=name, largest=largest(values), final=float(values[-1])))
             attributes = {"units": "1", "long_name": f"drift of {name.replace('_', ' ')}"}
             self.dataset[f"{name}_drift"] = ("time", values, attributes)
 
     def _by_shooting(self, states: RowStates, starts: np.ndarray) -> None:
         """Without rates in the file: those that lead to the next row also lead to the one beyond it."""
         shot = defects.shot_rates(self.equations, self.times, states, starts)
-        quaternions = self.quaternions
-        begun = self.equations.states(states[starts], quaternions[starts], shot)
-        ends = [
-            self.equations.after(state, self.times[n], self.times[n + 2 : n + 3])[0]
-            for state, n in zip(begun, starts, strict=True)
-        ]
-        reached, _ = self.equations.attitude(np.stack(ends))
-        apart = rotation_vectors([normalised(reached)], [quaternions[starts + 2]])
+        begun = self.equations.states(states[starts], picked(self.quaternions, starts), shot)
+        times, until = picked(self.times, starts), picked(self.times, starts + 2)
+        reached, _ = self.equations.attitude(defects.ends_of(self.equations, begun, times, until))
+        apart = rotation_vectors([normalised(reached)], [picked(self.quaternions, starts + 2)])
         self.told.append(
             "the file has no angular velocities: defects are at each second row, from two attitudes"
         )
@@ -101,9 +97,10 @@ class ByEquations:
     def _keep(self, starts: np.ndarray, sizes: np.ndarray, rates: np.ndarray | None) -> None:
         """Local defects as values, and along time in the dataset."""
         put, windows = self.dataset, self.windows
-        self.intervals = self.times[starts + 1] - self.times[starts]
+        times = picked(self.times, starts)
+        self.intervals = picked(self.times, starts + 1) - times
         put["defect"] = ("start", sizes, {"units": "rad", "long_name": "local defect of the attitude"})
-        put["defect_time"] = ("start", self.times[starts], {"units": "s", "long_name": "time of the row"})
+        put["defect_time"] = ("start", times, {"units": "s", "long_name": "time of the row"})
         if rates is not None:
             words = {"units": "rad s-1", "long_name": "local defect of the angular velocity"}
             put["rate_defect"] = ("start", rates, words)
@@ -112,7 +109,7 @@ class ByEquations:
         self.local = LocalDefects(
             largest=float(sizes[at]),
             rms=float(np.sqrt(np.nanmean(sizes**2))),
-            time=float(self.times[starts[at]]),
+            time=float(times[at]),
             rate_largest=None if rates is None else float(np.nanmax(rates)),
             rows=len(starts),
             window_s=None if windows is None else windows.length,

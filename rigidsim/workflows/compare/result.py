@@ -145,8 +145,9 @@ class Comparison(SummaryPart):
     def plot(self) -> Figure:
         """Attitude error, drifts and local defects along time."""
         from rigidsim.look.figures.compared import compared_figure
+        from rigidsim.workflows.compare.saving import thinned
 
-        return compared_figure(self.dataset)
+        return compared_figure(thinned(self.dataset))
 
     def save(self, path: str | Path) -> Path:
         """Write the dataset (netCDF-4/HDF5)."""
