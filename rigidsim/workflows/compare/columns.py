@@ -15,22 +15,10 @@ from rigidsim.errors import RigidsimError
 from rigidsim.formats.trajectories import Trajectory
 from rigidsim.scene.epochs import Epoch
 from rigidsim.scene.exact import parse_number
-from rigidsim.store.many_rows import (
-    blocks_of,
-    flagged,
-    gathered,
-    largest,
-    picked,
-    steps_of,
-    usual,
-    usual_step,
-)
+from rigidsim.store.many_rows import blocks_of, gathered, largest, picked
+from rigidsim.workflows.compare.row_checks import refuse_rows, refuse_values
 
 LEAST_ROWS = 3
-_NORM = 1e-3  # that the usual norm of a quaternion may differ from one, beyond which it is told
-_DAMAGED = 0.05  # that a norm may differ from those around it; integrators let it drift, and more slowly
-_AROUND = 2  # rows on each side
-_GAP = 1000.0  # times the median spacing, from which on a gap is told
 _FIXED = 0.6  # share of numbers with the same count of decimals that a fixed format makes
 _DOUBLE_DIGITS = 15
 _TIMES = {"s": "s", "sec": "s", "seconds": "s", "second": "s", "day": "day", "days": "day", "d": "day",
@@ -140,8 +128,8 @@ def attitudes_of(found: Trajectory, epoch: Epoch | None) -> Attitudes:
             f"{found.source}: no attitude among its columns ({', '.join(found.columns)}), which all of a "
             "comparison is about; name it qw qx qy qz, q0 q1 q2 q3, r11 ... r33, or euler_1 euler_2 euler_3"
         )
-    _refuse_rows(made, used)
-    _tell_gaps(made)
+    refuse_values(found, [name for names in used.values() for name in names])
+    told += refuse_rows(found, made.times, made.quaternions, made.matrices)
     kept = [made.quaternions, made.matrices, made.angles]
     attitude = next(x for x in kept if x is not None)
     resolution = (
@@ -277,81 +265,6 @@ def _since(found: Trajectory, epoch: Epoch | None, told: list[str]) -> np.ndarra
 def seconds_in(unit: str) -> float:
     """Seconds of a unit of time."""
     return float(parse_number(f"1 {unit}", "s"))
-
-
-def _refuse_rows(made: Attitudes, used: Mapping[str, Sequence[str]]) -> None:
-    found, times, count = made.trajectory, made.times, len(made.times)
-    for names in used.values():
-        for name in names:
-            column = found.columns[name]
-            bad, at = flagged(lambda rows, column=column: ~np.isfinite(column[rows]), count)
-            if bad:
-                raise RigidsimError(
-                    f"{found.source}: {found.row(at)}: {name} is no finite number ({bad:,} "
-                    "such rows); remove these rows, or write them anew"
-                )
-    again, at = flagged(lambda rows: steps_of(times, rows) == 0, count - 1)
-    if again:
-        raise RigidsimError(
-            f"{found.source}: {found.row(at + 1)} has the time of the row before ({again:,} such "
-            "rows); keep one row for each time"
-        )
-    back, at = flagged(lambda rows: steps_of(times, rows) < 0, count - 1)
-    if back:
-        raise RigidsimError(
-            f"{found.source}: {found.row(at + 1)} is earlier than the row before; sort the rows by time"
-        )
-    if made.quaternions is not None:
-        _refuse_norms(made, made.quaternions)
-    if (matrices := made.matrices) is not None:
-        bad, at = flagged(lambda rows: _apart_from_rotations(matrices[rows]) > 0.1, count)
-        if bad:
-            raise RigidsimError(
-                f"{found.source}: {found.row(at)}: the matrix is no rotation ({bad:,} such rows)"
-            )
-
-
-def _refuse_norms(made: Attitudes, quaternions: np.ndarray) -> None:
-    found, count = made.trajectory, len(quaternions)
-    most = usual(lambda rows: np.linalg.norm(quaternions[rows], axis=1), count)
-
-    def damaged(rows: slice) -> np.ndarray:
-        """Norms unlike the median of each and those around it."""
-        before, after = min(_AROUND, rows.start), min(_AROUND, count - rows.stop)
-        norms = np.linalg.norm(quaternions[rows.start - before : rows.stop + after], axis=1)
-        padded = np.pad(norms, (_AROUND - before, _AROUND - after), mode="edge")
-        size = rows.stop - rows.start
-        smooth = np.median([padded[n : n + size] for n in range(2 * _AROUND + 1)], axis=0)
-        return np.abs(norms[before : before + size] - smooth) > _DAMAGED * max(most, 1e-300)
-
-    bad, first = flagged(damaged, count)
-    if (bad and bad < count / 10) or not most:
-        at = max(first, 0)
-        raise RigidsimError(
-            f"{found.source}: {found.row(at)}: a quaternion of norm {np.linalg.norm(quaternions[at]):.6g}, "
-            f"where {most:.6g} is usual ({bad:,} such rows); these are no rotations: remove or mend them"
-        )
-    if abs(most - 1) > _NORM:
-        made.told.append(f"quaternions have the norm {most:.6g}; they were normalised")
-
-
-def _apart_from_rotations(matrices: np.ndarray) -> np.ndarray:
-    return np.asarray(np.abs(np.einsum("nij,nkj->nik", matrices, matrices) - np.eye(3)).max(axis=(1, 2)))
-
-
-def _tell_gaps(made: Attitudes) -> None:
-    times, found = made.times, made.trajectory
-    step = usual_step(times)
-    longest, at = 0.0, 0
-    for rows in blocks_of(len(times) - 1):
-        steps = steps_of(times, rows)
-        if steps.max() > longest:
-            longest, at = float(steps.max()), rows.start + int(np.argmax(steps))
-    if longest > _GAP * step:
-        made.told.append(
-            f"between {found.row(at)} and the next the time advances by {longest:.6g}, where "
-            f"{step:.6g} is usual: a gap, or times in mixed units"
-        )
 
 
 def _resolution(values: np.ndarray, narrow: bool) -> float:
