@@ -71,7 +71,7 @@ def test_where_rows_cannot_be_kept_is_told(tmp_path: Path, monkeypatch: pytest.M
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "none"))
-    with pytest.raises(rigidsim.RigidsimError, match="No such file or directory.*set TMPDIR"):
+    with pytest.raises(rigidsim.RigidsimError, match=r"No such file or directory.*set TMPDIR"):
         gathered(iter(PARTS))
 
 

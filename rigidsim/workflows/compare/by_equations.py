@@ -18,7 +18,8 @@ from rigidsim.workflows.physics.models import rotation_vectors
 
 _MOST_STARTS = 1500  # rows from which local defects are integrated
 _MOST_WINDOWS = 250
-_NO_RATES = "the file has no angular velocities, by which the two differ"
+_ABOVE = 5.0  # times what the digits of the file allow, from which on defects without rates tell something
+_STEADY = 1e-9  # of the rate squared: an angular acceleration that is none
 _NORM = "quaternion_norm"
 
 
@@ -30,6 +31,7 @@ class ByEquations:
         times: (rows,), s. quaternions: (rows, 4), w x y z, of norm one. rates: (rows, 3), rad/s, if there.
         flight: positions and velocities (rows, 6), SI, if there.
         norm_drift: relative, of the quaternions as they are written; None for other attitudes.
+        noise: of the attitude by the digits of the file, rad.
         windows: None where models can't be told from integrators; ``missing`` says why.
     """
 
@@ -39,12 +41,13 @@ class ByEquations:
     rates: np.ndarray | None
     flight: np.ndarray | None
     norm_drift: np.ndarray | None
+    noise: float
     own: OwnMotion
     dataset: xarray.Dataset
     drifts: list[TrajectoryDrift] = field(default_factory=list)
     local: LocalDefects | None = None
     windows: defects.WindowDefects | None = None
-    missing: str = _NO_RATES
+    missing: str = ""
     told: list[str] = field(default_factory=list)
     intervals: np.ndarray = field(default_factory=lambda: np.empty(0))  # of local defects, s
 
@@ -88,11 +91,37 @@ class ByEquations:
         begun = self.equations.states(states[starts], picked(self.quaternions, starts), shot)
         times, until = picked(self.times, starts), picked(self.times, starts + 2)
         reached, _ = self.equations.attitude(defects.ends_of(self.equations, begun, times, until))
-        apart = rotation_vectors([normalised(reached)], [picked(self.quaternions, starts + 2)])
+        there = picked(self.quaternions, starts + 2)
+        apart = np.linalg.norm(rotation_vectors([normalised(reached)], [there]), axis=1)
         self.told.append(
             "the file has no angular velocities: defects are at each second row, from two attitudes"
         )
-        self._keep(starts, np.linalg.norm(apart, axis=1), None)
+        self._keep(starts, apart, None)
+        self._missing_without_rates(starts, apart, until - times)
+
+    def _missing_without_rates(self, starts: np.ndarray, apart: np.ndarray, length: np.ndarray) -> None:
+        """What acceleration would have to be missing if the defects (rows,), rad, were another model's.
+
+        Where the two intervals are a and b, and the rate is what leads over the first, an acceleration makes
+        its (a + b) b / 2 of angle at the end of the second.
+        """
+        missing = _rms(2 * apart / (length * (length - self.intervals)))
+        rates = picked(self.own.rates, starts)
+        change = (picked(self.own.rates, starts + 1) - rates) / self.intervals[:, None]
+        own, rate = (_rms(np.linalg.norm(x, axis=1)) for x in (change, rates))
+        share = f"{missing / own:.2g} of its own" if own > _STEADY * rate**2 else "where its own is zero"
+        told = (
+            f"a loose integration, or an angular acceleration of {missing:.3g} rad/s^2 that its model adds to "
+            f"the body ({share}), would lead to the same rows"
+        )
+        if _rms(apart) <= _ABOVE * self.noise:
+            told = f"local defects ({_rms(apart):.2g} rad) are within the digits of the file, too"
+        elif self.local is not None:
+            self.local = self.local.having(missing_acceleration=missing)
+        self.missing = (
+            f"the file has attitudes alone; {told}. Write angular velocities too, as columns wx wy wz: an "
+            "attitude that isn't their integral tells an integration"
+        )
 
     def _keep(self, starts: np.ndarray, sizes: np.ndarray, rates: np.ndarray | None) -> None:
         """Local defects as values, and along time in the dataset."""
@@ -116,3 +145,7 @@ class ByEquations:
             unexplained=None if windows is None else unexplained_share(windows),
             missing_acceleration=None if mean is None else float(mean),
         )
+
+
+def _rms(values: np.ndarray) -> float:
+    return float(np.sqrt(np.nanmean(values**2)))

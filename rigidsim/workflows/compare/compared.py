@@ -135,9 +135,9 @@ class _Judging:
         self.read = times, found, reading
         dataset = _dataset(times, errors, name, self.given.trajectory.source)
         rate_errors = None if rates is None else _distances(rates, own.rates)
-        known = self._by_equations(times, theirs, rates, own, flight, dataset)
-        rate = defects.motion_rate(times, own.rates if rates is None else rates)
         attitude_noise, rate_noise = self._noise(found, reading)
+        known = self._by_equations(times, theirs, rates, own, flight, attitude_noise, dataset)
+        rate = defects.motion_rate(times, own.rates if rates is None else rates)
         floor = max(within, 4 * attitude_noise, 3 * own.uncertainty)
         start = (float(errors[0]), 0.0 if rate_errors is None else float(rate_errors[0]))
         windows, missing = (None, self.why_not) if known is None else (known.windows, known.missing)
@@ -272,7 +272,7 @@ class _Judging:
 
     def _by_equations(
         self, times: np.ndarray, theirs: np.ndarray, rates: np.ndarray | None, own: OwnMotion,
-        flight: np.ndarray | None, dataset: xarray.Dataset,
+        flight: np.ndarray | None, noise: float, dataset: xarray.Dataset,
     ) -> ByEquations | None:  # fmt: skip
         """Drifts and local defects, which are put into the dataset too; None where they can't be measured."""
         if self.equations is None:
@@ -284,7 +284,7 @@ class _Judging:
             drift = gathered(
                 np.linalg.norm(given[rows], axis=1) / begun - 1 for rows in blocks_of(len(times))
             )
-        found = ByEquations(self.equations, times, theirs, rates, flight, drift, own, dataset)
+        found = ByEquations(self.equations, times, theirs, rates, flight, drift, noise, own, dataset)
         try:
             found.measure()
         except NotFromStates as error:

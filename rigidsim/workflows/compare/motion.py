@@ -133,6 +133,6 @@ def motion_at_all(
     )
     place = speed = None
     if equations.flies:
-        place = each(lambda some: equations.flight(some)[:, :3])
-        speed = each(lambda some: equations.flight(some)[:, 3:])
+        flight = each(lambda some: np.asarray(equations.flight(some)))
+        place, speed = flight[:, :3], flight[:, 3:]
     return OwnMotion([quaternions], rates, place, speed, max(own.uncertainty, float(apart)), "", states)
