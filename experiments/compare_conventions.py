@@ -11,7 +11,9 @@ Checked: the attitude error told is within 10 % of the true one (where that is a
 rates is as large as the true one, so that the convention is right or makes no difference; no loose
 integration is called a wrong model, no wrong model an integration error or agreement.
 
-Run: python -m experiments.compare_conventions [--files N] [--models N] [--seed N] [--no-rates]      Exit: 1 if one fails
+Run: python -m experiments.compare_conventions [--files N] [--models N] [--seed N] [--no-rates]
+
+Exit: 1 if one fails
 """
 
 from __future__ import annotations

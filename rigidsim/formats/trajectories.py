@@ -198,7 +198,7 @@ def _of_parquet(path: Path) -> Trajectory:
         names = [column.name for column in numbers]
         blocks = (
             np.column_stack([column.to_numpy(zero_copy_only=False) for column in batch.columns])
-            for batch in file.iter_batches(BLOCK, columns=names)
+            for batch in file.iter_batches(BLOCK, columns=names, use_threads=False)
         )
         narrow = any(types.is_float32(column.type) for column in numbers)
         return Trajectory(_columns(names, blocks) if names else {}, str(path), narrow=narrow)

@@ -111,8 +111,8 @@ class ByEquations:
         own, rate = (_rms(np.linalg.norm(x, axis=1)) for x in (change, rates))
         share = f"{missing / own:.2g} of its own" if own > _STEADY * rate**2 else "where its own is zero"
         told = (
-            f"a loose integration, or an angular acceleration of {missing:.3g} rad/s^2 that its model adds to "
-            f"the body ({share}), would lead to the same rows"
+            f"a loose integration, or an angular acceleration of {missing:.3g} rad/s^2 that its model adds "
+            f"to the body ({share}), would lead to the same rows"
         )
         if _rms(apart) <= _ABOVE * self.noise:
             told = f"local defects ({_rms(apart):.2g} rad) are within the digits of the file, too"
