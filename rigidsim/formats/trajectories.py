@@ -1,6 +1,7 @@
 """Trajectories that other tools wrote, as named columns of doubles: CSV, Parquet, netCDF and AEM or OEM.
 
-Nothing is known here of what the columns mean, nor is anything left out, sorted or filled in.
+Nothing is known here of what the columns mean, nor is anything left out, sorted or filled in. Files are read
+by blocks of rows, so that memory doesn't grow with them.
 """
 
 from __future__ import annotations
@@ -9,7 +10,7 @@ import importlib.util
 import itertools
 import re
 import warnings
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -19,6 +20,7 @@ import numpy as np
 from rigidsim.errors import RigidsimError
 from rigidsim.formats.messages import message_rows
 from rigidsim.scene.epochs import Epoch
+from rigidsim.store.many_rows import BLOCK, blocks_of, gathered
 
 if TYPE_CHECKING:
     import pandas
@@ -30,6 +32,7 @@ KINDS = (
 _TEXT = {".csv", ".txt", ".dat", ".tsv"}
 _XARRAY = {".nc", ".nc4", ".cdf", ".h5", ".hdf5", ".zarr"}
 _MOST_COLUMNS = 500
+_BUFFER = 2**20  # bytes of a Parquet file's column that are read at once
 
 
 @dataclass(frozen=True)
@@ -111,43 +114,46 @@ def trajectory_of(table: Any, source: str = "the table") -> Trajectory:
             f"given {type(table).__name__}; a path, a mapping of names to arrays, a pandas DataFrame or an "
             "xarray Dataset is allowed"
         )
-    return _made(((str(name), value, ()) for name, value in table.items()), source)
+    return _made(((str(name), np.asarray(value), ()) for name, value in table.items()), source)
 
 
 def _made(
     given: Iterable[tuple[str, Any, tuple[str, ...]]], source: str, units: Mapping[str, str] | None = None
 ) -> Trajectory:
-    """Columns of arrays, each with the labels of its components (none: numbers from 0)."""
-    columns: dict[str, np.ndarray] = {}
-    narrow = False
+    """Columns of arrays (or of what is read from a file by slices), each with the labels of its components
+    (none: numbers from 0).
+    """
+    names: list[str] = []
+    kept = []
     for name, value, labels in given:
-        array = np.asarray(value)
-        if array.dtype.kind not in "fiu" or not array.ndim:
+        if value.dtype.kind not in "fiu" or not value.ndim:
             continue
-        narrow |= array.dtype == np.float32
-        array = array.astype(np.float64, copy=False)
-        if array.ndim == 1:
-            columns[name] = array
-            continue
-        places = list(itertools.product(*map(range, array.shape[1:])))
+        places = list(itertools.product(*map(range, value.shape[1:])))
         if len(places) > _MOST_COLUMNS:
             continue
-        for n, place in enumerate(places):
-            label = labels[n] if labels else "".join(map(str, place))
-            flat = array.reshape(len(array), -1)
-            columns[f"{name}_{label}"] = flat[:, n]
-    sizes = {len(column) for column in columns.values()}
+        kept.append(value)
+        parts = labels or ["".join(map(str, place)) for place in places]
+        names += [name] if value.ndim == 1 else [f"{name}_{part}" for part in parts]
+    sizes = {len(value) for value in kept}
     if len(sizes) > 1:
         raise RigidsimError(f"{source}: columns of different lengths ({sorted(sizes)[:5]}); give equal ones")
-    return Trajectory(columns, source, units or {}, narrow=narrow)
+    blocks = (
+        np.column_stack([np.asarray(value[rows]).reshape(rows.stop - rows.start, -1) for value in kept])
+        for rows in blocks_of(max(sizes, default=0))
+    )
+    narrow = any(value.dtype == np.float32 for value in kept)
+    return Trajectory(_columns(names, blocks), source, units or {}, narrow=narrow)
+
+
+def _columns(names: Sequence[str], blocks: Iterable[np.ndarray]) -> dict[str, np.ndarray]:
+    """Columns of a table that comes in blocks (rows, columns)."""
+    empty = np.empty((0, len(names)))
+    table = gathered(itertools.chain([empty], (block.astype(np.float64, copy=False) for block in blocks)))
+    return {name: table[:, n] for n, name in enumerate(names)}
 
 
 def _of_frame(frame: pandas.DataFrame, source: str) -> Trajectory:
-    columns = {}
-    for name in frame.columns:
-        column = frame[name]
-        if column.dtype.kind in "fiu":
-            columns[str(name)] = column
+    columns = {str(name): frame[name].to_numpy() for name in frame.columns if frame[name].dtype.kind in "fiu"}
     if isinstance(frame.index.name, str) and frame.index.dtype.kind in "fiu":
         columns = {frame.index.name: frame.index.values, **columns}
     return _made(((name, value, ()) for name, value in columns.items()), source)
@@ -157,14 +163,17 @@ def _of_dataset(dataset: xarray.Dataset, source: str) -> Trajectory:
     """The variables along the dimension of time; residuals beyond doubles (``NAME_lo``) are left out."""
     along = "time" if "time" in dataset.dims else next(iter(dataset.dims), None)
     units, given = {}, []
-    for name, variable in {**dataset.coords, **dataset.data_vars}.items():
+    for name in (*dataset.coords, *dataset.data_vars):
+        variable = dataset.variables[name]
         if along not in variable.dims or str(name).endswith(("_lo", "_lo2")):
             continue
         others = [dim for dim in variable.dims if dim != along]
         labels: tuple[str, ...] = ()
         if len(others) == 1 and others[0] in dataset.coords:
             labels = tuple(map(str, dataset.coords[others[0]].values))
-        given.append((str(name), variable.transpose(along, *others).values, labels))
+        if variable.dims[0] != along:
+            variable = variable.transpose(along, *others).load()
+        given.append((str(name), variable, labels))
         if isinstance(unit := variable.attrs.get("units"), str):
             units[str(name)] = unit
     return _made(given, source, units)
@@ -181,12 +190,18 @@ def _of_xarray_file(path: Path) -> Trajectory:
 def _of_parquet(path: Path) -> Trajectory:
     if importlib.util.find_spec("pyarrow") is None:
         raise RigidsimError(f'{path}: needs pyarrow, which is missing: pip install "rigidsim[export]"')
+    from pyarrow import types
     from pyarrow.parquet import ParquetFile
 
-    with ParquetFile(path) as file:  # column by column: the whole of it isn't held twice
-        names = list(file.schema_arrow.names)
-        given = [(name, file.read([name]).column(0).to_numpy(), ()) for name in names]
-    return _made(given, str(path))
+    with ParquetFile(path, buffer_size=_BUFFER, pre_buffer=False) as file:
+        numbers = [x for x in file.schema_arrow if types.is_integer(x.type) or types.is_floating(x.type)]
+        names = [column.name for column in numbers]
+        blocks = (
+            np.column_stack([column.to_numpy(zero_copy_only=False) for column in batch.columns])
+            for batch in file.iter_batches(BLOCK, columns=names, use_threads=False)
+        )
+        narrow = any(types.is_float32(column.type) for column in numbers)
+        return Trajectory(_columns(names, blocks) if names else {}, str(path), narrow=narrow)
 
 
 def _of_text(path: Path) -> Trajectory:
@@ -208,19 +223,29 @@ def _of_text(path: Path) -> Trajectory:
             f"{path}: its first line holds numbers; put a line of names above, such as t,qw,qx,qy,qz,wx,wy,wz"
         )
     exact: dict[str, Any] = {"float_precision": "round_trip"} if separator != r"\s+" else {}
+    worded, numbered = set(), set()
+
+    def block(frame: pandas.DataFrame) -> np.ndarray:
+        columns = []
+        for name in names:
+            column = frame[name]
+            if column.dtype.kind not in "fiu":  # words in a column of numbers are shown as what isn't finite
+                column = pandas.to_numeric(column.astype(object), errors="coerce")
+                worded.add(name)
+            columns.append(column.to_numpy(np.float64))
+            if np.isfinite(columns[-1]).any():
+                numbered.add(name)
+        return np.column_stack(columns)
+
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # what reads exactly has other names in other versions
-        frame = pandas.read_csv(
+        with pandas.read_csv(
             path, sep=separator, skiprows=head + 1, header=None, comment="#", skip_blank_lines=True,
-            names=names, index_col=False, encoding="utf-8-sig", **exact,
-        )  # fmt: skip
-    for name in frame.columns:
-        if frame[name].dtype.kind not in "fiub" and len(frame):
-            parsed = pandas.to_numeric(frame[name], errors="coerce")
-            if parsed.notna().any():  # words in a column of numbers stay visible as what is not finite
-                frame[name] = parsed
-    made = _of_frame(frame, str(path))
-    return Trajectory(made.columns, str(path), counted="line", first=head + 2)
+            names=names, index_col=False, encoding="utf-8-sig", chunksize=BLOCK, **exact,
+        ) as frames:  # fmt: skip
+            found = _columns(names, map(block, frames))
+    columns = {name: found[name] for name in names if name in numbered or name not in worded}
+    return Trajectory(columns, str(path), counted="line", first=head + 2)
 
 
 def _is_number(text: str) -> bool:

@@ -6,7 +6,6 @@ In double precision at its epsilon, with the attitude as a quaternion. States th
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -25,14 +24,9 @@ from rigidsim.scene.choices import DEFAULT_METHOD
 from rigidsim.scene.scene import Scene
 from rigidsim.solve.compiled import compiled_engine, compiled_function, evaluate_rows
 from rigidsim.solve.precision import precision_of
+from rigidsim.store.many_rows import blocks_of, gathered, picked
 
 _STEPS = 100_000
-_BLOCK = 65_536  # rows that are worked on together
-
-
-def blocks_of(count: int) -> Iterator[slice]:
-    """Blocks of rows, so that what is made of millions of rows on the way stays small."""
-    return (slice(begin, min(begin + _BLOCK, count)) for begin in range(0, count, _BLOCK))
 
 
 class NotFromStates(Exception):
@@ -94,23 +88,20 @@ class FromStates:
         engine = self._engine
         engine.time = self._start
         engine.state[:] = self._precision.array(self._system.initial)
-        internal = self._internal(times)
-        found = np.empty((len(times), len(engine.state)))
-        if internal[0] != self._start:
-            self._advance(internal[:1], found[:1])
-        for rows in blocks_of(len(times)):
-            self._advance(internal[rows], found[rows])
-        return found
+        first = self._internal(times[:1])
+        if first[0] != self._start:
+            self._advanced(first)
+        return gathered(self._advanced(self._internal(times[rows])) for rows in blocks_of(len(times)))
 
-    def _advance(self, times: np.ndarray, found: np.ndarray) -> None:
-        """Go on to ascending times, and put the states there into an array."""
+    def _advanced(self, times: np.ndarray) -> np.ndarray:
+        """Go on to ascending times: the states there."""
         engine = self._engine
         grid = times if times[0] == engine.time else np.append(engine.time, times)
         result = engine.propagate_grid(grid, max_steps=10**9)
         states = np.asarray(result[5] if len(result) > 5 else result[-1])
         if result[0] != hy.taylor_outcome.time_limit or len(states) != len(grid):
             raise NotFromStates("its motion ends before the trajectory does")
-        found[:] = states[len(grid) - len(times) :]
+        return states[len(grid) - len(times) :]
 
     def states(
         self, own: np.ndarray, quaternions: np.ndarray, rates: np.ndarray, flight: np.ndarray | None = None
@@ -159,15 +150,15 @@ class FromStates:
             return {}
         components = [x for invariant in invariants for x in invariant.expressions]
         options = dict(self._precision.options, compact_mode=self._system.wide)
-        internal = self._internal(times)
         value = compiled_function(components, self._system.variables, **options)
-        begun = evaluate_rows(value, states[slice(1)], times=internal[:1])[:, 0]
+        begun = evaluate_rows(value, states[slice(1)], times=self._internal(times[:1]))[:, 0]
         expressions = drift_outputs(invariants, self._system.scene.context, self._precision.number)
         function = compiled_function(expressions, self._system.variables, **options)
-        found = np.empty((len(expressions), len(times)))
-        for rows in blocks_of(len(times)):
-            found[:, rows] = evaluate_rows(function, states[rows], begun, internal[rows])
-        return {invariant.name: found[n] for n, invariant in enumerate(invariants)}
+        found = gathered(
+            evaluate_rows(function, states[rows], begun, self._internal(times[rows])).T
+            for rows in blocks_of(len(times))
+        )
+        return {invariant.name: found[:, n] for n, invariant in enumerate(invariants)}
 
 
 @dataclass(frozen=True)
@@ -186,6 +177,11 @@ class RowStates:
     rates: np.ndarray
     flight: np.ndarray | None
 
-    def __getitem__(self, rows: Any) -> np.ndarray:
-        flight = None if self.flight is None else self.flight[rows]
-        return self.equations.states(self.own[rows], self.quaternions[rows], self.rates[rows], flight)
+    def __getitem__(self, rows: int | slice | np.ndarray) -> np.ndarray:
+        if isinstance(rows, np.ndarray):
+            own, quaternions, rates = (picked(x, rows) for x in (self.own, self.quaternions, self.rates))
+            flight = None if self.flight is None else picked(self.flight, rows)
+        else:
+            own, quaternions, rates = self.own[rows], self.quaternions[rows], self.rates[rows]
+            flight = None if self.flight is None else self.flight[rows]
+        return self.equations.states(own, quaternions, rates, flight)

@@ -215,6 +215,26 @@ def test_without_rates_it_is_undecided(experiment: rigidsim.Experiment) -> None:
     assert found.rate_error is None
     assert found.local_defects is not None
     assert 1e-8 < found.local_defects.largest < 1e-3
+    assert "Write angular velocities too, as columns wx wy wz" in found.why
+
+
+def test_without_rates_the_missing_acceleration_is_told(experiment: rigidsim.Experiment) -> None:
+    """What brakes the experiment's body and not theirs, at rows of unequal distances."""
+    braked = experiment.having(['loads=[{kind="viscous_torque",coefficients=[0.001,0.001,0.001]}]'])
+    times, q, w = theirs()
+    kept = np.sort(np.random.default_rng(1).permutation(len(times))[:160])
+    kept[0] = 0
+    found = rigidsim.compare(braked, {"t": times[kept], "q": q[kept]})
+    assert found.verdict == "undecided"
+    assert found.local_defects is not None
+    true = float(np.sqrt(np.mean(np.sum((0.001 * w / MOMENTS) ** 2, 1))))
+    assert found.local_defects.missing_acceleration == pytest.approx(true, rel=0.1)
+    own = np.cross(w, MOMENTS * w) / MOMENTS
+    share = true / float(np.sqrt(np.mean(np.sum(own**2, 1))))
+    told = float(found.why.split(" of its own")[0].rpartition("(")[2])
+    assert told == pytest.approx(share, rel=0.1)
+    few = rigidsim.compare(braked, {"t": times, "q": np.round(q, 4)})
+    assert "within the digits of the file" in few.why
 
 
 SEQUENCES = ["zxz", "zyz", "xyx", "xzx", "yxy", "yzy", "zyx", "xyz", "xzy", "yxz", "yzx", "zxy"]

@@ -16,7 +16,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _LEAST = 1e-17
-_MOST = 4000  # points that are drawn, the largest of each stretch
 _COLORS = (BLUE, ORANGE, GREY, "#2c8a57", "#8a4fb0", "#b0574f")
 
 
@@ -60,9 +59,5 @@ def save_compared(dataset: xarray.Dataset, path: Path, file_format: str = "png")
 
 
 def _line(axes: Axes, times: np.ndarray, values: np.ndarray, color: str, label: str) -> None:
-    """A line, of very many points the largest of each stretch; zeros aren't drawn."""
-    stretch = -(-len(times) // _MOST)
-    if stretch > 1:
-        begins = np.arange(0, len(times), stretch)
-        times, values = times[begins], np.maximum.reduceat(values, begins)
+    """A line; zeros aren't drawn."""
     axes.plot(times, np.where(values > _LEAST, values, np.nan), color=color, label=label, linewidth=1.1)

@@ -101,8 +101,9 @@ def run_dataset(path: Path) -> xarray.Dataset:
         RigidsimError: the file can't be used, or its convention can't be told.
     """
     given = attitudes_of(read_trajectory(path), None)
-    times = given.times * seconds_in(given.time_unit or "s")
-    reading, rates, told = _read(given, times)
+    second = seconds_in(given.time_unit or "s")
+    times = given.times * second
+    reading, rates, told = _read(given, second)
     found = FoundReading(reading, NONE, 0.0, [])
     return dataset_of_rows(given, times, found, rates, {"title": path.stem, "comment": "; ".join(told)})
 
@@ -145,7 +146,7 @@ def _variable(values: np.ndarray, dim: str, unit: str, name: str) -> Any:
     return ("time", dim), values, {"units": unit, "long_name": name}
 
 
-def _read(given: Attitudes, times: np.ndarray) -> tuple[Reading, RateReading | None, list[str]]:
+def _read(given: Attitudes, second: float) -> tuple[Reading, RateReading | None, list[str]]:
     """Readings of attitude and rates, and what a user should know of them."""
     source, told = given.trajectory.source, list(given.told)
     if given.time_unit is None:
@@ -158,7 +159,7 @@ def _read(given: Attitudes, times: np.ndarray) -> tuple[Reading, RateReading | N
             )
         told.append("the attitude was taken from body axes to space axes")
         return Reading(order="wxyz" if given.named else ""), None, told
-    near = turning_readings(given, times, signs=False)
+    near = turning_readings(given, second, signs=False)
     if not near:
         raise RigidsimError(
             f"{source}: in no convention tried does its attitude turn at its rates, or its rows are too far "

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from decimal import Decimal
 from fractions import Fraction
+from typing import Any
 
 import numpy as np
 
@@ -14,12 +15,10 @@ from rigidsim.errors import RigidsimError
 from rigidsim.formats.trajectories import Trajectory
 from rigidsim.scene.epochs import Epoch
 from rigidsim.scene.exact import parse_number
+from rigidsim.store.many_rows import blocks_of, gathered, largest, picked
+from rigidsim.workflows.compare.row_checks import refuse_rows, refuse_values
 
 LEAST_ROWS = 3
-_NORM = 1e-3  # that the usual norm of a quaternion may differ from one, beyond which it is told
-_DAMAGED = 0.05  # that a norm may differ from those around it; integrators let it drift, and more slowly
-_AROUND = 2  # rows on each side
-_GAP = 1000.0  # times the median spacing, from which on a gap is told
 _FIXED = 0.6  # share of numbers with the same count of decimals that a fixed format makes
 _DOUBLE_DIGITS = 15
 _TIMES = {"s": "s", "sec": "s", "seconds": "s", "second": "s", "day": "day", "days": "day", "d": "day",
@@ -66,6 +65,14 @@ class Attitudes:
     resolution: tuple[float, float] = (0.0, 0.0)
     told: list[str] = field(default_factory=list)
 
+    def at(self, rows: np.ndarray) -> Attitudes:
+        """These rows alone, in memory."""
+        names = ("times", "quaternions", "matrices", "angles", "rates", "positions", "velocities")
+        arrays = {name: getattr(self, name) for name in names}
+        columns = {name: picked(values, rows) for name, values in self.trajectory.columns.items()}
+        some: dict[str, Any] = {name: picked(x, rows) for name, x in arrays.items() if x is not None}
+        return replace(self, trajectory=replace(self.trajectory, columns=columns), **some)
+
 
 def attitudes_of(found: Trajectory, epoch: Epoch | None) -> Attitudes:
     """Find time, attitude, rates and positions among the columns, and refuse rows that can't be used.
@@ -91,13 +98,15 @@ def attitudes_of(found: Trajectory, epoch: Epoch | None) -> Attitudes:
         if names is None:
             return None
         used[kind] = [plain[name] for name in names]
-        return np.stack([found.columns[plain[name]] for name in names], axis=1)
+        columns = [found.columns[name] for name in used[kind]]
+        return gathered(np.stack([x[block] for x in columns], axis=1) for block in blocks_of(rows))
 
     if found.epochs:
         times = _since(found, epoch, told)
     else:
         name, time_unit = _time_among(plain, units, found.source)
-        times = found.columns[plain[name]]
+        column = found.columns[plain[name]]
+        times = gathered(column[block] for block in blocks_of(rows))
         used["time"] = [plain[name]]
     quaternion = _components(plain, "quaternion", "wxyz") or _bare_quaternion(plain)
     named = quaternion is not None
@@ -119,8 +128,8 @@ def attitudes_of(found: Trajectory, epoch: Epoch | None) -> Attitudes:
             f"{found.source}: no attitude among its columns ({', '.join(found.columns)}), which all of a "
             "comparison is about; name it qw qx qy qz, q0 q1 q2 q3, r11 ... r33, or euler_1 euler_2 euler_3"
         )
-    _refuse_rows(made, used)
-    _tell_gaps(made)
+    refuse_values(found, [name for names in used.values() for name in names])
+    told += refuse_rows(found, made.times, made.quaternions, made.matrices)
     kept = [made.quaternions, made.matrices, made.angles]
     attitude = next(x for x in kept if x is not None)
     resolution = (
@@ -258,77 +267,17 @@ def seconds_in(unit: str) -> float:
     return float(parse_number(f"1 {unit}", "s"))
 
 
-def _refuse_rows(made: Attitudes, used: Mapping[str, Sequence[str]]) -> None:
-    found = made.trajectory
-    for names in used.values():
-        for name in names:
-            bad = np.flatnonzero(~np.isfinite(found.columns[name]))
-            if len(bad):
-                raise RigidsimError(
-                    f"{found.source}: {found.row(bad[0])}: {name} is no finite number ({len(bad):,} "
-                    "such rows); remove these rows, or write them anew"
-                )
-    steps = np.diff(made.times)
-    again = np.flatnonzero(steps == 0)
-    if len(again):
-        raise RigidsimError(
-            f"{found.source}: {found.row(again[0] + 1)} has the time of the row before ({len(again):,} such "
-            "rows); keep one row for each time"
-        )
-    back = np.flatnonzero(steps < 0)
-    if len(back):
-        raise RigidsimError(
-            f"{found.source}: {found.row(back[0] + 1)} is earlier than the row before; sort the rows by time"
-        )
-    if made.quaternions is not None:
-        norms = np.linalg.norm(made.quaternions, axis=1)
-        usual = float(np.median(norms))
-        bad = np.flatnonzero(np.abs(norms - _smoothed(norms)) > _DAMAGED * max(usual, 1e-300))
-        if (len(bad) and len(bad) < len(norms) / 10) or not usual:
-            at = bad[0] if len(bad) else 0
-            raise RigidsimError(
-                f"{found.source}: {found.row(at)}: a quaternion of norm {norms[at]:.6g}, where {usual:.6g} "
-                f"is usual ({len(bad):,} such rows); these are no rotations: remove or mend them"
-            )
-        if abs(usual - 1) > _NORM:
-            made.told.append(f"quaternions have the norm {usual:.6g}; they were normalised")
-    if made.matrices is not None:
-        apart = np.abs(np.einsum("nij,nkj->nik", made.matrices, made.matrices) - np.eye(3)).max(axis=(1, 2))
-        bad = np.flatnonzero(apart > 0.1)
-        if len(bad):
-            raise RigidsimError(
-                f"{found.source}: {found.row(bad[0])}: the matrix is no rotation ({len(bad):,} such rows)"
-            )
-
-
-def _smoothed(values: np.ndarray) -> np.ndarray:
-    """Median of each value and those around it."""
-    padded = np.pad(values, _AROUND, mode="edge")
-    return np.median([padded[n : n + len(values)] for n in range(2 * _AROUND + 1)], axis=0)
-
-
-def _tell_gaps(made: Attitudes) -> None:
-    steps = np.diff(made.times)
-    at = int(np.argmax(steps))
-    if steps[at] > _GAP * np.median(steps):
-        found = made.trajectory
-        made.told.append(
-            f"between {found.row(at)} and the next the time advances by {steps[at]:.6g}, where "
-            f"{np.median(steps):.6g} is usual: a gap, or times in mixed units"
-        )
-
-
 def _resolution(values: np.ndarray, narrow: bool) -> float:
     """Half the last digit in which numbers are written, from a sample of them; that of doubles at least."""
-    largest = float(np.abs(values).max())
+    most = largest(values)
     if narrow:
-        return largest * 2.0**-24
-    flat = values.ravel()
-    some = flat[np.linspace(0, flat.size - 1, min(flat.size, 300)).astype(int)]
+        return most * 2.0**-24
+    places = np.linspace(0, values.size - 1, min(values.size, 300)).astype(int)
+    some = picked(values.reshape(-1), places)
     written = [Decimal(repr(value)).normalize().as_tuple() for value in some.tolist()]
-    places = [-int(exponent) for _, _, exponent in written]
-    usual = max(set(places), key=places.count)
-    if places.count(usual) > _FIXED * len(places) and max(places) == usual:
-        return 0.5 * 10.0**-usual if usual < _DOUBLE_DIGITS else largest * 2.0**-53
+    decimals = [-int(exponent) for _, _, exponent in written]
+    common = max(set(decimals), key=decimals.count)
+    if decimals.count(common) > _FIXED * len(decimals) and max(decimals) == common:
+        return 0.5 * 10.0**-common if common < _DOUBLE_DIGITS else most * 2.0**-53
     digits = max(len(mantissa) for _, mantissa, _ in written)
-    return largest * (0.5 * 10.0 ** (1 - digits) if digits < _DOUBLE_DIGITS else 2.0**-53)
+    return most * (0.5 * 10.0 ** (1 - digits) if digits < _DOUBLE_DIGITS else 2.0**-53)

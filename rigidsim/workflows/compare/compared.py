@@ -12,7 +12,8 @@ import xarray
 
 from rigidsim.errors import RigidsimError
 from rigidsim.scene.config import Experiment
-from rigidsim.solve.from_states import FromStates, NotFromStates, blocks_of
+from rigidsim.solve.from_states import FromStates, NotFromStates
+from rigidsim.store.many_rows import blocks_of, flagged, gathered, largest, mean_square, picked
 from rigidsim.workflows.compare import defects
 from rigidsim.workflows.compare.as_run import dataset_of_rows, trajectory_given
 from rigidsim.workflows.compare.by_equations import ByEquations
@@ -25,7 +26,7 @@ from rigidsim.workflows.compare.conventions import (
     rows_compared,
 )
 from rigidsim.workflows.compare.kinematics import Turning, turning_readings
-from rigidsim.workflows.compare.motion import OwnMotion, own_motion, plain, sampled_run
+from rigidsim.workflows.compare.motion import OwnMotion, motion_at_all, own_motion, plain, sampled_run
 from rigidsim.workflows.compare.own_steps import own_steps
 from rigidsim.workflows.compare.result import (
     INTEGRATION_ERROR,
@@ -42,7 +43,6 @@ from rigidsim.workflows.read import Given, as_experiment
 
 WITHIN = 1e-9
 """Largest angle (rad) between attitudes that agree, if nothing else is asked for."""
-_MOST_OWN = 20_000  # rows, up to which the experiment's own method gives the motion at all of them
 _UNITS = ("s", "ms", "min", "h", "day", "yr")
 _FAR = np.log(0.02)  # the same, above which only conventions are tried in which it turns at its rates
 _BAD = np.log(0.15)  # mean logarithm of mismatches (rad), above which times in another unit are tried
@@ -116,37 +116,33 @@ class _Judging:
         self.told = list(self.given.told)
         self.turning: list[Turning] = []
         unit, found, sampled = self._convention()
-        times = self.given.times * seconds_in(unit)
-        own = self._own(times, sampled)
-        if own.ended:
-            self.told.append(f"the experiment's motion {own.ended}; later rows aren't compared")
+        second = seconds_in(unit)
+        times = gathered(self.given.times[rows] * second for rows in blocks_of(len(self.given.times)))
+        own = motion_at_all(self.experiment, self.equations, times, sampled, self.told)
         count = len(own.rates)
         times, theirs = times[:count], found.quaternions(self.given)[:count]
-        errors = np.concatenate([_errors(own, theirs, rows) for rows in blocks_of(count)])
+        errors = gathered(_errors(own, theirs, rows) for rows in blocks_of(count))
         compared = rows_compared(count)
         rates: np.ndarray | None = None
         reading: RateReading | None = None
         more: list[str] = []
         if self.given.rates is not None:
             allowed = {one.rates for one in self.turning if one.reading == found.reading}
-            reading, more = find_rates(
-                self.given, found, compared, theirs[compared], own.rates[compared], allowed
-            )
-            rates = np.concatenate(
-                [reading.rates(self.given.rates[rows], found, theirs[rows]) for rows in blocks_of(count)]
-            )
+            there = picked(theirs, compared), picked(own.rates, compared)
+            reading, more = find_rates(self.given.at(compared), found, *there, allowed)
+            rates = gathered(_rates(self.given, reading, found, theirs, rows) for rows in blocks_of(count))
         flight = self._flight(count)
         self.read = times, found, reading
         dataset = _dataset(times, errors, name, self.given.trajectory.source)
-        rate_errors = None if rates is None else np.linalg.norm(rates - own.rates, axis=1)
-        known = self._by_equations(times, theirs, rates, own, flight, dataset)
-        rate = defects.motion_rate(times, own.rates if rates is None else rates)
+        rate_errors = None if rates is None else _distances(rates, own.rates)
         attitude_noise, rate_noise = self._noise(found, reading)
+        known = self._by_equations(times, theirs, rates, own, flight, attitude_noise, dataset)
+        rate = defects.motion_rate(times, own.rates if rates is None else rates)
         floor = max(within, 4 * attitude_noise, 3 * own.uncertainty)
         start = (float(errors[0]), 0.0 if rate_errors is None else float(rate_errors[0]))
         windows, missing = (None, self.why_not) if known is None else (known.windows, known.missing)
         seen = Evidence(
-            float(errors.max()),
+            largest(errors),
             floor,
             attitude_noise,
             rate_noise,
@@ -169,12 +165,12 @@ class _Judging:
             )
         position_error = None
         if flight is not None and own.positions is not None and self.given.positions is not None:
-            apart = np.linalg.norm(flight[:, :3] - own.positions, axis=1)
-            position_error = float(apart.max())
+            apart = _distances(flight[:, :3], own.positions)
+            position_error = largest(apart)
             dataset["position_error"] = ("time", apart, {"units": "m", "long_name": "distance of positions"})
         dataset.attrs["verdict"] = verdict
-        largest = int(np.argmax(errors))
-        apart_rows = np.flatnonzero(errors > floor)
+        worst = max((int(np.argmax(errors[rows])) + rows.start for rows in blocks_of(count)), key=errors.item)
+        _, first = flagged(lambda rows: errors[rows] > floor, count)
         trajectory = self.given.trajectory
         made = Comparison(
             name=name,
@@ -186,21 +182,19 @@ class _Judging:
             within=floor,
             resolution=attitude_noise,
             attitude_error=AttitudeError(
-                largest=float(errors[largest]),
-                rms=float(np.sqrt(np.mean(errors**2))),
-                time=float(times[largest]),
-                row=trajectory.row(largest),
+                largest=float(errors[worst]),
+                rms=float(np.sqrt(mean_square(errors))),
+                time=float(times[worst]),
+                row=trajectory.row(worst),
             ),
-            rate_error=None if rate_errors is None else float(rate_errors.max()),
+            rate_error=None if rate_errors is None else largest(rate_errors),
             position_error=position_error,
             convention=_described(found, unit, reading, more),
             drifts=[] if known is None else known.drifts,
             local_defects=local,
-            first_disagreement=Disagreement(
-                time=float(times[apart_rows[0]]), row=trajectory.row(apart_rows[0])
-            )
-            if len(apart_rows)
-            else None,
+            first_disagreement=None
+            if first < 0
+            else Disagreement(time=float(times[first]), row=trajectory.row(first)),
             told=self.told,
         )
         made._dataset = dataset
@@ -210,20 +204,21 @@ class _Judging:
         """Write the timeline of both, after ``compared``."""
         times, found, reading = self.read
         rows = np.unique(np.linspace(0, len(times) - 1, min(len(times), MOST_SHOWN)).astype(int))
-        own = sampled_run(self.experiment, times[rows]).dataset
+        own = sampled_run(self.experiment, picked(times, rows)).dataset
         name = Path(self.given.trajectory.source).stem
         looks = {key: own.attrs[key] for key in DRAWN if key in own.attrs} | {"title": name}
-        theirs = dataset_of_rows(self.given, times, found, reading, looks).isel(time=rows)
+        theirs = dataset_of_rows(self.given.at(rows), picked(times, rows), found, reading, looks)
         return save_timeline(own, theirs, name, path)
 
     def _convention(self) -> tuple[str, FoundReading, tuple[np.ndarray, OwnMotion]]:
         """Unit of the times and convention of the attitude, with the motion at the rows compared."""
         units = (self.given.time_unit,) if self.given.time_unit else _UNITS
         rows = rows_compared(len(self.given.times))
+        some = self.given.at(rows)
         best: tuple[str, FoundReading, tuple[np.ndarray, OwnMotion]] | None = None
         refused = ""
         for unit in units:
-            times = self.given.times[rows] * seconds_in(unit)
+            times = some.times * seconds_in(unit)
             if times[0] < self.begin - 1e-9 * abs(self.begin):
                 refused = (
                     f"{self.given.trajectory.source}: its first time ({times[0]:.6g} s) is before the "
@@ -234,7 +229,7 @@ class _Judging:
                 continue
             own = own_motion(self.experiment, times)
             kept = rows[: len(own.rates)]
-            found = find_convention(self.given, kept, own.quaternions[0])
+            found = find_convention(some, own.quaternions[0])
             # where nothing moves anything fits: what counts is the mismatch by the motion in these times
             moved = angles_between(own.quaternions[0], own.quaternions[0][:1]).max()
             score = found.score - float(np.log(min(1.0, moved + 1e-12)))
@@ -250,39 +245,19 @@ class _Judging:
             )
         if best[1].score > _FAR:  # another model may be nearer in another convention: its rates tell
             unit, found, (kept, own) = best
-            times = self.given.times * seconds_in(unit)
-            self.turning = turning_readings(self.given, times, signs=True)
+            self.turning = turning_readings(self.given, seconds_in(unit), signs=True)
             allowed = {one.reading for one in self.turning}
-            best = unit, find_convention(self.given, kept, own.quaternions[0], allowed), (kept, own)
+            best = unit, find_convention(some, own.quaternions[0], allowed), (kept, own)
         if best[1].score > _BAD:
             why = "this is one in which it turns at its rates" if self.turning else "that found may be wrong"
             self.told.append(f"no convention tried brings it near the experiment: {why}")
         return best
 
-    def _own(self, times: np.ndarray, sampled: tuple[np.ndarray, OwnMotion]) -> OwnMotion:
-        """The experiment at all rows; of very many rows by the same equations in double precision."""
-        if len(times) <= len(sampled[0]) and not sampled[1].ended:
-            return sampled[1]
-        if len(times) <= _MOST_OWN or self.equations is None or sampled[1].ended:
-            return own_motion(self.experiment, times)
-        states = self.equations.motion(times)
-        quaternions, rates = self.equations.attitude(states)
-        rows, own = sampled
-        apart = np.linalg.norm(
-            rotation_vectors(own.quaternions, [normalised(quaternions[rows])]), axis=1
-        ).max()
-        self.told.append(
-            f"{len(times):,} rows: all were compared with the motion in double precision, which is within "
-            f"{apart:.1g} rad of the experiment's own at {len(rows)} of them"
-        )
-        flight = self.equations.flight(states)
-        place, speed = (None, None) if flight is None else (flight[:, :3], flight[:, 3:])
-        return OwnMotion([quaternions], rates, place, speed, max(own.uncertainty, float(apart)), "", states)
-
     def _flight(self, count: int) -> np.ndarray | None:
         if self.given.positions is None or self.given.velocities is None:
             return None
-        return np.concatenate([self.given.positions[:count], self.given.velocities[:count]], axis=1)
+        both = self.given.positions, self.given.velocities
+        return gathered(np.concatenate([x[rows] for x in both], axis=1) for rows in blocks_of(count))
 
     def _noise(self, found: FoundReading, reading: RateReading | None) -> tuple[float, float]:
         """Resolution of attitude (rad) and rates (rad/s) by the digits of the file."""
@@ -297,15 +272,19 @@ class _Judging:
 
     def _by_equations(
         self, times: np.ndarray, theirs: np.ndarray, rates: np.ndarray | None, own: OwnMotion,
-        flight: np.ndarray | None, dataset: xarray.Dataset,
+        flight: np.ndarray | None, noise: float, dataset: xarray.Dataset,
     ) -> ByEquations | None:  # fmt: skip
         """Drifts and local defects, which are put into the dataset too; None where they can't be measured."""
         if self.equations is None:
             self.told.append(f"neither local defects nor drifts were measured: {self.why_not}")
             return None
-        given = self.given.quaternions
-        norms = None if given is None else np.linalg.norm(given[: len(times)], axis=1)
-        found = ByEquations(self.equations, times, theirs, rates, flight, norms, own, dataset)
+        drift: np.ndarray | None = None
+        if (given := self.given.quaternions) is not None:
+            begun = np.linalg.norm(given[:1], axis=1)
+            drift = gathered(
+                np.linalg.norm(given[rows], axis=1) / begun - 1 for rows in blocks_of(len(times))
+            )
+        found = ByEquations(self.equations, times, theirs, rates, flight, drift, noise, own, dataset)
         try:
             found.measure()
         except NotFromStates as error:
@@ -320,6 +299,17 @@ def _errors(own: OwnMotion, theirs: np.ndarray, rows: slice) -> np.ndarray:
     """Angles (rows,), rad, between attitudes."""
     one = [part[rows] for part in own.quaternions]
     return np.linalg.norm(rotation_vectors([normalised(one[0]), *one[1:]], [theirs[rows]]), axis=1)
+
+
+def _rates(
+    given: Attitudes, reading: RateReading, found: FoundReading, theirs: np.ndarray, rows: slice
+) -> np.ndarray:
+    assert given.rates is not None
+    return reading.rates(given.rates[rows], found, theirs[rows])
+
+
+def _distances(one: np.ndarray, other: np.ndarray) -> np.ndarray:
+    return gathered(np.linalg.norm(one[rows] - other[rows], axis=1) for rows in blocks_of(len(one)))
 
 
 def _dataset(times: np.ndarray, errors: np.ndarray, name: str, source: str) -> xarray.Dataset:

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rigidsim.scene.rotations import quaternion_of
-from rigidsim.solve.from_states import blocks_of
+from rigidsim.store.many_rows import blocks_of, gathered, largest
 from rigidsim.workflows.compare.columns import Attitudes
 from rigidsim.workflows.compare.rotations import (
     SEQUENCES,
@@ -130,11 +130,8 @@ class FoundReading:
 
     def quaternions(self, given: Attitudes) -> np.ndarray:
         """All attitudes in the experiment's convention and axes."""
-        return np.concatenate(
-            [
-                self.frames.applied(self.reading.quaternions(given, rows))
-                for rows in blocks_of(len(given.times))
-            ]
+        return gathered(
+            self.frames.applied(self.reading.quaternions(given, rows)) for rows in blocks_of(len(given.times))
         )
 
 
@@ -145,10 +142,11 @@ def rows_compared(count: int) -> np.ndarray:
     return np.unique(np.concatenate([even, early]).astype(int))
 
 
-def find_convention(
-    given: Attitudes, rows: np.ndarray, motion: np.ndarray, allowed: Collection[Reading] = ()
-) -> FoundReading:
-    """The reading nearest to the experiment's attitudes (rows, 4) at these rows; of those allowed, if any."""
+def find_convention(given: Attitudes, motion: np.ndarray, allowed: Collection[Reading] = ()) -> FoundReading:
+    """The reading nearest to the experiment's attitudes (rows, 4), to which the trajectory may have further
+    rows; of those allowed, if any.
+    """
+    rows = slice(len(motion))
     tried = []
     for cost, reading in enumerate(readings(given)):
         if allowed and reading not in allowed:
@@ -199,7 +197,7 @@ def readings(given: Attitudes) -> Iterator[Reading]:
 def _degrees(given: Attitudes) -> bool:
     """Whether Euler angles look like degrees: beyond a few turns of radians."""
     assert given.angles is not None
-    return float(np.abs(given.angles).max()) > 4 * np.pi
+    return largest(given.angles) > 4 * np.pi
 
 
 def _score(read: np.ndarray, motion: np.ndarray) -> float:
@@ -243,7 +241,6 @@ def possible_rates(given: Attitudes) -> list[RateReading]:
 def find_rates(
     given: Attitudes,
     found: FoundReading,
-    rows: np.ndarray,
     quaternions: np.ndarray,
     motion: np.ndarray,
     allowed: Collection[RateReading] = (),
@@ -251,7 +248,7 @@ def find_rates(
     """The reading of rates nearest to the experiment's (rows, 3), and others that are equally near.
 
     Args:
-        quaternions: attitudes of these rows as the trajectory has them, in the experiment's convention.
+        quaternions: attitudes of its rows as the trajectory has them, in the experiment's convention.
         allowed: readings that may be taken; any if there are none.
     """
     assert given.rates is not None
@@ -262,7 +259,7 @@ def find_rates(
     ):
         if allowed and reading not in allowed:
             continue
-        read = reading.rates(given.rates[rows], found, quaternions)
+        read = reading.rates(given.rates, found, quaternions)
         apart = np.linalg.norm(read - motion, axis=1) / size
         tried.append((float(np.mean(np.log(apart + _LEAST))), reading))
     best = min(score for score, _ in tried)

@@ -18,6 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rigidsim.solve.from_states import FromStates, RowStates
+from rigidsim.store.many_rows import picked, usual_step
 from rigidsim.workflows.compare.rotations import conjugated, multiplied, normalised, turned, vector_of
 
 _WINDOW = 0.5  # times the rate of the motion: length of a window, where the rows allow it
@@ -66,18 +67,23 @@ class WindowDefects:
 def motion_rate(times: np.ndarray, rates: np.ndarray) -> float:
     """The rate of a motion, rad/s: that of its turning, or of the change of its rates, if that is faster."""
     rows = np.unique(np.linspace(0, len(times) - 2, min(len(times) - 1, _MOST_RATES)).astype(int))
-    size = float(np.sqrt(np.mean(np.sum(rates[np.append(rows, rows[-1] + 1)] ** 2, axis=1))))
-    steps = times[rows + 1] - times[rows]
-    change = (rates[rows + 1] - rates[rows]) / steps[:, None]
+    size = float(np.sqrt(np.mean(np.sum(picked(rates, np.append(rows, rows[-1] + 1)) ** 2, axis=1))))
+    steps = picked(times, rows + 1) - picked(times, rows)
+    change = (picked(rates, rows + 1) - picked(rates, rows)) / steps[:, None]
     bend = float(np.sqrt(np.sum(change**2, axis=1) @ steps / steps.sum()))
     return max(size, bend / size if size else 0.0)
 
 
 def row_defects(equations: FromStates, times: np.ndarray, states: RowStates, rows: np.ndarray) -> RowDefects:
     """Defects from some rows to the next ones; ``states`` are the trajectory's."""
-    ends = np.stack([equations.after(states[n], times[n], times[n + 1 : n + 2])[0] for n in rows])
+    ends = ends_of(equations, states[rows], picked(times, rows), picked(times, rows + 1))
     attitude, rates = _apart(equations, states[rows + 1], ends)
     return RowDefects(rows, attitude, rates)
+
+
+def ends_of(equations: FromStates, begun: np.ndarray, times: np.ndarray, until: np.ndarray) -> np.ndarray:
+    """States (rows, states) where the equations lead from states at times (s) to others."""
+    return np.stack([equations.after(*one)[0] for one in zip(begun, times, until[:, None], strict=True)])
 
 
 def window_defects(
@@ -88,7 +94,7 @@ def window_defects(
     Args:
         rate: of the motion, rad/s.
     """
-    spacing = float(np.median(np.diff(times)))
+    spacing = usual_step(times)
     count = len(times)
     stride = max(1, round(_WINDOW / (max(rate, 1e-300) * spacing * _PARTS)))
     stride = min(stride, (count - 1) // _PARTS)
@@ -143,16 +149,15 @@ def shot_rates(equations: FromStates, times: np.ndarray, states: RowStates, rows
     """Rates (rows, 3) with which the equations lead from the attitude of each row to that of the next: for
     trajectories without rates, from the mean rate between the rows on, by three corrections.
     """
-    quaternions, near = states.quaternions, states.rates
-    spacing = times[rows + 1] - times[rows]
-    mean = vector_of(multiplied(conjugated(quaternions[rows]), quaternions[rows + 1])) / spacing[:, None]
-    fast = np.linalg.norm(near[rows], axis=1) * spacing > np.pi * 0.8
-    rates = np.where(fast[:, None], near[rows], mean)
+    here, there = picked(states.quaternions, rows), picked(states.quaternions, rows + 1)
+    near, own = picked(states.rates, rows), states[rows]
+    begin, end = picked(times, rows), picked(times, rows + 1)
+    spacing = end - begin
+    mean = vector_of(multiplied(conjugated(here), there)) / spacing[:, None]
+    fast = np.linalg.norm(near, axis=1) * spacing > np.pi * 0.8
+    rates = np.where(fast[:, None], near, mean)
     for _ in range(4):
-        begun = equations.states(states[rows], quaternions[rows], rates)
-        ends = np.stack(
-            [equations.after(s, times[n], times[n + 1 : n + 2])[0] for s, n in zip(begun, rows, strict=True)]
-        )
+        ends = ends_of(equations, equations.states(own, here, rates), begin, end)
         reached, _ = equations.attitude(ends)
-        rates = rates + vector_of(multiplied(conjugated(reached), quaternions[rows + 1])) / spacing[:, None]
+        rates = rates + vector_of(multiplied(conjugated(reached), there)) / spacing[:, None]
     return np.asarray(rates)

@@ -36,27 +36,30 @@ class Turning:
     rates: RateReading
 
 
-def turning_readings(given: Attitudes, times: np.ndarray, *, signs: bool) -> list[Turning]:
+def turning_readings(given: Attitudes, second: float, *, signs: bool) -> list[Turning]:
     """The readings that obey kinematics about equally well, the plainest first; none where rows are too far
     apart to tell, or where none does.
 
     Args:
-        times: (rows,), s. signs: whether rates may have the other sign.
+        second: s, the trajectory's unit of time. signs: whether rates may have the other sign.
     """
     if given.rates is None:
         return []
-    rows = rows_compared(len(times) - 1)
-    steps = (times[rows + 1] - times[rows])[:, None]
-    first, second = given.rates[rows], given.rates[rows + 1]
+    rows = rows_compared(len(given.times) - 1)
+    here, there = given.at(rows), given.at(rows + 1)
+    assert here.rates is not None
+    assert there.rates is not None
+    steps = (there.times * second - here.times * second)[:, None]
+    every = slice(None)
     tried = []
     for reading in readings(given):
         found = FoundReading(reading, NONE, 0.0, [])
-        before, after = reading.quaternions(given, rows), reading.quaternions(given, rows + 1)
+        before, after = reading.quaternions(here, every), reading.quaternions(there, every)
         turns = vector_of(multiplied(conjugated(before), after))
         if np.median(np.linalg.norm(turns, axis=1)) > _FASTEST:
             continue
         for plain in possible_rates(given):
-            mean = (plain.rates(first, found, before) + plain.rates(second, found, after)) / 2
+            mean = (plain.rates(here.rates, found, before) + plain.rates(there.rates, found, after)) / 2
             size = float(np.linalg.norm(mean, axis=1).mean()) or 1.0
             for negative in (False, True) if signs else (False,):
                 apart = np.linalg.norm(turns / steps - (-mean if negative else mean), axis=1) / size

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 
@@ -12,10 +12,15 @@ from rigidsim.errors import ConfigError, Problem, RigidsimError
 from rigidsim.scene.config import Experiment
 from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.scene import Scene, build_scene
+from rigidsim.solve.from_states import FromStates
+from rigidsim.store.many_rows import blocks_of, gathered, picked
 from rigidsim.store.run import Run
+from rigidsim.workflows.compare.rotations import normalised
+from rigidsim.workflows.physics.models import rotation_vectors
 from rigidsim.workflows.run import run
 
 _FLIGHT = ("position", "velocity")
+_MOST_OWN = 20_000  # rows, up to which the experiment's own method gives the motion at all of them
 
 
 @dataclass(frozen=True)
@@ -95,3 +100,39 @@ def own_motion(experiment: Experiment, times: np.ndarray) -> OwnMotion:
         uncertainty=float(announced or 0.0),
         ended=ended,
     )
+
+
+def motion_at_all(
+    experiment: Experiment, equations: FromStates | None, times: np.ndarray,
+    sampled: tuple[np.ndarray, OwnMotion], told: list[str],
+) -> OwnMotion:  # fmt: skip
+    """The experiment at all rows; of very many by the same equations in double precision.
+
+    Args:
+        times: (rows,), s. sampled: rows at which the motion is known, and that.
+        told: gets what a user should know of it.
+    """
+    rows, own = sampled
+    if len(times) <= _MOST_OWN or equations is None or own.ended:
+        found = own if len(times) <= len(rows) and not own.ended else own_motion(experiment, times)
+        if found.ended:
+            told.append(f"the experiment's motion {found.ended}; later rows aren't compared")
+        return found
+    states = equations.motion(times)
+
+    def each(what: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
+        return gathered(what(states[block]) for block in blocks_of(len(times)))
+
+    quaternions = each(lambda some: equations.attitude(some)[0])
+    rates = each(lambda some: equations.attitude(some)[1])
+    there = [normalised(picked(quaternions, rows))]
+    apart = np.linalg.norm(rotation_vectors(own.quaternions, there), axis=1).max()
+    told.append(
+        f"{len(times):,} rows: all were compared with the motion in double precision, which is within "
+        f"{apart:.1g} rad of the experiment's own at {len(rows)} of them"
+    )
+    place = speed = None
+    if equations.flies:
+        flight = each(lambda some: np.asarray(equations.flight(some)))
+        place, speed = flight[:, :3], flight[:, 3:]
+    return OwnMotion([quaternions], rates, place, speed, max(own.uncertainty, float(apart)), "", states)

@@ -76,7 +76,8 @@ class LocalDefects(SummaryPart):
         window_s: length of the windows that models are told from integrators by.
         unexplained: of the windows' attitude defects, rms of what differences of the rates don't explain
             over rms of what they do.
-        missing_acceleration: rms, rad/s^2, that would explain the rates' defects.
+        missing_acceleration: rms, rad/s^2, that would explain the rates' defects, or the attitude's where
+            the trajectory has no rates.
         order: of the tool's method, and step_tolerance: rad, that errors of its steps are held to, if rows
             are its steps; None where they don't show.
     """
@@ -145,8 +146,9 @@ class Comparison(SummaryPart):
     def plot(self) -> Figure:
         """Attitude error, drifts and local defects along time."""
         from rigidsim.look.figures.compared import compared_figure
+        from rigidsim.workflows.compare.saving import thinned
 
-        return compared_figure(self.dataset)
+        return compared_figure(thinned(self.dataset))
 
     def save(self, path: str | Path) -> Path:
         """Write the dataset (netCDF-4/HDF5)."""

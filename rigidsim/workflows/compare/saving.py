@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+
+import numpy as np
+import xarray
 
 from rigidsim.errors import RigidsimError
 from rigidsim.store import atomic
-
-if TYPE_CHECKING:
-    import xarray
+from rigidsim.store.many_rows import blocks_of
+from rigidsim.store.netcdf import writing
 
 FIGURES = (".png", ".svg")
 DRAWN = ("drawing", "principal_moments", "principal_axes", "center_of_mass", "mass", "surroundings")
 """Attributes of a run's dataset that its body is drawn by."""
 MOST_SHOWN = 20_000  # rows of a timeline
+_MOST_DRAWN = 4000  # points of a figure
 
 
 def save_dataset(dataset: xarray.Dataset, path: Path) -> Path:
@@ -23,12 +25,42 @@ def save_dataset(dataset: xarray.Dataset, path: Path) -> Path:
         raise RigidsimError(f"{path}: the dataset is no picture; give --out FILE.h5, and --figure for that")
     try:
         with atomic.replacing(path) as temporary:
-            dataset.to_netcdf(temporary, engine="h5netcdf")
+            _write(dataset, temporary)
     except OSError as error:
         raise RigidsimError(
             f"{path}: can't be written: {error.strerror or error}; choose another --out"
         ) from None
     return path
+
+
+def _write(dataset: xarray.Dataset, path: Path) -> None:
+    """Variable by variable, by blocks of rows."""
+    with writing(path) as file:
+        file.attributes(dataset.attrs)
+        for dim, size in dataset.sizes.items():
+            file.dimension(str(dim), size)
+        for name, variable in dataset.variables.items():
+            target = file.variable(str(name), [str(dim) for dim in variable.dims], variable.attrs)
+            for rows in blocks_of(len(variable)):
+                target[rows] = variable[rows].values
+
+
+def thinned(dataset: xarray.Dataset) -> xarray.Dataset:
+    """A comparison's dataset with, of very many rows, the largest of each stretch, as a figure shows them."""
+    count = dataset.sizes["time"]
+    stretch = -(-count // _MOST_DRAWN)
+    if stretch == 1:
+        return dataset
+    found: dict[str, list[np.ndarray]] = {}
+    for rows in blocks_of(count, multiple=stretch):
+        for name, variable in dataset.variables.items():
+            if variable.dims == ("time",):
+                values = variable[rows].values
+                begins = np.arange(0, len(values), stretch)
+                shown = values[begins] if name == "time" else np.maximum.reduceat(np.abs(values), begins)
+                found.setdefault(str(name), []).append(shown)
+    drawn = {name: ("time", np.concatenate(parts)) for name, parts in found.items()}
+    return dataset.drop_dims("time").assign_coords(time=drawn.pop("time")).assign(drawn)
 
 
 def save_figure(dataset: xarray.Dataset, path: Path) -> Path:
@@ -39,7 +71,7 @@ def save_figure(dataset: xarray.Dataset, path: Path) -> Path:
         raise RigidsimError(f"{path}: a figure is a .png or a .svg")
     try:
         with atomic.replacing(path) as temporary:
-            save_compared(dataset, temporary, file_format=path.suffix.lower()[1:])
+            save_compared(thinned(dataset), temporary, file_format=path.suffix.lower()[1:])
     except OSError as error:
         raise RigidsimError(
             f"{path}: can't be written: {error.strerror or error}; choose another name"
