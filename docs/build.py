@@ -1,7 +1,8 @@
 """Builds the documentation as a site: ``python docs/build.py [FOLDER] [--code-only]``, by default _site.
 
 Needs the extra "docs" (``pip install -c constraints.txt -e '.[docs]'``) and no network. Notebooks are run,
-and shown with what they print and draw; with ``--code-only`` they aren't. Warnings and dead links are errors,
+and shown with what they print and draw, and scenes of the gallery play in the browser; with ``--code-only``
+neither is so. Warnings and dead links are errors,
 also links to places within pages; the pages fetch nothing when they are read.
 """
 
@@ -19,11 +20,12 @@ sys.path.insert(0, str(HERE.parent))
 
 import checking  # noqa: E402
 import reference  # noqa: E402
+import scenes  # noqa: E402
 import staging  # noqa: E402
 
 
 def build(site: Path, *, run: bool = True) -> int:
-    """Build the site into a folder, which is replaced; ``run`` the notebooks for it.
+    """Build the site into a folder, which is replaced; ``run`` the notebooks and the scenes for it.
 
     Returns:
         How many pages it has.
@@ -46,6 +48,9 @@ def build(site: Path, *, run: bool = True) -> int:
         done = subprocess.run([*sphinx, *environment, str(pages), str(site)])
         if done.returncode:
             raise SystemExit(done.returncode)
+    if run:
+        scenes.record(site)
+        scenes.put_viewer(site / "_static" / "viewer")
     faults = checking.faults(site)
     if faults:
         raise SystemExit("\n".join(faults))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import gzip
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -14,6 +16,7 @@ sys.path.insert(0, str(ROOT / "docs" / "builder"))
 
 import checking  # noqa: E402
 import reference  # noqa: E402
+import scenes  # noqa: E402
 import staging  # noqa: E402
 
 
@@ -53,12 +56,46 @@ def test_links_lead_to_places_of_the_site(pages: Path) -> None:
         ('<a href="https://example.org/x">', []),
         ('<script src="https://example.org/x.js">', ["one.html: fetches https://example.org/x.js"]),
         ('<link href="//example.org/x.css">', ["one.html: fetches //example.org/x.css"]),
+        ('<button data-recording="x.rrd">', ["one.html: x.rrd leads nowhere"]),
+        ('<script src="re_viewer.js"></script>', ["one.html: lets the viewer fetch from elsewhere"]),
     ],
 )
 def test_a_built_site_is_checked_as_a_reader_finds_it(page: str, fault: list[str], tmp_path: Path) -> None:
     (tmp_path / "one.html").write_text(page)
     (tmp_path / "two.html").write_text('<h2 id="there">')
+    (tmp_path / "re_viewer.js").write_text("")
     assert checking.faults(tmp_path) == fault
+
+
+def test_style_sheets_fetch_nothing_from_elsewhere(tmp_path: Path) -> None:
+    (tmp_path / "fine.css").write_text(
+        "a { background: url(data:image/png;base64,x) } b { src: url(c.woff) }"
+    )
+    assert checking.faults(tmp_path) == []
+    (tmp_path / "far.css").write_text("@font-face { src: url('https://example.org/x.woff') }")
+    assert checking.faults(tmp_path) == ["far.css: fetches https://example.org/x.woff"]
+
+
+def test_scenes_that_play_have_a_button_below_their_timeline() -> None:
+    gallery = (ROOT / "docs" / "gallery.md").read_text(encoding="utf-8")
+    text = scenes.with_buttons(gallery)
+    assert text.count("<button") == len(scenes.PLAYED) >= 5
+    for name in scenes.PLAYED:
+        section = text.split(f"\n## {name}\n")[1].split("\n## ")[0]
+        assert f'data-recording="scenes/{name}.rrd"' in section
+
+
+@pytest.mark.slow
+def test_the_site_serves_recordings_and_viewer_itself(tmp_path: Path) -> None:
+    """The viewer comes from the installed rerun-sdk, and its page lets it fetch from the site alone."""
+    viewer = tmp_path / "_static" / "viewer"
+    shutil.copytree(ROOT / "docs" / "builder" / "_static", tmp_path / "_static")
+    scenes.record(tmp_path, ("tossed_plate",))
+    scenes.put_viewer(viewer)
+    assert 1e5 < (tmp_path / "scenes" / "tossed_plate.rrd").stat().st_size < 2e6
+    assert gzip.decompress((viewer / "re_viewer_wasm.bin").read_bytes()).startswith(b"\0asm")
+    assert b"wasm_bindgen" in (viewer / "re_viewer.js").read_bytes()
+    assert checking.faults(tmp_path) == []
 
 
 def test_the_reference_has_every_key_command_and_variable(pages: Path) -> None:

@@ -21,6 +21,7 @@ html_copy_source = False
 html_show_sourcelink = False
 html_static_path = ["_static"]
 html_css_files = ["tables.css"]
+html_js_files = ["play.js"]
 highlight_language = "none"
 
 myst_enable_extensions = ["amsmath", "deflist", "dollarmath"]

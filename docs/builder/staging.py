@@ -13,6 +13,7 @@ import shutil
 from pathlib import Path
 
 import notebooks
+import scenes
 
 ROOT = Path(__file__).resolve().parents[2]
 ELSEWHERE = {
@@ -36,7 +37,7 @@ def gather(folder: Path, root: Path = ROOT, *, run: bool = False) -> list[Path]:
 
     Args:
         root: of the repository.
-        run: whether to run the notebooks and to show what comes of them.
+        run: whether to run the notebooks and to show what comes of them, and scenes play.
 
     Returns:
         The pages, without those that are generated.
@@ -54,6 +55,8 @@ def gather(folder: Path, root: Path = ROOT, *, run: bool = False) -> list[Path]:
             text = notebooks.as_page(page, target.parent / "pictures" if run else None)
         else:
             text = page.read_text(encoding="utf-8")
+        if run and place == "gallery.md":
+            text = scenes.with_buttons(text)
         target.write_text(_linked(text, page, folder, root, dead), encoding="utf-8")
     if dead:
         raise DeadLinkError("\n".join(dead))

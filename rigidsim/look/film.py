@@ -168,11 +168,11 @@ class HeadlessViewer:
     def seek_tick(self, tick: int) -> None:
         """Go to a time of the timeline, as its integer, and stay there."""
         # Integers of any timeline pass through `sequence` as they are.
-        self.client.set_time(self.timeline, sequence=tick, play_state="paused")
+        self._asked(lambda: self.client.set_time(self.timeline, sequence=tick, play_state="paused"))
 
     def picture(self) -> bytes:
         """PNG of the window as it is."""
-        return bytes(self.client.take_screenshot())
+        return bytes(self._asked(self.client.take_screenshot))
 
     def settled_picture(self, least: float = 7.0) -> bytes:
         """PNG of the window once it no longer changes, after so many seconds at least: plots are read then,
@@ -186,6 +186,16 @@ class HeadlessViewer:
                 return picture
             last = picture
         raise self._failure("its picture never came to rest")
+
+    def _asked(self, question: Callable[[], Any]) -> Any:
+        """The viewer's answer, asked again where a busy machine keeps it beyond the client's own patience."""
+        until = time.monotonic() + _PATIENCE
+        while True:
+            try:
+                return question()
+            except TimeoutError:
+                if time.monotonic() > until or self.process.poll() is not None:
+                    raise self._failure("no answer in time") from None
 
     def _open(self) -> None:
         """Wait until the recording is loaded: --screenshot-to fires before the plots have been read."""

@@ -31,7 +31,7 @@ that loads see, and the keys of sensitivities.
 """
 
 SCHEMA_VERSION = 4
-"""That of 0.1.0. Versions before were never released; files of any other version are refused."""
+"""That of all of 1.x. Versions before were never released; files of any other version are refused."""
 
 
 @dataclass(frozen=True)

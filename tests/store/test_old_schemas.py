@@ -1,4 +1,4 @@
-"""Files of the schema of 0.1.0 are read for good; those of any other are refused with the reason."""
+"""Files of the schema of 1.0 are read for good; those of any other are refused with the reason."""
 
 from __future__ import annotations
 

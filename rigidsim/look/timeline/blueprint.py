@@ -21,11 +21,13 @@ PIXELS = 800.0  # about the height of the page
 _DARK = (18, 20, 26)
 PARTS = ("page", "scene", "plots")
 """What a picture can show: the scene and its plots, or one of them."""
+PLAYER = "player"
+"""The part for a small frame within another page: the scene above its first plot, and the time to play."""
 
 
 def build_blueprint(run: DrawnRun, *, following: bool = False, part: str | None = None) -> rrb.Blueprint:
     """The layout for a run, which opens at its start and plays, or stays at the end of one that goes on; of a
-    picture one of ``PARTS``, without the viewer's own bars.
+    picture one of ``PARTS``, without the viewer's own bars; or ``PLAYER``.
     """
     stages, planes, clock = run.picture.stages, run.planes, run.clock
     narrow, facing = len(stages) > 1, stages[0].flat
@@ -55,6 +57,15 @@ def build_blueprint(run: DrawnRun, *, following: bool = False, part: str | None 
     panel = time_panel(clock, run.screen_seconds, following=following)
     if part is None:
         return page_of(left, right, panel, heights)
+    if part == PLAYER:
+        below = rrb.Vertical(left, *right[:1], row_shares=[5, 2][: 1 + len(right)])
+        return rrb.Blueprint(
+            below,
+            rrb.TopPanel(state="hidden"),
+            rrb.BlueprintPanel(state="hidden"),
+            rrb.SelectionPanel(state="hidden"),
+            panel,
+        )
     return bare(left, rrb.Vertical(*right, row_shares=heights) if right else None, clock, part)
 
 

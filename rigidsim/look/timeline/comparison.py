@@ -14,8 +14,9 @@ from rigidsim.look.plots import Color, Plot, Series
 from rigidsim.look.signals import values
 from rigidsim.look.solids import Array
 from rigidsim.look.timeline.blueprint import build_comparison
-from rigidsim.look.timeline.drawn import Clock, DrawnRun, build_clock
+from rigidsim.look.timeline.drawn import Clock, DrawnRun, build_clock, dated
 from rigidsim.look.timeline.writing import chunks, recording_to
+from rigidsim.scene.readable import epoch_of
 
 MOST = 6  # largest number of runs shown side by side
 ROWS = 20_000  # largest number of rows shown of each run
@@ -35,13 +36,15 @@ def write_comparison(named: Sequence[tuple[str, xarray.Dataset]], path: Path, *,
         raise ValueError(f"given {len(named)} runs; 2 to {MOST} can be seen side by side")
     runs = [(name, DrawnRun.of(dataset, rows)) for name, dataset in named]
     clock = build_clock(np.unique(np.concatenate([run.seconds for _, run in runs])))
+    first, *others = [epoch_of(run.rows.attrs) for _, run in runs]
+    shown = dated(clock, first) if all(epoch == first for epoch in others) else clock
     drawn = [
-        _named(replace(run, clock=_part(clock, run.seconds)), name, number)
+        _named(replace(run, clock=_part(clock, shown, run.seconds)), name, number)
         for number, (name, run) in enumerate(runs)
     ]
     apart = attitude_differences([(name, run.rows) for name, run in runs])
     titles = [legible(name) for name, _ in named]
-    blueprint = build_comparison(list(zip(titles, drawn, strict=True)), clock, apart)
+    blueprint = build_comparison(list(zip(titles, drawn, strict=True)), shown, apart)
     if apart is not None:
         drawn[0].plots.append(apart)
     count, name = sum(len(run.steps) for run in drawn), " and ".join(name for name, _ in named)
@@ -53,11 +56,11 @@ def write_comparison(named: Sequence[tuple[str, xarray.Dataset]], path: Path, *,
     return count
 
 
-def _part(clock: Clock, seconds: Array) -> Clock:
-    """The common clock, for the times of one run."""
+def _part(clock: Clock, shown: Clock, seconds: Array) -> Clock:
+    """The common clock as it is shown, with dates or without, for the times of one run."""
     whole = np.asarray(clock.ticks * clock.seconds_per_tick)
     places = np.clip(np.searchsorted(whole, seconds - 0.5 * clock.seconds_per_tick), 0, len(whole) - 1)
-    return replace(clock, ticks=clock.ticks[places])
+    return replace(shown, ticks=shown.ticks[places])
 
 
 def _named(run: DrawnRun, name: str, number: int) -> DrawnRun:

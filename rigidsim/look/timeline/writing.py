@@ -33,7 +33,8 @@ def write_timeline(
     time gets a plot. It may be lazy: only the rows shown are read.
     path: the file; it is whole when this returns.
     rows: at most so many rows are shown, evenly strided, with the first and the last.
-    part: of the page that a picture shows, "page", "scene" or "plots", without the viewer's own bars.
+    part: of the page that a picture shows, "page", "scene" or "plots", without the viewer's own bars;
+    or "player", for a small frame within another page.
 
     Raises:
     ValueError: no samples, a time that isn't finite, `rows` < 2 or an unreadable `drawing`.
