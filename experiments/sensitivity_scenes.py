@@ -142,7 +142,7 @@ def _own(draw: random.Random) -> tuple[str, list[str]]:
 
 
 def _elastic(draw: random.Random) -> tuple[str, list[str]]:
-    part = "[body.elasticity]\nlove_number = 8e-13\ndelay = 0.05\nradius = 1.2\nmean_rate = 0.8\n"
+    part = "[body.elasticity]\nlove_number = 6e-13\ndelay = 0.05\nradius = 1.2\nmean_rate = 0.8\n"
     load = f'[[loads]]\nkind = "gravity_gradient"\ngravitational_parameter = 1.2\n{_orbit(draw)}'
     keys = [f"body.elasticity.{key}" for key in ("love_number", "delay", "radius")]
     body = f"[body]\nprincipal_moments = [1.6, 1.7, 1.9]\nmass = 1.5\n{part}"

@@ -23,6 +23,7 @@ from rigidsim.model.parametrised import Coefficients, Parametrised
 from rigidsim.model.rotations import Symbolic
 from rigidsim.solve.compiled import Kept, compiled_engine, compiled_function, evaluate_rows
 from rigidsim.solve.precision import Precision, precision_of
+from rigidsim.solve.tangent_states import jacobian_rows, moving_states
 from rigidsim.solve.variational import LostTangents, Rows
 
 WIDTH = 4
@@ -52,7 +53,9 @@ class _LaneNumbers:
     initial_slopes: np.ndarray
 
     @classmethod
-    def of(cls, found: Coefficients, keys: int) -> _LaneNumbers:
+    def of(cls, found: Coefficients) -> _LaneNumbers:
+        keys = len(found.initial_slopes[0])
+
         def table(rows: list[list[Any]]) -> np.ndarray:
             return np.array([[float(x) for x in row] for row in rows]).reshape(len(rows), keys)
 
@@ -69,35 +72,38 @@ class TangentLanes:
         self._states, self._count, self._keys = len(system.states), parametrised.count, len(parametrised.keys)
         self._options = dict(precision_of("double").options)
         self._x = list(system.variables)
-        self._d = [hy.make_vars(f"tangent_{name}") for name in system.states]
-        tangents = self._derivatives(parametrised.equations)
         self._plain = list(zip(self._x, parametrised.equations, strict=True))
-        self._both = [*self._plain, *zip(self._d, tangents, strict=True)]
-        self._slopes = self._derivatives(parametrised.outputs)
+        self._moving, tangents, self._slopes = self._tangents()
+        self._d = list(tangents)
+        self._both = [*self._plain, *tangents.items()]
         start = system.scene.context.ldexp(system.scene.start, -system.scaling.time)
         self._start = float(start)
         self._units = np.array(
             [math.ldexp(1.0, e) for one in parametrised.recorded for e in one.exponents], dtype=float
         )
+        self._moved: tuple[bytes, np.ndarray] | None = None  # the latest motion, and all it depends on
         self.use(parametrised.coefficients)
 
     def use(self, coefficients: Coefficients) -> None:
-        """Take coefficients and initial values."""
-        self._numbers = _LaneNumbers.of(coefficients, self._keys)
-        self._moved: tuple[bytes, np.ndarray] | None = None
+        """Take coefficients and initial values; without derivatives of these there are none of the motion."""
+        self._numbers = _LaneNumbers.of(coefficients)
 
-    def _derivatives(self, expressions: list[Symbolic]) -> list[Symbolic]:
-        """Of expressions along the tangent."""
-        varied = [hy.par[i] for i in range(self._count)]
-        by = [*self._x, *varied]
-        along = [*self._d, *(hy.par[self._count + i] for i in range(self._count))]
-        found = hy.diff_tensors([hy.expression(x) for x in expressions], diff_args=by, diff_order=1).jacobian
-        zero = hy.expression(0.0)
-        made = []
-        for row in found:
-            terms = [d * a for d, a in zip(row, along, strict=True) if d != zero]
-            made.append(hy.sum(terms) if terms else zero)
-        return made
+    def _tangents(self) -> tuple[list[int], dict[Symbolic, Symbolic], list[Symbolic]]:
+        """States with tangents, these with their equations, and derivatives of the outputs along them."""
+        made = self._made
+        expressions = [*made.equations, *made.outputs]
+        jacobian = jacobian_rows(expressions, self._x)
+        forcing = jacobian_rows(expressions, [hy.par[i] for i in range(self._count)])
+        moving = moving_states(made, jacobian, forcing)
+        d = {i: hy.make_vars(f"tangent_{made.states[i]}") for i in moving}
+
+        def along(row: int) -> Symbolic:
+            terms = [slope * d[i] for i, slope in jacobian[row].items() if i in d]
+            terms += [slope * hy.par[self._count + m] for m, slope in forcing[row].items()]
+            return hy.sum(terms) if terms else hy.expression(0.0)
+
+        outputs = range(len(made.equations), len(expressions))
+        return moving, {d[i]: along(i) for i in moving}, [along(row) for row in outputs]
 
     # --- motion and tangents ----------------------------------------------------------------------------
 
@@ -125,7 +131,8 @@ class TangentLanes:
     def _motion(self, times: np.ndarray) -> np.ndarray:
         """States (n, states) by the scalar integrator."""
         n = self._numbers
-        if self._moved is not None and self._moved[0] == times.tobytes():
+        described = b"".join(x.tobytes() for x in (n.initial, n.values, times))
+        if self._moved is not None and self._moved[0] == described:
             return self._moved[1]
         engine = compiled_engine(self._plain, np.zeros(self._states), **self._options)
         engine.time, engine.state[:], engine.pars[:] = self._start, n.initial, n.values[: len(engine.pars)]
@@ -133,7 +140,7 @@ class TangentLanes:
         outcome, *_, states = engine.propagate_grid(grid)
         if outcome != hy.taylor_outcome.time_limit or not np.isfinite(states).all():
             raise LostTangents("the motion is no longer finite")
-        self._moved = times.tobytes(), np.asarray(states[len(grid) - len(times) :])
+        self._moved = described, np.asarray(states[len(grid) - len(times) :])
         return self._moved[1]
 
     def _lanes(self, times: np.ndarray, keys: list[int]) -> list[np.ndarray]:
@@ -142,9 +149,8 @@ class TangentLanes:
         sizes = [np.abs(np.append(n.initial_slopes[:, j], n.slopes[:, j])).max(initial=0.0) for j in keys]
         scales = [math.ldexp(1.0, _SMALL - (math.frexp(size)[1] if size else 0)) for size in sizes]
         pars = np.concatenate([np.repeat(n.values[:, None], WIDTH, axis=1), n.slopes[:, keys] * scales])
-        state = np.concatenate(
-            [np.repeat(n.initial[:, None], WIDTH, axis=1), n.initial_slopes[:, keys] * scales]
-        )
+        tangents = n.initial_slopes[np.ix_(self._moving, keys)] * scales
+        state = np.concatenate([np.repeat(n.initial[:, None], WIDTH, axis=1), tangents])
         engine = self._engine()
         engine.set_time(self._start)
         engine.state[:] = state
@@ -168,7 +174,7 @@ class TangentLanes:
 
     def _engine(self) -> Any:
         options = dict(self._options, tol=TOLERANCE)
-        shape = (2 * self._states, WIDTH)
+        shape = (len(self._both), WIDTH)
 
         def make() -> Any:
             return hy.taylor_adaptive_batch(self._both, np.zeros(shape), **options)

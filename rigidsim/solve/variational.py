@@ -23,6 +23,7 @@ from rigidsim.model.rotations import Symbolic
 from rigidsim.solve.compiled import TaylorEngine, compiled_engine, compiled_function, evaluate_rows
 from rigidsim.solve.precision import Precision, Scalar
 from rigidsim.solve.stepper import longest_step
+from rigidsim.solve.tangent_states import jacobian_rows, moving_states
 
 _LARGE, _SMALL = 1, -2  # binary exponents between which a tangent's largest component is left as it is
 _LOOK = 64  # steps between two looks at whether to go on
@@ -88,9 +89,9 @@ class Variational:
         made, system = self.parametrised, self.system
         variables, first, count = system.variables, made.first, made.count
         varied = [hy.par[first + i] for i in range(count)]
-        jacobian = _jacobian([*made.equations, *made.outputs], variables)
-        forcing = _jacobian([*made.equations, *made.outputs], varied)
-        moving = self._moving(jacobian, forcing)
+        jacobian = jacobian_rows([*made.equations, *made.outputs], variables)
+        forcing = jacobian_rows([*made.equations, *made.outputs], varied)
+        moving = moving_states(made, jacobian, forcing, self._set)
         tangents = {
             (i, j): hy.make_vars(f"tangent_{j}_{system.states[i]}") for i in moving for j in range(self.keys)
         }
@@ -111,18 +112,6 @@ class Variational:
         """Number of the parameter that is a coefficient's derivative by a key."""
         made = self.parametrised
         return int(made.first + made.count * (1 + key) + coefficient)
-
-    def _moving(self, jacobian: list[dict[int, Symbolic]], forcing: list[dict[int, Symbolic]]) -> list[int]:
-        """States that depend on a key, and that others or what is recorded depend on."""
-        names, set_anew = self.system.states, self._set
-        slopes = self.parametrised.coefficients.initial_slopes
-        moved = {i for i in range(self.states) if forcing[i] or any(x != 0 for x in slopes[i])}
-        while more := {i for i in range(self.states) if i not in moved and moved & jacobian[i].keys()}:
-            moved |= more
-        wanted = {i for row in range(self.states, len(jacobian)) for i in jacobian[row]}
-        while more := {i for row in wanted for i in jacobian[row] if i not in wanted}:
-            wanted |= more
-        return sorted(i for i in moved & wanted if names[i] not in set_anew)
 
     # --- where it is ------------------------------------------------------------------------------------
 
@@ -333,12 +322,3 @@ def turned(quaternion: np.ndarray, slopes: np.ndarray) -> np.ndarray:
     square = w * w + sum(v[:, :, i : i + 1] * v[:, :, i : i + 1] for i in range(3))
     half = w * b - a * v - crossed
     return (half + half) / square
-
-
-def _jacobian(expressions: Sequence[Symbolic], by: Sequence[Symbolic]) -> list[dict[int, Symbolic]]:
-    """Derivatives that aren't zero everywhere: a row for each expression, by the number of the variable."""
-    if not by:
-        return [{} for _ in expressions]
-    found = hy.diff_tensors([hy.expression(x) for x in expressions], diff_args=list(by), diff_order=1)
-    zero = hy.expression(0.0)
-    return [{i: d for i, d in enumerate(row) if d != zero} for row in found.jacobian]

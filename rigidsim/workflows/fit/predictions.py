@@ -192,7 +192,7 @@ class ByTangents:
         self._source: TangentLanes | Tangents
         if fits_lanes(made, prepared.precision):
             self._source, self._made = TangentLanes(made), made
-            self._at = list(made.values)
+            self._at, self._sloped = list(made.values), True
         else:
             self._source = Tangents(stepping, self._keys, record=self._names)
 
@@ -230,12 +230,12 @@ class ByTangents:
         self, values: Sequence[float], times: np.ndarray, slopes: bool
     ) -> dict[str, tuple[np.ndarray, np.ndarray | None]]:
         wanted = [Fraction(float(value)) for value in values]
-        if wanted == self._at:
+        if wanted == self._at and (self._sloped or not slopes):
             return self._rows(times, slopes)
-        self._at = wanted
-        coefficients = self._made.at(wanted)
+        self._at, self._sloped = wanted, slopes
+        coefficients = self._made.at(wanted, slopes=slopes)
         if coefficients is None:  # the equations have another form here
-            self._made = self._made.made_at(wanted)
+            self._made, self._sloped = self._made.made_at(wanted), True
             self._source = TangentLanes(self._made)
         else:
             assert isinstance(self._source, TangentLanes)

@@ -36,7 +36,7 @@ def search(weighing: Weighing, starts: int, told: Callable[[str], None]) -> Foun
         RigidsimError: from no start the motion can be computed, or too few rows are left.
     """
     ended, costs, notes = _from_starts(weighing, starts, told)
-    compared = weighing.compared(ended.values)
+    compared = weighing.compared(ended.values, fresh=starts > 1)  # the latest needn't be the best
     seen: list[bytes] = []
     rounds = 0
     while rounds < _ROUNDS and _sort_out(weighing, compared):
@@ -51,7 +51,7 @@ def search(weighing: Weighing, starts: int, told: Callable[[str], None]) -> Foun
         again = iterate(ended.values, weighing.linearised, _telling(told))
         if again is None:
             raise RigidsimError(f"fit: {weighing.failure}")
-        ended, compared = again, weighing.compared(again.values)
+        ended, compared = again, weighing.compared(again.values, fresh=False)
     for readings, used in zip(weighing.readings, weighing.used, strict=True):
         if used.sum() < 0.5 * len(used):
             notes.append(

@@ -50,8 +50,9 @@ class Weighing:
         self._fixed = np.array([one.start for one in keys.considered])
         self._weights = np.array([0.0 if k.sigma is None else 1.0 / k.sigma for k in keys.estimated])
         self.failure = ""
-        self._sloped: Prediction | None = None  # the latest prediction with derivatives
+        self._sloped: Prediction | None = None  # the latest prediction, with the latest derivatives
         self._latest: tuple[bytes, Residuals] | None = None  # the same beside the readings, with its values
+        self._fresh = False  # whether these derivatives are those of its values
 
     def compared(self, values: np.ndarray, *, fresh: bool = True) -> Residuals:
         """Residuals and slopes of all rows, used or not; the latest slopes unless they are to be ``fresh``.
@@ -59,21 +60,20 @@ class Weighing:
         Raises:
             NotPredicted: the motion doesn't reach them.
         """
-        if fresh and self._latest is not None and self._latest[0] == values.tobytes():
+        if self._latest is not None and self._latest[0] == values.tobytes() and self._fresh >= fresh:
             return self._latest[1]
         found = self._predictor.at([*values, *self._fixed], self.times, slopes=fresh)
-        if fresh:
-            self._sloped = found
-        assert self._sloped is not None
-        found = Prediction(found.values, self._sloped.slopes, self._sloped.noise)
-        made = self._beside(found)
-        if fresh:
-            self._latest = values.tobytes(), made
-        return made
+        self._fresh = bool(found.slopes)  # some come with them, asked for or not
+        if not found.slopes:
+            assert self._sloped is not None
+            found = Prediction(found.values, self._sloped.slopes, self._sloped.noise)
+        self._sloped = found
+        self._latest = values.tobytes(), self._beside(found)
+        return self._latest[1]
 
     def along(self, values: np.ndarray) -> Prediction:
-        """Predictions with derivatives along the run, as far as the scene has them: of the latest evaluation
-        with derivatives, which is that of the values where a fit ends.
+        """Predictions with derivatives along the run, as far as the scene has them: of the latest evaluation,
+        which is that of the values where a fit ends.
         """
         found = self._sloped
         if (
