@@ -45,7 +45,7 @@ T = TypeVar("T")
 ROWS = 10_000
 SIGMA = 1e-3  # rad, and rad/s
 MOST_RUNS, MOST_OF_SCIPY = 10.0, 0.2
-_ASKED = "asked of this project (issue 33)"
+_ASKED = "asked of this project"
 FREE = """
 name = "seen"
 [body]

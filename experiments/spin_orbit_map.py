@@ -47,7 +47,7 @@ NAME = "hyperion_map"
 KEEP = ("megno", "final")
 REGULAR = 3.0
 """MEGNO below which a motion counts as regular after 100 orbits: 2, and what its oscillation adds."""
-_MOST_RATIO = 1.3  # asked of this project (issue 14)
+_MOST_RATIO = 1.3  # asked of this project
 _MANY = 250_000
 _DIFFERENT_SHARE = 0.02
 

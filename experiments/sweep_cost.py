@@ -46,7 +46,7 @@ from rigidsim.solve.batch.run import BatchRun
 MEMBERS, MANY, ROUNDS = 4096, 150_000, 3
 _MOST = {8: 0.25, 4: 0.35}
 _MOST_OF_TWO = 0.55
-_ASKED = "asked of this project (issue 14)"
+_ASKED = "asked of this project"
 TEXT = """
 name = "free_bodies"
 [body]

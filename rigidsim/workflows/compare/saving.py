@@ -25,7 +25,10 @@ def save_dataset(dataset: xarray.Dataset, path: Path) -> Path:
         raise RigidsimError(f"{path}: the dataset is no picture; give --out FILE.h5, and --figure for that")
     try:
         with atomic.replacing(path) as temporary:
-            _write(dataset, temporary)
+            if all(variable.dtype == np.float64 for variable in dataset.variables.values()):
+                _write(dataset, temporary)
+            else:  # a fit's, with names and flags, is never large
+                dataset.to_netcdf(temporary, engine="h5netcdf")
     except OSError as error:
         raise RigidsimError(
             f"{path}: can't be written: {error.strerror or error}; choose another --out"
