@@ -15,7 +15,7 @@ from equations import CLOSE, Random, array, derivative, general_body, matrix, pr
 from field_truth import gradient, keys, lumpy, moments_of, pulled, random_field, tensor_of
 from gyrostats import BITS, exact
 from killing import killed
-from support import config, run_text, same_bits
+from support import EPSILON, config, law, run_text, same_bits
 
 import rigidsim
 from rigidsim import ConfigError
@@ -256,7 +256,10 @@ def test_motions_are_those_of_equations_of_their_own(precision: str, end: float,
         'record = ["quaternion", "angular_velocity"]',
     )
     matrices, rates = by_momentum(("0.1", "0.2", "1.0"), end)
-    data = run_text(text).dataset
+    run = run_text(text)
+    data = run.dataset
+    # rates wander by roundings, and the attitude adds up what they do
+    wander = 3 * law(EPSILON[precision], run.summary["cost"]["steps"], 1.03, end)
     w, x, y, z = whole(data, "quaternion")[-1]
     found = np.array(
         [
@@ -265,7 +268,7 @@ def test_motions_are_those_of_equations_of_their_own(precision: str, end: float,
             [2 * (x * z - w * y), 2 * (y * z + w * x), w * w - x * x - y * y + z * z],
         ]
     )
-    assert np.abs(found - matrices).max() < least
+    assert np.abs(found - matrices).max() < max(least, wander)
     assert np.abs(whole(data, "angular_velocity")[-1] - rates).max() < least
 
 
