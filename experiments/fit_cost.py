@@ -13,7 +13,7 @@ CPU time of this process, all of it compiled before:
   Each of its runs compiles the equations of other numbers, which counts here.
 
 Held against, from near: ten times the run, and a fifth of SciPy's time. Both must end in the same values,
-within 0.01 sigmas.
+within twice what SciPy's tolerance leaves open (0.025 sigmas).
 
 Run: python -m experiments.fit_cost [--rounds N]      Exit: 1 if one fails
 """
@@ -189,7 +189,8 @@ def beside_scipy(scene: Scene, whole: float, found: Any) -> list[Check]:
     print(f"SciPy: {seconds:.0f} s, {runs} runs; fit {whole:.2f} s", flush=True)
     return [
         Check("all of a fit by SciPy's time", whole / seconds, 0, MOST_OF_SCIPY, "1", _ASKED, "absolute"),
-        Check("values apart", apart, 0, 0.01, "sigmas", "SciPy's own tolerance", "absolute"),
+        # SciPy stops where the sum of 60,000 squares changes by less than 1e-8 of it: sqrt(6e-4) sigmas
+        Check("values apart", apart, 0, 0.05, "sigmas", "twice SciPy's own tolerance", "absolute"),
     ]
 
 

@@ -266,7 +266,7 @@ def test_angles_between_axes() -> None:
 
 
 @pytest.mark.slow(100)
-@pytest.mark.parametrize("number", [0, 1, 2])
+@pytest.mark.parametrize("number", [0])
 def test_random_scenes(number: int) -> None:
     told: list[str] = []
     assert least_models.campaign(1, 100 + number, told.append)[0] == 0, told
