@@ -41,7 +41,6 @@ def build(site: Path, *, run: bool = True) -> int:
             raise SystemExit(f"dead links\n{error}") from None
         reference.write(pages / "reference")
         staging.add_contents(pages)
-        shutil.copytree(HERE / "builder" / "_static", pages / "_static")
         shutil.rmtree(site, ignore_errors=True)
         sphinx = [sys.executable, "-m", "sphinx", "-q", "-W", "--keep-going", "-E", "-b", "html"]
         environment = ["-c", str(HERE / "builder"), "-d", str(pages / ".doctrees")]
@@ -51,6 +50,8 @@ def build(site: Path, *, run: bool = True) -> int:
     if run:
         scenes.record(site)
         scenes.put_viewer(site / "_static" / "viewer")
+    else:
+        shutil.rmtree(site / "_static" / "viewer")  # its page without the viewer leads nowhere
     faults = checking.faults(site)
     if faults:
         raise SystemExit("\n".join(faults))
