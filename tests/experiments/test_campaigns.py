@@ -59,11 +59,11 @@ def test_lost_rows_and_changed_bits_are_failures(finished: RunFolder) -> None:
 
 @pytest.mark.slow(40)
 def test_a_small_campaign(capfd: pytest.CaptureFixture[str]) -> None:
-    arguments = "--kills 8 --full-disks 2 --read-only 2 --damages 16 --seconds 240"  # seconds at most
+    arguments = "--kills 3 --full-disks 1 --read-only 1 --damages 6 --seconds 240"  # seconds at most
     assert kill_campaign.main(arguments.split()) == 0
     told = capfd.readouterr().out
-    assert "kills: 8 of 8" in told
-    assert "damages: 16 of 16; failures so far: 0" in told
+    assert "kills: 3 of 3" in told
+    assert "damages: 6 of 6; failures so far: 0" in told
 
 
 # ---- the campaign of kills over sweeps, shortened

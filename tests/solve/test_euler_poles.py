@@ -158,7 +158,7 @@ def relative(n: int, chance: random.Random) -> tuple[str, str, str]:
 @pytest.mark.slow
 def test_angles_mean_the_quaternion_in_every_sequence_formulation_and_precision() -> None:
     chance = random.Random(25)
-    for n in range(52):
+    for n in range(26):
         text, sequence, precision = relative(n, chance)
         found = run_text(text, f'name="p{n}"').dataset
         assert worst_error(found, sequence, BITS[precision]) <= 1, text

@@ -133,5 +133,5 @@ def _tried(number: int, folder: Path) -> None:
 
 @pytest.mark.slow
 def test_functions_end_in_no_traceback(tmp_path: Path) -> None:
-    for number in range(60):
+    for number in range(15):
         _tried(number, tmp_path)

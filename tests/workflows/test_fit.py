@@ -334,4 +334,4 @@ def test_what_cannot_be_observed_is_refused(here: Path) -> None:
 @pytest.mark.slow(120)
 def test_errors_of_random_fits_are_as_large_as_their_sigmas_say() -> None:
     told: list[str] = []
-    assert fit_campaign.campaign(40, 10, 2, told.append) == 0, told
+    assert fit_campaign.campaign(16, 8, 2, told.append) == 0, told
