@@ -3,7 +3,8 @@
 The Earth's field to degree 4 by Cunningham's recursion in axes that turn (Montenbruck & Gill, Satellite
 Orbits, section 3.2), gravity-gradient torques of Earth and Sun, drag and light on a box and a panel (3.4
 and 3.5, Wertz 1978, 17.2), the Earth's shadow of a point Sun, a magnet and eddy currents in a dipole. Earth
-radii and circular periods over 2 pi for units; sides of faces are numbers that events turn. The scene is in
+radii and circular periods over 2 pi for units; sides of faces are numbers that events turn. Or a sphere in
+place of box and panel, which has no sides, in full light or with the shadow. The scenes are in
 ``experiments/satellite_cost.py``.
 
 python -m experiments.bare.satellite [--hours 24]
@@ -26,6 +27,7 @@ UNIT = math.sqrt(RADIUS**3 / MU)
 SPIN = 7.2921151e-5
 MASS, MOMENTS = 4.0, (0.01, 0.03, 0.034)
 EDGES, PANEL, PLACE = (0.34, 0.1, 0.1), 0.06, (-0.02, 0.01, 0.004)
+BALL = 0.15  # radius of the sphere, about PLACE
 SPECULAR, DIFFUSE, DRAG = 0.2, 0.1, 2.2
 DENSITY, ALTITUDE, HEIGHT = 4e-12, 400e3, 60e3
 MAGNET, DIPOLE, CONDUCTOR = (1e-4, -2e-4, 3e-4), (1.3e22, 0.0, -7.6e22), (30.0, 10.0, 20.0)
@@ -79,9 +81,10 @@ def field(x: Sequence[Any]) -> list[Any]:
 
 
 class Satellite:
-    """Equations, events and start."""
+    """Equations, events and start of one with plates or a sphere for its outside."""
 
-    def __init__(self) -> None:
+    def __init__(self, *, plates: bool = True, shadow: bool = True) -> None:
+        self.plates, self.shadow = plates, shadow
         self.x, self.v = hy.make_vars("x", "y", "z"), hy.make_vars("u", "v", "w")
         self.w, self.q = hy.make_vars("wx", "wy", "wz"), hy.make_vars("q0", "q1", "q2", "q3")
         self.states = [*self.x, *self.v, *self.w, *self.q]
@@ -96,8 +99,8 @@ class Satellite:
         """In body axes."""
         return [dot([self.r[i][j] for i in range(3)], vector) for j in range(3)]
 
-    def equations(self) -> tuple[list[Any], list[Any]]:
-        """The system, and what changes its sign where a face or the Sun turns away."""
+    def equations(self) -> tuple[list[Any], dict[int, Any]]:
+        """The system, and what changes its sign where a face or the Sun turns away, by its parameter."""
         far = hy.sqrt(dot(self.x, self.x))
         up = self.seen([x / far for x in self.x])
         tensor = [a * b for a, b in zip(MOMENTS, up, strict=True)]
@@ -112,23 +115,9 @@ class Satellite:
         swept = [-SPIN * UNIT * self.x[1], SPIN * UNIT * self.x[0], 0.0]
         wind = self.seen([RADIUS / UNIT * (a - b) for a, b in zip(self.v, swept, strict=True)])
         thick = DENSITY * hy.exp((6378136.6 + ALTITUDE - RADIUS * far) / HEIGHT)
-        faces = [EDGES[1] * EDGES[2], EDGES[0] * EDGES[2], EDGES[0] * EDGES[1]]
-        met = [hy.par[k] * wind[k] for k in range(3)]
-        push = -0.5 * DRAG * thick
-        box = [push * dot(faces, met) * k for k in wind]
-        panel = [push * PANEL * met[2] * k for k in wind]
-        # light, unless the Earth is before the Sun
-        pressure = hy.par[6] * (1361.0 / 299792458.0)
-        for i, area in enumerate([*faces, PANEL]):
-            axis = min(i, 2) if i < 3 else 2
-            c = hy.par[3 + axis] * light[axis]
-            force = [-pressure * area * c * (1.0 - SPECULAR) * k for k in light]
-            normal = 2.0 * pressure * area * c * (SPECULAR * c + DIFFUSE / 3.0) * hy.par[3 + axis]
-            force[axis] = force[axis] - normal
-            if i < 3:
-                box = [a + b for a, b in zip(box, force, strict=True)]
-            else:
-                panel = [a + b for a, b in zip(panel, force, strict=True)]
+        # what meets the box, or nothing; and the panel, or the sphere
+        outside = self.on_plates if self.plates else self.on_sphere
+        box, panel = outside(wind, thick, light)
         torque = [a + b for a, b in zip(torque, cross(PLACE, panel), strict=True)]
         # magnetic field
         pole = self.seen(DIPOLE)
@@ -158,7 +147,37 @@ class Satellite:
         flight = [p + q for p, q in zip(earth, pushed, strict=True)]
         edge = dot(self.x, sun) + hy.sqrt(dot(self.x, self.x) - 1.0)
         rates = [*self.v, *flight, *right, *turning]
-        return list(zip(self.states, rates, strict=True)), [*wind, *light, edge]
+        turning_away = dict(enumerate([*wind, *light])) if self.plates else {}
+        return list(zip(self.states, rates, strict=True)), turning_away | ({6: edge} if self.shadow else {})
+
+    def on_plates(self, wind: list[Any], thick: Any, light: list[Any]) -> tuple[list[Any], list[Any]]:
+        """Forces of air and light in body axes, on the box and on the panel."""
+        faces = [EDGES[1] * EDGES[2], EDGES[0] * EDGES[2], EDGES[0] * EDGES[1]]
+        met = [hy.par[k] * wind[k] for k in range(3)]
+        push = -0.5 * DRAG * thick
+        box = [push * dot(faces, met) * k for k in wind]
+        panel = [push * PANEL * met[2] * k for k in wind]
+        # light, unless the Earth is before the Sun
+        pressure = hy.par[6] * (1361.0 / 299792458.0)
+        for i, area in enumerate([*faces, PANEL]):
+            axis = min(i, 2) if i < 3 else 2
+            c = hy.par[3 + axis] * light[axis]
+            force = [-pressure * area * c * (1.0 - SPECULAR) * k for k in light]
+            normal = 2.0 * pressure * area * c * (SPECULAR * c + DIFFUSE / 3.0) * hy.par[3 + axis]
+            force[axis] = force[axis] - normal
+            if i < 3:
+                box = [a + b for a, b in zip(box, force, strict=True)]
+            else:
+                panel = [a + b for a, b in zip(panel, force, strict=True)]
+        return box, panel
+
+    def on_sphere(self, wind: list[Any], thick: Any, light: list[Any]) -> tuple[list[Any], list[Any]]:
+        """Nothing, and the forces on the sphere."""
+        area = math.pi * BALL**2
+        pressure = (hy.par[6] if self.shadow else 1.0) * (1361.0 / 299792458.0)
+        push = -0.5 * DRAG * thick * area * hy.sqrt(dot(wind, wind))
+        pull = -pressure * area * (1.0 + 4.0 / 9.0 * DIFFUSE)
+        return [0.0, 0.0, 0.0], [push * a + pull * b for a, b in zip(wind, light, strict=True)]
 
     def integrate(self, hours: float = 24.0, samples: int = 1441) -> dict[str, Any]:
         """Samples in SI, and the cost."""
@@ -167,8 +186,11 @@ class Satellite:
         start = [x / RADIUS for x in POSITION] + [v * UNIT / RADIUS for v in VELOCITY]
         size = math.sqrt(dot(QUATERNION[:3], QUATERNION[:3]) + QUATERNION[3] ** 2)
         start += [w * UNIT for w in RATES] + [q / size for q in QUATERNION]
-        at = hy.cfunc(looks, vars=self.states)(np.array(start), time=0.0) > 0
         off = (-1.0,) * 6 + (0.0,)
+        pars = [1.0] * 7
+        for k, look in looks.items():
+            if hy.cfunc([look], vars=self.states)(np.array(start), time=0.0)[0] <= 0:
+                pars[k] = off[k]
 
         def turn(k: int) -> Any:
             def flip(engine: Any, sign: int) -> bool:
@@ -177,9 +199,9 @@ class Satellite:
 
             return flip
 
-        events = [hy.t_event(look, callback=turn(k)) for k, look in enumerate(looks)]
-        pars = [1.0 if on else off[k] for k, on in enumerate(at)]
-        engine = hy.taylor_adaptive(equations, start, pars=pars, t_events=events, compact_mode=True)
+        events = [hy.t_event(look, callback=turn(k)) for k, look in looks.items()]
+        used = pars[: len(off)] if looks else []
+        engine = hy.taylor_adaptive(equations, start, pars=used, t_events=events, compact_mode=True)
         steps = 0
 
         def count(_: Any) -> bool:
