@@ -26,6 +26,7 @@ def satellites() -> MemberResults:
     return results_of("satellites")
 
 
+@pytest.mark.slow
 def test_nobody_beside_a_member_changes_its_estimate(satellites: MemberResults) -> None:
     alone = results_of("satellites", [4])
     assert alone.engines.keys() == satellites.engines.keys() != {"alone"}

@@ -52,7 +52,7 @@ def orbit_start(eccentricity: str = "0.1") -> list[list[Any]]:
         ("double", "rotation_matrix", 20, 5e-13),
         ("double", "euler_angles", 20, 5e-13),
         ("single", "quaternion", 20, 2e-4),
-        ("quadruple", "quaternion", 20, 1e-18),
+        pytest.param("quadruple", "quaternion", 20, 1e-18, marks=pytest.mark.slow),
     ],
 )
 def test_without_delay(precision: str, formulation: str, end: float, within: float) -> None:
@@ -267,6 +267,7 @@ def test_a_killed_run_is_resumed_bit_for_bit_and_verified(tmp_path: Path) -> Non
     assert rigidsim.verify(tmp_path / "scene").identical
 
 
+@pytest.mark.slow
 def test_members_of_a_sweep_are_their_single_runs(tmp_path: Path) -> None:
     text = scene(20, f"{ELASTIC}, delay = 0.01")
     axes = 'axes."body.elasticity.love_number" = {values = [0.1, 0.3]}\n'

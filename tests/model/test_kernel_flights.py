@@ -54,6 +54,7 @@ def flown(start: np.ndarray, origin: str, days: float) -> np.ndarray:
     return y
 
 
+@pytest.mark.slow
 def test_a_satellite_feels_the_tides_of_moon_and_sun() -> None:
     dataset = run_text(SCENE).dataset
     start = np.array([42164e3, 0, 0, 0, 3074.7, 100.0])

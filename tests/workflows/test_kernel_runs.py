@@ -68,7 +68,8 @@ def test_samples_have_the_same_bits_however_many_steps_are_taken_at_once(scene: 
     np.testing.assert_array_equal(at_once.dataset["quaternion"][::every], fewer.dataset["quaternion"])
 
 
-@pytest.mark.parametrize("kernel", ["small.bsp", pytest.param("de421", marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("kernel", ["small.bsp", "de421"])
 def test_resumed_anywhere_it_has_the_same_bits(scene: Path, tmp_path: Path, kernel: str) -> None:
     """At each of many steps, among them those that end at edges."""
     scene.write_text(text_of(kernel))

@@ -158,6 +158,7 @@ def test_a_binary_kernel_is_its_series(tmp_path: Path) -> None:
     assert found.attrs["orientation_of"] == "axes 31006"
 
 
+@pytest.mark.slow
 def test_it_is_resumed_and_verified_in_every_bit(tmp_path: Path) -> None:
     kernels = tmp_path / "kernels"
     kernels.mkdir()

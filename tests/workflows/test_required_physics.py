@@ -115,6 +115,7 @@ def test_no_cheaper_model_is_within_the_error(tmp_path: Path) -> None:
         assert gone == closed(least)
 
 
+@pytest.mark.slow
 def test_the_written_config_runs_and_is_the_least_model(tmp_path: Path) -> None:
     text = satellite() + '[output]\nrecord = ["core_angular_velocity", "quaternion"]\n'
     with pytest.raises(rigidsim.RunFolderError, match="there is no folder"):
