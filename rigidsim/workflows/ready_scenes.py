@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from rigidsim.errors import RigidsimError
+from rigidsim.scene.bodies.presets import PRESETS
 from rigidsim.scene.validation_messages import nearest, shown
 
 SUBJECTS: Mapping[str, tuple[str, ...]] = {
@@ -154,6 +155,8 @@ def _file_of(scene: str) -> Path:
     name = ALIASES.get(scene.lower(), scene)
     if name not in found:
         hint = nearest(scene, [*found, *ALIASES])
+        if scene.lower() in PRESETS:
+            hint = f'; that is a body, which any scene takes as [body] preset = "{scene.lower()}"'
         raise RigidsimError(f"new: given {shown(scene)}{hint}; the command rigidsim new lists all scenes")
     return found[name]
 

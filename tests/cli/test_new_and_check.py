@@ -70,6 +70,8 @@ def test_new(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, rigidsim_command: 
     unknown = rigidsim_command("new", "gyroscpe")
     assert unknown.exit_code == 2
     assert 'did you mean "gyroscope"?; the command rigidsim new lists all scenes' in unknown.stderr
+    body = rigidsim_command("new", "Didymos").stderr
+    assert 'that is a body, which any scene takes as [body] preset = "didymos"; the command' in body
     for name in ("a/b", "..", "a b"):
         bad = rigidsim_command("new", "coin", name)
         assert bad.exit_code == 2
