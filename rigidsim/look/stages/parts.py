@@ -160,13 +160,20 @@ class Shell:
 @dataclass(frozen=True)
 class Cone:
     """A translucent cone along time, from the reference point to the corners (rows, corners, 3) of its rim,
-    stage units, body axes; the body carries it. A rim at the reference point is none.
+    stage units, body axes; the body carries it. A double one has another to the other side; one whose rim is
+    at the reference point isn't seen.
     """
 
     name: str
     color: Color
     rim: Array
     words: str
+    double: bool = True
+
+    @property
+    def rims(self) -> list[Array]:
+        """Its rim, and of a double cone that of the other side."""
+        return [self.rim, -self.rim] if self.double else [self.rim]
 
 
 @dataclass(frozen=True)

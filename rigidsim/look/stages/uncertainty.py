@@ -19,12 +19,13 @@ from rigidsim.look.stages.parts import Array, Cone, Picture, Stage
 
 COVARIANCE = "attitude_covariance"
 """Variable (time, 3, 3) of a dataset, rad^2, of the attitude as a rotation vector in space axes."""
-COLOR: parts.Color = (190, 150, 255)
+COLOR: parts.Color = (236, 232, 222)
 _REACH = 1.7  # length of the cone, in units of the body's reach
 _CORNERS = 72
 _NARROW, _WIDE = np.deg2rad(12.0), np.deg2rad(60.0)  # half-angles (rad) that are drawn as they are
 _WIDENED, _NARROWED = np.deg2rad(25.0), np.deg2rad(50.0)  # the largest (rad) that others are drawn with
 _STEPS = (1, 2, 3, 5, 10)
+_SUPERSCRIPTS = str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹")
 _TO_SCALE = 0.5  # reaches: a body drawn smaller is a mark on its orbit
 _ABOUT = "uncertainty_about_figure_axis"
 _LEADING = "figure_axis_uncertainty"
@@ -90,18 +91,16 @@ def with_cone(dataset: xarray.Dataset, subject: Subject, picture: Picture) -> Pi
         why = "none of the fitted numbers moves it" if np.isfinite(angles).any() else "it has no bounds"
         return replace(picture, notes=[*picture.notes, f"no uncertainty of the figure axis is drawn: {why}"])
     factor = drawn_factor(largest)
-    words = "1 sigma of the figure axis"
-    if factor > 1:
-        words += f", {factor:,.0f} times as wide"
-    elif factor < 1:
-        words += f", {1 / factor:,.0f} times narrower"
+    words = "1 sigma of the figure axis" + ("" if factor == 1 else f", drawn × {_factor_text(factor)}")
     drawn = _REACH * np.where(
         np.isfinite(found.spread).all(axis=(1, 2))[:, None, None], found.rim(factor), 0.0
     )
-    cone = Cone("figure_axis_uncertainty", COLOR, drawn, words)
+    # the other side of a top's axis goes through the ground
+    cone = Cone(_LEADING, COLOR, drawn, words, double=not signals.is_top(dataset))
     notes = [
-        f"{words} (violet): the predicted standard deviation by the sigmas of the fit's data and priors; its "
-        "half-angles are the roots of the covariance across the axis"
+        f"{words} (white cone): the standard deviation that the fit predicts by the sigmas of its data and "
+        "priors; the half-angles are the roots of the covariance across the axis, times that factor if there "
+        "is one; their true values are plotted"
     ]
     if not np.isfinite(angles).all():
         notes.append("where there is no cone, an undetermined parameter would move the axis without bounds")
@@ -132,6 +131,16 @@ def drawn_factor(largest: float) -> float:
     if wider:
         return float(max(step for step in steps if step <= room))
     return 1 / float(min(step for step in steps if step >= room))
+
+
+def _factor_text(factor: float) -> str:
+    """A factor in few letters: ``200``, ``2·10⁸`` or ``1/5``."""
+    if factor < 1:
+        return f"1/{_factor_text(1 / factor)}"
+    if factor < 1e6:
+        return f"{factor:,.0f}"
+    digit, _, power = f"{factor:.0e}".partition("e")
+    return f"{digit}·10{str(int(power)).translate(_SUPERSCRIPTS)}"
 
 
 def _to_scale(stage: Stage) -> bool:

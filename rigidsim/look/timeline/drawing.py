@@ -22,6 +22,7 @@ OLDER = 16  # rows in one piece of a trail's older part
 _STRETCH = 25.0  # of a frame along the line of sight: perspective is a 25th of what it was
 _EDGE: Color = (12, 14, 20)
 _AXIS_COLORS = [(235, 70, 60), (90, 200, 90), (80, 130, 250)]
+_CLEAR = 46  # of 255: of a cone, through which labels are read
 _FADED, _DIM = 0.5, 0.26  # of a trail's brightness: its older part, and the whole curve
 
 
@@ -171,22 +172,29 @@ def _draw_trail_static(recording: rr.RecordingStream, path: str, trail: Trail) -
 
 
 def _draw_cone_static(recording: rr.RecordingStream, path: str, cone: Cone) -> None:
-    corners = np.arange(1, cone.rim.shape[1] + 1, dtype=np.uint32)  # 0 is the apex
-    sides = np.stack([np.zeros_like(corners), corners, np.roll(corners, -1)], axis=1)
-    surface = rr.Mesh3D.from_fields(triangle_indices=sides, albedo_factor=(*cone.color, 90))
+    count = cone.rim.shape[1]
+    sides = []
+    for number, _ in enumerate(cone.rims):
+        corners = 1 + number * count + np.arange(count, dtype=np.uint32)  # 0 is the apex
+        sides.append(np.stack([np.zeros_like(corners), corners, np.roll(corners, -1)], axis=1))
+    surface = rr.Mesh3D.from_fields(
+        triangle_indices=np.concatenate(sides), albedo_factor=(*cone.color, _CLEAR)
+    )
     recording.log(f"{path}/surface", surface, static=True)
     edge = rr.LineStrips3D.from_fields(colors=[cone.color], radii=rr.Radius.ui_points(0.9))
     recording.log(f"{path}/rim", edge, static=True)
 
 
 def _cone_columns(cone: Cone, path: str, rows: slice) -> Iterable[tuple[str, slice, Columns]]:
-    rim = cone.rim[rows].astype(np.float32)
-    count, corners, _ = rim.shape
-    vertices = np.concatenate([np.zeros((count, 1, 3), dtype=np.float32), rim], axis=1)
+    rims = np.stack([rim[rows] for rim in cone.rims], axis=1).astype(np.float32)  # (rows, sides, corners, 3)
+    count, sides, corners, _ = rims.shape
+    vertices = np.zeros((count, 1 + sides * corners, 3), dtype=np.float32)
+    vertices[:, 1:] = rims.reshape(count, -1, 3)
     surface = rr.Mesh3D.columns(vertex_positions=vertices.reshape(-1, 3))
-    yield f"{path}/surface", rows, surface.partition([corners + 1] * count)
-    closed = np.concatenate([rim, rim[:, :1]], axis=1)
-    yield f"{path}/rim", rows, rr.LineStrips3D.columns(strips=list(closed))
+    yield f"{path}/surface", rows, surface.partition([vertices.shape[1]] * count)
+    closed = np.concatenate([rims, rims[:, :, :1]], axis=2).reshape(count * sides, corners + 1, 3)
+    edges = rr.LineStrips3D.columns(strips=list(closed))
+    yield f"{path}/rim", rows, edges.partition([sides] * count)
 
 
 def _dimmed(color: Color, part: float) -> tuple[int, int, int]:

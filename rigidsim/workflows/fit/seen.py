@@ -67,6 +67,7 @@ def fitted_run(experiment: Experiment, fit: xarray.Dataset, source: str = "memor
         _refuse_other(found, fit, source)
         found = found.assign({_COVARIANCE: covariance})
     found = found.assign_attrs(fit=str(fit.attrs.get("sentence", "")))
+    found.attrs.pop("attitude_error", None)  # the integration's: beside the fit's own it would mislead
     return FittedRun(made.outcome, found, source)
 
 
