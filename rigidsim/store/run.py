@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, Self
 from rigidsim.errors import FORCE, RESUME, RunFolderError, either
 from rigidsim.look import viewer
 from rigidsim.store import atomic, netcdf, segments
+from rigidsim.store.fits import is_fit
 from rigidsim.store.folder import RunFolder, find_run
 from rigidsim.store.netcdf import Block
 from rigidsim.store.seal import refuse_damaged
@@ -255,6 +256,9 @@ def open_run(path: str | Path) -> SavedRun:
     if is_sweep(path):
         what = either("rigidsim info shows it, and rigidsim resume completes it", "use rigidsim.open_sweep")
         raise RunFolderError(f"{path}: is a sweep, no single run; {what}; its dataset.h5 holds all members")
+    if is_fit(path):
+        what = either("rigidsim info and rigidsim view show it", "xarray.open_dataset reads its dataset.h5")
+        raise RunFolderError(f"{path}: is a fit, no run; {what}; rigidsim run takes its fitted.toml")
     folder = find_run(path)
     return SavedRun(folder, folder.read_summary())
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Self
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
@@ -55,20 +55,28 @@ def fitted_run(experiment: Experiment, fit: xarray.Dataset, source: str = "memor
     Raises:
         RunFolderError: the experiment's motion isn't that of the dataset.
     """
-    made = sampled_run(experiment, fit["time"].values)
+    made = sampled_run(_quiet(experiment, turning=_COVARIANCE in fit), fit["time"].values)
     found = made.dataset
     if found.sizes["time"] != fit.sizes["time"]:
         raise RunFolderError(f"{source}: the fitted motion {made.outcome.message}, before the fit's own end")
     if _COVARIANCE in fit:
         covariance = fit[_COVARIANCE].variable.copy()
         covariance.attrs["covariance_of"] = "attitude"
-        if "quaternion" not in found:  # not asked for by [output] record
-            found = found.assign(quaternion=fit["quaternion"])
         _refuse_other(found, fit, source)
         found = found.assign({_COVARIANCE: covariance})
-    found = found.assign_attrs(fit=str(fit.attrs.get("sentence", "")))
-    found.attrs.pop("attitude_error", None)  # the integration's: beside the fit's own it would mislead
-    return FittedRun(made.outcome, found, source)
+    return FittedRun(made.outcome, found.assign_attrs(fit=str(fit.attrs.get("sentence", ""))), source)
+
+
+def _quiet(experiment: Experiment, *, turning: bool) -> Experiment:
+    """The experiment without its own error, which would mislead beside the fit's, and what costs time and
+    isn't shown; with its attitude recorded, if it has one.
+    """
+    output = experiment.config.output
+    update: dict[str, Any] = {"estimate": False, "timeline": False, "lyapunov": False, "sensitivity": None}
+    if turning and output.record is not None and "quaternion" not in output.record:
+        update["record"] = [*output.record, "quaternion"]
+    config = experiment.config.model_copy(update={"output": output.model_copy(update=update)})
+    return replace(experiment, config=config)
 
 
 def _refuse_other(found: xarray.Dataset, fit: xarray.Dataset, source: str) -> None:
