@@ -128,8 +128,13 @@ def test_no_cone_is_drawn_where_nothing_bounds_it(symmetric_top: Top) -> None:
     assert (sizes[:4] > 1).all()
     assert not sizes[4:].any()
     assert any("undetermined" in note for note in picture.notes)
-    for value, why in ((np.nan, "no bounds"), (0.0, "none of the fitted numbers moves it")):
-        picture, _ = build_picture(with_covariance(top, np.full((11, 3, 3), value)))
+    _, subject = build_picture(top)
+    assert subject.attitude is not None
+    axis = subject.attitude @ Z  # turned about the axis alone: across it, rounding is left
+    about = 0.01 * axis[:, :, None] * axis[:, None, :]
+    moves = "none of the fitted numbers moves it"
+    for unseen, why in ((np.full((11, 3, 3), np.nan), "no bounds"), (0 * about, moves), (about, moves)):
+        picture, _ = build_picture(with_covariance(top, unseen))
         assert not picture.stages[0].cones
         assert any(why in note for note in picture.notes)
 

@@ -22,6 +22,7 @@ COVARIANCE = "attitude_covariance"
 COLOR: parts.Color = (236, 232, 222)
 _REACH = 1.7  # length of the cone, in units of the body's reach
 _CORNERS = 72
+_ROUNDING = 1e-7  # of the uncertainty about the axis: the root of what rounding leaves of its square
 _NARROW, _WIDE = np.deg2rad(12.0), np.deg2rad(60.0)  # half-angles (rad) that are drawn as they are
 _WIDENED, _NARROWED = np.deg2rad(25.0), np.deg2rad(50.0)  # the largest (rad) that others are drawn with
 _STEPS = (1, 2, 3, 5, 10)
@@ -52,7 +53,7 @@ class AxisUncertainty:
         """
         first, second = signals.across(axis)
         moved = np.stack([second, -first, axis])  # a x u, a x v, and about a
-        known = np.isfinite(covariance).all(axis=(1, 2))
+        known = np.asarray(np.isfinite(covariance).all(axis=(1, 2)))
         in_space = np.einsum("tij,kj->tki", attitude, moved)
         found = np.einsum(
             "tki,tij,tlj->tkl", in_space, np.where(known[:, None, None], covariance, 0.0), in_space
@@ -87,14 +88,12 @@ def with_cone(dataset: xarray.Dataset, subject: Subject, picture: Picture) -> Pi
     found = AxisUncertainty.of(signals.figure_direction(dataset), subject.attitude, covariance)
     angles = found.half_angles
     largest = float(np.nanmax(angles, initial=0.0))
-    if not largest > 0:
+    if not largest > _ROUNDING * float(np.nanmax(found.about, initial=0.0)):
         why = "none of the fitted numbers moves it" if np.isfinite(angles).any() else "it has no bounds"
         return replace(picture, notes=[*picture.notes, f"no uncertainty of the figure axis is drawn: {why}"])
     factor = drawn_factor(largest)
     words = "1 sigma of the figure axis" + ("" if factor == 1 else f", drawn × {_factor_text(factor)}")
-    drawn = _REACH * np.where(
-        np.isfinite(found.spread).all(axis=(1, 2))[:, None, None], found.rim(factor), 0.0
-    )
+    drawn = _REACH * np.nan_to_num(found.rim(factor))
     # the other side of a top's axis goes through the ground
     cone = Cone(_LEADING, COLOR, drawn, words, double=not signals.is_top(dataset))
     notes = [
