@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING, Any, Self
 from rigidsim.errors import FORCE, RESUME, RunFolderError, either
 from rigidsim.look import viewer
 from rigidsim.store import atomic, netcdf, segments
-from rigidsim.store.fits import is_fit
 from rigidsim.store.folder import RunFolder, find_run
 from rigidsim.store.netcdf import Block
 from rigidsim.store.seal import refuse_damaged
@@ -256,6 +255,8 @@ def open_run(path: str | Path) -> SavedRun:
     if is_sweep(path):
         what = either("rigidsim info shows it, and rigidsim resume completes it", "use rigidsim.open_sweep")
         raise RunFolderError(f"{path}: is a sweep, no single run; {what}; its dataset.h5 holds all members")
+    from rigidsim.store.fits import is_fit  # which a run doesn't need
+
     if is_fit(path):
         what = either("rigidsim info and rigidsim view show it", "xarray.open_dataset reads its dataset.h5")
         raise RunFolderError(f"{path}: is a fit, no run; {what}; rigidsim run takes its fitted.toml")

@@ -12,6 +12,7 @@ from rigidsim.store.run import Run
 from rigidsim.store.summary import Brief
 from rigidsim.workflows.compare.motion import sampled_run
 from rigidsim.workflows.compare.rotations import conjugated, multiplied, normalised, vector_of
+from rigidsim.workflows.fit.observed import QUATERNION
 
 if TYPE_CHECKING:
     import xarray
@@ -73,15 +74,15 @@ def _quiet(experiment: Experiment, *, turning: bool) -> Experiment:
     """
     output = experiment.config.output
     update: dict[str, Any] = {"estimate": False, "timeline": False, "lyapunov": False, "sensitivity": None}
-    if turning and output.record is not None and "quaternion" not in output.record:
-        update["record"] = [*output.record, "quaternion"]
+    if turning and output.record is not None and QUATERNION not in output.record:
+        update["record"] = [*output.record, QUATERNION]
     config = experiment.config.model_copy(update={"output": output.model_copy(update=update)})
     return replace(experiment, config=config)
 
 
 def _refuse_other(found: xarray.Dataset, fit: xarray.Dataset, source: str) -> None:
     """Refuse a config that was changed since: its motion would have another uncertainty."""
-    here, there = (normalised(one["quaternion"].values) for one in (found, fit))
+    here, there = (normalised(one[QUATERNION].values) for one in (found, fit))
     apart = np.linalg.norm(vector_of(multiplied(here, conjugated(there))), axis=1)
     sigma = np.sqrt(np.nan_to_num(np.einsum("tii->t", fit[_COVARIANCE].values), nan=np.inf))
     worst = int(np.argmax(apart - _SHARE * sigma))
