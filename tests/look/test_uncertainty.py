@@ -153,3 +153,24 @@ def test_the_recording_has_the_cone_in_body_axes(
     corners = cone.rim.shape[1]
     np.testing.assert_array_equal(vertices[:, 1 : 1 + corners], cone.rim.astype(np.float32))
     np.testing.assert_array_equal(vertices[:, 1 + corners :], -cone.rim.astype(np.float32))
+
+
+def test_cones_side_by_side_each_have_their_factor_in_the_legend(symmetric_top: Top, tmp_path: Path) -> None:
+    from rerun.chunk import RrdReader
+
+    from rigidsim.look.timeline.comparison import write_comparison
+
+    top, path = symmetric_top(count=11), tmp_path / "t.rrd"
+    runs = [
+        (name, with_covariance(top, np.tile(x**2 * np.eye(3), (11, 1, 1))))
+        for name, x in (("a", 0.3), ("b", 1e-3))
+    ]
+    write_comparison(runs, path)
+    words = [
+        label
+        for chunk in RrdReader(path).stream()
+        if chunk.entity_path == "/legend/words"
+        for label in chunk.to_record_batch().column("Points2D:labels")[0].as_py()
+    ]
+    assert "■ a: 1 sigma of the figure axis" in words
+    assert "■ b: 1 sigma of the figure axis, drawn × 300" in words

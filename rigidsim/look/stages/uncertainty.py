@@ -21,6 +21,7 @@ COVARIANCE = "attitude_covariance"
 """Variable (time, 3, 3) of a dataset, rad^2, of the attitude as a rotation vector in space axes."""
 COLOR: parts.Color = (236, 232, 222)
 _REACH = 1.7  # length of the cone, in units of the body's reach
+_ON_DISC = 1.12  # where a globe is seen as a disc that fills the view
 _CORNERS = 72
 _ROUNDING = 1e-7  # of the uncertainty about the axis: the root of what rounding leaves of its square
 _NARROW, _WIDE = np.deg2rad(12.0), np.deg2rad(60.0)  # half-angles (rad) that are drawn as they are
@@ -93,9 +94,10 @@ def with_cone(dataset: xarray.Dataset, subject: Subject, picture: Picture) -> Pi
         return replace(picture, notes=[*picture.notes, f"no uncertainty of the figure axis is drawn: {why}"])
     factor = drawn_factor(largest)
     words = "1 sigma of the figure axis" + ("" if factor == 1 else f", drawn × {_factor_text(factor)}")
-    drawn = _REACH * np.nan_to_num(found.rim(factor))
+    rim = np.nan_to_num(found.rim(factor))
     # the other side of a top's axis goes through the ground
-    cone = Cone(_LEADING, COLOR, drawn, words, double=not signals.is_top(dataset))
+    cone = Cone(_LEADING, COLOR, _REACH * rim, words, double=not signals.is_top(dataset))
+    short = replace(cone, rim=_ON_DISC * rim)
     notes = [
         f"{words} (white cone): the standard deviation that the fit predicts by the sigmas of its data and "
         "priors; the half-angles are the roots of the covariance across the axis, times that factor if there "
@@ -110,7 +112,10 @@ def with_cone(dataset: xarray.Dataset, subject: Subject, picture: Picture) -> Pi
     first, *rest = picture.leading or ("",)
     return replace(
         picture,
-        stages=[replace(one, cones=[cone]) if _to_scale(one) else one for one in picture.stages],
+        stages=[
+            replace(one, cones=[short if one.flat else cone]) if _to_scale(one) else one
+            for one in picture.stages
+        ],
         leading=(first, _LEADING, *rest),
         notes=[*picture.notes, *notes],
         derived={**picture.derived, **derived},
