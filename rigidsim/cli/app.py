@@ -234,7 +234,8 @@ def view(
 ) -> None:
     """Open timelines in the rerun viewer (drawn first, where a run has none), or draw them to a file.
 
-    A run that another process is working on is followed while it goes on.
+    A run that another process is working on is followed while it goes on. A fit is shown as its motion,
+    with a cone of one standard deviation about the figure axis.
 
     Example: rigidsim view runs/intermediate_axis
     """

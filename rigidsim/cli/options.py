@@ -164,7 +164,8 @@ RunPaths = Annotated[
     list[Path],
     typer.Argument(
         metavar="RUN...",
-        help="Run folders (runs/NAME), their dataset.h5, or other tools' files; several go side by side.",
+        help="Folders of runs (runs/NAME) or fits (fits/NAME), their dataset.h5, or other tools' files; "
+        "several go side by side.",
         autocompletion=offered("runs"),
     ),
 ]

@@ -40,7 +40,13 @@ def summary_page(dataset: xarray.Dataset, thinned: xarray.Dataset) -> str:
     if "modelling_error" in attributes:
         facts.append(("from the full model", f"{float(attributes['modelling_error']):.2g} rad"))
     facts = [(name, value) for name, value in facts if value not in (None, "")]
-    lines = [heading, "", *_table(tuple(name for name, _ in facts), [tuple(str(v) for _, v in facts)])]
+    fitted = [f"fit: {attributes['fit']}", ""] if attributes.get("fit") else []
+    lines = [
+        heading,
+        "",
+        *fitted,
+        *_table(tuple(name for name, _ in facts), [tuple(str(v) for _, v in facts)]),
+    ]
     invariants = _invariants(thinned)
     if invariants:
         drift = "largest drift" if complete else "largest drift of the rows shown"

@@ -247,7 +247,11 @@ def _variables(dataset: xarray.Dataset) -> Iterator[xarray.DataArray]:
     names = sorted(map(str, dataset.data_vars), key=lambda name: name != "euler_angles")
     for name in names:
         variable = dataset[name]
-        if "time" in variable.dims and variable.dtype.kind in "fiub":
+        if (
+            "time" in variable.dims
+            and variable.dtype.kind in "fiub"
+            and "covariance_of" not in variable.attrs
+        ):
             yield variable.transpose("time", ...)
 
 

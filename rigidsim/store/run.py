@@ -255,6 +255,11 @@ def open_run(path: str | Path) -> SavedRun:
     if is_sweep(path):
         what = either("rigidsim info shows it, and rigidsim resume completes it", "use rigidsim.open_sweep")
         raise RunFolderError(f"{path}: is a sweep, no single run; {what}; its dataset.h5 holds all members")
+    from rigidsim.store.fits import is_fit  # which a run doesn't need
+
+    if is_fit(path):
+        what = either("rigidsim info and rigidsim view show it", "xarray.open_dataset reads its dataset.h5")
+        raise RunFolderError(f"{path}: is a fit, no run; {what}; rigidsim run takes its fitted.toml")
     folder = find_run(path)
     return SavedRun(folder, folder.read_summary())
 

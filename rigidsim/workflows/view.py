@@ -11,11 +11,13 @@ from rigidsim.errors import RigidsimError, RunFolderError
 from rigidsim.look import viewer
 from rigidsim.scene.sweeps.sweep import Sweep
 from rigidsim.store import pictures
+from rigidsim.store.fits import is_fit
 from rigidsim.store.pictures import Told
 from rigidsim.store.run import Run, SavedRun, open_run
 from rigidsim.store.sweeps.folder import is_sweep
 from rigidsim.store.sweeps.run import open_sweep
 from rigidsim.workflows.compare.as_run import open_any
+from rigidsim.workflows.fit.folder import FitFolder
 from rigidsim.workflows.read import parse
 from rigidsim.workflows.run import run
 from rigidsim.workflows.sweeps.members import single_member
@@ -31,11 +33,15 @@ def runs_of(paths: Sequence[Path], members: Sequence[int] = ()) -> list[tuple[st
             f"{sweeps[0]}: is a sweep; choose members of it with --member N (repeatable, counted from 0); "
             "rigidsim plot draws a variable over its axes"
         )
-    runs: list[Run] = [open_any(path) for path in paths]
+    runs: list[Run] = [_fit(path) if is_fit(path) else open_any(path) for path in paths]
     names = [run.outcome.name for run in runs]
     if len(set(names)) < len(names):
         names = [run.place for run in runs]
     return list(zip(names, runs, strict=True))
+
+
+def _fit(path: Path) -> Run:
+    return FitFolder(path if path.is_dir() else path.parent).motion()
 
 
 def _members(paths: Sequence[Path], members: Sequence[int]) -> list[tuple[str, Run]]:

@@ -235,7 +235,7 @@ def camera(stage: Stage, *, narrow: bool = False, subject: Subject | None = None
             return stage.camera
         back = stage.camera.target + 1.08 * (stage.camera.position - stage.camera.target)
         return Camera(back, stage.camera.target, stage.camera.up)
-    target, radius = np.zeros(3), 1.12 * parts.ARROW_REACH if stage.arrows else 1.3
+    target, radius = np.zeros(3), 1.12 * parts.ARROW_REACH if stage.arrows or stage.cones else 1.3
     if stage.translation is not None:
         low, high = np.nanmin(stage.translation, axis=0), np.nanmax(stage.translation, axis=0)
         target = (low + high) / 2

@@ -158,6 +158,25 @@ class Shell:
 
 
 @dataclass(frozen=True)
+class Cone:
+    """A translucent cone along time, from the reference point to the corners (rows, corners, 3) of its rim,
+    stage units, body axes; the body carries it. A double one has another to the other side; one whose rim is
+    at the reference point isn't seen.
+    """
+
+    name: str
+    color: Color
+    rim: Array
+    words: str
+    double: bool = True
+
+    @property
+    def rims(self) -> list[Array]:
+        """Its rim, and of a double cone that of the other side."""
+        return [self.rim, -self.rim] if self.double else [self.rim]
+
+
+@dataclass(frozen=True)
 class Camera:
     """The eye, what it looks at, and the upward direction, (3,) each, in the frame looked from."""
 
@@ -186,6 +205,7 @@ class Stage:
     vectors: list[Vector] = field(default_factory=list)
     solids: list[Solid] = field(default_factory=list)
     shells: list[Shell] = field(default_factory=list)
+    cones: list[Cone] = field(default_factory=list)
     frames: dict[str, NDArray[np.float32]] = field(default_factory=dict)  # quaternions of others, by name
     looked_from: str = ""  # frame that the camera is in; empty for space
     flat: bool = False  # that frame is stretched along its x axis, as for an eye far away on it

@@ -14,6 +14,7 @@ from rigidsim.look import signals
 from rigidsim.look.stages import orbits, parts, planet, precession, top
 from rigidsim.look.stages.bodies import Subject, column, source_arrows, vectors_of, with_track
 from rigidsim.look.stages.parts import BODY, Array, Arrow, Camera, Line, Picture, Shell, Spot, Stage, Vector
+from rigidsim.look.stages.uncertainty import with_cone
 from rigidsim.look.stages.wheels import with_wheels
 from rigidsim.look.surroundings import carries_within
 from rigidsim.scene.rotations import quaternion_of
@@ -125,7 +126,7 @@ def build_picture(dataset: xarray.Dataset) -> tuple[Picture, Subject]:
     subject = Subject.of(dataset)
     pictures = (kind(dataset, subject) for kind in KINDS)
     found = next((picture for picture in pictures if picture is not None), None) or _any(dataset, subject)
-    found = with_wheels(dataset, subject, found)
+    found = with_cone(dataset, subject, with_wheels(dataset, subject, found))
     found.notes.insert(0, f"lengths are in units of the body's reach: 1 unit = {subject.reach:.6g} m")
     return found, subject
 

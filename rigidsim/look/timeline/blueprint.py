@@ -108,7 +108,7 @@ def build_comparison(
     views += [plot_view(plot, clock) for plot in common.values() if plot.place == "drift"]
     left = left_side(
         scene,
-        plotting.legend_of(runs[0].picture.stages),
+        plotting.legend_of([stage for run in runs for stage in run.picture.stages]),
         {page.lower(): name for name, run in named for page in run.pages},
     )
     return page_of(left, views, time_panel(clock, max(run.screen_seconds for run in runs), following=False))

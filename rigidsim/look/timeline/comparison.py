@@ -47,10 +47,11 @@ def write_comparison(named: Sequence[tuple[str, xarray.Dataset]], path: Path, *,
     blueprint = build_comparison(list(zip(titles, drawn, strict=True)), shown, apart)
     if apart is not None:
         drawn[0].plots.append(apart)
+    stages = [stage for run in drawn for stage in run.picture.stages]
     count, name = sum(len(run.steps) for run in drawn), " and ".join(name for name, _ in named)
     with recording_to(path, name, count, blueprint) as recording:
         for run in drawn:
-            run.draw_static(recording, legend=run is drawn[0])
+            run.draw_static(recording, legend=stages if run is drawn[0] else ())
             for part in chunks(0, len(run.seconds)):
                 run.draw_rows(recording, part)
     return count
@@ -67,7 +68,12 @@ def _named(run: DrawnRun, name: str, number: int) -> DrawnRun:
     """A run under entities and titles of its own, with only its leading plots."""
     root, title = f"run{number}", legible(name)
     stages = [
-        replace(stage, root=f"{root}/{stage.root}", title=f"{title}: {stage.title}")
+        replace(
+            stage,
+            root=f"{root}/{stage.root}",
+            title=f"{title}: {stage.title}",
+            cones=[replace(cone, words=f"{title}: {cone.words}") for cone in stage.cones],
+        )
         for stage in run.picture.stages[:1]
     ]
     plots = []

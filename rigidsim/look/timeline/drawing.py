@@ -13,7 +13,7 @@ import rerun as rr
 
 from rigidsim.look.signals import joined
 from rigidsim.look.solids import Array, Mesh, ball
-from rigidsim.look.stages.parts import BODY, NEAR, Arrow, Color, Line, Shell, Stage, Trail
+from rigidsim.look.stages.parts import BODY, NEAR, Arrow, Color, Cone, Line, Shell, Stage, Trail
 from rigidsim.look.symbols import graticule, sharp_edges
 
 Columns = Iterable[rr.ComponentColumn]
@@ -22,6 +22,7 @@ OLDER = 16  # rows in one piece of a trail's older part
 _STRETCH = 25.0  # of a frame along the line of sight: perspective is a 25th of what it was
 _EDGE: Color = (12, 14, 20)
 _AXIS_COLORS = [(235, 70, 60), (90, 200, 90), (80, 130, 250)]
+_CLEAR = 46  # of 255: of a cone, through which labels are read
 _FADED, _DIM = 0.5, 0.26  # of a trail's brightness: its older part, and the whole curve
 
 
@@ -57,6 +58,8 @@ def draw_static(recording: rr.RecordingStream, stages: Sequence[Stage]) -> None:
             recording.log(_arrow_path(stage, arrow), *style, static=True)
         for trail in stage.trails:
             _draw_trail_static(recording, trail_path(stage, trail), trail)
+        for cone in stage.cones:
+            _draw_cone_static(recording, _cone_path(stage, cone), cone)
         _draw_surroundings(recording, stage)
 
 
@@ -168,6 +171,32 @@ def _draw_trail_static(recording: rr.RecordingStream, path: str, trail: Trail) -
         recording.log(f"{path}/{name}", style, static=True)
 
 
+def _draw_cone_static(recording: rr.RecordingStream, path: str, cone: Cone) -> None:
+    count = cone.rim.shape[1]
+    sides = []
+    for number, _ in enumerate(cone.rims):
+        corners = 1 + number * count + np.arange(count, dtype=np.uint32)  # 0 is the apex
+        sides.append(np.stack([np.zeros_like(corners), corners, np.roll(corners, -1)], axis=1))
+    surface = rr.Mesh3D.from_fields(
+        triangle_indices=np.concatenate(sides), albedo_factor=(*cone.color, _CLEAR)
+    )
+    recording.log(f"{path}/surface", surface, static=True)
+    edge = rr.LineStrips3D.from_fields(colors=[cone.color], radii=rr.Radius.ui_points(0.9))
+    recording.log(f"{path}/rim", edge, static=True)
+
+
+def _cone_columns(cone: Cone, path: str, rows: slice) -> Iterable[tuple[str, slice, Columns]]:
+    rims = np.stack([rim[rows] for rim in cone.rims], axis=1).astype(np.float32)  # (rows, sides, corners, 3)
+    count, sides, corners, _ = rims.shape
+    vertices = np.zeros((count, 1 + sides * corners, 3), dtype=np.float32)
+    vertices[:, 1:] = rims.reshape(count, -1, 3)
+    surface = rr.Mesh3D.columns(vertex_positions=vertices.reshape(-1, 3))
+    yield f"{path}/surface", rows, surface.partition([vertices.shape[1]] * count)
+    closed = np.concatenate([rims, rims[:, :, :1]], axis=2).reshape(count * sides, corners + 1, 3)
+    edges = rr.LineStrips3D.columns(strips=list(closed))
+    yield f"{path}/rim", rows, edges.partition([sides] * count)
+
+
 def _dimmed(color: Color, part: float) -> tuple[int, int, int]:
     red, green, blue = (round(part * x + (1 - part) * 20) for x in color)
     return red, green, blue
@@ -217,6 +246,9 @@ def stage_columns(stage: Stage, rows: slice) -> Iterable[tuple[str, slice, Colum
             strips = _pieces(trail.points, older, stride, OLDER)
             yield f"{path}/older", older, rr.LineStrips3D.columns(strips=strips)
 
+    for cone in stage.cones:
+        yield from _cone_columns(cone, _cone_path(stage, cone), rows)
+
 
 def _every(rows: slice, stride: int) -> slice:
     return slice(-(-rows.start // stride) * stride, rows.stop, stride)
@@ -235,3 +267,7 @@ def _pieces(points: Array, rows: slice, stride: int, length: int) -> pa.Array:
 
 def _arrow_path(stage: Stage, arrow: Arrow) -> str:
     return f"/{stage.root}/{BODY if arrow.in_body else 'centre'}/{arrow.name}"
+
+
+def _cone_path(stage: Stage, cone: Cone) -> str:
+    return f"/{stage.root}/{BODY}/{cone.name}"

@@ -1,6 +1,7 @@
 """Everything drawn of one run, ready to be sent to a recording: clock, picture, plots, states and pages."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Self
@@ -15,7 +16,7 @@ from rigidsim.look.page import config_page, notes_page, summary_page
 from rigidsim.look.plots import Plot, Series, plan_plots
 from rigidsim.look.solids import Array
 from rigidsim.look.stages.bodies import Subject
-from rigidsim.look.stages.parts import Picture, Plane, screen_seconds
+from rigidsim.look.stages.parts import Picture, Plane, Stage, screen_seconds
 from rigidsim.look.stages.registry import build_picture
 from rigidsim.look.states import States, charts_of, sections_of, states_of
 from rigidsim.look.thinning import by_extremes, thin, thinned_indices
@@ -161,8 +162,10 @@ class DrawnRun:
             screen_seconds=screen_seconds(rows),
         )
 
-    def draw_static(self, recording: rr.RecordingStream, *, legend: bool = True) -> None:
-        """Draw what holds for all times; with the legend and its clock, if wanted."""
+    def draw_static(self, recording: rr.RecordingStream, *, legend: Sequence[Stage] | None = None) -> None:
+        """Draw what holds for all times; with the clock and the legend of its own stages, or of those given,
+        but of none neither.
+        """
         for name, text in self.pages.items():
             document = rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN)
             recording.log(f"/{name.lower()}", document, static=True)
@@ -174,11 +177,12 @@ class DrawnRun:
             ticks = np.rint(lane.seconds / self.clock.seconds_per_tick).astype(np.int64)
             ticks += self.clock.since or 0
             plotting.draw_states(recording, lane, [self._clock_column(ticks)])
-        if not legend:
+        explained = self.picture.stages if legend is None else legend
+        if not explained:
             return
         told = thinned_indices(len(self.seconds), plotting.CLOCK_ROWS)
         words = [f"t = {text}" for text in self.words.coarse(self.seconds[told].tolist())]
-        plotting.draw_legend(recording, plotting.legend_of(self.picture.stages), words, self._times(told))
+        plotting.draw_legend(recording, plotting.legend_of(explained), words, self._times(told))
 
     def draw_rows(self, recording: rr.RecordingStream, rows: slice) -> None:
         """Draw what changes, for some rows."""

@@ -9,7 +9,7 @@ import rerun as rr
 from rigidsim.look.plots import Plot
 from rigidsim.look.signals import joined
 from rigidsim.look.solids import Array
-from rigidsim.look.stages.parts import NEAR, Arrow, Color, Line, Plane, Stage, Trail, Vector
+from rigidsim.look.stages.parts import NEAR, Arrow, Color, Cone, Line, Plane, Stage, Trail, Vector
 from rigidsim.look.states import States
 
 PIXELS = 500  # about the width of a plot
@@ -159,8 +159,8 @@ def legend_of(stages: Sequence[Stage]) -> list[tuple[str, Color]]:
     """Meaning of each colour, once."""
     found: dict[str, Color] = {}
     for stage in stages:
-        parts: list[Arrow | Vector | Trail | Line]
-        parts = [*stage.arrows, *stage.vectors, *stage.trails, *stage.lines]
+        parts: list[Arrow | Vector | Trail | Line | Cone]
+        parts = [*stage.arrows, *stage.vectors, *stage.trails, *stage.lines, *stage.cones]
         for part in parts:
             if part.words:
                 found.setdefault(part.words, part.color)

@@ -15,6 +15,7 @@ from typing import Any
 
 import heyoka
 import numpy as np
+import xarray
 
 from rigidsim import __version__
 from rigidsim.errors import FORCE, OUT, RESUME, RunFolderError
@@ -24,6 +25,8 @@ from rigidsim.store.fits import BEGUN
 from rigidsim.store.folder import FileOf, WorkFolder
 from rigidsim.workflows.fit.predictions import Prediction, Predictor
 from rigidsim.workflows.fit.result import KIND, FitResult
+from rigidsim.workflows.fit.seen import FittedRun, fitted_run
+from rigidsim.workflows.read import load
 
 _NAMES = (
     "config.toml",
@@ -113,6 +116,19 @@ class FitFolder(WorkFolder):
             return FitResult.model_validate_json(self.summary.read_text(encoding="utf-8"))
         except (OSError, ValueError) as error:
             raise RunFolderError(f"{self.summary}: can't be read ({error})") from None
+
+    def motion(self) -> FittedRun:
+        """The fitted experiment's motion with the predicted uncertainty, to be viewed.
+
+        Raises:
+            RunFolderError: the fit isn't finished, or its files can't be used.
+        """
+        self.read_result()
+        try:
+            fit = xarray.load_dataset(self.dataset, engine="h5netcdf")
+        except (OSError, ValueError) as error:
+            raise RunFolderError(f"{self.dataset}: can't be read ({error})") from None
+        return fitted_run(load(self.fitted), fit, str(self.path))
 
     def copy(self, number: int, name: str) -> Path:
         """Where the data of a ``[[fit.data]]`` are kept."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from html import escape
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from pydantic import PrivateAttr
@@ -149,6 +150,18 @@ class FitResult(SummaryPart):
         from rigidsim.look.figures.fitted import fitted_figure
 
         return fitted_figure(self.dataset)
+
+    def view(
+        self, *, web: bool = False, png: str | Path | None = None, at: float | str | None = None,
+        part: str = "page",
+    ) -> int:  # fmt: skip
+        """The fitted motion in the viewer, with a cone of one standard deviation about the figure axis, or a
+        picture of it; arguments, value and errors are those of ``Run.view``.
+        """
+        from rigidsim.workflows.fit.seen import fitted_run  # which loads what runs are made with
+
+        run = fitted_run(self.experiment, self.dataset, self.folder or "memory")
+        return run.view(web=web, png=png, at=at, part=part)
 
     def __repr__(self) -> str:
         lines = [f"<FitResult {self.name!r}: {self.sentence}"]

@@ -1,0 +1,93 @@
+"""A fitted experiment's motion, with the uncertainty that its fit predicts, to be viewed as a run is."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, Self
+
+import numpy as np
+
+from rigidsim.errors import RunFolderError
+from rigidsim.store.run import Run
+from rigidsim.store.summary import Brief
+from rigidsim.workflows.compare.motion import sampled_run
+from rigidsim.workflows.compare.rotations import conjugated, multiplied, normalised, vector_of
+from rigidsim.workflows.fit.observed import QUATERNION
+
+if TYPE_CHECKING:
+    import xarray
+
+    from rigidsim.scene.config import Experiment
+
+_COVARIANCE = "attitude_covariance"
+_ROUNDING = 1e-6  # rad: between two ways of integrating a motion that isn't chaotic
+_SHARE = 0.1  # of a sigma, by which these may differ where the motion amplifies both
+
+
+@dataclass(frozen=True, repr=False)
+class FittedRun(Run):
+    """The motion of a fitted experiment in memory; ``source``: where the fit is kept."""
+
+    outcome: Brief
+    shown: xarray.Dataset
+    source: str
+
+    @property
+    def place(self) -> str:
+        """The fit's folder."""
+        return self.source
+
+    @property
+    def dataset(self) -> xarray.Dataset:
+        """As of a run, with ``attitude_covariance`` beside it, at the times at which this is known."""
+        return self.shown
+
+    def concluded(self, outcome: Brief) -> Self:
+        """Nothing is saved of it."""
+        return self
+
+
+def fitted_run(experiment: Experiment, fit: xarray.Dataset, source: str = "memory") -> FittedRun:
+    """Run a fitted experiment at the times of its fit's dataset, and put the predicted covariance beside it.
+
+    Args:
+        experiment: with the estimated values. fit: the fit's dataset.
+
+    Raises:
+        RunFolderError: the experiment's motion isn't that of the dataset.
+    """
+    made = sampled_run(_quiet(experiment, turning=_COVARIANCE in fit), fit["time"].values)
+    found = made.dataset
+    if found.sizes["time"] != fit.sizes["time"]:
+        raise RunFolderError(f"{source}: the fitted motion {made.outcome.message}, before the fit's own end")
+    if _COVARIANCE in fit:
+        covariance = fit[_COVARIANCE].variable.copy()
+        covariance.attrs["covariance_of"] = "attitude"
+        _refuse_other(found, fit, source)
+        found = found.assign({_COVARIANCE: covariance})
+    return FittedRun(made.outcome, found.assign_attrs(fit=str(fit.attrs.get("sentence", ""))), source)
+
+
+def _quiet(experiment: Experiment, *, turning: bool) -> Experiment:
+    """The experiment without its own error, which would mislead beside the fit's, and what costs time and
+    isn't shown; with its attitude recorded, if it has one.
+    """
+    output = experiment.config.output
+    update: dict[str, Any] = {"estimate": False, "timeline": False, "lyapunov": False, "sensitivity": None}
+    if turning and output.record is not None and QUATERNION not in output.record:
+        update["record"] = [*output.record, QUATERNION]
+    config = experiment.config.model_copy(update={"output": output.model_copy(update=update)})
+    return replace(experiment, config=config)
+
+
+def _refuse_other(found: xarray.Dataset, fit: xarray.Dataset, source: str) -> None:
+    """Refuse a config that was changed since: its motion would have another uncertainty."""
+    here, there = (normalised(one[QUATERNION].values) for one in (found, fit))
+    apart = np.linalg.norm(vector_of(multiplied(here, conjugated(there))), axis=1)
+    sigma = np.sqrt(np.nan_to_num(np.einsum("tii->t", fit[_COVARIANCE].values), nan=np.inf))
+    worst = int(np.argmax(apart - _SHARE * sigma))
+    if apart[worst] > max(_ROUNDING, _SHARE * sigma[worst]):
+        raise RunFolderError(
+            f"{source}: the motion of fitted.toml is {apart[worst]:.2g} rad from that of the fit's dataset "
+            f"at {found['time'].values[worst]:.6g} s; was it changed? rigidsim verify {source} tells"
+        )

@@ -1,0 +1,176 @@
+"""Cones of uncertainty: half-angles by eigenvalues in closed form, in space and in the body, and drawn."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray
+
+pytest.importorskip("rerun")
+
+from rigidsim.look.plots import plan_plots
+from rigidsim.look.solids import rotation_matrix
+from rigidsim.look.stages.registry import build_picture
+from rigidsim.look.stages.uncertainty import COVARIANCE, AxisUncertainty, drawn_factor
+from rigidsim.look.timeline import write_timeline
+
+Top = Callable[..., xarray.Dataset]
+Z = np.array([0.0, 0.0, 1.0])
+
+
+def with_covariance(dataset: xarray.Dataset, covariance: np.ndarray) -> xarray.Dataset:
+    dims = ("time", "space_axis", "other_space_axis")
+    return dataset.assign({COVARIANCE: (dims, covariance, {"covariance_of": "attitude"})})
+
+
+def attitudes(count: int) -> np.ndarray:
+    return rotation_matrix(np.random.default_rng(3).standard_normal((count, 4)))
+
+
+def test_half_angles_are_roots_of_the_covariance_across_the_axis() -> None:
+    turning = attitudes(50)
+    known = np.diag([0.03**2, 0.01**2, 0.07**2])  # body axes: about x, y and the figure axis z itself
+    found = AxisUncertainty.of(Z, turning, turning @ known @ turning.transpose(0, 2, 1))
+    np.testing.assert_allclose(found.half_angles, np.tile([0.03, 0.01], (50, 1)), rtol=1e-12)
+    np.testing.assert_allclose(found.about, 0.07, rtol=1e-12)
+    # a turn about x moves z along y: the cone is 0.03 wide there, and 0.01 along x
+    rim = found.rim(10.0)
+    np.testing.assert_allclose(np.linalg.norm(rim, axis=2), 1.0, rtol=1e-14)
+    np.testing.assert_allclose(np.abs(rim[:, :, 1]).max(axis=1), np.sin(0.3), rtol=1e-12)
+    np.testing.assert_allclose(np.abs(rim[:, :, 0]).max(axis=1), np.sin(0.1), rtol=1e-12)
+
+
+def test_half_angles_are_roots_of_eigenvalues_for_any_covariance_and_axis() -> None:
+    rng = np.random.default_rng(8)
+    turning, mixed = attitudes(20), rng.standard_normal((20, 3, 3))
+    covariance = mixed @ mixed.transpose(0, 2, 1)
+    axis = rng.standard_normal(3)
+    axis /= np.linalg.norm(axis)
+    found = AxisUncertainty.of(axis, turning, covariance)
+    for attitude, spread, angles in zip(turning, covariance, found.half_angles, strict=True):
+        n = attitude @ axis
+        crossed = np.array([[0, n[2], -n[1]], [-n[2], 0, n[0]], [n[1], -n[0], 0]])  # d x n = crossed @ d
+        moved = np.linalg.eigvalsh(crossed @ spread @ crossed.T)  # the least is that along n, zero
+        np.testing.assert_allclose(angles**2, moved[:0:-1], rtol=1e-10)
+
+
+def test_a_one_sigma_cone_holds_as_many_axes_as_a_plane_normal_distribution() -> None:
+    rng = np.random.default_rng(4)
+    turning, mixed = attitudes(1), 1e-4 * rng.standard_normal((3, 3))
+    found = AxisUncertainty.of(Z, turning, (mixed @ mixed.T)[None])
+    turns = rng.standard_normal((40_000, 3)) @ mixed.T  # rotation vectors in space axes
+    moved = np.cross(turns, turning[0] @ Z) @ turning[0]  # body axes
+    across = np.stack([found.rim(1.0, 4)[0, k] for k in (0, 1)], axis=1)[:2]  # spread, to first order
+    inside = np.linalg.norm(np.linalg.solve(across, moved[:, :2].T), axis=0) < 1
+    share = 1 - np.exp(-0.5)
+    assert inside.mean() == pytest.approx(share, abs=4 * np.sqrt(share * (1 - share) / 40_000))
+
+
+def test_a_cone_that_stays_in_space_turns_against_the_body_that_carries_it(symmetric_top: Top) -> None:
+    top = symmetric_top(count=101)
+    sigma = 0.3  # about X of space alone: the axis moves across X, whatever the body does
+    picture, subject = build_picture(with_covariance(top, np.tile(np.diag([sigma**2, 0, 0]), (101, 1, 1))))
+    (cone,) = picture.stages[0].cones
+    assert subject.attitude is not None
+    axis, about = subject.attitude @ Z, np.array([1.0, 0.0, 0.0])
+    sideways = np.cross(about, axis)
+    in_space = np.einsum("tij,tkj->tki", subject.attitude, cone.rim)
+    flat = np.cross(axis, sideways)  # across which nothing moves: the cone is a fan
+    np.testing.assert_allclose(np.einsum("tki,ti->tk", in_space, flat), 0.0, atol=1e-7)
+    moved = np.linalg.norm(np.cross(in_space, axis[:, None]), axis=2)
+    angle = np.arctan2(moved, np.einsum("tki,ti->tk", in_space, axis))
+    np.testing.assert_allclose(angle.max(axis=1), sigma * np.linalg.norm(sideways, axis=1), rtol=1e-3)
+    # it is the cone of this space axis at each time, so in the body it goes round
+    first = cone.rim[:, int(np.argmax(angle[0]))]
+    assert np.ptp(np.arctan2(first[:, 1], first[:, 0])) > 3.0
+
+
+@pytest.mark.parametrize(
+    ("largest", "factor"),
+    [
+        (0.3, 1.0),
+        (1.0, 1.0),
+        (0.2, 2.0),
+        (0.0436, 10.0),
+        (1e-3, 300.0),
+        (1e-9, 3e8),
+        (1.5, 1 / 2),
+        (60.0, 1 / 100),
+    ],
+)
+def test_cones_that_cannot_be_seen_are_drawn_by_a_round_factor(largest: float, factor: float) -> None:
+    assert drawn_factor(largest) == pytest.approx(factor, rel=1e-12)
+
+
+def test_the_factor_stands_in_the_legend_and_true_angles_are_plotted(symmetric_top: Top) -> None:
+    from rigidsim.look.timeline.plotting import legend_of
+
+    top = with_covariance(symmetric_top(count=11), np.tile(1e-6 * np.eye(3), (11, 1, 1)))
+    picture, _ = build_picture(top)
+    words = [text for text, _ in legend_of(picture.stages)]
+    assert "1 sigma of the figure axis, drawn × 300" in words
+    plots = plan_plots(top.assign(picture.derived), picture.leading)
+    (plot,) = [plot for plot in plots if plot.key == "figure_axis_uncertainty"]
+    assert plot.place == "leading"
+    np.testing.assert_allclose(plot.series[0].values, 1e-3 * 3600 * 180 / np.pi, rtol=1e-12)  # arcsec
+    assert not any(COVARIANCE in series.name for plot in plots for series in plot.series)
+
+
+def test_no_cone_is_drawn_where_nothing_bounds_it(symmetric_top: Top) -> None:
+    top, covariance = symmetric_top(count=11), np.tile(0.04 * np.eye(3), (11, 1, 1))
+    covariance[4:] = np.nan
+    picture, _ = build_picture(with_covariance(top, covariance))
+    (cone,) = picture.stages[0].cones
+    sizes = np.linalg.norm(cone.rim, axis=2)
+    assert (sizes[:4] > 1).all()
+    assert not sizes[4:].any()
+    assert any("undetermined" in note for note in picture.notes)
+    _, subject = build_picture(top)
+    assert subject.attitude is not None
+    axis = subject.attitude @ Z  # turned about the axis alone: across it, rounding is left
+    about = 0.01 * axis[:, :, None] * axis[:, None, :]
+    moves = "none of the fitted numbers moves it"
+    for unseen, why in ((np.full((11, 3, 3), np.nan), "no bounds"), (0 * about, moves), (about, moves)):
+        picture, _ = build_picture(with_covariance(top, unseen))
+        assert not picture.stages[0].cones
+        assert any(why in note for note in picture.notes)
+
+
+def test_the_recording_has_the_cone_in_body_axes(
+    symmetric_top: Top, read_back: Callable[[Path, str], dict[str, np.ndarray]], tmp_path: Path
+) -> None:
+    covariance = np.tile(np.diag([0.3**2, 0.25**2, 0.1**2]), (31, 1, 1))
+    top = with_covariance(symmetric_top(count=31), covariance)
+    picture, _ = build_picture(top)
+    (cone,) = picture.stages[0].cones
+    write_timeline(top, tmp_path / "t.rrd")
+    rows = read_back(tmp_path / "t.rrd", "/scene/body/figure_axis_uncertainty/surface")
+    vertices = rows["Mesh3D:vertex_positions"].reshape(31, -1, 3)
+    assert not vertices[:, 0].any()  # the apex
+    corners = cone.rim.shape[1]
+    np.testing.assert_array_equal(vertices[:, 1 : 1 + corners], cone.rim.astype(np.float32))
+    np.testing.assert_array_equal(vertices[:, 1 + corners :], -cone.rim.astype(np.float32))
+
+
+def test_cones_side_by_side_each_have_their_factor_in_the_legend(symmetric_top: Top, tmp_path: Path) -> None:
+    from rerun.chunk import RrdReader
+
+    from rigidsim.look.timeline.comparison import write_comparison
+
+    top, path = symmetric_top(count=11), tmp_path / "t.rrd"
+    runs = [
+        (name, with_covariance(top, np.tile(x**2 * np.eye(3), (11, 1, 1))))
+        for name, x in (("a", 0.3), ("b", 1e-3))
+    ]
+    write_comparison(runs, path)
+    words = [
+        label
+        for chunk in RrdReader(path).stream()
+        if chunk.entity_path == "/legend/words"
+        for label in chunk.to_record_batch().column("Points2D:labels")[0].as_py()
+    ]
+    assert "■ a: 1 sigma of the figure axis" in words
+    assert "■ b: 1 sigma of the figure axis, drawn × 300" in words

@@ -1,0 +1,120 @@
+"""A fit's folder in the viewer: the fitted motion with the uncertainty that its covariance tells."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray
+from typer.testing import CliRunner
+
+pytest.importorskip("rerun")
+
+import rigidsim
+from rigidsim.cli.app import app
+from rigidsim.errors import RunFolderError
+from rigidsim.look import viewer
+from rigidsim.look.stages.registry import build_picture
+from rigidsim.workflows.view import runs_of
+
+SPIN, SIGMA = 0.7, 0.01  # rad/s, rad
+TIMES = np.linspace(0.5, 9.5, 19)
+BALL = """
+name = "ball"
+[body]
+principal_moments = [2, 2, 2]
+[initial]
+angular_velocity = [0, 0, 0.69]
+[frame]
+figure_axis = "x"
+[output]
+record = ["angular_velocity"]
+[time]
+end = 10
+[fit]
+parameters = ["initial.attitude[2]", "initial.angular_velocity[2]"]
+[[fit.data]]
+file = "turn.csv"
+observable = "euler_angles"
+columns = ["a", "b", "c"]
+unit = "deg"
+sigma = "0.01 rad"
+"""
+
+
+@pytest.fixture(scope="module")
+def fits(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of a fit of a uniform spin about z, whose x axis is the figure axis."""
+    folder = tmp_path_factory.mktemp("seen")
+    phases = SPIN * TIMES + SIGMA * np.random.default_rng(5).standard_normal(len(TIMES))
+    rows = [f"{t},{np.rad2deg(phase) % 360},0,0" for t, phase in zip(TIMES, phases, strict=True)]
+    (folder / "turn.csv").write_text("\n".join(["time,a,b,c", *rows]))
+    (folder / "ball.toml").write_text(BALL)
+    rigidsim.fit(folder / "ball.toml", out=folder / "fits")
+    return folder / "fits" / "ball"
+
+
+def test_the_cone_of_a_uniform_spin_is_as_wide_as_the_covariance_of_a_straight_line(fits: Path) -> None:
+    ((name, run),) = runs_of([fits])
+    assert name == "ball"
+    dataset = run.dataset
+    picture, _ = build_picture(dataset)
+    # phase = offset + rate t by least squares; across z it moves the x axis, along z nothing does
+    line = np.stack([np.ones(len(TIMES)), TIMES], axis=1)
+    covariance = SIGMA**2 * np.linalg.inv(line.T @ line)
+    now = np.stack([np.ones(dataset.sizes["time"]), dataset["time"].values], axis=1)
+    expected = np.sqrt(np.einsum("ti,ij,tj->t", now, covariance, now))
+    angles = picture.derived["figure_axis_uncertainty"].values
+    np.testing.assert_allclose(angles[:, 0], expected, rtol=1e-5)
+    np.testing.assert_allclose(angles[:, 1], 0.0, atol=1e-8)
+    assert "attitude_error" not in dataset.attrs  # the integration's own, which isn't what is meant here
+    assert "converged" in dataset.attrs["fit"]
+
+
+def test_a_fit_is_viewed_by_its_folder_from_the_command_line(
+    fits: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from rerun.chunk import RrdReader
+
+    entities: set[str] = set()
+
+    def pretend(path: Path, *, web: bool) -> int:
+        entities.update(chunk.entity_path for chunk in RrdReader(path).stream())
+        return 0
+
+    monkeypatch.setattr(viewer, "open_viewer", pretend)
+    result = CliRunner().invoke(app, ["view", str(fits)], prog_name="rigidsim")
+    assert result.exit_code == 0, result.output
+    assert {f"/scene/body/figure_axis_uncertainty/{part}" for part in ("rim", "surface")} <= entities
+
+
+def test_a_fitted_config_that_was_changed_is_refused(fits: Path) -> None:
+    fitted = fits / "fitted.toml"
+    text = fitted.read_text()
+    fitted.write_text(text.replace("[2, 2, 2]", "[2, 2, 2.5]"))
+    assert runs_of([fits])  # the same motion: a spin about z is one for any moments
+    fitted.write_text(text.replace("angular_velocity = [0, 0, 0.", "angular_velocity = [0, 0.1, 0."))
+    with pytest.raises(RunFolderError, match="was it changed"):
+        runs_of([fits])
+    fitted.write_text(text)
+
+
+def test_a_fit_is_no_run_and_says_what_shows_it(fits: Path) -> None:
+    with pytest.raises(RunFolderError, match="is a fit, no run"):
+        rigidsim.open_run(fits)
+
+
+def test_an_unfinished_fit_is_not_shown(tmp_path: Path) -> None:
+    (tmp_path / "begun.json").write_text("{}")
+    with pytest.raises(RunFolderError, match="unfinished fit"):
+        runs_of([tmp_path])
+
+
+def test_without_a_covariance_the_motion_alone_is_shown(fits: Path) -> None:
+    from rigidsim.workflows.fit.seen import fitted_run
+    from rigidsim.workflows.read import load
+
+    bare = xarray.load_dataset(fits / "dataset.h5").drop_vars("attitude_covariance")
+    picture, _ = build_picture(fitted_run(load(fits / "fitted.toml"), bare).dataset)
+    assert not picture.stages[0].cones
