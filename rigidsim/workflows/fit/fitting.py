@@ -18,7 +18,7 @@ from rigidsim.workflows.fit.folder import FitFolder, Remembered
 from rigidsim.workflows.fit.keys import FitKeys
 from rigidsim.workflows.fit.observed import Observed, observing
 from rigidsim.workflows.fit.predictions import ByDifferences, ByTangents, Predictor
-from rigidsim.workflows.fit.readings import Readings, read_readings
+from rigidsim.workflows.fit.readings import DataFiles, Readings, files_beside, read_readings
 from rigidsim.workflows.fit.result import FitResult
 from rigidsim.workflows.fit.searching import search
 from rigidsim.workflows.fit.weighing import Weighing
@@ -58,14 +58,11 @@ def fit(
     """
     asked = as_experiment(experiment, changes)
     _refuse(asked)
-    assert asked.config.fit is not None
-    source = Path(asked.source)
-    beside = source.parent if source.is_file() else Path()
-    places = [beside / data.file for data in asked.config.fit.data]
+    places = files_beside(asked)
     if out is None:
         return _fitted(asked, places, None, told or _silent)
     folder = FitFolder(Path(out) / asked.config.name)
-    missing = [path for path in places if not path.exists()]
+    missing = [path for files in places for path in files.all if not path.exists()]
     if missing:
         raise RigidsimError(f"{missing[0]}: there is no such file; [[fit.data]] files lie beside the config")
     with folder.locked():
@@ -123,7 +120,7 @@ def _refuse(experiment: Experiment) -> None:
         raise ConfigError(problems, experiment.source)
 
 
-def _fitted(experiment: Experiment, places: list[Path], memory: Path | None, told: Told) -> FitResult:
+def _fitted(experiment: Experiment, places: list[DataFiles], memory: Path | None, told: Told) -> FitResult:
     """Fit by data in given files; predictions are kept in ``memory``."""
     keys = FitKeys(experiment)
     assert experiment.config.fit is not None

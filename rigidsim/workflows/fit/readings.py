@@ -8,21 +8,52 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 
 from rigidsim.errors import ConfigError, Problem, RigidsimError
-from rigidsim.formats.observations import Observations, read_observations
+from rigidsim.formats import ck_reading
+from rigidsim.formats.observations import Observations, read_attitudes, read_observations
+from rigidsim.scene.config import Experiment
 from rigidsim.scene.epochs import Epoch
 from rigidsim.scene.exact import parse_number, parse_quantity
 from rigidsim.scene.fit_table import FitDataTable
+from rigidsim.scene.frame import ECLIPTIC, EQUATOR, SpaceAxes
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.units import UnitError, conversion
 from rigidsim.workflows.compare.rotations import SEQUENCES, normalised, of_euler
 from rigidsim.workflows.fit.observed import EULER_ANGLES, QUATERNION, Observed
 
+_META = b"KPL/MK"
 _NORM = 1e-2  # by which the norm of a quaternion may differ from 1
+
+
+@dataclass(frozen=True)
+class DataFiles:
+    """Where the file of a ``[[fit.data]]`` is, and the kernels that it is read with, if it is a CK."""
+
+    file: Path
+    kernels: tuple[Path, ...] = ()
+
+    @property
+    def all(self) -> tuple[Path, ...]:
+        """The file, then the kernels."""
+        return (self.file, *self.kernels)
+
+    @property
+    def of_kernels(self) -> bool:
+        """Whether the file is a CK."""
+        return bool(self.kernels) or self.file.suffix.lower() == ck_reading.SUFFIX
+
+
+def files_beside(experiment: Experiment) -> list[DataFiles]:
+    """The data of a config: beside it, or in the working directory where it comes from no file."""
+    assert experiment.config.fit is not None
+    source = Path(experiment.source)
+    beside = source.parent if source.is_file() else Path()
+    tables = experiment.config.fit.data
+    return [DataFiles(beside / x.file, tuple(beside / one for one in x.kernels)) for x in tables]
 
 
 @dataclass(frozen=True)
@@ -54,14 +85,40 @@ class Readings:
         return f"{self.quantity.text} (data {self.number})"
 
 
-def read_readings(number: int, table: FitDataTable, quantity: Observed, scene: Scene, path: Path) -> Readings:
-    """Read the file of a table of ``[[fit.data]]``, which is at a path.
+def read_readings(
+    number: int, table: FitDataTable, quantity: Observed, scene: Scene, files: DataFiles
+) -> Readings:
+    """Read the data of a table of ``[[fit.data]]``, which are in these files.
 
     Raises:
         ConfigError: a key of the table doesn't suit. RigidsimError: a row of the file can't be used.
     """
-    found = read_observations(path)
-    return _ReadTable(number, table, quantity, scene, found, path).made()
+    if files.of_kernels:
+        found = _attitudes(number, table, quantity, scene, files)
+    else:
+        found = read_observations(files.file)
+    return _ReadTable(number, table, quantity, scene, found, files.file).made()
+
+
+def _attitudes(
+    number: int, table: FitDataTable, quantity: Observed, scene: Scene, files: DataFiles
+) -> Observations:
+    """The rows of a CK, which holds dates, and attitudes relative to J2000."""
+    problem = ""
+    if scene.epoch is None:
+        problem = f"{table.file} is a CK, which holds dates; give the date of time 0 as [time] epoch"
+    elif quantity.rotation and scene.axes is None:
+        allowed = ", ".join(f'"{name}"' for name in get_args(SpaceAxes))
+        problem = f"{table.file} is a CK, whose attitudes are relative to J2000; say by [frame] axes what "
+        problem += f"the space axes of the config are: {allowed}"
+    for given, path in zip(table.kernels, files.kernels, strict=True):
+        if path.is_file() and path.read_bytes().startswith(_META):
+            problem = f"{given} is a meta-kernel, whose paths a fit's copies don't have; list its kernels"
+    if problem:
+        raise ConfigError(Problem(f"[[fit.data]] number {number} file", problem))
+    assert scene.epoch is not None
+    axes = ECLIPTIC if scene.axes == ECLIPTIC else EQUATOR
+    return read_attitudes(files.file, files.kernels, scene.epoch, axes)
 
 
 class _ReadTable:
