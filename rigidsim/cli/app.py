@@ -202,6 +202,7 @@ def fit(
     out: options.FitsOption = Path("fits"),
     overrides: options.SetOption = None,
     write: options.FittedOption = None,
+    member: options.MemberOption = None,
     force: Annotated[bool, typer.Option("--force", help="Replace a fit of the same name.")] = False,
     as_json: options.JsonOption = False,
 ) -> None:

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from rigidsim.errors import ConfigError, Problem, RigidsimError, RunFolderError
+from rigidsim.errors import SWEEP, ConfigError, Problem, RigidsimError, RunFolderError, either
 from rigidsim.scene.config import Experiment
 from rigidsim.store import atomic
 from rigidsim.workflows.compare.saving import save_dataset
@@ -60,7 +60,7 @@ def fit(
     _refuse(asked)
     places = files_beside(asked)
     if out is None:
-        return _fitted(asked, places, None, told or _silent)
+        return fit_to(asked, places, told=told)
     folder = FitFolder(Path(out) / asked.config.name)
     missing = [path for files in places for path in files.all if not path.exists()]
     if missing:
@@ -88,14 +88,14 @@ def resume_fit(path: str | Path, *, told: Told | None = None) -> FitResult:
 def fit_again(folder: FitFolder, *, told: Told | None = None) -> FitResult:
     """The fit of a folder made again from its own copies, without writing anything."""
     experiment = load(folder.config)
-    return _fitted(experiment, folder.copies(experiment), None, told or _silent)
+    return fit_to(experiment, folder.copies(experiment), told=told)
 
 
 def _kept(experiment: Experiment, folder: FitFolder, told: Told) -> FitResult:
     """Fit, and write the results."""
     from rigidsim.look.figures.fitted import save_fitted
 
-    result = _fitted(experiment, folder.copies(experiment), folder.evaluations, told)
+    result = fit_to(experiment, folder.copies(experiment), folder.evaluations, told=told)
     save_dataset(result.dataset, folder.dataset)
     atomic.write_bytes(folder.fitted, result.experiment.text.encode())
     with atomic.replacing(folder.figure) as temporary:
@@ -115,13 +115,21 @@ def _refuse(experiment: Experiment) -> None:
     if config.fit is None:
         problems.append(Problem("[fit]", "missing; it names parameters and data, see docs/fits.md"))
     if config.sweep is not None:
-        problems.append(Problem("[sweep]", "a fit takes a single experiment; remove [sweep]"))
+        one = either("--member N", "[sweep] removed")
+        what = f"asks for many fits, which {SWEEP} makes; with {one} here it is a single one"
+        problems.append(Problem("[sweep]", what))
     if problems:
         raise ConfigError(problems, experiment.source)
 
 
-def _fitted(experiment: Experiment, places: list[DataFiles], memory: Path | None, told: Told) -> FitResult:
-    """Fit by data in given files; predictions are kept in ``memory``."""
+def fit_to(
+    experiment: Experiment, places: list[DataFiles], memory: Path | None = None, *, told: Told | None = None
+) -> FitResult:
+    """Fit by data in given files; predictions are kept in a folder ``memory``.
+
+    Raises:
+        ConfigError, RigidsimError: as for ``fit``.
+    """
     keys = FitKeys(experiment)
     assert experiment.config.fit is not None
     with ExitStack() as stack:
@@ -140,7 +148,7 @@ def _fitted(experiment: Experiment, places: list[DataFiles], memory: Path | None
         times = np.linspace(float(keys.scene.start), float(keys.scene.samples.last), _ALONG_ROWS)
         kept = predictor if memory is None else Remembered(predictor, memory)
         weighing = Weighing(keys, readings, kept, times)
-        found = search(weighing, experiment.config.fit.starts, told)
+        found = search(weighing, experiment.config.fit.starts, told or _silent)
         notes = list(dict.fromkeys(text for one in readings for text in one.told))
         findings = Findings(experiment.config.name, keys, weighing, found, predictor.how, notes)
         return findings.result(weighing.along(found.ended.values), times)

@@ -101,7 +101,7 @@ class FitFolder(WorkFolder):
         self.evaluations.mkdir()
         for files, copies in zip(sources, self.copies(experiment), strict=True):
             for path, copy in zip(files.all, copies.all, strict=True):
-                atomic.write_bytes(copy, _content(path))
+                atomic.write_bytes(copy, content(path))
         atomic.write_bytes(self.config, experiment.text.encode())
         atomic.write_bytes(self.begun, json.dumps(now, indent=2).encode())
 
@@ -181,13 +181,14 @@ def versions() -> dict[str, str]:
     }  # fmt: skip
 
 
-def _content(path: Path) -> bytes:
+def content(path: Path) -> bytes:
+    """Bytes of a file, or of the dataset of a run's folder."""
     return (path / "dataset.h5" if path.is_dir() else path).read_bytes()
 
 
 def digest(path: Path) -> str:
     """SHA-256 of a file, or of the dataset of a run's folder."""
-    return hashlib.sha256(_content(path)).hexdigest()
+    return hashlib.sha256(content(path)).hexdigest()
 
 
 def kernel_digests(sources: Sequence[DataFiles]) -> list[list[str]]:

@@ -47,11 +47,16 @@ class DataFiles:
         return bool(self.kernels) or self.file.suffix.lower() == ck_reading.SUFFIX
 
 
-def files_beside(experiment: Experiment) -> list[DataFiles]:
-    """The data of a config: beside it, or in the working directory where it comes from no file."""
-    assert experiment.config.fit is not None
+def folder_of(experiment: Experiment) -> Path:
+    """Where the data of a config lie: beside it, or in the working directory where it comes from no file."""
     source = Path(experiment.source)
-    beside = source.parent if source.is_file() else Path()
+    return source.parent if source.is_file() else Path()
+
+
+def files_beside(experiment: Experiment) -> list[DataFiles]:
+    """The data of a config where they lie."""
+    assert experiment.config.fit is not None
+    beside = folder_of(experiment)
     tables = experiment.config.fit.data
     return [DataFiles(beside / x.file, tuple(beside / one for one in x.kernels)) for x in tables]
 
