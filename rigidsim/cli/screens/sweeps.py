@@ -103,7 +103,7 @@ def print_sweep(result: SavedSweep) -> None:
     assert cost is not None
     engines = ", ".join(f"{n:,} {_ENGINES.get(engine, engine)}" for engine, n in told.engines.items())
     errors = f", {cost.estimate_cpu_seconds:.3g} s of them for errors" if cost.estimate_cpu_seconds else ""
-    steps = "" if told.fitted else f"{cost.steps:,} steps, "
+    steps = "" if _FITS in told.engines else f"{cost.steps:,} steps, "
     spent = f"{steps}{cost.cpu_seconds:.3g} s of CPU in {cost.tiles:,} blocks of members"
     on.line("cost", f"{spent} ({engines}){errors}")
     if told.fitted:
@@ -123,7 +123,7 @@ def print_sweep(result: SavedSweep) -> None:
     for text in told.warnings:
         on.line("warning", text, "yellow")
     on.line("next", f"rigidsim plot {place}")
-    if not told.fitted:
+    if _FITS not in told.engines:
         on.line("", f"rigidsim view {place} --member 0")
     on.line("", f"rigidsim export {place} --format csv")
 
@@ -135,6 +135,7 @@ def _fitted(key: str, one: FittedOfMembers) -> list[Styled]:
     return [key, digits_text(one.median, one.sigma or 0.0), f"{one.spread:.2g}", sigma, unit]
 
 
+_FITS = "fits"
 _ENGINES = {"alone": "one by one"}
 _CURES = {
     "asked": "[sweep] batch = false says so: leave it out, and they run four or eight at once",

@@ -86,7 +86,8 @@ def save_sweep_figure(dataset: xarray.Dataset, path: Any, what: str | None, *, f
 def sweep_figure(dataset: xarray.Dataset, what: str | None = None) -> Figure:
     """A sweep's page: one variable over its axes, by its name, with ``[INDEX]`` for one component; by default
     the first indicator, else the first time of an event, else a secular rate, else the first quantity kept
-    that isn't the same in all members; of fits what they estimated. Times are in the scene's unit, angles in a readable one.
+    that isn't the same in all members; of fits what they estimated. Times are in the scene's unit, angles in
+    a readable one.
     ``ValueError`` names the variables there are where there is none of that name.
     """
     if what is None and holds_fits(dataset):
