@@ -63,6 +63,8 @@ def sweep(
 ) -> SavedSweep:
     """Run every member of a config's ``[sweep]``, and save them as one dataset in ``out/<name>/``.
 
+    Members of a config with ``[fit]`` are fits, by copies of their data in the folder.
+
     A folder that holds a part of the same sweep is completed; if axes are longer or more is kept than
     before, only what is new is computed.
 
@@ -79,7 +81,9 @@ def sweep(
 
     Raises:
         ConfigError: no sweep, or one of its members can't be run; nothing was written.
-        RunFolderError: the folder is in use, holds something else, or can't be written.
+        RunFolderError: the folder is in use, holds something else, or can't be written; or data of fits have
+            other contents than before.
+        RigidsimError: data of fits aren't there.
     """
     given = as_experiment(experiment, changes)
     if not isinstance(out, str | os.PathLike):
