@@ -32,6 +32,7 @@ class Observations:
         units: as far as the file tells.
         rows: what each row is called: "line 12".
         epochs: dates of a message's rows.
+        frames: names of the frames from and to which its attitude turns.
     """
 
     source: str
@@ -40,6 +41,7 @@ class Observations:
     units: dict[str, str] = field(default_factory=dict)
     rows: Sequence[str] = ()
     epochs: tuple[Epoch, ...] = ()
+    frames: tuple[str, str] = ("", "")
 
     @property
     def names(self) -> list[str]:
@@ -106,7 +108,9 @@ def read_observations(path: Path) -> Observations:
         path = path / "dataset.h5"
     found = read_trajectory(path)
     rows = [found.row(n) for n in range(_count(found))]
-    return Observations(str(path), {}, dict(found.columns), dict(found.units), rows, found.epochs)
+    return Observations(
+        str(path), {}, dict(found.columns), dict(found.units), rows, found.epochs, found.frames
+    )
 
 
 def read_attitudes(path: Path, kernels: Sequence[Path], epoch: Epoch, axes: str) -> Observations:

@@ -216,3 +216,29 @@ def test_rows_outside_the_run_are_told(here: Path) -> None:
     found = rigidsim.fit(rigidsim.parse(short + FIT))
     assert found.data[0].rows == 11
     assert "40 of 51 rows lie outside the run" in found.told[0]
+
+
+@pytest.mark.parametrize("turned_over", [False, True])
+def test_a_message_is_turned_from_its_own_axes(turned_over: bool, here: Path) -> None:
+    """An AEM of a scene in the ecliptic is about the equator; another tool's may go from body to space."""
+    rigidsim.run(rigidsim.parse(TUMBLING), out=here / "runs")
+    [path] = rigidsim.export(here / "runs/tumbling", "aem", here / "seen.aem")
+    text = path.read_text()
+    assert "REF_FRAME_A = EME2000" in text
+    if turned_over:
+        rows = []
+        for row in text.splitlines():
+            words = row.split()
+            if len(words) == 5 and "T" in words[0]:
+                words[4] = f"-{words[4]}".removeprefix("--")  # the conjugate
+            rows.append(" ".join(words))
+        text = "\n".join(rows).replace("REF_FRAME_A = EME2000", "REF_FRAME_A = SC_BODY_1")
+        text = text.replace("REF_FRAME_B = SC_BODY_1", "REF_FRAME_B = EME2000")
+        path.write_text(text)
+    config = TUMBLING + FIT.replace("seen.bc", "seen.aem").replace('kernels = ["clock.tsc"]', "")
+    found = rigidsim.fit(rigidsim.parse(config))
+    assert found.data[0].rms < 1e-9
+    assert abs(found.value("initial.attitude[0]")) < 1e-9
+    path.write_text(text.replace("EME2000", "MARS_IAU"))
+    with pytest.raises(ConfigError, match="attitudes from one of EME2000"):
+        rigidsim.fit(rigidsim.parse(config))

@@ -19,10 +19,10 @@ from rigidsim.scene.config import Experiment
 from rigidsim.scene.epochs import Epoch
 from rigidsim.scene.exact import parse_number, parse_quantity
 from rigidsim.scene.fit_table import FitDataTable
-from rigidsim.scene.frame import ECLIPTIC, EQUATOR, SpaceAxes
+from rigidsim.scene.frame import ECLIPTIC, EQUATOR, OBLIQUITY, SpaceAxes
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.units import UnitError, conversion
-from rigidsim.workflows.compare.rotations import SEQUENCES, normalised, of_euler
+from rigidsim.workflows.compare.rotations import SEQUENCES, conjugated, multiplied, normalised, of_euler
 from rigidsim.workflows.fit.observed import EULER_ANGLES, QUATERNION, Observed
 
 _META = b"KPL/MK"
@@ -182,6 +182,8 @@ class _ReadTable:
     def _values(self) -> np.ndarray:
         components = self.quantity.components
         names = self.table.columns or [*components]
+        if self.table.columns is None and self.quantity.form == QUATERNION and any(self.found.frames):
+            names = ["qw", "qx", "qy", "qz"]
         if len(names) != len(components):
             raise self.fault(
                 "columns",
@@ -205,12 +207,32 @@ class _ReadTable:
                     f"{self.found.source}: {self.found.rows[bad[0]]}: a quaternion of norm "
                     f"{norms[bad[0]]:.6g}; norms within 0.01 of 1 are allowed: mend or remove these rows"
                 )
-            return normalised(values)
+            return self._in_space(normalised(values))
         if self.quantity.form == EULER_ANGLES:
             sequence = self.scene.config.integrator.euler_sequence
             assert sequence in SEQUENCES
             return of_euler(sequence, values)
         return values
+
+    def _in_space(self, quaternions: np.ndarray) -> np.ndarray:
+        """Attitudes of a message between the frames that it names, as those to the config's space axes; its
+        quaternion from space to body axes is that of the turn from body coordinates to space coordinates.
+        """
+        first, last = self.found.frames
+        known = get_args(SpaceAxes)
+        if last in known and first not in known:
+            first, quaternions = last, conjugated(quaternions)
+        axes = self.scene.axes
+        if first == axes or not first:
+            return quaternions
+        if first not in known or axes is None:
+            what = f'{self.table.file} turns from "{first}" to "{last}", and the config\'s space axes are '
+            what += f'"{axes}"' if axes else "not named; say by [frame] axes what they are"
+            raise self.fault("file", f"{what}: attitudes from one of {', '.join(known)} are allowed")
+        if ECLIPTIC not in (first, axes):
+            return quaternions  # within 0.03 arcsec of each other
+        half = float(OBLIQUITY) / 2 * (-1 if axes == ECLIPTIC else 1)
+        return multiplied(np.array([[np.cos(half), np.sin(half), 0.0, 0.0]]), quaternions)
 
     def _si(self, unit: str) -> float:
         """Factor to SI for an expression, whose dimension isn't known."""
