@@ -221,7 +221,7 @@ def test_rows_outside_the_run_are_told(here: Path) -> None:
 @pytest.mark.parametrize("turned_over", [False, True])
 def test_a_message_is_turned_from_its_own_axes(turned_over: bool, here: Path) -> None:
     """An AEM of a scene in the ecliptic is about the equator; another tool's may go from body to space."""
-    rigidsim.run(rigidsim.parse(TUMBLING), out=here / "runs")
+    rigidsim.run(rigidsim.parse(TUMBLING + "[output]\ntimeline = false\n"), out=here / "runs")
     [path] = rigidsim.export(here / "runs/tumbling", "aem", here / "seen.aem")
     text = path.read_text()
     assert "REF_FRAME_A = EME2000" in text
