@@ -20,6 +20,7 @@ def either(command_line: str, python: str) -> str:
 FORCE = either("--force", "force=True")
 OUT = either("--out", "out")
 RESUME = either("rigidsim resume", "rigidsim.resume(...)")
+SWEEP = either("rigidsim sweep", "rigidsim.sweep(...)")
 VIEW = either("rigidsim view", "run.view()")
 
 

@@ -123,7 +123,8 @@ def sweep(
     force: Annotated[bool, typer.Option("--force", help="Replace what lies there.")] = False,
     as_json: options.JsonOption = False,
 ) -> None:
-    """Run all members, and write one labelled dataset; what is there already isn't computed again.
+    """Run all members, and write one labelled dataset; what is there already isn't computed again. With [fit]
+    in the config each member is a fit.
 
     Give the command again to go on after an interruption, or with a config whose axes are longer.
 
@@ -202,6 +203,7 @@ def fit(
     out: options.FitsOption = Path("fits"),
     overrides: options.SetOption = None,
     write: options.FittedOption = None,
+    member: options.MemberOption = None,
     force: Annotated[bool, typer.Option("--force", help="Replace a fit of the same name.")] = False,
     as_json: options.JsonOption = False,
 ) -> None:

@@ -1,8 +1,15 @@
-"""CK, SPICE's kernel of attitudes, read as a trajectory: at times between its own, which it interpolates."""
+"""CK, SPICE's kernel of attitudes: read as a trajectory, at times between its own, which SPICE interpolates,
+or as observations, at its own times.
+
+Attitudes and rates are always SPICE's; its own times are found in the segments, whose layout is NAIF's "CK
+Required Reading". Of segments that overlap SPICE takes the last one in the file, and so do the own times.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -13,11 +20,15 @@ from rigidsim.errors import RigidsimError
 from rigidsim.formats.trajectories import Trajectory
 from rigidsim.scene.kernels.kernel import KernelError
 from rigidsim.scene.kernels.spice import loaded
+from rigidsim.scene.rotations import quaternion_of
 
 SUFFIX = ".bc"
 _TURN = 0.1  # rad from row to row
 _FEWEST, _MOST, _FIRST = 200, 20_000, 50
 _DIGITS = "123"
+_DIRECTORY = 100  # times for each of which a directory holds one more
+_PACKET = {0: 8, 1: 4, 2: 14, 3: 7}  # numbers of a row of type 5, by its subtype
+_INSTANTS, _RATES, _LINES, _POLYNOMIALS = 1, 2, 3, 5  # types of segments that have rows
 
 
 def read_ck(path: Path, kernels: Sequence[Path], ahead: Fraction, begin: float, end: float) -> Trajectory:
@@ -30,8 +41,58 @@ def read_ck(path: Path, kernels: Sequence[Path], ahead: Fraction, begin: float, 
     Raises:
         RigidsimError: SPICE refuses a kernel, or the CK doesn't cover the experiment.
     """
-    if not path.exists():
-        raise RigidsimError(f"{path}: there is no such file")
+    with _opened(path, kernels, "as --kernels FILE") as (toolkit, number):
+        return _rows(toolkit, path, number, ahead, (begin, end))
+
+
+@dataclass(frozen=True)
+class KernelRows:
+    """The rows of a CK at its own times, in the order of time.
+
+    Attributes:
+        times: (rows,), s of the experiment.
+        quaternions: (rows, 4), w x y z, from body axes to J2000.
+        rates: (rows, 3), angular velocity in body axes, rad/s, nan where there is none; None without any.
+    """
+
+    times: np.ndarray
+    quaternions: np.ndarray
+    rates: np.ndarray | None
+
+
+def read_rows(path: Path, kernels: Sequence[Path], ahead: Fraction) -> KernelRows:
+    """Attitude and, if it is there, angular velocity of the only object of a CK at the times of its rows.
+
+    Args:
+        kernels: the clock (SCLK), where that needs it leap seconds (LSK), and what else its frame needs (FK).
+        ahead: date of time 0, s of TDB since J2000.
+
+    Raises:
+        RigidsimError: SPICE refuses a kernel, or a segment has no rows (types 4 and 6).
+    """
+    with _opened(path, kernels, "as kernels = [...] beside file") as (toolkit, number):
+        clock = toolkit.ckmeta(number, "SCLK")
+        ticks, rated = _own_ticks(toolkit, path)
+        dates = [toolkit.sct2e(clock, tick) for tick in ticks]
+        try:  # one after the other: SPICE takes an earlier segment at the end of one without rates otherwise
+            matrices = np.array([toolkit.ckgp(number, tick, 0.0, "J2000")[0] for tick in ticks])
+            turning = [toolkit.ckgpav(number, tick, 0.0, "J2000")[1] for tick in ticks[rated]]
+        except toolkit.NotFoundError:
+            raise RigidsimError(f"{path}: SPICE finds no attitude at the time of one of its rows") from None
+        rates = np.full((len(ticks), 3), np.nan)
+        if turning:
+            rates[rated] = np.einsum("nij,nj->ni", matrices[rated], np.array(turning))
+        times = np.array([float(Fraction(date) - ahead) for date in dates])
+    # SPICE's matrices go from the reference to the body
+    return KernelRows(times, quaternion_of(matrices.transpose(0, 2, 1)), rates if rated.any() else None)
+
+
+@contextmanager
+def _opened(path: Path, kernels: Sequence[Path], how: str) -> Iterator[tuple[Any, int]]:
+    """SPICE's toolkit with a CK loaded, and the number of its object; ``how`` other kernels are given."""
+    for each in (path, *kernels):
+        if not each.is_file():
+            raise RigidsimError(f"{each}: there is no such file")
     try:
         with loaded(*kernels, path) as toolkit:
             objects = [int(number) for number in toolkit.ckobj(str(path))]
@@ -39,9 +100,68 @@ def read_ck(path: Path, kernels: Sequence[Path], ahead: Fraction, begin: float, 
                 raise RigidsimError(
                     f"{path}: holds {len(objects)} objects ({objects[:9]}); write one to a file"
                 )
-            return _rows(toolkit, path, objects[0], ahead, (begin, end))
+            yield toolkit, objects[0]
     except KernelError as error:
-        raise RigidsimError(f"{path}: {error}; give its clock and leap seconds as --kernels FILE") from None
+        raise RigidsimError(f"{path}: {error}; give its clock and leap seconds {how}") from None
+
+
+def _own_ticks(toolkit: Any, path: Path) -> tuple[np.ndarray, np.ndarray]:
+    """The times of all rows, ticks of the clock, ascending; and which rows have rates."""
+    handle = toolkit.dafopr(str(path))
+    try:
+        segments = []
+        toolkit.dafbfs(handle)
+        while toolkit.daffna():
+            _, whole = toolkit.dafus(toolkit.dafgs(), 2, 6)
+            kind, rated, first, last = (int(x) for x in whole[2:])
+            if kind not in (_INSTANTS, _RATES, _LINES, _POLYNOMIALS):
+                raise RigidsimError(
+                    f"{path}: a segment of type {kind}, which holds polynomials and no rows; those of types "
+                    f"{_INSTANTS}, {_RATES}, {_LINES} and {_POLYNOMIALS} are allowed: sample it into a CSV"
+                )
+            values = np.asarray(toolkit.dafgda(handle, first, last), dtype=np.float64)
+            segments.append((_Segment.of(values, kind, rated=bool(rated)), bool(rated)))
+    finally:
+        toolkit.dafcls(handle)
+    found = dict[float, bool]()
+    for place, (segment, rated) in enumerate(segments):
+        hidden = np.zeros(len(segment.ticks), dtype=bool)
+        for later, _ in segments[place + 1 :]:
+            hidden |= later.holds(segment.ticks)
+        found |= dict.fromkeys(segment.ticks[~hidden].tolist(), rated)
+    ticks = sorted(found)
+    return np.array(ticks), np.array([found[tick] for tick in ticks], dtype=bool)
+
+
+@dataclass(frozen=True)
+class _Segment:
+    """Times of the rows of one segment, and the spans in which SPICE has attitudes by it, all in ticks."""
+
+    ticks: np.ndarray
+    begins: np.ndarray
+    ends: np.ndarray
+
+    def holds(self, ticks: np.ndarray) -> np.ndarray:
+        """Whether SPICE has attitudes of it at these times, (n,) bool."""
+        span = np.searchsorted(self.begins, ticks, side="right") - 1
+        return (span >= 0) & (ticks <= self.ends[span])
+
+    @classmethod
+    def of(cls, values: np.ndarray, kind: int, *, rated: bool) -> _Segment:
+        """A segment by the numbers of its array, (n,) float64."""
+        if kind == _RATES:
+            count = (_DIRECTORY * (len(values) + 1)) // (10 * _DIRECTORY + 1)  # which it doesn't hold itself
+            begins, ends = values[8 * count : 10 * count].reshape(2, count)
+            return cls(begins, begins, ends)
+        count = int(values[-1])
+        row = _PACKET[int(values[-4])] if kind == _POLYNOMIALS else 7 if rated else 4
+        ticks = values[row * count : (row + 1) * count]
+        if kind == _INSTANTS:
+            return cls(ticks, ticks, ticks)
+        after = (row + 1) * count + (count - 1) // _DIRECTORY
+        begins = values[after : after + int(values[-2])]
+        last = np.append(np.searchsorted(ticks, begins[1:]), count) - 1
+        return cls(ticks, begins, ticks[last])
 
 
 def _rows(toolkit: Any, path: Path, number: int, ahead: Fraction, span: tuple[float, float]) -> Trajectory:

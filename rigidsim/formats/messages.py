@@ -21,9 +21,11 @@ Row = tuple[int, str, dict[str, float], dict[str, str]]
 """Number of the line (KVN) or of the row, date, values by name, and the keys that are valid for it."""
 
 
-def message_rows(path: Path, message: str) -> tuple[tuple[Epoch, ...], dict[str, np.ndarray], str, int]:
-    """Dates, columns by name (positions in m, velocities in m/s), what rows are counted as, and the first's
-    number.
+def message_rows(
+    path: Path, message: str
+) -> tuple[tuple[Epoch, ...], dict[str, np.ndarray], str, int, tuple[str, str]]:
+    """Dates, columns by name (positions in m, velocities in m/s), what rows are counted as, the first's
+    number, and the frames from and to which an attitude turns; empty where rows differ in them.
 
     Args:
         message: "AEM" or "OEM".
@@ -49,7 +51,9 @@ def message_rows(path: Path, message: str) -> tuple[tuple[Epoch, ...], dict[str,
     epochs = tuple(_date(date, keys.get("TIME_SYSTEM", ""), f"{path}, row {n}") for n, date, _, keys in rows)
     scale = 1.0 if message == "AEM" else _KM
     columns = {plain: np.array([row[2][name] for row in rows]) * scale for name, plain in names.items()}
-    return epochs, columns, "row" if xml else "line", rows[0][0]
+    named = {(keys.get("REF_FRAME_A", ""), keys.get("REF_FRAME_B", "")) for *_, keys in rows}
+    frames = named.pop() if len(named) == 1 else ("", "")
+    return epochs, columns, "row" if xml else "line", rows[0][0], frames
 
 
 def _of_kvn(text: str, message: str) -> Iterator[Row]:

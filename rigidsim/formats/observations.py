@@ -11,8 +11,11 @@ from pathlib import Path
 import numpy as np
 
 from rigidsim.errors import RigidsimError
+from rigidsim.formats.ck_reading import read_rows
 from rigidsim.formats.trajectories import KINDS, Trajectory, read_trajectory
 from rigidsim.scene.epochs import Epoch, parse_epoch
+from rigidsim.scene.frame import ECLIPTIC, OBLIQUITY
+from rigidsim.scene.rotations import product
 from rigidsim.scene.validation_messages import nearest
 
 _TEXT = {".csv", ".txt", ".dat", ".tsv"}
@@ -29,6 +32,7 @@ class Observations:
         units: as far as the file tells.
         rows: what each row is called: "line 12".
         epochs: dates of a message's rows.
+        frames: names of the frames from and to which its attitude turns.
     """
 
     source: str
@@ -37,6 +41,7 @@ class Observations:
     units: dict[str, str] = field(default_factory=dict)
     rows: Sequence[str] = ()
     epochs: tuple[Epoch, ...] = ()
+    frames: tuple[str, str] = ("", "")
 
     @property
     def names(self) -> list[str]:
@@ -103,7 +108,32 @@ def read_observations(path: Path) -> Observations:
         path = path / "dataset.h5"
     found = read_trajectory(path)
     rows = [found.row(n) for n in range(_count(found))]
-    return Observations(str(path), {}, dict(found.columns), dict(found.units), rows, found.epochs)
+    return Observations(
+        str(path), {}, dict(found.columns), dict(found.units), rows, found.epochs, found.frames
+    )
+
+
+def read_attitudes(path: Path, kernels: Sequence[Path], epoch: Epoch, axes: str) -> Observations:
+    """The rows of a CK at its own times, with columns named as in exported tables.
+
+    Args:
+        kernels: those that it is read with. epoch: date of time 0.
+        axes: space axes of its attitudes here, one of ``SpaceAxes``.
+
+    Raises:
+        RigidsimError: SPICE refuses a kernel, or the CK holds no rows.
+    """
+    found = read_rows(path, kernels, epoch.since_j2000())
+    quaternions = found.quaternions
+    if axes == ECLIPTIC:
+        half = -float(OBLIQUITY) / 2
+        quaternions = np.stack(product([np.cos(half), np.sin(half), 0.0, 0.0], [*quaternions.T]), axis=1)
+    numbers = {"time": found.times, **{f"quaternion_{x}": quaternions[:, n] for n, x in enumerate("wxyz")}}
+    if found.rates is not None:
+        numbers |= {f"angular_velocity_{x}": found.rates[:, n] for n, x in enumerate("xyz")}
+    units = {name: "rad/s" for name in numbers if name.startswith("angular")} | {"time": "s"}
+    rows = [f"row {n}" for n in range(len(found.times))]
+    return Observations(str(path), {}, numbers, units, rows)
 
 
 def _count(found: Trajectory) -> int:

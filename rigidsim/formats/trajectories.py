@@ -47,6 +47,7 @@ class Trajectory:
         first: number of the first row, as the file counts them.
         narrow: whether the numbers were single precision.
         epochs: times of a message as dates, in place of a column of times.
+        frames: names of the frames from and to which a message's attitude turns; empty where it isn't said.
     """
 
     columns: Mapping[str, np.ndarray]
@@ -56,6 +57,7 @@ class Trajectory:
     first: int = 0
     narrow: bool = False
     epochs: tuple[Epoch, ...] = ()
+    frames: tuple[str, str] = ("", "")
 
     def row(self, index: int) -> str:
         """A row as the file counts it."""
@@ -88,8 +90,10 @@ def read_trajectory(path: Path) -> Trajectory:
             with path.open(errors="replace") as file:
                 head = file.read(4096)
             if (found := re.search(r"CCSDS_(AEM|OEM)_VERS", head)) is not None:
-                epochs, columns, counted, first = message_rows(path, found[1])
-                return Trajectory(columns, str(path), counted=counted, first=first, epochs=epochs)
+                epochs, columns, counted, first, frames = message_rows(path, found[1])
+                return Trajectory(
+                    columns, str(path), counted=counted, first=first, epochs=epochs, frames=frames
+                )
             if suffix in _TEXT:
                 return _of_text(path)
     except (RigidsimError, MemoryError):

@@ -234,5 +234,5 @@ def joined(parts: Sequence[Kept], counts: Sequence[int]) -> Kept:
                 place = (slice(first, first + count), *(slice(0, n) for n in values.shape[1:]))
                 table[place] = values
             first += count
-        found[name] = KeptVariable(like.dims, table, like.attributes, like.item)
+        found[name] = KeptVariable(like.dims, table, like.attributes, like.item, like.labels)
     return found

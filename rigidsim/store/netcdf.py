@@ -69,8 +69,12 @@ class NetcdfFile:
 
     def labels(self, dim: str, labels: Sequence[str]) -> None:
         """Write a dimension's labels, unless they are there."""
-        if dim not in self._labelled.variables:
-            self.texts(dim, dim, labels, {"long_name": dim.replace("_", " ")})
+        self.texts_once(dim, dim, labels)
+
+    def texts_once(self, name: str, dim: str, texts: Sequence[str]) -> None:
+        """Write strings along a dimension, unless they are there."""
+        if name not in self._labelled.variables:
+            self.texts(name, dim, texts, {"long_name": name.replace("_", " ")})
 
     def _created(
         self, name: str, dims: Sequence[str], dtype: Any, attributes: Mapping[str, Any], **how: Any

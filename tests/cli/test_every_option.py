@@ -48,6 +48,7 @@ QUICK = {
     "tradeoff free.toml --with runs/free,long": 2,
     "compare free.toml missing.bc --kernels missing.tsc": 2,
     "fit watched.toml --out fits --set time.end=3 --write watched_again.toml --force --json": 0,
+    "fit nights.toml --member 1 --out fits": 0,
     "info fits/watched --json": 0,
     "verify fits/watched --json": 0,
     "info runs/free --json": 0,
@@ -98,6 +99,7 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
         "stopped": support.config(more="[limits]\nmax_steps = 3", name="stopped"),
         "swept": support.config(more=SWEEP, name="swept"),
         "watched": support.config(more=FIT, name="watched"),
+        "nights": support.config(more=f"{FIT}\n{SWEEP}", name="nights"),
         "wrong": support.config(body="principal_moments = [1, 2, 9]", name="wrong"),
     }
     with pytest.MonkeyPatch.context() as patch:

@@ -15,10 +15,16 @@ from rigidsim.workflows.read import load
 
 
 def fit(
-    config: Path, out: Path, overrides: list[str] | None, write: Path | None, force: bool, as_json: bool
-) -> int:
+    config: Path, out: Path, overrides: list[str] | None, write: Path | None, member: int | None,
+    force: bool, as_json: bool,
+) -> int:  # fmt: skip
     """Fit, save, print."""
-    result = fitting.fit(load(config, overrides=overrides or []), out=out, force=force, told=_tell)
+    experiment = load(config, overrides=overrides or [])
+    if member is not None:
+        from rigidsim.workflows.sweeps.members import single_member  # which few fits need
+
+        experiment = single_member(experiment, member)
+    result = fitting.fit(experiment, out=out, force=force, told=_tell)
     if write is not None:
         try:
             atomic.write_bytes(write, result.experiment.text.encode())

@@ -46,7 +46,8 @@ def run_scanned(
     worst = 0
     for experiment in experiments:
         with SweepProgress() as watching:
-            result = workflow.sweep(scanned(experiment, scan), out=out, force=force, observer=watching)
+            motion = experiment if experiment.config.fit is None else experiment.having(["fit="])
+            result = workflow.sweep(scanned(motion, scan), out=out, force=force, observer=watching)
         worst = worst or _print(result, as_json)
     return worst
 

@@ -12,7 +12,8 @@ from rich.progress import BarColumn, Progress, TextColumn
 from rigidsim.cli.screens.page import Page, Styled
 from rigidsim.scene.sweeps.sweep import Sweep
 from rigidsim.session.progress import clock_text
-from rigidsim.store.sweeps.run import SavedSweep
+from rigidsim.store.sweeps.run import FittedOfMembers, SavedSweep
+from rigidsim.workflows.fit.result import digits_text
 from rigidsim.workflows.sweeps.plan import SweepPlan
 from rigidsim.workflows.sweeps.sweep import SweepObserver
 
@@ -102,8 +103,13 @@ def print_sweep(result: SavedSweep) -> None:
     assert cost is not None
     engines = ", ".join(f"{n:,} {_ENGINES.get(engine, engine)}" for engine, n in told.engines.items())
     errors = f", {cost.estimate_cpu_seconds:.3g} s of them for errors" if cost.estimate_cpu_seconds else ""
-    spent = f"{cost.steps:,} steps, {cost.cpu_seconds:.3g} s of CPU in {cost.tiles:,} blocks of members"
+    steps = "" if _FITS in told.engines else f"{cost.steps:,} steps, "
+    spent = f"{steps}{cost.cpu_seconds:.3g} s of CPU in {cost.tiles:,} blocks of members"
     on.line("cost", f"{spent} ({engines}){errors}")
+    if told.fitted:
+        on.table(
+            ["parameter", "median", "spread", "sigma", ""], [_fitted(*row) for row in told.fitted.items()]
+        )
     if told.why_alone is not None and told.engines.get("alone"):
         on.line("", _one_by_one(told.why_alone))
     for name, error in told.estimated_errors.items():
@@ -117,10 +123,19 @@ def print_sweep(result: SavedSweep) -> None:
     for text in told.warnings:
         on.line("warning", text, "yellow")
     on.line("next", f"rigidsim plot {place}")
-    on.line("", f"rigidsim view {place} --member 0")
+    if _FITS not in told.engines:
+        on.line("", f"rigidsim view {place} --member 0")
     on.line("", f"rigidsim export {place} --format csv")
 
 
+def _fitted(key: str, one: FittedOfMembers) -> list[Styled]:
+    """What fits found of one parameter: between members, and by their own sigmas."""
+    sigma = "undetermined" if one.sigma is None else f"{one.sigma:.2g}"
+    unit = "" if one.unit == "1" else one.unit
+    return [key, digits_text(one.median, one.sigma or 0.0), f"{one.spread:.2g}", sigma, unit]
+
+
+_FITS = "fits"
 _ENGINES = {"alone": "one by one"}
 _CURES = {
     "asked": "[sweep] batch = false says so: leave it out, and they run four or eight at once",

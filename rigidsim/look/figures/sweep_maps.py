@@ -17,6 +17,7 @@ from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 
 from rigidsim.look.figures import sweep_axes
+from rigidsim.look.figures.fitted_members import fitted_members_figure, holds_fits
 from rigidsim.look.figures.style import GREY, MOST_VECTOR_POINTS, PALE, PALETTE, STYLE, blank, key, titled
 from rigidsim.look.figures.sweep_axes import along, label_of, named, title_of, value_text
 from rigidsim.look.figures.sweep_units import in_units, tells_nothing
@@ -85,9 +86,13 @@ def save_sweep_figure(dataset: xarray.Dataset, path: Any, what: str | None, *, f
 def sweep_figure(dataset: xarray.Dataset, what: str | None = None) -> Figure:
     """A sweep's page: one variable over its axes, by its name, with ``[INDEX]`` for one component; by default
     the first indicator, else the first time of an event, else a secular rate, else the first quantity kept
-    that isn't the same in all members. Times are in the scene's unit, angles in a readable one.
+    that isn't the same in all members; of fits what they estimated. Times are in the scene's unit, angles in
+    a readable one.
     ``ValueError`` names the variables there are where there is none of that name.
     """
+    if what is None and holds_fits(dataset):
+        with rc_context(STYLE):  # type: ignore[arg-type]
+            return fitted_members_figure(dataset)
     names = drawable(dataset)
     name, bracket, index = (what or default_of(dataset)).partition("[")
     if name not in names or (bracket and not index.removesuffix("]").isdigit()):

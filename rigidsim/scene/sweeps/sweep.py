@@ -1,6 +1,7 @@
 """A sweep: the members of ``[sweep]``, each a single experiment identified by its exact values."""
 
 import math
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from dataclasses import replace as exchanged
@@ -15,6 +16,8 @@ from rigidsim.scene.sweeps.values import axis_values
 from rigidsim.scene.toml_text import apply_overrides, key_steps, parse_toml
 
 MOST_MEMBERS = 100_000_000
+FITS = "fit"
+"""What is kept of a sweep whose members are fits."""
 _ASKED = either("is asked for with rigidsim run --sweep KEY=SPEC", "changes={'sweep': {...}} adds one")
 _SAME_FOR_ALL = {
     "name": "the sweep has one name",
@@ -65,6 +68,8 @@ class Sweep:
                 problems += [Problem(where, problem.what) for problem in error.problems]
         events = [event.name for event in experiment.config.events]
         problems += clashes(axes, events, product=table.mode == "product")
+        if experiment.config.fit is not None:
+            problems += _of_fits(table)
         if experiment.config.output.sensitivity:
             what = "given beside [sweep], which keeps none; leave it out, or run its members by themselves"
             problems.append(Problem("[output] sensitivity", what))
@@ -76,9 +81,15 @@ class Sweep:
 
     @property
     def table(self) -> SweepTable:
-        """``[sweep]`` as it stands in the config."""
-        assert self.experiment.config.sweep is not None
-        return self.experiment.config.sweep
+        """``[sweep]`` as it stands in the config; of fits it keeps these."""
+        table = self.experiment.config.sweep
+        assert table is not None
+        return table.model_copy(update={"keep": [FITS]}) if self.fits else table
+
+    @property
+    def fits(self) -> bool:
+        """Whether each member is a fit, by the config's ``[fit]``, rather than a run."""
+        return self.base.config.fit is not None
 
     @property
     def product(self) -> bool:
@@ -173,6 +184,19 @@ class Sweep:
             return f"{problem.where}: {problem.what}"
         names = ", ".join(f'"{name}"' for name in self.table.keep if name in INDICATORS)
         return f"[sweep] keep: given {names}: {problem.what.removeprefix(added)}"
+
+
+def _of_fits(table: SweepTable) -> list[Problem]:
+    """What a sweep of fits can't have."""
+    problems = []
+    if "keep" in table.model_fields_set:
+        what = "given beside [fit]: each member is a fit, and what it finds is kept; leave keep out"
+        problems.append(Problem("[sweep] keep", what))
+    for key in table.axes:
+        if re.fullmatch(r"\s*fit\s*(\.\s*parameters\b.*)?", key):
+            what = "can't be swept: all members estimate the same parameters"
+            problems.append(Problem(f'[sweep] axes."{key[:60]}"', what))
+    return problems
 
 
 def _plain_key(key: str) -> str:

@@ -21,6 +21,7 @@ _GZIP = 4
 _BOX_NUMBERS = 1 << 22  # numbers of a variable that are gathered at once: 32 MB
 _CHUNK_NUMBERS = 1 << 17
 _SAMPLES = "sample"
+_UNIT = "_unit"
 
 RESERVED = {
     *LABELS,
@@ -36,6 +37,21 @@ RESERVED = {
     *("failed", "failed_member", "failed_reason", "lyapunov", "megno", "fli", "line"),
 }
 """Names that an axis can't have."""
+OF_FITS = {
+    *("parameter", "parameter_unit", "other_parameter", "value", "sigma", "scaled_sigma", "covariance"),
+    *(
+        "start",
+        "converged",
+        "undetermined",
+        "chi_square",
+        "freedom",
+        "scale",
+        "rows",
+        "outliers",
+        "evaluations",
+    ),
+}
+"""Names that an axis can't have in a sweep of fits."""
 SUFFIXES = ("_final", "_min", "_max", "_mean", "_largest", "_time", "_times", "_count", "_first", "_lo")
 """Suffixes of the names of variables that are kept."""
 
@@ -116,14 +132,15 @@ def _declared(
         if name == "time" and found.times is not None:
             continue
         dims = [samples if dim == _SAMPLES else dim for dim in described.variable.dims]
+        known = {**labelled, **described.variable.labels}
         for dim, size in zip(dims, described.extra, strict=True):
-            if dim in labelled:
-                file.labels(dim, labelled[dim])
+            if dim in known:
+                file.labels(dim, known[dim])
             else:
                 file.dimension(dim, size)
         attributes = {k: v for k, v in described.variable.attributes.items() if v is not None}
-        if beside:
-            attributes["coordinates"] = beside
+        if more := " ".join(filter(None, [beside, *_labels(file, described)])):
+            attributes["coordinates"] = more
         chunk = chunk_shape(sweep.shape, described.extra)
         small = math.prod(sweep.shape) * math.prod(described.extra) < 512
         variable = file.variable(
@@ -132,6 +149,15 @@ def _declared(
         )  # fmt: skip
         created[name] = (variable, described)
     return created
+
+
+def _labels(file: NetcdfFile, described: Described) -> list[str]:
+    """Write a variable's own labels; returns the names of those that are no dimensions."""
+    own = described.variable.labels
+    for name, texts in own.items():
+        if name.endswith(_UNIT):
+            file.texts_once(name, name.removesuffix(_UNIT), texts)
+    return [name for name in own if name.endswith(_UNIT)]
 
 
 def chunk_shape(members: Sequence[int], extra: Sequence[int]) -> tuple[int, ...]:

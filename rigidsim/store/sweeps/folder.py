@@ -32,6 +32,8 @@ class SweepFolder(WorkFolder):
 
     tiles = FileOf("tiles")
     """Folder of generations and their tiles."""
+    data = FileOf("data")
+    """Folder with copies of the data of a sweep of fits."""
 
     @property
     def is_sweep(self) -> bool:
@@ -119,7 +121,7 @@ class SweepFolder(WorkFolder):
 
     def begin(self, *, force: bool) -> None:
         """Make the folder ready; RunFolderError if it holds something else, or can't be written."""
-        ours = ["config.toml", "tiles", "dataset.h5", "summary.json"]
+        ours = ["config.toml", "tiles", "data", "dataset.h5", "summary.json"]
         try:
             present = self.content([*ours, *(path.name for path in self.path.glob("figure*"))])
             self.path.mkdir(parents=True, exist_ok=True)
@@ -129,15 +131,16 @@ class SweepFolder(WorkFolder):
             if force:
                 for path in (self.summary, self.dataset, self.config):
                     path.unlink(missing_ok=True)
-                if self.tiles.exists():
-                    shutil.rmtree(self.tiles)
+                for folder in (self.tiles, self.data):
+                    if folder.exists():
+                        shutil.rmtree(folder)
             self.remove_torn()
         except OSError as error:
             raise self.unwritable(error) from None
 
     def remove_torn(self) -> None:
         """Delete partial files that killed processes were writing."""
-        for folder in (self.path, self.tiles):
+        for folder in (self.path, self.tiles, self.data):
             for path in folder.glob(".*.partial"):
                 if not _alive(path):
                     path.unlink(missing_ok=True)

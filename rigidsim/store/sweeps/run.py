@@ -42,6 +42,18 @@ class ErrorsOfMembers(SummaryPart):
     units: str
 
 
+class FittedOfMembers(SummaryPart):
+    """A number that each of these ``members`` of a sweep of fits estimated: median and standard deviation of
+    the values, and the median of the fits' own sigmas (None if it is undetermined), in ``unit``.
+    """
+
+    members: int
+    median: float
+    spread: float
+    sigma: float | None
+    unit: str
+
+
 class SweepSummary(SummaryPart):
     """Contents of a sweep's ``summary.json``; of an unfinished one, what its tiles tell.
 
@@ -52,6 +64,7 @@ class SweepSummary(SummaryPart):
         outcomes, warned: number of members by how they ended, and by what they are warned of.
         engines: number of members by what ran them.
         why_alone: code of the reason why members were run one by one.
+        fitted: by key what fits estimated.
         mixed_provenance: what differs between tiles, if anything.
     """
 
@@ -79,6 +92,7 @@ class SweepSummary(SummaryPart):
     cost: SweepCost | None = None
     largest_drifts: dict[str, float] = Field(default_factory=dict)
     estimated_errors: dict[str, ErrorsOfMembers] = Field(default_factory=dict)
+    fitted: dict[str, FittedOfMembers] = Field(default_factory=dict)
     config_sha256: str = ""
     provenance: dict[str, str] = Field(default_factory=dict)
     mixed_provenance: str | None = None

@@ -7,7 +7,7 @@ was new. A tile holds the results of some members: sealed, written once, and rea
 import hashlib
 import io
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -139,13 +139,15 @@ class Generation:
 @dataclass(frozen=True)
 class KeptVariable:
     """One variable for some members, (members, ...) float64 or int64: its dimensions besides theirs, and the
-    item of ``[sweep] keep`` that it is of.
+    item of ``[sweep] keep`` that it is of; labels of dimensions that no other variable has, by name, and
+    as ``NAME_unit`` the units of what they name.
     """
 
     dims: tuple[str, ...]
     values: np.ndarray
     attributes: Mapping[str, Any] = field(default_factory=dict)
     item: str = ALWAYS
+    labels: Mapping[str, Sequence[str]] = field(default_factory=dict)
 
 
 Kept = dict[str, KeptVariable]
@@ -168,6 +170,7 @@ class Tile:
         """The sealed file's bytes."""
         described = {
             name: {"dims": list(v.dims), "attributes": dict(v.attributes), "item": v.item}
+            | ({"labels": dict(v.labels)} if v.labels else {})
             for name, v in self.kept.items()
         }
         buffer = io.BytesIO()
@@ -200,7 +203,8 @@ def read_tile(path: Path, config_sha256: str) -> Tile:
             for name, v in json.loads(file.attrs["variables"]).items():
                 empty = np.zeros((len(members), *(0 for _ in v["dims"])))
                 values = np.asarray(held[name][()]) if name in held else empty
-                kept[name] = KeptVariable(tuple(v["dims"]), values, v["attributes"], v["item"])
+                labels = v.get("labels", {})
+                kept[name] = KeptVariable(tuple(v["dims"]), values, v["attributes"], v["item"], labels)
             tile = Tile(
                 str(file.attrs["config_sha256"]),
                 members,

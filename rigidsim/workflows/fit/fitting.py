@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from rigidsim.errors import ConfigError, Problem, RigidsimError, RunFolderError
+from rigidsim.errors import SWEEP, ConfigError, Problem, RigidsimError, RunFolderError, either
 from rigidsim.scene.config import Experiment
 from rigidsim.store import atomic
 from rigidsim.workflows.compare.saving import save_dataset
@@ -18,7 +18,7 @@ from rigidsim.workflows.fit.folder import FitFolder, Remembered
 from rigidsim.workflows.fit.keys import FitKeys
 from rigidsim.workflows.fit.observed import Observed, observing
 from rigidsim.workflows.fit.predictions import ByDifferences, ByTangents, Predictor
-from rigidsim.workflows.fit.readings import Readings, read_readings
+from rigidsim.workflows.fit.readings import DataFiles, Readings, files_beside, read_readings
 from rigidsim.workflows.fit.result import FitResult
 from rigidsim.workflows.fit.searching import search
 from rigidsim.workflows.fit.weighing import Weighing
@@ -58,14 +58,11 @@ def fit(
     """
     asked = as_experiment(experiment, changes)
     _refuse(asked)
-    assert asked.config.fit is not None
-    source = Path(asked.source)
-    beside = source.parent if source.is_file() else Path()
-    places = [beside / data.file for data in asked.config.fit.data]
+    places = files_beside(asked)
     if out is None:
-        return _fitted(asked, places, None, told or _silent)
+        return fit_to(asked, places, told=told)
     folder = FitFolder(Path(out) / asked.config.name)
-    missing = [path for path in places if not path.exists()]
+    missing = [path for files in places for path in files.all if not path.exists()]
     if missing:
         raise RigidsimError(f"{missing[0]}: there is no such file; [[fit.data]] files lie beside the config")
     with folder.locked():
@@ -91,14 +88,14 @@ def resume_fit(path: str | Path, *, told: Told | None = None) -> FitResult:
 def fit_again(folder: FitFolder, *, told: Told | None = None) -> FitResult:
     """The fit of a folder made again from its own copies, without writing anything."""
     experiment = load(folder.config)
-    return _fitted(experiment, folder.copies(experiment), None, told or _silent)
+    return fit_to(experiment, folder.copies(experiment), told=told)
 
 
 def _kept(experiment: Experiment, folder: FitFolder, told: Told) -> FitResult:
     """Fit, and write the results."""
     from rigidsim.look.figures.fitted import save_fitted
 
-    result = _fitted(experiment, folder.copies(experiment), folder.evaluations, told)
+    result = fit_to(experiment, folder.copies(experiment), folder.evaluations, told=told)
     save_dataset(result.dataset, folder.dataset)
     atomic.write_bytes(folder.fitted, result.experiment.text.encode())
     with atomic.replacing(folder.figure) as temporary:
@@ -118,13 +115,21 @@ def _refuse(experiment: Experiment) -> None:
     if config.fit is None:
         problems.append(Problem("[fit]", "missing; it names parameters and data, see docs/fits.md"))
     if config.sweep is not None:
-        problems.append(Problem("[sweep]", "a fit takes a single experiment; remove [sweep]"))
+        one = either("--member N", "[sweep] removed")
+        what = f"asks for many fits, which {SWEEP} makes; with {one} here it is a single one"
+        problems.append(Problem("[sweep]", what))
     if problems:
         raise ConfigError(problems, experiment.source)
 
 
-def _fitted(experiment: Experiment, places: list[Path], memory: Path | None, told: Told) -> FitResult:
-    """Fit by data in given files; predictions are kept in ``memory``."""
+def fit_to(
+    experiment: Experiment, places: list[DataFiles], memory: Path | None = None, *, told: Told | None = None
+) -> FitResult:
+    """Fit by data in given files; predictions are kept in a folder ``memory``.
+
+    Raises:
+        ConfigError, RigidsimError: as for ``fit``.
+    """
     keys = FitKeys(experiment)
     assert experiment.config.fit is not None
     with ExitStack() as stack:
@@ -143,7 +148,7 @@ def _fitted(experiment: Experiment, places: list[Path], memory: Path | None, tol
         times = np.linspace(float(keys.scene.start), float(keys.scene.samples.last), _ALONG_ROWS)
         kept = predictor if memory is None else Remembered(predictor, memory)
         weighing = Weighing(keys, readings, kept, times)
-        found = search(weighing, experiment.config.fit.starts, told)
+        found = search(weighing, experiment.config.fit.starts, told or _silent)
         notes = list(dict.fromkeys(text for one in readings for text in one.told))
         findings = Findings(experiment.config.name, keys, weighing, found, predictor.how, notes)
         return findings.result(weighing.along(found.ended.values), times)

@@ -24,6 +24,7 @@ from rigidsim.store import atomic
 from rigidsim.store.fits import BEGUN
 from rigidsim.store.folder import FileOf, WorkFolder
 from rigidsim.workflows.fit.predictions import Prediction, Predictor
+from rigidsim.workflows.fit.readings import DataFiles
 from rigidsim.workflows.fit.result import KIND, FitResult
 from rigidsim.workflows.fit.seen import FittedRun, fitted_run
 from rigidsim.workflows.read import load
@@ -70,19 +71,21 @@ class FitFolder(WorkFolder):
         """Whether its results are there."""
         return self.summary.is_file() and self.is_fit
 
-    def begin(self, experiment: Experiment, sources: Sequence[Path], *, force: bool) -> None:
+    def begin(self, experiment: Experiment, sources: Sequence[DataFiles], *, force: bool) -> None:
         """Begin a fit, or go on with the same one.
 
         Raises:
             RunFolderError: another fit, or something else, is there.
         """
         there = self.content(_NAMES)
-        now = {
+        now: dict[str, Any] = {
             "kind": KIND,
             "text_sha256": hashlib.sha256(experiment.text.encode()).hexdigest(),
-            "data_sha256": [digest(path) for path in sources],
+            "data_sha256": [digest(files.file) for files in sources],
             "versions": versions(),
         }
+        if any(files.kernels for files in sources):
+            now["kernels_sha256"] = kernel_digests(sources)
         if there and not force:
             if self.finished:
                 raise RunFolderError(
@@ -99,8 +102,9 @@ class FitFolder(WorkFolder):
             shutil.rmtree(path) if path.is_dir() else path.unlink()
         self.data.mkdir()
         self.evaluations.mkdir()
-        for number, path in enumerate(sources, start=1):
-            atomic.write_bytes(self.copy(number, path.name), _content(path))
+        for files, copies in zip(sources, self.copies(experiment), strict=True):
+            for path, copy in zip(files.all, copies.all, strict=True):
+                atomic.write_bytes(copy, content(path))
         atomic.write_bytes(self.config, experiment.text.encode())
         atomic.write_bytes(self.begun, json.dumps(now, indent=2).encode())
 
@@ -130,15 +134,21 @@ class FitFolder(WorkFolder):
             raise RunFolderError(f"{self.dataset}: can't be read ({error})") from None
         return fitted_run(load(self.fitted), fit, str(self.path))
 
-    def copy(self, number: int, name: str) -> Path:
-        """Where the data of a ``[[fit.data]]`` are kept."""
-        suffix = Path(name).suffix or ".h5"  # the folder of a run is kept as its dataset
-        return self.data / f"{number}_{Path(name).stem}{suffix}"
-
-    def copies(self, experiment: Experiment) -> list[Path]:
+    def copies(self, experiment: Experiment) -> list[DataFiles]:
         """The kept data of a config."""
         assert experiment.config.fit is not None
-        return [self.copy(n, Path(x.file).name) for n, x in enumerate(experiment.config.fit.data, start=1)]
+        return [
+            DataFiles(
+                self._copy(f"{number}", table.file),
+                tuple(self._copy(f"{number}_{k}", name) for k, name in enumerate(table.kernels, start=1)),
+            )
+            for number, table in enumerate(experiment.config.fit.data, start=1)
+        ]
+
+    def _copy(self, number: str, given: str) -> Path:
+        name = Path(given).name
+        suffix = Path(name).suffix or ".h5"  # the folder of a run is kept as its dataset
+        return self.data / f"{number}_{Path(name).stem}{suffix}"
 
 
 class Remembered:
@@ -187,10 +197,16 @@ def versions() -> dict[str, str]:
     }  # fmt: skip
 
 
-def _content(path: Path) -> bytes:
+def content(path: Path) -> bytes:
+    """Bytes of a file, or of the dataset of a run's folder."""
     return (path / "dataset.h5" if path.is_dir() else path).read_bytes()
 
 
 def digest(path: Path) -> str:
     """SHA-256 of a file, or of the dataset of a run's folder."""
-    return hashlib.sha256(_content(path)).hexdigest()
+    return hashlib.sha256(content(path)).hexdigest()
+
+
+def kernel_digests(sources: Sequence[DataFiles]) -> list[list[str]]:
+    """SHA-256 of the kernels that each file is read with."""
+    return [[digest(path) for path in files.kernels] for files in sources]

@@ -8,21 +8,57 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 
 from rigidsim.errors import ConfigError, Problem, RigidsimError
-from rigidsim.formats.observations import Observations, read_observations
+from rigidsim.formats import ck_reading
+from rigidsim.formats.observations import Observations, read_attitudes, read_observations
+from rigidsim.scene.config import Experiment
 from rigidsim.scene.epochs import Epoch
 from rigidsim.scene.exact import parse_number, parse_quantity
 from rigidsim.scene.fit_table import FitDataTable
+from rigidsim.scene.frame import ECLIPTIC, EQUATOR, OBLIQUITY, SpaceAxes
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.units import UnitError, conversion
-from rigidsim.workflows.compare.rotations import SEQUENCES, normalised, of_euler
+from rigidsim.workflows.compare.rotations import SEQUENCES, conjugated, multiplied, normalised, of_euler
 from rigidsim.workflows.fit.observed import EULER_ANGLES, QUATERNION, Observed
 
+_META = b"KPL/MK"
 _NORM = 1e-2  # by which the norm of a quaternion may differ from 1
+
+
+@dataclass(frozen=True)
+class DataFiles:
+    """Where the file of a ``[[fit.data]]`` is, and the kernels that it is read with, if it is a CK."""
+
+    file: Path
+    kernels: tuple[Path, ...] = ()
+
+    @property
+    def all(self) -> tuple[Path, ...]:
+        """The file, then the kernels."""
+        return (self.file, *self.kernels)
+
+    @property
+    def of_kernels(self) -> bool:
+        """Whether the file is a CK."""
+        return bool(self.kernels) or self.file.suffix.lower() == ck_reading.SUFFIX
+
+
+def folder_of(experiment: Experiment) -> Path:
+    """Where the data of a config lie: beside it, or in the working directory where it comes from no file."""
+    source = Path(experiment.source)
+    return source.parent if source.is_file() else Path()
+
+
+def files_beside(experiment: Experiment) -> list[DataFiles]:
+    """The data of a config where they lie."""
+    assert experiment.config.fit is not None
+    beside = folder_of(experiment)
+    tables = experiment.config.fit.data
+    return [DataFiles(beside / x.file, tuple(beside / one for one in x.kernels)) for x in tables]
 
 
 @dataclass(frozen=True)
@@ -54,14 +90,40 @@ class Readings:
         return f"{self.quantity.text} (data {self.number})"
 
 
-def read_readings(number: int, table: FitDataTable, quantity: Observed, scene: Scene, path: Path) -> Readings:
-    """Read the file of a table of ``[[fit.data]]``, which is at a path.
+def read_readings(
+    number: int, table: FitDataTable, quantity: Observed, scene: Scene, files: DataFiles
+) -> Readings:
+    """Read the data of a table of ``[[fit.data]]``, which are in these files.
 
     Raises:
         ConfigError: a key of the table doesn't suit. RigidsimError: a row of the file can't be used.
     """
-    found = read_observations(path)
-    return _ReadTable(number, table, quantity, scene, found, path).made()
+    if files.of_kernels:
+        found = _attitudes(number, table, quantity, scene, files)
+    else:
+        found = read_observations(files.file)
+    return _ReadTable(number, table, quantity, scene, found, files.file).made()
+
+
+def _attitudes(
+    number: int, table: FitDataTable, quantity: Observed, scene: Scene, files: DataFiles
+) -> Observations:
+    """The rows of a CK, which holds dates, and attitudes relative to J2000."""
+    problem = ""
+    if scene.epoch is None:
+        problem = f"{table.file} is a CK, which holds dates; give the date of time 0 as [time] epoch"
+    elif quantity.rotation and scene.axes is None:
+        allowed = ", ".join(f'"{name}"' for name in get_args(SpaceAxes))
+        problem = f"{table.file} is a CK, whose attitudes are relative to J2000; say by [frame] axes what "
+        problem += f"the space axes of the config are: {allowed}"
+    for given, path in zip(table.kernels, files.kernels, strict=True):
+        if path.is_file() and path.read_bytes().startswith(_META):
+            problem = f"{given} is a meta-kernel, whose paths a fit's copies don't have; list its kernels"
+    if problem:
+        raise ConfigError(Problem(f"[[fit.data]] number {number} file", problem))
+    assert scene.epoch is not None
+    axes = ECLIPTIC if scene.axes == ECLIPTIC else EQUATOR
+    return read_attitudes(files.file, files.kernels, scene.epoch, axes)
 
 
 class _ReadTable:
@@ -120,6 +182,8 @@ class _ReadTable:
     def _values(self) -> np.ndarray:
         components = self.quantity.components
         names = self.table.columns or [*components]
+        if self.table.columns is None and self.quantity.form == QUATERNION and any(self.found.frames):
+            names = ["qw", "qx", "qy", "qz"]
         if len(names) != len(components):
             raise self.fault(
                 "columns",
@@ -143,12 +207,32 @@ class _ReadTable:
                     f"{self.found.source}: {self.found.rows[bad[0]]}: a quaternion of norm "
                     f"{norms[bad[0]]:.6g}; norms within 0.01 of 1 are allowed: mend or remove these rows"
                 )
-            return normalised(values)
+            return self._in_space(normalised(values))
         if self.quantity.form == EULER_ANGLES:
             sequence = self.scene.config.integrator.euler_sequence
             assert sequence in SEQUENCES
             return of_euler(sequence, values)
         return values
+
+    def _in_space(self, quaternions: np.ndarray) -> np.ndarray:
+        """Attitudes of a message between the frames that it names, as those to the config's space axes; its
+        quaternion from space to body axes is that of the turn from body coordinates to space coordinates.
+        """
+        first, last = self.found.frames
+        known = get_args(SpaceAxes)
+        if last in known and first not in known:
+            first, quaternions = last, conjugated(quaternions)
+        axes = self.scene.axes
+        if first == axes or not first:
+            return quaternions
+        if first not in known or axes is None:
+            what = f'{self.table.file} turns from "{first}" to "{last}", and the config\'s space axes are '
+            what += f'"{axes}"' if axes else "not named; say by [frame] axes what they are"
+            raise self.fault("file", f"{what}: attitudes from one of {', '.join(known)} are allowed")
+        if ECLIPTIC not in (first, axes):
+            return quaternions  # within 0.03 arcsec of each other
+        half = float(OBLIQUITY) / 2 * (-1 if axes == ECLIPTIC else 1)
+        return multiplied(np.array([[np.cos(half), np.sin(half), 0.0, 0.0]]), quaternions)
 
     def _si(self, unit: str) -> float:
         """Factor to SI for an expression, whose dimension isn't known."""

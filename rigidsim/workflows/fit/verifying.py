@@ -12,7 +12,8 @@ import xarray
 
 from rigidsim.errors import RunFolderError
 from rigidsim.workflows.fit.fitting import fit_again
-from rigidsim.workflows.fit.folder import FitFolder, digest, versions
+from rigidsim.workflows.fit.folder import FitFolder, digest, kernel_digests, versions
+from rigidsim.workflows.read import load
 
 
 @dataclass(frozen=True)
@@ -47,6 +48,9 @@ def verify_fit(path: str | Path, *, told: Callable[[str], None] | None = None) -
     for source, known in zip(again.data, begun["data_sha256"], strict=True):
         if source.sha256 != known:
             problems.append(f"data {source.number}: not the bytes that the fit was made from")
+    kernels = kernel_digests(folder.copies(load(folder.config)))
+    if begun.get("kernels_sha256", kernels) != kernels:
+        problems.append("kernels: not the bytes that the fit was made from")
     if again.experiment.text != folder.fitted.read_text(encoding="utf-8"):
         problems.append(f"{folder.fitted.name}: other values than those fitted again")
     if digest(folder.config) != begun["text_sha256"]:

@@ -11,7 +11,7 @@ import numpy as np
 
 from rigidsim.accuracy.estimates.members import MemberErrors, MemberEstimates
 from rigidsim.errors import ConfigError
-from rigidsim.scene.sweeps.sweep import Sweep
+from rigidsim.scene.sweeps.sweep import FITS, Sweep
 from rigidsim.session.dataset import dataset_variables
 from rigidsim.session.kept import MemberSeries, Points, kept_events, kept_of_series
 from rigidsim.session.members import (
@@ -59,6 +59,8 @@ class Batched:
 
 def why_alone(sweep: Sweep, keep: Sequence[str]) -> str:
     """Code of the reason why no member of a sweep can run in a batch; empty if some may."""
+    if sweep.fits:
+        return FITS
     for item in _ONE_BY_ONE:
         if item in keep:
             return item

@@ -96,11 +96,15 @@ def hidden_of(sweep: Sweep) -> tuple[str, ...]:
     return () if asked is not None and GROWTH in asked else (GROWTH,)
 
 
-def tile_image(config: str, members: Sequence[int], keep: Sequence[str], apart: bool | None) -> bytes:
-    """Run members of a sweep's config and keep items (``items_of``): the sealed file of their tile."""
+def tile_image(
+    config: str, members: Sequence[int], keep: Sequence[str], apart: bool | None, data: str = ""
+) -> bytes:
+    """Run members of a sweep's config and keep items (``items_of``): the sealed file of their tile; ``data``:
+    the folder of what members are fitted to.
+    """
     began, cpu = time.perf_counter(), time.process_time()
     sweep = sweep_of(config)
-    results = run_members(sweep, members, [plain(item) for item in keep], apart)
+    results = run_members(sweep, members, [plain(item) for item in keep], apart, Path(data))
     made = {
         "engines": dict(results.engines),
         "why_alone": results.why_alone,
@@ -122,9 +126,20 @@ def tile_image(config: str, members: Sequence[int], keep: Sequence[str], apart: 
 
 
 def run_members(
-    sweep: Sweep, members: Sequence[int], keep: Sequence[str], apart: bool | None = None
+    sweep: Sweep,
+    members: Sequence[int],
+    keep: Sequence[str],
+    apart: bool | None = None,
+    data: Path | None = None,
 ) -> MemberResults:
-    """Run some members of a sweep and keep the items asked for; ``apart``: see ``Generation``."""
+    """Run some members of a sweep and keep the items asked for; ``apart``: see ``Generation``; ``data``: the
+    folder of what they are fitted to, if they are.
+    """
+    if sweep.fits:
+        from rigidsim.workflows.sweeps.fits import fit_members  # which few sweeps need
+
+        assert data is not None
+        return fit_members(sweep, members, data)
     events = [event.name for event in sweep.base.config.events]
     most = sweep.table.most_events
     more = frequencies_of if "frequencies" in keep else None

@@ -13,7 +13,8 @@ from rigidsim.session.dataset import dataset_variables, refuse_taken_names
 from rigidsim.solve.batch.lanes import recommended_width
 from rigidsim.solve.problem import InitialValueProblem, prepare
 from rigidsim.store.summary_parts import SummaryPart
-from rigidsim.store.sweeps.dataset import RESERVED, SUFFIXES
+from rigidsim.store.sweeps.dataset import OF_FITS, RESERVED, SUFFIXES
+from rigidsim.workflows.fit.keys import FitKeys
 from rigidsim.workflows.plan import RunPlan, plan
 from rigidsim.workflows.sweeps.batch import why_alone
 from rigidsim.workflows.sweeps.members import batches_of, first_possible, markable, recording
@@ -41,6 +42,8 @@ whoever has the last one. A tile itself, with its file, costs about 10 ms.
 _LARGEST_TILE = 8192
 _FEW = 64
 _TILES_OF_FEW = 16
+_TILES_OF_FITS = 1000  # at most twice as many: each fit takes a second or more
+_RUNS_OF_A_FIT = 15  # so long a fit takes, in runs (experiments/fit_cost.py)
 _LARGEST_TILE_BYTES = 64e6
 _BUILD_SECONDS = 0.2  # seconds to compile equations for each member that runs by itself
 _BATCH_SECONDS = 2e-5  # seconds of overhead per member of a batch besides its integration
@@ -73,7 +76,7 @@ def check_sweep(sweep: Sweep, *, every: bool = True, each: Each = map) -> Initia
             errors, _ = batches_of(sweep.experiment.text).refused(refused)
             told = [sweep.blamed(member, errors[member]) for member in refused if member in errors]
             problems = [problem for error in told for problem in error.problems]
-        if not problems and accepted < sweep.count <= _ALL and every:
+        if not problems and accepted < sweep.count <= _ALL and every and not sweep.fits:
             problems = _worked_out(sweep, _FEWER, equations=True)
     if len(problems) >= _MOST_TOLD:
         problems.append(Problem("[sweep]", "there may be more members of this kind; these came first"))
@@ -88,7 +91,9 @@ def _worked_out(sweep: Sweep, most: int, *, equations: bool = False) -> list[Pro
     for member in _tried(sweep, most):
         try:
             experiment = sweep.worked_out(member)
-            if equations:
+            if sweep.fits:
+                FitKeys(experiment)
+            elif equations:
                 prepare(experiment)
             else:
                 check_start(build_scene(experiment))
@@ -134,7 +139,7 @@ def _tried(sweep: Sweep, most: int) -> Iterator[int]:
 
 def _refuse_names(sweep: Sweep) -> None:
     states = [table.name for table in sweep.base.config.states]
-    taken = RESERVED | {*OBSERVABLES, *states}
+    taken = RESERVED | {*OBSERVABLES, *states} | (OF_FITS if sweep.fits else set())
     problems = []
     for number, name in enumerate(states, start=1):
         if name in RESERVED or name.endswith(SUFFIXES):
@@ -159,7 +164,7 @@ def _refuse_what_none_has(sweep: Sweep) -> None:
 
 def refuse_untold_tiles(sweep: Sweep) -> None:
     """Refuse shares of tiles whose number depends on how fast a machine is."""
-    if sweep.table.tile is None and sweep.count > _FEW:
+    if sweep.table.tile is None and sweep.count > _FEW and not sweep.fits:
         length = max(_FEW, sweep.count // 1000)
         what = (
             f"missing, and {either('--tiles needs', 'tiles=(...) needs')} it: otherwise the number of tiles "
@@ -173,6 +178,8 @@ def tile_length(sweep: Sweep) -> int:
     """Number of members computed and saved at once: some seconds of work."""
     if sweep.table.tile is not None:
         return sweep.table.tile
+    if sweep.fits:
+        return max(1, sweep.count // _TILES_OF_FITS)
     if sweep.count <= _FEW:
         return max(1, -(-sweep.count // _TILES_OF_FEW))
     first = first_possible(sweep)
@@ -184,6 +191,8 @@ def tile_length(sweep: Sweep) -> int:
 def _member_seconds(sweep: Sweep, made: RunPlan) -> float:
     predicted = made.predicted
     seconds = predicted.integration_seconds + predicted.recording_seconds
+    if (fit := sweep.base.config.fit) is not None:
+        return fit.starts * _RUNS_OF_A_FIT * seconds + max(predicted.building_seconds, _BUILD_SECONDS)
     if why_alone(sweep, sweep.table.keep) or batches_of(sweep.experiment.text).apart is not None:
         beside = predicted.choosing_seconds + predicted.modelling_seconds
         return seconds + max(predicted.building_seconds, _BUILD_SECONDS) + beside
@@ -204,6 +213,8 @@ def _length(sweep: Sweep, seconds: float, size: float) -> int:
 
 def bytes_of_member(sweep: Sweep, prepared: InitialValueProblem) -> float:
     """Bytes of a member in the dataset before compression."""
+    if (fit := sweep.base.config.fit) is not None:
+        return 8.0 * (3 * len(fit.parameters) + 4) ** 2  # vectors among them, and what is said of each
     keep = sweep.table.keep
     variables = [v for v in dataset_variables(prepared) if v.name != "time"]
     recorded = [v for v in variables if "drift_of" not in v.attributes]
@@ -273,7 +284,7 @@ def plan_sweep(sweep: Sweep) -> SweepPlan:
     seconds, size = _member_seconds(sweep, made), bytes_of_member(sweep, first)
     length = sweep.table.tile
     if length is None:
-        length = tile_length(sweep) if sweep.count <= _FEW else _length(sweep, seconds, size)
+        length = tile_length(sweep) if sweep.fits or sweep.count <= _FEW else _length(sweep, seconds, size)
     axes = [
         PlannedAxis(
             name=axis.name,

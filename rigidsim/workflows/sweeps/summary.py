@@ -6,7 +6,8 @@ from rigidsim.scene.sweeps.sweep import Sweep
 from rigidsim.session.members import ENDED_WELL, OUTCOMES, WARNINGS
 from rigidsim.store.sweeps.run import ErrorsOfMembers, SweepCost, SweepSummary
 from rigidsim.store.sweeps.sources import Gathered, Sources, TileReader
-from rigidsim.store.sweeps.tiles import ALWAYS
+from rigidsim.store.sweeps.tiles import ALWAYS, Kept
+from rigidsim.workflows.sweeps.fits import fitted_of
 
 _DECIDING = ("version_", "cpu_model", "ephemeris_", "orientation_")  # what decides on bits
 _ERRORS = {
@@ -27,6 +28,7 @@ def summary_of(
     steps = 0
     worst: dict[str, float] = {}
     estimated: dict[str, list[np.ndarray]] = {name: [] for name in _ERRORS}
+    fits: list[tuple[Kept, np.ndarray]] = []
     always = sources.found[ALWAYS]
     order = np.argsort(always.tile, kind="stable")
     edges = np.flatnonzero(np.diff(always.tile[order])) + 1
@@ -34,6 +36,9 @@ def summary_of(
         tile, rows = reader.tile(int(always.tile[group[0]])), always.row[group]
         arrays = {name: variable.values[rows] for name, variable in tile.kept.items()}
         ended_as += np.bincount(arrays["status"], minlength=len(OUTCOMES))
+        if wanted.fits:
+            fits.append((tile.kept, rows))
+            continue
         bits = arrays["warnings"]
         warned_of += np.array([int((bits >> bit & 1).sum()) for bit in range(len(WARNINGS))])
         steps += int(arrays["steps"].sum())
@@ -53,6 +58,8 @@ def summary_of(
     if failing:
         said = f"{failing:,} members didn't end well; failed_member and failed_reason say which"
         warnings = {"members_failed": said, **warnings}
+    fitted, of_fits = fitted_of(fits)
+    warnings |= of_fits
     engines: dict[str, int] = {}
     for made in found.made:
         for engine, number in made["engines"].items():
@@ -68,7 +75,7 @@ def summary_of(
         name=wanted.experiment.config.name,
         description=wanted.experiment.config.description,
         status="finished",
-        message=f"all {wanted.count:,} members were run",
+        message=f"all {wanted.count:,} members were {'fitted' if wanted.fits else 'run'}",
         exit_code=0,
         members=wanted.count,
         shape=dict(zip(wanted.dims, wanted.shape, strict=True)),
@@ -100,6 +107,7 @@ def summary_of(
             for name, parts in estimated.items()
             if len(values := np.concatenate([np.zeros(0), *parts]))
         },
+        fitted=fitted,
         config_sha256=wanted.experiment.sha256,
         provenance=kinds[0] if kinds else {},
         mixed_provenance=mixed,

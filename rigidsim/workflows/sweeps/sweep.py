@@ -20,9 +20,11 @@ from rigidsim.store.sweeps.run import SavedSweep, open_sweep
 from rigidsim.store.sweeps.sources import TileReader, gather, sources_of
 from rigidsim.store.sweeps.tiles import Generation
 from rigidsim.store.variables import SCHEMA_VERSION
+from rigidsim.workflows.fit.readings import folder_of
 from rigidsim.workflows.read import Given, as_experiment, reads_kernels
 from rigidsim.workflows.sweeps.batch import why_alone
 from rigidsim.workflows.sweeps.cluster import Cluster
+from rigidsim.workflows.sweeps.fits import given_files, keep_data, refuse_other_data
 from rigidsim.workflows.sweeps.members import batches_of, recording, refuse_other_kernel, sweep_of
 from rigidsim.workflows.sweeps.plan import check_sweep, refuse_untold_tiles, tile_length
 from rigidsim.workflows.sweeps.summary import summary_of
@@ -61,6 +63,8 @@ def sweep(
 ) -> SavedSweep:
     """Run every member of a config's ``[sweep]``, and save them as one dataset in ``out/<name>/``.
 
+    Members of a config with ``[fit]`` are fits, by copies of their data in the folder.
+
     A folder that holds a part of the same sweep is completed; if axes are longer or more is kept than
     before, only what is new is computed.
 
@@ -77,7 +81,9 @@ def sweep(
 
     Raises:
         ConfigError: no sweep, or one of its members can't be run; nothing was written.
-        RunFolderError: the folder is in use, holds something else, or can't be written.
+        RunFolderError: the folder is in use, holds something else, or can't be written; or data of fits have
+            other contents than before.
+        RigidsimError: data of fits aren't there.
     """
     given = as_experiment(experiment, changes)
     if not isinstance(out, str | os.PathLike):
@@ -93,6 +99,7 @@ def sweep(
         way=_way(workers, scheduler),
         share=tiles,
         observer=observer or SweepObserver(),
+        beside=folder_of(given),
     )
 
 
@@ -134,12 +141,15 @@ def run_sweep(
     observer: SweepObserver,
     force: bool = False,
     share: tuple[int, int] | None = None,
+    beside: Path | None = None,
 ) -> SavedSweep:
-    """See ``sweep``."""
+    """See ``sweep``; ``beside``: where data of fits lie, None if the copies in the folder have to do."""
     if share is not None and force:
         raise RunFolderError(f"{FORCE} is for a sweep as a whole, and its tiles are computed by others, too")
     if share is not None and not folder.generations():
         refuse_untold_tiles(wanted)
+    files = given_files(wanted) if wanted.fits else []
+    refuse_other_data(files, beside, folder.data, anew=force)
     observer.checking(wanted)
     began, cpu = time.perf_counter(), time.process_time()
     if _complete(wanted, folder) and not force:
@@ -157,6 +167,9 @@ def run_sweep(
             if share is None:
                 folder.begin(force=force)
             _refuse_other(wanted, folder)
+            if beside is not None and files:
+                keep_data(files, beside, folder.data)
+            way.data = str(folder.data.absolute())
             for begun in folder.generations() if reads_kernels(wanted.base) else ():
                 for tile in folder.present(begun).nonzero()[0][:1].tolist():
                     made = folder.read(begun, tile).made

@@ -46,7 +46,7 @@ def verify_sweep(
         step = len(chosen) if together is None else together
         for begin in range(0, len(chosen), step):
             some = chosen[begin : begin + step]
-            again = run_members(sweep, some, sweep.table.keep, apart).kept
+            again = run_members(sweep, some, sweep.table.keep, apart, saved.folder.data).kept
             for name, place, there, here in _differences(dataset, sweep, some, again, held):
                 differing[name] = None
                 if first is None or some[place] < first.sample:

@@ -33,14 +33,22 @@ _MOST_DEATHS = 5
 _WATCH_SECONDS = 1.0
 
 
-def task(generation: Generation, tile: int) -> tuple[str, list[int], tuple[str, ...], bool | None]:
+def task(
+    generation: Generation, tile: int, data: str
+) -> tuple[str, list[int], tuple[str, ...], bool | None, str]:
     """Arguments of ``tile_image`` for a tile."""
     work, _ = generation.work_of(tile)
-    return generation.config, generation.members_of(tile).tolist(), work.keep, generation.apart
+    return generation.config, generation.members_of(tile).tolist(), work.keep, generation.apart, data
 
 
 class Way:
-    """Computes tiles; no bit depends on which way is used. This one does in this process, one by one."""
+    """Computes tiles; no bit depends on which way is used. This one does in this process, one by one.
+
+    Attributes:
+        data: folder of what members are fitted to, where they are fits.
+    """
+
+    data = ""
 
     def ready_for(self, sweep: Sweep) -> AbstractContextManager[object]:
         """Get ready for a sweep's tiles, beside whatever is still to be looked at before any is computed; at
@@ -57,7 +65,7 @@ class Way:
         if no more can be computed.
         """
         for tile in tiles:
-            yield tile, tile_image(*task(generation, tile))
+            yield tile, tile_image(*task(generation, tile, self.data))
 
 
 class Workers(Way):
@@ -115,7 +123,9 @@ class Workers(Way):
         while waiting or running:
             while waiting and len(running) < 2 * self._count:  # one task ahead for each worker
                 tile = waiting[-1]  # keeps waiting if the pool broke just now and takes no more
-                running[pool.submit(leave_tile, self._between / str(tile), *task(generation, tile))] = tile
+                running[
+                    pool.submit(leave_tile, self._between / str(tile), *task(generation, tile, self.data))
+                ] = tile
                 waiting.pop()
             done, _ = wait(running, timeout=0.5, return_when=FIRST_COMPLETED)
             if not done and not all(process.is_alive() for process in _processes(pool)):

@@ -1,0 +1,244 @@
+"""Fits to attitudes in SPICE's CK: rows at the kernel's own times, whatever its type, and from other axes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+import rigidsim
+from rigidsim.errors import ConfigError, RigidsimError
+from rigidsim.formats.ck_reading import read_rows
+from rigidsim.scene.epochs import parse_epoch
+from rigidsim.workflows.fit.verifying import verify_fit
+
+spiceypy = pytest.importorskip("spiceypy")
+
+OBJECT, CLOCK = -77000, -77
+EPOCH = "2029-04-13T21:46:00 TDB"
+AHEAD = parse_epoch(EPOCH).since_j2000()
+TICK = 2.0**-10  # s
+ATTITUDE, RATE = 1e-3, 1e-4  # sigmas, rad and rad/s
+TUMBLING = f"""
+name = "tumbling"
+[body]
+principal_moments = [1, 1.6, 2.2]
+[initial]
+angular_velocity = [0.02, 0.1, 0.05]
+quaternion = [0.5, 0.1, -0.7, 0.4]
+[frame]
+axes = "ecliptic J2000"
+[time]
+epoch = "{EPOCH}"
+end = 100
+samples = 51
+"""
+FIT = """
+[fit]
+parameters = ["initial.attitude", "initial.angular_velocity", "body.principal_moments[1]"]
+[[fit.data]]
+file = "seen.bc"
+kernels = ["clock.tsc"]
+observable = "quaternion"
+sigma = "1e-3 rad"
+"""
+RATES = FIT.partition("[[fit.data]]")[2].replace("quaternion", "angular_velocity").replace("1e-3", "1e-4")
+BOTH = f"{FIT}[[fit.data]]{RATES.replace(' rad', ' rad/s')}"
+
+
+def clock(path: Path) -> Path:
+    """A clock that counts ticks of TDB from time 0 of the experiment on."""
+    number, units = -CLOCK, 1_000_000
+    rows = {
+        f"SCLK_DATA_TYPE_{number}": 1, f"SCLK01_TIME_SYSTEM_{number}": 1, f"SCLK01_N_FIELDS_{number}": 2,
+        f"SCLK01_MODULI_{number}": f"{units} 1024", f"SCLK01_OFFSETS_{number}": "0 0",
+        f"SCLK01_OUTPUT_DELIM_{number}": 2, f"SCLK_PARTITION_START_{number}": 0,
+        f"SCLK_PARTITION_END_{number}": units * 1024,
+        f"SCLK01_COEFFICIENTS_{number}": f"0 {int(AHEAD)} 1.0", "SCLK_KERNEL_ID": "@2000-01-01/12:00",
+    }  # fmt: skip
+    text = "\n".join(f"{name} = ( {value} )" for name, value in rows.items())
+    path.write_text(f"KPL/SCLK\n\\begindata\n{text}\n\\begintext\n")
+    return path
+
+
+def packets(attitude: Rotation) -> np.ndarray:
+    """Quaternions of SPICE's matrices, which go from the reference to the body."""
+    return np.ascontiguousarray(attitude.inv().as_quat()[:, [3, 0, 1, 2]])
+
+
+def write(path: Path, kind: int, ticks: np.ndarray, attitude: Rotation, rates: Any) -> None:
+    """A segment, relative to J2000, added to a file; rates in J2000, or None."""
+    there = path.exists()
+    handle = spiceypy.dafopw(str(path)) if there else spiceypy.ckopn(str(path), "seen", 0)
+    span = (float(ticks[0]), float(ticks[-1]))
+    q, has = packets(attitude), rates is not None
+    av = rates if has else np.zeros((len(q), 3))
+    begins = ticks[[0, len(ticks) // 2]]  # a gap in the middle
+    if kind == 1:
+        spiceypy.ckw01(handle, *span, OBJECT, "J2000", has, "seen", len(q), ticks, q, av)
+    elif kind == 2:
+        spiceypy.ckw02(
+            handle, ticks[0], ticks[-1] + 8, OBJECT, "J2000", "seen", len(q), ticks, ticks + 8, q, av,
+            np.full(len(q), TICK),
+        )  # fmt: skip
+    elif kind == 3:
+        spiceypy.ckw03(handle, *span, OBJECT, "J2000", has, "seen", len(q), ticks, q, av, 2, begins)
+    else:
+        rows = np.concatenate([q, av], axis=1)
+        spiceypy.ckw05(
+            handle, 3, 7, *span, OBJECT, "J2000", has, "seen", ticks, rows, TICK, 2, begins
+        )  # fmt: skip
+    spiceypy.ckcls(handle)
+
+
+@pytest.fixture
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    clock(tmp_path / "clock.tsc")
+    return tmp_path
+
+
+def some(count: int) -> tuple[np.ndarray, Rotation, np.ndarray]:
+    """Times in ticks, unevenly, attitudes, and rates in J2000."""
+    numbers = np.random.default_rng(3)
+    ticks = np.cumsum(numbers.integers(10, 300, count)).astype(float)
+    return ticks, Rotation.random(count, rng=numbers), numbers.standard_normal((count, 3))
+
+
+@pytest.mark.parametrize("rated", [True, False])
+@pytest.mark.parametrize("kind", [1, 2, 3, 5])
+@pytest.mark.parametrize("count", [20, 100, 101, 250])
+def test_rows_are_those_that_were_written(kind: int, rated: bool, count: int, here: Path) -> None:
+    """Of whatever type and length: a directory follows after each hundred times."""
+    ticks, attitude, rates = some(count)
+    write(here / "seen.bc", kind, ticks, attitude, rates if rated else None)
+    found = read_rows(here / "seen.bc", [here / "clock.tsc"], AHEAD)
+    np.testing.assert_allclose(found.times, ticks * TICK, atol=2e-7)  # doubles of seconds since J2000
+    again = Rotation.from_quat(found.quaternions[:, [1, 2, 3, 0]])
+    assert (again.inv() * attitude).magnitude().max() < 1e-14
+    if not rated and kind in (1, 3, 5):
+        assert found.rates is None
+    elif rated:
+        assert found.rates is not None
+        np.testing.assert_allclose(found.rates, attitude.inv().apply(rates), atol=1e-13)
+
+
+def test_of_segments_that_overlap_the_last_one_counts(here: Path) -> None:
+    """But not in its gap, where SPICE reads the earlier one, nor between the instants of one."""
+    ticks, attitude, rates = some(40)
+    write(here / "seen.bc", 3, ticks, attitude, rates)
+    within = np.concatenate([np.linspace(ticks[n] + 0.5, ticks[n + 3] + 0.5, 6) for n in (10, 30)])
+    _, other, _ = some(12)
+    write(here / "seen.bc", 3, within, other, None)
+    write(here / "seen.bc", 1, ticks[[2, 5]], other[:2], None)
+    found = read_rows(here / "seen.bc", [here / "clock.tsc"], AHEAD)
+    hidden = [11, 12, 13, 31, 32, 33]
+    wanted = np.concatenate([np.delete(ticks, hidden), within])
+    np.testing.assert_allclose(found.times, np.sort(wanted) * TICK, atol=2e-7)
+    assert found.rates is not None
+    assert np.isnan(found.rates).any(axis=1).sum() == len(within) + 2
+    turned = Rotation.from_quat(found.quaternions[[2, 5]][:, [1, 2, 3, 0]])
+    assert (turned.inv() * other[:2]).magnitude().max() < 1e-14
+
+
+def seen(folder: Path) -> dict[str, float]:
+    """A run's attitudes and rates with noise as a CK relative to J2000; and the truth."""
+    truth = {"initial.angular_velocity[1]": 0.1003, "body.principal_moments[1]": 1.603}
+    run = rigidsim.run(rigidsim.parse(TUMBLING).replace(truth), out=None).dataset
+    numbers = np.random.default_rng(11)
+    times = run["time"].values
+    body = Rotation.from_quat(run["quaternion"].values[:, [1, 2, 3, 0]])
+    turn = Rotation.from_rotvec([np.radians(84381.406 / 3600), 0, 0])  # from the ecliptic to the equator
+    noisy = Rotation.from_rotvec(ATTITUDE * numbers.standard_normal((len(times), 3))) * turn * body
+    rates = run["angular_velocity"].values + RATE * numbers.standard_normal((len(times), 3))
+    write(folder / "seen.bc", 3, times / TICK, noisy, noisy.apply(rates))
+    return truth
+
+
+def test_a_fit_to_a_kernel_finds_start_and_moment(here: Path) -> None:
+    """From attitudes and rates with noise, relative to other axes than the config's."""
+    truth = seen(here)
+    found = rigidsim.fit(rigidsim.parse(TUMBLING + BOTH))
+    assert found.converged
+    assert [one.rows for one in found.data] == [51, 51]
+    assert found.scale == pytest.approx(1, abs=0.15)
+    for one in found.parameters:
+        assert one.sigma is not None
+        right = truth.get(one.key, one.start)
+        assert abs(one.value - right) < 3 * one.sigma, one.key
+    assert found.sigma("initial.attitude[0]") < ATTITUDE
+
+
+@pytest.mark.slow
+def test_a_fit_keeps_its_kernels_and_verifies_by_them(here: Path) -> None:
+    seen(here)
+    rigidsim.fit(rigidsim.parse(TUMBLING + BOTH), out=here / "fits")
+    folder = here / "fits/tumbling"
+    kept = sorted(path.name for path in (folder / "data").iterdir())
+    assert kept == ["1_1_clock.tsc", "1_seen.bc", "2_1_clock.tsc", "2_seen.bc"]
+    for path in (here / "seen.bc", here / "clock.tsc"):
+        path.unlink()
+    assert verify_fit(folder).identical
+    other = folder / "data/2_1_clock.tsc"
+    other.write_text(other.read_text().replace("2000-01-01", "2000-01-02"))
+    assert verify_fit(folder).problems == ["kernels: not the bytes that the fit was made from"]
+
+
+WRONG: dict[str, tuple[str, str, str]] = {
+    "no clock": ('kernels = ["clock.tsc"]', "", "give its clock and leap seconds as kernels"),
+    "a missing clock": ("clock.tsc", "cluck.tsc", "cluck.tsc: there is no such file"),
+    "a list of kernels": ("clock.tsc", "all.tm", "all.tm is a meta-kernel"),
+    "no date": (f'epoch = "{EPOCH}"', "", r"give the date of time 0 as \[time\] epoch"),
+    "no axes": ('axes = "ecliptic J2000"', "", r"say by \[frame\] axes"),
+    "another day": ("2029-04-13", "2029-04-14", "no row lies within the run"),
+    "nothing of the kind": ('observable = "quaternion"', 'observable = "energy"', "has no column"),
+}
+
+
+@pytest.mark.parametrize("name", WRONG)
+def test_what_a_kernel_needs_is_told(name: str, here: Path) -> None:
+    ticks, attitude, rates = some(9)
+    write(here / "seen.bc", 3, ticks, attitude, rates)
+    (here / "all.tm").write_text("KPL/MK\n\\begindata\nKERNELS_TO_LOAD = ( 'clock.tsc' )\n")
+    given, instead, message = WRONG[name]
+    error = ConfigError if " is a " in message or "[" in message else RigidsimError
+    with pytest.raises(error, match=message):
+        rigidsim.fit(rigidsim.parse((TUMBLING + FIT).replace(given, instead)))
+
+
+def test_rows_outside_the_run_are_told(here: Path) -> None:
+    """A kernel usually covers more than the experiment."""
+    seen(here)
+    short = TUMBLING.replace("end = 100", "end = 20")
+    found = rigidsim.fit(rigidsim.parse(short + FIT))
+    assert found.data[0].rows == 11
+    assert "40 of 51 rows lie outside the run" in found.told[0]
+
+
+@pytest.mark.parametrize("turned_over", [False, True])
+def test_a_message_is_turned_from_its_own_axes(turned_over: bool, here: Path) -> None:
+    """An AEM of a scene in the ecliptic is about the equator; another tool's may go from body to space."""
+    rigidsim.run(rigidsim.parse(TUMBLING + "[output]\ntimeline = false\n"), out=here / "runs")
+    [path] = rigidsim.export(here / "runs/tumbling", "aem", here / "seen.aem")
+    text = path.read_text()
+    assert "REF_FRAME_A = EME2000" in text
+    if turned_over:
+        rows = []
+        for row in text.splitlines():
+            words = row.split()
+            if len(words) == 5 and "T" in words[0]:
+                words[4] = f"-{words[4]}".removeprefix("--")  # the conjugate
+            rows.append(" ".join(words))
+        text = "\n".join(rows).replace("REF_FRAME_A = EME2000", "REF_FRAME_A = SC_BODY_1")
+        text = text.replace("REF_FRAME_B = SC_BODY_1", "REF_FRAME_B = EME2000")
+        path.write_text(text)
+    config = TUMBLING + FIT.replace("seen.bc", "seen.aem").replace('kernels = ["clock.tsc"]', "")
+    found = rigidsim.fit(rigidsim.parse(config))
+    assert found.data[0].rms < 1e-9
+    assert abs(found.value("initial.attitude[0]")) < 1e-9
+    path.write_text(text.replace("EME2000", "MARS_IAU"))
+    with pytest.raises(ConfigError, match="attitudes from one of EME2000"):
+        rigidsim.fit(rigidsim.parse(config))
