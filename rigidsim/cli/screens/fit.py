@@ -44,6 +44,8 @@ def print_fit(found: FitResult) -> None:
         on.line("note", f"derivatives by {found.derivatives}")
     if found.folder:
         on.line("folder", found.folder)
+        on.line("next", f"rigidsim view {found.folder}", "cyan")
+        on.line("", f"rigidsim run {found.folder}/fitted.toml", "cyan")
 
 
 print_saved = print_fit

@@ -20,15 +20,12 @@ _MOST_DRAWN = 4000  # points of a figure
 
 
 def save_dataset(dataset: xarray.Dataset, path: Path) -> Path:
-    """Write the dataset; a picture's name is refused."""
+    """Write the dataset of a comparison, which has numbers alone; a picture's name is refused."""
     if path.suffix.lower() in FIGURES:
         raise RigidsimError(f"{path}: the dataset is no picture; give --out FILE.h5, and --figure for that")
     try:
         with atomic.replacing(path) as temporary:
-            if all(variable.dtype == np.float64 for variable in dataset.variables.values()):
-                _write(dataset, temporary)
-            else:  # a fit's, with names and flags, is never large
-                dataset.to_netcdf(temporary, engine="h5netcdf")
+            _write(dataset, temporary)
     except OSError as error:
         raise RigidsimError(
             f"{path}: can't be written: {error.strerror or error}; choose another --out"

@@ -12,7 +12,6 @@ import numpy as np
 from rigidsim.errors import SWEEP, ConfigError, Problem, RigidsimError, RunFolderError, either
 from rigidsim.scene.config import Experiment
 from rigidsim.store import atomic
-from rigidsim.workflows.compare.saving import save_dataset
 from rigidsim.workflows.fit.findings import Findings
 from rigidsim.workflows.fit.folder import FitFolder, Remembered
 from rigidsim.workflows.fit.keys import FitKeys
@@ -96,7 +95,8 @@ def _kept(experiment: Experiment, folder: FitFolder, told: Told) -> FitResult:
     from rigidsim.look.figures.fitted import save_fitted
 
     result = fit_to(experiment, folder.copies(experiment), folder.evaluations, told=told)
-    save_dataset(result.dataset, folder.dataset)
+    with atomic.replacing(folder.dataset) as temporary:
+        result.dataset.to_netcdf(temporary, engine="h5netcdf")
     atomic.write_bytes(folder.fitted, result.experiment.text.encode())
     with atomic.replacing(folder.figure) as temporary:
         save_fitted(result.dataset, temporary)
