@@ -1,4 +1,4 @@
-"""Scenes of the gallery and of the first page that play in the browser: their recordings, and rerun's viewer beside them.
+"""Scenes that play in the browser, in the gallery and on the first page: recordings, and rerun's viewer.
 
 The viewer is the one that rerun-sdk brings, and the site serves it itself: nothing is fetched from elsewhere,
 neither when the site is built nor when it is read (``_static/viewer/index.html`` forbids it to the browser).
