@@ -20,6 +20,7 @@ html_math_renderer = "mathml"
 html_copy_source = False
 html_show_sourcelink = False
 html_static_path = ["_static"]
+html_favicon = "_static/favicon.svg"
 html_css_files = ["tables.css"]
 html_js_files = ["play.js"]
 highlight_language = "none"

@@ -1,4 +1,4 @@
-"""Scenes of the gallery that play in the browser: their recordings, and rerun's viewer beside them.
+"""Scenes that play in the browser, in the gallery and on the first page: recordings, and rerun's viewer.
 
 The viewer is the one that rerun-sdk brings, and the site serves it itself: nothing is fetched from elsewhere,
 neither when the site is built nor when it is read (``_static/viewer/index.html`` forbids it to the browser).
@@ -26,6 +26,8 @@ PLAYED = (
     "tossed_plate",
 )
 ROWS = 1500  # of a recording: 1.0 to 1.4 MB
+PAGES = ("index.md", "gallery.md")
+"""With timelines that get a button."""
 FOLDER = "scenes"
 """Of the recordings, in the site."""
 _VIEWER = {"re_viewer.js": "re_viewer.js", "re_viewer_bg.wasm": "re_viewer_wasm.bin"}
@@ -40,7 +42,7 @@ _BUTTON = """{picture}
 
 
 def with_buttons(text: str) -> str:
-    """The page of the gallery with a button below the timeline of each scene that plays."""
+    """A page with a button below the timeline of each scene that plays."""
 
     def replaced(found: re.Match[str]) -> str:
         if found[1] not in PLAYED:

@@ -25,7 +25,7 @@ ELSEWHERE = {
 _FIRST = {"README.md": "index.md"}  # links to it lead to docs/index.md, with which the site begins
 _LINK = re.compile(r"(?<!`)(!?)\[((?:[^\[\]]|\[[^\]]*\])*)\]\(([^()\s]+)\)")
 _FENCE = re.compile(r"^(```.*?^```$)", re.MULTILINE | re.DOTALL)
-_ENTRY = re.compile(r"^- \[[^\]]+\]\(([\w/.-]+)\)|^- `(reference/[\w.]+\.md)`", re.MULTILINE)
+_ENTRY = re.compile(r"\]\(([\w/.-]+\.md)\)|^- `(reference/[\w.]+\.md)`", re.MULTILINE)
 
 
 class DeadLinkError(Exception):
@@ -55,7 +55,7 @@ def gather(folder: Path, root: Path = ROOT, *, run: bool = False) -> list[Path]:
             text = notebooks.as_page(page, target.parent / "pictures" if run else None)
         else:
             text = page.read_text(encoding="utf-8")
-        if run and place == "gallery.md":
+        if run and place in scenes.PAGES:
             text = scenes.with_buttons(text)
         target.write_text(_linked(text, page, folder, root, dead), encoding="utf-8")
     if dead:
@@ -92,9 +92,17 @@ def add_contents(folder: Path) -> None:
             made.append(_toctree(section.partition("\n")[0], names))
     rest = sorted(str(page.relative_to(folder)) for page in folder.rglob("*.md"))
     rest = [name for name in rest if name not in listed]
-    text = re.sub(r"^- `(reference/[\w.]+)\.md`", r"- [\1](\1.md)", text, flags=re.MULTILINE)
+    text = re.sub(
+        r"^- `(reference/[\w.]+\.md)`", lambda found: _titled(folder, found[1]), text, flags=re.MULTILINE
+    )
     made += [_toctree("More", rest)] if rest else []
     index.write_text("\n\n".join([text.rstrip(), *made]) + "\n", encoding="utf-8")
+
+
+def _titled(folder: Path, name: str) -> str:
+    """An entry for a page that is made from the code, by its title."""
+    title = (folder / name).read_text(encoding="utf-8").partition("\n")[0].removeprefix("# ")
+    return f"- [{title}]({name})"
 
 
 def _toctree(caption: str, names: list[str]) -> str:

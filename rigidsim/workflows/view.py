@@ -84,14 +84,14 @@ def render(
         return target
     if at is not None or part != "page":
         raise RunFolderError("--at and --part: are for the picture of a single run; leave them out")
-    with _recording_of(named) as timeline:
+    with _recording_of(named, bars=False) as timeline:
         pictures.draw_recording(timeline, target, seconds=seconds, told=told)
     return target
 
 
 @contextmanager
-def _recording_of(named: Sequence[tuple[str, Run]]) -> Iterator[Path]:
-    """The recording of a run, or a temporary one of several runs side by side."""
+def _recording_of(named: Sequence[tuple[str, Run]], *, bars: bool = True) -> Iterator[Path]:
+    """The recording of a run, or a temporary one of several runs side by side, for a picture without bars."""
     if len(named) == 1:
         with named[0][1].recording() as timeline:
             yield timeline
@@ -102,7 +102,7 @@ def _recording_of(named: Sequence[tuple[str, Run]]) -> Iterator[Path]:
         datasets = [(name, opened.enter_context(run.dataset)) for name, run in named]
         path = Path(scratch) / "timeline.rrd"
         try:
-            write_comparison(datasets, path)
+            write_comparison(datasets, path, bars=bars)
         except (OSError, RuntimeError, ValueError) as error:
             raise RunFolderError(f"side by side: {getattr(error, 'strerror', None) or error}") from None
         yield path

@@ -266,6 +266,29 @@ def test_a_flight_has_its_rotors_where_the_body_is_to_scale(two: xarray.Dataset)
         assert middle @ axis > 0.5 * reach  # and outside
 
 
+@pytest.mark.parametrize("size", [0.9, 0.3, 0.01])
+def test_a_rotor_has_the_size_of_its_moment_or_is_said_to_be_enlarged(size: float) -> None:
+    """A cylinder ``size`` times as large in radius and height has size^5 of the moment."""
+    text = f"""
+name = "gyroscope"
+body = {{shape = "cylinder", mass = 2, radius = 1, height = 0.5}}
+initial.angular_velocity = [0.1, 0, 0]
+time = {{end = 1, samples = 11}}
+[[rotors]]
+name = "wheel"
+axis = [0, 0, 1]
+moment = {size**5!r}
+rate = 3
+"""
+    picture = build_picture(rigidsim.run(rigidsim.parse(text), out=None).dataset.load())[0]
+    (disc,) = [solid.mesh for solid in picture.stages[0].solids if solid.name == "disc"]
+    body = np.concatenate([mesh.vertices for mesh in picture.stages[0].meshes])
+    drawn, whole = (np.hypot(v[:, 0], v[:, 1]).max() for v in (disc.vertices, body))
+    (told,) = [note for note in picture.notes if "rotor wheel" in note]
+    assert ("enlarged" in told) == (size == 0.01)
+    assert drawn / whole > 10 * size if size == 0.01 else drawn / whole == pytest.approx(size, rel=1e-6)
+
+
 @pytest.mark.slow
 def test_of_moments_that_vary_no_sphere_is_drawn() -> None:
     text = DRIVEN.replace("[50, 90, 110]", '[50, 90, "110 - 10*sin(t/10)"]')

@@ -23,6 +23,7 @@ ROWS, FULL_READ = 20_000, 2_000_000  # that a figure draws; that are read for th
 
 _TELLING = 0.5  # changes of sign to a sample: four samples a swing
 _CYCLES, _MANY = 14, 60  # swings shown of the start, where there are more than so many
+_NAME = 38  # letters that a name in the table has room for
 _BANDS = 400  # parts of a panel's width, each with the least and the largest value in it
 _CURVE, _PLANE, _FACT = 2.55, 4.7, 0.235  # heights, inches
 _WIDE, _NARROW = 12.4, 8.2
@@ -216,5 +217,6 @@ def _table(axes: Axes, lines: list[tuple[str, str]]) -> None:
     axes.set_axis_off()
     for row, (name, value) in enumerate(lines):
         height = 1.0 - (row + 0.5) / (len(lines) + 1)
-        axes.text(0.04, height, name, color=GREY, fontsize=9, va="center", clip_on=False)
+        fitting = min(9.0, 9.0 * _NAME / len(name))
+        axes.text(0.04, height, name, color=GREY, fontsize=fitting, va="center", clip_on=False)
         axes.text(0.70, height, value, color=INK, fontsize=9, va="center", clip_on=False)

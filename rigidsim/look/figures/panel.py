@@ -67,9 +67,9 @@ def angle_scale(values: Array) -> tuple[float, str]:
     return 1 / unit.per_radian, unit.name
 
 
-def angle_text(value: float, digits: int = 4) -> str:
-    """An angle in rad with its unit: ``206.3 mas``, ``23.44°``."""
-    scale, unit = angle_scale(np.array([value]))
+def angle_text(value: float, digits: int = 4, *, like: float | None = None) -> str:
+    """An angle in rad with its unit, or that of another: ``206.3 mas``, ``23.44°``."""
+    scale, unit = angle_scale(np.array([value if like is None else like]))
     text = number(value / scale, digits)
     symbol = ANGLE_UNITS[unit].symbol if unit in ANGLE_UNITS else unit
     return f"{text}{'' if symbol in '°″' else ' '}{symbol}"

@@ -39,7 +39,7 @@ def polar_motion(axes: Axes, dataset: xarray.Dataset, plane: Array) -> None:
     least, most = float(np.nanmin(radius)), float(np.nanmax(radius))
     size = angle_text(float(np.nanmean(radius)))
     if not most - least < 1e-3 * most:
-        size = f"{angle_text(least)} to {angle_text(most)}"
+        size = f"{angle_text(least, like=most)} to {angle_text(most)}"
     title = "Polar motion (+: figure axis)"
     if rate is None:
         key(axes, f"{title}, {size}")

@@ -1,7 +1,8 @@
 """Rotors on a body's stage: discs with a mark that turn about their axes, and whose momentum is whose.
 
 A disc is drawn where its axis leaves the body, so that it is seen. Its radius is as of a disc of the body's
-density: moments of inertia go with the fifth power of size. It turns by the integral of its rate relative to
+density: moments of inertia go with the fifth power of size. One too small to be seen is enlarged, which the
+page "Picture" tells. It turns by the integral of its rate relative to
 the body; if that were too fast for a screen it would seem to stand or to go backwards, and is drawn slower by
 one factor for all such rotors and the whole run, which the legend tells: a wheel that spins up is seen to do
 so, and which of several is the fastest.
@@ -24,7 +25,7 @@ OF_WHEELS: Color = (150, 205, 110)
 _MARK, _METAL, _DARK = (255, 226, 120), (158, 164, 176), (104, 110, 124)
 _MARKED = 0.5  # rad to either side
 _FLATNESS, _GAP = 0.3, 0.06  # of a disc's radius: its thickness; of the body's reach: to what is below
-_SMALLEST, _LARGEST, _USUAL = 0.12, 0.55, 0.3  # radii over the body's reach
+_SMALLEST, _USUAL = 0.12, 0.3  # radii over the body's reach
 _PICTURES = 30.0  # a second on the screen that are surely drawn
 _TOO_FAST, _SLOWED = 1 / 3, 1 / 12  # turns from one picture to the next: from which on, and then
 _LEADING = "rotor_rate"
@@ -32,16 +33,27 @@ _LEADING = "rotor_rate"
 
 @dataclass(frozen=True)
 class _Disc:
-    """Where a disc is: its middle along the axis, and its radius, in units of the body's reach."""
+    """Where a disc is: its middle along the axis, its radius, and that of one of the body's density (0: not
+    known), in units of the body's reach.
+    """
 
     rotor: RecordedRotor
     middle: float
     radius: float
+    true_radius: float
 
     @property
     def top(self) -> float:
         """Where it ends on the axis."""
         return self.middle + self.radius * _FLATNESS / 2
+
+    def size(self) -> str:
+        """What its size means."""
+        if not self.true_radius:
+            return "of no particular size"
+        larger = self.radius / self.true_radius
+        enlarged = f", enlarged {larger:.1f} times to be seen" if larger > 1 else ""
+        return f"of the size of a disc of the body's density{enlarged}"
 
 
 def with_wheels(dataset: xarray.Dataset, subject: Subject, picture: Picture) -> Picture:
@@ -68,9 +80,7 @@ def with_wheels(dataset: xarray.Dataset, subject: Subject, picture: Picture) -> 
         words = f"rotor {rotor.name}" + (f", drawn turning {slower:g} times slower" if slower > 1 else "")
         ends = np.outer([0.0, disc.top], rotor.axis)
         lines.append(Line(f"{name}/axle", _MARK, ends, BODY, 2.0, 0.7, words))
-        notes.append(
-            f"{words}: on its axis, outside of the body; of the size of a disc of the body's density"
-        )
+        notes.append(f"{words}: on its axis, outside of the body; {disc.size()}")
     arrows, trails, told = _momenta(dataset, stage, found)
     changed = replace(
         stage,
@@ -118,11 +128,11 @@ def _placed(dataset: xarray.Dataset, subject: Subject, found: list[RecordedRotor
         along = corners @ rotor.axis
         across = float(np.linalg.norm(corners - np.outer(along, rotor.axis), axis=1).max())
         whole = 0.0 if inertia is None else float(rotor.axis @ inertia @ rotor.axis)
-        share = (rotor.moment / whole) ** 0.2 if whole > 0 else _USUAL
-        radius = float(np.clip(share * across, _SMALLEST, _LARGEST))
+        true_radius = (rotor.moment / whole) ** 0.2 * across if whole > 0 else 0.0
+        radius = max(true_radius or _USUAL * across, _SMALLEST)
         below = [disc.top for disc in placed if disc.rotor.axis @ rotor.axis > 0.9]
         middle = max([float(along.max()), *below]) + _GAP + radius * _FLATNESS / 2
-        placed.append(_Disc(rotor, middle, radius))
+        placed.append(_Disc(rotor, middle, radius, true_radius))
     return placed
 
 

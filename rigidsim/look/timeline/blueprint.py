@@ -23,6 +23,7 @@ PARTS = ("page", "scene", "plots")
 """What a picture can show: the scene and its plots, or one of them."""
 PLAYER = "player"
 """The part for a small frame within another page: the scene above its first plot, and the time to play."""
+_CURVES = 6  # of runs side by side: more names would cover the curves
 
 
 def build_blueprint(run: DrawnRun, *, following: bool = False, part: str | None = None) -> rrb.Blueprint:
@@ -41,7 +42,8 @@ def build_blueprint(run: DrawnRun, *, following: bool = False, part: str | None 
     shares = [3.0] * len(spaces) + [2.6 if facing else 1.6] * len(beside)
     scene = spaces[0] if len(shares) == 1 else rrb.Horizontal(*spaces, *beside, column_shares=shares)
     pages = {page.lower(): page for page in run.pages if part is None or (part, page) == ("page", "Summary")}
-    left = left_side(scene, plotting.legend_of(stages), pages)
+    height = PIXELS / 2 if part == PLAYER else PIXELS
+    left = left_side(scene, plotting.legend_of(stages), pages, height)
     views = {
         place: [plot_view(plot, clock) for plot in run.plots if plot.place == place]
         for place in ("leading", "drift", "more")
@@ -83,10 +85,10 @@ def bare(left: rrb.Container, right: rrb.Container | None, clock: Clock, part: s
 
 
 def build_comparison(
-    named: Sequence[tuple[str, DrawnRun]], clock: Clock, difference: Plot | None
+    named: Sequence[tuple[str, DrawnRun]], clock: Clock, difference: Plot | None, *, bars: bool = True
 ) -> rrb.Blueprint:
     """The layout for runs side by side on a common clock, each with one stage, under names of its own, and
-    the distances between their attitudes, if known.
+    the distances between their attitudes, if known; with the viewer's own ``bars`` or without.
     """
     runs = [run for _, run in named]
     eyes = [space_view(run.picture.stages[0], run, narrow=True) for run in runs]
@@ -105,12 +107,16 @@ def build_comparison(
         )
     views = [] if difference is None else [plot_view(difference, clock)]
     views += [plot_view(plot, clock) for plot in common.values() if plot.place == "leading"][: 4 - len(views)]
-    views += [plot_view(plot, clock) for plot in common.values() if plot.place == "drift"]
+    for plot in (plot for plot in common.values() if plot.place == "drift"):
+        curves = sum(len(one.labels) for one in plot.series) + len(plot.levels)
+        views.append(plot_view(plot, clock, named=curves <= _CURVES))  # leading plots tell the colours, too
     left = left_side(
         scene,
         plotting.legend_of([stage for run in runs for stage in run.picture.stages]),
         {page.lower(): name for name, run in named for page in run.pages},
     )
+    if not bars:
+        return bare(left, rrb.Vertical(*views) if views else None, clock, "page")
     return page_of(left, views, time_panel(clock, max(run.screen_seconds for run in runs), following=False))
 
 
@@ -130,9 +136,12 @@ def page_of(
 
 
 def left_side(
-    scene: rrb.View | rrb.Container, legend: Sequence[tuple[str, Color]], pages: Mapping[str, str]
+    scene: rrb.View | rrb.Container,
+    legend: Sequence[tuple[str, Color]],
+    pages: Mapping[str, str],
+    pixels: float = PIXELS,
 ) -> rrb.Container:
-    """The scene above its legend and the text pages, by their entities."""
+    """The scene above its legend and the text pages, by their entities, about so many pixels high."""
     lines = -(-(1 + len(legend)) // plotting.LEGEND_COLUMNS)  # with the clock
     height = 30.0 + 24.0 * lines
     key = rrb.Spatial2DView(
@@ -146,8 +155,8 @@ def left_side(
         rrb.TextDocumentView(origin=f"/{entity}", name=name) for entity, name in pages.items()
     ]
     if not texts:
-        return rrb.Vertical(scene, key, row_shares=[PIXELS - height, height])
-    return rrb.Vertical(scene, key, tabs(texts), row_shares=[PIXELS * 0.7 - height, height, PIXELS * 0.3])
+        return rrb.Vertical(scene, key, row_shares=[pixels - height, height])
+    return rrb.Vertical(scene, key, tabs(texts), row_shares=[pixels * 0.7 - height, height, pixels * 0.3])
 
 
 def tabs(views: Sequence[rrb.View | rrb.Container]) -> rrb.View | rrb.Container:
@@ -225,8 +234,8 @@ def plane_view(plane: Plane) -> rrb.Spatial2DView:
     )
 
 
-def plot_view(plot: Plot, clock: Clock) -> rrb.TimeSeriesView:
-    """A view of one plot."""
+def plot_view(plot: Plot, clock: Clock, *, named: bool = True) -> rrb.TimeSeriesView:
+    """A view of one plot, with the names of its curves or without."""
     # Independent axes of infinite range: a long run opens whole.
     shown = rr.TimeRange(start=rr.TimeRangeBoundary.infinite(), end=rr.TimeRangeBoundary.infinite())
     if plot.window:
@@ -244,7 +253,7 @@ def plot_view(plot: Plot, clock: Clock) -> rrb.TimeSeriesView:
             *(plotting.plot_path(plot, level.key) for level in plot.levels),
         ],
         name=plot.title,
-        plot_legend=rrb.PlotLegend(visible=True, corner=corner),
+        plot_legend=rrb.PlotLegend(visible=named, corner=corner),
         axis_y=None if plot.range is None else rrb.ScalarAxis(range=plot.range),
         axis_x=rrb.TimeAxis(link=LinkAxis.Independent, view_range=shown),
     )

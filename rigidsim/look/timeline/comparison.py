@@ -24,9 +24,12 @@ COLORS = ((92, 148, 235), (240, 190, 60), (104, 190, 110), (225, 115, 190), (80,
 _FLOOR = 1e-18  # rad: below what a difference of attitudes in double precision can be
 
 
-def write_comparison(named: Sequence[tuple[str, xarray.Dataset]], path: Path, *, rows: int = ROWS) -> int:
+def write_comparison(
+    named: Sequence[tuple[str, xarray.Dataset]], path: Path, *, rows: int = ROWS, bars: bool = True
+) -> int:
     """Write two to ``MOST`` datasets, at most so many rows of each, with their names on the screen as one
-    recording on one clock, side by side; it is whole when this returns the number of rows written.
+    recording on one clock, side by side; it is whole when this returns the number of rows written. A picture
+    is without the viewer's own ``bars``.
 
     Raises:
         ValueError: another number of datasets, or as for ``timeline.write_timeline``.
@@ -44,7 +47,7 @@ def write_comparison(named: Sequence[tuple[str, xarray.Dataset]], path: Path, *,
     ]
     apart = attitude_differences([(name, run.rows) for name, run in runs])
     titles = [legible(name) for name, _ in named]
-    blueprint = build_comparison(list(zip(titles, drawn, strict=True)), shown, apart)
+    blueprint = build_comparison(list(zip(titles, drawn, strict=True)), shown, apart, bars=bars)
     if apart is not None:
         drawn[0].plots.append(apart)
     stages = [stage for run in drawn for stage in run.picture.stages]
