@@ -164,6 +164,11 @@ class Linearised(Protocol):
         """See the class."""
 
 
+def _rounding_is_left(linear: Linear, solution: Solution) -> bool:
+    """Whether the step without damping, too, would change the sum of squares by no more than rounding."""
+    return solution.step_sigmas <= max(_LAST, (10 * _ROUNDED * linear.cost) ** 0.5)
+
+
 def iterate(
     begin: np.ndarray,
     linearised: Linearised,
@@ -211,8 +216,9 @@ def iterate(
                 told(iterations, linear.cost, solution.step_sigmas)
                 continue
             if trial is not None and trial.cost <= linear.cost * (1 + _ROUNDED):
-                settled = True  # rounding is all that changes any more
-                continue
+                settled = _rounding_is_left(linear, solution)  # otherwise damping alone keeps it here
+                if settled:
+                    continue
             damping, growth, calm = max(damping, _AFTER_FAILURE) * growth, 2 * growth, 0
             continue
         gained = (linear.cost - trial.cost) / max(linear.foreseen(step), 1e-300)
