@@ -58,6 +58,7 @@ def test_a_fit_that_stops_at_a_wall_has_not_converged() -> None:
     ended = iterate(np.zeros(2), beside_a_wall)
     assert ended is not None
     assert not ended.converged
+    assert ended.barred
     assert ended.values[0] == pytest.approx(1)
 
 
@@ -86,3 +87,24 @@ def test_a_prior_without_a_width_is_refused_for_that_alone(here: Path) -> None:
     (problem,) = error.value.problems
     assert problem.where == '[fit] prior."body.principal_moments[2]"'
     assert "above zero" in problem.what
+
+
+def test_units_in_the_names_of_columns_count(here: Path) -> None:
+    rates(here, [1, 2, 2.5])
+    rows = np.loadtxt("rates.csv", delimiter=",", skiprows=1)
+    rows = np.column_stack([rows[:, 0] / 60, np.rad2deg(rows[:, 1:]), np.full(len(rows), np.rad2deg(1e-3))])
+    names = ["t_min", "wx [deg/s]", "wy [deg/s]", "wz [deg/s]", "s [deg/s]"]
+    np.savetxt("degrees.csv", rows, "%.17g", ",", header=",".join(names), comments="")
+    told = RATES.replace("rates.csv", "degrees.csv").replace('["x", "y", "z"]', str(names[1:4]))
+    told = told.replace("sigma = 1e-3", 'sigma = "s [deg/s]"\ntime = "t_min"')
+    text = LAMINA.replace("2, 3]", "2, 2.4]")
+    one, other = (rigidsim.fit(rigidsim.parse(text + data)) for data in (RATES, told))
+    assert other.value("body.principal_moments[2]") == pytest.approx(2.5, abs=1e-9)
+    assert other.sigma("body.principal_moments[2]") == pytest.approx(one.sigma("body.principal_moments[2]"))
+
+
+def test_columns_in_several_units_are_refused(here: Path) -> None:
+    (here / "mixed.csv").write_text("time,a_deg_s,b_rad_s,c_rad_s\n1,1,1,1\n2,1,2,1\n")
+    data = RATES.replace("rates.csv", "mixed.csv").replace('"x", "y", "z"', '"a_deg_s", "b_rad_s", "c_rad_s"')
+    with pytest.raises(ConfigError, match=r"columns in several units \(deg/s, rad/s\)"):
+        rigidsim.fit(rigidsim.parse(LAMINA + data))
