@@ -108,3 +108,9 @@ def test_columns_in_several_units_are_refused(here: Path) -> None:
     data = RATES.replace("rates.csv", "mixed.csv").replace('"x", "y", "z"', '"a_deg_s", "b_rad_s", "c_rad_s"')
     with pytest.raises(ConfigError, match=r"columns in several units \(deg/s, rad/s\)"):
         rigidsim.fit(rigidsim.parse(LAMINA + data))
+
+
+def test_single_precision_which_would_tell_moments_apart_by_rounding_is_refused() -> None:
+    text = LAMINA.replace("[fit]", '[integrator]\nprecision = "single"\n[fit]') + RATES
+    with pytest.raises(ConfigError, match=r"\[integrator\] precision: .*\"double\" is allowed"):
+        rigidsim.fit(rigidsim.parse(text))

@@ -119,6 +119,11 @@ def _refuse(experiment: Experiment) -> None:
         problems.append(Problem("[fit]", "missing; it names parameters and data, see docs/fits.md"))
     if config.sweep is not None:
         problems.append(Problem("[sweep]", "a fit takes a single experiment; remove [sweep]"))
+    if config.integrator.precision == "single":
+        what = (
+            'given "single", in which differences of motions have no digits left; "double" is allowed, or a '
+        )
+        problems.append(Problem("[integrator] precision", what + "higher one"))
     if problems:
         raise ConfigError(problems, experiment.source)
 
