@@ -16,9 +16,14 @@ from rigidsim.formats.trajectories import KINDS, Trajectory, read_trajectory
 from rigidsim.scene.epochs import Epoch, parse_epoch
 from rigidsim.scene.frame import ECLIPTIC, OBLIQUITY
 from rigidsim.scene.rotations import product
+from rigidsim.scene.units import is_unit
 from rigidsim.scene.validation_messages import nearest
 
 _TEXT = {".csv", ".txt", ".dat", ".tsv"}
+_IN_NAME = re.compile(r".*[\[(]\s*([^\[\]()]+?)\s*[\])]")  # "wx [deg/s]"
+_ENDINGS = {"deg": "deg", "arcsec": "arcsec", "rad": "rad", "deg_s": "deg/s", "degs": "deg/s",
+            "rad_s": "rad/s", "rads": "rad/s"}  # fmt: skip
+_OF_TIMES = re.compile(r"(?:t|time)_(s|min|h|day|yr|ms)")
 _A_DATE = re.compile(r"\d{4}-\d\d-\d\d")
 
 
@@ -171,7 +176,18 @@ def _of_text(path: Path) -> Observations:
             column.append(cell)
     if not rows:
         raise RigidsimError(f"{path}: no rows; a line of names and rows of values are needed")
-    return Observations(str(path), dict(zip(names, columns, strict=True)), rows=rows)
+    units = {name: unit for name in names if (unit := _unit_in(name))}
+    return Observations(str(path), dict(zip(names, columns, strict=True)), units=units, rows=rows)
+
+
+def _unit_in(name: str) -> str | None:
+    """The unit that the name of a column says: ``wx [deg/s]``, ``alpha_deg``, ``time_day``."""
+    if match := _IN_NAME.fullmatch(name):
+        return match[1] if is_unit(match[1]) else None
+    if match := _OF_TIMES.fullmatch(name.lower()):
+        return match[1]
+    ending = next((end for end in _ENDINGS if name.lower().endswith(f"_{end}")), None)
+    return _ENDINGS[ending] if ending else None
 
 
 def _number(text: str) -> float:

@@ -20,6 +20,7 @@ from rigidsim.workflows.compare.row_checks import refuse_rows, refuse_values
 
 LEAST_ROWS = 3
 _FIXED = 0.6  # share of numbers with the same count of decimals that a fixed format makes
+_FEW = 9  # different numbers: those of one matrix, whose digits say nothing of a format
 _DOUBLE_DIGITS = 15
 _TIMES = {"s": "s", "sec": "s", "seconds": "s", "second": "s", "day": "day", "days": "day", "d": "day",
           "h": "h", "hr": "h", "hours": "h", "hour": "h", "min": "min", "minutes": "min", "ms": "ms",
@@ -133,7 +134,7 @@ def attitudes_of(found: Trajectory, epoch: Epoch | None) -> Attitudes:
     kept = [made.quaternions, made.matrices, made.angles]
     attitude = next(x for x in kept if x is not None)
     resolution = (
-        _resolution(attitude, found.narrow),
+        _resolution(attitude, found.narrow, few=_FEW),
         0.0 if made.rates is None else _resolution(made.rates, found.narrow),
     )
     taken = {name for names in used.values() for name in names}  # which is held already
@@ -267,13 +268,17 @@ def seconds_in(unit: str) -> float:
     return float(parse_number(f"1 {unit}", "s"))
 
 
-def _resolution(values: np.ndarray, narrow: bool) -> float:
-    """Half the last digit in which numbers are written, from a sample of them; that of doubles at least."""
+def _resolution(values: np.ndarray, narrow: bool, few: int = 0) -> float:
+    """Half the last digit in which numbers are written, from a sample of them; that of doubles at least. Up
+    to ``few`` different numbers, as those of a body at rest, are taken for exact.
+    """
     most = largest(values)
     if narrow:
         return most * 2.0**-24
     places = np.linspace(0, values.size - 1, min(values.size, 300)).astype(int)
     some = picked(values.reshape(-1), places)
+    if len(np.unique(some)) <= few:
+        return most * 2.0**-53
     written = [Decimal(repr(value)).normalize().as_tuple() for value in some.tolist()]
     decimals = [-int(exponent) for _, _, exponent in written]
     common = max(set(decimals), key=decimals.count)

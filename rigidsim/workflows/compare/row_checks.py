@@ -72,13 +72,17 @@ def _norms(found: Trajectory, quaternions: np.ndarray) -> list[str]:
         padded = np.pad(norms, (_AROUND - before, _AROUND - after), mode="edge")
         size = rows.stop - rows.start
         smooth = np.median([padded[n : n + size] for n in range(2 * _AROUND + 1)], axis=0)
-        return np.abs(norms[before : before + size] - smooth) > _DAMAGED * max(most, 1e-300)
+        return np.abs(norms[before : before + size] - smooth) > _DAMAGED * most
 
-    bad, first = flagged(damaged, count)
-    if (bad and bad < count / 10) or not most:
-        at = max(first, 0)
+    if not most:
         raise RigidsimError(
-            f"{found.source}: {found.row(at)}: a quaternion of norm {np.linalg.norm(quaternions[at]):.6g}, "
+            f"{found.source}: most quaternions have the norm 0, and are no rotations; write attitudes there"
+        )
+    bad, first = flagged(damaged, count)
+    if bad and bad < count / 10:
+        norm = np.linalg.norm(quaternions[first])
+        raise RigidsimError(
+            f"{found.source}: {found.row(first)}: a quaternion of norm {norm:.6g}, "
             f"where {most:.6g} is usual ({bad:,} such rows); these are no rotations: remove or mend them"
         )
     return [f"quaternions have the norm {most:.6g}; they were normalised"] if abs(most - 1) > _NORM else []

@@ -27,6 +27,7 @@ _CALM = 3  # steps in a row that didn't fail, after which damping falls fast
 _SHORTER = 0.1  # of a step: the next one may have the same derivatives
 _LAST = 0.1  # sigmas: a step as short as this most likely ends a fit, where derivatives are needed anyway
 _NEAR = 0.02  # sigmas: derivatives from no further away are those of a place, to far less than sigmas show
+_LATELY = 10  # evaluations
 _ROUNDED = 1e-11  # relative change of a sum of squares that rounding makes
 _BLOCK = 250  # rows
 _TALL = 4  # times: of the rows of a block by its columns, and of a matrix by a block's rows
@@ -145,7 +146,8 @@ class Ended:
     """Where an iteration ended.
 
     Attributes:
-        values: (estimated,). iterations: evaluations of the motion.
+        values: (estimated,). iterations: evaluations of the motion. barred: whether the motion couldn't be
+            computed in one of the last of these.
     """
 
     values: np.ndarray
@@ -153,6 +155,7 @@ class Ended:
     solution: Solution
     converged: bool
     iterations: int
+    barred: bool = False
 
 
 class Linearised(Protocol):
@@ -162,6 +165,11 @@ class Linearised(Protocol):
 
     def __call__(self, values: np.ndarray, fresh: bool = True) -> Linear | None:
         """See the class."""
+
+
+def _rounding_is_left(linear: Linear, solution: Solution) -> bool:
+    """Whether the step without damping, too, would change the sum of squares by no more than rounding."""
+    return solution.step_sigmas <= max(_LAST, (10 * _ROUNDED * linear.cost) ** 0.5)
 
 
 def iterate(
@@ -187,6 +195,7 @@ def iterate(
     if linear is None:
         return None
     damping, iterations, growth, calm, settled = _FIRST_DAMPING, 1, 2.0, _CALM, False
+    barred = -_LATELY  # the latest evaluation without a motion
     apart = 0.0  # sigmas from where the derivatives are from
     solution = Solution(linear)
     told(iterations, linear.cost, solution.step_sigmas)
@@ -199,7 +208,9 @@ def iterate(
             trial, step = linearised(values), np.zeros_like(values)
         else:
             step = solution.step(damping)
-            trial = None if (values + step == values).all() else linearised(values + step, fresh=last)
+            still = bool((values + step == values).all())
+            trial = None if still else linearised(values + step, fresh=last)
+            barred = iterations if trial is None and not still else barred
         iterations += 1
         most_cost = linear.cost * (1 + _ROUNDED) if last else linear.cost
         if settled or trial is None or trial.cost >= most_cost:
@@ -211,8 +222,9 @@ def iterate(
                 told(iterations, linear.cost, solution.step_sigmas)
                 continue
             if trial is not None and trial.cost <= linear.cost * (1 + _ROUNDED):
-                settled = True  # rounding is all that changes any more
-                continue
+                settled = _rounding_is_left(linear, solution)  # otherwise damping alone keeps it here
+                if settled:
+                    continue
             damping, growth, calm = max(damping, _AFTER_FAILURE) * growth, 2 * growth, 0
             continue
         gained = (linear.cost - trial.cost) / max(linear.foreseen(step), 1e-300)
@@ -235,4 +247,5 @@ def iterate(
         again = linearised(values)
         assert again is not None
         linear, solution = again, Solution(again)
-    return Ended(values, linear, solution, settled or solution.step_sigmas <= WITHIN, iterations)
+    converged = settled or solution.step_sigmas <= WITHIN
+    return Ended(values, linear, solution, converged, iterations, iterations - barred <= _LATELY)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import combinations
 
 import numpy as np
 import xarray
@@ -121,7 +122,7 @@ class Findings:
             evaluations=ended.iterations,
             starts=[_finite(cost) for cost in self.search.costs],
             derivatives=self.derivatives,
-            told=[*self.told, *self.search.told],
+            told=[*self.told, *_counted_twice(self._sets[1]), *self.search.told],
         )  # fmt: skip
         made._dataset = self._dataset(made, along, times)
         made._experiment = self.keys.fitted(ended.values)
@@ -269,6 +270,24 @@ class Findings:
             own = np.sqrt(np.einsum("nii->n", found))
             found[apart > 1e-3 * own] = np.nan
         return np.asarray(found)
+
+
+def _counted_twice(sets: Sequence[Readings]) -> list[str]:
+    """Of which sets rows are the same observations."""
+    found = []
+    for one, other in combinations(sets, 2):
+        if one.quantity.text != other.quantity.text:
+            continue
+        rows = [
+            {(t, *v) for t, v in zip(x.times.tolist(), x.values.tolist(), strict=True)} for x in (one, other)
+        ]
+        if same := len(rows[0] & rows[1]):
+            found.append(
+                f"data {one.number} and {other.number} have rows with the same time and values of "
+                f"{one.quantity.text} ({same:,}), which count twice and make sigmas too small: "
+                "remove one of each"
+            )
+    return found
 
 
 def _rescaled(linear: object, scale: float) -> np.ndarray:

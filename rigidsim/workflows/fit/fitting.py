@@ -118,6 +118,11 @@ def _refuse(experiment: Experiment) -> None:
         one = either("--member N", "[sweep] removed")
         what = f"asks for many fits, which {SWEEP} makes; with {one} here it is a single one"
         problems.append(Problem("[sweep]", what))
+    if config.integrator.precision == "single":
+        what = (
+            'given "single", in which differences of motions have no digits left; "double" is allowed, or a '
+        )
+        problems.append(Problem("[integrator] precision", what + "higher one"))
     if problems:
         raise ConfigError(problems, experiment.source)
 

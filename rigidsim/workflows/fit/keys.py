@@ -61,7 +61,8 @@ class FitKeys:
         self._problems: list[Problem] = []
         self.estimated = self._all("parameters", table.parameters, table.prior)
         self.considered = self._all("consider", list(table.consider), table.consider)
-        self._refuse_rest(table.prior)
+        if not self._problems:  # otherwise a key that was refused would seem not to be there
+            self._refuse_rest(table.prior)
         if self._problems:
             raise ConfigError(self._problems, experiment.source)
         self._turned = any(one.key.startswith(ATTITUDE) for one in self.all)
@@ -80,12 +81,15 @@ class FitKeys:
 
     def _all(self, where: str, keys: Sequence[str], sigmas: Mapping[str, KnownWithin]) -> tuple[FitKey, ...]:
         found: list[FitKey] = []
+        known = "prior" if where == "parameters" else where
         for key in keys:
+            at = f'[fit] {where} "{key[:60]}"'
             try:
-                for index, one in enumerate(varied_keys(self._experiment, [key], f"[fit] {where}")):
-                    found.append(self._one(one, _sigma(sigmas, one, key, index)))
+                every = varied_keys(self._experiment, [key], f"[fit] {where}")
+                at = f'[fit] {known}."{key[:60]}"'
+                found += [self._one(one, _sigma(sigmas, one, key, n)) for n, one in enumerate(every)]
             except ValueError as error:
-                self._problems.append(Problem(f'[fit] {where} "{key[:60]}"', str(error)))
+                self._problems.append(Problem(at, str(error)))
             except ConfigError as error:
                 self._problems += error.problems
         names = [one.key for one in found]

@@ -192,7 +192,10 @@ class _ReadTable:
             )
         given = np.stack([self.found.column(name) for name in names], axis=1)
         units = {self.found.units.get(name) for name in names} - {None, "1"}
-        unit = self.table.unit or (units.pop() if len(units) == 1 else None)
+        if len(units) > 1 and self.table.unit is None:
+            said = ", ".join(sorted(map(str, units)))
+            raise self.fault("columns", f"columns in several units ({said}); write all in one")
+        unit = self.table.unit or (units.pop() if units else None)
         self.factor = 1.0
         if unit is not None:
             expected = None if self.quantity.unit is None else config_unit(self.quantity.unit)
@@ -246,6 +249,8 @@ class _ReadTable:
         unit = "rad" if self.quantity.rotation else own and config_unit(own)
         if isinstance(given, str) and given in self.found.names:
             factor = self.factor if self.quantity.form != QUATERNION else 1.0
+            if unit is not None and (said := self.found.units.get(given)) not in (None, "1"):
+                factor = self._factor("sigma", config_unit(str(said)), unit)
             column = self.found.column(given) * factor
             if (column <= 0).any():
                 at = int(np.flatnonzero(column <= 0)[0])

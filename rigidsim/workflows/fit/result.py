@@ -177,7 +177,7 @@ class FitResult(SummaryPart):
         left = f", {len(self.outliers)} left out" if self.outliers else ""
         rows = sum(one.used for one in self.data)
         size = "" if self.scale is None else f", residuals {self.scale:.3g} sigmas"
-        return f"{state}, {rows:,} rows{left}{size}"
+        return f"{state}, {rows:,} row{'' if rows == 1 else 's'}{left}{size}"
 
     def _repr_html_(self) -> str:
         rows = "".join(

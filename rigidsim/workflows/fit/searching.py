@@ -52,6 +52,8 @@ def search(weighing: Weighing, starts: int, told: Callable[[str], None]) -> Foun
         if again is None:
             raise RigidsimError(f"fit: {weighing.failure}")
         ended, compared = again, weighing.compared(again.values, fresh=False)
+    if not ended.converged and ended.barred:
+        notes.append(f"steps towards a better fit were refused: {weighing.failure}")
     for readings, used in zip(weighing.readings, weighing.used, strict=True):
         if used.sum() < 0.5 * len(used):
             notes.append(
