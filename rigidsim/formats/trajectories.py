@@ -48,6 +48,7 @@ class Trajectory:
         narrow: whether the numbers were single precision.
         epochs: times of a message as dates, in place of a column of times.
         frames: names of the frames from and to which a message's attitude turns; empty where it isn't said.
+        left_out: names of columns that hold no real numbers.
     """
 
     columns: Mapping[str, np.ndarray]
@@ -58,6 +59,7 @@ class Trajectory:
     narrow: bool = False
     epochs: tuple[Epoch, ...] = ()
     frames: tuple[str, str] = ("", "")
+    left_out: tuple[str, ...] = ()
 
     def row(self, index: int) -> str:
         """A row as the file counts it."""
@@ -128,8 +130,10 @@ def _made(
     (none: numbers from 0).
     """
     names: list[str] = []
-    kept = []
+    kept, left_out = [], []
     for name, value, labels in given:
+        if value.ndim and value.dtype.kind not in "fiu":
+            left_out.append(name)
         if value.dtype.kind not in "fiu" or not value.ndim:
             continue
         places = list(itertools.product(*map(range, value.shape[1:])))
@@ -146,7 +150,7 @@ def _made(
         for rows in blocks_of(max(sizes, default=0))
     )
     narrow = any(value.dtype == np.float32 for value in kept)
-    return Trajectory(_columns(names, blocks), source, units or {}, narrow=narrow)
+    return Trajectory(_columns(names, blocks), source, units or {}, narrow=narrow, left_out=tuple(left_out))
 
 
 def _columns(names: Sequence[str], blocks: Iterable[np.ndarray]) -> dict[str, np.ndarray]:
@@ -157,7 +161,7 @@ def _columns(names: Sequence[str], blocks: Iterable[np.ndarray]) -> dict[str, np
 
 
 def _of_frame(frame: pandas.DataFrame, source: str) -> Trajectory:
-    columns = {str(name): frame[name].to_numpy() for name in frame.columns if frame[name].dtype.kind in "fiu"}
+    columns = {str(name): frame[name].to_numpy() for name in frame.columns}
     if isinstance(frame.index.name, str) and frame.index.dtype.kind in "fiu":
         columns = {frame.index.name: frame.index.values, **columns}
     return _made(((name, value, ()) for name, value in columns.items()), source)
@@ -205,7 +209,9 @@ def _of_parquet(path: Path) -> Trajectory:
             for batch in file.iter_batches(BLOCK, columns=names, use_threads=False)
         )
         narrow = any(types.is_float32(column.type) for column in numbers)
-        return Trajectory(_columns(names, blocks) if names else {}, str(path), narrow=narrow)
+        left_out = tuple(name for name in file.schema_arrow.names if name not in names)
+        columns = _columns(names, blocks) if names else {}
+        return Trajectory(columns, str(path), narrow=narrow, left_out=left_out)
 
 
 def _of_text(path: Path) -> Trajectory:
@@ -249,7 +255,8 @@ def _of_text(path: Path) -> Trajectory:
         ) as frames:  # fmt: skip
             found = _columns(names, map(block, frames))
     columns = {name: found[name] for name in names if name in numbered or name not in worded}
-    return Trajectory(columns, str(path), counted="line", first=head + 2)
+    left_out = tuple(name for name in names if name not in columns)
+    return Trajectory(columns, str(path), counted="line", first=head + 2, left_out=left_out)
 
 
 def _is_number(text: str) -> bool:

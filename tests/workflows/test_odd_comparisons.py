@@ -39,3 +39,12 @@ def test_a_body_that_stands_still_does_not_agree_with_one_that_tumbles(quaternio
 def test_quaternions_that_are_all_zero_are_refused_as_such() -> None:
     with pytest.raises(RigidsimError, match="most quaternions have the norm 0"):
         rigidsim.compare(rigidsim.parse(TUMBLING), standing([0, 0, 0, 0]))
+
+
+@pytest.mark.parametrize("values", [np.full(61, "0.1"), np.full(61, 1j), np.full(61, True)])
+def test_columns_that_hold_no_real_numbers_are_told(values: np.ndarray) -> None:
+    left_out = "left out, since they hold no real numbers: wx"
+    found = rigidsim.compare(rigidsim.parse(TUMBLING), standing([1, 0, 0, 0]) | {"wx": values})
+    assert left_out in found.told
+    with pytest.raises(RigidsimError, match=r"no time among its columns .* real numbers: t\)"):
+        rigidsim.compare(rigidsim.parse(TUMBLING), standing([1, 0, 0, 0]) | {"t": values})

@@ -114,3 +114,10 @@ def test_single_precision_which_would_tell_moments_apart_by_rounding_is_refused(
     text = LAMINA.replace("[fit]", '[integrator]\nprecision = "single"\n[fit]') + RATES
     with pytest.raises(ConfigError, match=r"\[integrator\] precision: .*\"double\" is allowed"):
         rigidsim.fit(rigidsim.parse(text))
+
+
+@pytest.mark.parametrize("sigma", ["1e300", "1e-300", "0", "inf", "nan"])
+def test_a_sigma_whose_square_is_no_number_is_refused(here: Path, sigma: str) -> None:
+    rates(here, [1, 2, 2.5])
+    with pytest.raises(ConfigError, match=r"sigma: given .*; a standard deviation above zero|finite"):
+        rigidsim.fit(rigidsim.parse(LAMINA + RATES.replace("1e-3", sigma)))

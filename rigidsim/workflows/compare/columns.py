@@ -84,14 +84,15 @@ def attitudes_of(found: Trajectory, epoch: Epoch | None) -> Attitudes:
     Raises:
         RigidsimError: no attitude, no time, or rows that aren't finite, ascending, or enough.
     """
-    told: list[str] = []
+    told = [f"left out, since they hold no real numbers: {', '.join(found.left_out)}"] * bool(found.left_out)
+    without = "".join(f" ({words})" for words in told)
     time_unit: str | None = "s"
     plain = {_plain(name): name for name in found.columns}
     units = {_plain(name): found.units.get(name) or _unit_in(name) for name in found.columns}
     rows = len(next(iter(found.columns.values()), ()))
     if rows < LEAST_ROWS:
         raise RigidsimError(
-            f"{found.source}: {rows} rows; at least {LEAST_ROWS} are needed: sample more often"
+            f"{found.source}: {rows} rows; at least {LEAST_ROWS} are needed: sample more often" + without
         )
     used: dict[str, list[str]] = {}
 
@@ -105,7 +106,7 @@ def attitudes_of(found: Trajectory, epoch: Epoch | None) -> Attitudes:
     if found.epochs:
         times = _since(found, epoch, told)
     else:
-        name, time_unit = _time_among(plain, units, found.source)
+        name, time_unit = _time_among(plain, units, found.source, without)
         column = found.columns[plain[name]]
         times = gathered(column[block] for block in blocks_of(rows))
         used["time"] = [plain[name]]
@@ -128,6 +129,7 @@ def attitudes_of(found: Trajectory, epoch: Epoch | None) -> Attitudes:
         raise RigidsimError(
             f"{found.source}: no attitude among its columns ({', '.join(found.columns)}), which all of a "
             "comparison is about; name it qw qx qy qz, q0 q1 q2 q3, r11 ... r33, or euler_1 euler_2 euler_3"
+            + without
         )
     refuse_values(found, [name for names in used.values() for name in names])
     told += refuse_rows(found, made.times, made.quaternions, made.matrices)
@@ -224,7 +226,7 @@ def _square(values: np.ndarray | None) -> np.ndarray | None:
 
 
 def _time_among(
-    plain: Mapping[str, str], units: Mapping[str, str | None], source: str
+    plain: Mapping[str, str], units: Mapping[str, str | None], source: str, without: str
 ) -> tuple[str, str | None]:
     for name in plain:
         match = re.fullmatch(r"(?:t|time|times|epoch|seconds|timestamp)(?:_([a-z]+))?", name)
@@ -238,7 +240,7 @@ def _time_among(
                 )
             return name, known
     raise RigidsimError(
-        f"{source}: no time among its columns ({', '.join(plain.values())}); name it t or time"
+        f"{source}: no time among its columns ({', '.join(plain.values())}); name it t or time" + without
     )
 
 

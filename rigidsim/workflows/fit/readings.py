@@ -27,6 +27,8 @@ from rigidsim.workflows.fit.observed import EULER_ANGLES, QUATERNION, Observed
 
 _META = b"KPL/MK"
 _NORM = 1e-2  # by which the norm of a quaternion may differ from 1
+_LEAST, _MOST = 1e-150, 1e150  # of a standard deviation, whose square has to be a double
+_SIGMAS = f"a standard deviation above zero, from {_LEAST:g} to {_MOST:g}, is allowed"
 
 
 @dataclass(frozen=True)
@@ -252,19 +254,19 @@ class _ReadTable:
             if unit is not None and (said := self.found.units.get(given)) not in (None, "1"):
                 factor = self._factor("sigma", config_unit(str(said)), unit)
             column = self.found.column(given) * factor
-            if (column <= 0).any():
-                at = int(np.flatnonzero(column <= 0)[0])
+            if (wrong := ~_usable(column)).any():
+                at = int(np.flatnonzero(wrong)[0])
                 raise RigidsimError(
-                    f"{self.found.source}: {self.found.rows[at]}: {given} is {column[at] / factor:g}; a "
-                    "standard deviation above zero is allowed"
+                    f"{self.found.source}: {self.found.rows[at]}: {given} is {column[at] / factor:g}; "
+                    + _SIGMAS
                 )
             return np.repeat(column[:, None], width, axis=1)
         try:
             value = float(parse_any(given, self.fault) if unit is None else parse_number(given, unit))
         except ValueError as error:
             raise self.fault("sigma", f"{error}; or the name of a column of {self.table.file}") from None
-        if not value > 0:
-            raise self.fault("sigma", f"given {given}; a standard deviation above zero is allowed")
+        if not _usable(value):
+            raise self.fault("sigma", f"given {given}; {_SIGMAS}")
         return np.full((count, width), value)
 
     def _within(self, times: np.ndarray) -> np.ndarray:
@@ -303,6 +305,10 @@ class _ReadTable:
 def config_unit(unit: str) -> str:
     """A unit of a dataset ("kg m2 s-1") as configs write it ("kg m^2 s^-1")."""
     return "rad/s" if unit == "rad s-1" else re.sub(r"(?<=[A-Za-z])(-?\d)", r"^\1", unit)
+
+
+def _usable(sigma: Any) -> Any:
+    return (sigma >= _LEAST) & (sigma <= _MOST)
 
 
 def parse_any(value: Any, fault: Any) -> Any:
