@@ -96,9 +96,9 @@ def assert_invariants_hold(run: rigidsim.Run) -> None:
         assert float(np.abs(run.dataset[f"{name}_drift"]).max()) == row["largest_drift"]
 
 
-@pytest.mark.parametrize("precision", cases(["single", "extended"], ["single"]))
 @pytest.mark.parametrize("path", SCENES, ids=NAMES)
-def test_all_invariants_hold_in_other_precisions(path: Path, precision: str, runs: Path) -> None:
+def test_all_invariants_hold_in_another_precision(path: Path, runs: Path) -> None:
+    precision = ("single", "extended")[NAMES.index(path.stem) % 2]
     run = run_config(path, runs, f'integrator.precision="{precision}"', "output.estimate=false")
     for name, row in run.summary["invariants"].items():
         assert row["bound"] == 50 * EPSILON[precision] * np.sqrt(run.summary["cost"]["steps"])

@@ -11,10 +11,9 @@ import heyoka as hy
 import mpmath
 import numpy as np
 import pytest
-from killing import killed
 from scipy.integrate import quad
 from scipy.optimize import brentq
-from support import config, loaded, run_text, same_bits
+from support import config, loaded, run_text
 
 import rigidsim
 from rigidsim import ConfigError
@@ -395,14 +394,6 @@ def test_members_of_a_batch_are_the_runs_they_stand_for(tmp_path: Any) -> None:
     for number, size in enumerate((7e6, 7.1e6, 7.2e6)):
         alone = run_text(text, f"loads[0].orbit.semi_major_axis={size}").dataset["quaternion"].values[-1]
         assert abs(abs(final[number] @ alone) - 1) <= 1e-13
-
-
-@pytest.mark.slow  # some minutes of compilation
-@pytest.mark.optimised  # as in the process that is killed
-def test_a_killed_run_with_a_shadow_resumes_bit_for_bit(tmp_path: Any) -> None:
-    given = shadowed('\nradius = "695700 km"', end=3000, samples=61)
-    done = rigidsim.resume(killed("support", given, tmp_path))
-    same_bits(run_text(given, estimate=True), done)
 
 
 @pytest.mark.parametrize(
