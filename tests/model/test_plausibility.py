@@ -354,3 +354,18 @@ def test_the_told_orbit_is_that_of_kepler(place: str, velocity: str, words: str)
     said = built.loads[0].told(built)  # type: ignore[attr-defined]
     assert words in said
     assert ("up to" in said) == ("up to" in words)
+
+
+def test_a_moment_is_told_with_its_numbers_and_its_laws() -> None:
+    built = build_scene(
+        parse(
+            scene(
+                '[[loads]]\nkind = "magnetic_dipole"\nmoment = ["-1e5*wx*by", 0, "1.5 A m^2"]\n'
+                "field = [0, 0, 3e-5]"
+            )
+        )
+    )
+    said = built.loads[0].told(built)  # type: ignore[attr-defined]
+    assert (
+        "dipole of [-1e5*wx*by, 0, 1.5] A m^2 in a uniform field of 3e-05 T: 1.5 A m^2 at the start" in said
+    )
