@@ -20,6 +20,7 @@ from rigidsim.model.loads.surface_load import Pushes, SurfaceLoad
 from rigidsim.model.plausibility import about_altitude
 from rigidsim.model.rotations import Symbolic
 from rigidsim.scene.bodies.outside import Plate
+from rigidsim.scene.bodies.presets import known_body
 from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.expressions.parser import parse_expression
 from rigidsim.scene.expressions.tree import Expression, ExpressionError
@@ -99,7 +100,10 @@ class Drag(SurfaceLoad):
         return kind(pushes.acting(), tuple(factors), around.free_flight, around.number)
 
     def cautions(self, fields: DragFields, where: str, scene: Scene) -> Iterator[Caution]:
-        if fields.altitude is not None:
+        attractors = (x for x in scene.config.loads if getattr(x, "kind", "") == "central_gravity")
+        strengths = (getattr(x, "gravitational_parameter", None) for x in attractors)
+        known = any(x is not None and known_body(float(x)) is not None for x in strengths)
+        if known and fields.altitude is not None:
             start = start_values(scene)["altitude"]
             yield from about_altitude(fields.altitude, float(start), where)
 
