@@ -77,10 +77,10 @@ def _orientation_at(epoch: Epoch, known: bool) -> tuple[np.ndarray, float]:
     if known and not table[0, 0] <= tai <= table[-1, 0]:
         ends = (int(row[0] // 86400) for row in (table[0], table[-1]))
         first, last = (date.fromordinal(_MJD_OF_DAY_0 + day) for day in ends)
+        newer = "; a newer heyoka knows later ones" if tai > table[-1, 0] else ""
         raise ValueError(
             f"the date {epoch} is outside what is known of the Earth's rotation, {first} to {last} (the "
-            "IERS's table in heyoka; a newer heyoka knows more); give the state in TEME or GCRF, which need "
-            "none of it"
+            f"IERS's table in heyoka{newer}); give the state in TEME or GCRF, which need none of it"
         )
     after = int(np.clip(np.searchsorted(table[:, 0], tai), 1, len(table) - 1))
     low, high = table[after - 1], table[after]

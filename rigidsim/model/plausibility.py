@@ -8,6 +8,7 @@ implausible: scenes without units are free.
 import math
 from collections.abc import Iterator, Sequence
 from fractions import Fraction
+from typing import Any
 
 from rigidsim.model.load_words import ASTRONOMICAL_UNIT, length_text, span_words
 from rigidsim.scene import attitude
@@ -26,6 +27,8 @@ _FARTHEST = 1e5  # radii of a body: its orbits and neighbours are nearer (Neptun
 _HEIGHT = 1e5  # m: a length from here on may be an altitude
 _DEEP = 0.01  # of the radius: what is nearer to the centre is no altitude, but on a scale of its own
 _SURFACE = 0.99  # of the equatorial radius: orbits may graze flattened bodies
+_ROUGHLY = 0.02  # relative difference of a radius, mean or equatorial, from the published one
+_SIMILAR = 10.0  # ratio of an air density's altitude to that of a flight in it
 _PERTURBED = 0.05
 """Relative difference of n^2 a^3 from G M that perturbations explain: the Moon's by the Sun is 0.0075, of
 inner moons of Saturn by its flattening 0.025.
@@ -133,6 +136,25 @@ def about_distance(
         yield Caution(WarningCode.LENGTH_WITHOUT_UNIT, f"{where}: {text}")
     elif distance >= _DEEP * body.radius:
         yield Caution(WarningCode.BELOW_SURFACE, f"{where}: given {_numbers(given)} m: {below}{height}")
+
+
+def about_radius(fields: Any, where: str) -> Iterator[Caution]:
+    """Radii of a known attracting body in km without a unit: of its altitude and shadow, figure and field."""
+    strength = getattr(fields, "gravitational_parameter", None)
+    if strength is None or (body := _meant_body(strength)) is None:
+        return
+    for table in ("", "figure.", "gravity_field."):
+        given = getattr(getattr(fields, table[:-1], None) if table else fields, "radius", None)
+        if given is not None and given.assumed and abs(1e3 * float(given) / body.radius - 1) < _ROUGHLY:
+            known = f"the radius of {body.called} is {length_text(body.radius)}"
+            yield _without_unit(f"{where} {table}radius", given, "m", known, "km")
+
+
+def about_altitude(given: ExactNumber, altitude: float, where: str) -> Iterator[Caution]:
+    """An altitude in km without a unit, where the body starts at about as many km (``altitude``, m)."""
+    if given.assumed and altitude / _SIMILAR < 1e3 * float(given) < altitude * _SIMILAR:
+        known = f"the body starts {length_text(altitude)} above the surface"
+        yield _without_unit(f"{where} altitude", given, "m", known, "km")
 
 
 def about_start(scene: Scene, body: KnownBody | None, place: Vector, velocity: Vector) -> Iterator[Caution]:

@@ -133,18 +133,23 @@ class PointMasses:
         return closest(context, place, moving, self.strengths[one] + self.strengths[other])
 
 
-def closest(context: Any, place: Vector, moving: Vector, strength: Any) -> tuple[Any, Any]:
-    """Least distance (m) of two masses left to themselves, and their angular rate there (rad/s), from
-    relative place and velocity and the sum of their gravitational parameters.
-    """
+def kepler_reach(context: Any, place: Vector, moving: Vector, strength: Any) -> tuple[Any, Any | None]:
+    """Least and largest distance (m) on the Kepler orbit through a place and velocity; None if unbound."""
     distance, speed = norm(context, place), norm(context, moving)
     momentum = norm(context, cross(place, moving))
     energy = speed**2 / 2 - strength / distance
     squared = 1 + 2 * energy * momentum**2 / strength**2
     e = context.sqrt(squared) if squared > 0 else context.zero
-    nearest_ = momentum**2 / strength / (1 + e)
-    if nearest_ > distance:
-        nearest_ = distance
+    least = min(momentum**2 / strength / (1 + e), distance)
+    return least, max(-strength / energy - least, distance) if energy < 0 else None
+
+
+def closest(context: Any, place: Vector, moving: Vector, strength: Any) -> tuple[Any, Any]:
+    """Least distance (m) of two masses left to themselves, and their angular rate there (rad/s), from
+    relative place and velocity and the sum of their gravitational parameters.
+    """
+    distance, speed = norm(context, place), norm(context, moving)
+    nearest_, _ = kepler_reach(context, place, moving, strength)
     if nearest_ < distance / _CLOSEST:
         nearest_ = distance / _CLOSEST
     return nearest_, context.sqrt(2 * strength / nearest_ + speed**2) / nearest_

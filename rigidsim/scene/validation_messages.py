@@ -39,6 +39,7 @@ _WORDS = {
     "too_long": "given {actual_length}; at most {max_length} are allowed",
     "kind_of_value": "given {given}; {msg}",
     "list_type": "given {given}; an array is allowed",
+    "dict_type": "given {given}; a table of keys and their values is allowed",
     "model_type": "given {given}; a table is allowed",
     "model_attributes_type": "given {given}; a table is allowed",
     "int_type": "given {given}; a whole number, without point or exponent, is allowed",

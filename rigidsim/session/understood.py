@@ -3,7 +3,7 @@
 from typing import Any
 
 from rigidsim.model.load import Load, loads_of
-from rigidsim.model.plausibility import about_named_strength
+from rigidsim.model.plausibility import about_named_strength, about_radius
 from rigidsim.scene import attitude
 from rigidsim.scene.arithmetic import Vector, working_bits
 from rigidsim.scene.readable import TimeWords
@@ -91,7 +91,8 @@ def cautions_of(scene: Scene) -> list[Caution]:
     found += [Caution(WarningCode.NEVER_HAPPENS, str(p)) for p in unreachable_events(scene.events)]
     for number, (fields, load) in enumerate(zip(scene.config.loads, scene.given_loads, strict=True), start=1):
         if isinstance(load, Load):
-            found += load.cautions(fields, f"[[loads]] number {number}", scene)
+            where = f"[[loads]] number {number}"
+            found += [*load.cautions(fields, where, scene), *about_radius(fields, where)]
     for number, one in enumerate(scene.config.bodies, start=1):
         if one.ephemeris:
             found += about_named_strength(

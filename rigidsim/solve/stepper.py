@@ -206,7 +206,8 @@ def bound_of_sparse_series(coefficients: np.ndarray) -> float:
     From rest under a torque that grows with time, a quaternion's series have every third term only: the last
     two are zero, and the engine would take any step at all.
     """
-    sizes = np.abs(coefficients.astype(np.float64)).max(axis=0).tolist()
+    with np.errstate(over="ignore"):  # of wider types
+        sizes = np.abs(coefficients.astype(np.float64)).max(axis=0).tolist()
     if not all(map(math.isfinite, sizes)):  # next to a pole of Euler angles: this chart is left
         return math.inf
     order, base = len(sizes) - 1, max(sizes[0], 1.0)  # the engine's errors are absolute below 1

@@ -190,7 +190,16 @@ DECAYING = [  # of the same test cases: down within the hour
             ["finds no orbit", "decayed"],
         ),
         (given(ITRF, "ITRF"), {}, ["[time] epoch", "missing", "ITRF"]),
-        (given(ITRF, "ITRF"), {"time": {"epoch": "2060-01-01 TT"}}, ["outside what is known", "1973-01-02"]),
+        (
+            given(ITRF, "ITRF"),
+            {"time": {"epoch": "2060-01-01 TT"}},
+            ["outside what is known", "1973-01-02", "newer heyoka"],
+        ),
+        (
+            given(ITRF, "ITRF"),
+            {"time": {"epoch": "1960-01-01 TT"}},
+            ["in heyoka); give the state in TEME or"],
+        ),
         ({"frame": "GCRF"}, {"time": {"epoch": DATE}}, ["frame", "without position or velocity"]),
     ],
 )

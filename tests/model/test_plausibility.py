@@ -95,6 +95,28 @@ IMPLAUSIBLE = {
         "length_without_unit",
         'a circular orbit there has 7546 m/s; write "7.5 km/s" if',
     ),
+    "a radius in km": (
+        flight('["7000 km", 0, 0]', '[0, "7.5 km/s", 0]') + "radius = 6378.137\n",
+        "length_without_unit",
+        "[[loads]] number 1 radius: given 6378.137 without a unit, which is taken as m, while the radius of "
+        'the Earth is 6378 km; write "6378.137 km" if',
+    ),
+    "a figure's radius in km": (
+        flight('["7000 km", 0, 0]', '[0, "7.5 km/s", 0]')
+        + "figure = {J2 = 1e-3, radius = 6378, pole = [0, 0, 1]}\n",
+        "length_without_unit",
+        "[[loads]] number 1 figure.radius: given 6378 without a unit",
+    ),
+    "an air's altitude in km": (
+        flight('["6800 km", 0, 0]', '[0, "7.6 km/s", 0]').replace(
+            "mass = 100", "mass = 100, surfaces = [{radius = 1}]"
+        )
+        + 'radius = "6378 km"\n[[loads]]\nkind = "drag"\ndensity = 1e-12\naltitude = 400\n'
+        "scale_height = 60\n",
+        "length_without_unit",
+        "[[loads]] number 2 altitude: given 400 without a unit, which is taken as m, while the body starts "
+        '422 km above the surface; write "400 km" if',
+    ),
     "an altitude": (
         scene(orbit('semi_major_axis = "550 km"')),
         "below_surface",
@@ -315,3 +337,35 @@ def test_it_is_told_exactly_where_a_spin_is_outside_its_resonance() -> None:
         found = warned(text)
         assert [caution.code.value for caution in found] == ["near_resonance"] * (not held[i]), i
         assert all(f"{names[p[i]]} resonance" in caution.text for caution in found)
+
+
+@pytest.mark.parametrize(
+    ("place", "velocity", "words"),
+    [
+        ("[7000e3, 0, 0]", "[0, 7546, 0]", "on an orbit of 7000 to 7000 km, period 97.14 min; torque up to"),
+        ("[7000e3, 0, 0]", "[0, 0, 0]", "on an orbit of 0 to 7000 km, period 34.34 min; torque "),
+        ("[7000e3, 0, 0]", "[0, 1, 0]", "on an orbit of 6.147e-05 to 7000 km, period 34.34 min; torque "),
+        ("[-50000e3, 8000e3, 0]", "[9000, 0, 0]", "unbound, no nearer than 4697 km; torque up to"),
+    ],
+)
+def test_the_told_orbit_is_that_of_kepler(place: str, velocity: str, words: str) -> None:
+    """Pericentres of p/(1 + e) with p = h^2/GM, however near the point, to which estimates don't follow."""
+    built = build_scene(parse(flight(place, velocity)))
+    said = built.loads[0].told(built)  # type: ignore[attr-defined]
+    assert words in said
+    assert ("up to" in said) == ("up to" in words)
+
+
+def test_a_moment_is_told_with_its_numbers_and_its_laws() -> None:
+    built = build_scene(
+        parse(
+            scene(
+                '[[loads]]\nkind = "magnetic_dipole"\nmoment = ["-1e5*wx*by", 0, "1.5 A m^2"]\n'
+                "field = [0, 0, 3e-5]"
+            )
+        )
+    )
+    said = built.loads[0].told(built)  # type: ignore[attr-defined]
+    assert (
+        "dipole of [-1e5*wx*by, 0, 1.5] A m^2 in a uniform field of 3e-05 T: 1.5 A m^2 at the start" in said
+    )

@@ -181,6 +181,7 @@ IN_ONE_TABLE: dict[str, list[tuple[str, ...]]] = {
         ('torque = "x"', "torque", "unknown key", "rotors, states"),
         ('[states]\nname = "s"', "[[states]]", "write [[states]] in double brackets"),
         ('loads = ["gravity"]', "[[loads]] number 1", 'given "gravity"; a table is allowed'),
+        ("sweep = {axes = [3]}", "[sweep] axes", "given [3]; a table of keys and their values is allowed"),
     ],
     "until 10": [
         ("samples = 5\nevery = 1", "every", "given beside samples"),

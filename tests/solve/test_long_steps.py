@@ -10,6 +10,7 @@ import pytest
 from support import config, run_text
 
 import rigidsim
+from rigidsim.solve.stepper import bound_of_sparse_series
 
 THROWN = config(
     "principal_moments = [1, 1, 1]\nmass = 1",
@@ -25,6 +26,12 @@ KINKED = config(
     'kind = "torque"\ncomponents = ["0", "0", "3e-6*sqrt((t - 241)^2)"]',
     "end = 1738\nsamples = 3",
 )
+
+
+def test_series_beyond_a_double_are_no_bound_and_warn_of_nothing(recwarn: pytest.WarningsRecorder) -> None:
+    """Next to a contact of an eclipse, high terms in quadruple precision are beyond any double."""
+    assert bound_of_sparse_series(np.array([[1, np.longdouble(10) ** 4000, 1]])) == math.inf
+    assert not recwarn.list
 
 
 @pytest.mark.parametrize("precision", ["single", "extended"])

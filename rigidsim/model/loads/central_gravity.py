@@ -35,10 +35,12 @@ from rigidsim.scene.arithmetic import Vector, cross, norm, unit_vectors
 from rigidsim.scene.exact import ZERO
 from rigidsim.scene.fields import BodyName, GravitationalParameter, Metre, Rate, Triple
 from rigidsim.scene.orbits import Orbit, attracting_body
-from rigidsim.scene.point_masses import closest
+from rigidsim.scene.point_masses import closest, kepler_reach
 from rigidsim.scene.registry import Surroundings, register_load
 from rigidsim.scene.scene import Scene
 from rigidsim.store.summary_parts import Caution
+
+_ROUNDED = 0.999  # of the distance for which estimates are made, and the pericentre but for rounding
 
 
 class CentralGravityFields(FigureFields):
@@ -189,15 +191,18 @@ class CentralGravity(PointAttraction):
 
     def told(self, scene: Scene) -> str:
         context, strength = scene.context, self.gravitational_parameter
-        _, distance, energy = self._start(scene)
+        offset, distance, _ = self._start(scene)
         source = f"{source_text(strength)}, {reach_text(strength, distance)} at the start"
         least = self.nearest_approach(scene)
+        at, largest = self.nearest_approach(scene), value_text(self.amplitude(scene), "N m")
+        least, farthest = kepler_reach(context, offset, scene.velocity or [], strength)
         path = f"unbound, no nearer than {length_text(float(least))}"
-        if energy < 0:
-            axis = -strength / (2 * energy)
-            period = span_words(2 * context.pi * context.sqrt(axis**3 / strength))
-            path = f"on an orbit of {length_text(float(least), float(2 * axis - least))}, period {period}"
-        return f"central gravity of {source}, {path}; torque up to {value_text(self.amplitude(scene), 'N m')}"
+        if farthest is not None:
+            period = span_words(2 * context.pi * context.sqrt(((least + farthest) / 2) ** 3 / strength))
+            path = f"on an orbit of {length_text(float(least), float(farthest))}, period {period}"
+        # an orbit that all but meets the point has no bound that says anything
+        torque = f"up to {largest}" if least >= at * _ROUNDED else f"{largest} at {length_text(float(at))}"
+        return f"central gravity of {source}, {path}; torque {torque}"
 
     def cautions(self, fields: CentralGravityFields, where: str, scene: Scene) -> Iterator[Caution]:
         given, name = fields.gravitational_parameter, fields.source

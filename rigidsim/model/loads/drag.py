@@ -7,6 +7,7 @@ the force is -rho C A (n . v) v / 2, that of the area seen against the stream; a
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Annotated, Any, Literal
 
@@ -16,13 +17,18 @@ from rigidsim.model.air_density import AIR_DENSITY, INDICES, LEAST, NRLMSISE, he
 from rigidsim.model.flight_names import RELATIVE_NAMES
 from rigidsim.model.kinematics import Kinematics
 from rigidsim.model.loads.surface_load import Pushes, SurfaceLoad
+from rigidsim.model.plausibility import about_altitude
 from rigidsim.model.rotations import Symbolic
 from rigidsim.scene.bodies.outside import Plate
+from rigidsim.scene.bodies.presets import known_body
 from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.expressions.parser import parse_expression
 from rigidsim.scene.expressions.tree import Expression, ExpressionError
 from rigidsim.scene.fields import Dimensionless, Metre, NumberOrFormula
+from rigidsim.scene.initial_values import start_values
 from rigidsim.scene.registry import LoadFields, Surroundings, register_load
+from rigidsim.scene.scene import Scene
+from rigidsim.store.summary_parts import Caution
 
 Density = Annotated[Any, NumberOrFormula("kg/m^3")]
 
@@ -92,6 +98,14 @@ class Drag(SurfaceLoad):
                 pushes.along_vector(surface, size, speed=True)
         kind = DragInThermosphere if fields.density == NRLMSISE else cls
         return kind(pushes.acting(), tuple(factors), around.free_flight, around.number)
+
+    def cautions(self, fields: DragFields, where: str, scene: Scene) -> Iterator[Caution]:
+        attractors = (x for x in scene.config.loads if getattr(x, "kind", "") == "central_gravity")
+        strengths = (getattr(x, "gravitational_parameter", None) for x in attractors)
+        known = any(x is not None and known_body(float(x)) is not None for x in strengths)
+        if known and fields.altitude is not None:
+            start = start_values(scene)["altitude"]
+            yield from about_altitude(fields.altitude, float(start), where)
 
 
 class DragInThermosphere(Drag):

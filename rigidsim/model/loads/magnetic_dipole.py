@@ -20,6 +20,7 @@ from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.expressions.parser import parse_expression
 from rigidsim.scene.expressions.tree import Constant, Expression, ExpressionError, evaluate, states_read
 from rigidsim.scene.initial_values import start_values
+from rigidsim.scene.readable import number_text
 from rigidsim.scene.registry import Surroundings, register_load
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.transitions import narrow_parts, root_parts
@@ -139,8 +140,15 @@ class SteeredDipole(MagneticDipole):
     def _words(self, scene: Scene) -> tuple[str, str]:
         values, context = start_values(scene), scene.context
         size = norm(context, [evaluate(component, values, context) for component in self.law])
-        shown = ", ".join(component.text for component in self.law)
+        shown = ", ".join(_text(component) for component in self.law)
         return f"magnetic dipole of [{shown}] A m^2", f"{value_text(size, 'A m^2')} at the start"
+
+
+def _text(component: Expression) -> str:
+    """A component as written; a number has no text of its own."""
+    if isinstance(component.root, Constant) and not component.text:
+        return number_text(float(component.root.value), 6)
+    return component.text
 
 
 def _law(given: list[Any], around: Surroundings) -> tuple[Expression, ...]:
