@@ -9,7 +9,8 @@ this number moved, in quadruple precision, give the central difference of fourth
 some h^4 = 1e-24, and 1e-13 for the 80 bits in which they are subtracted. They share nothing with the
 variational equations but the way from a config to equations. The largest difference along the run, relative
 to the derivative's largest value there, may be 1e-9. ``--quick`` takes the four motions from one compiled
-system with other coefficients, in a quarter of the time; ``--only N`` repeats a case; the exit code is 1 if
+system with other coefficients, in a quarter of the time, by larger steps, so that a case beyond 1e-9 is to
+be repeated without it; ``--only N`` repeats a case; the exit code is 1 if
 one is off.
 """
 
