@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from contextlib import contextmanager
+from datetime import UTC, datetime
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -159,6 +161,17 @@ def cases(every: Iterable[Any], usual: Collection[Any]) -> list[Any]:
     every = list(every)
     assert set(usual) <= set(every), "no such case"
     return [case if case in usual else pytest.param(case, marks=pytest.mark.slow) for case in every]
+
+
+def seeds(few: int, many: int) -> list[Any]:
+    """Seeds of random relatives: the few first in each suite, the others among the long tests. They change by
+    the day, unless the environment variable ``RIGIDSIM_SEED`` (a whole number) gives the first one; the name of
+    a failing test shows its seed.
+    """
+    first = int(os.environ.get("RIGIDSIM_SEED", f"{datetime.now(UTC):%y%m%d}000"))
+    every = [pytest.param(seed, id=f"seed{seed}") for seed in range(first, first + few)]
+    rest = range(first + few, first + many)
+    return every + [pytest.param(seed, id=f"seed{seed}", marks=pytest.mark.slow) for seed in rest]
 
 
 def assert_announced(announced: Sequence[float], true: Sequence[float], at_most: float = 10) -> None:
