@@ -165,8 +165,8 @@ def cases(every: Iterable[Any], usual: Collection[Any]) -> list[Any]:
 
 def seeds(few: int, many: int) -> list[Any]:
     """Seeds of random relatives: the few first in each suite, the others among the long tests. They change by
-    the day, unless the environment variable ``RIGIDSIM_SEED`` (a whole number) gives the first one; the name of
-    a failing test shows its seed.
+    the day, unless the environment variable ``RIGIDSIM_SEED`` (a whole number) gives the first one; the name
+    of a failing test shows its seed.
     """
     first = int(os.environ.get("RIGIDSIM_SEED", f"{datetime.now(UTC):%y%m%d}000"))
     every = [pytest.param(seed, id=f"seed{seed}") for seed in range(first, first + few)]
