@@ -6,6 +6,7 @@ the same format in a tenth of it, so that whole chunks are compressed here; with
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from itertools import accumulate, pairwise
 from pathlib import Path
 from typing import Any
 
@@ -74,7 +75,7 @@ class NetcdfFile:
     def texts_once(self, name: str, dim: str, texts: Sequence[str]) -> None:
         """Write strings along a dimension, unless they are there."""
         if name not in self._labelled.variables:
-            self.texts(name, dim, texts, {"long_name": name.replace("_", " ")})
+            self.texts(name, dim, texts, label_attributes(name))
 
     def _created(
         self, name: str, dims: Sequence[str], dtype: Any, attributes: Mapping[str, Any], **how: Any
@@ -97,6 +98,11 @@ class NetcdfFile:
                 group.create_dataset(key, data=stored, track_order=True)
 
 
+def label_attributes(dim: str) -> dict[str, str]:
+    """Attributes of the variable of a dimension's labels."""
+    return {"long_name": dim.replace("_", " ")}
+
+
 @contextmanager
 def writing(target: Any) -> Iterator[NetcdfFile]:
     """A new netCDF-4 file in a file object open for reading and writing; complete when the block ends."""
@@ -105,15 +111,18 @@ def writing(target: Any) -> Iterator[NetcdfFile]:
 
 
 def _attributes(owner: Any, attributes: Mapping[str, Any]) -> None:
-    """Write attributes: strings, and numbers as netCDF writes them, always as an array."""
     for name, value in attributes.items():
-        if isinstance(value, str):
-            owner.attrs[name] = value
-            continue
-        numbers = np.atleast_1d(np.asarray(value))
-        if numbers.dtype.kind not in "if":
-            raise TypeError(f"attribute {name}: {value!r} is neither a text nor made of numbers")
-        owner.attrs[name] = numbers.astype("<i8" if numbers.dtype.kind == "i" else "<f8")
+        owner.attrs[name] = attribute(name, value)
+
+
+def attribute(name: str, value: Any) -> str | np.ndarray:
+    """An attribute as it is written: a string, or numbers as netCDF writes them, always as an array."""
+    if isinstance(value, str):
+        return value
+    numbers = np.atleast_1d(np.asarray(value))
+    if numbers.dtype.kind not in "if":
+        raise TypeError(f"attribute {name}: {value!r} is neither a text nor made of numbers")
+    return numbers.astype("<i8" if numbers.dtype.kind == "i" else "<f8")
 
 
 class ChunkedVariable:
@@ -151,12 +160,14 @@ class ChunkedVariable:
 
 
 def joined_parts(blocks: Sequence[Block], variable: Variable) -> list[np.ndarray]:
-    """Parts of a variable along all blocks, row by row as in a file; blocks are stored column by column."""
-    found = []
-    for part in range(variable.parts):
-        pieces = [block[variable.name][part] for block in blocks]
-        rows = sum(len(piece) for piece in pieces)
-        found.append(np.concatenate(pieces, out=np.empty((rows, *pieces[0].shape[1:]))))
+    """Parts of a variable along all blocks, each of shape (rows, *variable.shape), row by row as in a file;
+    blocks are stored column by column.
+    """
+    ends = list(accumulate((len(block["time"][0]) for block in blocks), initial=0))
+    found = [np.empty((ends[-1], *variable.shape)) for _ in range(variable.parts)]
+    for block, (first, stop) in zip(blocks, pairwise(ends), strict=True):
+        for part, values in zip(found, block[variable.name], strict=True):
+            part[first:stop] = values.reshape(stop - first, *variable.shape)
     return found
 
 
@@ -191,7 +202,7 @@ def write_blocks(
     created = declare(file, variables, rows, attributes, compressed=False)
     for variable in variables if rows else ():
         for name, values in zip(variable.part_names(), joined_parts(blocks, variable), strict=True):
-            created[name][...] = values.reshape(created[name].shape)
+            created[name][...] = values
 
 
 def add_extras(file: NetcdfFile, extras: Sequence[Extra]) -> None:

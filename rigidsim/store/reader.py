@@ -6,7 +6,7 @@ content it would show as data. Whatever isn't a whole dataset of rigidsim is ref
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -17,8 +17,16 @@ from xarray.backends import AbstractDataStore, BackendArray
 from xarray.core import indexing
 
 from rigidsim.errors import RunFolderError
-from rigidsim.store.netcdf import check_version, reading, root_attributes
-from rigidsim.store.variables import LABELS, OF_THE_RUN
+from rigidsim.store.netcdf import (
+    Block,
+    attribute,
+    check_version,
+    joined_parts,
+    label_attributes,
+    reading,
+    root_attributes,
+)
+from rigidsim.store.variables import LABELS, OF_THE_RUN, Extra, Variable, used_labels
 
 _MOST_VARIABLES = 10_000
 _GROUPS = ("checkpoint", "events")
@@ -57,6 +65,39 @@ def open_dataset(
         text = str(error).strip() or type(error).__name__
         raise RunFolderError(f"{path}: can't be read ({text.splitlines()[0][:200]})") from None
     return opened
+
+
+def in_memory(
+    variables: Sequence[Variable],
+    blocks: Sequence[Block],
+    extras: Sequence[Extra],
+    attributes: Mapping[str, Any],
+) -> xarray.Dataset:
+    """The dataset that ``open_dataset`` would read from a file of this content, without the file."""
+    parts = [
+        (name, ("time", *variable.dims), values, variable.part_attributes(part))
+        for variable in variables
+        for part, (name, values) in enumerate(
+            zip(variable.part_names(), joined_parts(blocks, variable), strict=True)
+        )
+    ]
+    parts += [(extra.name, extra.dims, extra.values.astype(float), extra.attributes) for extra in extras]
+    content = {
+        dim: xarray.Variable(dim, np.array(labels, str), label_attributes(dim))
+        for dim, labels in used_labels(variables).items()
+    }
+    for name, dims, values, told in parts:
+        content[name] = xarray.Variable(dims, values, _as_read(told), {"dtype": values.dtype})
+    return xarray.decode_cf(xarray.Dataset(content, attrs=_as_read(attributes))).load()
+
+
+def _as_read(attributes: Mapping[str, Any]) -> dict[str, Any]:
+    """Attributes as readers of a file give them: a single number isn't an array."""
+    stored = {name: attribute(name, value) for name, value in attributes.items()}
+    return {
+        name: value if len(value) != 1 or isinstance(value, str) else value[0]
+        for name, value in stored.items()
+    }
 
 
 def inspect(path: Path) -> None:

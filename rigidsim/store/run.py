@@ -1,6 +1,5 @@
 """Runs on disk, finished or partial, opened for reading, and runs in memory."""
 
-import io
 import sys
 import tempfile
 from abc import abstractmethod
@@ -13,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Self
 
 from rigidsim.errors import FORCE, RESUME, RunFolderError, either
 from rigidsim.look import viewer
-from rigidsim.store import atomic, netcdf, segments
+from rigidsim.store import atomic, segments
 from rigidsim.store.folder import RunFolder, find_run
 from rigidsim.store.netcdf import Block
 from rigidsim.store.seal import refuse_damaged
@@ -232,14 +231,9 @@ class MemoryRun(Run):
     @cached_property
     def dataset(self) -> "xarray.Dataset":
         """The dataset, in memory."""
-        import xarray
+        from rigidsim.store.reader import in_memory
 
-        buffer = io.BytesIO()
-        with netcdf.writing(buffer) as file:
-            netcdf.write_blocks(file, self.variables, self.blocks, self.attributes)
-            netcdf.add_extras(file, self.extras)
-        with xarray.open_dataset(buffer, engine="h5netcdf") as opened:
-            return opened.load()
+        return in_memory(self.variables, self.blocks, self.extras, self.attributes)
 
     def concluded(self, outcome: Brief) -> Self:
         """The same run with another summary."""

@@ -1,0 +1,74 @@
+"""A run in memory has the dataset that its file would have, as xarray reads it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+import xarray
+from support import CONFIGS, cases, config, same_bits
+from test_fingerprints import shortened
+
+import rigidsim
+
+OF_ONE_RUN = ("run_id", "started_at", "finished_at", "wall_seconds", "cpu_seconds")
+PRECISIONS = ("single", "double", "extended", "quadruple")
+USUAL = [path for path in CONFIGS if path.stem in ("moon_mean_axis", "skater")]  # dates, and "work"
+EXTRAS = """
+[[events]]
+name = "found"
+expression = "wx"
+[[events]]
+name = "never"
+expression = "1 + t"
+[[rotors]]
+name = "a"
+axis = [1, 0, 0]
+moment = 0.1
+rate = 3
+[[rotors]]
+name = "longer"
+axis = [0, 1, 0]
+moment = 0.2
+rate = 2
+"""
+STOP = '[[events]]\nname = "soon"\nexpression = "t - 0.5"\naction = "stop"'
+
+
+@pytest.mark.parametrize("path", cases([*USUAL, *CONFIGS[::3]], USUAL), ids=lambda path: path.stem)
+def test_a_run_in_memory_has_the_dataset_of_the_file(path: Path, tmp_path: Path) -> None:
+    precision = PRECISIONS[CONFIGS.index(path) % 4]
+    asked = ["output.timeline=false", f'integrator.precision="{precision}"', *shortened(path)]
+    assert_the_same(rigidsim.load(path, overrides=asked), tmp_path)
+
+
+@pytest.mark.parametrize("precision", cases(PRECISIONS, ["extended"]))
+def test_events_dates_names_and_exponents_are_the_same(precision: str, tmp_path: Path) -> None:
+    time = 'end = 9\nsamples = 5\nepoch = "2016-12-31T23:59:58 UTC"'
+    text = config(time=time, integrator=f'precision = "{precision}"', output="lyapunov = true", more=EXTRAS)
+    assert_the_same(rigidsim.parse(text), tmp_path)
+
+
+def test_a_run_without_samples_is_the_same(tmp_path: Path) -> None:
+    text = config(time="times = [1, 2]", integrator='precision = "extended"', more=STOP)
+    assert_the_same(rigidsim.parse(text), tmp_path)
+
+
+def assert_the_same(experiment: rigidsim.Experiment, folder: Path) -> None:
+    rigidsim.run(experiment, out=folder)
+    with xarray.open_dataset(next(folder.glob("*/dataset.h5"))) as opened:
+        saved = opened.load()
+    kept = rigidsim.run(experiment, out=None).dataset
+    for dataset in (kept, saved):
+        for name in OF_ONE_RUN:
+            del dataset.attrs[name]
+    xarray.testing.assert_identical(kept, saved)
+    same_bits(kept, saved)
+    assert (list(kept.data_vars), list(kept.coords)) == (list(saved.data_vars), list(saved.coords))
+    assert list(kept.attrs) == list(saved.attrs)
+    for one, other in ((kept, saved), *((kept[name], saved[name]) for name in kept.variables)):
+        assert [type(value) for value in one.attrs.values()] == [
+            type(value) for value in other.attrs.values()
+        ]
+        for key in ("dtype", "units", "calendar", "coordinates"):
+            assert one.encoding.get(key) == other.encoding.get(key), key
