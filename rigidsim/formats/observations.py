@@ -13,7 +13,7 @@ import numpy as np
 from rigidsim.errors import RigidsimError
 from rigidsim.formats.ck_reading import read_rows
 from rigidsim.formats.trajectories import KINDS, Trajectory, read_trajectory
-from rigidsim.scene.epochs import Epoch, parse_epoch
+from rigidsim.scene.epochs import A_DATE, Epoch, parse_epoch
 from rigidsim.scene.frame import ECLIPTIC, OBLIQUITY
 from rigidsim.scene.rotations import product
 from rigidsim.scene.units import is_unit
@@ -24,7 +24,6 @@ _IN_NAME = re.compile(r".*[\[(]\s*([^\[\]()]+?)\s*[\])]")  # "wx [deg/s]"
 _ENDINGS = {"deg": "deg", "arcsec": "arcsec", "rad": "rad", "deg_s": "deg/s", "degs": "deg/s",
             "rad_s": "rad/s", "rads": "rad/s"}  # fmt: skip
 _OF_TIMES = re.compile(r"(?:t|time)_(s|min|h|day|yr|ms)")
-_A_DATE = re.compile(r"\d{4}-\d\d-\d\d")
 
 
 @dataclass(frozen=True)
@@ -80,12 +79,12 @@ class Observations:
         """
         if self.epochs:
             return list(self.epochs)
-        if name in self.numbers or not any(_A_DATE.match(text) for text in self._texts(name)):
+        if name in self.numbers or not any(A_DATE.match(text) for text in self._texts(name)):
             return None
         found = []
         for text, row in zip(self._texts(name), self.rows, strict=True):
             try:
-                found.append(parse_epoch(f"{text.removesuffix('Z')} {scale}"))
+                found.append(parse_epoch(text, scale))
             except ValueError as error:
                 raise RigidsimError(f"{self.source}: {row}: {error}") from None
         return found

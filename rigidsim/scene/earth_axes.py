@@ -48,7 +48,7 @@ def earth_axes(epoch: Epoch, axes: str, context: Any) -> Matrix:
             (they are 0.02 arcsec apart).
 
     Raises:
-        ValueError: a date before 1972, when UTC began.
+        ValueError: a date before 1960, when UTC began.
     """
     days = epoch.universal_date() - _J2000
     centuries = (epoch.uniform().julian_date() - _J2000) / _CENTURY

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
+from datetime import date, time
 from decimal import Decimal
 from itertools import product
 from typing import Annotated, Any, TypeVar
@@ -285,6 +286,8 @@ EachOnce = Annotated[list[T], AfterValidator(_each_once)]
 
 
 def _instant(value: Any) -> Epoch:
+    if isinstance(value, date | time):  # TOML's own; a datetime is a date
+        value = value.isoformat()
     if not isinstance(value, str):
         raise ValueError(f'given {shown(value)}; a string such as "2029-04-13T21:46:00 TDB" is allowed')
     return parse_epoch(value)

@@ -47,8 +47,8 @@ class FitDataTable(ConfigTable):
     """standard deviation of each component: a number with its unit (bare ones are SI), or the name of a
     column, in ``unit``; of attitudes that of each component of a rotation vector
     """
-    scale: Literal["TDB", "TT", "UTC"] = "UTC"
-    """time scale of dates"""
+    scale: Literal["TDB", "TT", "TAI", "GPS", "UTC"] = "UTC"
+    """time scale of dates that don't name theirs"""
     outliers: Dimensionless | None = Field(None, examples=[4])
     """leave out, and tell, rows with a residual of more than so many standard deviations; by default none"""
 

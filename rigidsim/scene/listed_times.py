@@ -7,6 +7,7 @@ from collections.abc import Iterable
 from fractions import Fraction
 from typing import Any
 
+from rigidsim.scene.epochs import A_DATE, Epoch, parse_epoch
 from rigidsim.scene.exact import parse_number
 from rigidsim.scene.validation_messages import shown
 
@@ -59,8 +60,12 @@ def _is_number(text: str) -> bool:
     return True
 
 
-def times_in(text: str, context: Any) -> list[Fraction]:
-    """Times (s) of such a table of a single column, exactly as written."""
+def times_in(text: str, context: Any, epoch: Epoch | None) -> list[Fraction]:
+    """Times (s) of such a table of a single column, exactly as written; dates count from the epoch."""
     head, *cells = time_column(text.splitlines()).splitlines()
     unit = head[len("time [") : -1]
-    return [parse_number(f"{cell} {unit}", "s").fraction(context) for cell in cells]
+    if not any(map(A_DATE.match, cells)):
+        return [parse_number(f"{cell} {unit}", "s").fraction(context) for cell in cells]
+    if epoch is None:
+        raise ValueError("holds dates; give the date of time 0 as [time] epoch")
+    return [parse_epoch(cell).since(epoch) for cell in cells]

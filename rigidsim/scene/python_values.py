@@ -2,6 +2,7 @@
 
 import numbers
 from collections.abc import Mapping, Sequence
+from datetime import date, time
 from decimal import Decimal
 from fractions import Fraction
 from typing import Any
@@ -14,8 +15,8 @@ from rigidsim.scene.validation_messages import shown
 
 _DEEPEST = 50
 _ALLOWED = (
-    "numbers (int, float, Decimal, Fraction, mpf, numpy's), strings, booleans, lists, arrays and "
-    "dictionaries are allowed"
+    "numbers (int, float, Decimal, Fraction, mpf, numpy's), strings, booleans, dates, lists, "
+    "arrays and dictionaries are allowed"
 )
 
 
@@ -95,6 +96,8 @@ def _plain(value: Any) -> Any:
     """A value of Python's own, or of a related type, as bool, int, Decimal, str, list or mapping."""
     if isinstance(value, bool | str | int | Decimal | Mapping):
         return value
+    if isinstance(value, date | time):
+        return value.isoformat()
     kind = value.dtype.kind if hasattr(value, "dtype") else ""
     if kind and value.shape:  # an array; its elements keep their kind
         return list(value)

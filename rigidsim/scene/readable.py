@@ -158,7 +158,7 @@ class TimeWords:
 
 
 def julian_year(epoch: Epoch) -> float:
-    """Julian year in the epoch's scale (TT for UTC): 2000 at J2000, one more every 365.25 days."""
+    """Julian year in TDB for an epoch in TDB, otherwise in TT: 2000 at J2000, one more every 365.25 days."""
     uniform = epoch.uniform()
     return _J2000_YEAR + float(uniform.julian_date() - J2000.julian_date()) / 365.25
 

@@ -44,7 +44,7 @@ class Time(ConfigTable):
     ) = Field(None, examples=[[0, 1, 10, 100], "theirs.csv"])
     """sample times, ascending, instead of end; or a CSV file beside the config with a column t or time"""
     epoch: Instant | None = Field(None, examples=["J2000", "2029-04-13T21:46:00 TDB"])
-    """date of time 0; scales TDB, TT and UTC"""
+    """date of time 0, in TDB, TT, TAI, GPS or UTC; 2029-04-13T21:46:00Z, with or without quotes, is UTC"""
     unit: TimeUnitName | None = Field(None, examples=["day"])
     """unit in which times are displayed, such as day, yr or kyr; bare numbers in the config remain seconds"""
 
@@ -117,8 +117,10 @@ def _double(time: Fraction) -> float:
         return math.copysign(math.inf, time)
 
 
-def _listed(given: str | list[Any], context: Any, texts: Mapping[str, str]) -> list[Fraction]:
+def _listed(table: Time, context: Any, texts: Mapping[str, str]) -> list[Fraction]:
     """Times of an array, or of the table of that name."""
+    given = table.times
+    assert given is not None
     if not isinstance(given, str):
         return [time.fraction(context) for time in given]
     from rigidsim.scene.listed_times import times_in  # which few configs need
@@ -127,7 +129,7 @@ def _listed(given: str | list[Any], context: Any, texts: Mapping[str, str]) -> l
         what = "but this config was given as text, without files beside it; put the table's text into "
         raise _fail("times", f'given "{given}", {what}[tables."{given}"] text')
     try:
-        return times_in(texts[given], context)
+        return times_in(texts[given], context, table.epoch)
     except ValueError as error:
         raise _fail("times", f'given "{given}", which {error}') from None
 
@@ -149,7 +151,7 @@ def sample_times(table: Time, context: Any, texts: Mapping[str, str]) -> tuple[A
 
     start = table.start.fraction(context)
     if table.times is not None:
-        times = _listed(table.times, context, texts)
+        times = _listed(table, context, texts)
         if not times:
             raise _fail("times", "given an empty array; at least one time is needed")
         doubles = _doubles(times)

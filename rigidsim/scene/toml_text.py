@@ -30,6 +30,16 @@ def decimal(text: str) -> Decimal:
         raise ValueError(f"the number {text[:40]} is out of range") from None
 
 
+_FINE_DATE = re.compile(r"^[^#\"'\n]*=\s*(\d{4}-\d\d-\d\d[Tt ]\d\d:\d\d:\d\d\.\d{7,})", re.MULTILINE)
+
+
+def _refuse_fine_dates(text: str) -> None:
+    """Refuse dates of TOML's own whose seconds have more decimals than its reader keeps."""
+    if (found := _FINE_DATE.search(text)) is not None:
+        line = text.count("\n", 0, found.start(1)) + 1
+        raise ValueError(f"a date with more than 6 decimals of a second (at line {line}); write it in quotes")
+
+
 def parse_toml(text: str, source: str) -> dict[str, Any]:
     """The tables of a TOML text, decimals kept as written."""
     deep = _DEEP_KEY.search(text)
@@ -38,6 +48,7 @@ def parse_toml(text: str, source: str) -> dict[str, Any]:
         what = f"can't be read: a key of more than {_DEEPEST_KEY} parts (at line {line})"
         raise ConfigError(Problem("TOML", what), source)
     try:
+        _refuse_fine_dates(text)
         return tomllib.loads(text, parse_float=decimal)
     except RecursionError:
         raise ConfigError(Problem("TOML", "can't be read: nested too deeply"), source) from None
@@ -144,10 +155,12 @@ def _apply(table: dict[str, Any], assignment: str, where: str, read: Callable[[s
 
 
 def _plain_value(text: str) -> Any:
+    _refuse_fine_dates(f"= {text}")
     return tomllib.loads(f"value = {text}", parse_float=decimal)["value"]
 
 
 def _written_value(text: str) -> Any:
+    _refuse_fine_dates(f"= {text}")
     value: Any = tomlkit.parse(f"value = {text}\n").item("value")
     value.trivia.comment = value.trivia.comment_ws = ""
     return value

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from datetime import date
 from typing import Any
 
-from rigidsim.scene.epochs import DIGITS, Epoch
+from rigidsim.scene.epochs import DIGITS, UTC_BEGIN, Epoch
 
 _LENGTH = 69
 _NUMBER = r"[ \dA-HJ-NP-Z][ \d]{4}"  # Alpha-5 has a letter for the first digit
@@ -88,6 +88,9 @@ def _epoch(lines: tuple[str, ...]) -> Epoch:
     if not 1 <= int(whole) <= days:
         raise _refused(lines, f"line 1 is for day {text} of {year}; days from 1 to {days} are allowed")
     day = date(year, 1, 1).toordinal() + int(whole) - 1
+    if day < UTC_BEGIN:
+        what = f"line 1 is for {date.fromordinal(day)}; dates from 1960-01-01 on, when UTC began, are allowed"
+        raise _refused(lines, what)
     return Epoch("UTC", day, int(decimals) * 86400 * _TICKS // 10 ** len(decimals))
 
 

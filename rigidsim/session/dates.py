@@ -39,15 +39,13 @@ class Dates:
 
     @property
     def scale(self) -> str:
-        """Time scale of years and Julian dates: the epoch's own, but TT for UTC, whose days differ in
-        length.
-        """
+        """Time scale of years and Julian dates: TDB for an epoch in TDB, otherwise TT."""
         return self.epoch.uniform().scale
 
     @cached_property
     def has_dates(self) -> bool:
-        """Whether all samples lie where readers have dates (1678 to 2261), and UTC is known if it is asked
-        for.
+        """Whether all samples lie where readers have dates (1678 to 2261) and, in UTC, from 1972 to the last
+        day for which it is known.
         """
         ends = [self.samples.begin, self.samples.exact_last]
         days: list[Fraction] = [Fraction(self.epoch.day), *(self.epoch.uniform().day + t / DAY for t in ends)]
@@ -55,6 +53,8 @@ class Dates:
             return False
         if self.epoch.scale != "UTC":
             return True
+        if self.epoch.day < leap_seconds()[0][0]:
+            return False
         last = date.fromordinal(leap_seconds()[2] - 1)
         known = [parse_epoch(f"{day} UTC").julian_date() for day in ("1972-01-01", last)]
         zero = self.epoch.julian_date()

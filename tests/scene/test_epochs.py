@@ -1,4 +1,4 @@
-"""Epochs: what time zero of a scene is, in three time scales, with leap seconds where they are."""
+"""Epochs: what time zero of a scene is, in five time scales, with leap seconds where they are."""
 
 from __future__ import annotations
 
@@ -86,15 +86,19 @@ def test_scales_and_calendar_are_those_of_erfa() -> None:
 @pytest.mark.parametrize(
     ("text", "phrase"),
     [
-        ("2029-04-13T21:46:00", "with its scale (TDB, TT, UTC)"),
+        (
+            "2029-04-13T21:46:00",
+            'write it behind the date, as "2029-04-13T21:46:00 TDB" (TDB, TT, TAI, GPS, UTC)',
+        ),
         ("yesterday TDB", 'such as "2029-04-13T21:46:00 TDB"'),
         ("2001-02-29 TT", "a date and time"),
         ("2001-02-28T24:00 TT", "a date and time"),
         ("2016-12-31T23:59:60 TT", "there was no leap second then"),
+        ("2029-04-13T21:46:00Z TT", "name one scale only"),
         ("2017-12-31T23:59:60 UTC", "there was no leap second then"),
         ("2016-12-31T12:59:60 UTC", "there was no leap second then"),
-        ("1971-12-31 UTC", "known from 1972-01-01 to"),
-        ("2999-01-01 UTC", "write the epoch in TT or TDB"),
+        ("1959-12-31 UTC", "known from 1960-01-01 to"),
+        ("2999-01-01 UTC", "write the date in TT, TAI or TDB"),
     ],
 )
 def test_what_is_no_instant_is_refused(text: str, phrase: str) -> None:

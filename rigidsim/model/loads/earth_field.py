@@ -64,7 +64,7 @@ class EarthField:
                 igrf(epoch.uniform().after(Decimal(round(plain(second)))), 1)
             frame = earth_axes(epoch, axes, context)
         except ValueError as error:
-            why = f'given "{IGRF}" for a run from {epoch}; {error}: a run within 1972 to 2029 is allowed'
+            why = f'given "{IGRF}" for a run from {epoch}; {error}: a run within 1970 to 2029 is allowed'
             raise around.fault("field", why) from None
         coefficients, squares = {}, dict.fromkeys(range(1, max(n for n, _, _ in given) + 1), context.zero)
         for (n, m, sine), value in given.items():

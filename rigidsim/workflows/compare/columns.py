@@ -6,7 +6,6 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from decimal import Decimal
-from fractions import Fraction
 from typing import Any
 
 import numpy as np
@@ -258,11 +257,7 @@ def _since(found: Trajectory, epoch: Epoch | None, told: list[str]) -> np.ndarra
     if epoch is None:
         told.append("the config has no [time] epoch: its time 0 was taken for the first row")
         epoch = dates[0]
-    if epoch.uniform().scale == dates[0].uniform().scale:
-        zero = epoch.julian_date()
-        return np.array([float((date.julian_date() - zero) * 86400) for date in dates])
-    zero = epoch.since_j2000()
-    return np.array([float(Fraction(date.since_j2000() - zero)) for date in dates])
+    return np.array([float(date.since(epoch)) for date in dates])
 
 
 def seconds_in(unit: str) -> float:

@@ -6,7 +6,6 @@ import hashlib
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from fractions import Fraction
 from pathlib import Path
 from typing import Any, get_args
 
@@ -16,7 +15,6 @@ from rigidsim.errors import ConfigError, Problem, RigidsimError
 from rigidsim.formats import ck_reading
 from rigidsim.formats.observations import Observations, read_attitudes, read_observations
 from rigidsim.scene.config import Experiment
-from rigidsim.scene.epochs import Epoch
 from rigidsim.scene.exact import parse_number, parse_quantity
 from rigidsim.scene.fit_table import FitDataTable
 from rigidsim.scene.frame import ECLIPTIC, EQUATOR, OBLIQUITY, SpaceAxes
@@ -172,7 +170,7 @@ class _ReadTable:
             raise self.fault(
                 "time", f'"{self.table.time}" holds dates, but the config has no [time] epoch; give it one'
             )
-        return seconds_since(self.scene.epoch, dates)
+        return np.array([float(date.since(self.scene.epoch)) for date in dates])
 
     def _factor(self, key: str, unit: str, expected: str) -> float:
         try:
@@ -317,15 +315,3 @@ def parse_any(value: Any, fault: Any) -> Any:
         return parse_quantity(value)
     except ValueError as error:
         raise fault("unit", str(error)) from None
-
-
-def seconds_since(epoch: Epoch, dates: Sequence[Epoch]) -> np.ndarray:
-    """Seconds from an epoch, which is time 0, to dates (rows,); leap seconds of UTC count."""
-    zero_scale = epoch.uniform().scale
-    found = []
-    for date in dates:
-        if date.uniform().scale == zero_scale:
-            found.append(float((date.julian_date() - epoch.julian_date()) * 86400))
-        else:
-            found.append(float(Fraction(date.since_j2000() - epoch.since_j2000())))
-    return np.array(found)
