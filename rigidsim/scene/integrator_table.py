@@ -9,6 +9,7 @@ from pydantic import Field, StrictBool, StrictInt, WithJsonSchema, field_validat
 from rigidsim.scene.choices import AUTO, DEFAULT_METHOD, FORMULATIONS, METHODS
 from rigidsim.scene.exact import ExactNumber, parse_number
 from rigidsim.scene.fields import (
+    Angle,
     ConfigTable,
     Dimensionless,
     EulerSequence,
@@ -55,11 +56,10 @@ class Integrator(ConfigTable):
     """project the state onto its invariants, so that errors of long runs grow far more slowly; auto: from
     step 8192 on, leaving shorter runs unchanged; in sweeps auto means false
     """
-    accuracy: Annotated[Dimensionless, WithJsonSchema(number_schema("rad"))] | None = Field(
-        None, examples=[1e-9], json_schema_extra={"x-above": 0, "x-below": 3}
-    )
+    accuracy: Angle | None = Field(None, examples=[1e-9], json_schema_extra={"x-above": 0, "x-below": 3})
     """attitude error allowed at the end, instead of precision and tolerance; certified"""
-    accuracy_axis: Dimensionless | None = Field(None, examples=[1e-6])
+    # version 1.0 promises that the schema shows no unit here
+    accuracy_axis: Annotated[Angle, WithJsonSchema(number_schema("1"))] | None = Field(None, examples=[1e-6])
     """error (rad) allowed until the end in the directions of the angular momentum and the figure axis; with
     [model] level = "auto" the cheapest model within it is chosen
     """

@@ -139,11 +139,12 @@ def _others(state: OwnState) -> list[str]:
 
 
 def _check_initial(table: OwnStateTable, number: int) -> None:
-    """Refuse an initial value with a unit of another dimension."""
+    """Refuse an initial value with a unit of another dimension, or an angle for a number."""
     given = table.initial
     if not isinstance(given, Quantity) or table.unit is None:
         return
-    wanted = () if table.unit == "1" else units.powers(table.unit)
-    if units.powers(given.unit) != wanted:
-        what = f'given a value in "{given.unit}", where "{table.unit}", the unit of {table.name}, is needed'
-        raise ConfigError(Problem(f"[[states]] number {number} initial", what))
+    try:
+        units.conversion(given.unit, table.unit)
+    except UnitError as error:
+        what = f"given a value in {given.unit}; {error}"
+        raise ConfigError(Problem(f"[[states]] number {number} initial", what)) from None

@@ -138,7 +138,7 @@ def test_in_flight_the_field_is_that_of_the_dipole_at_the_body() -> None:
         ("field = [1, 0, 0]\nmagnetic_tensor = [1, 1]", "exactly 3 are needed"),
         ("magnetic_tensor = [1, 1, 1]", "field: given neither field nor orbit"),
         ('field = ["1 V", 0, 0]\nmagnetic_tensor = [1, 1, 1]', "T"),
-        ('field = [1, 0, 0]\nconductivity = "1 ohm"\nradius = 1', 'unknown unit "ohm"'),
+        ('field = [1, 0, 0]\nconductivity = "1 blob"\nradius = 1', 'unknown unit "blob"'),
         ("field = [1, 0, 0]\nmagnetic_tensor = [1, 1, 1]\nmoment = [1, 0, 0]", "moment"),
     ],
 )

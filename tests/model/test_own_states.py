@@ -351,7 +351,11 @@ BAD = {
     "unit that isn't SI": (state("a", "wz", 0, "deg"), 'states are in SI: "rad" is allowed'),
     "no unit": (state("a", "wz", 0, "blob"), 'unknown unit "blob"'),
     "derivative's dimension": (state("a", "wz", 0, "m"), 'in "1/s", where "m/s" is needed'),
-    "initial value's dimension": (state("a", "wz", "3 s", "rad"), 'in "s", where "rad", the unit of a'),
+    "initial value's dimension": (
+        state("a", "wz", "3 s", "rad"),
+        'given a value in s; "s" is not a unit of the dimension asked for, which is rad',
+    ),
+    "an angle for a number": (state("a", "wz", "3 deg", "1"), '"deg" is a unit, where only a number'),
     "no value at the start": (state("a", "1/a"), "no finite value at the start"),
     "the quaternion's sign": (state("a", "qx"), "changes with the sign of the quaternion"),
     "unknown name": (state("a", "b"), 'unknown name "b".*a, pi, e; x, y, z, vx'),

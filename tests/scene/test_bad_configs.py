@@ -151,7 +151,12 @@ IN_ONE_TABLE: dict[str, list[tuple[str, ...]]] = {
         ('preset = "earth"\npoints = []\nshape = "sphere"', "points", "at least one entry is needed"),
     ],
     "rate": [
-        ('"1 fortnight"', 'given "1 fortnight"', 'unknown unit "fortnight"', "known units: m kg s"),
+        (
+            '"1 fortnight"',
+            'given "1 fortnight"',
+            'unknown unit "fortnight"',
+            "units for rad/s: rpm; for rad: rad deg",
+        ),
         ('"2 Hz"', '"Hz" may count turns or radians; write "turn/s"'),
         ('"2 Radian/s"', 'unknown unit "Radian"; did you mean "radian"?'),
     ],

@@ -79,7 +79,7 @@ def of_name(readable: Readable) -> Measure:
         return ANY
     if not readable.unit:
         return NUMBER
-    return Measure(_SI.get(readable.unit) or units.powers(readable.unit))
+    return Measure(units.powers(readable.unit))
 
 
 def of_number(number: ExactNumber) -> Measure:
@@ -148,12 +148,3 @@ def end_of_unit(text: str, position: int, names: Collection[str], parameters: Co
 
 def _sorted(powers: dict[str, Fraction]) -> units.Powers:
     return tuple(sorted((base, power) for base, power in powers.items() if power))
-
-
-_SI: dict[str, units.Powers] = {
-    "s": (("second", Fraction(1)),),
-    "rad/s": (("second", Fraction(-1)),),
-    "m": (("meter", Fraction(1)),),
-    "m/s": (("meter", Fraction(1)), ("second", Fraction(-1))),
-}
-"""Written out so that expressions without units don't load the units library."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -87,7 +88,7 @@ class FitKeys:
             try:
                 every = varied_keys(self._experiment, [key], f"[fit] {where}")
                 at = f'[fit] {known}."{key[:60]}"'
-                found += [self._one(one, _sigma(sigmas, one, key, n)) for n, one in enumerate(every)]
+                found += [self._one(one, _given(sigmas, one, key, n)) for n, one in enumerate(every)]
             except ValueError as error:
                 self._problems.append(Problem(at, str(error)))
             except ConfigError as error:
@@ -97,16 +98,17 @@ class FitKeys:
             self._problems.append(Problem(f"[fit] {where}", f'"{name}" is given twice; give it once'))
         return tuple(found)
 
-    def _one(self, varied: VariedKey, sigma: float | None) -> FitKey:
+    def _one(self, varied: VariedKey, sigma: Any) -> FitKey:
         suffix, unit = "", varied.unit
         table, _, name = varied.name.partition(".")
         given = self._experiment.config.parameters.get(name) if table == "parameters" else None
         if isinstance(given, Quantity):  # constants of expressions have units of their own
             found = unit_text(powers(given.unit)) or "rad"
             suffix = unit = f"rad{found[1:]}" if found.startswith("1/") else found
+        known = None if sigma is None else _sigma(sigma, varied, given)
         places = [written_key(place) for place in varied.places]
         size = abs(float(varied.number)) or abs(float(varied.size)) or 1.0
-        return FitKey(varied.name, unit, float(varied.number), sigma, suffix, tuple(places), size)
+        return FitKey(varied.name, unit, float(varied.number), known, suffix, tuple(places), size)
 
     def _refuse_rest(self, prior: Mapping[str, KnownWithin]) -> None:
         """A prior of something that isn't estimated would be without effect."""
@@ -164,20 +166,26 @@ def written_key(place: Sequence[str | int]) -> str:
     )
 
 
-def _sigma(sigmas: Mapping[str, KnownWithin], varied: VariedKey, key: str, index: int) -> float | None:
-    """What is known beforehand of a number, by its own key or by that of its vector, SI."""
+def _given(sigmas: Mapping[str, KnownWithin], varied: VariedKey, key: str, index: int) -> Any:
+    """What is known beforehand of a number, by its own key or by that of its vector, as written."""
     plain = {name.replace(" ", ""): table for name, table in sigmas.items()}
     table = (
         plain.get(varied.name) or plain.get(key.replace(" ", "")) or plain.get(varied.name.rpartition("[")[0])
     )
-    if table is None:
-        return None
-    given = table.sigma
-    if isinstance(given, list):
-        if index >= len(given):
-            raise ValueError(f"given {shown(given)} as sigma; one for each component is needed")
-        given = given[index]
-    number = parse_quantity(given) if varied.unit == "1" else parse_number(given, varied.unit)
+    if table is None or not isinstance(table.sigma, list):
+        return table and table.sigma
+    if index >= len(table.sigma):
+        raise ValueError(f"given {shown(table.sigma)} as sigma; one for each component is needed")
+    return table.sigma[index]
+
+
+def _sigma(given: Any, varied: VariedKey, parameter: Any) -> float:
+    """A standard deviation in SI, of a key or of a parameter."""
+    anything = varied.name.startswith(("parameters", "states")) and varied.unit == "1"
+    number = parse_quantity(given) if anything else parse_number(given, varied.unit)
+    both = isinstance(number, Quantity) and isinstance(parameter, Quantity)
+    if both and powers(number.unit) != powers(parameter.unit):
+        raise ValueError(f"given {shown(given)}, where {parameter.unit}, the parameter's unit, is needed")
     if not float(number) > 0:
         raise ValueError(f"given {shown(given)} as sigma; a standard deviation above zero is allowed")
     return float(number)
