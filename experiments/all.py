@@ -27,8 +27,6 @@ STUDIES = (
     "toutatis",
     "heavy_top_regimes",
     "flip_period",
-    "free_flight_energy",
-    "bodies_table",
     "luni_solar_precession",
     "precession_and_nutation",
     "spectral_lines",

@@ -55,7 +55,7 @@ mostly does better than its beginning forecasts; ratio to a failed setting's for
 promise.
 
 With these 199 of 200 random runs kept what they were asked for, and 96 of 100 cost at most twice the cheapest
-setting of a full search (``experiments/accuracy_certificates.py``).
+setting of a full search (experiments/README.md).
 """
 
 
