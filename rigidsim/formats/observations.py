@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import csv
-import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -12,18 +10,12 @@ import numpy as np
 
 from rigidsim.errors import RigidsimError
 from rigidsim.formats.ck_reading import read_rows
+from rigidsim.formats.text_tables import TEXT, as_number, is_date, name_and_unit, open_text
 from rigidsim.formats.trajectories import KINDS, Trajectory, read_trajectory
-from rigidsim.scene.epochs import A_DATE, Epoch, parse_epoch
+from rigidsim.scene.epochs import Epoch, parse_epoch
 from rigidsim.scene.frame import ECLIPTIC, OBLIQUITY
 from rigidsim.scene.rotations import product
-from rigidsim.scene.units import is_unit
 from rigidsim.scene.validation_messages import nearest
-
-_TEXT = {".csv", ".txt", ".dat", ".tsv"}
-_IN_NAME = re.compile(r".*[\[(]\s*([^\[\]()]+?)\s*[\])]")  # "wx [deg/s]"
-_ENDINGS = {"deg": "deg", "arcsec": "arcsec", "rad": "rad", "deg_s": "deg/s", "degs": "deg/s",
-            "rad_s": "rad/s", "rads": "rad/s"}  # fmt: skip
-_OF_TIMES = re.compile(r"(?:t|time)_(s|min|h|day|yr|ms)")
 
 
 @dataclass(frozen=True)
@@ -37,6 +29,7 @@ class Observations:
         rows: what each row is called: "line 12".
         epochs: dates of a message's rows.
         frames: names of the frames from and to which its attitude turns.
+        number: the number in a cell of a text; nan where it holds none.
     """
 
     source: str
@@ -46,6 +39,7 @@ class Observations:
     rows: Sequence[str] = ()
     epochs: tuple[Epoch, ...] = ()
     frames: tuple[str, str] = ("", "")
+    number: Callable[[str], float] = as_number
 
     @property
     def names(self) -> list[str]:
@@ -58,10 +52,11 @@ class Observations:
         Raises:
             RigidsimError: there is no such column, or a row holds no finite number.
         """
+        name = self.named(name)
         if name in self.numbers:
             found = self.numbers[name]
         else:
-            found = np.array([_number(text) for text in self._texts(name)])
+            found = np.array([self.number(text) for text in self.texts[name]])
         bad = np.flatnonzero(~np.isfinite(found))
         if len(bad):
             given = f' ("{self.texts[name][bad[0]][:40]}")' if name in self.texts else ""
@@ -79,23 +74,40 @@ class Observations:
         """
         if self.epochs:
             return list(self.epochs)
-        if name in self.numbers or not any(A_DATE.match(text) for text in self._texts(name)):
+        name = self.named(name)
+        if name in self.numbers or not any(map(is_date, self.texts[name])):
             return None
         found = []
-        for text, row in zip(self._texts(name), self.rows, strict=True):
+        for text, row in zip(self.texts[name], self.rows, strict=True):
             try:
                 found.append(parse_epoch(text, scale))
             except ValueError as error:
                 raise RigidsimError(f"{self.source}: {row}: {error}") from None
         return found
 
-    def _texts(self, name: str) -> list[str]:
-        if name not in self.texts:
-            near = nearest(name, self.names)
-            raise RigidsimError(
-                f'{self.source}: has no column "{name}"{near}; its columns are {", ".join(self.names)[:400]}'
-            )
-        return self.texts[name]
+    def has(self, name: str) -> bool:
+        """Whether there is a column of this name, with its unit or without."""
+        return any(name in (one, name_and_unit(one)[0]) for one in self.names)
+
+    def unit(self, name: str) -> str | None:
+        """The unit of a column, as far as the file or the column's name says it."""
+        return self.units.get(self.named(name))
+
+    def named(self, name: str) -> str:
+        """The column of this name, with its unit or without.
+
+        Raises:
+            RigidsimError: there is none, or there are several.
+        """
+        if name in self.names:
+            return name
+        same = [one for one in self.names if name_and_unit(one)[0] == name]
+        if len(same) == 1:
+            return same[0]
+        near = f"; give one of {', '.join(same)}" if same else nearest(name, self.names)
+        raise RigidsimError(
+            f'{self.source}: has no column "{name}"{near}; its columns are {", ".join(self.names)[:400]}'
+        )
 
 
 def read_observations(path: Path) -> Observations:
@@ -104,7 +116,7 @@ def read_observations(path: Path) -> Observations:
     Raises:
         RigidsimError: there is no such file, it is of no known kind, or it can't be read.
     """
-    if path.is_file() and path.suffix.lower() in _TEXT:
+    if path.is_file() and path.suffix.lower() in TEXT:
         return _of_text(path)
     if not path.exists():
         raise RigidsimError(f"{path}: there is no such file; allowed: {KINDS}")
@@ -145,52 +157,11 @@ def _count(found: Trajectory) -> int:
 
 
 def _of_text(path: Path) -> Observations:
-    names: list[str] = []
-    columns: list[list[str]] = []
-    rows = []
-    separator = ","
-    try:
-        lines = path.read_text(encoding="utf-8-sig").splitlines()
-    except (OSError, UnicodeDecodeError) as error:
-        raise RigidsimError(f"{path}: can't be read ({error}); save it as UTF-8 text") from None
-    for number, line in enumerate(lines, start=1):
-        if not line.strip() or line.lstrip().startswith("#"):
-            continue
-        if not names:
-            separator = next((c for c in ",;\t" if c in line), " ")
-        cells = [
-            cell.strip() for cell in next(csv.reader([line], delimiter=separator, skipinitialspace=True))
-        ]
-        if not names:
-            names, columns = cells, [[] for _ in cells]
-            if all(np.isfinite(_number(cell)) for cell in cells):
-                raise RigidsimError(f"{path}: line {number} holds numbers; put a line of names above")
-            continue
-        if len(cells) != len(names):
-            raise RigidsimError(
-                f"{path}: line {number} has {len(cells)} values, where the line of names has {len(names)}"
-            )
-        rows.append(f"line {number}")
-        for column, cell in zip(columns, cells, strict=True):
-            column.append(cell)
+    table = open_text(path)
+    rows = list(table.rows())
     if not rows:
         raise RigidsimError(f"{path}: no rows; a line of names and rows of values are needed")
-    units = {name: unit for name in names if (unit := _unit_in(name))}
-    return Observations(str(path), dict(zip(names, columns, strict=True)), units=units, rows=rows)
-
-
-def _unit_in(name: str) -> str | None:
-    """The unit that the name of a column says: ``wx [deg/s]``, ``alpha_deg``, ``time_day``."""
-    if match := _IN_NAME.fullmatch(name):
-        return match[1] if is_unit(match[1]) else None
-    if match := _OF_TIMES.fullmatch(name.lower()):
-        return match[1]
-    ending = next((end for end in _ENDINGS if name.lower().endswith(f"_{end}")), None)
-    return _ENDINGS[ending] if ending else None
-
-
-def _number(text: str) -> float:
-    try:
-        return float(text)
-    except ValueError:
-        return float("nan")
+    columns = zip(*(cells for _, cells in rows), strict=True)
+    texts = {name: list(cells) for name, cells in zip(table.names, columns, strict=True)}
+    lines = [f"line {number}" for number, _ in rows]
+    return Observations(str(path), texts, units=table.units, rows=lines, number=table.number)

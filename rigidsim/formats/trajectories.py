@@ -9,8 +9,7 @@ from __future__ import annotations
 import importlib.util
 import itertools
 import re
-import warnings
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -19,7 +18,8 @@ import numpy as np
 
 from rigidsim.errors import RigidsimError
 from rigidsim.formats.messages import message_rows
-from rigidsim.scene.epochs import Epoch
+from rigidsim.formats.text_tables import TEXT, TIMES, is_date, name_and_unit, open_text
+from rigidsim.scene.epochs import Epoch, parse_epoch
 from rigidsim.store.many_rows import BLOCK, blocks_of, gathered
 
 if TYPE_CHECKING:
@@ -29,7 +29,6 @@ if TYPE_CHECKING:
 KINDS = (
     "CSV (.csv, .txt, .dat, .tsv), Parquet, netCDF or HDF5 that xarray reads (.nc, .h5, .zarr), AEM, CK (.bc)"
 )
-_TEXT = {".csv", ".txt", ".dat", ".tsv"}
 _XARRAY = {".nc", ".nc4", ".cdf", ".h5", ".hdf5", ".zarr"}
 _MOST_COLUMNS = 500
 _BUFFER = 2**20  # bytes of a Parquet file's column that are read at once
@@ -49,6 +48,8 @@ class Trajectory:
         epochs: times of a message as dates, in place of a column of times.
         frames: names of the frames from and to which a message's attitude turns; empty where it isn't said.
         left_out: names of columns that hold no real numbers.
+        notes: what a user should know of how the file was read.
+        lines: numbers of the rows' lines, where these don't follow each other.
     """
 
     columns: Mapping[str, np.ndarray]
@@ -60,10 +61,13 @@ class Trajectory:
     epochs: tuple[Epoch, ...] = ()
     frames: tuple[str, str] = ("", "")
     left_out: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
+    lines: np.ndarray | None = None
 
     def row(self, index: int) -> str:
         """A row as the file counts it."""
-        return f"{self.counted} {self.first + int(index)}"
+        number = self.first + int(index) if self.lines is None else int(self.lines[index])
+        return f"{self.counted} {number}"
 
 
 def is_trajectory(path: Path) -> bool:
@@ -71,7 +75,7 @@ def is_trajectory(path: Path) -> bool:
     suffix = path.suffix.lower()
     if suffix in _XARRAY:
         return not (path.parent / "dataset.h5").exists()
-    return suffix in {*_TEXT, ".parquet", ".pq", ".aem", ".oem", ".xml"}
+    return suffix in {*TEXT, ".parquet", ".pq", ".aem", ".oem", ".xml"}
 
 
 def read_trajectory(path: Path) -> Trajectory:
@@ -96,7 +100,7 @@ def read_trajectory(path: Path) -> Trajectory:
                 return Trajectory(
                     columns, str(path), counted=counted, first=first, epochs=epochs, frames=frames
                 )
-            if suffix in _TEXT:
+            if suffix in TEXT:
                 return _of_text(path)
     except (RigidsimError, MemoryError):
         raise
@@ -215,53 +219,59 @@ def _of_parquet(path: Path) -> Trajectory:
 
 
 def _of_text(path: Path) -> Trajectory:
-    import pandas
+    table = open_text(path)
+    names = table.names
+    worded: set[int] = set()  # columns with a cell that is no number
+    numbered: set[int] = set()  # columns with a number
+    lines: list[int] = []
+    timed = {n for n, name in enumerate(names) if name_and_unit(name)[0].lower() in TIMES}
+    dates: dict[int, list[tuple[int, str]]] = {}
 
-    head, header = 0, ""
-    with path.open(encoding="utf-8-sig", errors="replace") as file:
-        for line in file:
-            if line.strip() and not line.lstrip().startswith("#"):
-                header = line.strip()
-                break
-            head += 1
-    if not header:
-        raise RigidsimError(f"{path}: empty; a line of names and rows of numbers are needed")
-    separator = next((c for c in ",;\t" if c in header), r"\s+")
-    names = [name.strip().strip('"') for name in re.split(separator, header)]
-    if all(_is_number(name) for name in names):
-        raise RigidsimError(
-            f"{path}: its first line holds numbers; put a line of names above, such as t,qw,qx,qy,qz,wx,wy,wz"
-        )
-    exact: dict[str, Any] = {"float_precision": "round_trip"} if separator != r"\s+" else {}
-    worded, numbered = set(), set()
+    def blocks() -> Iterator[np.ndarray]:
+        rows = table.rows()
+        while block := list(itertools.islice(rows, BLOCK)):
+            lines.extend(number for number, _ in block)
+            try:
+                yield np.array([[float(cell) for cell in cells] for _, cells in block])
+            except ValueError:
+                yield np.array([list(map(table.number, cells)) for _, cells in block])
+                for number, cells in block:
+                    for n in timed:
+                        if is_date(cells[n]) or n in dates:
+                            dates.setdefault(n, []).append((number, cells[n]))
 
-    def block(frame: pandas.DataFrame) -> np.ndarray:
-        columns = []
-        for name in names:
-            column = frame[name]
-            if column.dtype.kind not in "fiu":  # words in a column of numbers are shown as what isn't finite
-                column = pandas.to_numeric(column.astype(object), errors="coerce")
-                worded.add(name)
-            columns.append(column.to_numpy(np.float64))
-            if np.isfinite(columns[-1]).any():
-                numbered.add(name)
-        return np.column_stack(columns)
+    def seen() -> Iterator[np.ndarray]:
+        for block in blocks():
+            finite = np.isfinite(block)
+            worded.update(np.flatnonzero(~finite.all(axis=0)).tolist())
+            numbered.update(np.flatnonzero(finite.any(axis=0)).tolist())
+            yield block
 
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # what reads exactly has other names in other versions
-        with pandas.read_csv(
-            path, sep=separator, skiprows=head + 1, header=None, comment="#", skip_blank_lines=True,
-            names=names, index_col=False, encoding="utf-8-sig", chunksize=BLOCK, **exact,
-        ) as frames:  # fmt: skip
-            found = _columns(names, map(block, frames))
-    columns = {name: found[name] for name in names if name in numbered or name not in worded}
-    left_out = tuple(name for name in names if name not in columns)
-    return Trajectory(columns, str(path), counted="line", first=head + 2, left_out=left_out)
+    found = _columns(names, seen())
+    kept = [n for n in range(len(names)) if n in numbered or n not in worded]
+    epochs: tuple[Epoch, ...] = ()
+    notes: tuple[str, ...] = ()
+    if dates and not timed.intersection(kept):
+        place = min(dates)
+        epochs, notes = _dates(path, dates[place]), ("dates were read as UTC",)
+        worded.discard(place)
+    left_out = tuple(names[n] for n in range(len(names)) if n not in kept and n in worded)
+    return Trajectory(
+        {names[n]: found[names[n]] for n in kept}, str(path), counted="line", first=lines[0] if lines else 0,
+        epochs=epochs, left_out=left_out, notes=notes, lines=_irregular(lines),
+    )  # fmt: skip
 
 
-def _is_number(text: str) -> bool:
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return True
+def _dates(path: Path, cells: Iterable[tuple[int, str]]) -> tuple[Epoch, ...]:
+    found = []
+    for number, cell in cells:
+        try:
+            found.append(parse_epoch(cell, "UTC"))
+        except ValueError as error:
+            raise RigidsimError(f"{path}: line {number}: {error}") from None
+    return tuple(found)
+
+
+def _irregular(lines: list[int]) -> np.ndarray | None:
+    """Numbers of the rows' lines; None where each row is in the line after the row before."""
+    return None if not lines or lines[-1] - lines[0] == len(lines) - 1 else np.array(lines)

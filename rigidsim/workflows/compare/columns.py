@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from rigidsim.errors import RigidsimError
+from rigidsim.formats.text_tables import TIMES, name_and_unit
 from rigidsim.formats.trajectories import Trajectory
 from rigidsim.scene.epochs import Epoch
 from rigidsim.scene.exact import parse_number
@@ -85,9 +86,10 @@ def attitudes_of(found: Trajectory, epoch: Epoch | None) -> Attitudes:
     """
     told = [f"left out, since they hold no real numbers: {', '.join(found.left_out)}"] * bool(found.left_out)
     without = "".join(f" ({words})" for words in told)
+    told += found.notes
     time_unit: str | None = "s"
     plain = {_plain(name): name for name in found.columns}
-    units = {_plain(name): found.units.get(name) or _unit_in(name) for name in found.columns}
+    units = {_plain(name): found.units.get(name) or name_and_unit(name)[1] for name in found.columns}
     rows = len(next(iter(found.columns.values()), ()))
     if rows < LEAST_ROWS:
         raise RigidsimError(
@@ -144,21 +146,9 @@ def attitudes_of(found: Trajectory, epoch: Epoch | None) -> Attitudes:
 
 
 def _plain(name: str) -> str:
-    """A name in small letters without its unit."""
-    bare = re.sub(r"[\[(].*?[\])]", "", name) if re.search(r"[a-zA-Z]\s*[\[(]", name) else name
+    """A name in small letters, without a unit in brackets."""
+    bare = name_and_unit(name)[0] if name.rstrip()[-1:] in ("]", ")") else name
     return re.sub(r"[^a-z0-9]+", "_", bare.strip().lower()).strip("_")
-
-
-def _unit_in(name: str) -> str | None:
-    match = re.search(r"[\[(]([^\])]+)[\])]\s*$", name)
-    if match and not match[1].strip().isdigit():
-        return match[1].strip()
-    match = re.search(r"_(deg|rad|deg_s|rad_s|degs|rads|rpm)$", name.lower())
-    return (
-        {"deg_s": "deg/s", "rad_s": "rad/s", "degs": "deg/s", "rads": "rad/s"}.get(match[1], match[1])
-        if match
-        else None
-    )
 
 
 _SUFFIX = r"(?:_(?:deg|rad|deg_s|rad_s|degs|rads|rpm|m|s|m_s|body|b))?"
@@ -228,7 +218,7 @@ def _time_among(
     plain: Mapping[str, str], units: Mapping[str, str | None], source: str, without: str
 ) -> tuple[str, str | None]:
     for name in plain:
-        match = re.fullmatch(r"(?:t|time|times|epoch|seconds|timestamp)(?:_([a-z]+))?", name)
+        match = re.fullmatch(rf"(?:{'|'.join(TIMES)})(?:_([a-z]+))?", name)
         if match and (match[1] is None or match[1] in _TIMES):
             given = units[name] or match[1] or ("s" if name == "seconds" else None)
             if given is None:

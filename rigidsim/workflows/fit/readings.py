@@ -150,6 +150,7 @@ class _ReadTable:
         order = kept[np.argsort(times[kept], kind="stable")]
         rows = [self.found.rows[n] for n in order]
         times, values, sigmas = times[order], values[order], sigmas[order]
+        self._refuse_huge(values, sigmas, rows)
         self._refuse_repeated(times, values, rows)
         limit = None if self.table.outliers is None else float(self.table.outliers)
         file = self.path / "dataset.h5" if self.path.is_dir() else self.path
@@ -164,7 +165,7 @@ class _ReadTable:
     def _times(self) -> np.ndarray:
         dates = self.found.dates(self.table.time, self.table.scale)
         if dates is None:
-            unit = self.found.units.get(self.table.time, "s")
+            unit = self.found.unit(self.table.time) or "s"
             return self.found.column(self.table.time) * self._factor("time", unit, "s")
         if self.scene.epoch is None:
             raise self.fault(
@@ -191,7 +192,7 @@ class _ReadTable:
                 f"({', '.join(components)}): name a column for each",
             )
         given = np.stack([self.found.column(name) for name in names], axis=1)
-        units = {self.found.units.get(name) for name in names} - {None, "1"}
+        units = {self.found.unit(name) for name in names} - {None, "1"}
         if len(units) > 1 and self.table.unit is None:
             said = ", ".join(sorted(map(str, units)))
             raise self.fault("columns", f"columns in several units ({said}); write all in one")
@@ -247,9 +248,9 @@ class _ReadTable:
         width = 3 if self.quantity.rotation else len(self.quantity.components)
         own = self.quantity.unit
         unit = "rad" if self.quantity.rotation else own and config_unit(own)
-        if isinstance(given, str) and given in self.found.names:
+        if isinstance(given, str) and self.found.has(given):
             factor = self.factor if self.quantity.form != QUATERNION else 1.0
-            if unit is not None and (said := self.found.units.get(given)) not in (None, "1"):
+            if unit is not None and (said := self.found.unit(given)) not in (None, "1"):
                 factor = self._factor("sigma", config_unit(str(said)), unit)
             column = self.found.column(given) * factor
             if (wrong := ~_usable(column)).any():
@@ -283,6 +284,18 @@ class _ReadTable:
                 f"({begin:.6g} to {end:.6g} s) and were left out, first {self.found.rows[first]}"
             )
         return np.flatnonzero(inside)
+
+    def _refuse_huge(self, values: np.ndarray, sigmas: np.ndarray, rows: Sequence[str]) -> None:
+        """Refuse values, such as 1e300 for a missing one, whose sum of squares in sigmas is no double."""
+        with np.errstate(over="ignore"):
+            huge = np.abs(values).max(axis=1) / sigmas.min(axis=1) > _MOST
+        if huge.any():
+            first = int(np.argmax(huge))
+            value = np.abs(values[first]).max() / self.factor
+            raise RigidsimError(
+                f"{self.found.source}: {rows[first]}: {value:.6g} is more than {_MOST:g} sigmas "
+                f"({int(huge.sum())} such rows); remove these rows, or mend their values"
+            )
 
     def _refuse_repeated(self, times: np.ndarray, values: np.ndarray, rows: Sequence[str]) -> None:
         again = np.flatnonzero(np.diff(times) == 0)
