@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from dataclasses import replace as exchanged
+from fractions import Fraction
 from functools import partial
 from pathlib import Path
 from typing import Any, TextIO
@@ -17,6 +18,7 @@ from rigidsim.errors import ConfigError, Problem
 from rigidsim.scene import validation_messages as messages
 from rigidsim.scene.bodies.field_files import cut
 from rigidsim.scene.bodies.gravity_field import asked_degree
+from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.fields import NAME_OR_VECTOR
 from rigidsim.scene.python_values import assignments_of, toml_text
 from rigidsim.scene.registry import LOAD_KINDS
@@ -96,6 +98,40 @@ class Experiment:
             raise ConfigError(Problem("replacing", what), self.source)
         other = parse(self.text, source=self.source, overrides={**(changes or {}), **tables})
         return exchanged(other, given=self.given, settings=(*self.settings, *other.settings))
+
+    def quiet(
+        self,
+        record: Sequence[str] | None = None,
+        times: Iterable[float | Fraction] | None = None,
+        *,
+        estimate: bool = False,
+        **tables: Any,
+    ) -> Experiment:
+        """The same motion with nothing made but samples: no timeline, exponents, derivatives. The text stays.
+
+        Args:
+            record: the variables recorded, without a published orientation; by default what the config asks
+                for.
+            times: exact times of the samples, s, ascending; by default as the config says.
+            estimate: whether the errors are estimated.
+            tables: other tables of the config.
+        """
+        output = self.config.output
+        found: dict[str, Any] = {
+            "timeline": False,
+            "lyapunov": False,
+            "sensitivity": None,
+            "estimate": estimate,
+        }
+        if record is not None:
+            tip = output.tip if "tip" in record else None
+            found |= {"record": list(record), "orientation": None, "orientation_of": None, "tip": tip}
+        tables["output"] = output.model_copy(update=found)
+        if times is not None:
+            listed: dict[str, Any] = {"times": [ExactNumber(Fraction(time)) for time in times]}
+            others = dict.fromkeys(("end", "samples", "every"))
+            tables["time"] = self.config.time.model_copy(update=listed | others)
+        return exchanged(self, config=self.config.model_copy(update=tables))
 
     def __repr__(self) -> str:
         loads = ", ".join(load.kind for load in self.config.loads) or "no load"  # type: ignore[attr-defined]

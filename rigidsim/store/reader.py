@@ -74,7 +74,7 @@ def in_memory(
     attributes: Mapping[str, Any],
 ) -> xarray.Dataset:
     """The dataset that ``open_dataset`` would read from a file of this content, without the file."""
-    parts = [
+    parts: list[tuple[str, tuple[str, ...], np.ndarray, Mapping[str, Any]]] = [
         (name, ("time", *variable.dims), values, variable.part_attributes(part))
         for variable in variables
         for part, (name, values) in enumerate(

@@ -1,17 +1,15 @@
 """A saved run integrated again: to be compared with, or for its motion between the samples."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from rigidsim.errors import RunFolderError
 from rigidsim.scene.config import Experiment
-from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.scene import Scene, build_scene
 from rigidsim.store.provenance import read_attributes
 from rigidsim.workflows.read import as_begun, embedded, refuse_other_kernel
@@ -20,11 +18,8 @@ from rigidsim.workflows.run import run
 RATES, ATTITUDE = "angular_velocity", "quaternion"
 
 
-def experiment_again(dataset: Path, **output: Any) -> Experiment:
+def experiment_again(dataset: Path) -> Experiment:
     """The experiment of a dataset as it was run: without guards, nothing left to be chosen, nothing drawn.
-
-    Args:
-        output: further values of ``[output]``.
 
     Raises:
         RunFolderError: no config can reproduce it, or a kernel is another one now.
@@ -35,14 +30,12 @@ def experiment_again(dataset: Path, **output: Any) -> Experiment:
     experiment = as_begun(embedded(dataset), dataset)
     refuse_other_kernel(experiment, dataset)
     config = experiment.config
-    quiet = config.output.model_copy(update={"timeline": False, **output})
-    plain = config.integrator.model_copy(update={"accuracy": None})
-    unguarded = type(config.limits).model_construct()
-    return _with(experiment, {"output": quiet, "limits": unguarded, "integrator": plain})
-
-
-def _with(experiment: Experiment, tables: Mapping[str, Any]) -> Experiment:
-    return replace(experiment, config=experiment.config.model_copy(update=dict(tables)))
+    tables = {
+        "output": config.output.model_copy(update={"timeline": False}),
+        "integrator": config.integrator.model_copy(update={"accuracy": None}),
+        "limits": type(config.limits).model_construct(),
+    }
+    return replace(experiment, config=config.model_copy(update=tables))
 
 
 @dataclass(frozen=True)
@@ -53,11 +46,9 @@ class MotionAgain:
 
     @cached_property
     def _experiment(self) -> Experiment:
-        none = dict.fromkeys(("orientation", "orientation_of", "sensitivity"))
-        found = experiment_again(self.dataset, **none, lyapunov=False, estimate=False)
-        names = list(found.config.output.record or (read_attributes(self.dataset).recorded or "").split())
-        names += [RATES] if RATES not in names else []
-        return _with(found, {"output": found.config.output.model_copy(update={"record": names})})
+        found = experiment_again(self.dataset)
+        names = found.config.output.record or (read_attributes(self.dataset).recorded or "").split()
+        return found.quiet(list(dict.fromkeys([*names, RATES])))
 
     @cached_property
     def _scene(self) -> Scene:
@@ -87,10 +78,7 @@ class MotionAgain:
         Raises:
             RunFolderError: the motion ends before.
         """
-        table = self._experiment.config.time
-        sampled = {"times": [ExactNumber(x) for x in times], "end": None, "samples": None, "every": None}
-        config = {"time": table.model_copy(update=sampled)}
-        again = run(_with(self._experiment, config), out=None, progress=False)
+        again = run(self._experiment.quiet(times=times), out=None, progress=False)
         found = again.dataset
         if found.sizes["time"] != len(times):
             raise RunFolderError(f"{self.dataset}: integrated again, the run {again.outcome.message}")

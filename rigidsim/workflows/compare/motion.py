@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
-from fractions import Fraction
+from dataclasses import dataclass
 
 import numpy as np
 
 from rigidsim.errors import ConfigError, Problem, RigidsimError
 from rigidsim.scene.config import Experiment
-from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.scene import Scene, build_scene
 from rigidsim.solve.from_states import FromStates
 from rigidsim.store.many_rows import blocks_of, gathered, picked
@@ -52,28 +50,13 @@ def plain(experiment: Experiment) -> tuple[Experiment, Scene]:
         raise ConfigError(Problem("[sweep]", what), experiment.source)
     flies = config.initial.position is not None or config.initial.velocity is not None
     names = ["quaternion", "angular_velocity", *(_FLIGHT if flies else ())]
-    output = {
-        "record": names,
-        "timeline": False,
-        "lyapunov": False,
-        "sensitivity": None,
-        "orientation": None,
-        "orientation_of": None,
-    }
-    quiet = replace(
-        experiment,
-        config=config.model_copy(update={"output": config.output.model_copy(update=output)}),
-    )
+    quiet = experiment.quiet(names, estimate=config.output.estimate)
     return quiet, build_scene(quiet)
 
 
 def sampled_run(experiment: Experiment, times: np.ndarray) -> Run:
     """Run the experiment in memory, sampled at exactly these doubles (s, ascending)."""
-    listed = [ExactNumber(Fraction(time)) for time in times.tolist()]
-    table = experiment.config.time.model_copy(
-        update={"times": listed, "end": None, "samples": None, "every": None}
-    )
-    sampled = replace(experiment, config=experiment.config.model_copy(update={"time": table}))
+    sampled = experiment.quiet(times=times.tolist(), estimate=experiment.config.output.estimate)
     return run(sampled, out=None, progress=False)
 
 

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from itertools import product
 from typing import Any
@@ -84,7 +84,7 @@ def observing(experiment: Experiment) -> Iterator[tuple[list[Observed], Experime
                 also += [state for state in states if state in own]
             names.append(name)
         record = [*dict.fromkeys([*names, *also])]
-        quiet = recording(experiment, record)
+        quiet = experiment.quiet(record, events=[], fit=None)
         recorded = {one.name: one for one in prepare(quiet).system.recorded}
         found = []
         for text, name in zip(texts, names, strict=True):
@@ -106,17 +106,6 @@ def observing(experiment: Experiment) -> Iterator[tuple[list[Observed], Experime
     finally:
         for name in entered:
             OBSERVABLES.pop(name, None)
-
-
-def recording(experiment: Experiment, names: Sequence[str]) -> Experiment:
-    """The experiment with nothing recorded but these variables, and nothing else made."""
-    config = experiment.config
-    output = {
-        "record": list(names), "timeline": False, "lyapunov": False, "estimate": False, "orientation": None,
-        "orientation_of": None, "tip": config.output.tip if "tip" in names else None,
-    }  # fmt: skip
-    update = {"output": config.output.model_copy(update=output), "events": [], "fit": None}
-    return replace(experiment, config=config.model_copy(update=update))
 
 
 def _expression(name: str, text: str, config: Config, number: int) -> tuple[Observable, frozenset[str]]:

@@ -21,7 +21,7 @@ from rigidsim.solve.tangent_lanes import TangentLanes, fits_lanes
 from rigidsim.solve.variational import LostTangents, turned
 from rigidsim.workflows.compare.rotations import conjugated, multiplied, normalised, vector_of
 from rigidsim.workflows.fit.keys import FitKeys
-from rigidsim.workflows.fit.observed import QUATERNION, Observed, recording
+from rigidsim.workflows.fit.observed import QUATERNION, Observed
 from rigidsim.workflows.run import run
 from rigidsim.workflows.sensitivity import Tangents
 
@@ -98,7 +98,7 @@ class ByDifferences:
         names = []
         for name in ALONG:
             try:
-                prepare(recording(self._quiet, [name]))
+                prepare(self._quiet.quiet([name]))
             except ConfigError:
                 continue
             names.append(name)
@@ -106,7 +106,7 @@ class ByDifferences:
             return Prediction({})
         forms = {"quaternion": "quaternion"}
         found = [Observed(name, name, forms.get(name, "plain"), (), None) for name in names]
-        return ByDifferences(self._keys, recording(self._quiet, names), found).at(values, times)
+        return ByDifferences(self._keys, self._quiet.quiet(names), found).at(values, times)
 
     def values(self, values: Sequence[float] | np.ndarray, times: np.ndarray) -> dict[str, np.ndarray]:
         """Predictions alone."""

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, Self
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Self
 
 import numpy as np
 
 from rigidsim.errors import RunFolderError
 from rigidsim.store.run import Run
 from rigidsim.store.summary import Brief
-from rigidsim.workflows.compare.motion import sampled_run
 from rigidsim.workflows.compare.rotations import conjugated, multiplied, normalised, vector_of
 from rigidsim.workflows.fit.observed import QUATERNION
+from rigidsim.workflows.run import run
 
 if TYPE_CHECKING:
     import xarray
@@ -56,7 +56,13 @@ def fitted_run(experiment: Experiment, fit: xarray.Dataset, source: str = "memor
     Raises:
         RunFolderError: the experiment's motion isn't that of the dataset.
     """
-    made = sampled_run(_quiet(experiment, turning=_COVARIANCE in fit), fit["time"].values)
+    record = experiment.config.output.record
+    if record is not None and QUATERNION not in record and _COVARIANCE in fit:
+        record = [*record, QUATERNION]
+    else:
+        record = None
+    # without its own error, which would mislead beside the fit's
+    made = run(experiment.quiet(record, fit["time"].values.tolist()), out=None, progress=False)
     found = made.dataset
     if found.sizes["time"] != fit.sizes["time"]:
         raise RunFolderError(f"{source}: the fitted motion {made.outcome.message}, before the fit's own end")
@@ -66,18 +72,6 @@ def fitted_run(experiment: Experiment, fit: xarray.Dataset, source: str = "memor
         _refuse_other(found, fit, source)
         found = found.assign({_COVARIANCE: covariance})
     return FittedRun(made.outcome, found.assign_attrs(fit=str(fit.attrs.get("sentence", ""))), source)
-
-
-def _quiet(experiment: Experiment, *, turning: bool) -> Experiment:
-    """The experiment without its own error, which would mislead beside the fit's, and what costs time and
-    isn't shown; with its attitude recorded, if it has one.
-    """
-    output = experiment.config.output
-    update: dict[str, Any] = {"estimate": False, "timeline": False, "lyapunov": False, "sensitivity": None}
-    if turning and output.record is not None and QUATERNION not in output.record:
-        update["record"] = [*output.record, QUATERNION]
-    config = experiment.config.model_copy(update={"output": output.model_copy(update=update)})
-    return replace(experiment, config=config)
 
 
 def _refuse_other(found: xarray.Dataset, fit: xarray.Dataset, source: str) -> None:
