@@ -22,7 +22,7 @@ from rigidsim.model.load_words import length_text, value_text
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.sources import read_in
 from rigidsim.model.two_part import rounded
-from rigidsim.scene.arithmetic import apply, norm
+from rigidsim.scene.arithmetic import apply
 from rigidsim.scene.earth_axes import STRENGTH, UNLIKE, earth_axes, rotation_rate
 from rigidsim.scene.expressions.names import PLACES, NameProvider, Readable, provides
 from rigidsim.scene.scene import Scene
@@ -82,16 +82,17 @@ def _geodetic_at_start(scene: Scene) -> list[float]:
     assert scene.axes is not None
     place = [-x for x in source.of(scene).source_at_start(scene)]
     x, y, z = apply(earth_axes(scene.epoch, scene.axes, context), place)
-    far = norm(context, place)
-    above = far / 1000 - _EQUATOR * (1 - _FLATTENING * (z / far) ** 2)  # to some 50 m
-    if above < LEAST:
-        what = f'given "{NRLMSISE}", but the body starts {length_text(float(plain(above)) * 1e3)} above the '
-        what += f"Earth; its network holds from {LEAST:g} km on: start higher, or give density, altitude and "
-        raise _fault(scene, what + "scale_height")
     turned = rotation_rate(context) * scene.start
     c, s = context.cos(turned), context.sin(turned)
     fixed = [float(plain(e)) / 1e3 for e in (c * x + s * y, c * y - s * x, z)]
-    return [float(e) for e in _compiled()[0](np.array(fixed))]
+    found = [float(e) for e in _compiled()[0](np.array(fixed))]
+    if found[0] < LEAST:
+        what = f'given "{NRLMSISE}", but the body starts {length_text(found[0] * 1e3)} above the Earth; its '
+        what += (
+            f"network holds from {LEAST:g} km on: start higher, or give density, altitude and scale_height"
+        )
+        raise _fault(scene, what)
+    return found
 
 
 @lru_cache(maxsize=1)

@@ -87,13 +87,26 @@ def axis_text(axis: Sequence[Any]) -> str:
 
 
 def direction_text(vector: Sequence[Any]) -> str:
-    """Direction of gravity in space axes: ``down along -Z``, ``along X``, or components."""
+    """Direction of gravity in space axes: ``down along -Z``, ``along +X``, or components."""
+    name = _direction(vector)
+    if name.startswith("("):
+        return f"along {name} in space axes"
+    return f"{('down ' if name[0] == '-' else 'up ') if name[1] == 'Z' else ''}along {name}"
+
+
+def sides_text(source: Sequence[Any]) -> str:
+    """On which side source and body see each other at the start, for the source's place (space axes)."""
+    there, back = _direction(source), _direction([-x for x in source])
+    return f"at the start the source is at {there} of the body, and the body at {back} of the source"
+
+
+def _direction(vector: Sequence[Any]) -> str:
+    """A direction in space axes: ``+X``, ``-Z`` or the components of its unit vector."""
     largest = max(abs(x) for x in vector)  # of numbers that a double need not hold
-    unit = [float(x / largest) for x in vector]
+    unit = [float(plain(x / largest)) for x in vector]
     unit = [x / math.hypot(*unit) for x in unit]
     unit = [0.0 if abs(x) < _STRAIGHT else x for x in unit]
     if unit.count(0.0) < 2:
-        return "along (" + ", ".join(number_text(x, _DIGITS) for x in unit) + ") in space axes"
+        return "(" + ", ".join(number_text(x, _DIGITS) for x in unit) + ")"
     axis = next(i for i, x in enumerate(unit) if x)
-    name = ("-" if unit[axis] < 0 else "+") + "XYZ"[axis]
-    return f"{('down ' if unit[axis] < 0 else 'up ') if axis == 2 else ''}along {name}"
+    return ("-" if unit[axis] < 0 else "+") + "XYZ"[axis]

@@ -27,9 +27,13 @@ from rigidsim.scene.expressions.names import (
     NameProvider,
     Readable,
 )
-from rigidsim.scene.expressions.tree import Expression, names_used
+from rigidsim.scene.expressions.tree import Expression, evaluate, names_used
+from rigidsim.scene.initial_values import start_values
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.schema import Config
+from rigidsim.scene.surfaces import random_states, value_at
+
+_ROUNDING = 2.0**-16  # of a quantity's size, by which it may be negative where it ends at zero
 
 
 def state_names(m: Kinematics, names: Collection[str], *, clocked: bool = True) -> dict[str, Any]:
@@ -51,6 +55,18 @@ def written(m: Kinematics, expressions: Iterable[Expression]) -> list[Symbolic]:
     return [
         to_heyoka(x, state_names(m, names_used(x)), m.number, m.scene.context, m.sides) for x in expressions
     ]
+
+
+def above_zero(m: Kinematics, expression: Expression) -> Symbolic:
+    """An expression over its size at the start, or else at random states, plus a rounding by which it may be
+    negative where it ends at zero.
+    """
+    context, values = m.scene.context, start_values(m.scene)
+    size = evaluate(expression, values, context)
+    if size == 0:
+        found = (value_at(expression, state, context) for state in random_states(m.scene))
+        size = context.maximum([context.zero, *(abs(x) for x in found if x is not None)]) or context.one
+    return m.number(1 / size) * written(m, [expression])[0] + _ROUNDING
 
 
 def in_si(m: Kinematics, expression: Symbolic, exponent: int) -> Symbolic:

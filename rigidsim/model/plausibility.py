@@ -15,7 +15,7 @@ from rigidsim.scene import attitude
 from rigidsim.scene.arithmetic import Vector, apply, dot, hansen, norm
 from rigidsim.scene.bodies.presets import KNOWN, KnownBody, known_body
 from rigidsim.scene.exact import ExactNumber
-from rigidsim.scene.orbits import PACES, KeplerOrbit, Orbit
+from rigidsim.scene.orbits import PACES, KeplerOrbit, OrbitElements
 from rigidsim.scene.point_masses import GRAVITATIONAL_CONSTANT
 from rigidsim.scene.readable import span_text
 from rigidsim.scene.scene import Scene
@@ -173,7 +173,7 @@ def about_start(scene: Scene, body: KnownBody | None, place: Vector, velocity: V
 
 
 def about_orbit(
-    table: Orbit, orbit: KeplerOrbit, strength: ExactNumber | None, where: str, scene: Scene
+    table: OrbitElements, orbit: KeplerOrbit, strength: ExactNumber | None, where: str, scene: Scene
 ) -> Iterator[Caution]:
     """A prescribed orbit as given (``table``) and in numbers: its units, its altitude, and its period."""
     given, axis = table.semi_major_axis, float(orbit.semi_major_axis)
@@ -184,7 +184,7 @@ def about_orbit(
     else:
         yield from about_strength(strength, axis, where)
         body = attracting(strength, axis)
-    at = f"{where} orbit.semi_major_axis"
+    at = f"{where} {table.key}.semi_major_axis"
     low = list(about_distance(body, float(orbit.pericentre), [given], at))
     yield from low
     if body is None and given.assumed:
@@ -194,13 +194,14 @@ def about_orbit(
         yield from _about_period(table, orbit, strength, where, scene)
 
 
-def _about_rates(table: Orbit, orbit: KeplerOrbit, strength: float, where: str) -> Iterator[Caution]:
+def _about_rates(table: OrbitElements, orbit: KeplerOrbit, strength: float, where: str) -> Iterator[Caution]:
     """Rates of node and periapsis without a unit that exceed the orbit's own, rad/s."""
     squared = float(strength / orbit.semi_major_axis**3)
     for key in ("node_rate", "periapsis_rate"):
         rate = getattr(table, key)
         if rate.assumed and abs(float(rate)) > math.sqrt(squared):
-            yield _without_unit(f"{where} orbit.{key}", rate, "rad/s", "the orbit itself is slower", "deg/yr")
+            at = f"{where} {table.key}.{key}"
+            yield _without_unit(at, rate, "rad/s", "the orbit itself is slower", "deg/yr")
 
 
 def _familiar_axis(given: ExactNumber, where: str) -> Iterator[Caution]:
@@ -212,7 +213,7 @@ def _familiar_axis(given: ExactNumber, where: str) -> Iterator[Caution]:
 
 
 def _about_period(
-    table: Orbit, orbit: KeplerOrbit, strength: ExactNumber, where: str, scene: Scene
+    table: OrbitElements, orbit: KeplerOrbit, strength: ExactNumber, where: str, scene: Scene
 ) -> Iterator[Caution]:
     """A pace that no mass explains: that of the source, and the body's as far as it is known."""
     key = next((key for key in PACES if getattr(table, key) is not None), None)
@@ -230,9 +231,9 @@ def _about_period(
     kepler = span_words(2 * math.pi * math.sqrt(axis**3 / most))
     yield Caution(
         WarningCode.PERIOD_CONTRADICTS,
-        f"{where} orbit.{key}: a turn takes {span_words(2 * math.pi / abs(orbit.mean_motion))}, while by "
-        f"Kepler's third law with this gravitational_parameter an orbit of {length_text(float(axis))} takes "
-        f"{kepler}; correct one of them, or leave {key} out",
+        f"{where} {table.key}.{key}: a turn takes {span_words(2 * math.pi / abs(orbit.mean_motion))}, "
+        "while by Kepler's third law with this gravitational_parameter an orbit of "
+        f"{length_text(float(axis))} takes {kepler}; correct one of them, or leave {key} out",
     )
 
 
@@ -240,7 +241,7 @@ def _about_period(
 
 
 def about_spin(
-    table: Orbit, orbit: KeplerOrbit, strength: ExactNumber, where: str, scene: Scene
+    table: OrbitElements, orbit: KeplerOrbit, strength: ExactNumber, where: str, scene: Scene
 ) -> Iterator[Caution]:
     """A spin about a principal axis along the normal of an orbit, which is given as ``table``."""
     found, motion = _spin(scene, orbit), float(orbit.mean_motion)
@@ -256,7 +257,14 @@ def about_spin(
 
 
 def _near_resonance(
-    spin: float, asymmetry: float, table: Orbit, orbit: KeplerOrbit, where: str, scene: Scene, *, known: bool
+    spin: float,
+    asymmetry: float,
+    table: OrbitElements,
+    orbit: KeplerOrbit,
+    where: str,
+    scene: Scene,
+    *,
+    known: bool,
 ) -> Iterator[Caution]:
     """A spin within a per cent of 1:1, 3:2, 1:2 or 2:1 with the orbit that just misses the resonance.
 

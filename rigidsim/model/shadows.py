@@ -25,13 +25,16 @@ from typing import Any
 
 import heyoka as hy
 
+from rigidsim.errors import ConfigError, Problem
 from rigidsim.model.kinematics import Kinematics
+from rigidsim.model.load_words import length_text
 from rigidsim.model.sources import SeenSource, read_in, sources_of
 from rigidsim.model.two_part import rounded
 from rigidsim.scene.arithmetic import bits_in_use, norm
 from rigidsim.scene.expressions.names import NameProvider, Readable, provides
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.schema import Config
+from rigidsim.scene.tracing.numbers import plain
 
 _PAST = {
     True: "(1 - step(inner))*full + step(inner)*(step(outer)*partly + 1 - step(outer))",
@@ -99,6 +102,7 @@ class Shadows(NameProvider):
             far = [norm(context, place) for place in places]
             units = [[x / r for x in place] for place, r in zip(places, far, strict=True)]
             size = pair.source.radius(context) / far[0] if pair.source.extended else None
+            _refuse_inside(pair.other, far[1], context)
             before = far[1] < far[0]
             values = _ShareInNumbers(context).parts(units, size, pair.other.radius(context) / far[1], before)
             found |= {name: values[part] for part, name in pair.parts.items()}
@@ -127,6 +131,15 @@ class Shadows(NameProvider):
             values = _ShareInExpressions(m).parts([here.direction, there.direction], size, other, before)
             found |= {name: values[part] for part, name in pair.parts.items()}
         return found
+
+
+def _refuse_inside(source: SeenSource, far: Any, context: Any) -> None:
+    radius = source.radius(context)
+    if far <= radius:
+        given, distance = (length_text(float(plain(x))) for x in (radius, far))
+        what = f"given {given}, but the body starts {distance} from the source's centre, inside it, where no "
+        what += "shadow is known; check the unit, the orbit and the start"
+        raise ConfigError(Problem(f"[[loads]] number {source.number + 1} radius", what))
 
 
 def _pairs(config: Config) -> Iterator[_Pair]:

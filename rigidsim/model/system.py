@@ -14,7 +14,7 @@ from rigidsim.model.capabilities import Ending, Ranged, having
 from rigidsim.model.formulations.formulation import Formulation, ModelPlan
 from rigidsim.model.heyoka_expressions import carries_sign, plain_angles, to_heyoka
 from rigidsim.model.mechanics import Mechanics
-from rigidsim.model.names import state_names
+from rigidsim.model.names import above_zero, state_names
 from rigidsim.model.orbits.pieces import Pieces, PieceSeries
 from rigidsim.model.orbits.prescribed import TablePieces
 from rigidsim.model.outputs import Invariant, Recorded, drift_outputs, find_invariants, recorded_variables
@@ -22,7 +22,7 @@ from rigidsim.model.rotations import Symbolic
 from rigidsim.model.scaling import Rounder
 from rigidsim.model.state_blocks import StateBlock, joined
 from rigidsim.scene.expressions.names import EULER_NAMES
-from rigidsim.scene.expressions.tree import names_used
+from rigidsim.scene.expressions.tree import names_used, never_below_zero
 
 _LARGEST_EXPONENT = 1000  # of a recorded variable in SI: float64 ends at 2^1024, and sizes are known roughly
 _DIRECTIONS = {"any": 0, "up": 1, "down": -1}
@@ -231,6 +231,11 @@ class System:
             expression = to_heyoka(event.expression, names, m.number, m.scene.context, m.sides)
             found.append(Crossing(event.name, expression, _DIRECTIONS[event.direction], event.stop))
         endings = [(*one, False) for load in having(Ending, m.loads) for one in load.endings(m)]
+        endings += [
+            (f"{where} is negative", above_zero(m, expression), False)
+            for where, expression in self.scene.never_negative()
+            if not never_below_zero(expression.root)
+        ]
         endings += [(*one, True) for load in having(Ranged, m.loads) for one in load.range_ends(m)]
         down = _DIRECTIONS["down"]
         return found + [Crossing("", x, down, True, why, leaves_range) for why, x, leaves_range in endings]

@@ -78,6 +78,13 @@ def negligible(context: Any) -> Any:
     return context.mpf(2) ** (_LOST_BITS - context.prec)
 
 
+def cosine_and_sine(context: Any, angle: Any) -> tuple[Any, Any]:
+    """Cosine and sine of an angle; zero where they are the rounding of pi, at whole quarters of a turn."""
+    least, pair = negligible(context), (context.cos(angle), context.sin(angle))
+    c, s = (x if abs(x) > least else context.zero for x in pair)
+    return c, s
+
+
 def dot(a: Vector, b: Vector) -> Any:
     """Scalar product."""
     return sum((x * y for x, y in zip(a, b, strict=True)), a[0] * 0)

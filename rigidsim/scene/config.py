@@ -255,9 +255,9 @@ def _named(config: Config) -> Iterator[tuple[str, str]]:
     if isinstance(config.time.times, str):
         yield _TIMES, config.time.times
     for number, load in enumerate(config.loads, 1):
-        name = getattr(getattr(load, "orbit", None), "table", None)
-        if name is not None:
-            yield f"[[loads]] number {number} orbit.table", name
+        orbit = getattr(load, "elements", None)
+        if orbit is not None and orbit.table is not None:
+            yield f"[[loads]] number {number} {orbit.key}.table", orbit.table
 
 
 def _text(

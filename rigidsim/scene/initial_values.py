@@ -37,6 +37,7 @@ def check_start(scene: Scene) -> None:
     for where, expression in scene.formulas():
         problems += _check(where, expression, values, scene.context)
         problems += _check_span(where, expression, scene)
+    problems = problems or _check_signs(scene, values)
     if problems:
         raise ConfigError(problems)
 
@@ -93,22 +94,44 @@ def _check(where: str, expression: Expression, values: dict[str, Any], context: 
     return []
 
 
+def _check_signs(scene: Scene, values: dict[str, Any]) -> list[Problem]:
+    """Refuse what is below zero at the start and can't be."""
+    found = [(at, x, evaluate(x, values, scene.context)) for at, x in scene.never_negative()]
+    what = 'given "{}", which is {} at the start; at least 0 is allowed'
+    return [
+        Problem(at, what.format(x.text, scene.context.nstr(value, 6)))
+        for at, x, value in found
+        if value is not None and value < 0
+    ]
+
+
 def _check_span(where: str, expression: Expression, scene: Scene) -> list[Problem]:
-    """Refuse a function of time alone, such as sqrt(-t), that has no value at any later time of the run."""
-    problems = []
+    """Refuse a function of time alone, such as sqrt(-t) or log(2 - t), that has a value at the start and at
+    no later time that is tried; the last time at which it has one is found by bisection.
+    """
+    problems, context = [], scene.context
     for node in _functions_of_time(expression):
-        part, refusals = Expression(expression.text, node), []
-        for n in range(1, _TIMES + 1):
-            then = scene.start + (scene.end - scene.start) * n / _TIMES
-            try:
-                evaluate(part, {"t": then}, scene.context)
-                break
-            except ExpressionError as error:
-                refusals.append(error)
-        else:
-            what = f"no finite value at any time after the start; rewrite it: {refusals[0]}"
-            problems.append(Problem(where, what))
+        part, span = Expression(expression.text, node), scene.end - scene.start
+        tried = [_refusal(part, scene.start + span * n / _TIMES, context) for n in range(_TIMES + 1)]
+        if tried[0] is not None or None in tried[1:]:
+            continue
+        last, beyond = scene.start, scene.start + span / _TIMES
+        for _ in range(context.prec):
+            middle = (last + beyond) / 2
+            last, beyond = (middle, beyond) if _refusal(part, middle, context) is None else (last, middle)
+        what = f"no finite value after t = {context.nstr(last, 8)} s, while the run goes on to "
+        what += f"{context.nstr(scene.end, 8)} s; rewrite it, or end the run before: {tried[1]}"
+        problems.append(Problem(where, what))
     return problems
+
+
+def _refusal(expression: Expression, time: Any, context: Any) -> ExpressionError | None:
+    """Why a function of time alone has no value at a time; None if it has one."""
+    try:
+        evaluate(expression, {"t": time}, context)
+    except ExpressionError as error:
+        return error
+    return None
 
 
 def _functions_of_time(expression: Expression) -> list[Node]:

@@ -5,32 +5,37 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any
+from typing import Any, ClassVar, Self
 
-from pydantic import Field, StrictStr
+from pydantic import Field, StrictStr, model_validator
 
-from rigidsim.scene.arithmetic import eccentric_anomaly
+from rigidsim.scene.arithmetic import cosine_and_sine, eccentric_anomaly
 from rigidsim.scene.exact import ZERO, ExactNumber
-from rigidsim.scene.fields import Angle, ConfigTable, Dimensionless, Metre, Rate, Second
+from rigidsim.scene.fields import Angle, ConfigTable, Dimensionless, Metre, Rate, Second, refuse
 from rigidsim.scene.orbit_tables.elements import ElementTable, TableError, read_table
 from rigidsim.scene.orbit_tables.pieces import TabulatedOrbit
 from rigidsim.scene.point_masses import ellipse_of
-from rigidsim.scene.registry import Surroundings
+from rigidsim.scene.registry import LoadFields, Surroundings
 from rigidsim.scene.tracing.arithmetic import TracedExact
 from rigidsim.scene.tracing.numbers import Traced, Untraceable
 from rigidsim.scene.validation_messages import nearest
 
 
-class Orbit(ConfigTable):
-    """A Kepler orbit of the attracting body, whose node and periapsis may move uniformly.
+class OrbitElements(ConfigTable):
+    """A Kepler orbit, whose node and periapsis may move uniformly.
 
     Angles are those at time zero of the scene, as classical elements in space axes. One of ``period``,
     ``sidereal_period`` and ``longitude_rate`` may replace the mean motion of Kepler's third law. A ``table``
     gives elements over time; those that it hasn't are constant.
+
+    Attributes:
+        key: of a load, that this table is.
+        opposite: whether the elements place the body as seen from the source.
     """
 
-    body: StrictStr | None = Field(None, examples=["sun"])
-    """name of the attracting point mass in [[bodies]]; excludes all other keys"""
+    key: ClassVar[str]
+    opposite: ClassVar[bool] = False
+
     table: StrictStr | None = Field(None, examples=["mars_elements.csv"])
     """name of a CSV file beside the config, with elements over time"""
     semi_major_axis: Metre | None = Field(None, examples=["7000 km"])
@@ -59,6 +64,49 @@ class Orbit(ConfigTable):
     """
     longitude_rate: Rate | None = Field(None, examples=["13.17639648 deg/day"])
     """rate of the mean longitude (node + periapsis + mean anomaly), instead of period"""
+
+
+class Orbit(OrbitElements):
+    """Where the attracting body is, as seen from the body: by a Kepler orbit, or as one of [[bodies]]."""
+
+    key = "orbit"
+
+    body: StrictStr | None = Field(None, examples=["sun"])
+    """name of the attracting point mass in [[bodies]]; excludes all other keys"""
+
+
+class SatelliteOrbit(OrbitElements):
+    """The body's own Kepler orbit about the attracting body, which is seen on the opposite side."""
+
+    key, opposite = "satellite_orbit", True
+
+
+class OrbitFields(LoadFields):
+    """Keys of a load whose source and body are on a prescribed orbit, which is given from either side."""
+
+    orbit: Orbit | None = Field(
+        default=None,
+        description="place of the source as seen from the body, by elements: a satellite's source is "
+        "opposite to the satellite's own elements, which are satellite_orbit",
+        examples=[{"semi_major_axis": "1 au", "eccentricity": 0.0167}],
+    )
+    satellite_orbit: SatelliteOrbit | None = Field(
+        default=None,
+        description="the body's own elements about the source, with the keys of orbit, instead of orbit",
+        examples=[{"semi_major_axis": "7000 km", "inclination": "51.6 deg"}],
+    )
+
+    @property
+    def elements(self) -> Orbit | SatelliteOrbit | None:
+        """The one of both that is given."""
+        return self.satellite_orbit if self.orbit is None else self.orbit
+
+    @model_validator(mode="after")
+    def _from_one_side(self) -> Self:
+        if self.orbit is not None and self.satellite_orbit is not None:
+            what = "given orbit and satellite_orbit; give one of them: orbit is the place of the source as "
+            raise refuse(what + "seen from the body, satellite_orbit the body's own orbit about the source")
+        return self
 
 
 @dataclass(frozen=True)
@@ -114,7 +162,7 @@ class KeplerOrbit:
             (self.ascending_node + self.node_rate * time, 3),
         )
         for angle, axis in turns:
-            c, s = context.cos(angle), context.sin(angle)
+            c, s = cosine_and_sine(context, angle)
             if axis == 3:
                 x, y = c * x - s * y, s * x + c * y
             else:
@@ -153,16 +201,16 @@ PACES = ("period", "sidereal_period", "longitude_rate")
 """Keys of which one may replace the mean motion of Kepler's third law."""
 
 
-def pace_of(table: Orbit, around: Surroundings) -> tuple[str, ExactNumber] | None:
+def pace_of(table: OrbitElements, around: Surroundings) -> tuple[str, ExactNumber] | None:
     """The key that replaces the mean motion of Kepler's third law, and its value; None if none is given."""
     given = [(key, getattr(table, key)) for key in PACES if getattr(table, key) is not None]
     for key, value in given:
         if value.sign <= 0:
             what = "rate" if key == "longitude_rate" else "time"
-            raise around.fault(f"orbit.{key}", f"given {float(value):g}; a positive {what} is allowed")
+            raise around.fault(f"{table.key}.{key}", f"given {float(value):g}; a positive {what} is allowed")
     if len(given) > 1:
         what = f"given beside {given[0][0]}; at most one of {', '.join(PACES)} is allowed"
-        raise around.fault(f"orbit.{given[1][0]}", what)
+        raise around.fault(f"{table.key}.{given[1][0]}", what)
     return given[0] if given else None
 
 
@@ -172,7 +220,7 @@ def rate_of(pace: tuple[str, ExactNumber], context: Any) -> Any:
     return value.at(context) if key == "longitude_rate" else 2 * context.pi / value.at(context)
 
 
-def mean_motion(table: Orbit, strength: Any | None, around: Surroundings) -> Any:
+def mean_motion(table: OrbitElements, strength: Any | None, around: Surroundings) -> Any:
     """Rate of the mean anomaly (mpf, rad/s): that of the pace that was given, or of Kepler's third law if the
     gravitational parameter ``strength`` is known. Mean longitude is ascending node + periapsis + mean
     anomaly.
@@ -181,7 +229,7 @@ def mean_motion(table: Orbit, strength: Any | None, around: Surroundings) -> Any
     if pace is None:
         if strength is None:
             what = "missing; give it, or gravitational_parameter for the one of Kepler's third law"
-            raise around.fault("orbit.period", what)
+            raise around.fault(f"{table.key}.period", what)
         assert table.semi_major_axis is not None
         return context.sqrt(strength / table.semi_major_axis.at(context) ** 3)
     rate = rate_of(pace, context)
@@ -190,19 +238,25 @@ def mean_motion(table: Orbit, strength: Any | None, around: Surroundings) -> Any
     motion = rate - table.node_rate.at(context) - table.periapsis_rate.at(context)
     if not motion > 0:
         what = f"less node_rate and periapsis_rate leaves the mean anomaly {context.nstr(motion, 8)} rad/s; "
-        raise around.fault(f"orbit.{pace[0]}", what + "a positive rate is allowed")
+        raise around.fault(f"{table.key}.{pace[0]}", what + "a positive rate is allowed")
     return motion
 
 
-def resolve_orbit(table: Orbit, strength: Any | None, around: Surroundings) -> KeplerOrbit:
-    """Work out the orbit's elements; ``strength`` is the gravitational parameter (mpf, m^3/s^2), if known."""
+def resolve_orbit(table: OrbitElements, strength: Any | None, around: Surroundings) -> KeplerOrbit:
+    """Elements of the attracting body as seen from the body: as given, or the body's own with the periapsis
+    half a turn back. ``strength`` is the gravitational parameter (mpf, m^3/s^2), if known.
+    """
     context = around.context
     if table.semi_major_axis is None:
-        raise around.fault("orbit.semi_major_axis", "missing; it is needed")
-    axis, eccentricity = ellipse_of(table, context, lambda key, text: around.fault(f"orbit.{key}", text))
+        raise around.fault(f"{table.key}.semi_major_axis", "missing; it is needed")
+    axis, eccentricity = ellipse_of(
+        table, context, lambda key, text: around.fault(f"{table.key}.{key}", text)
+    )
     motion = mean_motion(table, strength, around)
     node, node_rate = table.ascending_node.at(context), table.node_rate.at(context)
     periapsis, periapsis_rate = table.periapsis.at(context), table.periapsis_rate.at(context)
+    if table.opposite:
+        periapsis = periapsis - context.pi
     anomaly, zero = table.mean_anomaly.at(context), context.zero
     if table.inclination.sign == 0:  # node and periapsis turn about the same axis
         periapsis, periapsis_rate, node, node_rate = periapsis + node, periapsis_rate + node_rate, zero, zero
@@ -228,8 +282,11 @@ def tabulated_orbit(
     bits: int,
     constants: tuple[tuple[str, ExactNumber], ...],
     strength: tuple[Any, ...] | None,
+    opposite: bool,
 ) -> TabulatedOrbit:
-    """A table's orbit, made once: of its text, the elements it lacks, and an mpf's parts for Kepler's law."""
+    """A table's orbit, made once: of its text, the elements it lacks, and an mpf's parts for Kepler's law;
+    ``opposite`` as in ``OrbitElements``.
+    """
     table = read_table(text, bits)
     context = table.context
     given = dict(constants)
@@ -248,9 +305,9 @@ def tabulated_orbit(
         mass = context.make_mpf(strength)
         motion = lambda axis: context.sqrt(mass / axis**3)  # noqa: E731
     columns = {key: value.at(context) for key, value in given.items()}
-    made_of = (name, text, bits, constants, strength)
+    made_of = (name, text, bits, constants, strength, opposite)
     listed = ElementTable(list(table.times), {k: list(v) for k, v in table.columns.items()}, context)
-    orbit = TabulatedOrbit(made_of, name, listed, columns, motion)
+    orbit = TabulatedOrbit(made_of, name, listed, columns, motion, opposite=opposite)
     _ = orbit.error
     return orbit
 
@@ -258,7 +315,9 @@ def tabulated_orbit(
 _NO_CONSTANTS = ("table", "node_rate", "periapsis_rate")
 
 
-def resolve_tabulated_orbit(fields: Orbit, strength: Any | None, around: Surroundings) -> TabulatedOrbit:
+def resolve_tabulated_orbit(
+    fields: OrbitElements, strength: Any | None, around: Surroundings
+) -> TabulatedOrbit:
     """Work out a table's orbit; ``strength`` is the gravitational parameter of Kepler's law, if known."""
     name = fields.table
     assert name is not None
@@ -269,23 +328,28 @@ def resolve_tabulated_orbit(fields: Orbit, strength: Any | None, around: Surroun
         raise Untraceable("an orbit by a table depends on it")
     for rate in ("node_rate", "periapsis_rate"):
         if getattr(fields, rate).sign != 0:
-            raise around.fault(f"orbit.{rate}", "given beside table, whose columns say what moves; remove it")
+            what = "given beside table, whose columns say what moves; remove it"
+            raise around.fault(f"{fields.key}.{rate}", what)
     pace_of(fields, around)
     if name not in around.tables:
         known = ", ".join(around.tables) or "none"
         what = f'given "{name}", but this config was given as text, without files beside it; put the '
-        raise around.fault("orbit.table", what + f'CSV into [tables."{name}"] text (there now: {known})')
+        what += f'CSV into [tables."{name}"] text (there now: {known})'
+        raise around.fault(f"{fields.key}.table", what)
     parts = None if strength is None else strength._mpf_
     constants = tuple((key, value.alone) for key, value in given if value is not None)
     try:
-        orbit = tabulated_orbit(name, around.tables[name], around.context.prec, constants, parts)
+        orbit = tabulated_orbit(
+            name, around.tables[name], around.context.prec, constants, parts, fields.opposite
+        )
     except TableError as error:
-        raise around.fault("orbit.table", f'given "{name}": {error}') from None
+        raise around.fault(f"{fields.key}.table", f'given "{name}": {error}') from None
     times = orbit.table.times
     if around.span is not None and not (times[0] <= around.span[0] and around.span[1] <= times[-1]):
         first, last, start, end = (around.context.nstr(t, 8) for t in (times[0], times[-1], *around.span))
         what = (
             f'given "{name}", which reaches from t = {first} s to {last} s, but the run goes from {start} s '
         )
-        raise around.fault("orbit.table", what + f"to {end} s; give more rows, or change [time] start or end")
+        what += f"to {end} s; give more rows, or change [time] start or end"
+        raise around.fault(f"{fields.key}.table", what)
     return orbit

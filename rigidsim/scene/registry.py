@@ -205,6 +205,10 @@ class SceneLoad:
         """Its expressions with their places in the config, to be tried at the start."""
         yield from ()
 
+    def never_negative(self) -> Iterator[tuple[str, Expression]]:
+        """Expressions for what no body or medium has below zero, with their places in the config."""
+        yield from ()
+
 
 class Companion(Protocol):
     """A class of loads that a key of another load brings beside it, on the same source."""

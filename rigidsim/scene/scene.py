@@ -113,6 +113,10 @@ class Scene:
         found = [(f"[[events]] number {n} expression", event.expression) for n, event in events]
         return self.acting_formulas() + found
 
+    def never_negative(self) -> list[tuple[str, Expression]]:
+        """Those of loads that may not fall below zero."""
+        return [formula for load in self.loads for formula in load.never_negative()]
+
     def acting_formulas(self) -> list[tuple[str, Expression]]:
         """Those in the equations of motion: of loads and of own states."""
         found = [formula for load in self.loads for formula in load.formulas()]

@@ -1,4 +1,4 @@
-"""What isn't modelled, and what takes its place: told to whom asks for it by name (``docs/scope.md``)."""
+"""What isn't modelled, and what has another name here: answers to whoever asks for it (``docs/scope.md``)."""
 
 from __future__ import annotations
 
@@ -142,15 +142,114 @@ OUT_OF_SCOPE = (
 )  # fmt: skip
 
 
+NAMED_OTHERWISE = {
+    "a wheel is one of [[rotors]] (docs/rotors.md)": (
+        "reaction_wheel", "momentum_wheel", "wheel", "flywheel", "rotor", "gyrostat", "gyroscope",
+        "momentum_bias", "dual_spin", "momentum_exchange",
+    ),
+    "wheels on gimbals aren't modelled; a wheel on a fixed axis is one of [[rotors]] (docs/rotors.md), and "
+    "the torque of a gimbal is a torque of expressions, with its angle in [[states]] (docs/own_states.md)": (
+        "control_moment_gyro", "control_moment_gyroscope", "cmg", "vscmg", "scmg", "gimballed_wheel",
+    ),
+    "coils are a magnetic_dipole whose moment is an expression, as in rigidsim new "
+    "detumbling_by_magnetorquers (docs/loads/magnetic_dipole.md)": (
+        "magnetorquer", "magnetic_torquer", "magnetorquer_rod", "torque_rod", "torque_coil", "coil", "mtq",
+        "mtb", "bdot", "b_dot",
+    ),
+    "a magnet, and a magnetic field, are a magnetic_dipole (docs/loads/magnetic_dipole.md)": (
+        "magnet", "magnetic", "magnetic_field", "magnetic_torque", "magnetic_moment", "dipole",
+        "residual_dipole", "geomagnetic", "geomagnetic_field", "earth_magnetic_field", "igrf", "wmm",
+    ),
+    "magnetic hysteresis isn't modelled; eddy_currents and viscous_torque brake in proportion to the rates, "
+    "and a law of a rod's magnetisation can be one of [[states]], which the moment of a magnetic_dipole "
+    "reads (docs/own_states.md)": (
+        "hysteresis", "hysteresis_rod", "hysteresis_damping", "hysteresis_damper", "magnetic_hysteresis",
+        "permeable_rod",
+    ),
+    "the oblateness of a source is figure = {J2 = .., radius = .., pole = ..} of central_gravity and "
+    "gravity_gradient (docs/loads/gravity_field.md)": (
+        "j2", "j2_gravity", "j2_perturbation", "oblateness", "oblate_gravity", "zonal", "zonal_harmonic",
+    ),
+    "harmonics of a source are gravity_field of central_gravity (docs/loads/central_gravity.md), of the body "
+    "[body] gravity_field (docs/loads/gravity_field.md)": (
+        "spherical_harmonic", "harmonic", "geopotential", "gravity_harmonic", "gravity_model", "egm96",
+        "egm2008", "non_spherical_gravity", "tesseral", "sectoral", "gravity_field",
+    ),
+    "a further attracting body is one more gravity_gradient, for its torque, or one of [[bodies]], which a "
+    "central_gravity names by orbit = {body = \"NAME\"} (docs/orbits_beside_the_body.md)": (
+        "third_body", "third_body_gravity", "third_body_perturbation", "perturber", "point_mass",
+        "luni_solar", "lunisolar", "perturbing_body",
+    ),
+    "the air is a drag on [[body.surfaces]] (docs/loads/drag.md)": (
+        "atmospheric_drag", "air_drag", "aerodynamic_drag", "aero_drag", "air_resistance", "atmosphere",
+        "air", "nrlmsise", "nrlmsise00", "nrlmsise_00", "free_molecular", "free_molecular_flow",
+    ),
+    "the push of light is a radiation_pressure on [[body.surfaces]] (docs/loads/radiation_pressure.md)": (
+        "solar_radiation_pressure", "srp", "solar_pressure", "solar_radiation", "light_pressure", "radiation",
+        "light", "sunlight", "solar_sail", "solar_torque",
+    ),
+    "uniform_gravity is a weight, central_gravity attracts a body in flight, gravity_gradient turns one on a "
+    "given orbit (docs/config.md)": (
+        "gravity", "gravitation", "gravitational", "gravitational_torque", "gravitational_force",
+    ),
+    "a body in flight is attracted by central_gravity (docs/loads/central_gravity.md)": (
+        "two_body", "kepler", "keplerian", "newtonian_gravity", "point_gravity", "point_mass_gravity",
+        "central_force", "earth_gravity", "inverse_square",
+    ),
+    "a weight is uniform_gravity (docs/loads/uniform_gravity.md)": (
+        "weight", "constant_gravity", "surface_gravity",
+    ),
+    "tides are raised by each gravity_gradient on a body with [body] elasticity (docs/elastic_bodies.md)": (
+        "tide", "tidal", "tidal_torque", "tidal_dissipation",
+    ),
+    "damping is viscous_torque, or a ring of liquid among [[rotors]], as in rigidsim new "
+    "gravity_gradient_boom (docs/loads/viscous_torque.md)": (
+        "damping", "damper", "viscous_damping", "nutation_damper", "rate_damping", "viscous_damper",
+    ),
+    "currents in the body are eddy_currents (docs/loads/eddy_currents.md)": (
+        "eddy", "eddy_current", "eddy_current_damping", "eddy_torque", "foucault_current",
+    ),
+    "a law of control is a torque or a force of expressions (docs/loads/torque.md), with [[states]] for what "
+    "it remembers (docs/own_states.md)": (
+        "controller", "control", "control_torque", "pd", "pid", "pd_control", "pid_control",
+        "attitude_control", "actuator", "motor", "spring", "spring_torque",
+    ),
+    "a torque in body or space axes is torque (docs/loads/torque.md)": (
+        "constant_torque", "body_torque", "external_torque", "applied_torque", "disturbance_torque",
+        "space_torque",
+    ),
+    "a force at a point of the body is force (docs/loads/torque.md)": (
+        "external_force", "applied_force", "body_force", "constant_force",
+    ),
+    "mass that leaves is mass_loss (docs/loads/mass_loss.md)": (
+        "jet_damping", "mass_flow", "mass_change", "mass_depletion", "propellant_mass_loss",
+    ),
+}  # fmt: skip
+"""What loads are called elsewhere, by the answer; names as in ``OutOfScope``."""
+
+
 def scope_answer(name: str) -> str:
     """``; contact isn't modelled: ... (docs/scope.md)`` for a name of such a thing, otherwise empty."""
     found = next((item for item in _named(name)), None)
     return f"; {found.said}: {found.instead} ({PAGE})" if found else ""
 
 
+def other_name(name: str) -> str:
+    """``; a wheel is one of [[rotors]] (docs/rotors.md)`` for what has another name here, otherwise empty."""
+    whole = "_".join(_words(name))
+    forms = whole, whole.removesuffix("s")
+    return next(
+        (f"; {said}" for said, names in NAMED_OTHERWISE.items() if any(x in names for x in forms)), ""
+    )
+
+
+def _words(name: str) -> list[str]:
+    return re.findall(r"[a-z0-9]+", name.lower()[:100])
+
+
 def _named(name: str) -> Iterator[OutOfScope]:
     """What a name speaks of: the whole of it first, then its words."""
-    words = re.findall(r"[a-z0-9]+", name.lower()[:100])
+    words = _words(name)
     for form in ("_".join(words), *words):
         for item in OUT_OF_SCOPE:
             if form in item.names or form.removesuffix("s") in item.names:

@@ -121,7 +121,7 @@ def changes(
     compared = 0
     for state in states:
         other = {**state, **{name: move(state[name]) for name, move in moved.items()}}
-        before, after = _value(expression, state, context), _value(expression, other, context)
+        before, after = value_at(expression, state, context), value_at(expression, other, context)
         if before is None or after is None:
             continue
         if abs(before - after) > context.ldexp(abs(before) + abs(after), -_BITS):
@@ -152,7 +152,7 @@ def _kinds(
     with context.workprec(context.prec + GUARD_BITS):
         for node, surface in sorted(arguments.items(), key=inner_first):
             parts = [on_sides(surface.expression, found, sides) for sides in drawn]
-            values = [_value(part, state, context) for part, state in zip(parts, states, strict=True)]
+            values = [value_at(part, state, context) for part, state in zip(parts, states, strict=True)]
             for index, others in enumerate(known):
                 sign = _ratio(values, others, agreement)
                 if sign:
@@ -164,7 +164,8 @@ def _kinds(
     return found
 
 
-def _value(expression: Expression, state: Mapping[str, Any], context: Any) -> Any | None:
+def value_at(expression: Expression, state: Mapping[str, Any], context: Any) -> Any | None:
+    """The value of an expression (mpf); None where it has none."""
     try:
         return evaluate(expression, state, context)
     except ExpressionError:

@@ -18,14 +18,9 @@ _ARRAYS_OF_TABLES = ("loads", "bodies", "rotors", "states", "events")
 _MEANT = {
     "box": "cuboid", "brick": "cuboid", "ball": "sphere", "disc": "disk", "hoop": "ring", "bar": "rod",
     "stick": "rod", "pipe": "tube", "rectangle": "plate", "square": "plate", "donut": "torus",
-    "gravity": "uniform_gravity", "weight": "uniform_gravity", "friction": "viscous_torque torque",
-    "damping": "viscous_torque", "air": "drag", "atmosphere": "drag", "srp": "radiation_pressure",
-    "solar_pressure": "radiation_pressure", "solar_radiation_pressure": "radiation_pressure",
-    "thruster": "torque force", "motor": "torque",
-    "spring": "torque force", "wheel": "rotors", "wheels": "rotors", "flywheel": "rotors",
-    "cassini": "cassini_1 cassini_2 cassini_3 cassini_4",
-    "gyroscope": "rotors", "controller": "states", "filter": "states", "slosh": "states",
-    "eddy": "eddy_currents", "speed": "rate", "magnet": "magnetic_dipole", "tide": "gravity_gradient",
+    "friction": "viscous_torque torque", "thruster": "torque force",
+    "cassini": "cassini_1 cassini_2 cassini_3 cassini_4", "filter": "states", "slosh": "states",
+    "speed": "rate",
     "planet": "gravity_gradient central_gravity", "sun": "gravity_gradient", "moon": "gravity_gradient",
     "spin": "angular_velocity rate", "omega": "angular_velocity", "w": "angular_velocity",
     "rates": "angular_velocity", "attitude": "quaternion euler_angles", "inertia": "inertia_tensor moment",
@@ -89,11 +84,13 @@ def nearest(given: str, allowed: Iterable[str]) -> str:
     return f"; did you mean {quoted}?" if close else ""
 
 
-def meant(given: str, allowed: Iterable[str]) -> str:
-    """What a name that isn't allowed may mean: a similar one, or something that isn't modelled."""
-    from rigidsim.scene.scope import scope_answer  # of no use until something is refused
+def meant(given: str, allowed: Iterable[str], *, effect: bool = False) -> str:
+    """What a name that isn't allowed may mean: a similar one, or something that isn't modelled; of an
+    ``effect`` on the body also what has another name here.
+    """
+    from rigidsim.scene.scope import other_name, scope_answer  # of no use until something is refused
 
-    return f"{nearest(given, allowed)}{scope_answer(given)}"
+    return (effect and other_name(given)) or f"{nearest(given, allowed)}{scope_answer(given)}"
 
 
 def key_path(location: Iterable[str | int]) -> str:
@@ -153,10 +150,11 @@ def _models(annotation: Any) -> list[type[BaseModel]]:
 def _what(table: type[BaseModel] | None, error: Mapping[str, Any]) -> str:
     kind, context = error["type"], error.get("ctx", {})
     location, given = tuple(error["loc"]), error["input"]
+    effect = len(location) == 1 or location[0] == "loads"
     if kind == "extra_forbidden":
         fields = sorted(table.model_fields) if table else []
         key = str(location[-1])
-        return f"unknown key{meant(key, fields)}; allowed: {', '.join(fields)}"
+        return f"unknown key{meant(key, fields, effect=effect)}; allowed: {', '.join(fields)}"
     if kind in ("missing", "union_tag_not_found"):
         return "missing; it must be given"
     if kind in ("literal_error", "union_tag_invalid"):
@@ -164,7 +162,7 @@ def _what(table: type[BaseModel] | None, error: Mapping[str, Any]) -> str:
         allowed = allowed.replace("'", "").replace(" or ", ", ")
         names = [part.strip() for part in allowed.split(",")]
         word = given if isinstance(given, str) else shown(given)
-        near = meant(word, names)
+        near = meant(word, names, effect=effect)
         return f"given {shown(given)}{near}; allowed: {', '.join(names)}"
     if kind == "list_type" and isinstance(given, Mapping) and location[0] in _ARRAYS_OF_TABLES:
         return f"given a table; an array of them is allowed: write [[{location[0]}]] in double brackets"

@@ -39,8 +39,8 @@ SAID = {
         lambda: gradient('orbit = {semi_major_axis = "6950 km", inclination = "51.6 deg"}'),
         # 3/2 G M / R^3 (C - A) = 1.5 * 3.986e14 / 6.95e6^3 * 1.5
         "gravity gradient of the Earth (G M 3.986e+14 m^3/s^2), on a circular orbit of 6950 km, 571.9 km "
-        "above "
-        "its surface, period 96.1 min, inclination 51.6 deg; torque up to 2.672e-06 N m",
+        "above its surface, period 96.1 min, inclination 51.6 deg; at the start the source is at +X of the "
+        "body, and the body at -X of the source; torque up to 2.672e-06 N m",
     ),
     "top": (
         lambda: told('kind = "uniform_gravity"', body=TOP),

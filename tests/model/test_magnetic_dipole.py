@@ -116,8 +116,8 @@ def test_along_an_orbit_it_agrees_with_another_integrator_of_the_plain_equations
     [
         ("moment = [1, 0, 0]", "[[loads]] number 1 field: given neither field nor orbit; exactly one"),
         (f"moment = [1, 0, 0]\nfield = [1, 0, 0]\n{ORBIT}", "field: given both field and orbit; exactly one"),
-        (f"moment = [1, 0, 0]\n{ORBIT}", "source_moment: missing; it is needed with orbit"),
-        ("moment = [1, 0, 0]\nfield = [1, 0, 0]\ngravitational_parameter = 1", "allowed with orbit only"),
+        (f"moment = [1, 0, 0]\n{ORBIT}", "source_moment: missing; an orbit needs it"),
+        ("moment = [1, 0, 0]\nfield = [1, 0, 0]\ngravitational_parameter = 1", "allowed with an orbit only"),
         (
             "moment = [1, 0, 0]\norbit = {semi_major_axis = 1}\nsource_moment = [1, 0, 0]",
             "orbit.period: missing; give it, or gravitational_parameter",
@@ -178,7 +178,7 @@ def test_in_flight_the_torque_is_right_at_random_states() -> None:
 @pytest.mark.parametrize(
     ("load", "message"),
     [
-        (f"source_moment = [0, 0, 1e22]\n{AROUND}", "remove orbit and gravitational_parameter"),
+        (f"source_moment = [0, 0, 1e22]\n{AROUND}", "remove it and gravitational_parameter"),
         ("", "field: given neither field nor source_moment; exactly one of them is needed"),
         ("source_moment = [0, 0, 1e22]\nfield = [0, 0, 1]", "given both field and source_moment"),
         ("field = [0, 0, 1]\nposition = [0, 0, 0]", "position: given; allowed with source_moment"),

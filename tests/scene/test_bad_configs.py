@@ -271,7 +271,7 @@ IN_ONE_TABLE: dict[str, list[tuple[str, ...]]] = {
         ('kind = "uniform_gravty"', "kind", 'given "uniform_gravty"', 'did you mean "uniform_gravity"?'),
         ("acceleration = [0, 0, -1]", "kind", "missing"),
         ('kind = "friction"', "kind", 'given "friction"; did you mean "viscous_torque" or "torque"?'),
-        ('kind = "gravity"', "kind", 'did you mean "uniform_gravity"?'),
+        ('kind = "gravity"', "kind", "uniform_gravity is a weight"),
         ('kind = "gravity_gradient"\ngravitational_parameter = 1', "orbit", "given none"),
         (
             'kind = "gravity_gradient"\ngravitational_parameter = -1\nposition = [1, 0, 0]',

@@ -73,7 +73,8 @@ def test_a_swept_parameter_within_a_function_of_time(tmp_path: Path, batch: str)
     ("torque", "words"),
     [
         ("-0.1*wrap(psi)", "reads psi, which the start leaves open"),
-        ("sqrt(-t)", "at any time after the start"),
+        ("sqrt(-t)", "no finite value after t = 0"),
+        ("log(2 - t)", "no finite value after t = 2.0 s"),
     ],
 )
 def test_what_has_no_value_is_refused(torque: str, words: str) -> None:

@@ -23,7 +23,7 @@ from rigidsim.model.orbits.prescribed import OrbitStates, element_states
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.state_blocks import StateBlock
 from rigidsim.model.two_part import as_factor
-from rigidsim.scene.arithmetic import cross, dot
+from rigidsim.scene.arithmetic import cosine_and_sine, cross, dot
 from rigidsim.scene.orbit_tables.pieces import TabulatedOrbit
 from rigidsim.scene.orbits import KeplerOrbit
 
@@ -110,8 +110,8 @@ class AveragedMechanics(Mechanics):
     def _turned(self, angle: Any, rate: Any) -> tuple[Symbolic, Symbolic]:
         """Cosine and sine of an angle that advances uniformly."""
         if rate == 0:
-            context = self.scene.context
-            return as_factor(self.number(context.cos(angle))), as_factor(self.number(context.sin(angle)))
+            c, s = cosine_and_sine(self.scene.context, angle)
+            return as_factor(self.number(c)), as_factor(self.number(s))
         moving = self._moving(angle, rate)
         return hy.cos(moving), hy.sin(moving)
 

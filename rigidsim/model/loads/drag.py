@@ -66,8 +66,9 @@ class DragFields(LoadFields):
 @register_load
 @dataclass(frozen=True)
 class Drag(SurfaceLoad):
-    """Drag on plates and spheres."""
+    """Drag on plates and spheres; ``law`` is the density, where an expression gives it."""
 
+    law: Expression | None = None
     Fields = DragFields
     title = "drag"
     described = "drag"
@@ -78,7 +79,7 @@ class Drag(SurfaceLoad):
             what = "given without a velocity relative to the air; it takes [initial] position and velocity, "
             raise around.fault("", what + "and a central_gravity (atmosphere_rate there turns the air)")
         pushes = Pushes(around, RELATIVE_NAMES)
-        half, factors = around.context.one / 2, []
+        half, factors, law = around.context.one / 2, [], None
         _refuse_indices(fields, around)
         if fields.density == NRLMSISE:
             factors.append(parse_expression(AIR_DENSITY, around.names))
@@ -88,7 +89,8 @@ class Drag(SurfaceLoad):
                 raise around.fault("density", what)
             half = half * fields.density.at(around.context)
         else:
-            factors.append(_law(fields.density, around))
+            law = _law(fields.density, around)
+            factors.append(law)
         factors += _falling(fields, around)
         for number, surface in pushes.surfaces():
             size = -half * surface.drag_coefficient * surface.area
@@ -97,7 +99,11 @@ class Drag(SurfaceLoad):
             else:
                 pushes.along_vector(surface, size, speed=True)
         kind = DragInThermosphere if fields.density == NRLMSISE else cls
-        return kind(pushes.acting(), tuple(factors), around.free_flight, around.number)
+        return kind(pushes.acting(), tuple(factors), around.free_flight, around.number, law)
+
+    def never_negative(self) -> Iterator[tuple[str, Expression]]:
+        if self.law is not None:
+            yield f"[[loads]] number {self.number + 1} drag density", self.law
 
     def cautions(self, fields: DragFields, where: str, scene: Scene) -> Iterator[Caution]:
         attractors = (x for x in scene.config.loads if getattr(x, "kind", "") == "central_gravity")
@@ -115,7 +121,7 @@ class DragInThermosphere(Drag):
 
     def range_ends(self, m: Kinematics) -> list[tuple[str, Symbolic]]:
         why = f"the altitude fell below {LEAST:g} km, from which NRLMSISE-00 is known here"
-        return [(why, (height(m) - (LEAST - 1.0)) / LEAST)]
+        return [(why, (height(m) - LEAST) / LEAST + 2.0**-20)]  # 14 cm: a run may start at the limit
 
     def _words(self) -> str:
         return "drag in NRLMSISE-00"

@@ -14,7 +14,7 @@ from rigidsim.model.capabilities import SourcePlace
 from rigidsim.model.gradient import GradientSource, gradient_terms, tidal_range
 from rigidsim.model.kinematics import Kinematics, quadratic_form
 from rigidsim.model.load import Load, Term
-from rigidsim.model.load_words import source_text, value_text
+from rigidsim.model.load_words import sides_text, source_text, value_text
 from rigidsim.model.loads.point_attraction import MovingGradient, kernel_strength, positive_strength
 from rigidsim.model.loads.source_figure import FigureFields
 from rigidsim.model.orbit_planes import OrbitPlane
@@ -28,27 +28,27 @@ from rigidsim.scene.epochs import J2000, Epoch
 from rigidsim.scene.fields import BodyName, GravitationalParameter, Metre, Triple
 from rigidsim.scene.frame import ECLIPTIC
 from rigidsim.scene.kernels.kernel import Sight
-from rigidsim.scene.orbits import KeplerOrbit, Orbit, attracting_body, resolve_orbit, resolve_tabulated_orbit
+from rigidsim.scene.orbits import (
+    KeplerOrbit,
+    OrbitFields,
+    attracting_body,
+    resolve_orbit,
+    resolve_tabulated_orbit,
+)
 from rigidsim.scene.registry import Surroundings, register_load
 from rigidsim.scene.scene import Scene
 from rigidsim.store.summary_parts import Caution
 
-_PLACES = ("orbit", "position", "ephemeris", "source")
+_PLACES = ("orbit", "satellite_orbit", "position", "ephemeris", "source")
 """Keys that tell how a source is placed."""
 
 
-class GravityGradientFields(FigureFields):
+class GravityGradientFields(OrbitFields, FigureFields):
     """Torque of a distant attracting body, to second degree (MacCullagh's formula)."""
 
     kind: Literal["gravity_gradient"]
     gravitational_parameter: GravitationalParameter | None = Field(
         default=None, description="G M of the attracting body", examples=["3.986004418e14 m^3/s^2"]
-    )
-    orbit: Orbit | None = Field(
-        default=None,
-        description="orbit of the attracting body as seen from this one; exactly one of orbit, position, "
-        "ephemeris and source",
-        examples=[{"semi_major_axis": "7000 km", "inclination": "51.6 deg"}],
     )
     position: Triple[Metre] | None = Field(
         default=None, description="position of a source at rest, space axes", examples=[["7000 km", 0, 0]]
@@ -90,15 +90,17 @@ class GravityGradient(GradientSource, Load):
         given = [key for key in _PLACES if getattr(fields, key) is not None]
         if len(given) != 1:
             found, places = " and ".join(given) or "none", f"{', '.join(_PLACES[:-1])} and {_PLACES[-1]}"
-            raise around.fault("orbit", f"given {found}; exactly one of {places} is needed")
+            what = f"given {found}; exactly one of {places} is needed (orbit is the place of the source as "
+            what += "seen from the body, satellite_orbit the body's own orbit about the source)"
+            raise around.fault("orbit", what)
         if fields.source is not None:
             placement = PlacedByKernel.of(fields.source, around)
             return cls(kernel_strength(fields.gravitational_parameter, fields.source, around), placement)
         strength, context = positive_strength(fields.gravitational_parameter, around), around.context
-        if fields.orbit is not None and fields.orbit.table is not None:
-            return cls(strength, PlacedByTable(resolve_tabulated_orbit(fields.orbit, strength, around)))
-        if fields.orbit is not None:
-            return cls(strength, PlacedOnOrbit(resolve_orbit(fields.orbit, strength, around)))
+        if fields.elements is not None and fields.elements.table is not None:
+            return cls(strength, PlacedByTable(resolve_tabulated_orbit(fields.elements, strength, around)))
+        if fields.elements is not None:
+            return cls(strength, PlacedOnOrbit(resolve_orbit(fields.elements, strength, around)))
         if fields.ephemeris is not None:
             refuse_series(around)
             if around.axes not in (None, ECLIPTIC):
@@ -214,7 +216,8 @@ class GravityGradient(GradientSource, Load):
     def told(self, scene: Scene) -> str:
         strength, largest = self.gravitational_parameter, value_text(self.amplitude(scene), "N m")
         where = self.placement.told(scene.context, strength)
-        return f"gravity gradient of {source_text(strength)}, {where}; torque up to {largest}"
+        seen = sides_text(self.placement.at_start(scene))
+        return f"gravity gradient of {source_text(strength)}, {where}; {seen}; torque up to {largest}"
 
     def cautions(self, fields: GravityGradientFields, where: str, scene: Scene) -> Iterator[Caution]:
         given = fields.gravitational_parameter

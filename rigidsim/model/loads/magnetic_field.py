@@ -12,7 +12,7 @@ from rigidsim.errors import ConfigError, Problem
 from rigidsim.model.capabilities import Attracting, SourcePlace, having
 from rigidsim.model.kinematics import Kinematics
 from rigidsim.model.load import Load, loads_of
-from rigidsim.model.load_words import length_text, orbit_text, value_text
+from rigidsim.model.load_words import length_text, orbit_text, sides_text, value_text
 from rigidsim.model.loads.central_gravity import CentralGravity
 from rigidsim.model.loads.earth_field import EarthField
 from rigidsim.model.loads.magnetic_keys import (
@@ -60,26 +60,26 @@ class InMagneticField(Load):
         flies = around.free_flight and fields.of_place
         refuse_contradictions(fields, around)
         strength = fields.gravitational_parameter
-        if strength is not None and (fields.orbit is None or strength.sign <= 0):
-            allowed = "with orbit only" if fields.orbit is None else "as a positive number only"
+        if strength is not None and (fields.elements is None or strength.sign <= 0):
+            allowed = "with an orbit only" if fields.elements is None else "as a positive number only"
             raise around.fault("gravitational_parameter", f"given {float(strength):g}; allowed {allowed}")
         found: dict[str, Any] = {"name": fields.name or ""}
         if fields.field == IGRF:
             earth = EarthField.of(fields, around)
             found |= {"earth": earth, "source": earth.dipole(around.context.mpf(_FIELD_CONSTANT))}
-        elif flies or fields.orbit is not None:
+        elif flies or fields.elements is not None:
             found["source"] = numbers(fields.source_moment or [], around)
         else:
             found["source"] = numbers(cast("list[ExactNumber]", fields.field), around)
         if flies:
             found["place"] = [] if fields.position is None else numbers(fields.position, around)
-        elif fields.orbit is not None:
+        elif fields.elements is not None:
             motion = None if strength is None else strength.at(around.context)
             for key in ("body", "table"):
-                if getattr(fields.orbit, key) is not None:
+                if getattr(fields.elements, key, None) is not None:
                     what = f"given for a {fields.kind}, which takes elements alone; gravity_gradient takes a "
-                    raise around.fault(f"orbit.{key}", what + key)
-            found["orbit"] = resolve_orbit(fields.orbit, motion, around)
+                    raise around.fault(f"{fields.elements.key}.{key}", what + key)
+            found["orbit"] = resolve_orbit(fields.elements, motion, around)
         return found
 
     @staticmethod
@@ -246,6 +246,7 @@ class InMagneticField(Load):
             where = f"{length_text(float(self._far(scene)))} away at the start"
         else:
             where = orbit_text(self.orbit, implied_strength(self.orbit))
+            where += f"; {sides_text(self.source_at_start(scene))}"
         return f"the field of a dipole of {source}, {where}"
 
     def fastest_rate(self, scene: Scene) -> Any:
@@ -255,5 +256,5 @@ class InMagneticField(Load):
         return scene.context.zero if self.orbit is None else self.orbit.fastest_rate(scene.context)
 
     def cautions(self, fields: MagneticFieldFields, where: str, scene: Scene) -> Iterator[Caution]:
-        if self.orbit is not None and fields.orbit is not None:
-            yield from about_orbit(fields.orbit, self.orbit, fields.gravitational_parameter, where, scene)
+        if self.orbit is not None and fields.elements is not None:
+            yield from about_orbit(fields.elements, self.orbit, fields.gravitational_parameter, where, scene)

@@ -20,8 +20,8 @@ from rigidsim.scene.fields import (
     name_or_vector,
 )
 from rigidsim.scene.geomagnetic_field import MOST
-from rigidsim.scene.orbits import Orbit
-from rigidsim.scene.registry import LoadFields, Surroundings
+from rigidsim.scene.orbits import OrbitFields
+from rigidsim.scene.registry import Surroundings
 
 MagneticMoment = Annotated[ExactNumber, InUnit("A m^2")]
 MomentOrLaw = Annotated[Any, NumberOrFormula("A m^2")]
@@ -29,8 +29,8 @@ FluxDensity = Annotated[ExactNumber, InUnit("T")]
 IGRF = "igrf"
 
 
-class MagneticFieldFields(LoadFields):
-    """Keys of a magnetic field: uniform, or of a dipole."""
+class MagneticFieldFields(OrbitFields):
+    """Keys of a magnetic field: uniform, or of a dipole about which the body moves, or the Earth's."""
 
     kind: str
     field: (
@@ -53,13 +53,10 @@ class MagneticFieldFields(LoadFields):
         description=f"degree of the igrf: 1 is a tilted dipole; by default {MOST}, all of it",
         examples=[6],
     )
-    orbit: Orbit | None = Field(
-        default=None,
-        description="orbit of the source as seen from the body, instead of field; needs source_moment; not "
-        "for a body with a position of its own, where which the field is taken",
-    )
     source_moment: Triple[MagneticMoment] | None = Field(
-        default=None, description="magnetic moment of the source, space axes", examples=[[0, 0, -7.7e22]]
+        default=None,
+        description="magnetic moment of the source, space axes, with orbit, satellite_orbit or in flight",
+        examples=[[0, 0, -7.7e22]],
     )
     position: Triple[Metre] | None = Field(
         default=None,
@@ -72,7 +69,7 @@ class MagneticFieldFields(LoadFields):
     )
 
     def placed_by(self, *, free_flight: bool) -> frozenset[str] | None:
-        if self.orbit is not None:
+        if self.elements is not None:
             return frozenset()
         return frozenset({"flight"}) if free_flight and self.of_place else None
 
@@ -84,7 +81,7 @@ class MagneticFieldFields(LoadFields):
 
 class MagneticDipoleFields(MagneticFieldFields):
     """Torque m x B on a dipole of the body, in a uniform ``field`` (space axes), or in the field of a centred
-    dipole ``source_moment`` (space axes) around which the body moves on ``orbit``, or in flight as it flies.
+    dipole ``source_moment`` (space axes) around which the body moves on an orbit, or in flight as it flies.
     """
 
     kind: Literal["magnetic_dipole"]
@@ -103,26 +100,28 @@ def numbers(values: list[ExactNumber], around: Surroundings) -> Vector:
 def refuse_contradictions(fields: MagneticFieldFields, around: Surroundings) -> None:
     """Require one field: uniform, of a dipole along an orbit, or in flight of a dipole where the body is."""
     host = around.bodies is not None and around.bodies.host is not None
-    if fields.orbit is not None and (around.free_flight or host):
+    if fields.elements is not None and (around.free_flight or host):
         why = "is one of [[bodies]]; a uniform field is allowed"
         if around.free_flight:
-            why = "has a position of its own, where the field is taken: remove orbit and "
+            why = "has a position of its own, where the field is taken: remove it and "
             why += "gravitational_parameter, and keep source_moment"
-        raise around.fault("orbit", f"given for a body that {why}")
+        raise around.fault(fields.elements.key, f"given for a body that {why}")
     if fields.field_degree is not None and fields.field != IGRF:
         raise around.fault("field_degree", f'given without field = "{IGRF}", whose degree it is; remove it')
     if fields.field == IGRF and not around.free_flight:
         what = (
             f'given "{IGRF}", the field where a body in flight is; give [initial] position and velocity and '
         )
-        raise around.fault("field", what + "a central_gravity, or a vector, or source_moment with orbit")
-    other = fields.source_moment if around.free_flight else fields.orbit
+        raise around.fault("field", what + "a central_gravity, or a vector, or source_moment with an orbit")
+    other = fields.source_moment if around.free_flight else fields.elements
     if (fields.field is None) == (other is None):
         given = "neither field nor" if fields.field is None else "both field and"
         name, why = ("source_moment", " for a body with a position") if around.free_flight else ("orbit", "")
         raise around.fault("field", f"given {given} {name}; exactly one of them is needed{why}")
-    if not around.free_flight and (fields.source_moment is None) != (fields.orbit is None):
-        what = "missing; it is needed with orbit" if fields.orbit else "given without orbit; remove it"
+    if not around.free_flight and (fields.source_moment is None) != (fields.elements is None):
+        what = (
+            "given without an orbit; remove it" if fields.elements is None else "missing; an orbit needs it"
+        )
         raise around.fault("source_moment", what)
     if fields.position is not None and not (around.free_flight and fields.of_place):
         what = (

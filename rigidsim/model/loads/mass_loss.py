@@ -37,7 +37,6 @@ from rigidsim.scene.expressions.tree import (
     Constant,
     Expression,
     ExpressionError,
-    constant_value,
     evaluate,
     names_used,
     states_read,
@@ -48,9 +47,6 @@ from rigidsim.scene.registry import LoadFields, Surroundings, register_load
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.tracing.numbers import plain
 from rigidsim.scene.transitions import narrow_parts, root_parts
-
-_ROUNDING = 2.0**-16
-"""Part of the rate at the start by which it may be negative: by rounding, where it ends."""
 
 
 class MassLossFields(LoadFields):
@@ -93,10 +89,6 @@ class MassLoss(Load):
             rate = parse_expression(fields.rate, around.names, parameters=around.parameters, unit="kg/s")
         except ExpressionError as error:
             raise around.fault("rate", str(error)) from None
-        constant = constant_value(rate, context)
-        if constant is not None and constant < 0:
-            given = context.nstr(plain(constant), 6)
-            raise around.fault("rate", f"given {given} kg/s; mass leaves at a rate of at least 0")
         if fields.exit_radius.sign < 0:
             what = f"given {float(fields.exit_radius):g} m; a radius of at least 0 is allowed"
             raise around.fault("exit_radius", what)
@@ -167,18 +159,8 @@ class MassLoss(Load):
                 terms.append((vector, rate * state))
         return terms
 
-    def endings(self, m: Kinematics) -> list[tuple[str, Symbolic]]:
-        """The rate over that at the start, or 1 kg/s if that is zero, less a rounding."""
-        if not names_used(self.rate):
-            return []
-        begun = evaluate(self.rate, start_values(m.scene), m.scene.context)
-        if begun < 0:
-            given = m.scene.context.nstr(begun, 6)
-            raise self._fault(
-                f"given a rate of {given} kg/s at the start; mass leaves at a rate of at least 0"
-            )
-        share = m.number(1 / begun if begun else m.scene.context.one) * self._heyoka(m, self.rate)
-        return [(f"the rate of [[loads]] number {self.number + 1} mass_loss is negative", share + _ROUNDING)]
+    def never_negative(self) -> Iterator[tuple[str, Expression]]:
+        yield f"[[loads]] number {self.number + 1} mass_loss rate", self.rate
 
     def told(self, scene: Scene) -> str:
         rate = evaluate(self.rate, start_values(scene), scene.context)

@@ -14,6 +14,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from rigidsim.scene.arithmetic import cosine_and_sine
 from rigidsim.scene.orbits import KeplerOrbit
 
 Series = Sequence[Any]
@@ -48,17 +49,17 @@ class KeplerParts:
 
         def turned(angle: Any, rate: Any) -> tuple[Any, Any, Any]:
             there = angle + rate * time
-            return context.cos(there), context.sin(there), None if rate == 0 else rate
+            return *cosine_and_sine(context, there), None if rate == 0 else rate
 
         return cls(
             e,
             context.sqrt(1 - e * e),
             orbit.mean_motion,
-            (context.cos(anomaly), context.sin(anomaly)),
+            cosine_and_sine(context, anomaly),
             1 / (1 - e * context.cos(anomaly)),
             turned(orbit.periapsis, orbit.periapsis_rate),
             turned(orbit.ascending_node, orbit.node_rate),
-            (context.cos(orbit.inclination), context.sin(orbit.inclination)),
+            cosine_and_sine(context, orbit.inclination),
         )
 
     def motions(self) -> tuple[list[Any], list[Any], list[Any]]:

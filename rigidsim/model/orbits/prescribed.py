@@ -39,7 +39,7 @@ from rigidsim.model.rotations import Symbolic
 from rigidsim.model.scaling import Rounder
 from rigidsim.model.state_blocks import StateBlock
 from rigidsim.model.two_part import as_factor, rounded
-from rigidsim.scene.arithmetic import bits_in_use
+from rigidsim.scene.arithmetic import bits_in_use, cosine_and_sine
 from rigidsim.scene.orbit_tables.pieces import AXIS, LONGITUDE, TabulatedOrbit
 from rigidsim.scene.orbits import KeplerOrbit
 
@@ -75,12 +75,13 @@ def orbit_states(
 
     def pair(name: str, angle: Any, rate: Symbolic | None) -> tuple[Symbolic, Symbolic]:
         """Cosine and sine of an angle: constants if it is fixed, two states if it moves."""
+        cosine, sine = cosine_and_sine(context, angle)
         if rate is None:
-            return constant(context.cos(angle)), constant(context.sin(angle))
+            return constant(cosine), constant(sine)
         c, s = hy.make_vars(f"cos_{name}{tag}", f"sin_{name}{tag}")
         names.extend((str(c), str(s)))
         derivatives.extend((-(rate * s), rate * c))
-        initial.extend((context.cos(angle), context.sin(angle)))
+        initial.extend((cosine, sine))
         norms.append(hy.sqrt(c * c + s * s))
         return c, s
 
@@ -104,7 +105,7 @@ def orbit_states(
         "periapsis", orbit.periapsis + orbit.periapsis_rate * start, uniform(orbit.periapsis_rate)
     )
     n_c, n_s = pair("node", orbit.ascending_node + orbit.node_rate * start, uniform(orbit.node_rate))
-    i_c, i_s = constant(context.cos(orbit.inclination)), constant(context.sin(orbit.inclination))
+    i_c, i_s = map(constant, cosine_and_sine(context, orbit.inclination))
     # R3(node) R1(inclination) R3(periapsis) (cos, sin, 0) of the true anomaly
     x = w_c * along - w_s * across
     y = w_s * along + w_c * across

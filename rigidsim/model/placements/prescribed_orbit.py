@@ -125,8 +125,8 @@ class PlacedOnOrbit(Placement):
         return {"orbit": {name: float(getattr(self.orbit, name)) for name in names}}
 
     def cautions(self, fields: Any, given: Any, where: str, scene: Scene) -> Iterator[Caution]:
-        yield from about_orbit(fields.orbit, self.orbit, given, where, scene)
-        yield from about_spin(fields.orbit, self.orbit, given, where, scene)
+        yield from about_orbit(fields.elements, self.orbit, given, where, scene)
+        yield from about_spin(fields.elements, self.orbit, given, where, scene)
 
 
 @dataclass(frozen=True)

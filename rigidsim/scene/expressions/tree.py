@@ -200,6 +200,23 @@ def constant_value(expression: Expression, context: Any) -> Any:
     return evaluate(expression, dict.fromkeys(names_used(expression)), context)
 
 
+def never_below_zero(node: Node) -> bool:
+    """Whether its form shows that a number isn't negative: sums, products and quotients of what isn't, even
+    powers, and functions without negative values.
+    """
+    if isinstance(node, Constant):
+        return node.value.sign >= 0
+    if isinstance(node, Name):
+        return False
+    if node.operator == "power":
+        base, exponent = node.operands
+        even = isinstance(exponent, Constant) and not exponent.value.swept and not exponent.value.pi_power
+        return (even and exponent.value.rational % 2 == 0) or never_below_zero(base)
+    if node.operator in ("sum", "product", "quotient"):
+        return all(map(never_below_zero, node.operands))
+    return node.operator in ("exp", "cosh", "sqrt", "sigmoid")
+
+
 def evaluate(expression: Expression, values: Mapping[str, Any], context: Any) -> Any:
     """The value (mpf) for values of the names; ``ExpressionError`` names a part without a finite one."""
 

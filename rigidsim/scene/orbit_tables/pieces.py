@@ -14,7 +14,7 @@ the mean longitude advances at the rate of Kepler's third law, or of ``period``.
 from bisect import bisect_right
 from collections.abc import Callable, Mapping
 from functools import cached_property
-from operator import add, mul
+from operator import add, mul, neg
 from typing import Any
 
 import numpy as np
@@ -38,6 +38,7 @@ _LARGEST_TILT = 0.9999  # of sin(i/2): 178.4 deg
 class TabulatedOrbit:
     """An orbit with elements over time; numbers are mpf of the scene's precision, SI. Orbits with equal keys,
     everything they are made from, are the same; ``motion`` goes from the semi-major axis to the mean motion.
+    The elements are the table's, or with ``opposite`` those of the other body: half a turn on in its plane.
     """
 
     def __init__(
@@ -47,10 +48,13 @@ class TabulatedOrbit:
         table: ElementTable,
         constants: Mapping[str, Any],
         motion: Callable[[Any], Any],
+        *,
+        opposite: bool = False,
     ) -> None:
         self.key, self.name, self.table, self.motion = key, name, table, motion
         self.context = table.context
         self._constants = constants
+        self._half_turn = self.context.pi if opposite else self.context.zero
         self._rows = self._regular()
         moving = [name for name, values in self._rows.items() if isinstance(values, list)]
         self.moving: tuple[str, ...] = tuple(moving)
@@ -90,11 +94,14 @@ class TabulatedOrbit:
         self._check("inclination", half, lambda x: 0 <= x < _LARGEST_TILT, "0 to 178 deg")
         k, h = pairs(e, periapsis)
         q, p = pairs(half, node)
+        if self._half_turn:
+            k, h = (_by_row(neg, x) for x in (k, h))
         found = {AXIS: axis, "k": k, "h": h, "q": q, "p": p}
         longitude = given.get("mean_longitude")
         if "mean_anomaly" in columns:
             longitude = _by_row(add, columns["mean_anomaly"], periapsis)
         if isinstance(longitude, list):
+            longitude = _by_row(add, longitude, self._half_turn)
             found[LONGITUDE] = self._unwrapped(longitude, axis)
         return found
 
@@ -184,9 +191,10 @@ class TabulatedOrbit:
         if given is None:
             periapsis = self._longitude_of_periapsis
             if isinstance(periapsis, list):
-                periapsis = self.context.atan2(elements["h"], elements["k"])
+                given_side = -1 if self._half_turn else 1
+                periapsis = self.context.atan2(given_side * elements["h"], given_side * elements["k"])
             given = self._constants.get("mean_anomaly", self.context.zero) + periapsis
-        return given + self.motion(elements[AXIS]) * time
+        return given + self._half_turn + self.motion(elements[AXIS]) * time
 
     @property
     def described(self) -> str:
