@@ -86,6 +86,7 @@ _INNER = {
     "PointMass": "An entry of [body] points",
     "Part": "An entry of [body] parts",
     "Orbit": "orbit of a load",
+    "SatelliteOrbit": "satellite_orbit of a load",
     "AxisTable": "An axis of [sweep] axes",
 }
 """Headings of tables within tables; others are called by their class."""

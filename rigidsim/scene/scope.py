@@ -221,11 +221,17 @@ NAMED_OTHERWISE = {
     "a force at a point of the body is force (docs/loads/torque.md)": (
         "external_force", "applied_force", "body_force", "constant_force",
     ),
+    "a start against the local frame of an orbit isn't there yet: equilibrium = \"relative\" rests in it, "
+    "and euler_angles in the sequence zxz (node, inclination, argument of latitude of the source's place) "
+    "put body x to the source and z along the orbit's normal (docs/starts.md, docs/observables.md)": (
+        "lvlh", "vvlh", "rtn", "ric", "rsw", "rsw_frame", "ntw", "tnw", "hill", "orbital_frame",
+        "local_orbital", "lvlh_frame", "local_vertical", "local_frame", "nadir",
+    ),
     "mass that leaves is mass_loss (docs/loads/mass_loss.md)": (
         "jet_damping", "mass_flow", "mass_change", "mass_depletion", "propellant_mass_loss",
     ),
 }  # fmt: skip
-"""What loads are called elsewhere, by the answer; names as in ``OutOfScope``."""
+"""What loads and frames of a start are called elsewhere, by the answer; names as in ``OutOfScope``."""
 
 
 def scope_answer(name: str) -> str:

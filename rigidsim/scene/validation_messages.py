@@ -86,7 +86,7 @@ def nearest(given: str, allowed: Iterable[str]) -> str:
 
 def meant(given: str, allowed: Iterable[str], *, effect: bool = False) -> str:
     """What a name that isn't allowed may mean: a similar one, or something that isn't modelled; of an
-    ``effect`` on the body also what has another name here.
+    ``effect`` on the body or a frame of its start also what has another name here.
     """
     from rigidsim.scene.scope import other_name, scope_answer  # of no use until something is refused
 
@@ -150,7 +150,7 @@ def _models(annotation: Any) -> list[type[BaseModel]]:
 def _what(table: type[BaseModel] | None, error: Mapping[str, Any]) -> str:
     kind, context = error["type"], error.get("ctx", {})
     location, given = tuple(error["loc"]), error["input"]
-    effect = len(location) == 1 or location[0] == "loads"
+    effect = len(location) == 1 or location[0] in ("loads", "initial")
     if kind == "extra_forbidden":
         fields = sorted(table.model_fields) if table else []
         key = str(location[-1])
