@@ -83,11 +83,18 @@ def test_the_density_is_that_of_the_model_within_the_network(case: tuple[float, 
 
 
 def test_a_run_ends_where_the_network_does() -> None:
-    run = run_text(text(place=np.array([6535e3, 0, 0]), end=20000.0, mass=0.2))
+    """At 150 km above WGS 84, which the last sample and its velocity tell to the tilt of the pole."""
+    run = run_text(text(place=np.array([6535e3, 0, 0]), end=20000.0, mass=0.2), "time.samples=2001")
     assert run.status == "stopped: out of range"
     assert "no body" not in str(run.summary)
     assert "below 150 km" in str(run.summary)
-    assert run.dataset["time"].values[-1] < 20000
+    left = run.summary["time_reached"] - run.dataset["time"].values[-1]
+    assert 0 <= left < 10
+    place, velocity = (run.dataset[name].values[-1] for name in ("position", "velocity"))
+    place = place + velocity * left - place * (3.986004418e14 / np.linalg.norm(place) ** 3 * left**2 / 2)
+    far = np.linalg.norm(place)
+    ellipsoid = 6378137 / np.sqrt(1 + (place[2] / far) ** 2 * (1 / (1 - 1 / 298.257223563) ** 2 - 1))
+    assert far - ellipsoid == pytest.approx(150e3, abs=200)
 
 
 @pytest.mark.parametrize(
