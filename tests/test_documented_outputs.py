@@ -51,7 +51,7 @@ class Shown:
     """An output as it is shown.
 
     Attributes:
-        stage: "slow", "studies" or "", as in the marker.
+        stage: "slow" or "", as in the marker.
         span: of its lines in the page's text.
     """
 
@@ -161,7 +161,7 @@ def test_what_is_shown_is_what_is_printed(shown: Shown, tmp_path: Path) -> None:
 def test_every_marker_has_its_output() -> None:
     markers = sum(len(re.findall(r"<!--.*output", page.read_text(encoding="utf-8"))) for page in PAGES)
     assert markers == len(OUTPUTS) >= 3
-    assert {shown.stage for shown in OUTPUTS} == {"", "slow", "studies"}
+    assert {shown.stage for shown in OUTPUTS} == {"", "slow"}
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda p: str(p.relative_to(ROOT)))

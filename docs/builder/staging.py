@@ -19,7 +19,6 @@ ROOT = Path(__file__).resolve().parents[2]
 ELSEWHERE = {
     "CHANGELOG.md": "changelog.md",
     "experiments/README.md": "experiments/index.md",
-    "experiments/checks.md": "experiments/checks.md",
 }
 """Pages outside docs/, by their place in the site."""
 _FIRST = {"README.md": "index.md"}  # links to it lead to docs/index.md, with which the site begins
