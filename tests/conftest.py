@@ -7,6 +7,7 @@ import shutil
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import nullcontext
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -15,7 +16,7 @@ os.environ.setdefault("CI", "1")  # rerun's viewer collects no statistics then
 sys.path.insert(0, str(Path(__file__).parent))
 sys.path.insert(0, str(Path(__file__).parents[1]))  # the studies are no installed package
 
-from rigidsim import parse  # noqa: F401  (tests that read configs below need every kind of load)
+from rigidsim import SavedRun, parse  # noqa: F401  (tests that read configs below need every kind of load)
 
 TERMINAL = shutil.get_terminal_size().columns
 # Whatever terminal the tests are started from, and however long the path of their temporary folder: no line
@@ -56,6 +57,18 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 def runs(tmp_path: Path) -> Path:
     """An empty folder for run folders."""
     return tmp_path / "runs"
+
+
+@pytest.fixture
+def ready(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., SavedRun]:
+    """Runs of ready scenes, by path or name and overrides: each is integrated once for all tests and workers,
+    and mustn't be written to. Kept apart are runs in optimised code, which rounds otherwise.
+    """
+    from support import shared_run
+
+    base = tmp_path_factory.getbasetemp()
+    shared = base.parent if "PYTEST_XDIST_WORKER" in os.environ else base
+    return partial(shared_run, shared / "ready")
 
 
 @pytest.fixture(scope="session")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
+from collections.abc import Callable
 
 import mpmath
 import numpy as np
@@ -13,12 +13,8 @@ from support import CONFIGS, EPSILON, angle_between, law, run_text, wide
 import rigidsim
 from rigidsim.solve.problem import prepare
 
+Ready = Callable[..., rigidsim.Run]
 BY_NAME = {path.stem: path for path in CONFIGS}
-
-
-def ready(name: str, out: Path, *overrides: str) -> rigidsim.Run:
-    experiment = rigidsim.load(BY_NAME[name], overrides=["output.timeline=false", *overrides])
-    return rigidsim.run(experiment, out=out, force=True)
 
 
 def body_frequency(run: rigidsim.Run) -> float:
@@ -29,15 +25,15 @@ def body_frequency(run: rigidsim.Run) -> float:
     return float((phase[-1] - phase[0]) / (time[-1] - time[0]))
 
 
-def test_free_symmetric_top_has_harmonic_body_rates(runs: Path) -> None:
-    run = ready("free_symmetric_top", runs)
+def test_free_symmetric_top_has_harmonic_body_rates(ready: Ready) -> None:
+    run = ready("free_symmetric_top")
     assert body_frequency(run) == pytest.approx((3 - 2) / 2 * 1.0, rel=1e-9)
     w = run.dataset["angular_velocity"].values
     assert (w[:, 2] == w[0, 2]).all()
 
 
-def test_rigid_earth_nutates_in_304_days_and_not_in_chandlers_430(runs: Path) -> None:
-    run = ready("earth_free_nutation", runs)
+def test_rigid_earth_nutates_in_304_days_and_not_in_chandlers_430(ready: Ready) -> None:
+    run = ready("earth_free_nutation")
     period = 2 * math.pi / body_frequency(run) / 86400
     flattening = 0.00327379492  # (C-A)/C, Mathews et al. 2002
     rotation = 2 * math.pi / 7.292115e-5 / 86400
@@ -46,9 +42,9 @@ def test_rigid_earth_nutates_in_304_days_and_not_in_chandlers_430(runs: Path) ->
     assert not 427 < period < 435  # Chandler 1891, Gross 2007: the elastic Earth
 
 
-def test_symmetric_top_follows_its_closed_form(runs: Path) -> None:
+def test_symmetric_top_follows_its_closed_form(ready: Ready) -> None:
     """R(t) = exp(t [L/A]x) R0 exp(t (A-C)/A w3 [z]x): Landau & Lifshitz, Mechanics, section 33."""
-    run = ready("free_symmetric_top", runs, "time.samples=51")
+    run = ready("free_symmetric_top", "time.samples=51")
     prepared = prepare(rigidsim.load(BY_NAME["free_symmetric_top"]))
     scene = prepared.scene
     a, c = mpmath.mpf(2), mpmath.mpf(3)
@@ -88,23 +84,23 @@ def tilt(run: rigidsim.Run) -> np.ndarray:
     return np.arccos(np.clip(1 - 2 * (q[:, 1] ** 2 + q[:, 2] ** 2), -1, 1))
 
 
-def test_sleeping_top_stays_up_above_the_threshold_and_falls_below(runs: Path) -> None:
+def test_sleeping_top_stays_up_above_the_threshold_and_falls_below(ready: Ready) -> None:
     # w3^2 = 4 A M g l / C^2: Landau & Lifshitz, section 35, problem 1
     threshold = math.sqrt(4 * 2e-4 * 0.1 * 9.80665 * 0.04) / 1e-4
     assert threshold == pytest.approx(56.02, abs=0.005)
-    stable = ready("heavy_top_sleeping_stable", runs)
-    unstable = ready("heavy_top_sleeping_unstable", runs)
+    stable = ready("heavy_top_sleeping_stable")
+    unstable = ready("heavy_top_sleeping_unstable")
     # linear theory: the push e over half the difference of the two nutation frequencies
     spread = math.sqrt((1e-4 * 57 / 2e-4) ** 2 - 4 * 0.1 * 9.80665 * 0.04 / 2e-4)
     assert tilt(stable).max() <= 1.01 * 2 * 1e-3 / spread
     assert tilt(unstable).max() > 0.3
     for name, side in (("heavy_top_sleeping_stable", 1.001), ("heavy_top_sleeping_unstable", 0.999)):
-        close = ready(name, runs, f"initial.angular_velocity=[1e-6, 0, {side * threshold!r}]", "time.end=30")
+        close = ready(name, f"initial.angular_velocity=[1e-6, 0, {side * threshold!r}]", "time.end=30")
         assert (tilt(close).max() > 1e-3) == (side < 1)
 
 
-def test_unstable_sleeping_top_grows_at_its_linear_rate(runs: Path) -> None:
-    run = ready("heavy_top_sleeping_unstable", runs, "initial.angular_velocity=[1e-8, 0, 55]")
+def test_unstable_sleeping_top_grows_at_its_linear_rate(ready: Ready) -> None:
+    run = ready("heavy_top_sleeping_unstable", "initial.angular_velocity=[1e-8, 0, 55]")
     # (A theta'' has the complex exponent i C w3 / 2A +- rate)
     rate = math.sqrt(0.1 * 9.80665 * 0.04 / 2e-4 - (1e-4 * 55 / (2 * 2e-4)) ** 2)
     time, angle = run.dataset["time"].values, tilt(run)
@@ -114,15 +110,15 @@ def test_unstable_sleeping_top_grows_at_its_linear_rate(runs: Path) -> None:
     assert fitted == pytest.approx(rate, rel=0.01)
 
 
-def test_regular_precession_keeps_its_tilt(runs: Path) -> None:
-    run = ready("heavy_top_regular_precession", runs)
+def test_regular_precession_keeps_its_tilt(ready: Ready) -> None:
+    run = ready("heavy_top_regular_precession")
     # a deviation of the rates of some eps, carried as in a stable motion
     allowed = 50 * EPSILON["double"] * math.sqrt(run.summary["cost"]["steps"])
     assert np.abs(np.cos(tilt(run)) - 0.5).max() < allowed
 
 
-def test_fast_top_at_right_angles_precesses_at_m_g_l_over_c_w3(runs: Path) -> None:
-    run = ready("heavy_top_fast", runs, 'output.record=["euler_angles"]')
+def test_fast_top_at_right_angles_precesses_at_m_g_l_over_c_w3(ready: Ready) -> None:
+    run = ready("heavy_top_fast", 'output.record=["euler_angles"]')
     phi = run.dataset["euler_angles"].values[:, 0]
     time = run.dataset["time"].values
     rate = (phi[-1] - phi[0]) / time[-1]
@@ -132,8 +128,8 @@ def test_fast_top_at_right_angles_precesses_at_m_g_l_over_c_w3(runs: Path) -> No
     assert abs(rate - slow) < slow / (nutation * time[-1]) * 2 + slow * (slow / nutation) ** 2
 
 
-def test_wobble_of_a_tossed_plate_is_twice_its_spin(runs: Path) -> None:
-    run = ready("tossed_plate", runs)
+def test_wobble_of_a_tossed_plate_is_twice_its_spin(ready: Ready) -> None:
+    run = ready("tossed_plate")
     momentum = run.dataset["angular_momentum"].values[0]
     precession = np.linalg.norm(momentum) / (0.3 * 0.25**2 / 12)
     assert precession / 25.0 == pytest.approx(2.0, abs=1e-3)  # small angle: w1/w3 = 1/25
@@ -212,11 +208,11 @@ def _scaled(numerator: int, denominator: int, exponent: int) -> str:
     return f"{numerator}/{denominator * 2**-exponent}"
 
 
-def test_mars_precesses_under_the_sun_as_measured(runs: Path) -> None:
+def test_mars_precesses_under_the_sun_as_measured(ready: Ready) -> None:
     """7.6083(21) arcsec a year (Konopliv et al. 2016), and 0.0067 of geodetic precession back. The mean is
     (3/2) (n^2/w) H cos(eps) (1 - e^2)^(-3/2). Two Martian years leave 1e-3 of it open.
     """
-    run = ready("mars_precession", runs)
+    run = ready("mars_precession")
     time, year = run.dataset["time"].values, 365.25 * 86400
     orbit = math.sqrt(1.32712440018e20 / (1.52371 * 149597870700) ** 3)
     lines = [wave(k * orbit * time) for k in (1, 2, 3) for wave in (np.cos, np.sin)]

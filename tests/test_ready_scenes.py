@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import lru_cache
 from pathlib import Path
 
@@ -11,6 +12,7 @@ from support import CONFIGS, EPSILON, amplification, angle_between, cases, law, 
 
 import rigidsim
 
+Ready = Callable[..., rigidsim.Run]
 ATTITUDE = 'output.record=["angular_velocity", "quaternion"]'
 AVERAGED = [path for path in CONFIGS if rigidsim.load(path).config.model.reduced]
 CONFIGS = [path for path in CONFIGS if path not in AVERAGED]
@@ -40,11 +42,6 @@ than a turn.
 """
 
 
-def run_config(path: Path, out: Path, *overrides: str) -> rigidsim.Run:
-    experiment = rigidsim.load(path, overrides=["output.timeline=false", *overrides])
-    return rigidsim.run(experiment, out=out, force=True)
-
-
 @lru_cache(maxsize=1)
 def reference(path: Path) -> np.ndarray:
     """Quaternions of the same scene in 80-bit arithmetic: rounding errors 2048 times smaller."""
@@ -58,11 +55,11 @@ def sensitivity(path: Path) -> float:
 
 
 @pytest.mark.parametrize("path", SCENES, ids=NAMES)
-def test_all_invariants_hold_and_the_attitude_is_right(path: Path, runs: Path) -> None:
-    run = run_config(path, runs)
+def test_all_invariants_hold_and_the_attitude_is_right(path: Path, ready: Ready) -> None:
+    run = ready(path)
     assert_invariants_hold(run)
     if run.summary["formulation"] != "quaternion" or "quaternion" not in run.dataset:
-        run = run_config(path, runs, ATTITUDE, 'integrator.formulation="quaternion"')
+        run = ready(path, ATTITUDE, 'integrator.formulation="quaternion"')
     assert_attitude_is_right(run, path)
     # and the summary promises no more than it keeps
     accuracy = run.summary["accuracy"]
@@ -72,8 +69,8 @@ def test_all_invariants_hold_and_the_attitude_is_right(path: Path, runs: Path) -
 
 @pytest.mark.slow  # full motions beside averaged ones
 @pytest.mark.parametrize("path", AVERAGED, ids=[path.stem for path in AVERAGED])
-def test_averaged_scenes_say_how_far_they_are_from_the_full_motion(path: Path, runs: Path) -> None:
-    run = run_config(path, runs)
+def test_averaged_scenes_say_how_far_they_are_from_the_full_motion(path: Path, ready: Ready) -> None:
+    run = ready(path)
     assert run.status == "finished"
     assert run.summary["warnings"] == []
     for name, row in run.summary["invariants"].items():
@@ -97,9 +94,9 @@ def assert_invariants_hold(run: rigidsim.Run) -> None:
 
 
 @pytest.mark.parametrize("path", SCENES, ids=NAMES)
-def test_all_invariants_hold_in_another_precision(path: Path, runs: Path) -> None:
+def test_all_invariants_hold_in_another_precision(path: Path, ready: Ready) -> None:
     precision = ("single", "extended")[NAMES.index(path.stem) % 2]
-    run = run_config(path, runs, f'integrator.precision="{precision}"', "output.estimate=false")
+    run = ready(path, f'integrator.precision="{precision}"', "output.estimate=false")
     for name, row in run.summary["invariants"].items():
         assert row["bound"] == 50 * EPSILON[precision] * np.sqrt(run.summary["cost"]["steps"])
         assert 0 <= row["largest_drift"] <= row["bound"], name
@@ -107,13 +104,13 @@ def test_all_invariants_hold_in_another_precision(path: Path, runs: Path) -> Non
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("path", "formulation"), TURNS, ids=NAMES)
-def test_the_attitude_is_right_in_other_formulations(path: Path, formulation: str, runs: Path) -> None:
+def test_the_attitude_is_right_in_other_formulations(path: Path, formulation: str, ready: Ready) -> None:
     overrides = [ATTITUDE, f'integrator.formulation="{formulation}"']
     if formulation == "euler_angles" and any(word in path.stem for word in UPRIGHT):
         overrides.append('integrator.euler_sequence="xyz"')
     if path.stem in SPARSE and formulation == "rotation_matrix":
         overrides.append(f'time.every="{SPARSE[path.stem]}"')
-    assert_attitude_is_right(run_config(path, runs, *overrides), path)
+    assert_attitude_is_right(ready(path, *overrides), path)
 
 
 def both(run: rigidsim.Run, path: Path) -> tuple[np.ndarray, np.ndarray]:

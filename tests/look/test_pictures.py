@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import io
 import time
+from collections.abc import Callable
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
@@ -28,13 +29,14 @@ pytestmark = [
     pytest.mark.skipif(not vulkan_drivers(), reason="no Vulkan driver: apt-get install mesa-vulkan-drivers"),
 ]
 
+Ready = Callable[..., rigidsim.Run]
 CONFIGS = sorted((Path(__file__).parents[2] / "configs").glob("*.toml"))
 ROWS = 3000
 
 
 @pytest.fixture(params=CONFIGS[::2], ids=lambda path: path.stem)
-def run(request: pytest.FixtureRequest) -> rigidsim.Run:
-    return rigidsim.run(rigidsim.load(request.param), out=None)
+def run(request: pytest.FixtureRequest, ready: Ready) -> rigidsim.Run:
+    return ready(request.param)
 
 
 def opened(path: Path) -> HeadlessViewer:
@@ -103,9 +105,8 @@ def _write_empty(dataset: rigidsim.Run, path: Path) -> None:
         bare.draw_rows(recording, slice(0, len(drawn.seconds)))
 
 
-def test_the_viewer_turns_the_body_as_the_dataset_says(tmp_path: Path) -> None:
-    config = next(path for path in CONFIGS if path.stem == "intermediate_axis")
-    with rigidsim.run(rigidsim.load(config), out=None).dataset as dataset:
+def test_the_viewer_turns_the_body_as_the_dataset_says(tmp_path: Path, ready: Ready) -> None:
+    with ready("intermediate_axis").dataset as dataset:
         write_timeline(dataset, tmp_path / "t.rrd")
         quaternion = dataset["quaternion"].values
         seconds = dataset["time"].values
@@ -126,13 +127,12 @@ def test_the_viewer_turns_the_body_as_the_dataset_says(tmp_path: Path) -> None:
         viewer.__exit__()
 
 
-def test_films_have_moving_frames(tmp_path: Path) -> None:
+def test_films_have_moving_frames(tmp_path: Path, ready: Ready) -> None:
     from PIL import Image
 
     from rigidsim.look import film
 
-    config = next(path for path in CONFIGS if path.stem == "heavy_top_fast")
-    with rigidsim.run(rigidsim.load(config), out=None).dataset as dataset:
+    with ready("heavy_top_fast").dataset as dataset:
         write_timeline(dataset, tmp_path / "t.rrd", rows=ROWS)
     told: list[tuple[int, int]] = []
     film.render(tmp_path / "t.rrd", tmp_path / "t.gif", seconds=0.5, told=lambda *now: told.append(now))
@@ -149,12 +149,11 @@ def test_films_have_moving_frames(tmp_path: Path) -> None:
         assert picture.size == film.SIZE
 
 
-def test_an_mp4_film_has_its_frames(tmp_path: Path) -> None:
+def test_an_mp4_film_has_its_frames(tmp_path: Path, ready: Ready) -> None:
     encoder = pytest.importorskip("imageio_ffmpeg")
     from rigidsim.look import film
 
-    config = next(path for path in CONFIGS if path.stem == "heavy_top_fast")
-    with rigidsim.run(rigidsim.load(config), out=None).dataset as dataset:
+    with ready("heavy_top_fast").dataset as dataset:
         write_timeline(dataset, tmp_path / "t.rrd", rows=ROWS)
     film.render(tmp_path / "t.rrd", tmp_path / "t.mp4", seconds=0.5)
     frames = encoder.read_frames(str(tmp_path / "t.mp4"))

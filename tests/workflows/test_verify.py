@@ -149,9 +149,8 @@ def test_a_dataset_exchanged_for_a_run_of_the_same_config(tmp_path: Path) -> Non
 
 @pytest.mark.slow
 @pytest.mark.parametrize("path", cases(CONFIGS[::3], []), ids=lambda p: p.stem)
-def test_every_ready_scene_is_identical(path: Path, tmp_path: Path) -> None:
-    run = rigidsim.run(rigidsim.load(path, overrides=["output.timeline=false"]), out=tmp_path)
-    verdict = rigidsim.verify(run.folder.path)
+def test_every_ready_scene_is_identical(path: Path, ready: Callable[..., rigidsim.SavedRun]) -> None:
+    verdict = rigidsim.verify(ready(path).folder.path)
     assert verdict.identical, verdict.as_dict()
 
 
