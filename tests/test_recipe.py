@@ -32,7 +32,7 @@ def recipe() -> dict[str, Any]:
 def test_the_version_is_the_same_everywhere(recipe: dict[str, Any]) -> None:
     written = {
         "CITATION.cff": r"^version: (\S+)$",
-        "CHANGELOG.md": r"^## (\S+)",
+        "CHANGELOG.md": r"^## (\d\S+)",
         "docs/versions.md": r"This is version (\S+);",
         "docs/method.md": r"version\s*= \{(\S+)\}",
     }
