@@ -15,7 +15,8 @@ from rigidsim.scene import attitude
 from rigidsim.scene.arithmetic import Vector, apply, dot, hansen, norm
 from rigidsim.scene.bodies.presets import KNOWN, KnownBody, known_body
 from rigidsim.scene.exact import ExactNumber
-from rigidsim.scene.orbits import PACES, KeplerOrbit, OrbitElements
+from rigidsim.scene.orbit_keys import PACES, Elements
+from rigidsim.scene.orbits import KeplerOrbit
 from rigidsim.scene.point_masses import GRAVITATIONAL_CONSTANT
 from rigidsim.scene.readable import span_text
 from rigidsim.scene.scene import Scene
@@ -173,7 +174,7 @@ def about_start(scene: Scene, body: KnownBody | None, place: Vector, velocity: V
 
 
 def about_orbit(
-    table: OrbitElements, orbit: KeplerOrbit, strength: ExactNumber | None, where: str, scene: Scene
+    table: Elements, orbit: KeplerOrbit, strength: ExactNumber | None, where: str, scene: Scene
 ) -> Iterator[Caution]:
     """A prescribed orbit as given (``table``) and in numbers: its units, its altitude, and its period."""
     given, axis = table.semi_major_axis, float(orbit.semi_major_axis)
@@ -184,24 +185,22 @@ def about_orbit(
     else:
         yield from about_strength(strength, axis, where)
         body = attracting(strength, axis)
-    at = f"{where} {table.key}.semi_major_axis"
-    low = list(about_distance(body, float(orbit.pericentre), [given], at))
+    at = f"{where} {table.key}"
+    low = list(about_distance(body, float(orbit.pericentre), [given], f"{at}.semi_major_axis"))
     yield from low
     if body is None and given.assumed:
-        yield from _familiar_axis(given, at)
+        yield from _familiar_axis(given, f"{at}.semi_major_axis")
     if strength is not None and not low and _meant_body(strength) is not None:
-        yield from _about_rates(table, orbit, float(strength), where)
-        yield from _about_period(table, orbit, strength, where, scene)
+        yield from _about_rates(table, orbit, float(strength), at)
+        yield from _about_period(table, orbit, strength, at, scene)
 
 
-def _about_rates(table: OrbitElements, orbit: KeplerOrbit, strength: float, where: str) -> Iterator[Caution]:
+def _about_rates(table: Elements, orbit: KeplerOrbit, strength: float, where: str) -> Iterator[Caution]:
     """Rates of node and periapsis without a unit that exceed the orbit's own, rad/s."""
-    squared = float(strength / orbit.semi_major_axis**3)
+    pace = math.sqrt(strength / orbit.semi_major_axis**3)
     for key in ("node_rate", "periapsis_rate"):
-        rate = getattr(table, key)
-        if rate.assumed and abs(float(rate)) > math.sqrt(squared):
-            at = f"{where} {table.key}.{key}"
-            yield _without_unit(at, rate, "rad/s", "the orbit itself is slower", "deg/yr")
+        if (rate := getattr(table, key)).assumed and abs(float(rate)) > pace:
+            yield _without_unit(f"{where}.{key}", rate, "rad/s", "the orbit itself is slower", "deg/yr")
 
 
 def _familiar_axis(given: ExactNumber, where: str) -> Iterator[Caution]:
@@ -213,7 +212,7 @@ def _familiar_axis(given: ExactNumber, where: str) -> Iterator[Caution]:
 
 
 def _about_period(
-    table: OrbitElements, orbit: KeplerOrbit, strength: ExactNumber, where: str, scene: Scene
+    table: Elements, orbit: KeplerOrbit, strength: ExactNumber, where: str, scene: Scene
 ) -> Iterator[Caution]:
     """A pace that no mass explains: that of the source, and the body's as far as it is known."""
     key = next((key for key in PACES if getattr(table, key) is not None), None)
@@ -231,9 +230,9 @@ def _about_period(
     kepler = span_words(2 * math.pi * math.sqrt(axis**3 / most))
     yield Caution(
         WarningCode.PERIOD_CONTRADICTS,
-        f"{where} {table.key}.{key}: a turn takes {span_words(2 * math.pi / abs(orbit.mean_motion))}, "
-        "while by Kepler's third law with this gravitational_parameter an orbit of "
-        f"{length_text(float(axis))} takes {kepler}; correct one of them, or leave {key} out",
+        f"{where}.{key}: a turn takes {span_words(2 * math.pi / abs(orbit.mean_motion))}, while by "
+        f"Kepler's third law with this gravitational_parameter an orbit of {length_text(float(axis))} takes "
+        f"{kepler}; correct one of them, or leave {key} out",
     )
 
 
@@ -241,7 +240,7 @@ def _about_period(
 
 
 def about_spin(
-    table: OrbitElements, orbit: KeplerOrbit, strength: ExactNumber, where: str, scene: Scene
+    table: Elements, orbit: KeplerOrbit, strength: ExactNumber, where: str, scene: Scene
 ) -> Iterator[Caution]:
     """A spin about a principal axis along the normal of an orbit, which is given as ``table``."""
     found, motion = _spin(scene, orbit), float(orbit.mean_motion)
@@ -253,18 +252,11 @@ def about_spin(
         value = f"{spin:.6g}"
         rate = f"the orbit of {where} has {math.degrees(motion):.6g} deg/s"
         yield _taken("[initial] angular_velocity", value, value, "rad/s", rate, "deg/s")
-    yield from _near_resonance(*found, table, orbit, where, scene, known=known)
+    yield from _near_resonance(found, table, orbit, where, scene, known=known)
 
 
 def _near_resonance(
-    spin: float,
-    asymmetry: float,
-    table: OrbitElements,
-    orbit: KeplerOrbit,
-    where: str,
-    scene: Scene,
-    *,
-    known: bool,
+    found: tuple[float, float], table: Elements, orbit: KeplerOrbit, where: str, scene: Scene, *, known: bool
 ) -> Iterator[Caution]:
     """A spin within a per cent of 1:1, 3:2, 1:2 or 2:1 with the orbit that just misses the resonance.
 
@@ -276,7 +268,7 @@ def _near_resonance(
     n sqrt(3 (B - A) |H| / C) of (p - 1) n + d(mean longitude)/dt, with H(p, e) of Goldreich & Peale 1966
     (Astronomical Journal 71, 425).
     """
-    motion = float(orbit.mean_motion)
+    (spin, asymmetry), motion = found, float(orbit.mean_motion)
     longitude = motion + float(orbit.periapsis_rate) + float(orbit.node_rate)
     for p in _RESONANCES:
         expected = float(p - 1) * motion + longitude

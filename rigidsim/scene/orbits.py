@@ -1,112 +1,22 @@
-"""Prescribed orbits: their config keys, and the elements worked out, by Kepler's laws or by a table."""
+"""Prescribed orbits worked out, by Kepler's laws or by a table."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any, ClassVar, Self
-
-from pydantic import Field, StrictStr, model_validator
+from typing import Any
 
 from rigidsim.scene.arithmetic import cosine_and_sine, eccentric_anomaly
-from rigidsim.scene.exact import ZERO, ExactNumber
-from rigidsim.scene.fields import Angle, ConfigTable, Dimensionless, Metre, Rate, Second, refuse
+from rigidsim.scene.exact import ExactNumber
+from rigidsim.scene.orbit_keys import PACES, Elements, Orbit
 from rigidsim.scene.orbit_tables.elements import ElementTable, TableError, read_table
 from rigidsim.scene.orbit_tables.pieces import TabulatedOrbit
 from rigidsim.scene.point_masses import ellipse_of
-from rigidsim.scene.registry import LoadFields, Surroundings
+from rigidsim.scene.registry import Surroundings
 from rigidsim.scene.tracing.arithmetic import TracedExact
 from rigidsim.scene.tracing.numbers import Traced, Untraceable
 from rigidsim.scene.validation_messages import nearest
-
-
-class OrbitElements(ConfigTable):
-    """A Kepler orbit, whose node and periapsis may move uniformly.
-
-    Angles are those at time zero of the scene, as classical elements in space axes. One of ``period``,
-    ``sidereal_period`` and ``longitude_rate`` may replace the mean motion of Kepler's third law. A ``table``
-    gives elements over time; those that it hasn't are constant.
-
-    Attributes:
-        key: of a load, that this table is.
-        opposite: whether the elements place the body as seen from the source.
-    """
-
-    key: ClassVar[str]
-    opposite: ClassVar[bool] = False
-
-    table: StrictStr | None = Field(None, examples=["mars_elements.csv"])
-    """name of a CSV file beside the config, with elements over time"""
-    semi_major_axis: Metre | None = Field(None, examples=["7000 km"])
-    """semi-major axis of the ellipse"""
-    eccentricity: Dimensionless = ZERO
-    """0 to below 1"""
-    inclination: Angle = Field(ZERO, examples=["51.6 deg"])
-    """inclination to the XY plane of the space axes"""
-    ascending_node: Angle = ZERO
-    """longitude of the ascending node from X, at time 0"""
-    periapsis: Angle = ZERO
-    """argument of periapsis from the ascending node, at time 0"""
-    mean_anomaly: Angle = ZERO
-    """mean anomaly at time 0"""
-    node_rate: Rate = Field(ZERO, examples=["-19.3 deg/yr"])
-    """rate of the ascending node"""
-    periapsis_rate: Rate = ZERO
-    """rate of the argument of periapsis"""
-    period: Second | None = Field(None, examples=["27.55455 day"])
-    """anomalistic period, from periapsis to periapsis: that of the mean anomaly (beside a table without one,
-    of the mean longitude); by default that of Kepler's third law
-    """
-    sidereal_period: Second | None = Field(None, examples=["27.321661 day"])
-    """period of the mean longitude (node + periapsis + mean anomaly), such as a sidereal month or year,
-    instead of period
-    """
-    longitude_rate: Rate | None = Field(None, examples=["13.17639648 deg/day"])
-    """rate of the mean longitude (node + periapsis + mean anomaly), instead of period"""
-
-
-class Orbit(OrbitElements):
-    """Where the attracting body is, as seen from the body: by a Kepler orbit, or as one of [[bodies]]."""
-
-    key = "orbit"
-
-    body: StrictStr | None = Field(None, examples=["sun"])
-    """name of the attracting point mass in [[bodies]]; excludes all other keys"""
-
-
-class SatelliteOrbit(OrbitElements):
-    """The body's own Kepler orbit about the attracting body, which is seen on the opposite side."""
-
-    key, opposite = "satellite_orbit", True
-
-
-class OrbitFields(LoadFields):
-    """Keys of a load whose source and body are on a prescribed orbit, which is given from either side."""
-
-    orbit: Orbit | None = Field(
-        default=None,
-        description="place of the source as seen from the body, by elements: a satellite's source is "
-        "opposite to the satellite's own elements, which are satellite_orbit",
-        examples=[{"semi_major_axis": "1 au", "eccentricity": 0.0167}],
-    )
-    satellite_orbit: SatelliteOrbit | None = Field(
-        default=None,
-        description="the body's own elements about the source, with the keys of orbit, instead of orbit",
-        examples=[{"semi_major_axis": "7000 km", "inclination": "51.6 deg"}],
-    )
-
-    @property
-    def elements(self) -> Orbit | SatelliteOrbit | None:
-        """The one of both that is given."""
-        return self.satellite_orbit if self.orbit is None else self.orbit
-
-    @model_validator(mode="after")
-    def _from_one_side(self) -> Self:
-        if self.orbit is not None and self.satellite_orbit is not None:
-            what = "given orbit and satellite_orbit; give one of them: orbit is the place of the source as "
-            raise refuse(what + "seen from the body, satellite_orbit the body's own orbit about the source")
-        return self
 
 
 @dataclass(frozen=True)
@@ -197,11 +107,7 @@ def attracting_body(orbit: Orbit, around: Surroundings) -> int:
     return found
 
 
-PACES = ("period", "sidereal_period", "longitude_rate")
-"""Keys of which one may replace the mean motion of Kepler's third law."""
-
-
-def pace_of(table: OrbitElements, around: Surroundings) -> tuple[str, ExactNumber] | None:
+def pace_of(table: Elements, around: Surroundings) -> tuple[str, ExactNumber] | None:
     """The key that replaces the mean motion of Kepler's third law, and its value; None if none is given."""
     given = [(key, getattr(table, key)) for key in PACES if getattr(table, key) is not None]
     for key, value in given:
@@ -220,7 +126,7 @@ def rate_of(pace: tuple[str, ExactNumber], context: Any) -> Any:
     return value.at(context) if key == "longitude_rate" else 2 * context.pi / value.at(context)
 
 
-def mean_motion(table: OrbitElements, strength: Any | None, around: Surroundings) -> Any:
+def mean_motion(table: Elements, strength: Any | None, around: Surroundings) -> Any:
     """Rate of the mean anomaly (mpf, rad/s): that of the pace that was given, or of Kepler's third law if the
     gravitational parameter ``strength`` is known. Mean longitude is ascending node + periapsis + mean
     anomaly.
@@ -242,7 +148,7 @@ def mean_motion(table: OrbitElements, strength: Any | None, around: Surroundings
     return motion
 
 
-def resolve_orbit(table: OrbitElements, strength: Any | None, around: Surroundings) -> KeplerOrbit:
+def resolve_orbit(table: Elements, strength: Any | None, around: Surroundings) -> KeplerOrbit:
     """Elements of the attracting body as seen from the body: as given, or the body's own with the periapsis
     half a turn back. ``strength`` is the gravitational parameter (mpf, m^3/s^2), if known.
     """
@@ -285,7 +191,7 @@ def tabulated_orbit(
     opposite: bool,
 ) -> TabulatedOrbit:
     """A table's orbit, made once: of its text, the elements it lacks, and an mpf's parts for Kepler's law;
-    ``opposite`` as in ``OrbitElements``.
+    ``opposite`` as in ``Elements``.
     """
     table = read_table(text, bits)
     context = table.context
@@ -315,9 +221,7 @@ def tabulated_orbit(
 _NO_CONSTANTS = ("table", "node_rate", "periapsis_rate")
 
 
-def resolve_tabulated_orbit(
-    fields: OrbitElements, strength: Any | None, around: Surroundings
-) -> TabulatedOrbit:
+def resolve_tabulated_orbit(fields: Elements, strength: Any | None, around: Surroundings) -> TabulatedOrbit:
     """Work out a table's orbit; ``strength`` is the gravitational parameter of Kepler's law, if known."""
     name = fields.table
     assert name is not None

@@ -34,7 +34,8 @@ from rigidsim.model.rotations import Symbolic
 from rigidsim.scene.arithmetic import Vector, cross, norm, unit_vectors
 from rigidsim.scene.exact import ZERO
 from rigidsim.scene.fields import BodyName, GravitationalParameter, Metre, Rate, Triple
-from rigidsim.scene.orbits import Orbit, attracting_body
+from rigidsim.scene.orbit_keys import Orbit
+from rigidsim.scene.orbits import attracting_body
 from rigidsim.scene.point_masses import closest, kepler_reach
 from rigidsim.scene.registry import Surroundings, register_load
 from rigidsim.scene.scene import Scene

@@ -20,7 +20,7 @@ from rigidsim.scene.fields import (
     name_or_vector,
 )
 from rigidsim.scene.geomagnetic_field import MOST
-from rigidsim.scene.orbits import OrbitFields
+from rigidsim.scene.orbit_keys import OrbitFields
 from rigidsim.scene.registry import Surroundings
 
 MagneticMoment = Annotated[ExactNumber, InUnit("A m^2")]

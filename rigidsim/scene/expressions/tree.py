@@ -210,8 +210,9 @@ def never_below_zero(node: Node) -> bool:
         return False
     if node.operator == "power":
         base, exponent = node.operands
-        even = isinstance(exponent, Constant) and not exponent.value.swept and not exponent.value.pi_power
-        return (even and exponent.value.rational % 2 == 0) or never_below_zero(base)
+        value = exponent.value if isinstance(exponent, Constant) else None
+        even = value is not None and not value.swept and not value.pi_power and value.rational % 2 == 0
+        return even or never_below_zero(base)
     if node.operator in ("sum", "product", "quotient"):
         return all(map(never_below_zero, node.operands))
     return node.operator in ("exp", "cosh", "sqrt", "sigmoid")

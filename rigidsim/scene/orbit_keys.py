@@ -1,0 +1,102 @@
+"""Keys of prescribed orbits, from the side of the attracting body or of the body."""
+
+from __future__ import annotations
+
+from typing import ClassVar, Self
+
+from pydantic import Field, StrictStr, model_validator
+
+from rigidsim.scene.exact import ZERO
+from rigidsim.scene.fields import Angle, ConfigTable, Dimensionless, Metre, Rate, Second, refuse
+from rigidsim.scene.registry import LoadFields
+
+PACES = ("period", "sidereal_period", "longitude_rate")
+"""Keys of which one may replace the mean motion of Kepler's third law."""
+
+
+class Elements(ConfigTable):
+    """A Kepler orbit, whose node and periapsis may move uniformly.
+
+    Angles are those at time zero of the scene, as classical elements in space axes. One of ``period``,
+    ``sidereal_period`` and ``longitude_rate`` may replace the mean motion of Kepler's third law. A ``table``
+    gives elements over time; those that it hasn't are constant.
+
+    Attributes:
+        key: of a load, that this table is.
+        opposite: whether the elements place the body as seen from the source.
+    """
+
+    key: ClassVar[str]
+    opposite: ClassVar[bool] = False
+
+    table: StrictStr | None = Field(None, examples=["mars_elements.csv"])
+    """name of a CSV file beside the config, with elements over time"""
+    semi_major_axis: Metre | None = Field(None, examples=["7000 km"])
+    """semi-major axis of the ellipse"""
+    eccentricity: Dimensionless = ZERO
+    """0 to below 1"""
+    inclination: Angle = Field(ZERO, examples=["51.6 deg"])
+    """inclination to the XY plane of the space axes"""
+    ascending_node: Angle = ZERO
+    """longitude of the ascending node from X, at time 0"""
+    periapsis: Angle = ZERO
+    """argument of periapsis from the ascending node, at time 0"""
+    mean_anomaly: Angle = ZERO
+    """mean anomaly at time 0"""
+    node_rate: Rate = Field(ZERO, examples=["-19.3 deg/yr"])
+    """rate of the ascending node"""
+    periapsis_rate: Rate = ZERO
+    """rate of the argument of periapsis"""
+    period: Second | None = Field(None, examples=["27.55455 day"])
+    """anomalistic period, from periapsis to periapsis: that of the mean anomaly (beside a table without one,
+    of the mean longitude); by default that of Kepler's third law
+    """
+    sidereal_period: Second | None = Field(None, examples=["27.321661 day"])
+    """period of the mean longitude (node + periapsis + mean anomaly), such as a sidereal month or year,
+    instead of period
+    """
+    longitude_rate: Rate | None = Field(None, examples=["13.17639648 deg/day"])
+    """rate of the mean longitude (node + periapsis + mean anomaly), instead of period"""
+
+
+class Orbit(Elements):
+    """Where the attracting body is, as seen from the body: by a Kepler orbit, or as one of [[bodies]]."""
+
+    key = "orbit"
+
+    body: StrictStr | None = Field(None, examples=["sun"])
+    """name of the attracting point mass in [[bodies]]; excludes all other keys"""
+
+
+class SatelliteOrbit(Elements):
+    """The body's own Kepler orbit about the attracting body, which is seen on the opposite side."""
+
+    key, opposite = "satellite_orbit", True
+
+
+class OrbitFields(LoadFields):
+    """Keys of a load whose source and body are on a prescribed orbit, which is given from either side."""
+
+    orbit: Orbit | None = Field(
+        default=None,
+        description="place of the source as seen from the body, by elements: a satellite's source is "
+        "opposite to the satellite's own elements, which are satellite_orbit",
+        examples=[{"semi_major_axis": "1 au", "eccentricity": 0.0167}],
+    )
+    satellite_orbit: SatelliteOrbit | None = Field(
+        default=None,
+        description="the body's own elements about the source, with the keys of orbit, instead of orbit",
+        examples=[{"semi_major_axis": "7000 km", "inclination": "51.6 deg"}],
+    )
+
+    @property
+    def elements(self) -> Orbit | SatelliteOrbit | None:
+        """The one of both that is given."""
+        return self.satellite_orbit if self.orbit is None else self.orbit
+
+    @model_validator(mode="after")
+    def _from_one_side(self) -> Self:
+        if self.orbit is not None and self.satellite_orbit is not None:
+            what = "given orbit and satellite_orbit; give one of them: orbit is the place of the source as "
+            raise refuse(what + "seen from the body, satellite_orbit the body's own orbit about the source")
+        return self
