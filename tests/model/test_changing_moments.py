@@ -3,17 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from killing import killed
 from scipy.integrate import solve_ivp
-from support import config, run_estimated, run_text, same_bits
+from support import config, run_estimated, run_text
 from test_rotors import matrices
-
-import rigidsim
 
 Side = Callable[[float, np.ndarray], float]
 START = "angular_velocity = [0.1, 0.2, 1]"
@@ -128,13 +124,6 @@ def test_moments_with_kinks_in_every_precision_and_formulation(
     assert (
         np.abs(matrices(run.dataset)[-1].astype(float) - bent(moments, change, kinks, 30.0)).max() <= within
     )
-
-
-@pytest.mark.slow
-@pytest.mark.optimised  # as in the process that is killed
-def test_a_killed_run_with_kinks_in_its_moments_is_resumed_bit_for_bit(tmp_path: Path) -> None:
-    given = text("min and max of an own state", 401)
-    same_bits(run_text(given), rigidsim.resume(killed("support", given, tmp_path)))
 
 
 # --- axes and angles ----------------------------------------------------------------------------------------

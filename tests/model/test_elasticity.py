@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import mpmath
 import numpy as np
 import pytest
 from elastic_bodies import Delayed, followed, strength
-from killing import killed
 from support import EPSILON, config, law, run_text, same_bits, wide
 from test_rotors import matrices
 
@@ -256,30 +254,6 @@ def test_with_a_rotor_or_a_core(more: str) -> None:
 
 
 # --- sessions and sweeps ------------------------------------------------------------------------------------
-
-
-@pytest.mark.slow
-@pytest.mark.optimised  # as in the process that is killed
-def test_a_killed_run_is_resumed_bit_for_bit_and_verified(tmp_path: Path) -> None:
-    text = scene(200, f"{ELASTIC}, delay = 0.01", samples=401)
-    done = rigidsim.resume(killed("support", text, tmp_path))
-    same_bits(run_text(text), done)
-    assert rigidsim.verify(tmp_path / "scene").identical
-
-
-@pytest.mark.slow
-def test_members_of_a_sweep_are_their_single_runs(tmp_path: Path) -> None:
-    text = scene(20, f"{ELASTIC}, delay = 0.01")
-    axes = 'axes."body.elasticity.love_number" = {values = [0.1, 0.3]}\n'
-    axes += 'axes."body.elasticity.delay" = {values = [0.005, 0.01]}\n'
-    found = rigidsim.sweep(rigidsim.parse(f'{text}[sweep]\nkeep = ["final"]\n{axes}'), out=tmp_path).dataset
-    for i, love in enumerate(("0.1", "0.3")):
-        keys = f"body.elasticity.love_number={love}", "body.elasticity.delay=0.005"
-        alone = run_text(text, *keys).dataset
-        # members of a batch are rounded otherwise
-        np.testing.assert_allclose(
-            found["quaternion_final"][i, 0], alone["quaternion"][-1], rtol=0, atol=1e-13
-        )
 
 
 def test_a_delay_that_is_long_is_told() -> None:

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from cores import Core, followed
 from gyrostats import exact
-from killing import killed
 from scipy.integrate import solve_ivp
 from support import EPSILON, config, law, run_estimated, run_text, same_bits, wide
 from test_rotors import matrices
@@ -348,35 +346,6 @@ def test_a_rate_of_a_core_that_isnt_there() -> None:
 
 
 # --- sessions and sweeps ------------------------------------------------------------------------------------
-
-
-@pytest.mark.slow
-@pytest.mark.optimised  # as in the process that is killed
-def test_a_killed_run_is_resumed_bit_for_bit(tmp_path: Path) -> None:
-    text = scene(100, samples=401)
-    done = rigidsim.resume(killed("support", text, tmp_path))
-    same_bits(run_text(text), done)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("key", "values"),
-    [
-        ("body.core.moment", [0.0, 0.1, 0.3]),
-        ("body.core.flattening", [0.0, 0.01, 0.3]),
-        ("body.core.friction", [0.0, 0.001, 0.5]),
-        ("body.core.angular_velocity[2]", [0.9, 1.0, 2.5]),
-        ("body.principal_moments[0]", [1.0, 1.1, 1.3]),
-    ],
-)
-def test_members_of_a_sweep_are_single_runs(key: str, values: list[float], tmp_path: Path) -> None:
-    text = scene(20)
-    swept = text + f'[sweep]\nkeep = ["final"]\naxes."{key}" = {{values = {values}}}\n'
-    found = rigidsim.sweep(rigidsim.parse(swept), out=tmp_path).dataset
-    for n, value in enumerate(values):
-        alone = run_text(text, f"{key}={value}").dataset
-        # in batches, whose code rounds otherwise: twenty turns' worth
-        np.testing.assert_allclose(found["quaternion_final"][n], alone["quaternion"][-1], rtol=0, atol=1e-14)
 
 
 @pytest.mark.slow

@@ -14,8 +14,7 @@ import xarray
 from equations import CLOSE, Random, array, derivative, general_body, matrix, prepared
 from field_truth import gradient, keys, lumpy, moments_of, pulled, random_field, tensor_of
 from gyrostats import BITS, exact
-from killing import killed
-from support import EPSILON, config, law, run_text, same_bits
+from support import EPSILON, config, law, run_text
 
 import rigidsim
 from rigidsim import ConfigError
@@ -272,16 +271,6 @@ def test_motions_are_those_of_equations_of_their_own(precision: str, end: float,
     assert np.abs(whole(data, "angular_velocity")[-1] - rates).max() < least
 
 
-@pytest.mark.parametrize("formulation", ["euler_angles", "rotation_matrix", "canonical"])
-def test_all_formulations_agree(formulation: str) -> None:
-    text = config(BODY, START, gradient_of(), "end = 20\nsamples = 21", output='record = ["quaternion"]')
-    one, other = (
-        run_text(text, f'integrator.formulation="{x}"').dataset for x in ("quaternion", formulation)
-    )
-    same = np.abs((one.quaternion * other.quaternion).sum("quaternion_component"))
-    assert float((1 - same).max()) < 1e-13
-
-
 def test_a_field_symmetric_to_the_orbit_keeps_the_motion_in_its_plane() -> None:
     body = "principal_moments = [1, 1.2, 1.5]\nmass = 10\ngravity_field = {radius = 0.5, "
     start = "angular_velocity = [0, 0, 0.9]"
@@ -391,25 +380,3 @@ def test_a_field_that_no_load_feels_is_told() -> None:
     found = cautions_of(prepare(rigidsim.parse(text)).scene)
     assert any("gravity_field has no effect" in x.text for x in found)
     assert not cautions_of(prepare(rigidsim.parse(config(BODY, START, gradient_of(degree=2)))).scene)
-
-
-@pytest.mark.slow
-@pytest.mark.optimised  # as in the process that is killed
-def test_a_killed_run_goes_on_with_the_same_bits(tmp_path: Path) -> None:
-    text = config(BODY, START, gradient_of(), "end = 4e3\nsamples = 401")
-    done = rigidsim.resume(killed("support", text, tmp_path))
-    same_bits(run_text(text), done)
-
-
-@pytest.mark.parametrize("key", ['body.gravity_field.C."3,1"', 'body.gravity_field.S."3,2"'])
-def test_members_of_a_sweep_are_single_runs(key: str, tmp_path: Path) -> None:
-    """In batches, in which coefficients are parameters."""
-    output = 'record = ["quaternion", "angular_velocity"]'
-    text = config(BODY, START, gradient_of(), "end = 20\nsamples = 5", output=output)
-    sweep = f"\n[sweep]\nkeep = [\"series\"]\naxes.'{key}' = {{linspace = [0.001, 0.01, 8]}}\n"
-    swept = rigidsim.sweep(rigidsim.parse(text + sweep), out=tmp_path).dataset
-    for number in (0, 5):
-        value = 0.001 + 0.009 * number / 7
-        single = run_text(text, f"{key}={value!r}").dataset
-        found = swept.quaternion.isel({swept.quaternion.dims[0]: number}).values
-        assert np.abs(found - single.quaternion.values).max() < 1e-12

@@ -9,7 +9,6 @@ import heyoka as hy
 import numpy as np
 import pytest
 from gyrostats import exact
-from killing import killed
 from moving_bodies import followed
 from scipy.integrate import solve_ivp
 from support import cases, config, run_text, same_bits, wide
@@ -344,24 +343,6 @@ def test_what_no_jet_does_is_refused(load: str, more: str, said: str) -> None:
 
 
 # --- sessions and sweeps ------------------------------------------------------------------------------------
-
-
-@pytest.mark.slow
-@pytest.mark.optimised  # as in the process that is killed
-def test_a_killed_run_is_resumed_bit_for_bit(tmp_path: Path) -> None:
-    text = scene(100, samples=401, loads='kind = "mass_loss"\nrate = "0.01"\nexit_point = [0, 0, 1]') + TABLES
-    done = rigidsim.resume(killed("support", text, tmp_path))
-    same_bits(run_text(text), done)
-
-
-@pytest.mark.slow
-def test_members_of_a_sweep_are_single_runs(tmp_path: Path) -> None:
-    text = scene(20) + TABLES
-    swept = text + '[sweep]\nkeep = ["final"]\naxes."parameters.k" = {values = [0.0, 0.1, 0.3]}\n'
-    found = rigidsim.sweep(rigidsim.parse(swept), out=tmp_path).dataset
-    for n, k in enumerate(("0.0", "0.1", "0.3")):
-        alone = run_text(text, f"parameters.k={k}").dataset
-        np.testing.assert_array_equal(found["quaternion_final"][n], alone["quaternion"][-1])
 
 
 def test_a_body_that_shrinks_by_states_has_scales_that_fit() -> None:

@@ -11,7 +11,6 @@ from typing import Any
 import heyoka as hy
 import numpy as np
 import pytest
-from killing import killed
 from scipy.spatial.transform import Rotation
 from support import (
     EPSILON,
@@ -279,18 +278,6 @@ def test_nadir_is_pointed_at_with_an_integral_against_a_bias() -> None:
     assert turned[:, 2] @ [np.cos(60), np.sin(60), 0] > 1 - 1e-6
 
 
-@pytest.mark.slow
-@pytest.mark.optimised  # as in the process that is killed
-def test_a_killed_run_with_states_and_surfaces_resumes_bit_for_bit(tmp_path: Path) -> None:
-    one = f'kind = "torque"\ncomponents = ["{LAW.format("x")}", "-d*wy", "-d*wz"]'
-    more = POINTING + state("sum_x", "2*qw*qx", 0, "s")
-    given = config(loads=one, more=more, time="end = 12\nsamples = 49", name="cut")
-    done = rigidsim.resume(killed("support", given, tmp_path))
-    assert done.summary["cost"]["sessions"] == 2
-    same_bits(run_text(given), done)
-    assert rigidsim.verify(done.folder.path).identical
-
-
 def test_a_law_that_reads_a_limited_state_switches_in_its_derivative() -> None:
     """u' = min(1, u) - 2 from u = 3: -1 until u = 1, at t = 2, and then u - 2: u = 2 - exp(t - 2)."""
     more = state("u", "min(1, u) - 2", 3) + '[[events]]\nname = "gone"\nexpression = "u"\n'
@@ -326,19 +313,6 @@ def test_only_what_is_read_or_recorded_is_carried() -> None:
     why = {row["states"]: row["why"] for row in plan["reasons"]}
     assert (why["held"], why["more"]) == ("state more reads it", "recorded")
     assert "apart" in {row["what"] for row in plan["left_out"]}
-
-
-def test_members_of_a_sweep_are_the_runs_one_by_one(tmp_path: Path) -> None:
-    base = config(loads=DAMPER.replace("1024", "(8*g)"), more="[parameters]\ng = 128\n" + LOOSE)
-    axes = 'axes."states[1].initial" = {values = [-0.1, 3]}\naxes."parameters.g" = {values = [64, 256]}\n'
-    swept = rigidsim.parse(base + '[sweep]\nmode = "zip"\nkeep = ["final"]\n' + axes)
-    with rigidsim.sweep(swept, out=tmp_path).dataset as members:
-        assert members["initial"].attrs["units"] == "rad"
-        for i, (start, gain) in enumerate([(-0.1, 64), (3, 256)]):
-            one = loaded(run_text(base, f"states[1].initial={start}", f"parameters.g={gain}"))
-            for name in ("quaternion", "slosh", "lagged"):  # rounding of steps that differ
-                found = members[f"{name}_final"].values[i]
-                np.testing.assert_allclose(found, one[name].values[-1], rtol=0, atol=1e-14)
 
 
 BAD = {

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from pathlib import Path
 from typing import Any
 
 import heyoka as hy
@@ -449,23 +448,6 @@ def test_events_and_loads_read_the_rates_of_rotors() -> None:
 
 
 # --- whole workflows ----------------------------------------------------------------------------------------
-
-
-@pytest.mark.slow
-def test_members_of_a_sweep_are_their_single_runs(tmp_path: Path) -> None:
-    text = scene(FREE, DRIVEN, end=10, samples=5, motors={1: "-k*wz"}, more="[parameters]\nk = 0.1\n")
-    text += '[sweep]\nkeep = ["final"]\naxes."rotors[0].rate" = {values = [-3, 0, 2]}\n'
-    text += 'axes."rotors[0].moment" = {values = [0.1, 0.2]}\naxes."parameters.k" = {values = [0.1, -0.2]}\n'
-    swept = rigidsim.sweep(rigidsim.parse(text), out=tmp_path)
-    data = swept.dataset
-    assert all(engine.startswith("batch of") for engine in swept.summary["engines"])
-    assert list(data["rotor"].values) == ["w0", "w1"]
-    for rate, moment, k in ((-3, 0.1, 0.1), (2, 0.2, -0.2)):
-        single = text.partition("[sweep]")[0]
-        changes = [f"rotors[0].rate={rate}", f"rotors[0].moment={moment}", f"parameters.k={k}"]
-        last = run_text(single, *changes).dataset["angular_velocity"].values[-1]
-        member = data["angular_velocity_final"].sel(rate=rate, moment=moment, k=k).values
-        np.testing.assert_allclose(member, last, rtol=0, atol=1e-13)
 
 
 def test_in_flight_it_turns_with_the_whole_tensor_pulling() -> None:
