@@ -6,6 +6,7 @@ import errno
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 _MOST_SHOWN = 30
 _COMMAND, _PYTHON, _END = "\x02", "\x03", "\x04"  # none is ever shown
@@ -22,6 +23,14 @@ OUT = either("--out", "out")
 RESUME = either("rigidsim resume", "rigidsim.resume(...)")
 SWEEP = either("rigidsim sweep", "rigidsim.sweep(...)")
 VIEW = either("rigidsim view", "run.view()")
+
+
+def run_again(folder: Path) -> str:
+    """What to do about a damaged file in a run's folder, which only a copy or another run replaces."""
+    config = folder / "config.toml"
+    command = either(f"rigidsim run {config} --out ELSEWHERE", f'rigidsim.run("{config}", out=...)')
+    again = command if config.is_file() else "run its config again"
+    return f"copy it again from where it is whole, or make it again: {again}"
 
 
 class RigidsimError(Exception):

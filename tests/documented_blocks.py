@@ -1,6 +1,7 @@
 """What the pages of the documentation show as code, taken apart and run, page by page, as a reader would.
 
-Blocks of a page run in one empty folder, from top to bottom, with the repository's ``configs`` at hand:
+Blocks of a page run in one empty folder, from top to bottom, with the repository's ``configs`` at hand unless
+the page says that it needs nothing but an empty folder:
 
 - ``sh``: each line is a command; those of ``rigidsim`` run here, others have to be marked;
 - ``python``: all blocks of a page share their names;
@@ -77,6 +78,12 @@ def blocks_of(page: Path) -> list[Block]:
 def is_slow(page: Path) -> bool:
     """Whether its blocks run in the long stage."""
     return "<!-- blocks: slow -->" in page.read_text(encoding="utf-8")
+
+
+def prepare(page: Path, folder: Path) -> None:
+    """Put into a folder what a page may expect there."""
+    if "empty folder" not in page.read_text(encoding="utf-8"):
+        (folder / "configs").symlink_to(Path(__file__).parents[1] / "configs")
 
 
 class Story:

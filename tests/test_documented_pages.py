@@ -6,7 +6,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from documented_blocks import Story, blocks_of, is_slow
+from documented_blocks import Story, blocks_of, is_slow, prepare
 from test_documented_outputs import differences
 
 ROOT = Path(__file__).parents[1]
@@ -27,7 +27,7 @@ def test_blocks_run_and_print_what_is_shown(
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("COLUMNS", "80")
     monkeypatch.setenv("MPLBACKEND", "agg")
-    (tmp_path / "configs").symlink_to(ROOT / "configs")
+    prepare(page, tmp_path)
     story = Story()
     for block in blocks_of(page):
         if not block.run:
@@ -74,7 +74,7 @@ def main(names: list[str]) -> None:
         found = blocks_of(page)
         made: dict[int, str] = {}
         with tempfile.TemporaryDirectory() as folder:
-            (Path(folder) / "configs").symlink_to(ROOT / "configs")
+            prepare(page, Path(folder))
             before = Path.cwd()
             os.chdir(folder)
             story = Story()

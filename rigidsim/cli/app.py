@@ -5,10 +5,12 @@ A command is declared here, with its arguments and help, and does its work in a 
 """
 
 import gc
+import sys
 from collections.abc import Callable
 from functools import wraps
 from importlib import import_module
 from inspect import cleandoc
+from io import TextIOWrapper
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -25,12 +27,14 @@ app = typer.Typer(
     no_args_is_help=True,
     context_settings={"help_option_names": ["-h", "--help"]},
     pretty_exceptions_enable=False,
-    rich_markup_mode="rich",
+    rich_markup_mode=None,  # in which [fit] would be a style
 )
 
 
 def main() -> None:
     """Entry point of ``rigidsim``."""
+    if isinstance(sys.stdout, TextIOWrapper):
+        sys.stdout.reconfigure(errors="backslashreplace")  # a file's name may be no text
     try:
         app(prog_name="rigidsim")
     finally:
@@ -51,7 +55,9 @@ def _command(module: str, more: str = "") -> Callable[[Callable[..., None]], Cal
         def invoked(**given: Any) -> None:
             raise typer.Exit(exit_code(lambda: work(given)))
 
-        app.command(help=f"{cleandoc(function.__doc__ or '')}{more}")(invoked)
+        text = cleandoc(function.__doc__ or "")
+        first = " ".join(text.split("\n\n")[0].split()).split(". ")[0].removesuffix(".")
+        app.command(help=text + more, short_help=f"{first}.")(invoked)
         return function
 
     return declared
@@ -90,7 +96,7 @@ def check(
 
     The exit code is 2 where one of them can't be run.
 
-    Example: rigidsim check configs/heavy_top_nutating.toml
+    Example: rigidsim check heavy_top_nutating
     """
 
 
@@ -102,13 +108,13 @@ def run(
     overrides: options.SetOption = None,
     scan: options.ScanOption = None,
     member: options.MemberOption = None,
-    force: Annotated[bool, typer.Option("--force", help="Replace a run of the same name.")] = False,
+    force: Annotated[bool, options.replacing("Replace a run of the same name.")] = False,
     as_json: options.JsonOption = False,
     verbose: options.VerboseOption = False,
 ) -> None:
     """Integrate, write the run folder, print how the run came out and what it cost.
 
-    Example: rigidsim run configs/intermediate_axis.toml --set time.end=100
+    Example: rigidsim run intermediate_axis --set time.end=100
     """
 
 
@@ -117,10 +123,10 @@ def sweep(
     config: options.ConfigPath,
     out: options.OutOption = Path("runs"),
     overrides: options.SetOption = None,
-    workers: options.WorkersOption = 1,
+    workers: options.WorkersOption = None,
     scheduler: options.SchedulerOption = None,
     tiles: options.TilesOption = None,
-    force: Annotated[bool, typer.Option("--force", help="Replace what lies there.")] = False,
+    force: Annotated[bool, options.replacing("Replace what lies there.")] = False,
     as_json: options.JsonOption = False,
 ) -> None:
     """Run all members, and write one labelled dataset; what is there already isn't computed again. With [fit]
@@ -128,7 +134,7 @@ def sweep(
 
     Give the command again to go on after an interruption, or with a config whose axes are longer.
 
-    Example: rigidsim sweep configs/sweeps/first_flip.toml --workers 2
+    Example: rigidsim sweep first_flip --workers 2
     """
 
 
@@ -137,7 +143,7 @@ def resume(
     run_path: options.RunPath,
     until: options.UntilOption = None,
     overrides: options.GuardOption = None,
-    workers: options.ResumeWorkersOption = 1,
+    workers: options.ResumeWorkersOption = None,
     as_json: options.JsonOption = False,
     verbose: options.VerboseOption = False,
 ) -> None:
@@ -151,7 +157,7 @@ def resume(
 
 @_command("sweep")
 def verify(
-    run_path: options.RunPath, members: options.MembersOption = 100, as_json: options.JsonOption = False
+    run_path: options.RunPath, members: options.MembersOption = None, as_json: options.JsonOption = False
 ) -> None:
     """Integrate the embedded config again and compare: identical, or what differs first. Exit code 1 then.
 
@@ -166,7 +172,7 @@ def plan(
     out: options.OutOption = Path("runs"),
     physics: options.PhysicsOption = None,
     write: options.WriteOption = None,
-    force: options.ReplaceOption = False,
+    force: Annotated[bool, options.replacing("With --physics: replace earlier runs and the file.")] = False,
     as_json: options.JsonOption = False,
 ) -> None:
     """Explain what would be integrated and why; predict steps, time, memory and file sizes.
@@ -174,7 +180,7 @@ def plan(
     With --physics run the scene without each of its effects, print what each is worth, and name the least
     model within an error. Give the command again to go on after an interruption.
 
-    Example: rigidsim plan configs/heavy_top_nutating.toml
+    Example: rigidsim plan heavy_top_nutating
     """
 
 
@@ -188,12 +194,13 @@ def compare(
     figure: options.ComparedFigureOption = None,
     timeline: options.ComparedTimelineOption = None,
     kernels: options.KernelsOption = None,
+    force: Annotated[bool, options.replacing("Replace existing files.")] = False,
     as_json: options.JsonOption = False,
 ) -> None:
     """Judge another tool's trajectory: its convention, its error along time, and whether its model or its
     integration differs.
 
-    Example: rigidsim compare configs/intermediate_axis.toml theirs.csv --figure theirs.png
+    Example: rigidsim compare intermediate_axis theirs.csv --figure theirs.png
     """
 
 
@@ -204,13 +211,13 @@ def fit(
     overrides: options.SetOption = None,
     write: options.FittedOption = None,
     member: options.MemberOption = None,
-    force: Annotated[bool, typer.Option("--force", help="Replace a fit of the same name.")] = False,
+    force: Annotated[bool, options.replacing("Replace a fit of the same name, and the file.")] = False,
     as_json: options.JsonOption = False,
 ) -> None:
     """Estimate the parameters of the config's [fit] from its data: values, sigmas, correlations, residuals,
     and what the data can't tell. Exit code 1 if the fit doesn't converge.
 
-    Example: rigidsim fit configs/toutatis_1992.toml
+    Example: rigidsim fit toutatis_1992
     """
 
 
@@ -232,7 +239,7 @@ def view(
     seconds: options.FilmLengthOption = None,
     member: options.MembersSeenOption = None,
     at: options.MomentOption = None,
-    part: options.PartOption = "page",
+    part: options.PartOption = None,
 ) -> None:
     """Open timelines in the rerun viewer (drawn first, where a run has none), or draw them to a file.
 
@@ -266,13 +273,13 @@ def tradeoff(
     repeats: options.RepeatsOption = 3,
     full: options.FullOption = False,
     files: options.WithFilesOption = None,
-    force: Annotated[bool, typer.Option("--force", help="Replace an earlier measurement.")] = False,
+    force: Annotated[bool, options.replacing("Replace an earlier measurement.")] = False,
     as_json: options.JsonOption = False,
 ) -> None:
     """Measure speed against accuracy of a scene: what to use for which accuracy. Dataset and figure in
     NAME_tradeoff.
 
-    Example: rigidsim tradeoff configs/asymmetric_top.toml
+    Example: rigidsim tradeoff asymmetric_top
     """
 
 
@@ -281,7 +288,7 @@ def export(
     run_path: options.RunPath,
     file_format: options.FormatOption,
     out: options.ExportPathOption = None,
-    force: Annotated[bool, typer.Option("--force", help="Replace what is there.")] = False,
+    force: Annotated[bool, options.replacing("Replace what is there.")] = False,
     angle_unit: options.AngleUnitOption = None,
     epoch: options.EpochOption = None,
     axes: options.AxesOption = None,
@@ -303,6 +310,7 @@ def analyse(
     variable: options.VariableOption = None,
     lines: Annotated[int, typer.Option("--lines", metavar="N", help="Of each signal at most.")] = 20,
     out: options.AnalysisOption = None,
+    force: Annotated[bool, options.replacing("Replace an existing analysis.")] = False,
     as_json: options.JsonOption = False,
 ) -> None:
     """Secular rates and spectral lines, labelled with the scene's frequencies: table, dataset and figure.

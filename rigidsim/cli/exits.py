@@ -8,6 +8,18 @@ from collections.abc import Callable
 from rigidsim.errors import RigidsimError
 
 
+def refuse_options(what: str, **given: object) -> None:
+    """Refuse options that were given where they don't apply, rather than ignore them.
+
+    Args:
+        what: what they are for, and what was given instead.
+        given: values by the options' names; None, False and nothing at all count as not given.
+    """
+    named = [f"--{name.replace('_', '-')}" for name, value in given.items() if value not in (None, False, [])]
+    if named:
+        raise RigidsimError(f"{', '.join(named)}: {what}; leave {'it' if len(named) == 1 else 'them'} out")
+
+
 def exit_code(command: Callable[[], int]) -> int:
     """Run a command that returns its exit code; an error meant for the user is printed and has one, too."""
     # SIGTERM ends like Ctrl-C, and so does SIGINT where a script's background job starts with it ignored:

@@ -25,8 +25,15 @@ def _option(flag: str, metavar: str, text: str, *others: str, **more: Any) -> An
     return typer.Option(flag, *others, metavar=metavar, help=text, **more)
 
 
-Configs = Annotated[list[Path], typer.Argument(metavar="CONFIG...", help="TOML files.")]
-ConfigPath = Annotated[Path, typer.Argument(metavar="CONFIG", help="TOML file of the experiment.")]
+def replacing(text: str) -> Any:
+    """The option ``--force``, and what it replaces: never what the command reads."""
+    return typer.Option("--force", help=text)
+
+
+_CONFIG = "TOML file of the experiment, or the name of a ready scene (rigidsim new lists them)."
+_CONFIGS = "TOML files, or names of ready scenes (rigidsim new lists them)."
+Configs = Annotated[list[Path], typer.Argument(metavar="CONFIG...", help=_CONFIGS)]
+ConfigPath = Annotated[Path, typer.Argument(metavar="CONFIG", help=_CONFIG)]
 RunPath = Annotated[
     Path,
     typer.Argument(
@@ -54,9 +61,6 @@ PhysicsOption = Annotated[
     str | None, _option("--physics", "ERROR", 'Find the least model within an angle, as "0.1 arcsec".')
 ]
 WriteOption = Annotated[Path | None, _option("--write", "FILE", "With --physics: its config.")]
-ReplaceOption = Annotated[
-    bool, typer.Option("--force", help="With --physics: replace earlier runs and the file.")
-]
 OutOption = Annotated[Path, _option("--out", "DIR", "Folder of the run folders.")]
 VerboseOption = Annotated[
     bool,
@@ -68,7 +72,7 @@ JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON for machine
 SceneArgument = Annotated[
     str | None,
     typer.Argument(
-        metavar="[SCENE]",
+        metavar="SCENE",
         help="Its name, or another that it is known by.",
         autocompletion=offered("scenes"),
         show_default=False,
@@ -76,10 +80,10 @@ SceneArgument = Annotated[
 ]
 NameArgument = Annotated[
     str | None,
-    typer.Argument(metavar="[NAME]", help="Of the experiment and its file NAME.toml; default SCENE."),
+    typer.Argument(metavar="NAME", help="Of the experiment and its file NAME.toml; default SCENE."),
 ]
 AnyConfigs = Annotated[
-    list[Path] | None, typer.Argument(metavar="CONFIG...", help="TOML files.", show_default=False)
+    list[Path] | None, typer.Argument(metavar="CONFIG...", help=_CONFIGS, show_default=False)
 ]
 FromOption = Annotated[Path | None, _option("--from", "DATASET", "Run the config that a dataset embeds.")]
 ScanOption = Annotated[
@@ -94,11 +98,11 @@ MemberOption = Annotated[
     int | None, _option("--member", "N", "Of a sweep: member N by itself, counted from 0.", min=0)
 ]
 WorkersOption = Annotated[
-    int, _option("--workers", "N", "Processes of this machine that run members.", min=1)
+    int | None, _option("--workers", "N", "Processes of this machine that run members; default 1.", min=1)
 ]
 SchedulerOption = Annotated[
     str | None,
-    _option("--scheduler", "ADDRESS", "Dask scheduler whose workers run members (rigidsim\\[cluster])."),
+    _option("--scheduler", "ADDRESS", "Dask scheduler whose workers run members (rigidsim[cluster])."),
 ]
 TilesOption = Annotated[
     str | None, _option("--tiles", "A:B", "Only tiles A to B-1: a share, for job arrays.")
@@ -109,22 +113,25 @@ GuardOption = Annotated[
     _option("--set", "KEY=VALUE", "A guard of this session, such as limits.max_steps=1000000."),
 ]
 ResumeWorkersOption = Annotated[
-    int, _option("--workers", "N", "Of a sweep: processes that run members.", min=1)
+    int | None, _option("--workers", "N", "Of a sweep: processes that run members; default 1.", min=1)
 ]
-MembersOption = Annotated[int, _option("--members", "N", "Of a sweep: how many members, drawn at random.")]
+MembersOption = Annotated[
+    int | None, _option("--members", "N", "Of a sweep: how many members, drawn at random; default 100.")
+]
 PictureOption = Annotated[Path | None, _option("--png", "FILE", "Draw a picture, without a display.")]
 WebOption = Annotated[bool, typer.Option("--web", help="In the browser, served on loopback only.")]
 MomentOption = Annotated[
     str | None, _option("--at", "TIME", 'Moment of a picture, in the scene\'s unit or as "2.4 hr".')
 ]
 PartOption = Annotated[
-    str, _option("--part", "PART", "Of the page, in pictures and films: page, scene or plots.")
+    str | None,
+    _option("--part", "PART", "Of the page, in pictures and films: page (the default), scene or plots."),
 ]
 FilmOption = Annotated[Path | None, _option("--gif", "FILE", "Draw a film, without a display.")]
 FilmLengthOption = Annotated[
     float | None, typer.Option("--seconds", min=0.5, max=120.0, help="That a film lasts; default 6.")
 ]
-VideoOption = Annotated[Path | None, _option("--mp4", "FILE", "The same; needs rigidsim\\[film].")]
+VideoOption = Annotated[Path | None, _option("--mp4", "FILE", "The same; needs rigidsim[film].")]
 BudgetOption = Annotated[float, _option("--budget", "SECONDS", "Time that it may take, roughly.")]
 RepeatsOption = Annotated[int, _option("--repeats", "N", "Fresh processes in which speeds are taken.")]
 FullOption = Annotated[

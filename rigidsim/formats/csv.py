@@ -84,4 +84,4 @@ def _on_one_line(text: str) -> str:
     return "".join(c if c.isprintable() else " " for c in text)
 
 
-FORMAT = Format(write_csv, angles=True, side_tables=True)
+FORMAT = Format(write_csv, angles=True, side_tables=True, names=("epoch",))

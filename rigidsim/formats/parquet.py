@@ -33,4 +33,4 @@ def write_parquet(table: Table, path: Path, source: TableSource) -> None:
             writer.write_table(pa.Table.from_arrays(arrays, schema=schema))
 
 
-FORMAT = Format(write_parquet, angles=True, side_tables=True)
+FORMAT = Format(write_parquet, angles=True, side_tables=True, names=())

@@ -94,4 +94,4 @@ def _json(value: Any) -> Any:
     return value.item() if hasattr(value, "item") and getattr(value, "ndim", 1) == 0 else value
 
 
-FORMAT = Format(write_zarr, angles=True, folder=("Zarr store", ".zgroup"))
+FORMAT = Format(write_zarr, angles=True, names=(), folder=("Zarr store", ".zgroup"))

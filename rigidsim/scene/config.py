@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-import json
+import os
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from dataclasses import replace as exchanged
@@ -20,7 +20,8 @@ from rigidsim.scene.bodies.field_files import cut
 from rigidsim.scene.bodies.gravity_field import asked_degree
 from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.fields import NAME_OR_VECTOR
-from rigidsim.scene.python_values import assignments_of, toml_text
+from rigidsim.scene.kernels.finding import EMBEDDED, folders_of
+from rigidsim.scene.python_values import assignments_of, inline, toml_text
 from rigidsim.scene.registry import LOAD_KINDS
 from rigidsim.scene.schema import Config, config_model
 from rigidsim.scene.toml_text import FLAG, apply_overrides, long_integers, parse_toml, written
@@ -55,6 +56,17 @@ class Experiment:
     def sha256(self) -> str:
         """SHA-256 of the TOML text of what is run."""
         return hashlib.sha256(self.text.encode()).hexdigest()
+
+    @property
+    def files(self) -> list[Path]:
+        """The files that the experiment is read from: its config, or the dataset that embeds it, and those
+        that it names as values and that lie where they are looked for; none for an experiment from Python.
+        """
+        path = Path(self.source.removesuffix(EMBEDDED))
+        folders = folders_of(self.source)
+        texts = [name for text in _texts(self.to_dict()) for name in (text, Path(text).name)]
+        named = [folder / text for text in texts for folder in folders]
+        return [file for file in dict.fromkeys([path, *named]) if os.path.isfile(file)]
 
     def having(self, overrides: Sequence[str]) -> Experiment:
         """The experiment with values replaced by the program rather than the user; see ``parse``."""
@@ -144,6 +156,21 @@ class Experiment:
         from html import escape  # which only notebooks need
 
         return f"<b>{escape(self.config.name)}</b><pre>{escape(self.text)}</pre>"
+
+
+def _texts(value: Any) -> Iterator[str]:
+    """Strings among the values of a table and of the tables in it that a file may be named by."""
+    if isinstance(value, str):
+        if "\n" not in value:
+            yield value
+    elif isinstance(value, Mapping):
+        for name, inner in value.items():
+            yield from _texts(inner)
+            if isinstance(inner, Mapping) and "text" in inner:  # a table that stands in the config by now
+                yield name
+    elif isinstance(value, list):
+        for inner in value:
+            yield from _texts(inner)
 
 
 def parse(text: str, *, source: str = "config", overrides: Overrides = ()) -> Experiment:
@@ -306,4 +333,4 @@ def _refuse_size(where: str, name: str, size: int) -> None:
 
 
 def _section(name: str, text: str) -> str:
-    return f"\n[tables.{json.dumps(name)}]\ntext = '''\n{text.rstrip()}\n'''\n"
+    return f"\n[tables.{inline(name)}]\ntext = '''\n{text.rstrip()}\n'''\n"

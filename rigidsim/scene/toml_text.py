@@ -20,6 +20,7 @@ from rigidsim.scene import validation_messages as messages
 _DEEPEST_KEY = 100
 _PART = r"""(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')"""
 _DEEP_KEY = re.compile(rf"(?<![\w.-]){_PART}(?:[ \t]*+\.[ \t]*+{_PART}){{{_DEEPEST_KEY}}}")
+_SURROGATE = re.compile("[\ud800-\udfff]")
 
 
 def decimal(text: str) -> Decimal:
@@ -46,6 +47,11 @@ def parse_toml(text: str, source: str) -> dict[str, Any]:
     if deep is not None:
         line = text.count("\n", 0, deep.start()) + 1
         what = f"can't be read: a key of more than {_DEEPEST_KEY} parts (at line {line})"
+        raise ConfigError(Problem("TOML", what), source)
+    broken = _SURROGATE.search(text)
+    if broken is not None:  # of an argument or a file name that isn't UTF-8
+        line = text.count("\n", 0, broken.start()) + 1
+        what = f"can't be read: holds bytes that are no UTF-8 text (at line {line}); write it in UTF-8"
         raise ConfigError(Problem("TOML", what), source)
     try:
         _refuse_fine_dates(text)

@@ -31,7 +31,7 @@ class RunVerdict:
     worst: str
 
 
-LEAST: dict[WarningCode, Soundness] = {
+LEAST: dict[str, Soundness] = {
     WarningCode.DRIFT: Soundness.DRIFTED,
     WarningCode.ATTITUDE_UNCERTAIN: Soundness.LOST,
     WarningCode.RATES_UNCERTAIN: Soundness.LOST,
@@ -79,8 +79,7 @@ def verdict_on(summary: Summary) -> RunVerdict:
     drifted = any(not share <= 1 for share in shares.values())
     named = shares if drifted else physical or shares
     worst = max(named, key=lambda name: named[name], default="")
-    known = {code.value: degree for code, degree in LEAST.items()}
-    degrees = [known.get(code, Soundness.LIMITED) for code in summary.warning_codes]
+    degrees = [LEAST.get(code, Soundness.LIMITED) for code in summary.warning_codes]
     degrees.append(Soundness.DRIFTED if drifted else _without_warnings(summary, bool(shares)))
     return RunVerdict(max(degrees, key=_DEGREES.index), named.get(worst), worst)
 

@@ -15,6 +15,7 @@ from rigidsim.errors import FORCE, OUT, RESUME, RunFolderError, StoppedWritingEr
 from rigidsim.look.figure_names import FIGURES
 from rigidsim.scene.kernels.finding import NOTE
 from rigidsim.store import atomic, provenance, segments
+from rigidsim.store.outputs import ANALYSIS
 from rigidsim.store.summary import Brief, read_summary
 from rigidsim.store.summary_parts import SummaryPart
 
@@ -139,7 +140,7 @@ class RunFolder(WorkFolder):
     timeline = FileOf("timeline.rrd")
     figure = FileOf("figure.png")
     """Default file of ``rigidsim plot``."""
-    analysis = FileOf("analysis.h5")
+    analysis = FileOf(ANALYSIS)
     spectrum = FileOf("analysis.png")
     """Figure of the analysis."""
     checkpoint = FileOf("checkpoint.h5")
@@ -155,7 +156,7 @@ class RunFolder(WorkFolder):
 
     def begin(self, config: str, *, force: bool, kernels: Sequence[Path] = ()) -> None:
         """Make the folder ready for a new run: write its config and its kernels' places; it is under way."""
-        self.create(force=force)
+        self.create(config, force=force)
         try:
             atomic.write_bytes(self.config, config.encode())
             if kernels:
@@ -164,8 +165,10 @@ class RunFolder(WorkFolder):
         except OSError as error:
             raise self.unwritable(error) from None
 
-    def create(self, *, force: bool) -> None:
-        """Create the folder, or clear it of an earlier run."""
+    def create(self, config: str, *, force: bool) -> None:
+        """Create the folder, or clear it of an earlier run; one that was begun with this config and saved
+        nothing needs no force.
+        """
         files = [self.config, self.dataset, self.timeline, self.summary, self.checkpoint, self.figure]
         files += [self.figure_of(name + end) for name in FIGURES for end in ("", "_slide")]
         files.append(self.figure_of("slide"))
@@ -173,7 +176,10 @@ class RunFolder(WorkFolder):
         folders = [self.segments, self.set_aside]
         try:
             present = self.content([path.name for path in files + folders])
-            if not force and present & {self.dataset.name, self.summary.name, self.segments.name}:
+            begun = self.config.name in present and self.config.read_bytes() == config.encode()
+            drawn = {path.name for path in files if path.suffix == ".png"}
+            mine = drawn | ({self.config.name} if begun else set())
+            if not force and any(not name.startswith(".") for name in present - mine):
                 what = "a finished run" if self.dataset.exists() else "an unfinished run"
                 raise RunFolderError(
                     f"{self.path}: holds {what}; {FORCE} replaces it, another {OUT} puts this one elsewhere"

@@ -12,7 +12,7 @@ from rigidsim.errors import RunFolderError
 from rigidsim.look import film
 from rigidsim.scene.exact import parse_number
 from rigidsim.scene.readable import TimeWords
-from rigidsim.store import atomic
+from rigidsim.store.outputs import writing
 
 if TYPE_CHECKING:
     import xarray
@@ -89,11 +89,8 @@ def _share(dataset: xarray.Dataset, at: str) -> float:
 @contextmanager
 def _new(target: Path) -> Iterator[Path]:
     """A temporary file of the target's suffix that replaces the target once complete."""
-    try:
-        with tempfile.TemporaryDirectory(prefix="rigidsim-view-") as scratch:
-            new = Path(scratch) / f"new{target.suffix}"
-            yield new
-            with atomic.replacing(target) as placed:
-                placed.write_bytes(new.read_bytes())
-    except OSError as error:
-        raise RunFolderError(f"{target}: can't be written: {error.strerror or error}") from None
+    with tempfile.TemporaryDirectory(prefix="rigidsim-view-") as scratch:
+        new = Path(scratch) / f"new{target.suffix}"
+        yield new
+        with writing(target) as placed:
+            placed.write_bytes(new.read_bytes())

@@ -10,11 +10,12 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
-from rigidsim.errors import FORCE, RESUME, RunFolderError, either
+from rigidsim.errors import FORCE, RESUME, RunFolderError, either, run_again
 from rigidsim.look import viewer
 from rigidsim.store import atomic, segments
 from rigidsim.store.folder import RunFolder, find_run
 from rigidsim.store.netcdf import Block
+from rigidsim.store.outputs import refuse_loss
 from rigidsim.store.seal import refuse_damaged
 from rigidsim.store.summary import Brief, Summary
 from rigidsim.store.sweeps.folder import is_sweep
@@ -44,6 +45,11 @@ class Run:
     @abstractmethod
     def place(self) -> str:
         """Description of where the run is kept."""
+
+    @property
+    def files(self) -> list[Path]:
+        """Files and folders that it is read from, which nothing may be written over."""
+        return []
 
     @property
     @abstractmethod
@@ -87,6 +93,7 @@ class Run:
         if png is not None:
             from rigidsim.store import pictures  # which loads Pillow
 
+            refuse_loss([png], self.files)
             with self.dataset as dataset:
                 pictures.draw(dataset, Path(png), at=None if at is None else str(at), part=part)
             return 0
@@ -140,6 +147,11 @@ class SavedRun(Run):
         """Path of the run's folder."""
         return str(self.folder.path)
 
+    @property
+    def files(self) -> list[Path]:
+        """See ``Run``."""
+        return [self.folder.path]
+
     @contextmanager
     def recording(self) -> Iterator[Path]:
         """See ``Run``; one that had to be drawn is kept in the folder, if that can be written."""
@@ -176,8 +188,12 @@ class SavedRun(Run):
         """Check a complete dataset against its seal and the summary, which reads the whole file."""
         if self.folder.dataset.exists():
             # a run completed again after a crash still has the summary of the first time, or none
-            claimed = None if self.folder.segments.exists() else self.outcome.dataset_digest
-            refuse_damaged(self.folder.dataset, claimed)
+            begun = self.folder.segments.exists()
+            try:
+                refuse_damaged(self.folder.dataset, None if begun else self.outcome.dataset_digest)
+            except RunFolderError as error:
+                remedy = f"{RESUME} completes it again" if begun else run_again(self.folder.path)
+                raise RunFolderError(f"{error}; {remedy}") from None
 
     def opened(self, *, indexed: bool = True) -> "xarray.Dataset":
         """As ``dataset``; without ``indexed``, sample times aren't loaded and can't be selected by."""

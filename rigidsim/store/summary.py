@@ -10,7 +10,7 @@ from typing import Annotated, Any, Self
 
 from pydantic import Field, StrictBool, StrictInt, StrictStr, ValidationError
 
-from rigidsim.errors import RunFolderError
+from rigidsim.errors import RunFolderError, run_again
 from rigidsim.scene.choices import DEFAULT_METHOD
 from rigidsim.store.summary_parts import (
     Accuracy,
@@ -31,7 +31,6 @@ from rigidsim.store.summary_parts import (
     TableErrors,
     Text,
     Three,
-    WarningCode,
     first_of,
 )
 
@@ -179,8 +178,7 @@ class Summary(Brief):
     @property
     def cautions(self) -> list[Caution]:
         """The warnings with their codes."""
-        pairs = zip(self.warning_codes, self.warnings, strict=True)
-        return [Caution(WarningCode(code), text) for code, text in pairs]
+        return [Caution(code, text) for code, text in zip(self.warning_codes, self.warnings, strict=True)]
 
     def warned(self, cautions: Iterable[Caution]) -> Self:
         """A copy with these warnings in place of its own."""
@@ -192,7 +190,7 @@ def as_fields(cautions: Iterable[Caution]) -> dict[str, Any]:
     kept = list(cautions)
     return {
         "warnings": tuple(caution.text for caution in kept),
-        "warning_codes": tuple(caution.code.value for caution in kept),
+        "warning_codes": tuple(str(caution.code) for caution in kept),
     }
 
 
@@ -208,7 +206,9 @@ def read_summary(path: Path) -> Brief:
         return (Summary if "cost" in content else Brief).model_validate(_visible(content))
     except (OSError, ValueError, RecursionError) as error:
         why = first_of(error) if isinstance(error, ValidationError) else str(error)[:200]
-        raise RunFolderError(f"{path}: is damaged or no summary of rigidsim ({why})") from None
+        raise RunFolderError(
+            f"{path}: is damaged or no summary of rigidsim ({why}); {run_again(path.parent)}"
+        ) from None
 
 
 def _visible(value: Any) -> Any:

@@ -1,7 +1,7 @@
 """Parts of the summaries of runs: fields and which of them are claims, codes, cost, invariants, accuracy."""
 
 from dataclasses import dataclass
-from enum import Enum
+from enum import Enum, StrEnum
 from typing import Annotated, Any, ClassVar, Self
 
 from pydantic import (
@@ -56,8 +56,8 @@ ENGINE = "engine"
 """Key beside the phases in ``Cost.seconds``: time that the engine alone took of integrating and recording."""
 
 
-class WarningCode(Enum):
-    """Why a result can't be trusted, or not wholly; ``value`` stands in summaries."""
+class WarningCode(StrEnum):
+    """Why a result can't be trusted, or not wholly: the words of summaries."""
 
     DRIFT = "drift"
     SINGULARITY = "singularity"
@@ -108,9 +108,9 @@ class AdviceCode(Enum):
 
 @dataclass(frozen=True)
 class Caution:
-    """A warning: its code for decisions, its text for people."""
+    """A warning: its code (a ``WarningCode``, or a later version's word), and its text for people."""
 
-    code: WarningCode
+    code: str
     text: str
 
 

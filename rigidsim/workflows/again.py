@@ -24,10 +24,11 @@ def experiment_again(dataset: Path) -> Experiment:
     Raises:
         RunFolderError: no config can reproduce it, or a kernel is another one now.
     """
+    begun = embedded(dataset)
     loads = read_attributes(dataset).python_loads
     if loads:
         raise RunFolderError(f"{dataset}: the run had loads from Python ({loads}), which its config lacks")
-    experiment = as_begun(embedded(dataset), dataset)
+    experiment = as_begun(begun, dataset)
     refuse_other_kernel(experiment, dataset)
     config = experiment.config
     tables = {

@@ -1,7 +1,7 @@
 """``rigidsim analyse``: secular rates and labelled lines of a run, as a table, a dataset and a figure."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -13,7 +13,7 @@ from rigidsim.analysis.labels import Known
 from rigidsim.analysis.result import Analysis
 from rigidsim.errors import ConfigError, RigidsimError
 from rigidsim.scene.scene import build_scene
-from rigidsim.store import atomic
+from rigidsim.store.outputs import refuse_loss, writing
 from rigidsim.store.run import Run
 from rigidsim.workflows.compare.as_run import open_any
 from rigidsim.workflows.known_frequencies import known_frequencies
@@ -94,24 +94,27 @@ class Saved:
     figure: Path
 
 
-def save(analysis: Analysis, out: Path, figure: Path | None = None) -> Saved:
-    """Write dataset and figure, each of which appears only when complete."""
-    from rigidsim.look.figures.spectrum import save_spectrum
+def places_of(out: Path, inputs: Iterable[Path], *, force: bool = False) -> Saved:
+    """Where an analysis of some files may be written: its dataset at ``out``, the figure with that name.
 
-    drawn = figure or out.with_suffix(".png")
+    Raises:
+        RigidsimError: a file would be replaced (``store.outputs``), or ``out`` is a picture's name.
+    """
     if out.suffix.lower() in FIGURES:
         raise RigidsimError(
             f"{out}: the dataset is no picture; give --out FILE.h5, the figure stands beside it"
         )
-    if drawn.suffix.lower() not in FIGURES:
-        raise RigidsimError(f"{drawn}: a figure is a .png or a .svg")
+    places = Saved(out, out.with_suffix(".png"))
+    refuse_loss([places.dataset, places.figure], inputs, force=force)
+    return places
+
+
+def save(analysis: Analysis, places: Saved) -> None:
+    """Write dataset and figure, each of which appears only when complete."""
+    from rigidsim.look.figures.spectrum import save_spectrum
+
     dataset = analysis.dataset
-    try:
-        with atomic.replacing(out) as temporary:
-            dataset.to_netcdf(temporary, engine="h5netcdf")
-        with atomic.replacing(drawn) as temporary:
-            save_spectrum(dataset, temporary, file_format=drawn.suffix.lower()[1:])
-    except OSError as error:
-        why = error.strerror or error
-        raise RigidsimError(f"{out}: can't be written: {why}; choose another --out") from None
-    return Saved(out, drawn)
+    with writing(places.dataset) as temporary:
+        dataset.to_netcdf(temporary, engine="h5netcdf")
+    with writing(places.figure) as temporary:
+        save_spectrum(dataset, temporary, file_format="png")

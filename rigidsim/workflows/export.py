@@ -1,7 +1,6 @@
 """``rigidsim export``: the dataset of a run or a sweep in other tools' formats."""
 
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -10,10 +9,10 @@ import xarray
 from rigidsim.errors import RESUME, RigidsimError, RunFolderError
 from rigidsim.formats import FOR_SWEEPS
 from rigidsim.formats.digits import angle_unit_named
-from rigidsim.formats.registry import Format, Naming, TableSource, format_named
+from rigidsim.formats.registry import Naming, TableSource, format_named
 from rigidsim.formats.tables import BLOCK_NUMBERS, tables_of
 from rigidsim.scene.arithmetic import working_bits
-from rigidsim.store import atomic
+from rigidsim.store.outputs import FILE, refuse_loss, writing
 from rigidsim.store.run import SavedRun, open_run
 from rigidsim.store.sweeps.folder import is_sweep
 from rigidsim.store.sweeps.run import SavedSweep, open_sweep
@@ -55,6 +54,11 @@ def export(
     found = format_named(file_format)
     if isinstance(saved, str | Path):
         saved = open_sweep(saved) if is_sweep(saved) else open_run(saved)
+    for name, value in vars(naming or Naming()).items():
+        if value != getattr(Naming(), name) and name not in found.names:
+            raise RigidsimError(
+                f"--{name.replace('_', '-')}: {file_format} has no place for it; leave it out"
+            )
     if variables and not found.angles:
         raise RigidsimError(
             f"--variable: {file_format} prescribes what it holds; csv, parquet and zarr don't"
@@ -89,10 +93,9 @@ def export(
             if target.suffix == suffix:
                 raise RigidsimError(f"--out: given {target}, but {suffix} is that of a file beside it")
             kept[target.with_suffix(suffix)] = first, write
-        for path in kept:
-            _refuse_existing(path, found, force)
+        refuse_loss(kept, saved.files, force=force, kind=found.folder or FILE)
         for path, (table, write) in kept.items():
-            with _replacing(path, found) as new:
+            with writing(path, folder=found.folder is not None) as new:
                 write(table, new, source)
         return list(kept)
 
@@ -146,31 +149,3 @@ def _bits_of_members(dataset: xarray.Dataset) -> int:
     if chosen or any(key.startswith("integrator") for key in axes):
         return _PART_BITS * max(len(parts_in(dataset, str(name))) for name in dataset.data_vars)
     return working_bits(integrator.precision)
-
-
-def _refuse_existing(path: Path, found: Format, force: bool) -> None:
-    if not path.parent.is_dir():
-        raise RigidsimError(
-            f"{path}: there is no folder {path.parent}; make it first, or choose another --out"
-        )
-    if not (path.exists() or path.is_symlink()):
-        return
-    if found.folder is not None:
-        kind, mark = found.folder
-        if not (path / mark).is_file():
-            raise RigidsimError(f"{path}: exists and is no {kind}; choose another --out")
-    elif not path.is_file():
-        raise RigidsimError(f"{path}: is no file; choose another --out")
-    if not force:
-        raise RigidsimError(f"{path}: exists; --force replaces it, --out PATH writes elsewhere")
-
-
-@contextmanager
-def _replacing(path: Path, found: Format) -> Iterator[Path]:
-    """A temporary path that replaces ``path`` if all goes well; nothing is left otherwise."""
-    try:
-        with (atomic.replacing if found.folder is None else atomic.replacing_folder)(path) as new:
-            yield new
-    except OSError as error:
-        why = error.strerror or error
-        raise RigidsimError(f"{path}: can't be written: {why}; choose another --out") from None

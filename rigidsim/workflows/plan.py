@@ -222,7 +222,7 @@ def plan(
     first = LATE if prepared.holds_late else 0
     held = prepared.holds_invariants and closed is not None and steps > first
     shared, equations = equation_texts(system.equations, **prepared.precision.options)
-    warnings = [(caution.code.value, caution.text) for caution in cautions_of(prepared.scene)]
+    warnings = [(str(caution.code), caution.text) for caution in cautions_of(prepared.scene)]
     if room.problem is not None:
         warnings.append(("disk_space", f"the run {room.problem}"))
     error: float | None = attitude_error(prepared.law_tolerance, int(steps), rate, duration, growth)

@@ -2,6 +2,7 @@
 are registered.
 """
 
+import os
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -12,21 +13,50 @@ import rigidsim.model.loads
 import rigidsim.model.partial_invariants
 import rigidsim.model.starts
 import rigidsim.solve.equilibria  # noqa: F401  (each enters what it defines into a registry of rigidsim.scene)
-from rigidsim.errors import ConfigError, Problem, RunFolderError
-from rigidsim.scene.config import Experiment, load, parse
+from rigidsim.errors import ConfigError, Problem, RunFolderError, run_again
+from rigidsim.scene.config import Experiment, Overrides, parse
+from rigidsim.scene.config import load as load_file
 from rigidsim.scene.kernels.finding import EMBEDDED, FOLDERS
 from rigidsim.scene.registry import OBSERVABLES
 from rigidsim.scene.scene import build_scene
 from rigidsim.scene.schema import config_model
-from rigidsim.scene.validation_messages import shown
+from rigidsim.scene.validation_messages import nearest, shown
 from rigidsim.session.dataset import kernel_attributes
 from rigidsim.store.netcdf import check_version, root_attributes
 from rigidsim.store.provenance import read_attributes
+from rigidsim.workflows.ready_scenes import ALIASES, ready_scenes
 
 __all__ = ["Experiment", "Given", "as_experiment", "config_model", "load", "parse"]
 
 Given = Experiment | str | Path | Mapping[str, Any]
-"""An experiment, the path of its config, or its tables as a dictionary."""
+"""An experiment, the path of its config or the name of a ready scene, or its tables as a dictionary."""
+
+
+def load(path: str | Path, *, overrides: Overrides = ()) -> Experiment:
+    """Read a config file, or a ready scene by its name (``"coin"``), with the table files that it names.
+
+    An existing file comes before a scene. An experiment is named as its scene was asked for.
+
+    Args:
+        path: of the config, or a name that the command ``rigidsim new`` lists.
+        overrides: as for ``parse``.
+
+    Raises:
+        ConfigError: neither is given; or the file is missing, not text, too large, or a bad config.
+    """
+    if not isinstance(path, str | Path) or os.path.lexists(path):
+        return load_file(path, overrides=overrides)
+    name, scenes = str(path), ready_scenes()
+    scene = scenes.get(ALIASES.get(name.lower(), name))
+    if scene is None:
+        if hint := nearest(Path(name).stem, [*scenes, *ALIASES]):
+            what = f"there is no such file, nor a ready scene of this name{hint}; the command rigidsim new "
+            raise ConfigError(Problem("file", what + "lists all scenes"), name)
+        return load_file(path, overrides=overrides)
+    if name != scene.stem:
+        as_table = isinstance(overrides, Mapping)
+        overrides = {"name": name, **overrides} if as_table else [f'name="{name}"', *overrides]
+    return load_file(scene, overrides=overrides)
 
 
 def as_experiment(given: Given, changes: Mapping[str, Any] | None = None) -> Experiment:
@@ -45,7 +75,10 @@ def embedded(dataset: Path, *, overrides: Sequence[str] = ()) -> Experiment:
     """The experiment that a dataset was made from, with the defaults that were in force when the run began;
     ``overrides`` as in ``rigidsim.load``.
     """
-    found = root_attributes(dataset)
+    try:
+        found = root_attributes(dataset)
+    except RunFolderError as error:
+        raise RunFolderError(f"{error}; {run_again(dataset.parent)}") from None
     check_version(found.get("schema_version"), dataset)
     text, given, settings = (found.get(name) for name in ("config", "config_given", "config_set"))
     if not (isinstance(text, str) and isinstance(given, str) and isinstance(settings, str)):

@@ -19,6 +19,7 @@ from rigidsim.session.storage import refuse_too_large, refuse_too_large_for_memo
 from rigidsim.solve.problem import InitialValueProblem, prepare
 from rigidsim.solve.status import Status
 from rigidsim.store.folder import RunFolder
+from rigidsim.store.outputs import refuse_inputs
 from rigidsim.store.run import MemoryRun, Run, SavedRun
 from rigidsim.store.summary import Summary
 from rigidsim.store.summary_parts import Caution, WarningCode
@@ -148,11 +149,13 @@ def _place(
         return
     folder = RunFolder(Path(out) / prepared.scene.name)
     refuse_too_large(prepared, folder.path)
+    scene = prepared.scene
+    places = [None if scene.ephemeris is None else scene.ephemeris.kernel.place]
+    places.append(None if scene.orientation is None else scene.orientation.place)
+    kernels = [place for place in places if place is not None]
+    refuse_inputs([folder.path], [*prepared.experiment.files, *kernels])
     with folder.locked():
-        scene = prepared.scene
-        places = [None if scene.ephemeris is None else scene.ephemeris.kernel.place]
-        places.append(None if scene.orientation is None else scene.orientation.place)
-        folder.begin(config, force=force, kernels=[place for place in places if place is not None])
+        folder.begin(config, force=force, kernels=kernels)
         yield folder
 
 
@@ -193,7 +196,7 @@ def certified(
         known |= {"chosen": choice.setting.title, "chosen_why": choice.why, "forecast": choice.forecast}
     cautions = summary.cautions
     if doubt is None:  # a certified error needs no estimate
-        cautions = [c for c in cautions if c.code is not WarningCode.ATTITUDE_UNCERTAIN]
+        cautions = [c for c in cautions if c.code != WarningCode.ATTITUDE_UNCERTAIN]
     else:
         cautions.append(Caution(WarningCode.NOT_CERTIFIED, doubt))
     session.phases.next("certify")

@@ -21,7 +21,7 @@ from rigidsim.accuracy.bench.plan import DEFAULT
 from rigidsim.errors import RigidsimError, RunFolderError
 from rigidsim.scene.choices import FULL
 from rigidsim.scene.config import Experiment
-from rigidsim.store import atomic
+from rigidsim.store.outputs import refuse_loss, writing
 from rigidsim.workflows.compare.compared import compare
 from rigidsim.workflows.compare.result import Comparison
 from rigidsim.workflows.plan_levels import compared_levels
@@ -120,19 +120,16 @@ def tradeoff(
     (s) that each took. Raises ``ConfigError`` and ``RunFolderError``.
     """
     experiment = as_experiment(experiment)
-    judged = [_judged(experiment, file, seconds) for file, seconds in others]  # before what takes long
     folder = None
     if out is not None:
         folder = Path(out) / f"{experiment.config.name}_tradeoff"
-        if (folder / DATASET).exists() and not force:
-            raise RunFolderError(
-                f"{folder / DATASET}: there is an earlier measurement; give --force to replace it, "
-                "or another --out"
-            )
         try:
             folder.mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise RunFolderError(f"{folder}: can't be made: {error.strerror or error}") from None
+        read = [*experiment.files, *(Path(file) for file, _ in others)]
+        refuse_loss([folder / DATASET, folder / FIGURE], read, force=force)
+    judged = [_judged(experiment, file, seconds) for file, seconds in others]  # before what takes long
     resolved = experiment
     if experiment.config.model.level != FULL:
         resolved = experiment.having([f'model.level="{FULL}"', "model.short_period=false"])
@@ -202,10 +199,7 @@ def save(dataset: xarray.Dataset, folder: Path) -> None:
     """Write dataset and figure, each of which appears only when complete."""
     from rigidsim.look.figures.work_precision import save_work_precision
 
-    try:
-        with atomic.replacing(folder / DATASET) as temporary:
-            dataset.to_netcdf(temporary, engine="h5netcdf")
-        with atomic.replacing(folder / FIGURE) as temporary:
-            save_work_precision(dataset, temporary)
-    except OSError as error:
-        raise RunFolderError(f"{folder}: can't be written: {error.strerror or error}") from None
+    with writing(folder / DATASET) as temporary:
+        dataset.to_netcdf(temporary, engine="h5netcdf")
+    with writing(folder / FIGURE) as temporary:
+        save_work_precision(dataset, temporary)

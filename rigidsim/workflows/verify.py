@@ -10,7 +10,7 @@ import numpy as np
 import xarray
 from pydantic import BaseModel
 
-from rigidsim.errors import RESUME, RunFolderError
+from rigidsim.errors import RESUME, RigidsimError, RunFolderError, run_again
 from rigidsim.session.session import Observer
 from rigidsim.solve.status import Status
 from rigidsim.store import provenance
@@ -80,9 +80,15 @@ def verify(path: str | Path, *, observer: Observer | None = None) -> Verdict:
         KeyboardInterrupt: the integration was interrupted; nothing was compared.
     """
     dataset, folder = _dataset(Path(path))
-    problems = _file_problems(dataset, folder)
+    broken = _seal_problems(dataset)
+    try:
+        experiment = experiment_again(dataset)
+    except RigidsimError:
+        if not broken:
+            raise
+        raise RunFolderError(f"{broken[0]}; {run_again(dataset.parent)}") from None
+    problems = broken + _file_problems(dataset, folder)
     saved = read_attributes(dataset)
-    experiment = experiment_again(dataset)
     with _scratch() as scratch:
         again = run(experiment, out=scratch, observer=observer)
         if again.status == Status.INTERRUPTED.value:
@@ -126,13 +132,18 @@ def _dataset(path: Path) -> tuple[Path, RunFolder | None]:
     return folder.dataset, None if alone else folder
 
 
-def _file_problems(dataset: Path, folder: RunFolder | None) -> list[str]:
-    """Faults that the files themselves show, before anything is integrated."""
-    problems = []
+def _seal_problems(dataset: Path) -> list[str]:
+    """What is wrong with the dataset's seal, if anything."""
     try:
         check_seal(dataset)
     except RunFolderError as error:
-        problems.append(error.for_command_line())
+        return [str(error)]
+    return []
+
+
+def _file_problems(dataset: Path, folder: RunFolder | None) -> list[str]:
+    """Other faults that the files themselves show, before anything is integrated."""
+    problems: list[str] = []
     if folder is None:
         return problems
     opened: Run = open_run(folder.path)

@@ -178,7 +178,7 @@ def test_plot_by_name(config: Config, rigidsim_command: Command, tmp_path: Path)
     [
         ("x.pdf", "the suffix must be one of .png, .svg, given '.pdf'"),
         ("x", "the suffix must be one of .png, .svg, given ''"),
-        ("no/such/folder.png", "can't be written: No such file or directory"),
+        ("no/such/folder.png", "there is no folder no/such; make it first"),
     ],
 )
 def test_plot_of_a_wrong_target(target: str, message: str, config: Config, rigidsim_command: Command) -> None:
@@ -213,7 +213,7 @@ def test_view(web: bool, config: Config, rigidsim_command: Command, monkeypatch:
     ("arguments", "message"),
     [
         (["runs/free", "--png", "x.jpg"], "--png: given x.jpg; a name that ends in .png is allowed"),
-        (["runs/free", "--gif", "nowhere/x.gif"], "in a folder that isn't there; make it first"),
+        (["runs/free", "--gif", "nowhere/x.gif"], "there is no folder nowhere; make it first"),
         (["runs/free", "--gif", "x.gif", "--web"], "--web opens the viewer, --png, --gif and --mp4 draw"),
         (["runs/free", "--seconds", "3"], "--seconds is for --gif and --mp4"),
         (["runs/free", "--member", "2"], "--member is for one sweep: give its folder"),

@@ -15,6 +15,8 @@ import support
 import typer
 from typer.testing import CliRunner
 
+import rigidsim
+from rigidsim.cli import app as cli
 from rigidsim.cli.app import app
 from rigidsim.look import viewer
 
@@ -44,7 +46,7 @@ QUICK = {
     "plan swept.toml --json": 0,
     "plan free.toml --physics 1arcsec --write least.toml --force --json": 2,
     "compare free.toml runs/free --set time.end=2 --within 1e-8 --out seen.h5 --figure seen.png --json": 0,
-    "compare free.toml runs/free --set time.end=2 --timeline both.rrd": 0,
+    "compare free.toml runs/free --set time.end=2 --timeline both.rrd --force": 0,
     "tradeoff free.toml --with runs/free,long": 2,
     "compare free.toml missing.bc --kernels missing.tsc": 2,
     "fit watched.toml --out fits --set time.end=3 --write watched_again.toml --force --json": 0,
@@ -56,7 +58,7 @@ QUICK = {
     "plot runs/free --what drift --out drift.png": 0,
     "plot runs/free --what rates --for-slides dark --out slide.png": 0,
     "plot runs/swept --out swept.png": 0,
-    "analyse runs/free --variable angular_velocity.z --lines 1 --out lines.h5 --json": 0,
+    "analyse runs/free --variable angular_velocity.z --lines 1 --out lines.h5 --force --json": 0,
     "export runs/free --format aem --out free.aem --force --epoch J2000 --axes ICRF --object-name COIN": 0,
     "export runs/free --format oem --out free.oem --epoch J2000 --frame ICRF --object-id 2000-001A": 0,
     "export runs/free --format csv --out free.csv --angle-unit deg --variable quaternion": 0,
@@ -149,6 +151,21 @@ def test_each_option_is_in_a_line() -> None:
     own = {o for p in program.params for o in p.opts if o.startswith("-")} - FROM_TYPER
     missing += sorted(own - {word for words in lines for word in words})
     assert not missing, f"add a line for each of {missing}"
+
+
+@pytest.mark.parametrize("name", [*typer.main.get_command(app).commands])  # type: ignore[attr-defined]
+def test_help_shows_what_it_says(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """No word of a docstring is taken for markup, and scenes of examples are there in an empty folder."""
+    monkeypatch.chdir(tmp_path)
+    text = " ".join(called(f"{name} --help", 0).output.split())
+    declared = getattr(cli, name).__doc__
+    assert " ".join(declared.split()) in text
+    example = declared.partition("Example: ")[2].partition(";")[0].split()
+    assert example[:2] == ["rigidsim", name]
+    if name in ("new", "check", "run", "sweep", "plan", "compare", "fit", "tradeoff"):
+        rigidsim.load(example[2])
+    for option in example:
+        assert not option.startswith("--") or option in text
 
 
 def run_line(line: str, code: int, folder: Path, patch: pytest.MonkeyPatch) -> None:

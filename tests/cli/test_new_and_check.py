@@ -50,6 +50,43 @@ def test_a_template_runs(scene: str) -> None:
         assert summary["events"]["flip"] >= 4
 
 
+# ready scenes by name
+
+
+def test_a_ready_scene_runs_by_its_name(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, rigidsim_command: Command
+) -> None:
+    """In an empty folder, with the tables and data that it reads; another name of it names the run."""
+    monkeypatch.chdir(tmp_path)
+    short = ("--set", "time.end=1", "--set", "output.timeline=false", "--json")
+    assert rigidsim_command("run", "coin", *short).exit_code == 0
+    assert rigidsim_command("run", "dzhanibekov", *short).exit_code == 0
+    assert {path.name for path in Path("runs").iterdir()} == {"coin", "dzhanibekov"}
+    for name in ("mars_with_table", "toutatis", "first_flip", "Bdot"):
+        result = rigidsim_command("check", name)
+        assert result.exit_code == 0, result.output
+        assert name in result.stdout
+    assert rigidsim_command("plan", "coin", "--json").exit_code == 0
+    assert rigidsim.load("toutatis", overrides={"time.end": "3 day"}).config.name == "toutatis"
+    assert rigidsim.load("toutatis", overrides=["name=mine"]).config.name == "mine"
+    assert rigidsim.run("coin", changes={"time.end": 0.1}, out=None).status == "finished"
+
+
+def test_an_existing_file_comes_before_a_scene(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, rigidsim_command: Command
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("coin").write_text(support.config(name="mine"))
+    assert rigidsim.load("coin").config.name == "mine"
+    Path("top").symlink_to("nowhere")  # it is meant, and missing
+    assert "No such file" in rigidsim_command("check", "top").output
+    for name in ("coins", "coin.toml", "feynmann"):
+        said = rigidsim_command("run", name).stderr
+        assert "no such file, nor a ready scene" in said
+        assert "did you mean" in said
+    assert "can't be read: No such file" in rigidsim_command("run", "my/experiment.toml").stderr
+
+
 # new
 
 

@@ -200,8 +200,8 @@ def test_a_run_that_cannot_even_begin_says_so(
 ) -> None:
     create = RunFolder.create
 
-    def then_read_only(folder: RunFolder, *, force: bool) -> None:
-        create(folder, force=force)
+    def then_read_only(folder: RunFolder, config: str, *, force: bool) -> None:
+        create(folder, config, force=force)
         remount("ro")
 
     name = config()

@@ -66,16 +66,25 @@ class Plan:
 
 
 def every_setting(exact: str = "", *, full: bool = False) -> list[Setting]:
-    """All settings, the most important first, since a budget cuts at the end."""
+    """All settings, since a budget cuts at the end: first those that compile and run fast, then what more
+    digits cost, then other formulations.
+    """
 
     def both(settings: list[Setting]) -> list[Setting]:
         return [replace(s, hold_invariants=held) for s in settings for held in (False, True)]
 
     general = [name for name, variables in FORMULATIONS.items() if variables.general]
     further = [name for name in general if name != DEFAULT.formulation]
-    plain = both([Setting(p) for p in ("double", "extended", "single", "quadruple")])
-    precise = [Setting(p, method=exact) for p in ("double", "extended", "quadruple")] if exact else []
+    peer = FORMULATIONS[DEFAULT.formulation].checked_by
+
+    def best(precision: str) -> list[Setting]:
+        # without a closed form the peer is needed to know the error of a reference, if nothing better is
+        # possible
+        other = [Setting(precision, method=exact)] if exact else [Setting(precision, formulation=peer)]
+        return both([Setting(precision)]) + (other if exact or precision != "quadruple" else [])
+
     loose = both([Setting(p, tolerance) for p, some in _TOLERANCES.items() for tolerance in some])
+    fast = [s for s in both([Setting("single")]) + loose if s.precision in ("single", "double")]
     tight = [
         replace(s, formulation=f)
         for p in ("double", "single", "extended")
@@ -84,14 +93,11 @@ def every_setting(exact: str = "", *, full: bool = False) -> list[Setting]:
     ]
     few = both([Setting("double", t, f) for t in _FEW_TOLERANCES for f in further])
     rest = [replace(s, formulation=f) for s in loose if s.precision != "quadruple" for f in further]
-    peer = FORMULATIONS[DEFAULT.formulation].checked_by
-    # needed to know the error of a reference, if nothing better is possible
-    others = [] if exact else [Setting(p, formulation=peer) for p in ("double", "extended")]
     listed = [
-        *plain[:2],
-        *precise,
-        *plain[2:],
-        *others,
+        *best("double"),
+        *sorted(fast, key=lambda s: s.hold_invariants),
+        *best("extended"),
+        *best("quadruple"),
         *loose,
         *tight[: 4 * len(further)],
         *few,

@@ -6,12 +6,13 @@ from pathlib import Path
 import rigidsim.workflows.check as validation
 import rigidsim.workflows.plan as planning
 import rigidsim.workflows.tradeoff as measuring
+from rigidsim.cli.exits import refuse_options
 from rigidsim.cli.screens.page import Page, Styled, answer, print_json
 from rigidsim.cli.screens.physics import print_physics
 from rigidsim.cli.screens.plan import print_plan, print_tradeoff
 from rigidsim.cli.screens.summary import print_checked
 from rigidsim.cli.screens.sweeps import print_sweep_plan
-from rigidsim.errors import ConfigError, Problem, RigidsimError
+from rigidsim.errors import RigidsimError
 from rigidsim.scene.editor_schema import editor_schema
 from rigidsim.scene.sweeps.sweep import Sweep
 from rigidsim.workflows.physics.required import required_physics
@@ -64,10 +65,8 @@ def plan(
         found = required_physics(experiment, physics, out=out, write=write, force=force, told=told)
         answer(as_json, found.as_dict(), print_physics, found)
         return
-    if write is not None or force:
-        what = 'given without --physics; add --physics ERROR, such as --physics "0.1 arcsec"'
-        raise ConfigError(Problem("--write" if write is not None else "--force", what))
-    swept = None if experiment.config.sweep is None else plan_sweep(Sweep.of(experiment))
+    refuse_options('is for --physics ERROR, such as --physics "0.1 arcsec"', write=write, force=force)
+    swept = None if experiment.config.sweep is None else plan_sweep(Sweep.of(experiment), out=out)
     made = planning.plan(experiment, out=out) if swept is None else swept.member
     if as_json:
         print_json((swept or made).as_dict())

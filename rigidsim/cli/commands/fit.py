@@ -5,8 +5,7 @@ from pathlib import Path
 
 from rigidsim.cli.screens.fit import print_again, print_fit, print_saved
 from rigidsim.cli.screens.page import answer
-from rigidsim.errors import RigidsimError
-from rigidsim.store import atomic
+from rigidsim.store.outputs import refuse_loss, writing
 from rigidsim.workflows.fit import fitting
 from rigidsim.workflows.fit.folder import FitFolder
 from rigidsim.workflows.fit.result import FitResult
@@ -24,14 +23,12 @@ def fit(
         from rigidsim.workflows.sweeps.members import single_member  # which few fits need
 
         experiment = single_member(experiment, member)
+    if write is not None:
+        refuse_loss([write], experiment.files, force=force)
     result = fitting.fit(experiment, out=out, force=force, told=_tell)
     if write is not None:
-        try:
-            atomic.write_bytes(write, result.experiment.text.encode())
-        except OSError as error:
-            raise RigidsimError(
-                f"{write}: can't be written: {error.strerror or error}; choose another name"
-            ) from None
+        with writing(write) as new:
+            new.write_text(result.experiment.text, encoding="utf-8")
     return _print(result, as_json)
 
 

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import rigidsim.workflows.analyse as analysing
 import rigidsim.workflows.export as exporting
+from rigidsim.cli.exits import refuse_options
 from rigidsim.cli.screens.analysis import print_analysis
 from rigidsim.cli.screens.page import answer
 from rigidsim.errors import RigidsimError
@@ -13,7 +14,7 @@ from rigidsim.look.figure_names import OVERVIEW, SPECTRUM
 from rigidsim.look.figures import available, check_name, figure_format, save_figure
 from rigidsim.look.figures.spectrum import save_spectrum
 from rigidsim.look.figures.sweep_maps import drawable, save_sweep_figure
-from rigidsim.store import atomic
+from rigidsim.store.outputs import ANALYSIS, refuse_loss, writing
 from rigidsim.store.run import SavedRun, open_run
 from rigidsim.store.sweeps.folder import is_sweep
 from rigidsim.store.sweeps.run import SavedSweep, open_sweep
@@ -23,14 +24,17 @@ from rigidsim.workflows.view import render, runs_of, show
 ALL = "all"
 
 
-def analyse(run_path: Path, variable: list[str] | None, lines: int, out: Path | None, as_json: bool) -> None:
+def analyse(
+    run_path: Path, variable: list[str] | None, lines: int, out: Path | None, force: bool, as_json: bool
+) -> None:
     """Find lines, save them, print them."""
     opened = open_any(run_path)
     _tell_notes(opened)
+    usual = opened.folder.analysis if isinstance(opened, SavedRun) else opened.beside(ANALYSIS)
+    places = analysing.places_of(out or usual, opened.files, force=force)
     analysis = analysing.analyse(opened, variable or (), lines=lines)
-    usual = opened.folder.analysis if isinstance(opened, SavedRun) else opened.beside("analysis.h5")
-    saved = analysing.save(analysis, out or usual)
-    answer(as_json, analysis.as_dict(), print_analysis, analysis, saved)
+    analysing.save(analysis, places)
+    answer(as_json, analysis.as_dict(), print_analysis, analysis, places)
 
 
 def export(
@@ -52,8 +56,8 @@ def export(
 def plot(run_path: Path, what: list[str] | None, out: Path | None, for_slides: str | None) -> None:
     """Draw figures of a run, or maps of a sweep."""
     swept = is_sweep(run_path)
-    if for_slides is not None and (swept or SPECTRUM in (what or [])):
-        raise RigidsimError("--for-slides: is for figures of a single run other than spectrum; leave it out")
+    if swept or SPECTRUM in (what or []):
+        refuse_options("is for figures of a single run other than spectrum", for_slides=for_slides)
     saved = open_sweep(run_path) if swept else open_any(run_path)
     _tell_notes(saved)
     wanted = list(dict.fromkeys(what or []))
@@ -80,7 +84,8 @@ def plot(run_path: Path, what: list[str] | None, out: Path | None, for_slides: s
             target = folder / usual if several or out is None else out
             try:
                 kind = figure_format(target)
-                with atomic.replacing(target) as new:
+                refuse_loss([target], saved.files)
+                with writing(target) as new:
                     if isinstance(saved, SavedSweep):
                         save_sweep_figure(dataset, new, None if name == OVERVIEW else name, file_format=kind)
                     elif name == SPECTRUM:
@@ -89,15 +94,12 @@ def plot(run_path: Path, what: list[str] | None, out: Path | None, for_slides: s
                         save_figure(dataset, new, name, file_format=kind, slides=for_slides)
             except ValueError as error:
                 raise RigidsimError(f"plot: {error}" if swept else str(error)) from None
-            except OSError as error:
-                why = error.strerror or error
-                raise RigidsimError(f"{target}: can't be written: {why}; choose another --out") from None
             print(target)
 
 
 def view(
     run_paths: list[Path], web: bool, png: Path | None, gif: Path | None, mp4: Path | None,
-    seconds: float | None, member: list[int] | None, at: str | None, part: str,
+    seconds: float | None, member: list[int] | None, at: str | None, part: str | None,
 ) -> int:  # fmt: skip
     """Open the viewer, or draw to files."""
     targets = {".png": png, ".gif": gif, ".mp4": mp4}
@@ -105,22 +107,22 @@ def view(
     for suffix, target in asked.items():
         if target.suffix.lower() != suffix:
             raise RigidsimError(f"--{suffix[1:]}: given {target}; a name that ends in {suffix} is allowed")
-        if not target.absolute().parent.is_dir():
-            raise RigidsimError(
-                f"--{suffix[1:]}: given {target}, in a folder that isn't there; make it first"
-            )
-    if asked and web:
-        raise RigidsimError("view: --web opens the viewer, --png, --gif and --mp4 draw to a file: give one")
-    if seconds is not None and not {".gif", ".mp4"} & set(asked):
-        raise RigidsimError("view: --seconds is for --gif and --mp4: give one of them, too")
-    if at is not None and set(asked) != {".png"}:
-        raise RigidsimError("view: --at is the moment of a --png picture: give that alone")
+    if asked:
+        refuse_options("opens the viewer, but --png, --gif and --mp4 draw to a file", web=web)
+    else:
+        refuse_options("is for pictures and films (--png, --gif, --mp4)", part=part)
+    if not {".gif", ".mp4"} & set(asked):
+        refuse_options("is for films (--gif, --mp4)", seconds=seconds)
+    if set(asked) != {".png"}:
+        refuse_options("is the moment of a picture (--png alone)", at=at)
+    refuse_loss(asked.values(), run_paths)
     named = runs_of(run_paths, member or ())
+    refuse_loss(asked.values(), [path for _, one in named for path in one.files])
     for _, one in named:
         _tell_notes(one)
     for target in asked.values():
         told = _tell if sys.stderr.isatty() else None
-        render(named, target, seconds=seconds, told=told, at=at, part=part)
+        render(named, target, seconds=seconds, told=told, at=at, part=part or "page")
         print(target)
     return 0 if asked else show(named, web=web)
 

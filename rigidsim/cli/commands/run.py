@@ -4,11 +4,13 @@ import sys
 from pathlib import Path
 
 import rigidsim.workflows.run as workflow
+from rigidsim.cli.exits import refuse_options
 from rigidsim.cli.screens.closing import print_run
 from rigidsim.errors import RigidsimError
 from rigidsim.scene.scene import build_scene
 from rigidsim.session import progress
 from rigidsim.session.understood import cautions_about, cautions_of
+from rigidsim.store.outputs import refuse_inputs
 from rigidsim.workflows.read import embedded, load
 
 
@@ -20,8 +22,12 @@ def run(
     experiments = [load(path, overrides=overrides or []) for path in configs or []]
     if dataset is not None:
         experiments.append(embedded(dataset, overrides=overrides or []))
-    if scan and member is not None:
-        raise RigidsimError("run: --member is one of a config's [sweep], --sweep makes another: give one")
+    if scan:
+        refuse_options("is for runs, and --sweep makes a sweep", member=member, verbose=verbose)
+    if as_json:
+        refuse_options("is for people, and --json always prints everything", verbose=verbose)
+    read = [path for experiment in experiments for path in experiment.files]
+    refuse_inputs([out / experiment.config.name for experiment in experiments], read)
     if scan:
         from rigidsim.cli.commands import sweep as sweeps  # a room of its own
 

@@ -6,6 +6,7 @@ from pathlib import Path
 import rigidsim.workflows.resume as resuming
 import rigidsim.workflows.sweeps.sweep as workflow
 import rigidsim.workflows.verify as verifying
+from rigidsim.cli.exits import refuse_options
 from rigidsim.cli.screens.closing import print_run
 from rigidsim.cli.screens.page import answer
 from rigidsim.cli.screens.summary import print_verdict
@@ -18,21 +19,21 @@ from rigidsim.store.fits import is_fit
 from rigidsim.store.sweeps.folder import is_sweep
 from rigidsim.store.sweeps.run import SavedSweep, open_sweep
 from rigidsim.workflows.read import load
-from rigidsim.workflows.sweeps.verify import verify_sweep
+from rigidsim.workflows.sweeps.verify import MEMBERS, verify_sweep
 
 
 def sweep(
-    config: Path, out: Path, overrides: list[str] | None, workers: int, scheduler: str | None,
+    config: Path, out: Path, overrides: list[str] | None, workers: int | None, scheduler: str | None,
     tiles: str | None, force: bool, as_json: bool,
 ) -> int:  # fmt: skip
     """Run all members, or a share of them."""
     share = None if tiles is None else _share(tiles)
-    if scheduler is not None and workers > 1:
-        raise RigidsimError("--workers are processes of this machine, --scheduler has its own: give one")
+    if scheduler is not None:
+        refuse_options("is for processes of this machine, and --scheduler has its own", workers=workers)
     experiment = load(config, overrides=overrides or [])
     with SweepProgress() as watching:
         result = workflow.sweep(
-            experiment, out=out, force=force, workers=workers, scheduler=scheduler, tiles=share,
+            experiment, out=out, force=force, workers=workers or 1, scheduler=scheduler, tiles=share,
             observer=watching,
         )  # fmt: skip
     code = _print(result, as_json)
@@ -53,37 +54,41 @@ def run_scanned(
 
 
 def resume(
-    run_path: Path, until: str | None, overrides: list[str] | None, workers: int, as_json: bool, verbose: bool
-) -> int:
+    run_path: Path, until: str | None, overrides: list[str] | None, workers: int | None, as_json: bool,
+    verbose: bool,
+) -> int:  # fmt: skip
     """Go on with a run, a sweep or a fit."""
+    of_runs = {"until": until, "set": overrides, "verbose": verbose}
     if is_fit(run_path):
-        if until is not None or overrides:
-            raise RigidsimError("resume: --until and --set are for runs; a fit goes on as it was begun")
+        refuse_options(f"is for runs and sweeps; {run_path} is a fit, which goes on as it was begun",
+                       **of_runs, workers=workers)  # fmt: skip
         from rigidsim.cli.commands import fit  # which few need
 
         return fit.resume(run_path, as_json)
     if not is_sweep(run_path):
+        refuse_options(f"is for sweeps; {run_path} is a run, which one process integrates", workers=workers)
+        if as_json:
+            refuse_options("is for people, and --json always prints everything", verbose=verbose)
         with progress.observer() as observer:
             run = resuming.resume(run_path, until=until, overrides=overrides or [], observer=observer)
         return print_run(run, as_json, verbose=verbose)
-    if until is not None or overrides:
-        raise RigidsimError(
-            "resume: --until and --set are for single runs; change the config of a sweep and give rigidsim "
-            "sweep CONFIG again, which computes only what is new"
-        )
+    what = f"is for runs, and {run_path} is a sweep; change its config and give rigidsim sweep CONFIG again"
+    refuse_options(f"{what} (that computes only what is new)", **of_runs)
     with SweepProgress() as watching:
-        result = workflow.resume_sweep(run_path, workers=workers, observer=watching)
+        result = workflow.resume_sweep(run_path, workers=workers or 1, observer=watching)
     return _print(result, as_json)
 
 
-def verify(run_path: Path, members: int, as_json: bool) -> int:
+def verify(run_path: Path, members: int | None, as_json: bool) -> int:
     """Integrate again and compare."""
+    if not is_sweep(run_path):
+        refuse_options(f"is for sweeps; {run_path} is compared as a whole", members=members)
     if is_fit(run_path):
         from rigidsim.cli.commands import fit
 
         return fit.verify(run_path, as_json)
     if is_sweep(run_path):
-        verdict, what = verify_sweep(run_path, members=members), "member"
+        verdict, what = verify_sweep(run_path, members=MEMBERS if members is None else members), "member"
     else:
         with progress.observer() as observer:
             verdict, what = verifying.verify(run_path, observer=observer), "sample"

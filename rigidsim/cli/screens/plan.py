@@ -135,7 +135,9 @@ def print_tradeoff(result: dict[str, Any]) -> None:
         )
     part = over / result["horizon_seconds"]
     how_much = "all" if part >= 1 else f"the first {100 * part:.2g} %"
-    on.line("measured", f"{how_much} of {span_text(result['horizon_seconds'])}; nothing is extrapolated")
+    some = sum(not row["reason"] for row in result["settings"])
+    some_of = f"{some} of {len(result['settings'])} settings, {how_much} of "
+    on.line("measured", f"{some_of}{span_text(result['horizon_seconds'])}; nothing is extrapolated")
     on.line("compared", f"{result['compared']}; largest error at up to 38 times")
     on.line("against", result["reference"])
     on.line(

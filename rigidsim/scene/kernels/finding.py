@@ -33,7 +33,7 @@ def kernel_of(given: str, source: str) -> Kernel:
         try:
             return open_package(given)
         except KernelError as error:
-            beside = [x for x in _folders(source) if f"{given}.bsp" in _names(x)]
+            beside = [x for x in folders_of(source) if f"{given}.bsp" in _names(x)]
             hint = f'; the file beside the config is "./{given}.bsp"' if beside else ""
             raise KernelError(f"{error}{hint}") from None
     stem = Path(given).stem
@@ -61,7 +61,7 @@ def find_file(given: str, source: str, what: str) -> Path:
 
 
 def _find(given: str, source: str, kind: str) -> Path:
-    wanted, folders = Path(given).expanduser(), _folders(source)
+    wanted, folders = Path(given).expanduser(), folders_of(source)
     places = [wanted] if wanted.is_absolute() else [folder / wanted for folder in folders]
     try:
         for path in [*places, *(folder / wanted.name for folder in folders)]:
@@ -93,7 +93,7 @@ def _is_package(name: str) -> bool:
     return True
 
 
-def _folders(source: str) -> list[Path]:
+def folders_of(source: str) -> list[Path]:
     """Folders to look in: the config's, the one that a run's folder notes, and those that are named."""
     file = Path(source.removesuffix(EMBEDDED)).absolute()
     named = [Path(x) for x in os.environ.get(FOLDERS, "").split(os.pathsep) if x]

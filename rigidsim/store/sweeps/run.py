@@ -117,6 +117,11 @@ class SavedSweep:
         return str(self.folder.path)
 
     @property
+    def files(self) -> list[Path]:
+        """Its folder, in which nothing may be written over."""
+        return [self.folder.path]
+
+    @property
     def status(self) -> str:
         """Status of the sweep: "finished", "running", "interrupted" ..."""
         return self.outcome.status

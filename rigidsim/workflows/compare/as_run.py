@@ -40,6 +40,11 @@ class TrajectoryRun(Run):
         """The file."""
         return str(self.path)
 
+    @property
+    def files(self) -> list[Path]:
+        """See ``Run``."""
+        return [self.path]
+
     @cached_property
     def dataset(self) -> xarray.Dataset:
         """Attitude, rates and flight, in s, rad/s and SI, and all other columns as they are."""
@@ -79,6 +84,12 @@ def trajectory_given(table: Any, scene: Scene, kernels: Sequence[str | Path]) ->
     if path.is_dir() and path.suffix != ".zarr":
         return trajectory_given(open_run(path), scene, kernels)
     return read_trajectory(path)
+
+
+def files_of(table: Any, kernels: Sequence[str | Path] = ()) -> list[Path]:
+    """The files that ``trajectory_given`` reads."""
+    read = table.files if isinstance(table, Run) else [table] if isinstance(table, str | Path) else []
+    return [Path(path) for path in (*read, *kernels)]
 
 
 def open_any(path: str | Path) -> SavedRun | TrajectoryRun:

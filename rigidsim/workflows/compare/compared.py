@@ -14,8 +14,8 @@ from rigidsim.errors import RigidsimError
 from rigidsim.scene.config import Experiment
 from rigidsim.solve.from_states import FromStates, NotFromStates
 from rigidsim.store.many_rows import blocks_of, flagged, gathered, largest, mean_square, picked
-from rigidsim.workflows.compare import defects
-from rigidsim.workflows.compare.as_run import dataset_of_rows, trajectory_given
+from rigidsim.workflows.compare import defects, saving
+from rigidsim.workflows.compare.as_run import dataset_of_rows, files_of, trajectory_given
 from rigidsim.workflows.compare.by_equations import ByEquations
 from rigidsim.workflows.compare.columns import Attitudes, attitudes_of, seconds_in
 from rigidsim.workflows.compare.conventions import (
@@ -57,6 +57,7 @@ def compare(
     figure: str | Path | None = None,
     timeline: str | Path | None = None,
     kernels: Sequence[str | Path] = (),
+    force: bool = False,
 ) -> Comparison:
     """Judge a trajectory by how far it is from an experiment, at its own times.
 
@@ -68,12 +69,15 @@ def compare(
         out: file for the dataset. figure: file for the figure, a .png or .svg.
         timeline: file for a timeline (.rrd) of both bodies with the angle between them.
         kernels: SPICE's, that a CK is read with: its clock, and leap seconds.
+        force: replace existing files; what is read is never written over.
 
     Raises:
         ConfigError: the config can't be run.
-        RigidsimError: the trajectory can't be used, and what to do.
+        RigidsimError: the trajectory can't be used, or a file would be replaced, and what to do.
     """
     asked = as_experiment(experiment)
+    place, picture, drawn = (None if path is None else Path(path) for path in (out, figure, timeline))
+    saving.refuse_targets(place, picture, drawn, [*asked.files, *files_of(table, kernels)], force=force)
     quiet, scene = plain(asked)
     given = attitudes_of(trajectory_given(table, scene, kernels), scene.epoch)
     if not 0 < within < np.pi:
@@ -85,12 +89,12 @@ def compare(
         equations, why_not = None, str(error)
     judging = _Judging(quiet, given, equations, why_not, float(scene.start), float(scene.samples.last))
     result = judging.compared(asked.config.name, within)
-    if out is not None:
-        result = _with(result, dataset_file=str(save_dataset(result.dataset, Path(out))))
-    if figure is not None:
-        result = _with(result, figure_file=str(save_figure(result.dataset, Path(figure))))
-    if timeline is not None:
-        result = _with(result, timeline_file=str(judging.drawn(Path(timeline))))
+    if place is not None:
+        result = _with(result, dataset_file=str(save_dataset(result.dataset, place)))
+    if picture is not None:
+        result = _with(result, figure_file=str(save_figure(result.dataset, picture)))
+    if drawn is not None:
+        result = _with(result, timeline_file=str(judging.drawn(drawn)))
     return result
 
 

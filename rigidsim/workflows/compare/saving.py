@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
 import xarray
 
 from rigidsim.errors import RigidsimError
-from rigidsim.store import atomic
 from rigidsim.store.many_rows import blocks_of
-from rigidsim.store.netcdf import writing
+from rigidsim.store.netcdf import writing as writing_netcdf
+from rigidsim.store.outputs import refuse_loss, writing
 
 FIGURES = (".png", ".svg")
 DRAWN = ("drawing", "principal_moments", "principal_axes", "center_of_mass", "mass", "surroundings")
@@ -19,23 +20,29 @@ MOST_SHOWN = 20_000  # rows of a timeline
 _MOST_DRAWN = 4000  # points of a figure
 
 
+def refuse_targets(
+    out: Path | None, figure: Path | None, timeline: Path | None, inputs: Iterable[Path], *, force: bool
+) -> None:
+    """Refuse files of the wrong kind, and those that would replace something (``store.outputs``)."""
+    if out is not None and out.suffix.lower() in FIGURES:
+        raise RigidsimError(f"{out}: the dataset is no picture; give --out FILE.h5, and --figure for that")
+    if figure is not None and figure.suffix.lower() not in FIGURES:
+        raise RigidsimError(f"{figure}: a figure is a .png or a .svg")
+    if timeline is not None and timeline.suffix.lower() != ".rrd":
+        raise RigidsimError(f"--timeline: given {timeline}; a name that ends in .rrd is allowed")
+    refuse_loss(filter(None, (out, figure, timeline)), inputs, force=force)
+
+
 def save_dataset(dataset: xarray.Dataset, path: Path) -> Path:
-    """Write the dataset of a comparison, which has numbers alone; a picture's name is refused."""
-    if path.suffix.lower() in FIGURES:
-        raise RigidsimError(f"{path}: the dataset is no picture; give --out FILE.h5, and --figure for that")
-    try:
-        with atomic.replacing(path) as temporary:
-            _write(dataset, temporary)
-    except OSError as error:
-        raise RigidsimError(
-            f"{path}: can't be written: {error.strerror or error}; choose another --out"
-        ) from None
+    """Write the dataset of a comparison, which has numbers alone."""
+    with writing(path) as temporary:
+        _write(dataset, temporary)
     return path
 
 
 def _write(dataset: xarray.Dataset, path: Path) -> None:
     """Variable by variable, by blocks of rows."""
-    with writing(path) as file:
+    with writing_netcdf(path) as file:
         file.attributes(dataset.attrs)
         for dim, size in dataset.sizes.items():
             file.dimension(str(dim), size)
@@ -67,15 +74,8 @@ def save_figure(dataset: xarray.Dataset, path: Path) -> Path:
     """Draw the figure, a PNG or SVG by its name."""
     from rigidsim.look.figures.compared import save_compared
 
-    if path.suffix.lower() not in FIGURES:
-        raise RigidsimError(f"{path}: a figure is a .png or a .svg")
-    try:
-        with atomic.replacing(path) as temporary:
-            save_compared(thinned(dataset), temporary, file_format=path.suffix.lower()[1:])
-    except OSError as error:
-        raise RigidsimError(
-            f"{path}: can't be written: {error.strerror or error}; choose another name"
-        ) from None
+    with writing(path) as temporary:
+        save_compared(thinned(dataset), temporary, file_format=path.suffix.lower()[1:])
     return path
 
 
@@ -83,15 +83,11 @@ def save_timeline(own: xarray.Dataset, theirs: xarray.Dataset, name: str, path: 
     """Write a timeline of the experiment and of a trajectory, side by side, and the angle between them."""
     from rigidsim.look.timeline.comparison import write_comparison  # which loads rerun
 
-    if path.suffix.lower() != ".rrd":
-        raise RigidsimError(f"--timeline: given {path}; a name that ends in .rrd is allowed")
     mine = str(own.attrs.get("title", "experiment"))
     named = [(mine, own), (name if name != mine else f"{name} of the file", theirs)]
     try:
-        with atomic.replacing(path) as temporary:
+        with writing(path) as temporary:
             write_comparison(named, temporary)
-    except (OSError, RuntimeError) as error:
-        raise RigidsimError(
-            f"{path}: can't be written: {getattr(error, 'strerror', None) or error}; choose another name"
-        ) from None
+    except RuntimeError as error:
+        raise RigidsimError(f"{path}: can't be written: {error}") from None
     return path

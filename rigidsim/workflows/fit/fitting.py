@@ -12,6 +12,7 @@ import numpy as np
 from rigidsim.errors import SWEEP, ConfigError, Problem, RigidsimError, RunFolderError, either
 from rigidsim.scene.config import Experiment
 from rigidsim.store import atomic
+from rigidsim.store.outputs import refuse_inputs
 from rigidsim.workflows.fit.findings import Findings
 from rigidsim.workflows.fit.folder import FitFolder, Remembered
 from rigidsim.workflows.fit.keys import FitKeys
@@ -64,6 +65,7 @@ def fit(
     missing = [path for files in places for path in files.all if not path.exists()]
     if missing:
         raise RigidsimError(f"{missing[0]}: there is no such file; [[fit.data]] files lie beside the config")
+    refuse_inputs([folder.path], [*asked.files, *(path for files in places for path in files.all)])
     with folder.locked():
         folder.begin(asked, places, force=force)
         return _kept(asked, folder, told or _silent)

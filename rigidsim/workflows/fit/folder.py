@@ -39,6 +39,7 @@ _NAMES = (
     "evaluations",
     BEGUN,
 )
+_AGAIN = f"copy it again from where it is whole, or make the fit again ({FORCE})"
 
 
 @dataclass(frozen=True)
@@ -119,7 +120,7 @@ class FitFolder(WorkFolder):
         try:
             return FitResult.model_validate_json(self.summary.read_text(encoding="utf-8"))
         except (OSError, ValueError) as error:
-            raise RunFolderError(f"{self.summary}: can't be read ({error})") from None
+            raise RunFolderError(f"{self.summary}: can't be read ({error}); {_AGAIN}") from None
 
     def motion(self) -> FittedRun:
         """The fitted experiment's motion with the predicted uncertainty, to be viewed.
@@ -131,7 +132,7 @@ class FitFolder(WorkFolder):
         try:
             fit = xarray.load_dataset(self.dataset, engine="h5netcdf")
         except (OSError, ValueError) as error:
-            raise RunFolderError(f"{self.dataset}: can't be read ({error})") from None
+            raise RunFolderError(f"{self.dataset}: can't be read ({error}); {_AGAIN}") from None
         return fitted_run(load(self.fitted), fit, str(self.path))
 
     def copies(self, experiment: Experiment) -> list[DataFiles]:

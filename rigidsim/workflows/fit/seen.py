@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Self
 
 import numpy as np
@@ -36,6 +37,11 @@ class FittedRun(Run):
     def place(self) -> str:
         """The fit's folder."""
         return self.source
+
+    @property
+    def files(self) -> list[Path]:
+        """See ``Run``."""
+        return [Path(self.source)]
 
     @property
     def dataset(self) -> xarray.Dataset:

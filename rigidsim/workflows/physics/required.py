@@ -7,13 +7,13 @@ from collections.abc import Callable, Sequence
 from decimal import Decimal
 from pathlib import Path
 
-from rigidsim.errors import FORCE, ConfigError, Problem, RunFolderError, either
+from rigidsim.errors import ConfigError, Problem, either
 from rigidsim.scene.config import Experiment
 from rigidsim.scene.exact import parse_number
 from rigidsim.scene.readable import span_text
 from rigidsim.session.session import Tuning
 from rigidsim.solve.problem import prepare
-from rigidsim.store import atomic
+from rigidsim.store.outputs import refuse_inputs, refuse_loss, writing
 from rigidsim.workflows.physics.beyond import averaged_levels, geodetic
 from rigidsim.workflows.physics.effects import missing_from, without
 from rigidsim.workflows.physics.models import ModelRun, Models
@@ -64,8 +64,11 @@ def required_physics(
     if not isinstance(out, str | Path):
         what = f"given {out!r}; a folder is allowed: the runs are kept there, so that they can go on"
         raise ConfigError(Problem("out", what))
-    target = None if write is None else _target(Path(write), force)
+    target = None if write is None else Path(write)
     folder = Path(out) / f"{experiment.config.name}-physics"
+    refuse_inputs([folder], experiment.files)
+    if target is not None:
+        refuse_loss([target], experiment.files, force=force)
     prepared = prepare(experiment)
     models = Models(experiment, folder, force, tuning, told)
     _refuse_without_effects(experiment, models)
@@ -115,7 +118,8 @@ def required_physics(
     if target is not None:
         made = least_config(experiment, found.least)
         made = made.having([f'name="{config.name[:_LONGEST]}-least"'])  # beside the full one's run
-        _write(target, _comments(result) + made.text)
+        with writing(target) as new:
+            new.write_text(_comments(result) + made.text, encoding="utf-8")
     _draw(result, folder / FIGURE)
     return result
 
@@ -159,21 +163,6 @@ def _asked(error: str | float | Decimal) -> float:
 def _in_short(problem: Problem) -> str:
     """A problem without the names that are allowed; numbers of tables are those of the smaller config."""
     return problem.what.partition("; allowed: ")[0]
-
-
-def _target(path: Path, force: bool) -> Path:
-    if path.exists() and not force:
-        raise RunFolderError(f"{path}: exists; {FORCE} replaces it, or give another file")
-    if not path.parent.is_dir():
-        raise RunFolderError(f"{path}: there is no folder {path.parent}; make it, or give another file")
-    return path
-
-
-def _write(path: Path, text: str) -> None:
-    try:
-        atomic.write_bytes(path, text.encode())
-    except OSError as error:
-        raise RunFolderError(f"{path}: can't be written: {error.strerror or error}") from None
 
 
 def _refuse_without_effects(experiment: Experiment, models: Models) -> None:
@@ -253,8 +242,5 @@ def _warnings(full: ModelRun, most: float) -> list[str]:
 def _draw(result: PhysicsPlan, path: Path) -> None:
     from rigidsim.look.figures.ladder import save_ladder
 
-    try:
-        with atomic.replacing(path) as temporary:
-            save_ladder(result.as_dict(), temporary)
-    except OSError as error:
-        raise RunFolderError(f"{path}: can't be written: {error.strerror or error}") from None
+    with writing(path) as temporary:
+        save_ladder(result.as_dict(), temporary)

@@ -3,6 +3,7 @@
 import itertools
 import math
 from collections.abc import Callable, Iterable, Iterator
+from pathlib import Path
 
 from rigidsim.errors import ConfigError, Problem, either
 from rigidsim.scene.initial_values import check_start
@@ -276,11 +277,13 @@ class SweepPlan(SummaryPart):
         return f"<Plan of the sweep {self.name!r}: {self.members:,} members, about {seconds:.3g} s>"
 
 
-def plan_sweep(sweep: Sweep) -> SweepPlan:
-    """Explain and predict a sweep; integrates for about half a second and writes nothing."""
+def plan_sweep(sweep: Sweep, *, out: str | Path = "runs") -> SweepPlan:
+    """Explain and predict a sweep; integrates for about half a second and writes nothing. ``out``: as for
+    ``plan``.
+    """
     sweep = recording(sweep)
     first = check_sweep(sweep, every=sweep.count <= QUICK)
-    made = plan(sweep.experiment_of(first_possible(sweep)))
+    made = plan(sweep.experiment_of(first_possible(sweep)), out=out)
     seconds, size = _member_seconds(sweep, made), bytes_of_member(sweep, first)
     length = sweep.table.tile
     if length is None:

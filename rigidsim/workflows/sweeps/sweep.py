@@ -14,6 +14,7 @@ from rigidsim.scene.sweeps.sweep import Sweep
 from rigidsim.scene.toml_text import apply_overrides, parse_toml
 from rigidsim.scene.validation_messages import shown
 from rigidsim.session.dataset import kernel_attributes
+from rigidsim.store.outputs import refuse_inputs
 from rigidsim.store.sweeps.dataset import write_dataset
 from rigidsim.store.sweeps.folder import SweepFolder
 from rigidsim.store.sweeps.run import SavedSweep, open_sweep
@@ -92,9 +93,11 @@ def sweep(
             "as they are finished, so that a sweep can be gone on with"
         )
         raise ConfigError(Problem("out", what), given.source)
+    folder = SweepFolder(Path(out) / given.config.name)
+    refuse_inputs([folder.path], given.files)
     return run_sweep(
         recording(Sweep.of(given)),
-        SweepFolder(Path(out) / given.config.name),
+        folder,
         force=force,
         way=_way(workers, scheduler),
         share=tiles,

@@ -1,0 +1,93 @@
+"""What a message about a damaged file advises is possible, and leads on.
+
+Truth: the command that the message names is given; it ends well, and its dataset is that of the whole file.
+"""
+
+from __future__ import annotations
+
+import json
+import random
+import re
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray
+from made_by_commands import called
+from support import seeds
+
+import rigidsim
+
+LOOKS = ("info", "resume", "verify", "plot", "analyse", "export --format csv")
+
+
+def damage(path: Path, draw: random.Random) -> None:
+    content = bytearray(path.read_bytes())
+    how = draw.choice(["cut", "flipped", "empty"])
+    if how == "cut":
+        del content[draw.randrange(len(content)) :]
+    elif how == "empty":
+        content.clear()
+    else:
+        content[draw.randrange(len(content))] ^= 1 << draw.randrange(8)
+    path.write_bytes(content)
+
+
+@pytest.mark.parametrize("seed", seeds(3, 25))
+def test_the_advice_about_a_damaged_dataset_leads_on(
+    seed: int, made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    draw = random.Random(seed)
+    shutil.copytree(made / "runs", "runs")
+    damage(Path("runs/free/dataset.h5"), draw)
+    for look in draw.sample(LOOKS, 2):
+        first, *options = look.split()
+        result = called([first, "runs/free", *options])
+        if first == "verify" and result.exit_code == 1:  # it names what differs, and that the seal is broken
+            assert "dataset.h5" in result.output
+            continue
+        assert result.exit_code == 2, result.output
+        command = re.search(r"rigidsim (run \S+ --out ELSEWHERE)", result.stderr)
+        assert command, result.stderr
+    assert called(["run", "runs/free/config.toml", "--out", "elsewhere"]).exit_code == 0
+    with (
+        xarray.open_dataset("elsewhere/free/dataset.h5", engine="h5netcdf") as again,
+        xarray.open_dataset(made / "runs/free/dataset.h5", engine="h5netcdf") as whole,
+    ):
+        assert np.array_equal(again["quaternion"], whole["quaternion"])
+
+
+@pytest.mark.parametrize("seed", seeds(1, 10))
+def test_a_sweep_is_written_again(
+    seed: int, made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    shutil.copytree(made / "runs", "runs")
+    whole = Path("runs/swept/dataset.h5").read_bytes()
+    damage(Path("runs/swept/dataset.h5"), random.Random(seed))
+    result = called(["info", "runs/swept"])
+    assert result.exit_code == 2
+    assert "remove it, and rigidsim resume writes it again" in result.stderr
+    Path("runs/swept/dataset.h5").unlink()
+    assert called(["resume", "runs/swept"]).exit_code == 0
+    assert len(Path("runs/swept/dataset.h5").read_bytes()) == len(whole)
+
+
+def test_a_later_versions_warning_is_plain_words(
+    made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+
+    monkeypatch.chdir(tmp_path)
+    shutil.copytree(made / "runs/free", "runs/free")
+    path = Path("runs/free/summary.json")
+    summary = json.loads(path.read_text())
+    summary |= {"warnings": ["the moon was full"], "warning_codes": ["full_moon"]}
+    path.write_text(json.dumps(summary))
+    outcome = rigidsim.open_run("runs/free").outcome
+    assert [(caution.code, caution.text) for caution in outcome.cautions] == [
+        ("full_moon", "the moon was full")
+    ]
+    assert "the moon was full" in called(["info", "runs/free"]).output
+    assert outcome.warned(outcome.cautions).as_dict()["warning_codes"] == ["full_moon"]
