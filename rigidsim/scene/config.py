@@ -64,7 +64,7 @@ class Experiment:
         """
         path = Path(self.source.removesuffix(EMBEDDED))
         folders = folders_of(self.source)
-        texts = [name for text in _texts(self.to_dict()) for name in (text, Path(text).name)]
+        texts = [name for text in texts_in(self.to_dict()) for name in (text, Path(text).name)]
         named = [folder / text for text in texts for folder in folders]
         return [file for file in dict.fromkeys([path, *named]) if os.path.isfile(file)]
 
@@ -158,19 +158,19 @@ class Experiment:
         return f"<b>{escape(self.config.name)}</b><pre>{escape(self.text)}</pre>"
 
 
-def _texts(value: Any) -> Iterator[str]:
-    """Strings among the values of a table and of the tables in it that a file may be named by."""
+def texts_in(value: Any) -> Iterator[str]:
+    """Strings in a table, and in the tables in it, by which a file may be named."""
     if isinstance(value, str):
         if "\n" not in value:
             yield value
     elif isinstance(value, Mapping):
         for name, inner in value.items():
-            yield from _texts(inner)
+            yield from texts_in(inner)
             if isinstance(inner, Mapping) and "text" in inner:  # a table that stands in the config by now
                 yield name
     elif isinstance(value, list):
         for inner in value:
-            yield from _texts(inner)
+            yield from texts_in(inner)
 
 
 def parse(text: str, *, source: str = "config", overrides: Overrides = ()) -> Experiment:

@@ -9,6 +9,7 @@ from typing import Any
 
 from rigidsim.errors import RigidsimError
 from rigidsim.scene.bodies.presets import PRESETS
+from rigidsim.scene.config import texts_in
 from rigidsim.scene.validation_messages import nearest, shown
 
 SUBJECTS: Mapping[str, tuple[str, ...]] = {
@@ -163,19 +164,8 @@ def _file_of(scene: str) -> Path:
 
 def _companions(config: Path) -> list[Path]:
     """Files beside a config that it names as values."""
-    names = dict.fromkeys(text for text in _texts(_parsed(config)) if re.fullmatch(r"\w[\w.-]*\.\w+", text))
+    names = dict.fromkeys(text for text in texts_in(_parsed(config)) if re.fullmatch(r"\w[\w.-]*\.\w+", text))
     return [path for path in (config.parent / name for name in names) if path.is_file()]
-
-
-def _texts(value: Any) -> Iterator[str]:
-    if isinstance(value, str):
-        yield value
-    elif isinstance(value, Mapping):
-        for inner in value.values():
-            yield from _texts(inner)
-    elif isinstance(value, list):
-        for inner in value:
-            yield from _texts(inner)
 
 
 def _parsed(path: Path) -> dict[str, Any]:
