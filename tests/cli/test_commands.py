@@ -214,7 +214,7 @@ def test_view(web: bool, config: Config, rigidsim_command: Command, monkeypatch:
     [
         (["runs/free", "--png", "x.jpg"], "--png: given x.jpg; a name that ends in .png is allowed"),
         (["runs/free", "--gif", "nowhere/x.gif"], "there is no folder nowhere; make it first"),
-        (["runs/free", "--gif", "x.gif", "--web"], "--web: opens the viewer, but --png, --gif and --mp4 draw"),
+        (["runs/free", "--gif", "x.gif", "--web"], "--web: opens the viewer, but --png"),
         (["runs/free", "--seconds", "3"], "--seconds: is for films (--gif, --mp4)"),
         (["runs/free", "--member", "2"], "--member is for one sweep: give its folder"),
         (["runs/free", "runs/none"], "no run here"),

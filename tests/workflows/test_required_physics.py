@@ -434,7 +434,7 @@ def test_options_that_need_physics(tmp_path: Path) -> None:
         [sys.executable, "-m", "rigidsim", *asked], cwd=tmp_path, capture_output=True, text=True
     )
     assert done.returncode == 2
-    assert "--write: given without --physics" in done.stderr
+    assert "--write: is for --physics" in done.stderr
 
 
 PUBLISHED = {
