@@ -1,109 +1,194 @@
-"""Rows of CCSDS messages: quaternions of an AEM, positions and velocities of an OEM, in KVN or XML."""
+"""CCSDS messages as they are written, in KVN or XML: segments, each with its keywords and its rows.
+
+Attitudes (AEM) of 504.0-B-1 and 504.0-B-2, orbits (OEM) of 502.0-B. Covariances are passed over.
+"""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from xml.etree import ElementTree
 
 import numpy as np
 
 from rigidsim.errors import RigidsimError
-from rigidsim.scene.epochs import Epoch, parse_epoch
+from rigidsim.scene.epochs import SCALES, Epoch, parse_epoch
 
-_DATE = re.compile(r"(\d{4})-(\d\d\d?)(?:-(\d\d))?T([\d:.]+)Z?")
-_ATTITUDE = {"Q1": "qx", "Q2": "qy", "Q3": "qz", "QC": "qw"}
-_ORBIT = {"X": "x", "Y": "y", "Z": "z", "X_DOT": "vx", "Y_DOT": "vy", "Z_DOT": "vz"}
-_KM = 1000.0
-
-Row = tuple[int, str, dict[str, float], dict[str, str]]
-"""Number of the line (KVN) or of the row, date, values by name, and the keys that are valid for it."""
+_STATES = {"AEM": "attitudeState", "OEM": "stateVector"}
+_UNITS = ("deg", "deg/s", "1/s", "s", "km", "km/s", "km/s**2")
+_MARKS = ("META_STOP", "DATA_START", "DATA_STOP")
 
 
-def message_rows(
-    path: Path, message: str
-) -> tuple[tuple[Epoch, ...], dict[str, np.ndarray], str, int, tuple[str, str]]:
-    """Dates, columns by name (positions in m, velocities in m/s), what rows are counted as, the first's
-    number, and the frames from and to which an attitude turns; empty where rows differ in them.
+@dataclass(frozen=True)
+class Row:
+    """Number of its line (KVN), or of the state in the message (XML); its date; its numbers in their order
+    (KVN) or by their names (XML).
+    """
+
+    number: int
+    date: str
+    values: Sequence[str] | dict[str, str]
+
+
+@dataclass(frozen=True)
+class Segment:
+    """One segment.
+
+    Attributes:
+        version: of the message. where: the file and the place of the metadata. counted: what rows are called.
+        keys: keywords of the metadata.
+    """
+
+    version: float
+    where: str
+    counted: str
+    keys: dict[str, str] = field(default_factory=dict)
+    rows: list[Row] = field(default_factory=list)
+
+    def fault(self, what: str, row: Row | None = None) -> RigidsimError:
+        """What is wrong with the metadata, or with a row."""
+        place = f"segment at {self.where}" if row is None else f"{self.counted} {row.number}"
+        return RigidsimError(f"{self.where.rpartition(', ')[0]}, {place.split(', ')[-1]}: {what}")
+
+    def key(self, name: str, allowed: Sequence[str] = ()) -> str:
+        """A keyword in capitals, one of those allowed; empty where it is missing."""
+        given = " ".join(self.keys.get(name, "").upper().split())
+        if given and allowed and given not in allowed:
+            raise self.fault(f"{name} = {given}; allowed: {', '.join(allowed)}")
+        return given
+
+    def numbers(self, names: Sequence[str], *more: Sequence[str]) -> np.ndarray:
+        """Numbers of these names (rows, names); KVN rows may have more, any of these groups of names."""
+        counts, total = {len(names)}, len(names)
+        for group in more:
+            total += len(group)
+            counts.add(total)
+        found = []
+        for row in self.rows:
+            if isinstance(row.values, dict):
+                if missing := [name for name in names if name not in row.values]:
+                    raise self.fault(f"has no {missing[0]}, which is needed besides {', '.join(names)}", row)
+                texts = [row.values[name] for name in names]
+            else:
+                if len(row.values) not in counts:
+                    what = f"holds {len(row.values)} numbers; {len(names)} are needed"
+                    raise self.fault(f"{what}: {', '.join(names)}", row)
+                texts = list(row.values[: len(names)])
+            try:
+                found.append([float(text) for text in texts])
+            except ValueError:
+                raise self.fault(f"one of {' '.join(texts)[:80]} is no number", row) from None
+        return np.array(found)
+
+    def epochs(self) -> list[Epoch]:
+        """The dates of all rows, in the time system of the segment."""
+        scale = {"TDT": "TT"}.get(self.key("TIME_SYSTEM"), self.key("TIME_SYSTEM"))
+        if scale not in SCALES:
+            given = f"TIME_SYSTEM = {scale}" if scale else "TIME_SYSTEM is missing"
+            raise self.fault(f"{given}; allowed: {', '.join(SCALES)}: write the times in one of these")
+        found = []
+        for row in self.rows:
+            try:
+                found.append(parse_epoch(row.date, scale))
+            except ValueError as error:
+                raise self.fault(str(error), row) from None
+        return found
+
+
+def read_segments(path: Path, kind: str) -> list[Segment]:
+    """The segments with rows.
 
     Args:
-        message: "AEM" or "OEM".
+        kind: "AEM" or "OEM".
 
     Raises:
-        RigidsimError: it holds no rows, or none that can be used.
+        RigidsimError: there are none, or a line belongs to nothing.
     """
-    text = path.read_text(encoding="utf-8", errors="replace")
-    names = _ATTITUDE if message == "AEM" else _ORBIT
+    text = path.read_text(encoding="utf-8-sig", errors="replace")
     xml = text.lstrip().startswith("<")
-    rows = list(_of_xml(text, names) if xml else _of_kvn(text, message))
-    if not rows:
-        raise RigidsimError(f"{path}: the {message} holds no data lines")
-    for number, _, values, keys in rows:
-        kind = keys.get("ATTITUDE_TYPE", "missing")
-        if message == "AEM" and not kind.upper().startswith("QUATERNION"):
-            raise RigidsimError(
-                f"{path}: ATTITUDE_TYPE = {kind}; QUATERNION is allowed: export the attitude as quaternions, "
-                "or as CSV"
-            )
-        if not set(names) <= set(values):
-            raise RigidsimError(f"{path}, row {number}: holds {len(values)} values; {len(names)} are needed")
-    epochs = tuple(_date(date, keys.get("TIME_SYSTEM", ""), f"{path}, row {n}") for n, date, _, keys in rows)
-    scale = 1.0 if message == "AEM" else _KM
-    columns = {plain: np.array([row[2][name] for row in rows]) * scale for name, plain in names.items()}
-    named = {(keys.get("REF_FRAME_A", ""), keys.get("REF_FRAME_B", "")) for *_, keys in rows}
-    frames = named.pop() if len(named) == 1 else ("", "")
-    return epochs, columns, "row" if xml else "line", rows[0][0], frames
+    found = [segment for segment in (_of_xml if xml else _of_kvn)(text, kind, path) if segment.rows]
+    if not found:
+        raise RigidsimError(f"{path}: the {kind} holds no data lines after a META_START")
+    objects = {(one.key("OBJECT_NAME"), one.key("OBJECT_ID"), one.key("CENTER_NAME")) for one in found}
+    if len(objects) > 1:
+        names = " and ".join(sorted({" ".join(filter(None, one)) for one in objects})[:2])
+        raise RigidsimError(
+            f"{path}: segments of different objects or centres, {names}; split them into files"
+        )
+    return found
 
 
-def _of_kvn(text: str, message: str) -> Iterator[Row]:
-    keys: dict[str, str] = {}
+def _of_kvn(text: str, kind: str, path: Path) -> Iterator[Segment]:
+    version, passed_over = 0.0, False
+    segment: Segment | None = None
     for number, line in enumerate(text.splitlines(), 1):
         words = line.split()
         if not words or words[0] == "COMMENT":
             continue
-        if "=" in line:
+        if words[0] == "META_START":
+            if segment is not None:
+                yield segment
+            segment, passed_over = Segment(version, f"{path}, line {number}", "line"), False
+        elif passed_over or words[0].startswith("COVARIANCE"):
+            passed_over = words[0] != "COVARIANCE_STOP"
+        elif "=" in line:
             key, _, value = line.partition("=")
-            keys[key.strip()] = value.strip()
-        elif words[0].startswith("COVARIANCE"):
-            return
-        elif _DATE.fullmatch(words[0]):
-            order = list(_ORBIT)
-            if message == "AEM":
-                order = [*"123C"] if keys.get("QUATERNION_TYPE") != "FIRST" else [*"C123"]
-                order = [f"Q{part}" for part in order]
-            values = dict(zip(order, map(float, words[1:]), strict=False))
-            yield number, words[0], values, dict(keys)
+            if key.strip() == f"CCSDS_{kind}_VERS":
+                version = float(value)
+            elif segment is not None:
+                segment.keys[key.strip().upper()] = value.strip()
+        elif segment is not None and re.match(r"\d{4}-", words[0]):
+            segment.rows.append(Row(number, words[0], words[1:]))
+        elif words[0] not in _MARKS:
+            what = "a keyword with =, or a date with numbers after META_START, is allowed"
+            raise RigidsimError(f'{path}, line {number}: "{line.strip()[:60]}"; {what}')
+    if segment is not None:
+        yield segment
 
 
-def _of_xml(text: str, names: dict[str, str]) -> Iterator[Row]:
-    keys: dict[str, str] = {}
+def _of_xml(text: str, kind: str, path: Path) -> Iterator[Segment]:
     count = 0
-    for element in ElementTree.fromstring(text).iter():
-        if _tag(element) == "metadata":
-            keys = _leaves(element)
-        elif any(_tag(child) == "EPOCH" for child in element):
-            leaves = _leaves(element)
-            values = {name: float(leaves[name]) for name in names if name in leaves}
-            yield count, leaves["EPOCH"], values, keys
-            count += 1
+    for message in ElementTree.fromstring(text).iter():
+        if _tag(message) != kind.lower():
+            continue
+        for place, element in enumerate(e for e in message.iter() if _tag(e) == "segment"):
+            segment = Segment(float(message.get("version", "0")), f"{path}, segment {place + 1}", "row")
+            for part in element.iter():
+                if _tag(part) == "metadata":
+                    segment.keys.update({_tag(leaf): (leaf.text or "").strip() for leaf in part})
+                elif _tag(part) == _STATES[kind]:
+                    values = dict(_leaves(part, segment, count))
+                    segment.rows.append(Row(count, values.pop("EPOCH", ""), values))
+                    count += 1
+            yield segment
 
 
-def _leaves(element: ElementTree.Element) -> dict[str, str]:
-    """Texts of all elements within that have no further ones, by their names."""
-    return {_tag(leaf): (leaf.text or "").strip() for leaf in element.iter() if not len(leaf)}
+def _leaves(state: ElementTree.Element, segment: Segment, number: int) -> Iterator[tuple[str, str]]:
+    """Texts of a state by their names. In version 1 turns have elements by their number, with the axis as an
+    attribute.
+    """
+    for leaf in state.iter():
+        if len(leaf):
+            continue
+        name = leaf.get("rate") or _tag(leaf)
+        unit = leaf.get("units", leaf.get("unit", "deg"))
+        row = Row(number, "", {})
+        if unit.lower() not in _UNITS:
+            raise segment.fault(
+                f'{name} in "{unit}"; {", ".join(_UNITS)} are allowed, as the standard has it', row
+            )
+        if axis := leaf.get("angle"):
+            name = f"ANGLE_{name[-1]}"
+            sequence = segment.keys.get("EULER_ROT_SEQ", "")
+            if "XYZ123".find(axis[0].upper()) % 3 != "XYZ123".find(sequence[int(name[-1]) - 1 :][:1]) % 3:
+                raise segment.fault(
+                    f"{axis} at place {name[-1]} of EULER_ROT_SEQ = {sequence}; mend one", row
+                )
+        yield name, (leaf.text or "").strip()
 
 
 def _tag(element: ElementTree.Element) -> str:
     """Name of an element without its namespace."""
     return element.tag.rpartition("}")[2]
-
-
-def _date(text: str, scale: str, where: str) -> Epoch:
-    match = _DATE.fullmatch(text)
-    if match is None or match[3] is None:
-        raise RigidsimError(f"{where}: the date {text}; dates as 2029-04-13T21:46:00 are allowed")
-    try:
-        return parse_epoch(f"{match[1]}-{match[2]}-{match[3]}T{match[4]} {scale}")
-    except ValueError as error:
-        raise RigidsimError(f"{where}: {error}") from None

@@ -27,8 +27,8 @@ class Observations:
         numbers: of others, by name, (rows,) float64.
         units: as far as the file tells.
         rows: what each row is called: "line 12".
-        epochs: dates of a message's rows.
-        frames: names of the frames from and to which its attitude turns.
+        epochs: dates of a message's rows. axes, settled: of a message, as of a ``Trajectory``.
+        notes: what a user should know of how the file was read.
         number: the number in a cell of a text; nan where it holds none.
     """
 
@@ -38,7 +38,9 @@ class Observations:
     units: dict[str, str] = field(default_factory=dict)
     rows: Sequence[str] = ()
     epochs: tuple[Epoch, ...] = ()
-    frames: tuple[str, str] = ("", "")
+    axes: str = ""
+    settled: bool = False
+    notes: tuple[str, ...] = ()
     number: Callable[[str], float] = as_number
 
     @property
@@ -110,8 +112,8 @@ class Observations:
         )
 
 
-def read_observations(path: Path) -> Observations:
-    """Read a table by the kind that its name says.
+def read_observations(path: Path, axes: str | None) -> Observations:
+    """Read a table by the kind that its name says; a message is turned to these space axes where it can be.
 
     Raises:
         RigidsimError: there is no such file, it is of no known kind, or it can't be read.
@@ -122,11 +124,12 @@ def read_observations(path: Path) -> Observations:
         raise RigidsimError(f"{path}: there is no such file; allowed: {KINDS}")
     if path.is_dir() and (path / "dataset.h5").is_file():  # the folder of a run
         path = path / "dataset.h5"
-    found = read_trajectory(path)
+    found = read_trajectory(path).in_axes(axes)
     rows = [found.row(n) for n in range(_count(found))]
     return Observations(
-        str(path), {}, dict(found.columns), dict(found.units), rows, found.epochs, found.frames
-    )
+        str(path), {}, dict(found.columns), dict(found.units), rows, found.epochs, found.axes, found.settled,
+        found.notes,
+    )  # fmt: skip
 
 
 def read_attitudes(path: Path, kernels: Sequence[Path], epoch: Epoch, axes: str) -> Observations:

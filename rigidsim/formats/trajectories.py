@@ -10,16 +10,18 @@ import importlib.util
 import itertools
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, get_args
 
 import numpy as np
 
 from rigidsim.errors import RigidsimError
-from rigidsim.formats.messages import message_rows
+from rigidsim.formats.message_columns import MESSAGE_COLUMNS, message_columns
 from rigidsim.formats.text_tables import TEXT, TIMES, is_date, name_and_unit, open_text
 from rigidsim.scene.epochs import Epoch, parse_epoch
+from rigidsim.scene.frame import ECLIPTIC, OBLIQUITY, SpaceAxes
+from rigidsim.scene.row_rotations import multiplied, turned
 from rigidsim.store.many_rows import BLOCK, blocks_of, gathered
 
 if TYPE_CHECKING:
@@ -29,6 +31,8 @@ if TYPE_CHECKING:
 KINDS = (
     "CSV (.csv, .txt, .dat, .tsv), Parquet, netCDF or HDF5 that xarray reads (.nc, .h5, .zarr), AEM, CK (.bc)"
 )
+KNOWN_AXES = frozenset(get_args(SpaceAxes))
+"""Space axes whose turns to each other are known."""
 _XARRAY = {".nc", ".nc4", ".cdf", ".h5", ".hdf5", ".zarr"}
 _MOST_COLUMNS = 500
 _BUFFER = 2**20  # bytes of a Parquet file's column that are read at once
@@ -46,7 +50,9 @@ class Trajectory:
         first: number of the first row, as the file counts them.
         narrow: whether the numbers were single precision.
         epochs: times of a message as dates, in place of a column of times.
-        frames: names of the frames from and to which a message's attitude turns; empty where it isn't said.
+        axes: the space axes that a message names; empty where none are named.
+        settled: whether a message says that its attitudes are those from body to space axes.
+        resolution: half the last digits of a message's quaternions and rates, whose numbers were converted.
         left_out: names of columns that hold no real numbers.
         notes: what a user should know of how the file was read.
         lines: numbers of the rows' lines, where these don't follow each other.
@@ -59,7 +65,9 @@ class Trajectory:
     first: int = 0
     narrow: bool = False
     epochs: tuple[Epoch, ...] = ()
-    frames: tuple[str, str] = ("", "")
+    axes: str = ""
+    settled: bool = False
+    resolution: tuple[float, float] | None = None
     left_out: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
     lines: np.ndarray | None = None
@@ -68,6 +76,20 @@ class Trajectory:
         """A row as the file counts it."""
         number = self.first + int(index) if self.lines is None else int(self.lines[index])
         return f"{self.counted} {number}"
+
+    def in_axes(self, axes: str | None) -> Trajectory:
+        """A message's attitudes and path in other space axes; the same where either are not known."""
+        if ECLIPTIC not in (axes, self.axes) or axes == self.axes or not {axes, self.axes} <= KNOWN_AXES:
+            return self
+        half = float(OBLIQUITY) / 2 * (-1 if axes == ECLIPTIC else 1)
+        turn, columns = np.array([[np.cos(half), np.sin(half), 0.0, 0.0]]), dict(self.columns)
+        for variable, names in MESSAGE_COLUMNS.items():
+            if variable == "angular_velocity" or not columns.keys() >= set(names):
+                continue
+            values = np.stack([columns[name] for name in names], axis=1)
+            change = multiplied if variable == "quaternion" else turned
+            columns |= dict(zip(names, change(turn, values).T, strict=True))
+        return replace(self, columns=columns, axes=axes or "")
 
 
 def is_trajectory(path: Path) -> bool:
@@ -96,10 +118,7 @@ def read_trajectory(path: Path) -> Trajectory:
             with path.open(errors="replace") as file:
                 head = file.read(4096)
             if (found := re.search(r"CCSDS_(AEM|OEM)_VERS", head)) is not None:
-                epochs, columns, counted, first, frames = message_rows(path, found[1])
-                return Trajectory(
-                    columns, str(path), counted=counted, first=first, epochs=epochs, frames=frames
-                )
+                return Trajectory(source=str(path), **message_columns(path, found[1]))
             if suffix in TEXT:
                 return _of_text(path)
     except (RigidsimError, MemoryError):

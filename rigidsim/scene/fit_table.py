@@ -32,7 +32,7 @@ class FitDataTable(ConfigTable):
     """``[[fit.data]]``: one set of observations, at its own times."""
 
     file: StrictStr = Field(examples=["observed.csv"])
-    """CSV, Parquet, netCDF, AEM, CK, or the dataset of a run; its path from the config's folder"""
+    """CSV, Parquet, netCDF, AEM, OEM, CK, or the dataset of a run; its path from the config's folder"""
     kernels: EachOnce[StrictStr] = Field(default_factory=list, examples=[["clock.tsc", "leapseconds.tls"]])
     """of a CK: the clock (SCLK) and what else SPICE reads it with; paths from the config's folder"""
     time: StrictStr = Field("time", examples=["time", "utc"])

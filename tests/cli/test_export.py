@@ -340,7 +340,7 @@ def test_no_message_names_what_nobody_said(
     refusals = {
         ("plain",): "doesn't say what its time 0 is, which a message must: give [time] epoch in the config",
         ("plain", "--epoch", "J2000"): "what its space axes are, which a message must: give [frame] axes",
-        ("plain", "--epoch", "2020-01-01"): '--epoch: given "2020-01-01"; a date and time with its scale',
+        ("plain", "--epoch", "2020-01-01"): '--epoch: given "2020-01-01", without its time scale',
         ("plain", "--epoch", "J2000", "--axes", "ecliptic"): 'did you mean "ecliptic J2000"?',
         ("plain", "--epoch", "J2000", "--axes", "EME200"): 'did you mean "EME2000"?',
         ("sky", "--epoch", "J2000"): "given 2000-01-01T12:00:00 TDB, but time 0 of the run is 2029-04-13",

@@ -370,7 +370,8 @@ def test_a_message(experiment: rigidsim.Experiment, tmp_path: Path) -> None:
         + "</quaternionEphemeris></attitudeState>"
         for row in rows
     )
-    about = "<TIME_SYSTEM>UTC</TIME_SYSTEM><ATTITUDE_TYPE>quaternion</ATTITUDE_TYPE>"
+    about = "<ATTITUDE_DIR>A2B</ATTITUDE_DIR><TIME_SYSTEM>UTC</TIME_SYSTEM>"
+    about += "<ATTITUDE_TYPE>quaternion</ATTITUDE_TYPE>"
     xml = tmp_path / "free.xml"
     xml.write_text(
         '<?xml version="1.0"?><aem id="CCSDS_AEM_VERS" version="1.0"><body><segment>'

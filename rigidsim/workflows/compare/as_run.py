@@ -83,7 +83,7 @@ def trajectory_given(table: Any, scene: Scene, kernels: Sequence[str | Path]) ->
         return ck_reading.read_ck(path, [Path(one) for one in kernels], scene.epoch.since_j2000(), *span)
     if path.is_dir() and path.suffix != ".zarr":
         return trajectory_given(open_run(path), scene, kernels)
-    return read_trajectory(path)
+    return read_trajectory(path).in_axes(scene.axes)
 
 
 def files_of(table: Any, kernels: Sequence[str | Path] = ()) -> list[Path]:
@@ -111,12 +111,16 @@ def run_dataset(path: Path) -> xarray.Dataset:
     Raises:
         RigidsimError: the file can't be used, or its convention can't be told.
     """
-    given = attitudes_of(read_trajectory(path), None)
+    trajectory = read_trajectory(path)
+    epoch = trajectory.epochs[0] if trajectory.epochs else None
+    given = attitudes_of(trajectory, epoch)
     second = seconds_in(given.time_unit or "s")
     times = given.times * second
     reading, rates, told = _read(given, second)
     found = FoundReading(reading, NONE, 0.0, [])
-    return dataset_of_rows(given, times, found, rates, {"title": path.stem, "comment": "; ".join(told)})
+    dated = {"epoch": str(epoch)} if epoch is not None else {}
+    attributes = {"title": path.stem, "comment": "; ".join(told), **dated}
+    return dataset_of_rows(given, times, found, rates, attributes)
 
 
 def dataset_of_rows(
@@ -160,6 +164,12 @@ def _variable(values: np.ndarray, dim: str, unit: str, name: str) -> Any:
 def _read(given: Attitudes, second: float) -> tuple[Reading, RateReading | None, list[str]]:
     """Readings of attitude and rates, and what a user should know of them."""
     source, told = given.trajectory.source, list(given.told)
+    if given.trajectory.settled:
+        return (
+            Reading("wxyz"),
+            RateReading("deg/s", "body", False),
+            [*told, "attitude and rates were taken between the frames that the file names"],
+        )
     if given.time_unit is None:
         told.append("times were taken for s; name a unit: t [day]")
     if given.rates is None:

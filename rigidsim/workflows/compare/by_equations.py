@@ -7,12 +7,12 @@ from dataclasses import dataclass, field
 import numpy as np
 import xarray
 
+from rigidsim.scene.row_rotations import normalised
 from rigidsim.solve.from_states import FromStates, RowStates
 from rigidsim.store.many_rows import largest, picked, usual_step
 from rigidsim.workflows.compare import defects
 from rigidsim.workflows.compare.motion import OwnMotion
 from rigidsim.workflows.compare.result import LocalDefects, TrajectoryDrift
-from rigidsim.workflows.compare.rotations import normalised
 from rigidsim.workflows.compare.verdict import unexplained_share
 from rigidsim.workflows.physics.models import rotation_vectors
 

@@ -5,23 +5,20 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from decimal import Decimal
 from typing import Any
 
 import numpy as np
 
 from rigidsim.errors import RigidsimError
+from rigidsim.formats.digits import FEW, written_resolution
 from rigidsim.formats.text_tables import TIMES, name_and_unit
 from rigidsim.formats.trajectories import Trajectory
 from rigidsim.scene.epochs import Epoch
 from rigidsim.scene.exact import parse_number
-from rigidsim.store.many_rows import blocks_of, gathered, largest, picked
+from rigidsim.store.many_rows import blocks_of, gathered, picked
 from rigidsim.workflows.compare.row_checks import refuse_rows, refuse_values
 
 LEAST_ROWS = 3
-_FIXED = 0.6  # share of numbers with the same count of decimals that a fixed format makes
-_FEW = 9  # different numbers: those of one matrix, whose digits say nothing of a format
-_DOUBLE_DIGITS = 15
 _TIMES = {"s": "s", "sec": "s", "seconds": "s", "second": "s", "day": "day", "days": "day", "d": "day",
           "h": "h", "hr": "h", "hours": "h", "hour": "h", "min": "min", "minutes": "min", "ms": "ms",
           "yr": "yr", "years": "yr", "year": "yr"}  # fmt: skip
@@ -136,9 +133,9 @@ def attitudes_of(found: Trajectory, epoch: Epoch | None) -> Attitudes:
     told += refuse_rows(found, made.times, made.quaternions, made.matrices)
     kept = [made.quaternions, made.matrices, made.angles]
     attitude = next(x for x in kept if x is not None)
-    resolution = (
-        _resolution(attitude, found.narrow, few=_FEW),
-        0.0 if made.rates is None else _resolution(made.rates, found.narrow),
+    resolution = found.resolution or (
+        written_resolution(attitude, found.narrow, few=FEW),
+        0.0 if made.rates is None else written_resolution(made.rates, found.narrow),
     )
     taken = {name for names in used.values() for name in names}  # which is held already
     others = {name: values for name, values in found.columns.items() if name not in taken}
@@ -253,23 +250,3 @@ def _since(found: Trajectory, epoch: Epoch | None, told: list[str]) -> np.ndarra
 def seconds_in(unit: str) -> float:
     """Seconds of a unit of time."""
     return float(parse_number(f"1 {unit}", "s"))
-
-
-def _resolution(values: np.ndarray, narrow: bool, few: int = 0) -> float:
-    """Half the last digit in which numbers are written, from a sample of them; that of doubles at least. Up
-    to ``few`` different numbers, as those of a body at rest, are taken for exact.
-    """
-    most = largest(values)
-    if narrow:
-        return most * 2.0**-24
-    places = np.linspace(0, values.size - 1, min(values.size, 300)).astype(int)
-    some = picked(values.reshape(-1), places)
-    if len(np.unique(some)) <= few:
-        return most * 2.0**-53
-    written = [Decimal(repr(value)).normalize().as_tuple() for value in some.tolist()]
-    decimals = [-int(exponent) for _, _, exponent in written]
-    common = max(set(decimals), key=decimals.count)
-    if decimals.count(common) > _FIXED * len(decimals) and max(decimals) == common:
-        return 0.5 * 10.0**-common if common < _DOUBLE_DIGITS else most * 2.0**-53
-    digits = max(len(mantissa) for _, mantissa, _ in written)
-    return most * (0.5 * 10.0 ** (1 - digits) if digits < _DOUBLE_DIGITS else 2.0**-53)

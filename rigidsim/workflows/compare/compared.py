@@ -12,6 +12,7 @@ import xarray
 
 from rigidsim.errors import RigidsimError
 from rigidsim.scene.config import Experiment
+from rigidsim.scene.row_rotations import angles_between, normalised
 from rigidsim.solve.from_states import FromStates, NotFromStates
 from rigidsim.store.many_rows import blocks_of, flagged, gathered, largest, mean_square, picked
 from rigidsim.workflows.compare import defects, saving
@@ -35,7 +36,6 @@ from rigidsim.workflows.compare.result import (
     Disagreement,
     FoundConvention,
 )
-from rigidsim.workflows.compare.rotations import angles_between, normalised
 from rigidsim.workflows.compare.saving import DRAWN, MOST_SHOWN, save_dataset, save_figure, save_timeline
 from rigidsim.workflows.compare.verdict import Evidence, judged
 from rigidsim.workflows.physics.models import rotation_vectors

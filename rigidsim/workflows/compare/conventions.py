@@ -14,9 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rigidsim.scene.rotations import quaternion_of
-from rigidsim.store.many_rows import blocks_of, gathered, largest
-from rigidsim.workflows.compare.columns import Attitudes
-from rigidsim.workflows.compare.rotations import (
+from rigidsim.scene.row_rotations import (
     SEQUENCES,
     angles_between,
     conjugated,
@@ -26,6 +24,8 @@ from rigidsim.workflows.compare.rotations import (
     turned,
     vector_of,
 )
+from rigidsim.store.many_rows import blocks_of, gathered, largest
+from rigidsim.workflows.compare.columns import Attitudes
 
 BODY_TO_SPACE, SPACE_TO_BODY = "body_to_space", "space_to_body"
 _LEAST = 1e-9  # rad: mismatches below are alike
@@ -176,7 +176,7 @@ def _axes(frames: Frames) -> str:
 
 def readings(given: Attitudes) -> Iterator[Reading]:
     """All ways to read an attitude, the plainest first."""
-    directions = (BODY_TO_SPACE, SPACE_TO_BODY)
+    directions = (BODY_TO_SPACE,) if given.trajectory.settled else (BODY_TO_SPACE, SPACE_TO_BODY)
     if given.quaternions is not None:
         orders = ("wxyz",) if given.named else ("wxyz", "xyzw")
         yield from (Reading(order=order, direction=d) for order in orders for d in directions)

@@ -17,9 +17,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from rigidsim.scene.row_rotations import conjugated, multiplied, normalised, turned, vector_of
 from rigidsim.solve.from_states import FromStates, RowStates
 from rigidsim.store.many_rows import picked, usual_step
-from rigidsim.workflows.compare.rotations import conjugated, multiplied, normalised, turned, vector_of
 
 _WINDOW = 0.5  # times the rate of the motion: length of a window, where the rows allow it
 _PARTS = 4  # of a window

@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from rigidsim.scene.row_rotations import conjugated, multiplied, vector_of
 from rigidsim.workflows.compare.columns import Attitudes
 from rigidsim.workflows.compare.conventions import (
     NONE,
@@ -20,7 +21,6 @@ from rigidsim.workflows.compare.conventions import (
     readings,
     rows_compared,
 )
-from rigidsim.workflows.compare.rotations import conjugated, multiplied, vector_of
 
 _LEAST, _ALIKE = 1e-9, 0.35  # as those of conventions, of relative mismatches
 _GOOD = float(np.log(0.1))  # mean logarithm of the mismatch, above which no reading is right

@@ -9,11 +9,11 @@ import numpy as np
 
 from rigidsim.errors import ConfigError, Problem, RigidsimError
 from rigidsim.scene.config import Experiment
+from rigidsim.scene.row_rotations import normalised
 from rigidsim.scene.scene import Scene, build_scene
 from rigidsim.solve.from_states import FromStates
 from rigidsim.store.many_rows import blocks_of, gathered, picked
 from rigidsim.store.run import Run
-from rigidsim.workflows.compare.rotations import normalised
 from rigidsim.workflows.physics.models import rotation_vectors
 from rigidsim.workflows.run import run
 

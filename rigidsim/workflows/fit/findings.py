@@ -9,7 +9,7 @@ from itertools import combinations
 import numpy as np
 import xarray
 
-from rigidsim.workflows.compare.rotations import turned
+from rigidsim.scene.row_rotations import turned
 from rigidsim.workflows.fit.estimation import consider_covariance
 from rigidsim.workflows.fit.keys import FitKey, FitKeys
 from rigidsim.workflows.fit.observed import QUATERNION

@@ -13,12 +13,12 @@ from rigidsim.errors import ConfigError, Problem
 from rigidsim.scene.config import Experiment, validated
 from rigidsim.scene.exact import Quantity, parse_number, parse_quantity
 from rigidsim.scene.fit_table import KnownWithin
+from rigidsim.scene.row_rotations import multiplied, of_vector
 from rigidsim.scene.scene import Scene, build_scene
 from rigidsim.scene.toml_text import apply_overrides, parse_toml
 from rigidsim.scene.units import powers, unit_text
 from rigidsim.scene.validation_messages import shown
 from rigidsim.scene.varied_keys import ATTITUDE, VariedKey, varied_keys
-from rigidsim.workflows.compare.rotations import multiplied, of_vector
 
 _FORMS = ("euler_angles", "pole", "prime_meridian", "obliquity", "node_longitude")
 

@@ -13,13 +13,13 @@ from rigidsim.errors import ConfigError, Problem, RigidsimError
 from rigidsim.scene.choices import DEFAULT_METHOD
 from rigidsim.scene.config import Experiment
 from rigidsim.scene.exact import ExactNumber
+from rigidsim.scene.row_rotations import conjugated, multiplied, normalised, vector_of
 from rigidsim.scene.sample_times import Time
 from rigidsim.scene.schema import Config
 from rigidsim.solve.differentiable import parametrised, refuse_without_derivatives
 from rigidsim.solve.problem import prepare
 from rigidsim.solve.tangent_lanes import TangentLanes, fits_lanes
 from rigidsim.solve.variational import LostTangents, turned
-from rigidsim.workflows.compare.rotations import conjugated, multiplied, normalised, vector_of
 from rigidsim.workflows.fit.keys import FitKeys
 from rigidsim.workflows.fit.observed import QUATERNION, Observed
 from rigidsim.workflows.run import run

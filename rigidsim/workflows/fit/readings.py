@@ -13,14 +13,15 @@ import numpy as np
 
 from rigidsim.errors import ConfigError, Problem, RigidsimError
 from rigidsim.formats import ck_reading
+from rigidsim.formats.message_columns import MESSAGE_COLUMNS
 from rigidsim.formats.observations import Observations, read_attitudes, read_observations
 from rigidsim.scene.config import Experiment
 from rigidsim.scene.exact import parse_number, parse_quantity
 from rigidsim.scene.fit_table import FitDataTable
-from rigidsim.scene.frame import ECLIPTIC, EQUATOR, OBLIQUITY, SpaceAxes
+from rigidsim.scene.frame import ECLIPTIC, EQUATOR, SpaceAxes
+from rigidsim.scene.row_rotations import SEQUENCES, normalised, of_euler
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.units import UnitError, conversion
-from rigidsim.workflows.compare.rotations import SEQUENCES, conjugated, multiplied, normalised, of_euler
 from rigidsim.workflows.fit.observed import EULER_ANGLES, QUATERNION, Observed
 
 _META = b"KPL/MK"
@@ -101,7 +102,7 @@ def read_readings(
     if files.of_kernels:
         found = _attitudes(number, table, quantity, scene, files)
     else:
-        found = read_observations(files.file)
+        found = read_observations(files.file, scene.axes)
     return _ReadTable(number, table, quantity, scene, found, files.file).made()
 
 
@@ -140,7 +141,7 @@ class _ReadTable:
     ) -> None:
         self.number, self.table, self.quantity, self.scene = number, table, quantity, scene
         self.found, self.path = found, path
-        self.told: list[str] = []
+        self.told: list[str] = [f"{table.file}: {note}" for note in found.notes]
 
     def made(self) -> Readings:
         times = self._times()
@@ -183,8 +184,10 @@ class _ReadTable:
     def _values(self) -> np.ndarray:
         components = self.quantity.components
         names = self.table.columns or [*components]
-        if self.table.columns is None and self.quantity.form == QUATERNION and any(self.found.frames):
-            names = ["qw", "qx", "qy", "qz"]
+        if self.found.epochs and self.quantity.variable in MESSAGE_COLUMNS:
+            names = self.table.columns or [*MESSAGE_COLUMNS[self.quantity.variable]]
+            if self.quantity.variable != "angular_velocity":
+                self._check_axes()
         if len(names) != len(components):
             raise self.fault(
                 "columns",
@@ -211,32 +214,23 @@ class _ReadTable:
                     f"{self.found.source}: {self.found.rows[bad[0]]}: a quaternion of norm "
                     f"{norms[bad[0]]:.6g}; norms within 0.01 of 1 are allowed: mend or remove these rows"
                 )
-            return self._in_space(normalised(values))
+            return normalised(values)
         if self.quantity.form == EULER_ANGLES:
             sequence = self.scene.config.integrator.euler_sequence
             assert sequence in SEQUENCES
             return of_euler(sequence, values)
         return values
 
-    def _in_space(self, quaternions: np.ndarray) -> np.ndarray:
-        """Attitudes of a message between the frames that it names, as those to the config's space axes; its
-        quaternion from space to body axes is that of the turn from body coordinates to space coordinates.
-        """
-        first, last = self.found.frames
-        known = get_args(SpaceAxes)
-        if last in known and first not in known:
-            first, quaternions = last, conjugated(quaternions)
-        axes = self.scene.axes
-        if first == axes or not first:
-            return quaternions
-        if first not in known or axes is None:
-            what = f'{self.table.file} turns from "{first}" to "{last}", and the config\'s space axes are '
+    def _check_axes(self) -> None:
+        """Refuse what a message holds in other axes than the config's, or in none that are said."""
+        axes, theirs, known = self.scene.axes, self.found.axes, get_args(SpaceAxes)
+        if self.quantity.rotation and not self.found.settled:
+            what = f"{self.table.file} doesn't say which frame is the body's"
+            raise self.fault("file", f"{what}; name the frames by REF_FRAME_A and REF_FRAME_B in the file")
+        if not theirs or (theirs != axes and (theirs not in known or axes is None)):
+            what = f'{self.table.file} is about the axes "{theirs}", and the config\'s space axes are '
             what += f'"{axes}"' if axes else "not named; say by [frame] axes what they are"
             raise self.fault("file", f"{what}: attitudes from one of {', '.join(known)} are allowed")
-        if ECLIPTIC not in (first, axes):
-            return quaternions  # within 0.03 arcsec of each other
-        half = float(OBLIQUITY) / 2 * (-1 if axes == ECLIPTIC else 1)
-        return multiplied(np.array([[np.cos(half), np.sin(half), 0.0, 0.0]]), quaternions)
 
     def _si(self, unit: str) -> float:
         """Factor to SI for an expression, whose dimension isn't known."""

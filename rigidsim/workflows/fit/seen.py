@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Self
 import numpy as np
 
 from rigidsim.errors import RunFolderError
+from rigidsim.scene.row_rotations import conjugated, multiplied, normalised, vector_of
 from rigidsim.store.run import Run
 from rigidsim.store.summary import Brief
-from rigidsim.workflows.compare.rotations import conjugated, multiplied, normalised, vector_of
 from rigidsim.workflows.fit.observed import QUATERNION
 from rigidsim.workflows.run import run
 

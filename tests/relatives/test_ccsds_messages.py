@@ -1,0 +1,490 @@
+"""AEM and OEM by writers of our own, from rotations of scipy and annex F of CCSDS 504.0-B-2."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from datetime import datetime, timedelta
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+from support import seeds
+
+import rigidsim
+from rigidsim.formats.trajectories import read_trajectory
+from rigidsim.scene.epochs import parse_epoch
+from rigidsim.workflows.compare.as_run import open_any
+
+SPACE = ["EME2000", "J2000", "ICRF", "GCRF", "ICRF3", "eme2000"]
+BODY = ["SC_BODY_1", "SC_BODY", "SC BODY 2", "GYRO_1", "STARTRACKER_1", "INSTRUMENT_A"]
+SEQUENCES = ["XYZ", "XZY", "YXZ", "YZX", "ZXY", "ZYX", "XYX", "XZX", "YXY", "YZY", "ZXZ", "ZYZ"]
+OLD = ["QUATERNION", "QUATERNION/DERIVATIVE", "QUATERNION/RATE", "EULER_ANGLE", "EULER_ANGLE/RATE", "SPIN",
+       "SPIN/NUTATION"]  # fmt: skip
+NEW = ["QUATERNION", "QUATERNION/DERIVATIVE", "QUATERNION/ANGVEL", "EULER_ANGLE", "EULER_ANGLE/DERIVATIVE",
+       "EULER_ANGLE/ANGVEL", "SPIN", "SPIN/NUTATION", "SPIN/NUTATION_MOM"]  # fmt: skip
+XML = {
+    "QUATERNION": "quaternionEphemeris", "QUATERNION/DERIVATIVE": "quaternionDerivative",
+    "QUATERNION/ANGVEL": "quaternionAngVel", "QUATERNION/RATE": "quaternionEulerRate",
+    "EULER_ANGLE": "eulerAngle", "EULER_ANGLE/DERIVATIVE": "eulerAngleDerivative",
+    "EULER_ANGLE/RATE": "eulerAngleRate", "EULER_ANGLE/ANGVEL": "eulerAngleAngVel", "SPIN": "spin",
+    "SPIN/NUTATION": "spinNutation", "SPIN/NUTATION_MOM": "spinNutationMom",
+}  # fmt: skip
+
+
+OBLIQUITY = np.radians(84381.406 / 3600)
+
+
+class Top:
+    """A symmetric top without torques: closed form, about a momentum in any direction."""
+
+    def __init__(self, rng: np.random.Generator, tilt: float | None = None) -> None:
+        self.to_space = Rotation.random(random_state=int(rng.integers(2**31)))
+        self.tilt = rng.uniform(0.2, 1.2) if tilt is None else tilt
+        self.nutation, self.spin = rng.uniform(0.05, 0.2) * rng.choice([-1, 1], 2)  # rad/s
+        self.begin = rng.uniform(0, 6, 2)
+
+    def attitude(self, times: np.ndarray) -> Rotation:
+        """Body to space."""
+        angles = [
+            self.begin[0] + self.nutation * times,
+            0 * times + self.tilt,
+            self.begin[1] + self.spin * times,
+        ]
+        return self.to_space * Rotation.from_euler("ZXZ", np.stack(angles, axis=1))
+
+    def rates(self, times: np.ndarray) -> np.ndarray:
+        """Along body axes, rad/s."""
+        momentum = self.attitude(times).inv().apply(self.to_space.apply([0, 0, 1]))
+        return self.nutation * momentum + self.spin * np.array([0, 0, 1])
+
+
+class Aem:
+    """A random message of a top, with what it should be read as."""
+
+    def __init__(self, rng: np.random.Generator, kind: str = "") -> None:
+        self.rng = rng
+        self.version = 1 if rng.integers(2) else 2
+        if kind:
+            self.version = 2
+        self.kind = kind or str(rng.choice(OLD if self.version == 1 else NEW))
+        self.xml = bool(rng.integers(2))
+        self.top = Top(rng, tilt=0.0 if self.kind == "SPIN" else None)
+        self.scale = str(rng.choice(["UTC", "TAI", "TT", "TDB", "GPS"]))
+        start = datetime(2024, 3, 1) + timedelta(seconds=int(rng.integers(10**8)) / 100 - 3e5)
+        self.segments = int(rng.integers(1, 4))
+        self.times = np.cumsum(rng.integers(50, 200, 12 * self.segments)) / 100  # s
+        self.dates = [start + timedelta(seconds=float(t)) for t in self.times]
+        space, body = str(rng.choice(SPACE)), str(rng.choice(BODY))
+        self.frames = [space, body] if rng.integers(2) else [body, space]
+        self.direction = str(rng.choice(["A2B", "B2A"])) if self.version == 1 else "A2B"
+        source = self.frames[0] if self.direction == "A2B" else self.frames[1]
+        self.from_space = source == space
+        if "SPIN" in self.kind and not self.from_space:
+            self.frames, self.from_space = self.frames[::-1], True
+        self.sequence = str(rng.choice(SEQUENCES))
+        self.first = bool(rng.integers(2)) and self.version == 1
+        self.of_source = bool(rng.integers(2))
+        if self.kind.endswith("RATE"):
+            while len(set(self.sequence)) < 3:  # whose rates have an order
+                self.sequence = str(rng.choice(SEQUENCES))
+
+    def numbers(self, times: np.ndarray) -> dict[str, np.ndarray]:
+        """By name, in the order of a row."""
+        turn, rates = self.top.attitude(times), self.top.rates(times)
+        lead = turn if self.from_space else turn.inv()
+        seen = rates if self.from_space else -turn.apply(rates)  # the target's, along its axes
+        components = np.degrees(lead.apply(seen) if self.of_source else seen)
+        attitude, _, rate = self.kind.partition("/")
+        found: dict[str, np.ndarray] = {}
+        if attitude == "QUATERNION":
+            x, y, z, w = lead.as_quat().T
+            found = {"Q1": x, "Q2": y, "Q3": z, "QC": w}
+            if rate == "DERIVATIVE":
+                vector = np.stack([x, y, z], axis=1)
+                change = 0.5 * (w[:, None] * seen + np.cross(vector, seen))
+                found |= {f"Q{n + 1}_DOT": change[:, n] for n in range(3)}
+                found["QC_DOT"] = -0.5 * np.sum(vector * seen, axis=1)
+        elif attitude == "EULER_ANGLE":
+            angles = lead.as_euler(self.sequence, degrees=True)
+            found = {f"ANGLE_{n + 1}": angles[:, n] for n in range(3)}
+            if rate == "DERIVATIVE":
+                after, before = (self.lead(times + h).as_euler(self.sequence) for h in (1e-5, -1e-5))
+                change = np.degrees((after - before + np.pi) % (2 * np.pi) - np.pi) / 2e-5
+                found |= {f"ANGLE_{n + 1}_DOT": change[:, n] for n in range(3)}
+        else:
+            axis = lead.apply([0, 0, 1])
+            alpha, delta = np.arctan2(axis[:, 1], axis[:, 0]), np.arcsin(np.clip(axis[:, 2], -1, 1))
+            zero = Rotation.from_euler("ZX", np.stack([alpha + np.pi / 2, np.pi / 2 - delta], axis=1))
+            phase = np.unwrap((zero.inv() * lead).as_euler("ZYX")[:, 0])
+            spin = 0 * alpha + (self.top.spin if rate else self.top.spin + self.top.nutation)
+            named = {"ALPHA": alpha, "DELTA": delta, "ANGLE": phase, "ANGLE_VEL": spin}
+            found = {f"SPIN_{key}": np.degrees(value) for key, value in named.items()}
+            h = self.top.to_space.apply([0, 0, 1])
+            if rate == "NUTATION_MOM":
+                found["MOMENTUM_ALPHA"] = 0 * alpha + np.degrees(np.arctan2(h[1], h[0]))
+                found["MOMENTUM_DELTA"] = 0 * alpha + np.degrees(np.arcsin(h[2]))
+                found["NUTATION_VEL"] = 0 * alpha + np.degrees(self.top.nutation)
+            elif rate == "NUTATION":
+                inside = lead.inv().apply(h)
+                found["NUTATION"] = np.degrees(np.arccos(np.clip(inside[:, 2], -1, 1)))
+                found["NUTATION_PER"] = 0 * alpha + 2 * np.pi / self.top.nutation
+                found["NUTATION_PHASE"] = np.degrees(np.arctan2(-inside[:, 1], inside[:, 0]))
+        if rate in ("ANGVEL", "RATE"):
+            names = [f"ANGVEL_{axis}" if rate == "ANGVEL" else f"{axis}_RATE" for axis in "XYZ"]
+            if rate == "RATE" and attitude == "EULER_ANGLE" and not self.xml:  # in the order of the sequence
+                names = [f"{axis}_RATE" for axis in self.sequence]
+                components = components[:, ["XYZ".index(axis) for axis in self.sequence]]
+            found |= {name: components[:, n] for n, name in enumerate(names)}
+        return found
+
+    def lead(self, times: np.ndarray) -> Rotation:
+        turn = self.top.attitude(times)
+        return turn if self.from_space else turn.inv()
+
+    def date(self, moment: datetime) -> str:
+        text = moment.strftime("%Y-%jT%H:%M:%S.%f" if self.rng.integers(2) else "%Y-%m-%dT%H:%M:%S.%f")
+        return text + ("Z" if self.scale == "UTC" and self.rng.integers(2) else "")
+
+    def keys(self) -> dict[str, str]:
+        old, (attitude, _, rate) = self.version == 1, self.kind.partition("/")
+        found = {
+            "OBJECT_NAME": "TOP", "OBJECT_ID": "2024-001A", "CENTER_NAME": "EARTH",
+            "REF_FRAME_A": self.frames[0], "REF_FRAME_B": self.frames[1], "TIME_SYSTEM": self.scale,
+            "ATTITUDE_TYPE": self.kind.lower() if self.xml else self.kind,
+        }  # fmt: skip
+        if old:
+            found["ATTITUDE_DIR"] = self.direction
+        if old and attitude == "QUATERNION":
+            found["QUATERNION_TYPE"] = "FIRST" if self.first else "LAST"
+        if attitude == "EULER_ANGLE":
+            numbered = self.sequence.translate(str.maketrans("XYZ", "123"))
+            found["EULER_ROT_SEQ"] = numbered if old else self.sequence
+        if rate in ("ANGVEL", "RATE"):
+            letter = "A" if self.of_source == (self.direction == "A2B") else "B"
+            named = f"REF_FRAME_{letter}"
+            found["ANGVEL_FRAME" if rate == "ANGVEL" else "RATE_FRAME"] = (
+                named if old or self.rng.integers(2) else found[named]
+            )
+        return found
+
+    def state(self, date: str, row: dict[str, float]) -> str:
+        """A row, in KVN or XML."""
+        if not self.xml:
+            names = list(row)
+            if self.first and "QC" in names:
+                for n in range(0, len(names) - len(names) % 4, 4):
+                    names[n : n + 4] = [names[n + 3], *names[n : n + 3]]
+            return " ".join([date, *(repr(float(row[name])) for name in names)])
+        leaves = []
+        for n, (name, value) in enumerate(row.items()):
+            text = repr(float(value))
+            if self.version == 1 and name.startswith("ANGLE_"):
+                leaves.append(f'<rotation{n + 1} angle="{self.sequence[n]}_ANGLE">{text}</rotation{n + 1}>')
+            elif name.endswith("RATE"):
+                leaves.append(
+                    f'<rotation{n % 3 + 1} rate="{name}" units="deg/s">{text}</rotation{n % 3 + 1}>'
+                )
+            else:
+                leaves.append(f"<{name}>{text}</{name}>")
+        tag = XML[self.kind]
+        return f"<attitudeState><{tag}><EPOCH>{date}</EPOCH>{''.join(leaves)}</{tag}></attitudeState>"
+
+    def text(self) -> str:
+        every = self.numbers(self.times)
+        blocks = []
+        for rows in np.split(np.arange(len(self.times)), self.segments):
+            states = [self.state(self.date(self.dates[n]), {k: v[n] for k, v in every.items()}) for n in rows]
+            if self.xml:
+                about = "".join(f"<{key}>{value}</{key}>" for key, value in self.keys().items())
+                blocks.append(
+                    f"<segment><metadata>{about}</metadata><data>{''.join(states)}</data></segment>"
+                )
+            else:
+                about = "\n".join(f"{key} = {value}" for key, value in self.keys().items())
+                rows_of = "\n".join(["DATA_START", "COMMENT 1 2", *states, "DATA_STOP"])
+                blocks.append(f"META_START\n{about}\nMETA_STOP\n\n{rows_of}\n")
+        if self.xml:
+            root = f'<aem id="CCSDS_AEM_VERS" version="{self.version}.0">'
+            return f'<?xml version="1.0"?>\n{root}<header/><body>{"".join(blocks)}</body></aem>'
+        return f"CCSDS_AEM_VERS = {self.version}.0\nORIGINATOR = ME\n{''.join(blocks)}"
+
+    def check(self, path: Path) -> None:
+        """Attitudes to 1e-12 rad; rates to 1e-10 deg/s, or to 1e-6 where ours are differences."""
+        path.write_text(self.text())
+        found = read_trajectory(path)
+        columns = found.columns
+        read = Rotation.from_quat(np.stack([columns[name] for name in ("qx", "qy", "qz", "qw")], axis=1))
+        apart = (read.inv() * self.top.attitude(self.times)).magnitude()
+        assert apart.max() < 1e-7 if "SPIN" in self.kind else apart.max() < 1e-12, self.text()[:900]
+        assert found.settled
+        for date, moment in zip(found.epochs, self.dates, strict=True):
+            assert date == parse_epoch(f"{moment.isoformat()} {self.scale}")
+        if self.kind in ("QUATERNION", "EULER_ANGLE"):
+            assert "wx" not in columns
+            return
+        rates = np.stack([columns[name] for name in ("wx", "wy", "wz")], axis=1)
+        expected = np.degrees(self.top.rates(self.times))
+        close = 1e-6 if self.kind == "EULER_ANGLE/DERIVATIVE" or "SPIN" in self.kind else 1e-10
+        assert np.abs(rates - expected).max() < close, (self.text()[:900], found.notes)
+
+
+@pytest.mark.parametrize("seed", seeds(4, 60))
+def test_attitudes_and_rates_are_those_that_were_written(seed: int, tmp_path: Path) -> None:
+    """Ten messages a seed: both versions, KVN and XML, all types, directions, frames, clocks, segments."""
+    rng = np.random.default_rng(seed)
+    for n in range(10):
+        Aem(rng).check(tmp_path / f"{n}.aem")
+
+
+@pytest.mark.parametrize("seed", seeds(2, 50))
+def test_rates_of_version_1_as_derivatives_are_known_by_the_motion(seed: int, tmp_path: Path) -> None:
+    """QUATERNION/RATE and EULER_ANGLE/RATE as derivatives of Euler angles, as Orekit writes them."""
+    rng = np.random.default_rng(seed)
+    given = Aem(rng, "EULER_ANGLE/DERIVATIVE")
+    given.version, given.xml, given.kind = 1, False, "EULER_ANGLE/RATE"
+    given.direction, given.of_source = "A2B", False
+    given.times = np.linspace(0, 6, 12 * given.segments)  # closer together
+    given.dates = [given.dates[0] + timedelta(seconds=round(float(t), 6)) for t in given.times]
+    given.times = np.array([(date - given.dates[0]).total_seconds() for date in given.dates])
+    plain = given.numbers
+
+    def derivatives(times: np.ndarray) -> dict[str, np.ndarray]:
+        given.kind = "EULER_ANGLE/DERIVATIVE"
+        found = plain(times)
+        given.kind = "EULER_ANGLE/RATE"
+        return found
+
+    given.numbers = derivatives  # type: ignore[method-assign]
+    path = tmp_path / "them.aem"
+    path.write_text(given.text())
+    found = read_trajectory(path)
+    if any("left out" in note for note in found.notes):  # near the singularity angles jump
+        return
+    assert found.notes == (
+        "rates were taken as derivatives of the Euler angles, at which the attitude turns",
+    )
+    rates = np.stack([found.columns[name] for name in ("wx", "wy", "wz")], axis=1)
+    assert np.abs(rates - np.degrees(given.top.rates(given.times))).max() < 1e-4
+
+
+def oem(rng: np.random.Generator, path: Path, xml: bool) -> tuple[list[str], np.ndarray]:
+    """Write an orbit in several segments with covariances; dates and numbers in m and m/s."""
+    segments, dates, rows = [], [], []
+    start = datetime(2024, 12, 30) + timedelta(seconds=int(rng.integers(86400)))
+    more, form = bool(rng.integers(2)), str(rng.choice(["%Y-%jT%H:%M:%S.%f", "%Y-%m-%dT%H:%M:%S.%f"]))
+    for _ in range(int(rng.integers(2, 5))):
+        states, lines = [], []
+        for _ in range(int(rng.integers(2, 6))):
+            start += timedelta(milliseconds=int(rng.integers(1, 10**6)))
+            date = start.strftime(form)
+            numbers = [*rng.uniform(-7e3, 7e3, 3), *rng.uniform(-7, 7, 3)]
+            given = [*numbers, *(rng.uniform(-1, 1, 3) if more else ())]
+            dates.append(start.isoformat())
+            rows.append(numbers)
+            lines.append(" ".join([date, *map(repr, map(float, given))]))
+            names = ("X", "Y", "Z", "X_DOT", "Y_DOT", "Z_DOT", "X_DDOT", "Y_DDOT", "Z_DDOT")
+            leaves = (f"<{name}>{float(x)!r}</{name}>" for name, x in zip(names, given, strict=False))
+            states.append(f"<stateVector><EPOCH>{date}</EPOCH>{''.join(leaves)}</stateVector>")
+        about = {
+            "OBJECT_NAME": "TOP", "OBJECT_ID": "2024-001A", "CENTER_NAME": "EARTH", "REF_FRAME": "EME2000",
+            "TIME_SYSTEM": "TAI", "START_TIME": lines[0].split()[0], "STOP_TIME": date,
+        }  # fmt: skip
+        covariance = [list(map(repr, map(float, rng.uniform(0, 1, n)))) for n in range(1, 7)]
+        if xml:
+            elements = "".join(f"<{key}>{value}</{key}>" for key, value in about.items())
+            matrix = (
+                f"<covarianceMatrix><EPOCH>{date}</EPOCH><CX_X>{covariance[0][0]}</CX_X></covarianceMatrix>"
+            )
+            data = "".join(states) + matrix * int(rng.integers(3))
+            segments.append(f"<segment><metadata>{elements}</metadata><data>{data}</data></segment>")
+        else:
+            head = "\n".join(f"{key} = {value}" for key, value in about.items())
+            block = "\n".join([f"EPOCH = {date}", "COV_REF_FRAME = RTN", *map(" ".join, covariance)])
+            many = "\n".join([block] * int(rng.integers(1, 3)))
+            after = f"COVARIANCE_START\n{many}\nCOVARIANCE_STOP\n" if rng.integers(2) else ""
+            segments.append(f"META_START\n{head}\nMETA_STOP\n" + "\n".join(lines) + f"\n{after}")
+    if xml:
+        text = f'<oem id="CCSDS_OEM_VERS" version="2.0"><header/><body>{"".join(segments)}</body></oem>'
+    else:
+        text = "CCSDS_OEM_VERS = 2.0\nCREATION_DATE = 2024-01-01T00:00:00\nORIGINATOR = ME\n" + "".join(
+            segments
+        )
+    path.write_text(text)
+    return dates, np.array(rows) * 1e3
+
+
+@pytest.mark.parametrize("seed", seeds(4, 60))
+def test_orbits_keep_all_their_segments(seed: int, tmp_path: Path) -> None:
+    """Four messages a seed, with 2 to 4 segments, most with covariances; ``oem`` reads the same of KVN."""
+    rng = np.random.default_rng(seed)
+    for n in range(4):
+        path, xml = tmp_path / f"{n}.oem", bool(n % 2)
+        dates, expected = oem(rng, path, xml)
+        found = read_trajectory(path)
+        read = np.stack([found.columns[name] for name in ("x", "y", "z", "vx", "vy", "vz")], axis=1)
+        assert np.abs(read / expected - 1).max() < 1e-15
+        assert [str(date) for date in found.epochs] == [str(parse_epoch(f"{date} TAI")) for date in dates]
+        assert found.axes == "EME2000"
+        about = found.in_axes("ecliptic J2000").columns
+        places = np.stack([about[name] for name in "xyz"], axis=1)
+        turned = Rotation.from_euler("x", -OBLIQUITY).apply(expected[:, :3])
+        assert np.abs(places - turned).max() < 1e-8  # m, at 1e7 m
+        if not xml:
+            lines = path.read_text().splitlines()
+            row = int(rng.integers(len(dates)))
+            assert repr(float(expected[row, 0] / 1e3))[:12] in lines[int(found.row(row).split()[1]) - 1]
+            theirs = pytest.importorskip("oem").OrbitEphemerisMessage.open(path)
+            states = [[*state.position, *state.velocity] for state in theirs.states]
+            assert np.abs(np.array(states) * 1e3 / expected - 1).max() < 1e-15
+
+
+SCENE = """
+name = "top"
+[body]
+principal_moments = [1, 1, {c!r}]
+[initial]
+quaternion = {q}
+angular_velocity = {w}
+[frame]
+axes = "{axes}"
+[time]
+epoch = "{epoch}"
+end = {end!r}
+samples = 2
+[output]
+timeline = false
+estimate = false
+"""
+FIT = """
+[fit]
+parameters = ["initial.attitude", "initial.angular_velocity"]
+[[fit.data]]
+file = "top.aem"
+observable = "quaternion"
+sigma = "1e-9 rad"
+[[fit.data]]
+file = "top.aem"
+observable = "angular_velocity"
+sigma = "1e-9 rad/s"
+"""
+
+
+def wrong_way(text: str) -> str:
+    """The same message with its frames exchanged."""
+    for one, other in (("REF_FRAME_A =", "REF_FRAME_B ="), ("REF_FRAME_A>", "REF_FRAME_B>")):
+        text = text.replace(one, "@").replace(other, one).replace("@", other)
+    return text
+
+
+@pytest.mark.parametrize("seed", seeds(1, 50))
+def test_every_command_reads_the_same(seed: int, tmp_path: Path) -> None:
+    """``compare``, ``fit`` and what ``view`` and ``plot`` show, about the equator or the ecliptic, for a free
+    top in its closed form; and none agrees with the message the wrong way round.
+    """
+    rng = np.random.default_rng(seed)
+    kinds = ["QUATERNION/DERIVATIVE", "QUATERNION/ANGVEL", "EULER_ANGLE/ANGVEL"]
+    given = Aem(rng, str(rng.choice(kinds)))
+    moment, top = rng.uniform(0.6, 1.8), given.top
+    top.spin = top.nutation * np.cos(top.tilt) * (1 / moment - 1)
+    axes = str(rng.choice(["EME2000", "ICRF", "ecliptic J2000"]))
+    turn = Rotation.from_euler("x", -OBLIQUITY if axes.startswith("ecl") else 0.0)
+    start, zero = given.dates[0] - timedelta(seconds=given.times[0]), np.zeros(1)
+    x, y, z, w = (turn * top.attitude(zero)).as_quat()[0].tolist()
+    scene = SCENE.format(
+        c=moment, q=[w, x, y, z], w=top.rates(zero)[0].tolist(), axes=axes,
+        epoch=f"{start.isoformat()} {given.scale}", end=float(given.times[-1]) + 1,
+    )  # fmt: skip
+    path = tmp_path / "top.aem"
+    path.write_text(given.text())
+    found = rigidsim.compare(rigidsim.parse(scene), path)
+    assert found.attitude_error.largest < 1e-9
+    assert found.rate_error is not None
+    assert found.rate_error < 1e-9
+    assert found.convention.direction == "body_to_space"
+
+    shown: Any = open_any(path).dataset
+    read = Rotation.from_quat(shown.quaternion.values[:, [1, 2, 3, 0]])
+    assert (read.inv() * top.attitude(given.times)).magnitude().max() < 1e-12
+    assert np.abs(shown.angular_velocity.values - top.rates(given.times)).max() < 1e-12
+    assert shown.attrs["epoch"] == str(parse_epoch(f"{given.dates[0].isoformat()} {given.scale}"))
+
+    (tmp_path / "top.toml").write_text(scene + FIT)
+    fitted = rigidsim.fit(rigidsim.load(tmp_path / "top.toml"))
+    assert [one.rms < 1e-9 for one in fitted.data] == [True, True]
+
+    path.write_text(wrong_way(path.read_text()))
+    assert rigidsim.compare(rigidsim.parse(scene), path).verdict != "agrees"
+
+
+def changed(old: str, new: str) -> Callable[[str], str]:
+    return lambda text: text.replace(old, new)
+
+
+WRONG = {
+    "no direction": (changed("ATTITUDE_DIR = A2B\n", ""), "line 2: ATTITUDE_DIR is missing, by"),
+    "a direction in version 2": (
+        lambda text: text.replace("VERS = 1.0", "VERS = 2.0").replace("A2B", "B2A"),
+        r"line 2: ATTITUDE_DIR = B2A, which version 2 doesn't know; swap",
+    ),
+    "the scalar's place": (changed("QUATERNION_TYPE = LAST\n", ""), "line 2: QUATERNION_TYPE is missing"),
+    "two frames of space": (changed("= SC_BODY_1", "= ICRF"), "one frame of space and one of the body"),
+    "another clock": (changed("= TAI", "= MET"), r"line 2: TIME_SYSTEM = MET; allowed: TDB, TT, TAI, GPS, UTC"),
+    "no clock": (changed("TIME_SYSTEM = TAI\n", ""), "line 2: TIME_SYSTEM is missing; allowed"),
+    "Z of another clock": (changed("00:02", "00:02Z"), "line 15: .*where the scale is TAI; name one scale only"),
+    "an unknown type": (changed("= QUATERNION\n", "= DCM\n"), "line 2: ATTITUDE_TYPE = DCM; allowed: QUATERNION, "),
+    "a number too few": (changed("2 0 0 0 1", "2 0 0 1"), "line 15: holds 3 numbers; 4 are needed: Q1, Q2, Q3, QC"),
+    "no number": (changed("2 0 0 0 1", "2 0 0 0 one"), "line 15: one of 0 0 0 one is no number"),
+    "no date": (changed("2024-061T00:00:02", "2024-161T00:61:02"), "line 15: .*a date such as"),
+    "a foreign line": (changed("DATA_STOP", "0 0 0 1"), 'line 17: "0 0 0 1"; a keyword with ='),
+    "another object": (
+        lambda text: text + text[text.index("META_START") :].replace("= TOP", "= CONE"),
+        "segments of different objects or centres",
+    ),
+    "other frames": (
+        lambda text: text + text[text.index("META_START") :].replace("EME2000", "LVLH"),
+        "segments in different frames, EME2000, LVLH",
+    ),
+    "no rows": (lambda text: text[: text.index("2024-061")], "holds no data lines"),
+}  # fmt: skip
+PLAIN = """CCSDS_AEM_VERS = 1.0
+META_START
+OBJECT_NAME = TOP
+REF_FRAME_A = EME2000
+REF_FRAME_B = SC_BODY_1
+ATTITUDE_DIR = A2B
+TIME_SYSTEM = TAI
+ATTITUDE_TYPE = QUATERNION
+QUATERNION_TYPE = LAST
+META_STOP
+COMMENT nothing turns
+DATA_START
+2024-061T00:00:00 0 0 0 1
+2024-061T00:00:01 0 0 0 1
+2024-061T00:00:02 0 0 0 1
+2024-061T00:00:03 0 0 0 1
+DATA_STOP
+"""
+
+
+@pytest.mark.parametrize("name", WRONG)
+def test_what_cannot_be_read_is_refused_with_its_line(name: str, tmp_path: Path) -> None:
+    change, message = WRONG[name]
+    path = tmp_path / "top.aem"
+    path.write_text(PLAIN)
+    assert read_trajectory(path).row(2) == "line 15"
+    path.write_text(change(PLAIN))
+    with pytest.raises(rigidsim.RigidsimError, match=message):
+        read_trajectory(path)
+
+
+def test_a_row_that_ends_a_segment_and_begins_the_next_counts_once(tmp_path: Path) -> None:
+    path = tmp_path / "top.aem"
+    path.write_text(
+        PLAIN + PLAIN[PLAIN.index("META_START") :].replace("T00:00:0", "T00:00:1").replace("10 0", "03 0")
+    )
+    found = read_trajectory(path)
+    assert len(found.epochs) == 7
+    assert (found.row(3), found.row(4)) == ("line 16", "line 30")
+    assert "first row, at the time of the row before, was left out" in found.notes[0]
