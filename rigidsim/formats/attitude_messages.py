@@ -18,7 +18,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from rigidsim.formats.digits import FEW, written_resolution
-from rigidsim.formats.messages import Segment
+from rigidsim.formats.messages import MessageSegment
 from rigidsim.scene.epochs import Epoch
 from rigidsim.scene.frame import EQUATOR
 from rigidsim.scene.rotations import rotation_matrix
@@ -76,7 +76,7 @@ class AttitudeRows:
         resolution: half the last digits that are written, of quaternions and of rates.
     """
 
-    def __init__(self, segment: Segment, dates: list[Epoch]) -> None:
+    def __init__(self, segment: MessageSegment, dates: list[Epoch]) -> None:
         self.segment, self.dates, self.notes = segment, dates, list[str]()
         kind, _, self.rate = segment.key("ATTITUDE_TYPE", TYPES).partition("/")
         if not kind:

@@ -13,7 +13,7 @@ import numpy as np
 
 from rigidsim.errors import RigidsimError
 from rigidsim.formats.attitude_messages import AttitudeRows, named_axes
-from rigidsim.formats.messages import Segment, read_segments
+from rigidsim.formats.messages import MessageSegment, read_segments
 from rigidsim.scene.epochs import Epoch
 from rigidsim.scene.frame import EQUATOR, SpaceAxes
 
@@ -40,7 +40,7 @@ def message_columns(path: Path, kind: str) -> dict[str, Any]:
     """
     segments = read_segments(path, kind)
     epochs = [one.epochs() for one in segments]
-    reading: Callable[[Segment, list[Epoch]], Any] = AttitudeRows if kind == "AEM" else _OrbitRows
+    reading: Callable[[MessageSegment, list[Epoch]], Any] = AttitudeRows if kind == "AEM" else _OrbitRows
     parts = [reading(*each) for each in zip(segments, epochs, strict=True)]
     notes = [note for part in parts for note in part.notes]
     for n, (before, after) in enumerate(pairwise(epochs), 1):
@@ -75,7 +75,7 @@ class _OrbitRows:
 
     settled, resolution = True, None
 
-    def __init__(self, segment: Segment, dates: list[Epoch]) -> None:
+    def __init__(self, segment: MessageSegment, dates: list[Epoch]) -> None:
         self.notes: list[str] = []
         self.axes = named_axes(segment.key("REF_FRAME"))
         self.table = segment.numbers(_ORBIT, _ACCELERATION) * _KM

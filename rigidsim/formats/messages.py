@@ -22,7 +22,7 @@ _MARKS = ("META_STOP", "DATA_START", "DATA_STOP")
 
 
 @dataclass(frozen=True)
-class Row:
+class MessageRow:
     """Number of its line (KVN), or of the state in the message (XML); its date; its numbers in their order
     (KVN) or by their names (XML).
     """
@@ -33,7 +33,7 @@ class Row:
 
 
 @dataclass(frozen=True)
-class Segment:
+class MessageSegment:
     """One segment.
 
     Attributes:
@@ -45,9 +45,9 @@ class Segment:
     where: str
     counted: str
     keys: dict[str, str] = field(default_factory=dict)
-    rows: list[Row] = field(default_factory=list)
+    rows: list[MessageRow] = field(default_factory=list)
 
-    def fault(self, what: str, row: Row | None = None) -> RigidsimError:
+    def fault(self, what: str, row: MessageRow | None = None) -> RigidsimError:
         """What is wrong with the metadata, or with a row."""
         place = f"segment at {self.where}" if row is None else f"{self.counted} {row.number}"
         return RigidsimError(f"{self.where.rpartition(', ')[0]}, {place.split(', ')[-1]}: {what}")
@@ -97,7 +97,7 @@ class Segment:
         return found
 
 
-def read_segments(path: Path, kind: str) -> list[Segment]:
+def read_segments(path: Path, kind: str) -> list[MessageSegment]:
     """The segments with rows.
 
     Args:
@@ -120,9 +120,9 @@ def read_segments(path: Path, kind: str) -> list[Segment]:
     return found
 
 
-def _of_kvn(text: str, kind: str, path: Path) -> Iterator[Segment]:
+def _of_kvn(text: str, kind: str, path: Path) -> Iterator[MessageSegment]:
     version, passed_over = 0.0, False
-    segment: Segment | None = None
+    segment: MessageSegment | None = None
     for number, line in enumerate(text.splitlines(), 1):
         words = line.split()
         if not words or words[0] == "COMMENT":
@@ -130,7 +130,7 @@ def _of_kvn(text: str, kind: str, path: Path) -> Iterator[Segment]:
         if words[0] == "META_START":
             if segment is not None:
                 yield segment
-            segment, passed_over = Segment(version, f"{path}, line {number}", "line"), False
+            segment, passed_over = MessageSegment(version, f"{path}, line {number}", "line"), False
         elif passed_over or words[0].startswith("COVARIANCE"):
             passed_over = words[0] != "COVARIANCE_STOP"
         elif "=" in line:
@@ -140,7 +140,7 @@ def _of_kvn(text: str, kind: str, path: Path) -> Iterator[Segment]:
             elif segment is not None:
                 segment.keys[key.strip().upper()] = value.strip()
         elif segment is not None and re.match(r"\d{4}-", words[0]):
-            segment.rows.append(Row(number, words[0], words[1:]))
+            segment.rows.append(MessageRow(number, words[0], words[1:]))
         elif words[0] not in _MARKS:
             what = "a keyword with =, or a date with numbers after META_START, is allowed"
             raise RigidsimError(f'{path}, line {number}: "{line.strip()[:60]}"; {what}')
@@ -148,24 +148,26 @@ def _of_kvn(text: str, kind: str, path: Path) -> Iterator[Segment]:
         yield segment
 
 
-def _of_xml(text: str, kind: str, path: Path) -> Iterator[Segment]:
+def _of_xml(text: str, kind: str, path: Path) -> Iterator[MessageSegment]:
     count = 0
     for message in ElementTree.fromstring(text).iter():
         if _tag(message) != kind.lower():
             continue
         for place, element in enumerate(e for e in message.iter() if _tag(e) == "segment"):
-            segment = Segment(float(message.get("version", "0")), f"{path}, segment {place + 1}", "row")
+            segment = MessageSegment(
+                float(message.get("version", "0")), f"{path}, segment {place + 1}", "row"
+            )
             for part in element.iter():
                 if _tag(part) == "metadata":
                     segment.keys.update({_tag(leaf): (leaf.text or "").strip() for leaf in part})
                 elif _tag(part) == _STATES[kind]:
                     values = dict(_leaves(part, segment, count))
-                    segment.rows.append(Row(count, values.pop("EPOCH", ""), values))
+                    segment.rows.append(MessageRow(count, values.pop("EPOCH", ""), values))
                     count += 1
             yield segment
 
 
-def _leaves(state: ElementTree.Element, segment: Segment, number: int) -> Iterator[tuple[str, str]]:
+def _leaves(state: ElementTree.Element, segment: MessageSegment, number: int) -> Iterator[tuple[str, str]]:
     """Texts of a state by their names. In version 1 turns have elements by their number, with the axis as an
     attribute.
     """
@@ -174,7 +176,7 @@ def _leaves(state: ElementTree.Element, segment: Segment, number: int) -> Iterat
             continue
         name = leaf.get("rate") or _tag(leaf)
         unit = leaf.get("units", leaf.get("unit", "deg"))
-        row = Row(number, "", {})
+        row = MessageRow(number, "", {})
         if unit.lower() not in _UNITS:
             raise segment.fault(
                 f'{name} in "{unit}"; {", ".join(_UNITS)} are allowed, as the standard has it', row
