@@ -87,7 +87,7 @@ class Trajectory:
             if variable == "angular_velocity" or not columns.keys() >= set(names):
                 continue
             values = np.stack([columns[name] for name in names], axis=1)
-            change = multiplied if variable == "quaternion" else turned
+            change = multiplied if len(names) == 4 else turned
             columns |= dict(zip(names, change(turn, values).T, strict=True))
         return replace(self, columns=columns, axes=axes or "")
 
