@@ -16,6 +16,7 @@ from __future__ import annotations
 
 import operator
 from collections.abc import Mapping
+from itertools import accumulate
 from typing import Any
 
 import heyoka as hy
@@ -63,7 +64,8 @@ def to_heyoka(
         try:
             return hy.expression(rounded(number(value)))
         except OverflowError:
-            raise expression.error("a constant beyond the range of the working precision", node) from None
+            what = f"a constant of {context.nstr(value, 6)}, which the working precision can't hold"
+            raise expression.error(f"{what}; write 0, another unit, or another precision", node) from None
 
     def combine(node: Node, operands: list[Any]) -> Any:
         """An mpf as long as all operands are constant, a line in time, or an expression."""
@@ -94,13 +96,28 @@ def to_heyoka(
             if context.isint(exponent):
                 return whole_power(operands[0], int(exponent))
             return operands[0] ** literal(node, exponent)
-        operands, named = [literal(node, operand) for operand in operands], node.operator
+        operands, named = [literal(node, x) for x in _in_range(node, operands, number)], node.operator
         if named in ("sum", "product"):
             return hy.sum(operands) if named == "sum" else hy.prod(operands)
         own: dict[str, Any] = {"negative": operator.neg, "quotient": operator.truediv}
         return (own.get(named) or getattr(hy, named))(*operands)
 
     return literal(expression.root, expressions.fold(expression, combine))
+
+
+def _in_range(node: expressions.Operation, operands: list[Any], number: Rounder) -> list[Any]:
+    """Operands with the numbers among them joined into one, if heyoka would leave the range on its way."""
+    plain = [x for x in operands if not isinstance(x, hy.expression)]
+    join = {"sum": operator.add, "product": operator.mul}.get(node.operator)
+    if join is None or len(plain) < 2:
+        return operands
+    partial = [*accumulate(plain, join)]
+    try:
+        for x in partial:
+            number(x)
+    except OverflowError:
+        return [partial[-1], *(x for x in operands if isinstance(x, hy.expression))]
+    return operands
 
 
 def _with_lines(node: expressions.Operation, operands: list[Any]) -> list[Any]:

@@ -15,6 +15,7 @@ import numpy as np
 from rigidsim.errors import ConfigError, Problem
 from rigidsim.model.kinematics import Kinematics
 from rigidsim.model.rotations import Symbolic
+from rigidsim.model.si import speaks_si
 from rigidsim.model.state_blocks import StateBlock
 from rigidsim.scene.arithmetic import Vector
 from rigidsim.scene.registry import SceneLoad
@@ -33,6 +34,9 @@ STATES_READ = ("attitude", "vertical", "flight")
 class Load(SceneLoad):
     """Base of all loads; as it stands it does nothing.
 
+    A load of a user takes the state in SI (``rigidsim.model.si.InSI``) and gives SI: torques in N m,
+    potentials in J, powers in W. rigidsim's own loads are written in internal units.
+
     What else a load may define (an orbit, what it conserves, its size, widths of pulses, damping, momentum
     that it carries) are the protocols of ``rigidsim.model.capabilities``, ``scaling`` and ``carriers``: it
     has those whose members it defines.
@@ -48,21 +52,27 @@ class Load(SceneLoad):
     conservative = False
     described = "a load given from Python"
 
+    def __init_subclass__(cls) -> None:
+        """Loads of users speak SI; those of rigidsim are in internal units."""
+        super().__init_subclass__()
+        if not cls.__module__.startswith("rigidsim."):
+            speaks_si(cls)
+
     def extra_states(self, m: Kinematics) -> StateBlock | None:
         """States of its own besides those of an ``orbit``; None if it has none."""
         return None
 
     def torque(self, m: Kinematics) -> list[Term]:
-        """Torque about the reference point, body axes, in internal units of energy."""
+        """Torque about the reference point, body axes, N m (of rigidsim's own loads in internal units)."""
         return []
 
     def force(self, m: Kinematics) -> list[Term]:
-        """Acceleration of the centre of mass, space axes, in internal units of speed over time."""
+        """Acceleration of the centre of mass, space axes, m/s^2 (of rigidsim's own in internal units)."""
         return []
 
     def potential(self, m: Kinematics) -> Symbolic | None:
-        """Potential energy in internal units: part of the total energy if ``conservative``, and of the
-        canonical formulation's Hamiltonian in any case.
+        """Potential energy, J (of rigidsim's own in internal units): part of the total energy if
+        ``conservative``, and of the canonical formulation's Hamiltonian in any case.
         """
         return None
 

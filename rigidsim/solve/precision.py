@@ -22,6 +22,9 @@ from rigidsim.errors import ConfigError, Problem
 from rigidsim.scene.arithmetic import working_bits
 
 _CHUNK_BITS = 24  # exact in every type
+_SMALLEST, _SMALLEST_SINGLE = -1074, -149
+"""Exponents of the last bits of float64, of which numbers of all precisions are made, and of float32."""
+
 
 Scalar: TypeAlias = "float | np.floating[Any] | hy.real128 | hy.real"
 """A number of a run's own precision (``Precision.scalar``)."""
@@ -68,7 +71,8 @@ class Precision:
         """The scalar nearest to an mpf (ties to even), with no double in between.
 
         Raises:
-            OverflowError: beyond the range of the internal arithmetic; scaling keeps scenes far from it.
+            OverflowError: beyond the range of the internal arithmetic, or so small that it would lose digits;
+                scaling keeps scenes far from it.
         """
         sign, mantissa, exponent, count = mpf_pos(value._mpf_, self.bits, round_nearest)
         if mantissa == 0:
@@ -77,16 +81,19 @@ class Precision:
             return self._scalar(0.0)
         total = self._scalar(0.0)
         mantissa, exponent = int(mantissa), int(exponent)
+        single = self.scalar is np.float32
+        if exponent < (_SMALLEST_SINGLE if single else _SMALLEST):
+            raise OverflowError(f"{mpmath.nstr(value, 8)} is below the range of {self.name}")
         while mantissa:
             part = float(mantissa & ((1 << _CHUNK_BITS) - 1))
             with np.errstate(over="ignore", under="ignore"):
                 scaled = float(np.ldexp(part, exponent))
-                if part and (scaled == 0.0 or np.isinf(scaled)):
+                if np.isinf(scaled):
                     raise OverflowError(f"{mpmath.nstr(value, 8)} is beyond the internal range")
                 total = total + self._scalar(scaled)
             mantissa >>= _CHUNK_BITS
             exponent += _CHUNK_BITS
-        if self.scalar is np.float32 and (total == 0 or np.isinf(total)):
+        if single and np.isinf(total):
             raise OverflowError(f"{mpmath.nstr(value, 8)} is beyond the range of single precision")
         return -total if sign else total
 

@@ -21,8 +21,11 @@ from rigidsim.model.system import System, build_system
 from rigidsim.model.two_part import in_two_parts
 from rigidsim.scene.choices import AUTO, FORMULATIONS
 from rigidsim.scene.config import Experiment
+from rigidsim.scene.expressions.tree import ExpressionError
+from rigidsim.scene.fields import numbers_in
 from rigidsim.scene.initial_values import check_start
 from rigidsim.scene.scene import Scene, build_scene
+from rigidsim.scene.validation_messages import key_path
 from rigidsim.solve.first_step import refuse_non_finite_start, refuse_roots_of_zero
 from rigidsim.solve.precision import Precision, Scalar, precision_of
 from rigidsim.solve.sampling import SampleClock
@@ -189,17 +192,38 @@ def prepare_scene(
             double_twin(prepared)  # its stability is a question of the rates, which it doesn't carry itself
     except ConfigError as error:
         raise error.at(experiment.source) from None
-    except OverflowError as error:
-        single = scene.config.integrator.precision == "single"
-        what = (
-            f"the scene's numbers span more than single precision can hold ({error}); choose a higher "
-            "precision or check the units"
-            if single
-            else f"the scene's numbers are too large, too small or too far apart ({error}): they and their "
-            "products, such as the energy, may be between about 1e-300 and 1e300; check the units"
-        )
-        raise ConfigError(Problem("config", what), experiment.source) from None
+    except (OverflowError, ExpressionError) as error:
+        raise ConfigError(_out_of_range(scene, error), experiment.source) from None
     return prepared
+
+
+_REMEDY = "check its unit, write 0, or choose another precision"
+
+
+def _out_of_range(scene: Scene, error: OverflowError | ExpressionError) -> list[Problem]:
+    """What to say of numbers that the precision can't hold, by their keys where these are known."""
+    config = scene.config
+    if isinstance(error, ExpressionError):
+        where = (place for place, expression in scene.formulas() if expression.text == error.of)
+        return [Problem(next(where, "config"), str(error))]
+    single = config.integrator.precision == "single"
+    largest = 10 ** (30 if single else 250)
+    extreme = [
+        Problem(key_path(path), f"given {scene.context.nstr(x.at(scene.context), 6)}; {error}: {_REMEDY}")
+        for path, numbers in numbers_in(config)
+        for x in numbers
+        if x.sign and not 1 < largest * abs(x.rational) < largest**2
+    ]
+    if extreme:
+        return extreme
+    what = (
+        f"the scene's numbers span more than single precision can hold ({error}); choose a higher "
+        "precision or check the units"
+        if single
+        else f"the scene's numbers are too large, too small or too far apart ({error}): they and their "
+        "products, such as the energy, may be between about 1e-300 and 1e300; check the units"
+    )
+    return [Problem("config", what)]
 
 
 _NUTATES = 4

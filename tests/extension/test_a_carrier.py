@@ -18,8 +18,7 @@ from scipy.spatial.transform import Rotation
 from support import STARTS, assert_announced_from, config, loaded, run_text, same_bits
 
 import rigidsim
-from rigidsim.model.kinematics import Kinematics
-from rigidsim.model.load import Load, Term
+from rigidsim.model.loads import InSI, Load, Term
 from rigidsim.model.state_blocks import StateBlock
 from rigidsim.scene.fields import Moment, Momentum, Triple
 from rigidsim.scene.registry import LoadFields, Surroundings, register_load
@@ -53,16 +52,16 @@ class Rotor(Load):
     def amplitude(self, scene: Scene) -> Any:
         return scene.context.zero
 
-    def carried_momentum(self, m: Kinematics) -> list[Term]:
-        return [([m.scene.context.ldexp(x, -m.scaling.momentum) for x in self.momentum], hy.expression(1.0))]
+    def carried_momentum(self, m: InSI) -> list[Term]:
+        return [(self.momentum, hy.expression(1.0))]
 
-    def carried_energy(self, m: Kinematics) -> Any:
-        return hy.expression(m.number(m.scene.context.ldexp(self._energy(), -m.scaling.energy)))
+    def carried_energy(self, m: InSI) -> Any:
+        return hy.expression(m.number(self._energy()))
 
-    def exerted_torque(self, m: Kinematics) -> list[Term]:
+    def exerted_torque(self, m: InSI) -> list[Term]:
         return []
 
-    def supplied_power(self, m: Kinematics) -> Any:
+    def supplied_power(self, m: InSI) -> Any:
         return None
 
     def carried_at_start(self, scene: Scene) -> tuple[list[Any], Any]:
@@ -84,29 +83,29 @@ class Wheel(Load):
     def __init__(self, torque: str, moment: str) -> None:
         self.torque_given, self.moment = torque, moment
 
-    def _motor(self, m: Kinematics) -> Any:
-        return m.scene.context.ldexp(m.scene.context.mpf(self.torque_given), -m.scaling.energy)
+    def _motor(self, m: InSI) -> Any:
+        return m.scene.context.mpf(self.torque_given)
 
-    def extra_states(self, m: Kinematics) -> StateBlock:
+    def extra_states(self, m: InSI) -> StateBlock:
         rate = hy.expression(m.number(self._motor(m)))
         why = "momentum of the wheel"
-        return StateBlock(["wheel"], [rate], [m.scene.context.zero], exponents=[m.scaling.momentum], why=why)
+        return StateBlock(["wheel"], [rate], [m.scene.context.zero], exponents=[m.units.momentum], why=why)
 
-    def carried_momentum(self, m: Kinematics) -> list[Term]:
+    def carried_momentum(self, m: InSI) -> list[Term]:
         zero, one = m.scene.context.zero, m.scene.context.one
         return [([zero, zero, one], hy.make_vars("wheel"))]
 
-    def _inverse(self, m: Kinematics) -> Any:
-        return m.number(m.scene.context.ldexp(1 / m.scene.context.mpf(self.moment), m.scaling.inertia))
+    def _inverse(self, m: InSI) -> Any:
+        return m.number(1 / m.scene.context.mpf(self.moment))
 
-    def carried_energy(self, m: Kinematics) -> Any:
+    def carried_energy(self, m: InSI) -> Any:
         return 0.5 * self._inverse(m) * hy.make_vars("wheel") ** 2.0
 
-    def exerted_torque(self, m: Kinematics) -> list[Term]:
+    def exerted_torque(self, m: InSI) -> list[Term]:
         zero = m.scene.context.zero
         return [([zero, zero, -self._motor(m)], hy.expression(1.0))]
 
-    def supplied_power(self, m: Kinematics) -> Any:
+    def supplied_power(self, m: InSI) -> Any:
         return m.number(self._motor(m)) * (self._inverse(m) * hy.make_vars("wheel") - m.rates[2])
 
     def carried_at_start(self, scene: Scene) -> tuple[list[Any], Any]:

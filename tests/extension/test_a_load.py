@@ -18,8 +18,7 @@ from support import STARTS, assert_announced_from, config, run_text, same_bits, 
 
 import rigidsim
 from rigidsim import ConfigError
-from rigidsim.model.kinematics import Kinematics
-from rigidsim.model.load import Load, Term
+from rigidsim.model.loads import InSI, Load, Term
 from rigidsim.scene.fields import Moment, Rate
 from rigidsim.scene.registry import LoadFields, Surroundings, register_load
 from rigidsim.solve.problem import prepare
@@ -50,12 +49,12 @@ class TorsionWire(Load):
             raise around.fault("inertia", f"given {float(fields.inertia):g}; a positive number is allowed")
         return cls(fields.inertia.at(around.context) * fields.frequency.at(around.context) ** 2)
 
-    def torque(self, m: Kinematics) -> list[Term]:
-        k, zero = m.scene.context.ldexp(self.stiffness, -m.scaling.energy), m.scene.context.zero
+    def torque(self, m: InSI) -> list[Term]:
+        k, zero = self.stiffness, m.scene.context.zero
         return [([-k, zero, zero], m.matrix[0][1]), ([zero, k, zero], m.matrix[0][0])]
 
-    def potential(self, m: Kinematics) -> Any:
-        return -m.number(m.scene.context.ldexp(self.stiffness, -m.scaling.energy)) * m.matrix[0][2]
+    def potential(self, m: InSI) -> Any:
+        return -m.number(self.stiffness) * m.matrix[0][2]
 
     def amplitude(self, scene: Any) -> Any:
         return 2 * self.stiffness

@@ -330,8 +330,13 @@ IN_SEVERAL: list[tuple[Any, ...]] = [
         'choose "auto"',
     ),
     ({"output": 'record = ["quaternion"]'} | RATES, "[output] record", "choose another formulation"),
-    ({"initial": "angular_velocity = [1e-4000, 1, 0]"}, "config", "1.0e-4000", "check the units"),
-    ({"body": "principal_moments = [1e4000, 1e4000, 1e4000]"}, "config", "angular_momentum"),
+    (
+        {"initial": "angular_velocity = [1e-4000, 1, 0]"},
+        "[initial] angular_velocity",
+        "given 1.0e-4000",
+        "unit",
+    ),
+    ({"body": "principal_moments = [1e4000, 1e4000, 1e4000]"}, "[body] principal_moments", "given 1.0e+4000"),
     ({"time": "end = 1\nsamples = 100_000_000"} | SINGLE, "[time]", "than single precision"),
     ({"time": "start = 1e9\nend = 1_000_000_001"} | SINGLE, "[time]", "samples 0 and 1 are closer together"),
 ]

@@ -138,11 +138,10 @@ class WrongPotential(Load):
 
     def torque(self, m: Kinematics) -> list[Term]:
         k, zero = m.scene.context.mpf("0.1"), m.scene.context.zero
-        k = m.scene.context.ldexp(k, -m.scaling.energy)
         return [([-k, zero, zero], m.matrix[0][1]), ([zero, k, zero], m.matrix[0][0])]
 
     def potential(self, m: Kinematics) -> Any:
-        k = m.scene.context.ldexp(m.scene.context.mpf("0.1000001"), -m.scaling.energy)
+        k = m.scene.context.mpf("0.1000001")
         return -m.number(k) * m.matrix[0][2]
 
     def amplitude(self, scene: Any) -> Any:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from rigidsim.model import flight_names, shadows  # noqa: F401  (names in expressions)
-from rigidsim.model.kinematics import seconds
 from rigidsim.model.load import Load, Term
 from rigidsim.model.loads import (  # noqa: F401  (each enters its kind; a new load is one line more here)
     applied,
@@ -25,9 +24,10 @@ from rigidsim.model.loads import (  # noqa: F401  (each enters its kind; a new l
     uniform_gravity,
     viscous_torque,
 )
+from rigidsim.model.si import InSI, in_si, seconds
 from rigidsim.model.state_blocks import StateBlock
 
-__all__ = ["ExtraStates", "Load", "LoadModel", "StateBlock", "Term", "seconds"]
+__all__ = ["ExtraStates", "InSI", "Load", "LoadModel", "StateBlock", "Term", "in_si", "seconds"]
 
 LoadModel = Load
 """Former name of ``Load``, kept for loads written in Python."""

@@ -28,6 +28,7 @@ from rigidsim.model.frames import (
 from rigidsim.model.load import loads_of
 from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.rotations import Symbolic
+from rigidsim.model.si import values_in_si
 from rigidsim.scene.arithmetic import Vector, negligible
 from rigidsim.scene.choices import variables_named
 from rigidsim.scene.registry import register_observable
@@ -224,7 +225,8 @@ class Observable:
         units: SI.
         long_name: description for readers.
         frame: "body axes", "space axes" or "".
-        expressions: components as expressions of the state, in internal units (see ``Kinematics``).
+        expressions: components as expressions of the state: of that in SI (``rigidsim.model.si.InSI``) for
+            units of a dimension without ``exponents``, otherwise of that in internal units (``Kinematics``).
         exponents: binary exponents of the components' internal units; None where they are in SI or have none.
         needs: what the scene must have; names in ``rigidsim.model.observables.observable.NEEDS``.
         conserved: why it is an invariant of this scene, or None where it isn't.
@@ -255,6 +257,11 @@ class Observable:
     steady: Callable[[Mechanics], Steady | None] = _without
     attributes: Callable[[Mechanics], Mapping[str, str]] = lambda _: {}
     absent: Callable[[Mechanics], str | None] = _without
+
+    def __post_init__(self) -> None:
+        """Let an observable with a dimension, but without exponents, take the state in SI."""
+        if self.exponents is None and self.units not in ("", "1", "rad"):
+            object.__setattr__(self, "expressions", values_in_si(self.expressions))
 
     def available(self, m: Mechanics) -> bool:
         """Whether the scene meets all needs and nothing else makes the quantity absent."""

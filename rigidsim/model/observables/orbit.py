@@ -95,7 +95,7 @@ register_all(
     ),
     Observable(
         "air_velocity", BODY, "m s-1", "velocity relative to the air", air_velocity,
-        frame="body axes", needs=("attitude", "flight"), by_default=_dragged, absent=_no_air,
+        lambda m: [0, 0, 0], "body axes", ("attitude", "flight"), by_default=_dragged, absent=_no_air,
         attributes=lambda m: {
             "convention": "of the centre of mass, in air that turns at the atmosphere_rate of the load flown "
             "about; the air comes from this direction"

@@ -31,9 +31,10 @@ ONE = ExactNumber(Fraction(1))
 
 
 class ExpressionError(ValueError):
-    """An expression that can't be read or has no value; the text shows the place, if it has one."""
+    """An expression, ``of``, that can't be read or has no value; the text shows the place, if it has one."""
 
     def __init__(self, what: str, text: str = "", position: int | None = None) -> None:
+        self.of = text
         self.column = None if position is None else position + 1
         if position is not None:
             first = max(0, position - 60)
