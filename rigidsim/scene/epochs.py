@@ -210,7 +210,7 @@ def parse_epoch(text: str, scale: str = "") -> Epoch:
     except (ValueError, OverflowError):
         raise ValueError(_allowed(shown, scale)) from None
     zone = match[9] or ""
-    named = {match[10], "UTC" if zone else None, scale or None} - {None}
+    named = {x for x in (match[10], "UTC" if zone else "", scale) if x}
     if len(named) > 1:
         raise ValueError(f"{shown}, where the scale is {scale or match[10]}; name one scale only")
     if not named:

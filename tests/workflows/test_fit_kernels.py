@@ -240,5 +240,5 @@ def test_a_message_is_turned_from_its_own_axes(turned_over: bool, here: Path) ->
     assert found.data[0].rms < 1e-9
     assert abs(found.value("initial.attitude[0]")) < 1e-9
     path.write_text(text.replace("EME2000", "MARS_IAU"))
-    with pytest.raises(ConfigError, match="attitudes from one of EME2000"):
+    with pytest.raises(ConfigError, match="attitudes and orbits about one of EME2000"):
         rigidsim.fit(rigidsim.parse(config))

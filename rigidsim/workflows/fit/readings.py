@@ -230,7 +230,8 @@ class _ReadTable:
         if not theirs or (theirs != axes and (theirs not in known or axes is None)):
             what = f'{self.table.file} is about the axes "{theirs}", and the config\'s space axes are '
             what += f'"{axes}"' if axes else "not named; say by [frame] axes what they are"
-            raise self.fault("file", f"{what}: attitudes from one of {', '.join(known)} are allowed")
+            allowed = f"attitudes and orbits about one of {', '.join(known)} are allowed"
+            raise self.fault("file", f"{what}: {allowed}")
 
     def _si(self, unit: str) -> float:
         """Factor to SI for an expression, whose dimension isn't known."""
