@@ -48,8 +48,11 @@ def _command(module: str, more: str = "") -> Callable[[Callable[..., None]], Cal
         name = function.__name__
 
         def work(given: dict[str, Any]) -> int:
-            code: int | None = getattr(import_module(f"rigidsim.cli.commands.{module}"), name)(**given)
-            return code or 0
+            command = getattr(import_module(f"rigidsim.cli.commands.{module}"), name)
+            compiled = sys.modules.get("rigidsim.solve.compiled")
+            if compiled is not None:  # loaded by those that integrate
+                compiled.quieten_engine()
+            return command(**given) or 0
 
         @wraps(function)
         def invoked(**given: Any) -> None:

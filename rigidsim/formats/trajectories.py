@@ -109,11 +109,14 @@ def read_trajectory(path: Path) -> Trajectory:
     if not path.exists():
         raise RigidsimError(f"{path}: there is no such file; allowed: {KINDS}")
     suffix = path.suffix.lower()
+    if suffix in (*_XARRAY, ".parquet", ".pq"):
+        try:
+            return _of_xarray_file(path) if suffix in _XARRAY else _of_parquet(path)
+        except (RigidsimError, MemoryError):
+            raise
+        except Exception as error:  # readers of other packages raise many kinds on files of other contents
+            raise _unreadable(path, error) from None
     try:
-        if suffix in _XARRAY:
-            return _of_xarray_file(path)
-        if suffix in (".parquet", ".pq"):
-            return _of_parquet(path)
         if path.is_file():
             with path.open(errors="replace") as file:
                 head = file.read(4096)
@@ -121,12 +124,14 @@ def read_trajectory(path: Path) -> Trajectory:
                 return Trajectory(source=str(path), **message_columns(path, found[1]))
             if suffix in TEXT:
                 return _of_text(path)
-    except (RigidsimError, MemoryError):
-        raise
-    except Exception as error:  # readers raise many kinds on files that aren't what their names say
-        text = str(error).strip() or type(error).__name__
-        raise RigidsimError(f"{path}: can't be read ({text.splitlines()[0][:200]})") from None
+    except (OSError, UnicodeDecodeError) as error:
+        raise _unreadable(path, error) from None
     raise RigidsimError(f"{path}: of no known kind; allowed: {KINDS}, or the folder of a run")
+
+
+def _unreadable(path: Path, error: Exception) -> RigidsimError:
+    text = str(error).strip() or type(error).__name__
+    return RigidsimError(f"{path}: can't be read ({text.splitlines()[0][:200]})")
 
 
 def trajectory_of(table: Any, source: str = "the table") -> Trajectory:

@@ -93,7 +93,8 @@ def _varied(
 ) -> list[Symbolic]:
     """Rates of a tangent vector of x' = f(x): derivatives of f (``rights``) along it; others are constant."""
     others = sorted({name for right in rights for name in hy.get_variables(right)} - set(map(str, states)))
-    constants = {hy.make_vars(name): hy.par[n] for n, name in enumerate(others)}
+    taken = max((int(str(par)[1:]) + 1 for par in hy.get_params(rights)), default=0)  # of turns and times
+    constants = {hy.make_vars(name): hy.par[taken + n] for n, name in enumerate(others)}
     rights = hy.subs(list(rights), constants) if constants else list(rights)
     # the derivative by one initial value obeys the equations that any tangent vector does
     equations = list(zip(states, rights, strict=True))

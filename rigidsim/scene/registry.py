@@ -18,7 +18,7 @@ from rigidsim.scene.bodies.body import RigidBody
 from rigidsim.scene.effect_parts import EffectPart
 from rigidsim.scene.epochs import Epoch
 from rigidsim.scene.exact import ExactNumber
-from rigidsim.scene.expressions.names import Names
+from rigidsim.scene.expressions.names import Names, origin
 from rigidsim.scene.expressions.tree import Expression
 from rigidsim.scene.fields import ConfigTable, Metre, VariableName, refuse
 from rigidsim.scene.kernels.ephemeris import Ephemeris
@@ -254,6 +254,24 @@ OBSERVABLES: dict[str, Any] = {}
 """What can be recorded, by name, in the order in which a dataset holds it (``Named``)."""
 
 
+def register_class(known: dict[str, Any], name: str, kind: type, what: str) -> None:
+    """Put a class into a registry. The same class defined anew, as in a notebook, replaces its older self.
+
+    Args:
+        what: the kind of thing, for the message.
+
+    Raises:
+        ValueError: another class, or one of the same name from another module, has the name already.
+    """
+    older = known.get(name, kind)
+    if origin(older) != origin(kind):
+        raise ValueError(
+            f'{what} "{name}" is registered already (by {origin(older)}, and now by {origin(kind)}); choose '
+            "another name"
+        )
+    known[name] = kind
+
+
 def register_load(kind: type[SceneLoad]) -> type[SceneLoad]:
     """Register a kind of load, so that ``[[loads]] kind = "..."`` finds it (usable as a class decorator).
 
@@ -264,9 +282,7 @@ def register_load(kind: type[SceneLoad]) -> type[SceneLoad]:
         raise ValueError(f"{kind.__name__} has no Fields; a load of a config declares its keys there")
     annotation = kind.Fields.model_fields["kind"].annotation
     (name,) = annotation.__args__  # type: ignore[union-attr]
-    if LOAD_KINDS.get(name, kind).__qualname__ != kind.__qualname__:
-        raise ValueError(f'a load of kind "{name}" is registered already ({LOAD_KINDS[name].__name__})')
-    LOAD_KINDS[name] = kind
+    register_class(LOAD_KINDS, name, kind, "a load of kind")
     return kind
 
 
@@ -274,7 +290,7 @@ def register_table(name: str) -> Callable[[type[SceneLoad]], type[SceneLoad]]:
     """Register loads whose keys are an array of tables of their own in the config (a class decorator)."""
 
     def register(kind: type[SceneLoad]) -> type[SceneLoad]:
-        TABLES[name] = kind
+        register_class(TABLES, name, kind, "a load with the tables")
         return kind
 
     return register
@@ -284,7 +300,7 @@ def register_of_body(key: str) -> Callable[[type[SceneLoad]], type[SceneLoad]]:
     """Register a load that a key of ``[body]`` brings (a class decorator)."""
 
     def register(kind: type[SceneLoad]) -> type[SceneLoad]:
-        OF_BODY[key] = kind
+        register_class(OF_BODY, key, kind, "a load by the key of [body]")
         return kind
 
     return register
@@ -294,7 +310,7 @@ def register_beside(key: str) -> Callable[[Any], Any]:
     """Register loads that a key of other loads brings beside these (a class decorator)."""
 
     def register(kind: Any) -> Any:
-        BESIDE[key] = kind
+        register_class(BESIDE, key, kind, "a load beside others by the key")
         return kind
 
     return register

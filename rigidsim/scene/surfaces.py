@@ -29,6 +29,9 @@ _STATES = 4  # states at which expressions are compared; two that agree at all o
 _TRIALS = 32  # attempts: some expressions have no value everywhere
 _BITS = 60  # of agreement, far fewer than the scene's arithmetic has
 
+PLATES = "[body] surfaces"
+"""How the place of a surface begins that is a plate of the body, and no expression of the user's."""
+
 
 @dataclass(frozen=True)
 class Surface:
@@ -37,6 +40,13 @@ class Surface:
     expression: Expression
     text: str
     where: str
+
+    @property
+    def remedy(self) -> str:
+        """What makes it smooth."""
+        if self.where.startswith(PLATES):
+            return "take a sphere in place of the plate"
+        return "make the change smooth, for instance tanh(u/width) in place of sign(u)"
 
 
 @dataclass(frozen=True)

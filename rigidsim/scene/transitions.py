@@ -100,7 +100,7 @@ def _least(expression: Expression) -> float:
         if isinstance(node, Constant):
             return float(node.value)
         if not isinstance(node, Operation):
-            return -node.of.bound
+            return -math.inf if node.of.turns else -node.of.bound
         if node.operator == "sum":
             return float(sum(operands))
         if node.operator in ("exp", "sqrt", "sigmoid"):

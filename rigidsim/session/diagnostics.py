@@ -110,7 +110,13 @@ class Diagnostics:
 
     def _drifts(self) -> Iterator[Caution]:
         for name, drift in self.statistics.largest.items():
-            if not drift <= self.drift_bound:
+            if math.isinf(drift):
+                yield Caution(
+                    WarningCode.DRIFT,
+                    f"{name} has no finite value at some samples, so that its drift isn't known; see where "
+                    "it is NaN in the dataset, and mend its expression or leave it out",
+                )
+            elif not drift <= self.drift_bound:
                 yield Caution(
                     WarningCode.DRIFT,
                     f"{name} drifted by {drift:.2g}, more than {self.drift_bound:.2g} = 50 tolerance "

@@ -2,7 +2,8 @@
 
 import re
 from collections import Counter
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from enum import Enum
 from itertools import accumulate
@@ -127,6 +128,16 @@ def plain_variables(
     return found
 
 
+@contextmanager
+def naming_member(member: int) -> Iterator[None]:
+    """Add a member's number to the traceback of an error of the code."""
+    try:
+        yield
+    except Exception as error:
+        error.add_note(f"in member {member} of the sweep")
+        raise
+
+
 def run_alone(
     run: Callable[[], MemoryRun],
     keep: Sequence[str],
@@ -135,15 +146,13 @@ def run_alone(
     more: Callable[[MemoryRun], Kept] | None = None,
     hidden: Collection[str] = (),
 ) -> MemberResults:
-    """Run one member by itself; its failure is recorded."""
+    """Run one member by itself; a refusal or failure is recorded, and errors of the code are raised."""
     try:
         result = run()
     except ConfigError as error:
         return failed(Outcome.REFUSED, "; ".join(str(problem) for problem in error.problems))
     except RigidsimError as error:
         return failed(Outcome.FAILED, str(error))
-    except (ArithmeticError, ValueError, RuntimeError, TypeError, LookupError) as error:
-        return failed(Outcome.FAILED, f"{type(error).__name__}: {error}")
     summary = result.outcome
     assert isinstance(summary, Summary)
     if summary.status == Status.INTERRUPTED.value:

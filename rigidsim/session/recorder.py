@@ -63,8 +63,12 @@ class SampleStatistics:
     version: ClassVar[int] = 1
 
     def see(self, invariant: str, drifts: np.ndarray) -> None:
-        """Follow one invariant through a block of samples: relative drifts, (samples,)."""
-        self.largest[invariant] = float(max(self.largest.get(invariant, 0.0), np.abs(drifts).max()))
+        """Follow one invariant through a block of samples: relative drifts, (samples,). One that is no finite
+        number counts as infinite.
+        """
+        sizes = np.abs(drifts.astype(np.float64))
+        largest = float(np.where(np.isfinite(sizes), sizes, math.inf).max())
+        self.largest[invariant] = max(self.largest.get(invariant, 0.0), largest)
         self.final[invariant] = float(drifts[-1])
 
     def see_undefined(self, variable: str, values: np.ndarray, first: int, times: np.ndarray) -> None:
@@ -251,7 +255,7 @@ class Recorder(SampleReceiver):
             return sys.maxsize
         drifts = [recorded[drift_name(i.name)][0][:, 0] for i in self._prepared.system.invariants]
         drifts += list(put_back.values()) if self._prepared.holds_late else []
-        past = [np.flatnonzero(np.abs(drift) > self._max_drift) for drift in drifts]
+        past = [np.flatnonzero(~(np.abs(drift) <= self._max_drift)) for drift in drifts]
         return min((int(found[0]) + 1 for found in past if len(found)), default=sys.maxsize)
 
     def due(self) -> bool:

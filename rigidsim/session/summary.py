@@ -111,14 +111,18 @@ def _invariants(found: Diagnostics, initial: Mapping[str, list[float]]) -> dict[
             units=invariant.units,
             scale=float(invariant.scale),
             scale_name=invariant.scale_name,
-            largest_drift=statistics.largest.get(name),
-            final_drift=statistics.final.get(name),
+            largest_drift=_finite(statistics.largest.get(name)),
+            final_drift=_finite(statistics.final.get(name)),
             bound=found.drift_bound,
             put_back=statistics.put_back.get(name) if held else None,
             why=invariant.why,
             numerical=invariant.numerical,
         )
     return table
+
+
+def _finite(drift: float | None) -> float | None:
+    return drift if drift is not None and math.isfinite(drift) else None
 
 
 def _accuracy(found: Diagnostics) -> Accuracy:

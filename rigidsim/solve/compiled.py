@@ -67,6 +67,13 @@ class Kept(Generic[T]):
 
 
 @cache
+def quieten_engine() -> None:
+    """In processes that are rigidsim's own, commands and workers: the engine warns on stdout of roots that it
+    loses, which switching steppers look for themselves.
+    """
+    hy.set_logger_level_error()
+
+
 def limit_disk_cache() -> None:
     """Limit heyoka's cache on disk before anything is compiled; the least recently used code is dropped when
     it is full.

@@ -37,7 +37,7 @@ def refuse_without_derivatives(scene: Scene, system: System, *, has_steps: bool,
     elif found:
         why = (
             f"the equations switch at a kink or jump of {found[0].text} ({found[0].where}), where "
-            "variational equations end; make the change smooth with tanh"
+            f"variational equations end; {found[0].remedy}"
         )
     elif system.switches:
         why = (

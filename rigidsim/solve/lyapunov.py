@@ -21,7 +21,8 @@ import numpy as np
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.system import System
 from rigidsim.model.tangents import moving_names, own_names
-from rigidsim.solve.compiled import interruptible
+from rigidsim.solve.compiled import TaylorEngine, interruptible
+from rigidsim.solve.switching.turned import Turned
 
 _INTERVAL = 16.0  # internal units between orthogonalisations: some dozens of steps, little growth
 _CHUNK, _MOST_CHUNKS = 4096, 256  # steps between two looks at Ctrl-C, and such chunks in an interval
@@ -63,6 +64,7 @@ class Convergence:
     sums: np.ndarray = field(default_factory=lambda: np.zeros(0))
     times: list[float] = field(default_factory=list)
     exponents: list[np.ndarray] = field(default_factory=list)
+    parameters: np.ndarray = field(default_factory=lambda: np.zeros(0))
 
     def arrays(self) -> dict[str, np.ndarray]:
         """The arrays to be saved."""
@@ -77,6 +79,7 @@ class Convergence:
             arrays["sums"],
             [float(t) for t in arrays.get("times", ())],
             list(arrays.get("exponents", ())),
+            arrays.get("parameters", np.zeros(0)),
         )
 
 
@@ -95,15 +98,17 @@ def lyapunov_spectrum(
     integrator = interruptible(lambda: hy.taylor_adaptive(equations, initial, time=start, compact_mode=True))
     intervals = max(1, math.ceil((end - start) / _INTERVAL))
     stride = max(1, math.ceil(intervals / _MOST_ROWS))
-    if done is None or done.state.shape != (len(initial),):  # none, or from another version
+    if done is None or (done.state.size, done.parameters.size) != (len(initial), len(integrator.pars)):
         done = Convergence(sums=np.zeros(count))
     if done.number:
         integrator.time = start + (end - start) * done.number / intervals
         integrator.state[:] = done.state
+        integrator.pars[:] = done.parameters
+    follow = _following(system, integrator, done)
     for number in range(done.number + 1, intervals + 1):
         time = start + (end - start) * number / intervals
         for _ in range(_MOST_CHUNKS):
-            outcome = integrator.propagate_until(time, max_steps=_CHUNK)[0]
+            outcome = integrator.propagate_until(time, max_steps=_CHUNK, callback=follow)[0]
             if outcome != hy.taylor_outcome.step_limit or not go_on(done):
                 break
         tangents = np.array(integrator.state[states:]).reshape(count, count)
@@ -117,10 +122,42 @@ def lyapunov_spectrum(
             done.times.append(math.ldexp(time - start, system.scaling.time))
             done.exponents.append(np.sort(done.sums)[::-1] / done.times[-1])
         done.number, done.state = number, np.array(integrator.state)
+        done.parameters = np.array(integrator.pars)
         if not go_on(done):
             return None
     names = tuple(system.states[i] for i in moving)
     return LyapunovSpectrum(np.array(done.times), np.array(done.exponents), names)
+
+
+def _following(
+    system: System, integrator: TaylorEngine, done: Convergence
+) -> Callable[[TaylorEngine], bool] | None:
+    """What keeps turns of angles, and the quaternion's sign, continuous after each step; None if the
+    equations read neither.
+    """
+    states, angles, used = len(system.states), len(system.turning), len(integrator.pars)
+    read = [*system.turning, *system.signed]
+    if not read or not used:
+        return None
+    function = hy.cfunc(read, system.variables, compact_mode=True)
+
+    def plain() -> tuple[list[float], list[float]]:
+        found = function(np.array(integrator.state[:states])).tolist()
+        return found[:angles], found[angles:]
+
+    here = plain()
+    turned = Turned.by(*here, done.parameters) if done.number else Turned.begun(system, *here)
+
+    def follow(_: TaylorEngine) -> bool:
+        nonlocal turned
+        here = plain()
+        found = turned.parameters(*here)
+        turned = Turned.by(*here, found)
+        integrator.pars[: len(found)] = found[:used]
+        return True
+
+    follow(integrator)
+    return follow
 
 
 def motion_states(system: System) -> list[int]:

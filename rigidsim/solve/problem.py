@@ -293,7 +293,7 @@ def _refuse_spectrum(system: System) -> None:
     if found:
         why = f"the equations switch at a kink or jump of {found[0].text} ({found[0].where}), where "
         why += "variational equations end"
-        instead = "make the change smooth with tanh"
+        instead = found[0].remedy
     raise ConfigError(Problem("[output] lyapunov", f"given true, but {why}; set it to false, or {instead}"))
 
 

@@ -57,7 +57,10 @@ ENGINE = "engine"
 
 
 class WarningCode(StrEnum):
-    """Why a result can't be trusted, or not wholly: the words of summaries."""
+    """Why a result can't be trusted, or not wholly: the words of summaries.
+
+    Datasets of sweeps hold a bit for each in this order, so that new ones come last.
+    """
 
     DRIFT = "drift"
     SINGULARITY = "singularity"
@@ -147,7 +150,7 @@ class InvariantDrift(SummaryPart):
 
     Attributes:
         scale: size that drifts are relative to, in ``units``.
-        largest_drift, final_drift: relative drifts; None if no sample was taken.
+        largest_drift, final_drift: relative drifts; None without samples, or if one isn't finite.
         bound: relative drift that rounding alone explains.
         put_back: for a projected invariant, the drift that would have been.
     """

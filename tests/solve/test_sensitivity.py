@@ -121,7 +121,7 @@ def test_other_values_need_no_other_code_until_the_equations_change() -> None:
         ('["loads[0].components[0]"]', TORQUE.format("0.1"), "has no number there"),
         ('["initial.attitude"]', '[integrator]\nprecision = "single"\n', "single precision"),
         ('["initial.attitude"]', '[integrator]\nmethod = "closed_form"\n', "takes no steps"),
-        ('["initial.attitude"]', TORQUE.format("-0.1*sign(wx)"), "make the change smooth with tanh"),
+        ('["initial.attitude"]', TORQUE.format("-0.1*sign(wx)"), "make the change smooth"),
     ],
 )
 def test_what_has_no_derivative_is_refused_in_words(keys: str, more: str, words: str) -> None:

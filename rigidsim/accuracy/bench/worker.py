@@ -31,6 +31,7 @@ from rigidsim.errors import ConfigError, RigidsimError
 from rigidsim.scene.config import Experiment, parse
 from rigidsim.solve.assembly import assemble
 from rigidsim.solve.closed_form import closed_form_of
+from rigidsim.solve.compiled import quieten_engine
 from rigidsim.solve.problem import prepare_scene
 from rigidsim.solve.sampler import Progress
 from rigidsim.solve.status import Status
@@ -119,6 +120,7 @@ def _per_unit(one_pass: Callable[[int], None], count: int, most: int, patience: 
 
 def work() -> None:
     """Do the tasks given on stdin, answering on stdout."""
+    quieten_engine()
     text, source, tasks = pickle.load(sys.stdin.buffer)
     experiment, answers = parse(text, source=source), Connection(sys.stdout.fileno(), readable=False)
     for task in tasks:

@@ -26,6 +26,7 @@ from rigidsim.scene.choices import DEFAULT_FORMULATION, FORMULATIONS, Variables
 from rigidsim.scene.expressions.tree import readables
 from rigidsim.scene.orbit_tables.pieces import TabulatedOrbit
 from rigidsim.scene.orbits import KeplerOrbit
+from rigidsim.scene.registry import register_class
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.surfaces import Surfaces
 
@@ -205,12 +206,8 @@ def formulates(variables: Variables) -> Callable[[F], F]:
     """
 
     def register(kind: F) -> F:
-        known = REGISTERED.get(variables.name)
-        if known is not None and known.__qualname__ != kind.__qualname__:
-            raise ValueError(
-                f'a formulation named "{variables.name}" is registered already ({known.__name__})'
-            )
-        FORMULATIONS[variables.name], REGISTERED[variables.name] = variables, kind
+        register_class(REGISTERED, variables.name, kind, "a formulation named")
+        FORMULATIONS[variables.name] = variables
         kind.variables = variables
         return kind
 

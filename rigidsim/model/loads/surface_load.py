@@ -31,11 +31,14 @@ from rigidsim.scene.transitions import narrow_parts, root_parts
 
 @dataclass(frozen=True)
 class Push:
-    """A force ``along`` (mpf, body axes) times an expression, at a ``place`` (m, body axes)."""
+    """A force ``along`` (mpf, body axes) times an expression, at a ``place`` (m, body axes); ``plate``: its
+    key in ``[body]``, empty for spheres.
+    """
 
     along: Vector
     expression: Expression
     place: Vector
+    plate: str = ""
 
 
 @dataclass(frozen=True)
@@ -57,8 +60,11 @@ class SurfaceLoad(Load):
         return tuple(found.values())
 
     def formulas(self) -> Iterator[tuple[str, Expression]]:
+        where = f"[[loads]] number {self.number + 1} {self.title}"
+        plates = {push.expression.root: push.plate for push in reversed(self.pushes) if push.plate}
         for expression in self.expressions:
-            yield f"[[loads]] number {self.number + 1} {self.title}", expression
+            plate = plates.get(expression.root)
+            yield (f"[body] {plate}, under {where}" if plate else where), expression
 
     @property
     def reads(self) -> frozenset[str]:  # type: ignore[override]
@@ -183,7 +189,7 @@ class Pushes:
         length = norm(context, [x.at(context) for x in surface.normal]) ** power
         factors = [f"max({facing}, 0)", *([f"({facing})"] * (power - 1)), *([text] if text else [])]
         expression = self.parsed("*".join(factors), given)
-        self.found.append(Push([x / length for x in along], expression, surface.position))
+        self.found.append(Push([x / length for x in along], expression, surface.position, surface.place))
 
     def _facing(self, plate: Plate, number: int) -> tuple[str, dict[str, ExactNumber]]:
         """The vector's component along the normal as written, in text, and what stands for numbers there."""

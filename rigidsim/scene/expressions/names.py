@@ -46,7 +46,7 @@ class Readable:
         unit: its SI unit; empty for numbers and angles, None if it isn't known.
         states: those without which it has no value, carried by need: "attitude", "flight", or the name of a
             state of one's own.
-        bound: of its absolute value.
+        bound: of its absolute value; of an angle that turns, within one turn.
         changes_sign: with the quaternion's sign, which means nothing.
         turns: whether it is an angle that is continued over full turns.
         jumps: what to do about it, if it isn't continuous: no event can read it then.
@@ -126,9 +126,14 @@ PROVIDERS: list[NameProvider] = []
 """All providers of names; the body's own first."""
 
 
+def origin(kind: type) -> str:
+    """Where a class was defined: equal for a class that is defined anew, as in a notebook."""
+    return f"{kind.__module__}.{kind.__qualname__}"
+
+
 def provides(kind: P) -> P:
-    """Register a provider of names (a class decorator); a class of the same name replaces an older one."""
-    PROVIDERS[:] = [x for x in PROVIDERS if type(x).__qualname__ != kind.__qualname__]
+    """Register a provider of names (a class decorator); the same class defined anew replaces the older."""
+    PROVIDERS[:] = [x for x in PROVIDERS if origin(type(x)) != origin(kind)]
     PROVIDERS.append(kind())
     return kind
 

@@ -10,14 +10,12 @@ import hashlib
 import importlib
 import importlib.util
 import re
-import struct
-import tokenize
-import zipfile
+from collections.abc import Callable
 from fractions import Fraction
 from functools import cached_property, lru_cache
 from pathlib import Path
 from types import ModuleType, SimpleNamespace
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -25,6 +23,8 @@ from rigidsim.scene.kernels.kernel import DAY, J2000_DATE, Kernel, KernelError
 from rigidsim.scene.kernels.series import BlockSeries, joined
 from rigidsim.scene.kernels.soundness import refuse_constants, refuse_exchanged
 from rigidsim.scene.validation_messages import nearest
+
+T = TypeVar("T")
 
 _EXTRA = "pip install 'rigidsim[ephemeris]'"
 _PACKAGES = ("de405", "de406", "de421", "de422", "de423")
@@ -39,11 +39,20 @@ _TYPES = (2, 3)
 _LARGEST_CACHED = 4
 _RECORD = 1024  # bytes, of SPK files
 _IDENTIFIERS = (b"DAF/SPK", b"NAIF/DAF")  # of SPK files today, and before 1997
-_UNREADABLE = (
-    OSError, EOFError, ValueError, TypeError, LookupError, ArithmeticError, AssertionError, AttributeError,
-    MemoryError, SyntaxError, struct.error, tokenize.TokenError, zipfile.BadZipFile,
-)  # fmt: skip
-"""What jplephem and numpy come upon in files that aren't what they should be."""
+_UNREADABLE = (OSError, ValueError, LookupError, ArithmeticError)
+"""What the numbers of a file that isn't what it should be lead to."""
+
+
+def _by_reader(read: Callable[[], T]) -> T:
+    """What jplephem or numpy reads; a ValueError for whatever they come upon in a file that isn't what it
+    should be.
+    """
+    try:
+        return read()
+    except (OSError, MemoryError):
+        raise
+    except Exception as error:
+        raise ValueError(_words(error)) from None
 
 
 def _jplephem(part: str) -> ModuleType:
@@ -69,10 +78,13 @@ class PackagedKernel(Kernel):
         self.name, self._folder = name, folder
         self._used: dict[str, BlockSeries] = {}
         # its files alone count: nothing of the package is run
+        ephem = _jplephem("ephem")
         module = SimpleNamespace(__name__=name, __file__=str(folder / "__init__.py"))
         try:
             refuse_exchanged(name, folder / "constants.npy")
-            self._data = _jplephem("ephem").Ephemeris(module)
+            path = folder / "constants.npy"
+            _by_reader(lambda: np.load(path, mmap_mode="r", allow_pickle=False))  # is as large as it says
+            self._data = _by_reader(lambda: ephem.Ephemeris(module))
             self.constants = {
                 key: float(value)
                 for key, value in vars(self._data).items()
@@ -98,7 +110,7 @@ class PackagedKernel(Kernel):
         if target not in self._used:
             path = self._folder / f"jpl-{file}.npy"
             try:
-                given = np.load(path, mmap_mode="r", allow_pickle=False)
+                given = _by_reader(lambda: np.load(path, mmap_mode="r", allow_pickle=False))
                 span = (self._end - self._begin) * DAY
                 if given.ndim != 3 or given.shape[1] != 3 or given.dtype != np.float64 or 0 in given.shape:
                     raise ValueError(f"an array of {given.dtype} {given.shape}")
@@ -164,13 +176,13 @@ class SpkKernel(Kernel):
         spk = _jplephem("spk")
         file = path.open("rb")
         try:
-            daf = spk.DAF(file)
+            daf = _by_reader(lambda: spk.DAF(file))
             if daf.locidw not in _IDENTIFIERS:
                 raise ValueError(f"it begins with {daf.locidw.decode('ascii', 'replace')}")
             most = path.stat().st_size // _RECORD
-            if any(number > most for number, _ in enumerate(daf.summary_records())):
+            if _by_reader(lambda: any(number > most for number, _ in enumerate(daf.summary_records()))):
                 raise ValueError("its list of segments has no end")
-            self._file = spk.SPK(daf)
+            self._file = _by_reader(lambda: spk.SPK(daf))
         except _UNREADABLE as error:
             file.close()
             what = f"which is no SPK file, or a damaged one ({_words(error)}); "
@@ -266,8 +278,9 @@ class SpkKernel(Kernel):
         if segment.frame != _FRAME:
             raise KernelError(f'whose "{label}" is in frame {segment.frame} of SPICE; J2000 (1) is allowed')
         try:
-            begin, length, _, count = self._file.daf.read_array(segment.end_i - 3, segment.end_i)
-            coefficients = segment.load_array()[2]
+            last = _by_reader(lambda: self._file.daf.read_array(segment.end_i - 3, segment.end_i))
+            begin, length, _, count = last
+            coefficients = _by_reader(segment.load_array)[2]
             covered = segment.start_second, segment.end_second
             if not (length > 0 and begin <= covered[0] < covered[1] <= begin + count * length):
                 raise ValueError("its blocks don't cover its span")

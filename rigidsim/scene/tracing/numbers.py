@@ -58,7 +58,10 @@ class Graph:
             return value.node
         if isinstance(value, Fraction):
             value = self.context.mpf(value.numerator) / self.context.mpf(value.denominator)
-        value = self.context.convert(value)
+        try:
+            value = self.context.convert(value)
+        except TypeError:
+            raise Untraceable(f"arithmetic with a {type(value).__name__}") from None
         return self.made("constant", (value,), value).node
 
     def decide(self, kind: str, left: int, right: int) -> bool:
@@ -196,6 +199,18 @@ class Traced:
 
     def __bool__(self) -> bool:
         return self != 0
+
+    def __getattr__(self, name: str) -> Any:
+        """What numbers have besides; dunder names are asked for by way of trial."""
+        if name.startswith("_"):
+            raise AttributeError(name)
+        raise Untraceable(name)
+
+    def _refused(self, *_: Any) -> Any:
+        raise Untraceable("an operation that the graph doesn't know")
+
+    __mod__ = __rmod__ = __floordiv__ = __rfloordiv__ = __divmod__ = __rdivmod__ = _refused
+    __round__ = __trunc__ = __floor__ = __ceil__ = __index__ = __complex__ = __format__ = _refused
 
 
 BINARY: dict[str, Callable[[Any, Any], Any]] = {

@@ -22,7 +22,9 @@ from rigidsim.scene.tracing.numbers import BINARY, Graph, Guard
 _CONTEXT = context_for("double")
 _BITS = _CONTEXT.prec
 _FAILURES = (ZeroDivisionError, ValueError, OverflowError, TypeError)
-"""Errors of mpmath for numbers outside the range of an operation; the member's own build reports them."""
+"""Errors of mpmath for numbers outside the range of an operation (of complex numbers none is the larger); the
+member's own build reports them.
+"""
 
 Reals = Any  # an array of hy.real, or one hy.real
 

@@ -52,6 +52,15 @@ class BatchBlock:
     events: list[BatchEvents]
     width: int  # lanes of the integrator, on which the last bits depend
 
+    def largest_drifts(self) -> np.ndarray:
+        """Magnitude of each sample's worst drift, (samples, m); infinite where one has no finite value, and 0
+        where no sample was taken.
+        """
+        worst = np.zeros(self.moments.shape)
+        for drift in self.drifts.values():
+            worst = np.maximum(worst, np.where(np.isfinite(drift), np.abs(drift), np.inf))
+        return np.where(np.arange(len(worst))[:, None] < self.reached, worst, 0.0)
+
 
 class BatchRun:
     """Runs a family's members with what is compiled once; by default with the processor's own width."""
@@ -186,7 +195,7 @@ class BatchRun:
         limit = self._traced.prepared.scene.config.limits.max_drift
         if limit is None or not block.drifts:
             return
-        beyond = np.any([np.abs(d) > float(limit) for d in block.drifts.values()], axis=0)
+        beyond = block.largest_drifts() > float(limit)
         for m in np.flatnonzero(beyond.any(axis=0)).tolist():
             block.status[m] = Status.MAX_DRIFT
             _end(block, m, int(np.argmax(beyond[:, m])) + 1)

@@ -105,15 +105,12 @@ def trace(
     for column, (key, number) in enumerate(zip(keys, numbers, strict=True)):
         config = _replaced(config, key_steps(key, "axes"), swept_number(graph, column, number))
     context = TracingContext(graph)
-    try:
-        scene: Scene = build_scene(replace(representative, config=config), context)
-        check_start(scene)
-        parameters = Parameters()
-        system = System(plan_model(scene, like=plan), parameters.number)
-        for part in ("equations", "outputs", "invariants", "crossings", "rate_bound", "initial"):
-            getattr(system, part)
-    except (TypeError, AttributeError, ValueError) as error:
-        raise Untraceable(str(error)) from error
+    scene: Scene = build_scene(replace(representative, config=config), context)
+    check_start(scene)
+    parameters = Parameters()
+    system = System(plan_model(scene, like=plan), parameters.number)
+    for part in ("equations", "outputs", "invariants", "crossings", "rate_bound", "initial"):
+        getattr(system, part)
     return TracedSystem(prepared, system, parameters, graph)
 
 

@@ -9,6 +9,7 @@ from typing import Any, ClassVar, TypeVar
 import numpy as np
 
 from rigidsim.model.system import System
+from rigidsim.scene.registry import register_class
 from rigidsim.solve.precision import Precision, Scalar
 from rigidsim.solve.stepper import Stepper
 
@@ -106,10 +107,7 @@ def register_effect(name: str) -> Callable[[E], E]:
     """
 
     def register(kind: E) -> E:
-        known = EFFECTS.get(name, kind)
-        if known.__qualname__ != kind.__qualname__:
-            raise ValueError(f'an effect named "{name}" is registered already ({known.__name__})')
-        EFFECTS[name] = kind
+        register_class(EFFECTS, name, kind, "an effect named")
         kind.registered = name
         return kind
 

@@ -8,6 +8,7 @@ from typing import ClassVar, TypeVar
 from rigidsim.errors import ConfigError, Problem
 from rigidsim.model.system import System
 from rigidsim.scene.choices import METHODS, Method
+from rigidsim.scene.registry import register_class
 from rigidsim.scene.scene import Scene
 from rigidsim.solve.closed_form import ClosedForm
 from rigidsim.solve.corrected_stepper import CorrectedStepper
@@ -96,10 +97,8 @@ def solves(method: Method) -> Callable[[A], A]:
     """
 
     def register(algorithm: A) -> A:
-        known = ALGORITHMS.get(method.name)
-        if known is not None and known.__qualname__ != algorithm.__qualname__:
-            raise ValueError(f'a method named "{method.name}" is registered already ({known.__name__})')
-        METHODS[method.name], ALGORITHMS[method.name] = method, algorithm
+        register_class(ALGORITHMS, method.name, algorithm, "a method named")
+        METHODS[method.name] = method
         algorithm.method = method
         return algorithm
 

@@ -21,8 +21,9 @@ from rigidsim.solve.events import BESIDE, EventLog, engine_events, of_order_one
 from rigidsim.solve.precision import Precision, Scalar
 from rigidsim.solve.requirements import SetAtKnots
 from rigidsim.solve.stepper import Mark
-from rigidsim.solve.switching.sides import HELD, SLIDES, Continuation, Look, Probe, continued
+from rigidsim.solve.switching.sides import HELD, SLIDES, Continuation, Look, Probe
 from rigidsim.solve.switching.sliding import Meeting, sliding
+from rigidsim.solve.switching.turned import Turned
 from rigidsim.solve.taylor_stepper import TaylorStepper
 
 Root = tuple[Any, int, int]
@@ -50,18 +51,9 @@ class SwitchedEngines(TaylorStepper):
         self._modes = [1] * len(surfaces.found)
         self._fresh, self._count, self._since = False, 0, 0.0
         self._piece: np.ndarray | None = None  # parameters of the piece in which the latest step was
-        hy.set_logger_level_error()  # it warns, on stdout, of roots that it loses; they are looked for here
         super().__init__(system, precision, tolerance, start, log)
-        probe = self._probe
-        pars = self._pars([0.0] * probe.angles, 1.0)
-        _, plain, quaternion = probe.values(self.state, self.time, pars)
-        begun = dict(zip(("phi", "theta", "psi"), system.scene.euler_angles or (), strict=False))
-        asked = [float(begun.get(name, a)) for name, a in zip(surfaces.turning, plain, strict=True)]
         # in the partner chart, where a run may begin, angles are plain already
-        self._angles = [a + 2 * np.pi * continued(b, a) for a, b in zip(plain, asked, strict=True)]
-        given = [float(x) for x in system.scene.quaternion]
-        same = not quaternion or float(np.dot(given, quaternion)) >= 0
-        self._quaternion = [x if same else -x for x in quaternion]
+        self._turned = Turned.begun(system, *self._plain(self.state, self.time))
         self._dense = self._integrator
         self._unsettled = ""
         self._begin()
@@ -97,8 +89,8 @@ class SwitchedEngines(TaylorStepper):
         mark = super().mark()
         sides = (
             *map(float, self._modes),
-            *self._angles,
-            *self._quaternion,
+            *self._turned.angles,
+            *self._turned.quaternion,
             float(self._fresh),
             float(self._count),
             self._since,
@@ -107,11 +99,10 @@ class SwitchedEngines(TaylorStepper):
 
     def back_to(self, mark: Mark) -> None:
         tiny, sides = mark.memory
-        memory = list(sides)
-        s, a, q = len(self._modes), len(self._angles), len(self._quaternion)
-        self._modes = [int(x) for x in memory[:s]]
-        self._angles, self._quaternion = memory[s : s + a], memory[s + a : s + a + q]
-        fresh, count, self._since = memory[s + a + q :]
+        s, a = len(self._modes), len(self._turned.angles)
+        self._modes = [int(x) for x in sides[:s]]
+        self._turned = Turned(list(sides[s : s + a]), list(sides[s + a : -3]))
+        fresh, count, self._since = sides[-3:]
         self._fresh, self._count = bool(fresh), int(count)
         self.failure = ""
         self._enter()
@@ -190,15 +181,12 @@ class SwitchedEngines(TaylorStepper):
     # --- parameters -----------------------------------------------------------------------------------------
 
     def _pars(
-        self,
-        turns: list[float],
-        sign: float,
-        over: dict[int, int] | None = None,
-        low: Scalar | None = None,
+        self, turns: list[float], over: dict[int, int] | None = None, low: Scalar | None = None
     ) -> np.ndarray:
+        """Parameters of the equations; turns of angles, and the sign of the quaternion, are given."""
         modes = self._modes if over is None else [over.get(j, mode) for j, mode in enumerate(self._modes)]
         sides = [-1.0 if mode < 0 else 1.0 for mode in modes]
-        numbers = [*sides, *turns, *([sign] if self._probe.signed else [])]
+        numbers = [*sides, *turns]
         if (pieces := self.system.pieces) is not None:
             if self._piece is None:  # of those that meet at a boundary, the one that ends there
                 self._piece = self._piece_of(bisect_left(pieces.knots, self.time))
@@ -245,36 +233,28 @@ class SwitchedEngines(TaylorStepper):
 
     def _parameters(self, over: dict[int, int] | None = None) -> np.ndarray:
         """Parameters at this boundary; turns and sign continue from the latest step."""
-        turns, sign = self._joined(self.state, self.time)
-        return self._pars(turns, sign, over, self._low)
+        return self._pars(self._joined(self.state, self.time), over, self._low)
 
     def _look(self, state: np.ndarray, time: Scalar, low: Scalar | None = None) -> Look:
         """Look at the surfaces in a state of the latest step, at a time in one number or two."""
-        return self._probe.look(state, time, self._pars(*self._joined(state, time), low=low))
+        return self._probe.look(state, time, self._pars(self._joined(state, time), low=low))
 
     def _values(self, state: np.ndarray, time: Scalar, low: Scalar | None = None) -> np.ndarray:
         """Arguments of the surfaces in a state of the latest step, likewise."""
-        return self._probe.values(state, time, self._pars(*self._joined(state, time), low=low))[0]
+        return self._probe.values(state, time, self._pars(self._joined(state, time), low=low))[0]
 
-    def _continued(
-        self, state: np.ndarray, time: Scalar
-    ) -> tuple[list[float], float, list[float], list[float]]:
-        """Turns and sign from the latest step on to a state, and the angles and the quaternion with them."""
-        if not (self._angles or self._quaternion):
-            return [], 1.0, [], []
-        _, plain, quaternion = self._probe.values(state, time, self._pars([0.0] * len(self._angles), 1.0))
-        turns = [continued(b, a) for a, b in zip(plain, self._angles, strict=True)]
-        same = not quaternion or float(np.dot(quaternion, self._quaternion)) >= 0
-        sign = 1.0 if same else -1.0
-        angles = [a + 2 * np.pi * n for a, n in zip(plain, turns, strict=True)]
-        return turns, sign, angles, [sign * x for x in quaternion]
+    def _plain(self, state: np.ndarray, time: Scalar) -> tuple[list[float], list[float]]:
+        """Angles within one turn, and the quaternion without its sign, that expressions read."""
+        return self._probe.values(state, time, self._pars(self._probe.unturned))[1:]
 
-    def _joined(self, state: np.ndarray, time: Scalar) -> tuple[list[float], float]:
-        return self._continued(state, time)[:2]
+    def _joined(self, state: np.ndarray, time: Scalar) -> list[float]:
+        """Turns and sign, continued from the latest step on to a state."""
+        return self._turned.parameters(*self._plain(state, time)) if self._probe.unturned else []
 
     def _follow(self) -> None:
         """Continue angles and quaternion to the end of the step just taken."""
-        *_, self._angles, self._quaternion = self._continued(self.state, self.time)
+        if self._probe.unturned:
+            self._turned = self._turned.followed(*self._plain(self.state, self.time))
 
     def _set(self, engine: TaylorEngine) -> None:
         """Set an engine's parameters at this boundary.

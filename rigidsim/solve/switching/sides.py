@@ -77,7 +77,8 @@ class Probe:
     def __init__(self, system: System, precision: Precision) -> None:
         self._epsilon = float(precision.epsilon)
         self.surfaces, self._states = len(system.surfaces), len(system.states)
-        self.angles, self.signed = len(system.turning), bool(system.signed)
+        self._angles = len(system.turning)
+        self.unturned = [0.0] * self._angles + [1.0] * bool(system.signed)
         self.parameters = system.parameters
         self.clocked = system.clocked
         self.moments = moments_of(system, precision)
@@ -90,9 +91,9 @@ class Probe:
             gradients += [by_state.get(name, hy.expression(0.0)) for name in system.states]
         field = [right for _, right in system.equations]
         options = {"compact_mode": True, **precision.options}
-        self._values = hy.cfunc(
-            [*system.surfaces, *system.turning, *system.signed, *named], variables, **options
-        )
+        read = [*system.surfaces, *system.turning, *system.signed]
+        spin = [hy.sum([w * w for w in system.mechanics.rates])] if self.unturned else []
+        self._values = hy.cfunc([*read, *spin, *named], variables, **options)
         found = [c.expression for c in system.crossings]
         sizes = [[g * g for g in slopes(expression)[1].values()] for expression in found]
         lengths = [hy.sqrt(hy.sum(squares)) if squares else hy.expression(0.0) for squares in sizes]
@@ -106,8 +107,12 @@ class Probe:
     ) -> tuple[np.ndarray, list[float], list[float]]:
         """Arguments in the run's precision; the plain angles and the plain quaternion if needed."""
         found = self._values(np.array(state), pars=pars, time=time)
-        rest = [float(x) for x in found[self.surfaces : -2]]
-        return found[: self.surfaces], rest[: self.angles], rest[self.angles :]
+        rest = [float(x) for x in found[self.surfaces : self.surfaces + len(self.unturned)]]
+        return found[: self.surfaces], rest[: self._angles], rest[self._angles :]
+
+    def rate(self, state: np.ndarray, time: Scalar, pars: np.ndarray) -> float:
+        """The body's angular velocity, rad per internal unit of time, where turns are continued."""
+        return math.sqrt(float(self._values(np.array(state), pars=pars, time=time)[-3]))
 
     def crossings(self, state: np.ndarray, time: Scalar, pars: np.ndarray) -> list[tuple[float, float]]:
         """Values of the events' expressions, and the effect on them of rounding in states of order one."""
@@ -252,8 +257,3 @@ class Fields:
         sides[along] = inner
         rates = self._base + self._parts @ sides
         return all(modes[i] * rates[i] > self._noise[i] for i in beside)
-
-
-def continued(before: float, plain: float) -> float:
-    """Full turns to add to a plain angle so that it is nearest to a continuous one."""
-    return float(np.rint((before - plain) / (2 * math.pi)))

@@ -8,7 +8,8 @@ that no cooldown is needed and a checkpoint holds all there is. All steps are si
 
 from __future__ import annotations
 
-from collections.abc import Collection
+import math
+from collections.abc import Callable, Collection, Sequence
 
 import heyoka as hy
 import numpy as np
@@ -22,6 +23,7 @@ from rigidsim.solve.switching.moments import between
 from rigidsim.solve.switching.roots import SurfaceRoots
 from rigidsim.solve.switching.sides import HELD, SLIDES, Continuation, Fields, Look
 from rigidsim.solve.switching.sliding import MOST_AT_ONCE
+from rigidsim.solve.switching.turned import MOST
 from rigidsim.solve.taylor_stepper import TaylorStepper
 
 _ATTEMPTS = 32  # attempts at one step
@@ -32,7 +34,6 @@ rounding, whose period is the square root of its size.
 _SHORTEST = 2.0**-8  # internal units of time; with more digits less, see ``_window``
 _ROUNDINGS = 2.0**15  # in the square of an interval
 _MOST_LEFT_OUT = 8.0  # roundings of the state, by a moment in two numbers
-_SMOOTH = "make the change smooth, for instance tanh(u/width) in place of sign(u)"
 _NOT_RESOLVED = "choose a higher precision, or count time from an epoch shortly before"
 _WIDTH = 2.0**8  # roundings of a time between two findings of the same crossing
 
@@ -85,6 +86,7 @@ class SwitchingStepper(SurfaceRoots):
             self._roots.clear()
             outcome, size = begun.step(longest, write_tc=True)
             bound = bound_of_sparse_series(begun.tc) if self._fresh or not self.steps else np.inf
+            bound = min(bound, self._bound_of_turn(before, time[0], size))
             if bound < abs(float(size)):
                 log.back_to(events)
                 self._roots.clear()
@@ -124,6 +126,15 @@ class SwitchingStepper(SurfaceRoots):
         if self._along:
             self._keep_to_surfaces()
         return True
+
+    def _bound_of_turn(self, before: np.ndarray, time: Scalar, size: Scalar) -> float:
+        """Bound of a step just taken within which turns can be continued: series of many terms go far."""
+        if not self._probe.unturned:
+            return math.inf
+        pars = self._integrator.pars[: self.system.parameters]
+        after = np.array(self.state), self.time
+        rates = [self._probe.rate(*there, pars) for there in ((before, time), after)]
+        return MOST / max(sum(rates) / 2, 1e-300)
 
     def _width(self, time: Scalar) -> Scalar:
         size = _WIDTH * self._epsilon * max(abs(float(time)), 1.0)
@@ -248,16 +259,38 @@ class SwitchingStepper(SurfaceRoots):
         idle = {j: self._modes[j] or 1 for j in on if j not in moving}
         if not moving:
             return self._by_trial(idle)
+        crossed = self._crossed(at, moving) if len(moving) > MOST_AT_ONCE else {}
+        moving = [j for j in moving if j not in crossed]
         if len(moving) > MOST_AT_ONCE:
             return Continuation(None, f"more than {MOST_AT_ONCE} surfaces meet there")
-        fields = Fields(at, self._probe, moving)
-        choice = fields.choose()
+        if not moving:
+            return Continuation({**idle, **crossed})
+        choice = Fields(lambda sides: at({**crossed, **sides}), self._probe, moving).choose()
         if choice.modes is not None:
-            return Continuation({**idle, **choice.modes})
-        if not choice.tangential or hint is None:
+            return Continuation({**idle, **crossed, **choice.modes})
+        if not choice.tangential or hint is None or hint[0] in crossed:
             return choice
         # touched: rounding hides the rates, but the step was seen to reach the other side
-        return Continuation({**idle, **{j: self._modes[j] for j in moving}, hint[0]: hint[1]})
+        return Continuation({**idle, **crossed, **{j: self._modes[j] for j in moving}, hint[0]: hint[1]})
+
+    def _crossed(self, at: Callable[[dict[int, int]], Look], moving: Sequence[int]) -> dict[int, int]:
+        """Sides to which surfaces are crossed whatever the sides of all are, as those of plates in the light:
+        the sides don't change a rate by so much that its sign could change.
+        """
+        sides = {j: self._modes[j] or 1 for j in moving}
+        seen: list[dict[int, int]] = []
+        for _ in range(2):  # from these sides, and from those to which the rates lead
+            here = at(sides)
+            beside = [at({**sides, k: -sides[k]}) for k in moving]
+            found = {}
+            for j in moving:
+                rate = float(here.rate(j))
+                changes = sum(abs(float(look.rate(j)) - rate) for look in beside)
+                if abs(rate) > changes + self._probe.rate_noise(here, j):
+                    found[j] = 1 if rate > 0 else -1
+            sides = {**sides, **found}
+            seen.append(found)
+        return {j: side for j, side in seen[1].items() if seen[0].get(j) == side}
 
     def _by_trial(self, idle: dict[int, int]) -> Continuation:
         """At rest on a surface, find by trial the side on which a step stays on its own."""
@@ -298,8 +331,9 @@ class SwitchingStepper(SurfaceRoots):
         engine.state[:] = before
         return found
 
-    def _fail(self, j: int, why: str, what_to_do: str = _SMOOTH) -> bool:
+    def _fail(self, j: int, why: str, what_to_do: str = "") -> bool:
         surface = self.system.plan.surfaces.found[j]
+        what_to_do = what_to_do or surface.remedy
         self.failure = f'at the kink or jump of "{surface.text}" ({surface.where}) {why}; {what_to_do}'
         return False
 

@@ -205,12 +205,7 @@ class BatchTiles:
         statuses = block.status.copy()
         statuses[gave_up] = Status.NON_FINITE
         kept["status"] = status_variable(_outcome_codes(statuses))
-        drifts = [np.abs(values) for values in block.drifts.values()]
-        nothing = np.zeros(len(gave_up))
-        worst = (
-            np.max([np.fmax.reduce(d, axis=0, initial=0.0) for d in drifts], axis=0) if drifts else nothing
-        )
-        over = worst > block.drift_bound
+        over = block.largest_drifts().max(axis=0) > block.drift_bound
         warned = {WarningCode.DRIFT: over, WarningCode.UNDEFINED: _lost(block)}
         if errors is not None:
             gone = WarningCode.RATES_UNCERTAIN if errors.attitude is None else WarningCode.ATTITUDE_UNCERTAIN

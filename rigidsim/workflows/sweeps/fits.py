@@ -16,7 +16,7 @@ import numpy as np
 from rigidsim.errors import FORCE, SWEEP, ConfigError, RigidsimError, RunFolderError
 from rigidsim.scene.config import Experiment
 from rigidsim.scene.sweeps.sweep import FITS, Sweep
-from rigidsim.session.members import OUTCOMES, MemberResults, Outcome, status_variable
+from rigidsim.session.members import OUTCOMES, MemberResults, Outcome, naming_member, status_variable
 from rigidsim.solve.status import Status
 from rigidsim.store import atomic
 from rigidsim.store.sweeps.run import FittedOfMembers
@@ -133,11 +133,15 @@ class _Missing(RunFolderError):
 
 def fit_members(sweep: Sweep, members: Sequence[int], folder: Path) -> MemberResults:
     """Fit some members, by the copies of their data."""
-    return MemberResults.together([_fit_member(sweep, member, folder) for member in members])
+    found = []
+    for member in members:
+        with naming_member(member):
+            found.append(_fit_member(sweep, member, folder))
+    return MemberResults.together(found)
 
 
 def _fit_member(sweep: Sweep, member: int, folder: Path) -> MemberResults:
-    """Fit one member; its failure is recorded."""
+    """Fit one member; a refusal or failure is recorded, and errors of the code are raised."""
     try:
         experiment = sweep.experiment_of(member)
         for given in _files(experiment):
@@ -150,8 +154,6 @@ def _fit_member(sweep: Sweep, member: int, folder: Path) -> MemberResults:
         return _without(Outcome.REFUSED.value, "; ".join(str(problem) for problem in error.problems))
     except RigidsimError as error:
         return _without(Outcome.FAILED.value, str(error))
-    except (ArithmeticError, ValueError, RuntimeError, TypeError, LookupError) as error:
-        return _without(Outcome.FAILED.value, f"{type(error).__name__}: {error}")
     why = {} if result.converged else {0: "the fit didn't converge: its values are where it stopped"}
     return MemberResults(_status(Status.FINISHED.value) | _kept(result), why, {"fits": 1})
 

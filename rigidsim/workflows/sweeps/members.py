@@ -17,7 +17,7 @@ from rigidsim.scene.scene import build_scene
 from rigidsim.scene.sweep_table import INDICATORS
 from rigidsim.scene.sweeps.sweep import Sweep
 from rigidsim.session.dataset import kernel_attributes
-from rigidsim.session.members import MemberResults, run_alone
+from rigidsim.session.members import MemberResults, naming_member, run_alone
 from rigidsim.solve.problem import prepare
 from rigidsim.store import provenance
 from rigidsim.store.run import MemoryRun
@@ -149,7 +149,8 @@ def run_members(
         done = batches_of(sweep.experiment.text).run(members, keep, apart)
     for place in done.left:
         member = partial(lambda member: run(sweep.experiment_of(member), out=None), members[place])
-        done.results.append(run_alone(member, keep, most, events, more, hidden))
+        with naming_member(members[place]):
+            done.results.append(run_alone(member, keep, most, events, more, hidden))
         done.members.append(np.array([place]))
     whole = in_order(done.results, done.members)
     return replace(whole, why_alone=done.why, estimating=done.estimating + whole.estimating)

@@ -23,6 +23,7 @@ from typing import Any, TypeVar
 
 from rigidsim.errors import StoppedError
 from rigidsim.scene.sweeps.sweep import Sweep
+from rigidsim.solve.compiled import quieten_engine
 from rigidsim.store.sweeps.tiles import Generation
 from rigidsim.workflows.sweeps.members import get_ready, tile_image
 
@@ -130,7 +131,7 @@ class Workers(Way):
             done, _ = wait(running, timeout=0.5, return_when=FIRST_COMPLETED)
             if not done and not all(process.is_alive() for process in _processes(pool)):
                 raise BrokenProcessPool("a worker died")  # the pool itself watches only those it knew
-            for future in done:
+            for future in sorted(done, key=lambda one: one.exception() is not None):  # raised last
                 future.result()
                 tile = running.pop(future)
                 file = self._between / str(tile)
@@ -187,6 +188,7 @@ def _begin_worker(parent: int, between: Path) -> None:
     does.
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    quieten_engine()
 
     def watch() -> None:
         while os.getppid() == parent:
