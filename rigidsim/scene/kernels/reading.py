@@ -44,9 +44,7 @@ _UNREADABLE = (OSError, ValueError, LookupError, ArithmeticError)
 
 
 def _by_reader(read: Callable[[], T]) -> T:
-    """What jplephem or numpy reads; a ValueError for whatever they come upon in a file that isn't what it
-    should be.
-    """
+    """What jplephem or numpy reads; a ValueError for whatever they find wrong in a file."""
     try:
         return read()
     except (OSError, MemoryError):
@@ -82,8 +80,7 @@ class PackagedKernel(Kernel):
         module = SimpleNamespace(__name__=name, __file__=str(folder / "__init__.py"))
         try:
             refuse_exchanged(name, folder / "constants.npy")
-            path = folder / "constants.npy"
-            _by_reader(lambda: np.load(path, mmap_mode="r", allow_pickle=False))  # is as large as it says
+            _by_reader(lambda: np.load(folder / "constants.npy", mmap_mode="r"))  # is as large as it says
             self._data = _by_reader(lambda: ephem.Ephemeris(module))
             self.constants = {
                 key: float(value)
@@ -278,8 +275,8 @@ class SpkKernel(Kernel):
         if segment.frame != _FRAME:
             raise KernelError(f'whose "{label}" is in frame {segment.frame} of SPICE; J2000 (1) is allowed')
         try:
-            last = _by_reader(lambda: self._file.daf.read_array(segment.end_i - 3, segment.end_i))
-            begin, length, _, count = last
+            words = segment.end_i - 3, segment.end_i
+            begin, length, _, count = _by_reader(lambda: self._file.daf.read_array(*words))
             coefficients = _by_reader(segment.load_array)[2]
             covered = segment.start_second, segment.end_second
             if not (length > 0 and begin <= covered[0] < covered[1] <= begin + count * length):

@@ -7,7 +7,7 @@ crossing and sliding is tried, and the one that agrees with its own field is tak
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import product
@@ -257,3 +257,26 @@ class Fields:
         sides[along] = inner
         rates = self._base + self._parts @ sides
         return all(modes[i] * rates[i] > self._noise[i] for i in beside)
+
+
+def crossings(at: Callable[[dict[int, int]], Look], probe: Probe, sides: Mapping[int, int]) -> dict[int, int]:
+    """Sides to which surfaces are crossed whatever the sides of all are, as those of plates in the light: the
+    sides don't change a rate by so much that its sign could change.
+
+    Args:
+        at: from sides by number to a ``Look``.
+        sides: of the surfaces that meet, to begin with.
+    """
+    seen: list[dict[int, int]] = []
+    for _ in range(2):  # from these sides, and from those to which the rates lead
+        here = at(dict(sides))
+        beside = [at({**sides, k: -side}) for k, side in sides.items()]
+        found = {}
+        for j in sides:
+            rate = float(here.rate(j))
+            changes = sum(abs(float(look.rate(j)) - rate) for look in beside)
+            if abs(rate) > changes + probe.rate_noise(here, j):
+                found[j] = 1 if rate > 0 else -1
+        sides = {**sides, **found}
+        seen.append(found)
+    return {j: side for j, side in seen[1].items() if seen[0].get(j) == side}

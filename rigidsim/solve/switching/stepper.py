@@ -9,7 +9,7 @@ that no cooldown is needed and a checkpoint holds all there is. All steps are si
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Collection
 
 import heyoka as hy
 import numpy as np
@@ -21,7 +21,7 @@ from rigidsim.solve.stepper import Stepper, bound_of_sparse_series
 from rigidsim.solve.switching.engines import Root
 from rigidsim.solve.switching.moments import between
 from rigidsim.solve.switching.roots import SurfaceRoots
-from rigidsim.solve.switching.sides import HELD, SLIDES, Continuation, Fields, Look
+from rigidsim.solve.switching.sides import HELD, SLIDES, Continuation, Fields, Look, crossings
 from rigidsim.solve.switching.sliding import MOST_AT_ONCE
 from rigidsim.solve.switching.turned import MOST
 from rigidsim.solve.taylor_stepper import TaylorStepper
@@ -259,7 +259,11 @@ class SwitchingStepper(SurfaceRoots):
         idle = {j: self._modes[j] or 1 for j in on if j not in moving}
         if not moving:
             return self._by_trial(idle)
-        crossed = self._crossed(at, moving) if len(moving) > MOST_AT_ONCE else {}
+        crossed = (
+            crossings(at, self._probe, {j: self._modes[j] or 1 for j in moving})
+            if len(moving) > MOST_AT_ONCE
+            else {}
+        )
         moving = [j for j in moving if j not in crossed]
         if len(moving) > MOST_AT_ONCE:
             return Continuation(None, f"more than {MOST_AT_ONCE} surfaces meet there")
@@ -272,25 +276,6 @@ class SwitchingStepper(SurfaceRoots):
             return choice
         # touched: rounding hides the rates, but the step was seen to reach the other side
         return Continuation({**idle, **crossed, **{j: self._modes[j] for j in moving}, hint[0]: hint[1]})
-
-    def _crossed(self, at: Callable[[dict[int, int]], Look], moving: Sequence[int]) -> dict[int, int]:
-        """Sides to which surfaces are crossed whatever the sides of all are, as those of plates in the light:
-        the sides don't change a rate by so much that its sign could change.
-        """
-        sides = {j: self._modes[j] or 1 for j in moving}
-        seen: list[dict[int, int]] = []
-        for _ in range(2):  # from these sides, and from those to which the rates lead
-            here = at(sides)
-            beside = [at({**sides, k: -sides[k]}) for k in moving]
-            found = {}
-            for j in moving:
-                rate = float(here.rate(j))
-                changes = sum(abs(float(look.rate(j)) - rate) for look in beside)
-                if abs(rate) > changes + self._probe.rate_noise(here, j):
-                    found[j] = 1 if rate > 0 else -1
-            sides = {**sides, **found}
-            seen.append(found)
-        return {j: side for j, side in seen[1].items() if seen[0].get(j) == side}
 
     def _by_trial(self, idle: dict[int, int]) -> Continuation:
         """At rest on a surface, find by trial the side on which a step stays on its own."""
