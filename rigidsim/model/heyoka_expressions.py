@@ -64,8 +64,8 @@ def to_heyoka(
         try:
             return hy.expression(rounded(number(value)))
         except OverflowError:
-            what = f"a constant of {context.nstr(value, 6)}, which the working precision can't hold"
-            raise expression.error(f"{what}; write 0, another unit, or another precision", node) from None
+            what = f"a constant that the working precision can't hold ({context.nstr(value, 6)}: write 0, "
+            raise expression.error(f"{what}another unit, or another precision)", node) from None
 
     def combine(node: Node, operands: list[Any]) -> Any:
         """An mpf as long as all operands are constant, a line in time, or an expression."""
