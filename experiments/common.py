@@ -20,7 +20,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 import rigidsim
-from rigidsim.store.variables import parts_in
+from rigidsim.scene.parts_of_values import parts_in
 
 CONFIGS = Path(__file__).parents[1] / "configs"
 DEFAULT_OUT = Path("runs/experiments")

@@ -52,7 +52,7 @@ from experiments.common import (
     save,
     tidy,
 )
-from rigidsim.store.variables import parts_in
+from rigidsim.scene.parts_of_values import parts_in
 
 NAME = "round_off_ensemble"
 CONFIG = CONFIGS / "sweeps" / "round_off.toml"

@@ -28,8 +28,8 @@ import numpy as np
 
 import rigidsim
 from experiments.sensitivity_scenes import Case, case
+from rigidsim.scene.parts_of_values import parts_in
 from rigidsim.scene.varied_keys import varied_keys
-from rigidsim.store.variables import parts_in
 from rigidsim.workflows.read import parse
 from rigidsim.workflows.sensitivity import Tangents
 

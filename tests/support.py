@@ -22,6 +22,7 @@ import rigidsim
 from rigidsim.accuracy.comparison import angles_between  # noqa: F401  (for the tests)
 from rigidsim.accuracy.setting import Setting
 from rigidsim.accuracy.trial import Trial, try_setting
+from rigidsim.scene.parts_of_values import parts_in
 from rigidsim.session.session import Tuning
 from rigidsim.solve import compiled
 from rigidsim.solve.problem import prepare
@@ -29,7 +30,6 @@ from rigidsim.solve.sampler import Pacing
 from rigidsim.solve.solvers.taylor.ways import Ways
 from rigidsim.solve.status import Status
 from rigidsim.store.segments import SegmentLimits
-from rigidsim.store.variables import parts_in
 
 CONFIGS = sorted((Path(__file__).parents[1] / "configs").glob("*.toml"))
 # a look at the guards after every few steps, so that they cut short runs where they say

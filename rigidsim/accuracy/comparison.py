@@ -11,8 +11,8 @@ import mpmath
 import numpy as np
 
 from rigidsim.scene.config import Experiment
+from rigidsim.scene.parts_of_values import parts_in
 from rigidsim.scene.scene import build_scene
-from rigidsim.store.variables import parts_in
 
 if TYPE_CHECKING:
     import xarray

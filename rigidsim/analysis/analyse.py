@@ -2,9 +2,10 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
+import numpy as np
 import xarray
 
 from rigidsim.analysis.decomposition import Decomposition, amplitude_spectrum, decompose
@@ -50,9 +51,14 @@ def analyse_dataset(
     known: Sequence[Known] = (),
     order: int | None = None,
     attitude_error: float | None = None,
+    fastest: float = 0.0,
 ) -> Analysis:
     """Secular rates and lines of a dataset's signals; arguments and errors as of
     ``rigidsim.workflows.analyse.analyse``. Residuals ``_lo``, ``_lo2`` are taken into account.
+
+    Args:
+        fastest: rate of the fastest motion (rad/s), as of the rotation; by itself, of what is known and of
+            rates that were recorded the largest counts.
     """
     if not 1 <= lines <= 500:
         raise RigidsimError(f"given lines = {lines}; 1 to 500 are allowed")
@@ -69,11 +75,14 @@ def analyse_dataset(
         list(zip(raw.frequencies, raw.errors, size, strict=True))
         for raw, size in zip(raws, sizes, strict=True)
     ]
+    fastest = max([fastest, *(abs(float(k.value)) for k in known), _largest_rate(dataset)])
+    # twice, since a body of three moments moves at twice its own rate, too
+    faster = not fastest or 2 * fastest > clock.nyquist
     names = _with_precession(known, raws, clock)
     in_body = [raw.signal.in_body for raw in raws]
     names = settled([k for k in names if float(k.value) != 0], measured, in_body)
     return Analysis(
-        signals=tuple(_named(raw, clock, names) for raw in raws),
+        signals=tuple(_named(raw, clock, names, faster) for raw in raws),
         known=tuple(names),
         start=float(clock.start),
         spacing=float(clock.spacing),
@@ -127,10 +136,18 @@ def _rate(raw: _Raw, clock: EquidistantTimes) -> tuple[Any, float]:
     return slope * per_second, raw.found.polynomial_errors[1] * float(per_second)
 
 
-def _named(raw: _Raw, clock: EquidistantTimes, known: Sequence[Known]) -> SignalAnalysis:
+def _largest_rate(dataset: xarray.Dataset) -> float:
+    """Of a recorded angular velocity the size at its fastest, rad/s; 0 without one."""
+    if "angular_velocity" not in dataset or "time" not in dataset["angular_velocity"].dims:
+        return 0.0
+    rates = dataset["angular_velocity"].transpose("time", ...).values
+    return float(np.nanmax(np.linalg.norm(rates.reshape(len(rates), -1), axis=1), initial=0.0))
+
+
+def _named(raw: _Raw, clock: EquidistantTimes, known: Sequence[Known], faster: bool) -> SignalAnalysis:
     found, signal = raw.found, raw.signal
     lines = [
-        _line(raw, clock, known, n)
+        replace(_line(raw, clock, known, n), faster=faster)
         for n in sorted(range(len(raw.frequencies)), key=lambda n: -abs(complex(found.sum.amplitudes[n])))
     ]
     rate, rate_error = _rate(raw, clock) if signal.degree > 0 else (None, math.nan)
@@ -242,6 +259,12 @@ def _notes(
         notes.append(
             f"{len(blends)} lines lie off their labels by more than what is left explains: blends of lines "
             "closer than a bin; their errors are those distances"
+        )
+    aliases = sum(line.can_be_alias for line in lines)
+    if aliases:
+        notes.append(
+            f"{aliases} lines without a label can be aliases of motions faster than Nyquist's frequency: "
+            "sample more often, or at another spacing, to see whether their frequencies stay"
         )
     doubtful = [line for line in lines if line.ambiguous]
     if doubtful:

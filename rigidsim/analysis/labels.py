@@ -111,12 +111,30 @@ def label(
 
     Where nothing fits within the error, combinations within ``blend``, far less than a bin, do: a line can
     have absorbed others that are too close to be told apart. One whose error is about a bin gets no label.
+    Where chance would fit as many combinations of all that is known, those of the frequencies below Nyquist's
+    are tried alone.
     """
     if _SIGMAS * error > resolution:
         return Label()
     if not known:
         return Label((), "0", 0) if abs(frequency) <= _SIGMAS * error else Label()
     seen = [n for n, k in enumerate(known) if k.where in ("", "body" if in_body else "space")]
+    slow = [n for n in seen if abs(float(known[n].value)) < nyquist]
+    place = frequency, error, known, nyquist, real, blend
+    found = _fitting(seen, *place)
+    return found if found.multipliers or len(slow) in (0, len(seen)) else _fitting(slow, *place)
+
+
+def _fitting(
+    seen: Sequence[int],
+    frequency: float,
+    error: float,
+    known: Sequence[Known],
+    nyquist: float,
+    real: bool,
+    blend: float,
+) -> Label:
+    """The combination of the known frequencies of these numbers that a line represents."""
     vectors = np.zeros((len(combinations(len(seen))), len(known)), dtype=np.int64)
     vectors[:, seen] = combinations(len(seen))
     values = np.array([float(k.value) for k in known])
@@ -134,6 +152,8 @@ def label(
         if real:
             # the mirror image has the opposite combination, which is in the list too
             fits &= (turns != 0) | (true >= 0)
+        if blended:  # what doesn't fit within its error is too weak a reason to unfold a line
+            fits &= turns == 0
         found = np.flatnonzero(fits)
         if not len(found):
             return Label()

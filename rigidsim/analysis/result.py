@@ -7,7 +7,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from operator import attrgetter
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import mpmath
 import numpy as np
@@ -15,10 +15,7 @@ import xarray
 from numpy.typing import NDArray
 
 from rigidsim.analysis.labels import Known, Label
-from rigidsim.store.variables import part_name
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+from rigidsim.scene.parts_of_values import part_name
 
 TURN = 2 * np.pi
 
@@ -35,6 +32,7 @@ class SpectralLine:
         phase: at time zero of the scene, rad within +-pi; mpf.
         phase_error: error of the phase in the middle of the samples, rad.
         label, mismatch: its label, and the distance from the labelled frequency, rad/s.
+        faster: whether motions beyond Nyquist's frequency are in the scene, or can't be ruled out.
     """
 
     frequency: Any
@@ -46,11 +44,19 @@ class SpectralLine:
     phase_error: float
     label: Label
     mismatch: float
+    faster: bool = False
 
     @property
     def period(self) -> float:
         """Period in s, positive; infinite for a constant."""
         return float(TURN / abs(self.frequency)) if self.frequency else float("inf")
+
+    @property
+    def can_be_alias(self) -> bool:
+        """Whether it may stand for a motion beyond Nyquist's frequency: nothing known explains the line, and
+        something is, or may be, as fast.
+        """
+        return self.faster and not self.label.text
 
     @property
     def unfolded(self) -> bool:
@@ -135,12 +141,6 @@ class Analysis:
         """
         return _dataset(self)
 
-    def figure(self) -> Figure:
-        """Spectra with their lines marked and named, as a matplotlib figure."""
-        from rigidsim.look.figures.spectrum import spectrum_figure
-
-        return spectrum_figure(self.dataset)
-
     def as_dict(self) -> dict[str, Any]:
         """Values for JSON."""
         return {
@@ -202,6 +202,7 @@ def _signal_dict(signal: SignalAnalysis, known: Sequence[Known]) -> dict[str, An
                     k.name: m for k, m in zip(known, line.label.multipliers or (), strict=False) if m
                 },
                 "unfolded": line.unfolded,
+                "can_be_alias": line.can_be_alias,
                 "ambiguous_with": list(line.label.doubtful),
                 "mismatch_rad_per_s": None if math.isnan(line.mismatch) else line.mismatch,
                 "null_because": _null_because(line),
@@ -268,6 +269,9 @@ def _dataset(analysis: Analysis) -> xarray.Dataset:
     table("mismatch", "rad s-1", "frequency less that of its label", "mismatch")
     table("label", "", "combination of known frequencies", "label.text", object, "")
     table("unfolded", "1", "1 where the frequency lies beyond Nyquist's", "unfolded", np.int8, 0)
+    table(
+        "can_be_alias", "1", "1 where a line can be an alias of a faster motion", "can_be_alias", np.int8, 0
+    )
     table("ambiguous", "1", "1 where several combinations fit", "ambiguous", np.int8, 0)
     multipliers = np.zeros((len(signals), longest, len(known)), dtype=np.int64)
     curves = np.full((2, len(signals), max((len(s.spectrum[0]) for s in signals), default=0)), np.nan)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from rigidsim.analysis.refinement import SignalSamples
 from rigidsim.errors import RigidsimError
-from rigidsim.store.variables import parts_in
+from rigidsim.scene.parts_of_values import parts_in
 
 Reals = NDArray[np.float64]
 

@@ -30,8 +30,8 @@ from rigidsim.scene.frame import EQUATOR
 from rigidsim.scene.kernels.ephemeris import EQUATORIAL
 from rigidsim.scene.kernels.kernel import KernelError
 from rigidsim.scene.kernels.spice import loaded, spice
+from rigidsim.scene.parts_of_values import parts_in
 from rigidsim.scene.rotations import product, rotation_matrix
-from rigidsim.store.variables import parts_in
 
 J2000 = "J2000"
 _WANTED, _ALLOWED = 2e-13, 1e-12

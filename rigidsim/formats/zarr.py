@@ -9,10 +9,10 @@ import xarray
 from rigidsim.formats.digits import RADIAN, converted
 from rigidsim.formats.registry import Format, TableSource
 from rigidsim.formats.tables import Table
+from rigidsim.scene.parts_of_values import parts_in
 from rigidsim.scene.readable import AngleUnit
 from rigidsim.store.netcdf import CHUNK_ROWS
 from rigidsim.store.sweeps.dataset import chunk_shape
-from rigidsim.store.variables import parts_in
 
 BLOCK_ROWS = 8 * CHUNK_ROWS
 _SLAB_BLOCKS = 8  # 128 MB at once: each is an append

@@ -1,126 +1,89 @@
-"""Fits of recorded angles for labels: mean rates, secular parts and the leading ellipse.
+"""Mean motions, circulations and leading ellipses of recorded angles, as `analysis` finds them.
 
-Quick estimates for labels and for removing trends; `rigidsim analyse` has the digits.
+Pictures and ``rigidsim analyse`` thus have one source of rates and periods. Samples that can't be analysed
+(few, uneven, with gaps) have a straight line taken off, whose rate is only said to be about right.
 """
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
+import xarray
 
+from rigidsim.analysis.analyse import analyse_dataset
+from rigidsim.analysis.result import SignalAnalysis, SpectralLine
+from rigidsim.errors import RigidsimError
 from rigidsim.look.solids import Array
 
 _TURN = 2 * np.pi
-_LINES, _ENOUGH = 4, 64  # sinusoids that are fitted beside a straight line, to so many samples or more
-_REFINEMENTS, _LEAST_CYCLES = 6, 1.2  # of the lines' frequencies; fewer cycles are like a straight line
+_LINES = 6  # that free a rate from swings to more digits than pictures show
 _UNIFORM = 0.1  # by which the rates of both halves of a run may differ: swings within a turn do so, too
+_LEAST_CYCLES = 1.5  # of a swing that an ellipse is drawn of
 
 
 @dataclass(frozen=True)
 class SecularLine:
-    """The secular part of an angle, ``at_start + rate * (t - t[0])``."""
+    """The secular part of an angle, ``value + rate * (t - middle)``; `known` unless it is a straight line
+    through samples that can't be analysed.
+    """
 
-    at_start: float
+    value: float
     rate: float
-    start: float
+    middle: float
+    known: bool
 
     def at(self, time: Array) -> Array:
         """Values (rows,) at given times."""
-        return np.asarray(self.at_start + self.rate * (time - self.start))
+        return np.asarray(self.value + self.rate * (time - self.middle))
+
+    @property
+    def about(self) -> str:
+        """What stands before its rate in a text."""
+        return "" if self.known else "about "
 
 
-def secular(time: Array, angle: Array, *, level: bool = False) -> SecularLine:
-    """Straight line through an angle (rows,) that swings about it; if `level`, only its mean.
-
-    Evenly sampled, its strongest sinusoids of at least 1.5 periods are fitted with it, their periods too, so
-    that a broken swing at the ends doesn't tilt it; all is weighted by a Hann window.
-    """
+def secular(time: Array, angle: Array) -> SecularLine:
+    """The secular part of an angle (rows,), rad, that swings about it, at times in s."""
+    found = _analysed(time, angle)
+    if found is not None:
+        rows = _even(time)
+        middle = (time[rows][0] + time[rows][-1]) / 2
+        return SecularLine(float(found.value.real), float(found.rate.real), float(middle), True)
     finite = np.isfinite(angle)
     t, y = time[finite], angle[finite]
     if len(t) < 3 or t[-1] == t[0]:
-        return SecularLine(float(y.mean()) if len(y) else 0.0, 0.0, float(time[0]) if len(time) else 0.0)
-    s = (t - t[0]) / (t[-1] - t[0])
-    weight = np.sin(np.pi * s) ** 2 * np.gradient(s)
-    weight /= weight.sum()
-    columns = [np.ones_like(s)] if level else [np.ones_like(s), s - 0.5]
-    polynomial, lines = len(columns), list[float]()
-    root = np.sqrt(weight)
-    middle = float(y[len(y) // 2])  # large angles lose fewer digits
-    found = _solve(columns, y - middle, root)
-    if len(t) >= _ENOUGH and np.ptp(np.diff(t)) < 1e-3 * (s[1] * (t[-1] - t[0])):
-        for _ in range(_LINES):
-            rest = y - middle - np.stack(columns, axis=1) @ found
-            cycles = _peak(rest * weight)
-            if cycles is None:
-                break
-            lines.append(cycles)
-            columns = [*columns[:polynomial], *_sinusoids(lines, s)]
-            found = _solve(columns, y - middle, root)
-        found = _refined(columns[:polynomial], lines, found, s, y - middle, root)
-    slope = 0.0 if level else float(found[1])
-    rate = slope / (t[-1] - t[0])
-    return SecularLine(middle + float(found[0]) - slope * 0.5 + rate * (time[0] - t[0]), rate, float(time[0]))
+        return SecularLine(float(y.mean()) if len(y) else 0.0, 0.0, 0.0, False)
+    middle = (t[0] + t[-1]) / 2
+    rate, value = np.polyfit(t - middle, y, 1)
+    return SecularLine(float(value), float(rate), float(middle), False)
 
 
-def _sinusoids(lines: list[float], s: Array) -> list[Array]:
-    """Cosine and sine of each line, of so many cycles over the whole."""
-    return [wave(2 * np.pi * cycles * s) for cycles in lines for wave in (np.cos, np.sin)]
+def _even(time: Array) -> slice:
+    """Rows that are equidistant: of thinned ones the last can be closer to the one before."""
+    uneven = len(time) > 2 and abs((time[-1] - time[-2]) / (time[1] - time[0]) - 1) > 1e-6
+    return slice(None, -1 if uneven else None)
 
 
-def _refined(
-    base: list[Array], lines: list[float], found: Array, s: Array, values: Array, root: Array
-) -> Array:
-    """Coefficients with the frequencies fitted as well (Gauss-Newton): lines pull at each other's peaks."""
-
-    def misfit(columns: list[Array], coefficients: Array) -> float:
-        return float(np.linalg.norm(root * (values - np.stack(columns, axis=1) @ coefficients)))
-
-    if not lines:
-        return found
-    left = misfit([*base, *_sinusoids(lines, s)], found)
-    for _ in range(_REFINEMENTS):
-        waves = _sinusoids(lines, s)
-        a, b = found[len(base) :: 2], found[len(base) + 1 :: 2]
-        slopes = [2 * np.pi * s * (b[k] * waves[2 * k] - a[k] * waves[2 * k + 1]) for k in range(len(lines))]
-        shifts = _solve([*base, *waves, *slopes], values, root)[-len(lines) :]
-        moved = [c + float(np.clip(d, -0.5, 0.5)) for c, d in zip(lines, shifts, strict=True)]
-        columns = [*base, *_sinusoids(moved, s)]
-        better = _solve(columns, values, root)
-        now = misfit(columns, better)
-        if not now < left or min(moved) < _LEAST_CYCLES:
-            break
-        lines, found, left = moved, better, now
-    return found
+def _analysed(time: Array, angle: Array) -> SignalAnalysis | None:
+    rows = _even(time)
+    return _analysis_of(time[rows].tobytes(), angle[rows].tobytes())
 
 
-def _solve(columns: list[Array], values: Array, root: Array) -> Array:
-    return np.asarray(
-        np.linalg.lstsq(np.stack(columns, axis=1) * root[:, None], values * root, rcond=None)[0]
-    )
-
-
-def _peak(windowed: Array) -> float | None:
-    """Cycles over the whole series of the strongest sinusoid; None if it has less than 1.5."""
-    padded = 8 * len(windowed)
-    power = np.abs(np.fft.rfft(windowed, padded)) ** 2
-    k = int(power[1:-1].argmax()) + 1
-    if k < 12 or power[k] == 0:
+@lru_cache(maxsize=16)  # panels share their angles
+def _analysis_of(time: bytes, angle: bytes) -> SignalAnalysis | None:
+    angles = xarray.DataArray(np.frombuffer(angle), dims="time", attrs={"units": "rad"})
+    dataset = xarray.Dataset({"angle": angles}, {"time": np.frombuffer(time)})
+    try:
+        return analyse_dataset(dataset, lines=_LINES)["angle"]
+    except RigidsimError:
         return None
-    return _maximum(power, k) * (len(windowed) - 1) / padded
 
 
-def _maximum(power: Array, k: int) -> float:
-    """Place of the maximum next to index k, by the parabola through three logarithms."""
-    left, mid, right = np.log(power[k - 1 : k + 2] + 1e-300)
-    bend = left - 2 * mid + right
-    shift = 0.5 * (left - right) / bend if bend < 0 else 0.0
-    return k + float(np.clip(shift, -0.5, 0.5))
+def circulation(time: Array, plane: Array) -> SecularLine | None:
+    """The mean motion of a point of a plane (rows, 2) about the origin; counterclockwise > 0.
 
-
-def circulation(time: Array, plane: Array) -> float | None:
-    """Mean rate, rad/s, at which a point of a plane (rows, 2) goes about the origin; counterclockwise > 0.
-
-    None if it doesn't, completes less than one turn, keeps speeding up or slowing down, or was sampled too
-    sparsely to tell.
+    None if it doesn't go round, completes less than one turn, keeps speeding up or slowing down, or was
+    sampled too sparsely to tell.
     """
     finite = np.isfinite(plane).all(axis=1)
     phase = np.arctan2(plane[finite, 1], plane[finite, 0])
@@ -128,59 +91,62 @@ def circulation(time: Array, plane: Array) -> float | None:
     steps -= _TURN * np.round(steps / _TURN)
     if len(steps) < 4 or np.abs(steps).max() > 0.9 * np.pi:
         return None
-    angle = np.concatenate([[0.0], np.cumsum(steps)])
-    if abs(angle[-1]) < 0.95 * _TURN:
+    angle = phase[0] + np.concatenate([[0.0], np.cumsum(steps)])
+    if abs(angle[-1] - angle[0]) < 0.95 * _TURN:
         return None
     half = len(angle) // 2
     rates = [secular(time[finite][part], angle[part]).rate for part in (slice(half), slice(half, None))]
     if abs(rates[0] - rates[1]) > _UNIFORM * max(map(abs, rates)):
         return None
-    return secular(time[finite], angle).rate or None
+    found = secular(time[finite], angle)
+    return found if found.rate else None
 
 
 @dataclass(frozen=True)
-class FittedEllipse:
-    """``forward exp(i w t) + backward exp(-i w t)`` from the first sample on; `rate` is w > 0, rad/s."""
+class Ellipse:
+    """``across cos(w t) ...``: complex amplitudes of both coordinates of a point, and w > 0, rad/s."""
 
-    forward: complex
-    backward: complex
+    across: complex
+    up: complex
     rate: float
 
     @property
     def semi_axes(self) -> tuple[float, float]:
         """The larger and the smaller semi-axis."""
-        a, b = abs(self.forward), abs(self.backward)
+        a, b = abs(self.across + 1j * self.up) / 2, abs(self.across - 1j * self.up) / 2
         return a + b, abs(a - b)
 
     def curve(self, points: int = 181) -> Array:
         """Points once around it, (points, 2)."""
         phase = np.exp(1j * np.linspace(0.0, _TURN, points))
-        z = self.forward * phase + self.backward / phase
-        return np.stack([z.real, z.imag], axis=1)
+        return np.stack([(self.across * phase).real, (self.up * phase).real], axis=1)
 
 
-def leading_ellipse(time: Array, plane: Array) -> FittedEllipse | None:
-    """The strongest periodic part of a point's motion in a plane (rows, 2), evenly sampled; None if it has
-    less than 1.5 periods in the run, or none stands out.
+def leading_ellipse(time: Array, longitude: Array, latitude: Array, shortened: float) -> Ellipse | None:
+    """The strongest line of a pole's longitude, `shortened` by the sine of its obliquity, and latitude
+    together (rows,), rad; None if neither has a line of 1.5 periods in the run, or they can't be analysed.
     """
-    steps = np.diff(time)
-    if len(time) < 16 or not np.isfinite(plane).all() or np.ptp(steps) > 1e-3 * steps.mean():
+    found = [_analysed(time, angle) for angle in (longitude, latitude)]
+    if found[0] is None or found[1] is None:
         return None
-    z = plane[:, 0] + 1j * plane[:, 1]
-    z = z - z.mean()
-    middle = (time - time.mean()) / (time[-1] - time[0])
-    trend = middle * (middle @ z) / (middle @ middle)  # of a slower swing that the run has a part of
-    window = np.sin(np.pi * (np.arange(len(z)) + 0.5) / len(z)) ** 2
-    padded = 8 * len(z)
-    power = np.abs(np.fft.fft((z - trend) * window, padded)) ** 2
-    frequencies = np.fft.fftfreq(padded, steps.mean())
-    both = power[1 : padded // 2] + power[:0:-1][: padded // 2 - 1]
-    k = int(both.argmax()) + 1
-    span = time[-1] - time[0]
-    if abs(frequencies[k]) * span < 1.5 or k >= padded // 2 - 2:
+    span = abs(time[-1] - time[0])
+    lines = [
+        (scale * float(line.amplitude), line)
+        for signal, scale in zip(found, (shortened, 1.0), strict=True)
+        if signal is not None
+        for line in signal.lines
+        if float(line.frequency) * span > _LEAST_CYCLES * _TURN
+    ]
+    if not lines:
         return None
-    rate = _TURN * (_maximum(both, k - 1) + 1) / (padded * steps.mean())
-    wave = np.exp(1j * rate * (time - time[0]))
-    basis = np.stack([wave, wave.conj(), np.ones_like(wave), middle, middle**2], axis=1)
-    found, *_ = np.linalg.lstsq(basis, z, rcond=None)
-    return FittedEllipse(complex(found[0]), complex(found[1]), float(rate))
+    rate = float(max(lines, key=lambda one: one[0])[1].frequency)
+
+    def part(signal: SignalAnalysis) -> complex:
+        near = [x for x in signal.lines if abs(float(x.frequency) - rate) * span < _TURN / 2]
+        return sum((_complex(x) for x in near[:1]), 0j)
+
+    return Ellipse(shortened * part(found[0]), part(found[1]), rate)
+
+
+def _complex(line: SpectralLine) -> complex:
+    return complex(float(line.amplitude) * np.exp(1j * float(line.phase)))

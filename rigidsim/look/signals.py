@@ -14,7 +14,7 @@ import numpy as np
 import xarray
 
 from rigidsim.look.solids import Array, rotation_matrix
-from rigidsim.look.surroundings import carries_within
+from rigidsim.look.surroundings import carries_within, frame, gravity
 
 _ORBIT_NORM = re.compile(r"orbit_norm_(\d+)")
 _IN_WORDS = {"energy_balance": "energy less work"}
@@ -125,6 +125,16 @@ def joined(values: Array, reach: float = 0.4) -> bool:
     return float(np.percentile(norms(np.diff(table, axis=0)), 95)) <= reach * radius or radius == 0.0
 
 
+def aliased(dataset: xarray.Dataset, rates: float = 1.0) -> bool:
+    """Whether a motion at so many times the body's rate, as recorded, makes half a turn or more between rows,
+    so that lines would draw waves that are not there.
+    """
+    turning, time = values(dataset, "angular_velocity"), seconds(dataset)
+    if turning is None or len(time) < 2 or not np.isfinite(turning).any():
+        return False
+    return bool(rates * np.nanmax(norms(turning)) * np.abs(np.diff(time)).max() > np.pi)
+
+
 def axis_names(dataset: xarray.Dataset) -> list[str]:
     """Names of the principal axes: those of body axes, or 1, 2, 3 if they aren't body axes."""
     axes = principal_axes(dataset)
@@ -164,8 +174,10 @@ def near_axis(dataset: xarray.Dataset) -> bool:
 
 def figure_direction(dataset: xarray.Dataset) -> Array:
     """Unit vector (3,) of the figure axis in body axes: as asked, of symmetry, or of the largest moment."""
-    frame: Any = read_config(dataset).get("frame", {})
-    asked = frame.get("figure_axis") if isinstance(frame, dict) else None
+    recorded = frame(dataset)
+    if recorded is not None:
+        return np.array(recorded["figure_axis"])
+    asked = _frame_asked(dataset).get("figure_axis")
     if asked in ("x", "y", "z"):
         return np.asarray(np.eye(3)["xyz".index(asked)])
     found = moments(dataset)
@@ -239,15 +251,16 @@ def reference_axes(dataset: xarray.Dataset) -> tuple[Array, str] | None:
     As ``[frame] reference`` says; where nothing says or was recorded against it, and space axes are those of
     the Earth's equator, the ecliptic.
     """
-    frame: Any = read_config(dataset).get("frame", {})
-    asked: Any = frame.get("reference") if isinstance(frame, dict) else None
+    recorded, asked = frame(dataset), _frame_asked(dataset).get("reference")
     if asked == "orbit":
         return None
     named = str(dataset.attrs.get("axes", ""))
     ecliptic = np.array([0.0, -np.sin(_OBLIQUITY), np.cos(_OBLIQUITY)])
     equatorial = named in _EQUATORIAL
     normal = ecliptic if asked is None and equatorial and "obliquity" not in dataset else np.eye(3)[2]
-    if isinstance(asked, list):
+    if recorded is not None and asked is not None:
+        normal = np.array(recorded["reference_normal"])
+    elif isinstance(asked, list):
         try:
             normal = np.array([float(x) for x in asked])
             normal /= np.linalg.norm(normal)
@@ -291,12 +304,21 @@ def orientation(dataset: xarray.Dataset, axis: str) -> tuple[Array, Array] | Non
     return tilt, longitude
 
 
+def lever(dataset: xarray.Dataset) -> Array | None:
+    """Of a body held off its centre of mass under uniform gravity the arm (3,) to the latter, m, body axes;
+    None of others, such as a body held at its centre of mass, which gravity doesn't turn.
+    """
+    arm = attribute(dataset, "center_of_mass")
+    held = "position" not in dataset and gravity(dataset) is not None
+    return arm if held and arm is not None and np.linalg.norm(arm) > 0 else None
+
+
 def is_top(dataset: xarray.Dataset) -> bool:
-    """Whether the scene is a body on a fixed point under uniform gravity, or a top's angles are recorded."""
+    """Whether the scene is a top whose axis is known in space (see ``lever``), or a top's tip is recorded."""
     if "position" in dataset:
         return False
-    on_point = "uniform_gravity" in load_kinds(dataset) and pole(dataset, "figure") is not None
-    return on_point or values(dataset, "tip") is not None
+    leaning = lever(dataset) is not None and pole(dataset, "figure") is not None
+    return leaning or values(dataset, "tip") is not None
 
 
 def across(axis: Array) -> tuple[Array, Array]:
@@ -312,23 +334,16 @@ def angle_between(directions: Array, others: Array) -> Array:
     return np.asarray(np.arctan2(np.linalg.norm(np.cross(directions, others), axis=1), cosine))
 
 
-def load_kinds(dataset: xarray.Dataset) -> list[str]:
-    """The kinds of the scene's loads, from the embedded config."""
-    loads: Any = read_config(dataset).get("loads", [])
-    return [str(load.get("kind")) for load in loads if isinstance(load, dict)]
-
-
 def vertical(dataset: xarray.Dataset) -> Array:
-    """Unit vector (3,) against a uniform gravity; Z if the config gives no other direction in numbers."""
-    for load in read_config(dataset).get("loads", []):
-        if isinstance(load, dict) and load.get("kind") == "uniform_gravity" and "acceleration" in load:
-            try:
-                pull = np.array([float(str(x).split()[0]) for x in load["acceleration"]])
-            except (ValueError, IndexError, TypeError):
-                break
-            if np.linalg.norm(pull) > 0:
-                return np.asarray(-pull / np.linalg.norm(pull))
-    return np.array([0.0, 0.0, 1.0])
+    """Unit vector (3,) against a uniform gravity; Z without any."""
+    pull = gravity(dataset)
+    return np.array([0.0, 0.0, 1.0]) if pull is None else np.asarray(-pull / np.linalg.norm(pull))
+
+
+def _frame_asked(dataset: xarray.Dataset) -> dict[str, Any]:
+    """``[frame]`` of the embedded config."""
+    found = read_config(dataset).get("frame", {})
+    return found if isinstance(found, dict) else {}
 
 
 def _unit(vectors: Array) -> Array:

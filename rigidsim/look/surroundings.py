@@ -1,9 +1,11 @@
-"""Surroundings of a body, from the dataset's attribute ``surroundings``: gravity, sources, attractors.
+"""Surroundings of a body, from the dataset's attribute ``surroundings``: frame, gravity, sources, attractors.
 
-It is a JSON list of objects: ``{"what": "gravity", "acceleration"}``, ``{"what": "attractor",
-"gravitational_parameter", "position"}`` and ``{"what": "source", "gravitational_parameter"}`` with ``orbit``
-(elements at time zero and their rates), ``position``, ``ephemeris``, or ``kernel``, the name by which its
-position was recorded; SI units, space axes. Datasets of older versions have none.
+It is a JSON list of objects in SI units, written by the room that knows the scene: ``{"what": "frame",
+"figure_axis", "reference_normal"}`` (unit vectors in body and space axes, null of a plane that moves;
+datasets of 1.0.0 have none), ``{"what": "gravity", "acceleration"}`` of all uniform fields together,
+``{"what": "attractor", "gravitational_parameter", "position"}`` and ``{"what": "source",
+"gravitational_parameter"}`` with ``orbit`` (elements at time zero and their rates), ``position``,
+``ephemeris``, or ``kernel``, the name by which its position was recorded.
 """
 
 import json
@@ -49,6 +51,11 @@ def has_rotors(dataset: xarray.Dataset) -> bool:
 def carries_within(dataset: xarray.Dataset) -> bool:
     """Whether rotors or a fluid core carry momentum of their own."""
     return has_rotors(dataset) or bool(told(dataset, "core"))
+
+
+def frame(dataset: xarray.Dataset) -> dict[str, Any] | None:
+    """The entry on the frame; None of datasets of 1.0.0."""
+    return next(iter(told(dataset, "frame")), None)
 
 
 def gravity(dataset: xarray.Dataset) -> Array | None:

@@ -321,10 +321,18 @@ def _of_ephemeris(scene: Scene) -> dict[str, Any]:
 
 
 def _surroundings(prepared: InitialValueProblem) -> list[dict[str, Any]]:
-    """Gravity and the pictured objects of every load."""
+    """The frame, gravity and the pictured objects of every load."""
     scene = prepared.scene
     locked = [x for found in scene.tabled.values() for x in found if not x.acts()]  # and drawn all the same
     shown = [load.pictured() for load in (*scene.loads, *locked, *prepared.python_loads)]
+    normal = scene.reference
+    shown.append(
+        {
+            "what": "frame",
+            "figure_axis": [float(x) for x in scene.figure.pole],
+            "reference_normal": None if normal is None else [float(x) for x in normal],
+        }
+    )
     if scene.gravity is not None:
         shown.append({"what": "gravity", "acceleration": [float(g) for g in scene.gravity]})
     return [one for one in shown if one is not None]

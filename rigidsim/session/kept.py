@@ -10,9 +10,10 @@ from typing import Any
 import numpy as np
 
 from rigidsim.model.tangents import GROWTH
+from rigidsim.scene.parts_of_values import part_name
 from rigidsim.solve.indicators import indicators
 from rigidsim.store.sweeps.tiles import ALWAYS, Kept, KeptVariable
-from rigidsim.store.variables import Variable, part_name
+from rigidsim.store.variables import Variable
 
 
 def kept(

@@ -2,13 +2,11 @@
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from itertools import count, takewhile
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-if TYPE_CHECKING:
-    import xarray
+from rigidsim.scene.parts_of_values import part_name
 
 LABELS: dict[str, list[str]] = {
     "body_axis": ["x", "y", "z"],
@@ -81,17 +79,6 @@ def used_labels(variables: Iterable[Variable]) -> dict[str, Sequence[str]]:
     """Dimensions of the variables besides time, in the order of a dataset, with their labels."""
     found = {dim: variable.labels(dim) for variable in variables for dim in variable.dims}
     return {dim: found[dim] for dim in (*LABELS, *OF_THE_RUN) if dim in found}
-
-
-def part_name(name: str, part: int) -> str:
-    """Name of a part of a value: ``name``, ``name_lo``, ``name_lo2``, ``name_lo3``, ..."""
-    return name + ("", "_lo")[part] if part < 2 else f"{name}_lo{part}"
-
-
-def parts_in(dataset: "xarray.Dataset", name: str) -> list[str]:
-    """Names of a value's parts in a dataset, whose sum, smallest first, is the exact value."""
-    residuals = takewhile(dataset.variables.__contains__, (part_name(name, part) for part in count(1)))
-    return [name, *takewhile(lambda residual: "residual_of" in dataset[residual].attrs, residuals)]
 
 
 def time_variable(parts: int) -> Variable:

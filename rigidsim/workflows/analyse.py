@@ -1,10 +1,12 @@
 """``rigidsim analyse``: secular rates and labelled lines of a run, as a table, a dataset and a figure."""
 
+from __future__ import annotations
+
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import xarray
 
@@ -12,14 +14,29 @@ from rigidsim.analysis.analyse import analyse_dataset
 from rigidsim.analysis.labels import Known
 from rigidsim.analysis.result import Analysis
 from rigidsim.errors import ConfigError, RigidsimError
-from rigidsim.scene.scene import build_scene
+from rigidsim.look.signals import is_averaged
+from rigidsim.scene.arithmetic import norm
+from rigidsim.scene.scene import Scene, build_scene
 from rigidsim.store.outputs import refuse_loss, writing
 from rigidsim.store.run import Run
 from rigidsim.workflows.compare.as_run import open_any
-from rigidsim.workflows.known_frequencies import known_frequencies
+from rigidsim.workflows.known_frequencies import OF_ROTATION, known_frequencies
 from rigidsim.workflows.read import parse
 
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
 FIGURES = (".png", ".svg")
+
+
+class DrawnAnalysis(Analysis):
+    """An analysis with its picture."""
+
+    def figure(self) -> Figure:
+        """Spectra with their lines marked and named, as a matplotlib figure."""
+        from rigidsim.look.figures.spectrum import spectrum_figure
+
+        return spectrum_figure(self.dataset)
 
 
 def analyse(
@@ -30,7 +47,7 @@ def analyse(
     floor: float = 1e-12,
     known: Mapping[str, Any] | None = None,
     window: int | None = None,
-) -> Analysis:
+) -> DrawnAnalysis:
     """Secular rates and spectral lines of a run, or of any dataset with equidistant ``time`` in s.
 
     Args:
@@ -57,23 +74,37 @@ def analyse(
         source = open_any(source)
     if isinstance(source, Run):
         with source.dataset as dataset:
-            names = _known(dataset, known)
             options["attitude_error"] = _attitude_error(source)
-            return analyse_dataset(dataset, chosen, known=names, **options)
-    return analyse_dataset(source, chosen, known=_known(source, known), **options)
+            return _analysed(dataset, chosen, known, options)
+    return _analysed(source, chosen, known, options)
 
 
-def _known(dataset: xarray.Dataset, given: Mapping[str, Any] | None) -> list[Known]:
+def _analysed(
+    dataset: xarray.Dataset,
+    chosen: Sequence[str],
+    given: Mapping[str, Any] | None,
+    options: Mapping[str, Any],
+) -> DrawnAnalysis:
+    scene, names = _scene(dataset), list[Known]()
+    averaged = is_averaged(dataset.attrs)  # which leaves no rotation
     if given is not None:
-        return [Known(name, value, 0.0, "given") for name, value in given.items()]
+        names = [Known(name, value, 0.0, "given") for name, value in given.items()]
+    elif scene is not None:
+        names = known_frequencies(scene, driven=bool(dataset.attrs.get("python_loads")))
+        names = [k for k in names if not averaged or k.name not in OF_ROTATION]
+    fastest = 0.0 if scene is None or averaged else float(norm(scene.context, scene.angular_velocity))
+    found = analyse_dataset(dataset, chosen, known=names, fastest=fastest, **options)
+    return DrawnAnalysis(**vars(found))
+
+
+def _scene(dataset: xarray.Dataset) -> Scene | None:
     text = dataset.attrs.get("config")
     if not isinstance(text, str):
-        return []
+        return None
     try:
-        scene = build_scene(parse(text, source="the dataset's config"))
+        return build_scene(parse(text, source="the dataset's config"))
     except ConfigError:  # the config is of another version: the numbers are valid all the same
-        return []
-    return known_frequencies(scene, driven=bool(dataset.attrs.get("python_loads")))
+        return None
 
 
 def _attitude_error(run: Run) -> float | None:

@@ -18,6 +18,7 @@ from rigidsim.model.sources import in_body_axes
 from rigidsim.scene.arithmetic import Vector, dot, norm
 from rigidsim.scene.scene import Scene
 
+SYMMETRIC = 1e-12  # relative difference of two moments, below which a body is symmetric
 _SMALL = 1e-5  # relative change of the frequencies of modes by their own amplitude
 _TORQUES = 0.02  # the same by torques
 _NEAR = 0.3  # of the spin, across it, from which a rotation isn't one about an axis
@@ -40,27 +41,61 @@ def modes_of_core(scene: Scene) -> list[Known]:
     if core is None or turning is None:
         return []
     spin, moments = turning
-    pulled = all(isinstance(x, Beside | GradientAlone | FluidCore) for x in loads_of(scene))
+    rates = [dot(axis, scene.angular_velocity) for axis in scene.body.principal_axes]
+    largest = max(range(3), key=lambda i: abs(dot(core.axis, scene.body.principal_axes[i])))
+    change = spin_change(scene, spin, rates, largest, moments, (Beside, FluidCore))
     found = _core_modes(scene, core, spin, moments)
     if found is None:
         return []
     (wobble, fading), (nutation, core_fading) = found
     source = "linearised equations of mantle and core"
-    rough, symmetric = 0.0 if pulled else _TORQUES, abs(moments[0] - moments[1]) <= 1e-12 * moments[2]
+    pulled = all(isinstance(x, Beside | GradientAlone | FluidCore) for x in loads_of(scene))
+    rough, symmetric = 0.0 if pulled else _TORQUES, abs(moments[0] - moments[1]) <= SYMMETRIC * moments[2]
     errors = [float(_SMALL * abs(x) + y) for x, y in ((wobble, fading), (nutation, core_fading))]
-    exact = symmetric and pulled and core.friction == 0
-    where = "body" if exact else ""
+    exact = change is not None and core.friction == 0
+    spinning, error = (0.0, float(change[0] * abs(spin))) if exact and change else (_TORQUES, 0.0)
+    where, turned = "body" if exact else "", "body" if exact and symmetric else ""
     known = [
-        Known("spin", spin, 0.0 if exact else _TORQUES, "initial rate about the principal axis", 0.0, where),
+        Known("spin", spin, spinning, "initial rate about the principal axis", error, turned),
         Known("free_core_nutation", nutation + spin, rough, f"{source}, in space", errors[1]),
     ]
     if not synchronous_modes(scene):
         known.append(Known("wobble", wobble, rough, source, errors[0], where))
         if exact:
             known.append(
-                Known("free_nutation", wobble + spin, rough, f"{source}, in space", errors[0], "space")
+                Known(
+                    "free_nutation", wobble + spin, rough, f"{source}, in space", errors[0] + error, "space"
+                )
             )
     return known
+
+
+def spin_change(
+    scene: Scene, spin: Any, rates: Vector, axis: int, moments: Vector, beside: tuple[type, ...] = ()
+) -> tuple[float, float] | None:
+    """Relative errors of the spin about a principal axis as at the start, and of the torque-free wobble.
+
+    None where other torques than gravity gradients (and loads of types `beside`) act, or where the amplitude
+    of a body without symmetry counts.
+
+    Args:
+        rates: along all principal axes, rad/s; moments: across the axis, and along it.
+    """
+    context = scene.context
+    low, high, polar = moments
+    tides = context.zero
+    for load in loads_of(scene):
+        source = gradient_source_of(load)
+        if source is not None:
+            distance = source.placement.nearest(context)
+            tides += 3 * source.gravitational_parameter / distance**3 / spin**2
+        elif not isinstance(load, beside):
+            return None
+    uneven = float(abs(high - low) / polar)
+    tumbling = float(sum(w**2 for k, w in enumerate(rates) if k != axis) / spin**2)
+    if uneven > SYMMETRIC and tumbling > _SMALL:
+        return None
+    return uneven * (tumbling + float(tides)), _SMALL + float(tides)
 
 
 def _turning(scene: Scene, axis: Vector) -> tuple[Any, Vector] | None:

@@ -9,7 +9,7 @@ from typing import Any
 import mpmath
 
 from rigidsim.analysis.labels import Known
-from rigidsim.model.capabilities import Beside, GradientAlone, gradient_source_of, orbit_of
+from rigidsim.model.capabilities import Beside, gradient_source_of, orbit_of
 from rigidsim.model.carriers import carried_beside
 from rigidsim.model.load import loads_of
 from rigidsim.model.loads.elasticity import Elasticity
@@ -20,11 +20,12 @@ from rigidsim.scene.scene import Scene
 from rigidsim.solve.closed_form import find_closed_form
 from rigidsim.solve.closed_form.free import AsymmetricFree, SymmetricFree
 from rigidsim.solve.closed_form.heavy import HeavyTop
-from rigidsim.workflows.free_modes import modes_of_core, synchronous_modes
+from rigidsim.workflows.free_modes import SYMMETRIC, modes_of_core, spin_change, synchronous_modes
 
 _LIBRATION = 0.08  # relative amount by which a libration of finite amplitude may be slower than a small one
 _SPIN = 0.02  # relative amount by which torques may change spin and wobble
-_WOBBLE = 1e-5  # the same for the wobble of a symmetric body
+OF_ROTATION = ("spin", "wobble", "free_nutation", "free_core_nutation")
+"""Frequencies of the rotation, which an averaged motion lacks."""
 _CENTURY = 36525 * 86400
 _DELAUNAY = {
     "l": "1717915923.2178",
@@ -180,20 +181,19 @@ def _of_spin(scene: Scene) -> list[Known]:
         a, b, c = moments[across[0]], moments[across[1]], moments[axis]
         if abs(third) <= 3 * context.hypot(rates[across[0]], rates[across[1]]):
             continue
-        # gravity gradients leave a symmetric body its axial rate, and hardly change its wobble
-        pulled = all(isinstance(load, GradientAlone) for load in loads_of(scene))
-        symmetric = abs(a - b) <= 1e-12 * c and pulled
+        symmetric = abs(a - b) <= SYMMETRIC * c
+        change = spin_change(scene, third, rates, axis, [a, b, c])
         source = "initial rate about the principal axis"
-        body = "body" if symmetric else ""
-        found = [Known("spin", abs(third), 0.0 if symmetric else _SPIN, source, 0.0, body)]
+        rough, errors = (_SPIN, (0.0, 0.0)) if change is None else (0.0, change)
+        where = "body" if symmetric and change is not None else ""
+        found = [Known("spin", abs(third), rough, source, float(errors[0] * abs(third)), where)]
         if a > 0 and b > 0 and (c - a) * (c - b) > 0:
             wobble = abs(third) * context.sqrt((c - a) * (c - b) / (a * b))
-            source = "free nutation: w sqrt((C-A)(C-B)/(A B))"
-            rough, error = (0.0, float(_WOBBLE * wobble)) if symmetric else (_SPIN, 0.0)
-            found.append(Known("wobble", wobble, rough, source, error, body))
-            if symmetric:
-                total = abs(third) * c / a
-                source = "free nutation in space: w C / A"
-                found.append(Known("free_nutation", total, 0.0, source, error, "space"))
+            source, error = "free nutation: w sqrt((C-A)(C-B)/(A B))", float(errors[1] * wobble)
+            found.append(Known("wobble", wobble, rough, source, error, "" if change is None else "body"))
+            if change is not None:  # its counterpart, nearly as fast as the spin
+                total = abs(third) + (wobble if c > a else -wobble)
+                source = "free nutation in space: the spin with the wobble"
+                found.append(Known("free_nutation", total, 0.0, source, error + found[0].error, "space"))
         return found
     return []

@@ -16,13 +16,13 @@ import rigidsim
 from rigidsim.accuracy.estimates.estimate import estimate_errors
 from rigidsim.accuracy.setting import Setting
 from rigidsim.accuracy.trial import try_setting
+from rigidsim.scene.parts_of_values import parts_in
 from rigidsim.solve.assembly import assemble, sampler
 from rigidsim.solve.effects.waypoints import Waypoints
 from rigidsim.solve.problem import prepare
 from rigidsim.solve.sample_block import SampleBlock
 from rigidsim.solve.sampler import SampleReceiver
 from rigidsim.solve.shadow import carriers
-from rigidsim.store.variables import parts_in
 
 COVERED = 3.0  # the campaign's measure (experiments/error_coverage.py): true at most 3 times the announced
 HONEST = 100.0  # and no scene of these is announced a hundred times as wrong as it is

@@ -16,7 +16,7 @@ from rigidsim.look.plots import plan_plots
 from rigidsim.look.thinning import thin
 from rigidsim.look.timeline import write_timeline
 from rigidsim.look.timeline.writing import CHUNK
-from rigidsim.store.variables import parts_in
+from rigidsim.scene.parts_of_values import parts_in
 
 Build = Callable[..., xarray.Dataset]
 Read = Callable[[Path, str], dict[str, np.ndarray]]

@@ -10,8 +10,8 @@ from support import cases, config, run_text
 
 import rigidsim
 from rigidsim import ConfigError
+from rigidsim.scene.parts_of_values import parts_in
 from rigidsim.solve.problem import prepare
-from rigidsim.store.variables import parts_in
 
 NAMES = 'record = ["quaternion", "angular_velocity", "obliquity", "node_longitude", "right_ascension"]'
 PRECESSING = "angular_momentum = [0, 0, 2]\neuler_angles = [0.3, 1.1, 0.2]"

@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 
 import rigidsim
 from rigidsim import ConfigError
+from rigidsim.scene.parts_of_values import parts_in
 from rigidsim.scene.scene import build_scene
-from rigidsim.store.variables import parts_in
 from tests.support import cases, run_text
 
 DIGITS = 50

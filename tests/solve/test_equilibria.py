@@ -10,8 +10,8 @@ from scipy.integrate import solve_ivp
 
 import rigidsim
 from rigidsim import ConfigError
+from rigidsim.scene.parts_of_values import parts_in
 from rigidsim.scene.scene import Scene, build_scene
-from rigidsim.store.variables import parts_in
 from tests.support import run_text
 
 YEAR = 31557600.0

@@ -17,7 +17,7 @@ from support import angle_between, cases, config, law, run_text
 
 from rigidsim.scene import attitude
 from rigidsim.scene.fields import EULER_SEQUENCES
-from rigidsim.store.variables import parts_in
+from rigidsim.scene.parts_of_values import parts_in
 
 FAULT = Path(__file__).parents[1] / "data" / "faults" / "euler_singular.toml"
 RECORD = 'record = ["euler_angles", "quaternion"]'

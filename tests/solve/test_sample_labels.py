@@ -16,8 +16,8 @@ from support import run_text
 
 import rigidsim
 from rigidsim import ConfigError
+from rigidsim.scene.parts_of_values import parts_in
 from rigidsim.solve.problem import prepare
-from rigidsim.store.variables import parts_in
 
 SPIN = """
 name = "spin"

@@ -177,4 +177,4 @@ def _label(line: SpectralLine) -> Text:
         return Text(f"{line.label.text}? or {others}: ambiguous", style="yellow")
     if line.unfolded:
         return Text(f"{line.label.text} (beyond Nyquist, unfolded)")
-    return Text(line.label.text or "-")
+    return Text(line.label.text or ("- (or an alias)" if line.can_be_alias else "-"))

@@ -4,7 +4,7 @@ import numpy as np
 import xarray
 from matplotlib.axes import Axes
 
-from rigidsim.look import fits, signals
+from rigidsim.look import fits, signals, surroundings
 from rigidsim.look.figures import eye as eyes
 from rigidsim.look.figures import style, timelines
 from rigidsim.look.figures.panel import angle_scale, angle_text, panel, recorded
@@ -18,10 +18,12 @@ _SMALL = 0.05  # rad: sines of smaller angles read as angles
 _FAR = 0.5  # rad from its mean motion, up to which a pole's path is as on a plane to a tenth
 
 
-def path_about(axes: Axes, path: Array, across: str, up: str, *, center: bool = True) -> None:
+def path_about(
+    axes: Axes, path: Array, across: str, up: str, *, center: bool = True, sparse: bool = False
+) -> None:
     """Draw a path (rows, 2) with equal scales, its labels, and a cross at the origin as its center."""
     x, y = path.T
-    style.trace(axes, x, y)
+    style.trace(axes, x, y, sparse=sparse)
     if center:
         axes.plot(0, 0, "+", color=INK, ms=10, mew=1.3)
         x, y = np.append(x, 0), np.append(y, 0)
@@ -33,25 +35,42 @@ def path_about(axes: Axes, path: Array, across: str, up: str, *, center: bool = 
 def polar_motion(axes: Axes, dataset: xarray.Dataset, plane: Array) -> None:
     """The spin axis seen from the figure axis, m1 to the right and m2 up, and its period."""
     scale, unit = angle_scale(plane)
-    path_about(axes, plane / scale, f"$m_1$ [{unit}]", f"$m_2$ [{unit}]")
-    rate = fits.circulation(signals.seconds(dataset), plane)
+    sparse = signals.aliased(dataset, _wobbling(dataset))
+    path_about(axes, plane / scale, f"$m_1$ [{unit}]", f"$m_2$ [{unit}]", sparse=sparse)
+    mean = None if sparse else fits.circulation(signals.seconds(dataset), plane)
     radius = np.hypot(*plane.T)
     least, most = float(np.nanmin(radius)), float(np.nanmax(radius))
     size = angle_text(float(np.nanmean(radius)))
     if not most - least < 1e-3 * most:
         size = f"{angle_text(least, like=most)} to {angle_text(most)}"
     title = "Polar motion (+: figure axis)"
-    if rate is None:
+    if mean is None:
         key(axes, f"{title}, {size}")
         return
-    period = span_text(_TURN / abs(rate), 5)
-    way = "counterclockwise" if rate > 0 else "clockwise"
+    period = mean.about + span_text(_TURN / abs(mean.rate), 5)
+    way = "counterclockwise" if mean.rate > 0 else "clockwise"
     if least > 0.55 * most:
         style.note(axes, 0.5, 0.62, f"{period}\n{way}", fontsize=11.5, fontweight="bold")
         style.note(axes, 0.5, 0.40, f"radius {size}", color=style.GREY)
         style.titled(axes, title)
     else:
         key(axes, f"{title}: once round in {period}, {way}")
+
+
+def _wobbling(dataset: xarray.Dataset) -> float:
+    """Rate of the free wobble over that of the spin, about the axis of largest or least moment."""
+    found = signals.moments(dataset)
+    if found is None:
+        return 0.0
+    low, middle, high = np.sort(found)
+    return float(
+        np.sqrt(
+            max(
+                (high - low) * (high - middle) / (low * middle),
+                (high - low) * (middle - low) / (high * middle),
+            )
+        )
+    )
 
 
 def pole_paths(dataset: xarray.Dataset) -> tuple[dict[str, Array], str, str] | None:
@@ -93,10 +112,11 @@ def pole_path(axes: Axes, dataset: xarray.Dataset, found: tuple[dict[str, Array]
     """
     shown, center, title = found
     scale, unit = angle_scale(np.concatenate([path.ravel() for path in shown.values()]))
+    sparse = center == "momentum" and signals.aliased(dataset)
     for name, path in shown.items():
         x, y = (path / scale).T
         if name == "figure" or len(shown) == 1:
-            style.trace(axes, x, y)
+            style.trace(axes, x, y, sparse=sparse)
         else:
             color = timelines.AXIS_COLORS[name]
             curve(
@@ -104,6 +124,7 @@ def pole_path(axes: Axes, dataset: xarray.Dataset, found: tuple[dict[str, Array]
                 x,
                 y,
                 in_plane=True,
+                sparse=sparse,
                 color=color,
                 lw=0.7,
                 alpha=0.6,
@@ -119,9 +140,10 @@ def pole_path(axes: Axes, dataset: xarray.Dataset, found: tuple[dict[str, Array]
     square(axes, *points.T)
     words = ("across the momentum",) * 2 if center == "momentum" else ("along X", "along Y")
     axes.set(xlabel=f"{words[0]} [{unit}]", ylabel=f"{words[1]} [{unit}]")
-    rate = fits.circulation(signals.seconds(dataset), next(iter(shown.values())))
-    if rate is not None:
-        title += f", once round in {span_text(_TURN / abs(rate), 4)}"
+    first = next(iter(shown.values()))
+    mean = None if sparse else fits.circulation(signals.seconds(dataset), first)
+    if mean is not None:
+        title += f", once round in {mean.about}{span_text(_TURN / abs(mean.rate), 4)}"
     key(axes, title)
 
 
@@ -158,10 +180,11 @@ def precesses(dataset: xarray.Dataset) -> bool:
     return timelines.orientations(dataset) is not None and signals.steady_momentum(dataset) is None
 
 
-def nutation_path(dataset: xarray.Dataset) -> Array | None:
-    """A precessing figure axis, else the momentum, less its mean motion (rows, 2), rad, if that stays small.
+def nutation_path(dataset: xarray.Dataset) -> tuple[Array, fits.Ellipse | None] | None:
+    """A precessing figure axis, else the momentum, less its mean motion (rows, 2), rad, if that stays small,
+    and its strongest part.
 
-    Longitude of the node, less a straight line, times sin of the mean obliquity; obliquity less its mean.
+    Longitude of the node, less its secular part, times sin of the mean obliquity; obliquity less its mean.
     """
     if not precesses(dataset):
         return None
@@ -170,20 +193,22 @@ def nutation_path(dataset: xarray.Dataset) -> Array | None:
         return None
     tilt, node = found
     seconds = signals.seconds(dataset)
-    mean = fits.secular(seconds, tilt, level=True).at_start
+    mean = fits.secular(seconds, tilt).value
     across = (node - fits.secular(seconds, node).at(seconds)) * np.sin(mean)
     path = np.stack([across, tilt - mean], axis=1)
-    return path if np.nanmax(np.hypot(*path.T)) < _FAR else None
+    if not np.nanmax(np.hypot(*path.T)) < _FAR:
+        return None
+    return path, fits.leading_ellipse(seconds, node, tilt, float(np.sin(mean)))
 
 
 @panel(nutation_path)
-def nutation(axes: Axes, dataset: xarray.Dataset, plane: Array) -> None:
+def nutation(axes: Axes, dataset: xarray.Dataset, found: tuple[Array, fits.Ellipse | None]) -> None:
     """Motion of the pole about its mean motion: longitude times sin(obliquity) across, obliquity up."""
+    plane, ellipse = found
     scale, unit = angle_scale(plane)
     labels = f"Δlongitude · sin(obliquity) [{unit}]", f"Δobliquity [{unit}]"
     path_about(axes, plane / scale, *labels, center=False)
     title = "Nutation: the pole about its mean motion"
-    ellipse = fits.leading_ellipse(signals.seconds(dataset), plane)
     if ellipse is None:
         style.titled(axes, title)
         return
@@ -230,7 +255,8 @@ _FLAT = 1e-3  # of a path's reach: it lies in a plane up to this thickness
 def path(axes: Axes, dataset: xarray.Dataset, position: Array) -> None:
     """The path of the centre of mass; the start is marked."""
     scale, unit = si_scale(position - position[0], "m")
-    if "uniform_gravity" in signals.load_kinds(dataset):
+    attractors = surroundings.told(dataset, "attractor")
+    if surroundings.gravity(dataset) is not None and not attractors:
         _thrown(axes, dataset, position, scale, unit)
         return
     finite = position[np.isfinite(position).all(axis=1)]
@@ -247,7 +273,7 @@ def path(axes: Axes, dataset: xarray.Dataset, position: Array) -> None:
     axes.plot(x[0], y[0], "o", color=Z, ms=4.5)
     title = "Path in its plane"
     size = float(np.hypot(x - x.mean(), y - y.mean()).max())
-    if np.hypot(x, y).min() < 3 * size and "central_gravity" in signals.load_kinds(dataset):
+    if np.hypot(x, y).min() < 3 * size and any(not any(one["position"]) for one in attractors):
         axes.plot(0, 0, "+", color=INK, ms=10, mew=1.3)
         x, y = np.append(x, 0), np.append(y, 0)
         title += " (+: origin)"

@@ -135,28 +135,32 @@ def _room(axes: Axes) -> float:
     return float(axes.get_position().width * axes.figure.bbox.width / axes.figure.dpi * 72.0 * 1.1)
 
 
-def curve(axes: Axes, x: Array, y: Array, *, in_plane: bool = False, **style: Any) -> None:
-    """Draw a curve over time, or in a plane; if the samples aren't dense enough, its samples as points.
+def curve(
+    axes: Axes, x: Array, y: Array, *, in_plane: bool = False, sparse: bool = False, **style: Any
+) -> None:
+    """Draw a curve over time, or in a plane; if the samples aren't dense enough, or are known to be `sparse`,
+    its samples as points.
 
     Long ones are drawn as pixels in an SVG, which otherwise would weigh megabytes.
     """
     style.setdefault("rasterized", len(x) > MOST_VECTOR_POINTS)
-    whole = joined(np.stack([x, y], axis=1)) if in_plane else joined(y, _OVER_TIME)
+    whole = not sparse and (joined(np.stack([x, y], axis=1)) if in_plane else joined(y, _OVER_TIME))
     if not whole:
         size = float(np.clip(9000 / max(len(x), 1), 2.0, 4.0))
         style |= {"linestyle": "none", "marker": ".", "markersize": size, "markeredgewidth": 0.0}
     axes.plot(x, y, **style)
 
 
-def trace(axes: Axes, x: Array, y: Array) -> None:
-    """Draw a path in a plane: of many turns about the origin the first stand out, otherwise coloured by time.
+def trace(axes: Axes, x: Array, y: Array, *, sparse: bool = False) -> None:
+    """Draw a path in a plane: of many turns about the origin the first stand out, otherwise coloured by time;
+    of samples that aren't dense enough, or are known to be `sparse`, the points.
 
     The start is marked. All that stands out has a label.
     """
     points = np.stack([x, y], axis=1)
     many = len(x) > MOST_VECTOR_POINTS
     axes.plot(x[0], y[0], "o", color=START, ms=4.5, zorder=5, lw=0, label="start")
-    if not joined(points):
+    if sparse or not joined(points):
         size = float(np.clip(9000 / max(len(x), 1), 1.2, 12.0))
         hues = np.linspace(0.0, 0.86, len(x))
         axes.scatter(x, y, c=hues, cmap="plasma", vmin=0, vmax=1, s=size, lw=0, rasterized=many)

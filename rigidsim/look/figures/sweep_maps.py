@@ -31,6 +31,7 @@ _ALWAYS = (
 _BESIDE = ("failed_member", "failed_reason")
 _LAST = ("_drift_largest", "_drift_final", "_time", "_times", "_count")
 _SECTION = "_occurrence"  # dimension of the points of a section
+_NO_RESULT = 30  # rank from which on nothing is a result
 _MOST_LINES = 16
 _FIRST = "_first"
 _FEW = 6  # values of a second axis up to which each has a line, and there is no map
@@ -55,9 +56,11 @@ def drawable(dataset: xarray.Dataset) -> list[str]:
 
 
 def default_of(dataset: xarray.Dataset) -> str:
-    """What a sweep's figure shows where nothing is named: the first that tells its members apart."""
-    names = drawable(dataset)
-    return next((name for name in names if not tells_nothing(dataset, name)), names[0])
+    """What a sweep's figure shows where nothing is named: the first result that tells its members apart, no
+    conserved quantity and no rounding; the members' status where nothing does.
+    """
+    results = (name for name in drawable(dataset) if _rank(dataset, name) < _NO_RESULT)
+    return next((name for name in results if not tells_nothing(dataset, name)), "status")
 
 
 def _rank(dataset: xarray.Dataset, name: str) -> int:
@@ -66,7 +69,10 @@ def _rank(dataset: xarray.Dataset, name: str) -> int:
     if name.endswith(_FIRST) and name.removesuffix(_FIRST) + "_count" in dataset:
         return 5  # when an event happened: nobody asks for one who wants something else
     if name in _ALWAYS:
-        return 30 + _ALWAYS.index(name)
+        return _NO_RESULT + _ALWAYS.index(name)
+    conserved = {str(v.attrs["drift_of"]) for v in dataset.data_vars.values() if "drift_of" in v.attrs}
+    if "drift_of" in dataset[name].attrs or any(name.startswith(f"{one}_") for one in conserved):
+        return _NO_RESULT + len(_ALWAYS)
     if any(str(dim).endswith(_SECTION) for dim in dataset[name].dims):
         return 12
     told = str(dataset[name].attrs.get("long_name", ""))

@@ -36,12 +36,18 @@ def time_axis(axes: Axes, dataset: xarray.Dataset, *, labelled: bool, begins: fl
 
 
 def lines(
-    axes: Axes, dataset: xarray.Dataset, table: Array, labels: Sequence[str | None], hues: Sequence[str]
+    axes: Axes,
+    dataset: xarray.Dataset,
+    table: Array,
+    labels: Sequence[str | None],
+    hues: Sequence[str],
+    *,
+    sparse: bool = False,
 ) -> None:
-    """Curves of the columns of `table` (rows, n) over time."""
+    """Curves of the columns of `table` (rows, n) over time; points if they are `sparse`."""
     time = clock(dataset)[0]
     for column, label, hue in zip(table.T, labels, hues, strict=False):
-        curve(axes, time, column, color=hue, label=label)
+        curve(axes, time, column, sparse=sparse, color=hue, label=label)
 
 
 def angles_over_time(
@@ -87,8 +93,9 @@ def attitude(axes: Axes, dataset: xarray.Dataset, _: Array) -> None:
     if angles is None:
         table = signals.body_direction(dataset, np.array([0.0, 0.0, 1.0]))
         assert table is not None
-        lines(axes, dataset, table, ["$z_X$", "$z_Y$", "$z_Z$"], (X, Y, Z))
-        key(axes, "Direction of the body's z axis in space")
+        sparse = signals.aliased(dataset)
+        lines(axes, dataset, table, ["$z_X$", "$z_Y$", "$z_Z$"], (X, Y, Z), sparse=sparse)
+        key(axes, "Direction of the body's z axis in space" + (", samples" if sparse else ""))
         axes.set_ylabel("direction cosine")
         axes.set_ylim(-1.08, 1.08)
         return
@@ -171,7 +178,7 @@ def obliquity(axes: Axes, dataset: xarray.Dataset, shown: dict[str, tuple[Array,
     table = np.stack([pair[0] for pair in shown.values()], axis=1)
     title, word = "Obliquity", "obliquity"
     if not _legible(table):
-        mean = secular(signals.seconds(dataset), table[:, 0], level=True).at_start
+        mean = secular(signals.seconds(dataset), table[:, 0]).value
         table = table - mean
         title, word = f"Obliquity less its mean, {angle_text(mean, 7)}", "obliquity − mean"
     _of_axes(axes, dataset, shown, table, title, word)
@@ -191,7 +198,7 @@ def longitude(axes: Axes, dataset: xarray.Dataset, shown: dict[str, tuple[Array,
         return
     # precession is told by the year, whatever the axis of time is in
     per = unit if abs(trend.rate) * DAY > _QUICK else named_unit("yr")
-    rate = angle_text(trend.rate * per.seconds, 3)
+    rate = trend.about + angle_text(trend.rate * per.seconds, 3)
     title = f"Longitude of the node less its mean motion, {rate}/{per.symbol}"
     _of_axes(axes, dataset, shown, rest, title, "longitude − line")
 
@@ -267,7 +274,7 @@ def _one_angle(axes: Axes, dataset: xarray.Dataset, angle: Array, title: str, wo
         rest = angle - trend.at(seconds)
         if np.nanmax(np.abs(rest)) > _STILL * span:
             angle, word = rest, f"{word} − line"
-            title += f" less its mean motion, {turning(trend.rate)}"
+            title += f" less its mean motion, {trend.about}{turning(trend.rate)}"
         else:  # what is left of it is rounding
             title += f": uniform, {turning(trend.rate)}"
     angles_over_time(axes, dataset, angle[:, None], title, hues=(hue,), word=word)

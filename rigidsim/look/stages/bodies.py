@@ -161,19 +161,9 @@ def vectors_of(
 
 
 def source_arrows(dataset: xarray.Dataset, subject: Subject, length: float) -> list[Arrow]:
-    """Directions in space to attracting bodies: from orbits, recorded point masses, or the recorded nadir.
-
-    Of sources those are left out whose tide is below a thousandth of the strongest one's.
-    """
+    """Directions in space to attracting bodies: from orbits, recorded point masses, or the recorded nadir."""
     arrows = []
-    sources, strength = list(_sources(dataset, subject)), {}
-    for key, one in zip(
-        (f"source{k}" for k in range(99)), surroundings.told(dataset, "source"), strict=False
-    ):
-        strength[key] = float(one.get("gravitational_parameter") or 0.0)
-    tides = [strength[key] / float(np.nanmean(signals.norms(path) ** 3)) for key, _, _, path in sources]
-    seen = [one for one, tide in zip(sources, tides, strict=True) if tide >= _WEAK * max(tides)]
-    for key, body, name, path in [*_masses(dataset), *seen]:
+    for key, body, name, path in [*_masses(dataset), *_sources(dataset, subject)]:
         way = length * path / np.linalg.norm(path, axis=1, keepdims=True)
         called, color = surroundings.called(body, name), surroundings.color_of(body, parts.SOURCE)
         arrows.append(Arrow(key, f"to {called}", color, way, False, f"direction of {called}"))
@@ -185,6 +175,8 @@ _Towards = Iterator[tuple[str, KnownBody | None, str, Array]]
 
 
 def _sources(dataset: xarray.Dataset, subject: Subject) -> _Towards:
+    """Sources of torque, without those whose tide is below a thousandth of the strongest tide."""
+    found = []
     listed = surroundings.told(dataset, "source")
     nadir = column(dataset, "nadir", 3)
     for number, one in enumerate(listed):
@@ -193,7 +185,12 @@ def _sources(dataset: xarray.Dataset, subject: Subject) -> _Towards:
             path = np.einsum("tij,tj->ti", subject.attitude, nadir)
         if path is not None:
             name = str(one.get("ephemeris", one.get("kernel", "source")))
-            yield f"source{number}", surroundings.body_of(one), name, path
+            tide = float(one.get("gravitational_parameter") or 0.0) / float(
+                np.nanmean(signals.norms(path) ** 3)
+            )
+            found.append((tide, (f"source{number}", surroundings.body_of(one), name, path)))
+    strongest = max((tide for tide, _ in found), default=0.0)
+    yield from (entry for tide, entry in found if tide >= _WEAK * strongest)
 
 
 def _masses(dataset: xarray.Dataset) -> _Towards:

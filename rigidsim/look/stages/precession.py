@@ -10,6 +10,7 @@ import numpy as np
 import xarray
 
 from rigidsim.look import signals, surroundings
+from rigidsim.look.fits import secular
 from rigidsim.look.signals import is_averaged
 from rigidsim.look.stages import parts
 from rigidsim.look.stages.bodies import Subject, direction_of, eye_at, source_arrows
@@ -177,15 +178,14 @@ def circle_of_precession(
     found = signals.orientation(dataset, axis)
     seconds = signals.seconds(dataset)
     if found is not None and len(seconds) > 8:
-        elapsed = seconds - seconds[0]
-        rate, start = np.polyfit(elapsed, found[1], 1)
-        advance = abs(rate) * elapsed[-1]
-        if float(np.abs(found[1] - start - rate * elapsed).max()) > max(advance, 1e-6):
+        mean, span = secular(seconds, found[1]), abs(float(seconds[-1] - seconds[0]))
+        advance = abs(mean.rate) * span
+        if float(np.abs(found[1] - mean.at(seconds)).max()) > max(advance, 1e-6):
             return  # it strays as far as it advances: it goes about another pole
-        if advance > 1e-9 and _whole_revolution(dataset, float(elapsed[-1])):
-            words += f": once in {span_text(2 * np.pi / abs(rate), 3)}"
+        if advance > 1e-9 and _whole_revolution(dataset, span):
+            words += f": once in {mean.about}{span_text(2 * np.pi / abs(mean.rate), 3)}"
             which = "pole" if axis == "figure" else axis
-            notes.append(f"the {which}'s longitude moves by {rate:.6g} rad/s on the mean (straight line)")
+            notes.append(f"the {which}'s longitude moves by {mean.about}{mean.rate:.6g} rad/s on the mean")
     stage.lines.append(Line("precession", PRECESSION, ring, stage.looked_from, 2.0, 1.0, words))
 
 
@@ -207,7 +207,7 @@ def nutation_planes(dataset: xarray.Dataset, axis: str) -> list[Plane]:
     if found is None or not np.isfinite(found).all() or len(found[0]) <= 8:
         return []
     seconds = signals.seconds(dataset)
-    tilt, node = (x - np.polyval(np.polyfit(seconds, x, 1), seconds) for x in found)
+    tilt, node = (x - secular(seconds, x).at(seconds) for x in found)
     path = np.stack([node * np.sin(np.mean(found[0])), tilt], axis=1)
     if not np.abs(path).max() > 0:
         return []

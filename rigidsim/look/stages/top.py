@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import xarray
 
-from rigidsim.look import signals, surroundings
+from rigidsim.look import signals
 from rigidsim.look.solids import Mesh
 from rigidsim.look.stages import parts
 from rigidsim.look.stages.bodies import FIELD, Subject, vectors_of
@@ -18,13 +18,10 @@ _SYMMETRIC = 1e-9  # of the moments
 
 def picture(dataset: xarray.Dataset, subject: Subject) -> Picture | None:
     """Picture of a body on a fixed point off its centre of mass under uniform gravity; None for others."""
-    pull = surroundings.gravity(dataset)
-    arm = signals.attribute(dataset, "center_of_mass")
-    if pull is None or subject.position is not None or subject.quaternion is None:
+    arm = signals.lever(dataset)
+    if arm is None or subject.quaternion is None:
         return None
-    if arm is None or not np.linalg.norm(arm) > 0:
-        return None
-    up = -pull / np.linalg.norm(pull)
+    up = signals.vertical(dataset)
     axis = _figure(dataset, arm)
     symbol = _symbol(dataset, subject, arm, axis)
     if symbol is not None:

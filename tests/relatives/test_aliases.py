@@ -1,0 +1,94 @@
+"""Lines of motions faster than the samples: labelled where the motion is known, marked where it can't be.
+
+The truth: a frequency w seen every T seconds appears at |w - 2 pi k / T|, k being the nearest whole number;
+and a planet that turns at W about its axis of largest moment C nutates freely at W sqrt((C-A)(C-B)/(A B)) in
+the body and, W faster, in space.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import xarray
+from support import run_text, seeds
+
+import rigidsim
+
+
+def seen_at(frequency: float, spacing: float) -> float:
+    turn = 2 * np.pi / spacing
+    return float(abs(frequency - turn * np.round(frequency / turn)))
+
+
+@pytest.mark.parametrize("seed", seeds(5, 60))
+def test_lines_of_random_samplings(seed: int) -> None:
+    """A slow and a fast known line, and an unknown one, sampled at random: only the last can be an alias."""
+    rng = np.random.default_rng(seed)
+    spacing, count = 10 ** rng.uniform(-2, 4), int(rng.integers(400, 900))
+    nyquist, step = np.pi / spacing, 2 * np.pi / (spacing * count)
+    while True:
+        slow, unknown = nyquist * rng.uniform(0.05, 0.9, 2)
+        fast = nyquist * rng.uniform(1.1, 30)
+        seen = [slow, seen_at(fast, spacing), seen_at(unknown, spacing), 0.0, nyquist]
+        if np.diff(np.sort(seen)).min() > 12 * step:
+            break
+    time = np.arange(count) * spacing
+    sizes, phases = 10 ** rng.uniform(-3, 0, 3), rng.uniform(-3, 3, 3)
+    parts = [a * np.cos(w * time + p) for a, w, p in zip(sizes, (slow, fast, unknown), phases, strict=True)]
+    dataset = xarray.Dataset({"obliquity": ("time", sum(parts), {"units": "rad"})}, {"time": time})
+    lines = rigidsim.analyse(dataset, known={"slow": slow, "fast": fast}, lines=3).signals[0].lines
+    found = {line.label.text: line for line in lines}
+    assert set(found) == {"slow", "fast", ""}
+    assert float(found["fast"].frequency) == pytest.approx(fast, rel=1e-9)
+    assert float(found["fast"].observed) == pytest.approx(seen[1], rel=1e-9)
+    assert float(found[""].frequency) == pytest.approx(unknown, rel=1e-9)
+    assert [found[name].can_be_alias for name in ("slow", "fast", "")] == [False, False, True]
+    # of motions that the samples resolve, no line can be one
+    resolved = rigidsim.analyse(dataset, known={"slow": slow / 4}, lines=3).signals[0].lines
+    assert not any(line.can_be_alias for line in resolved) or slow / 2 > nyquist
+
+
+PLANET = """
+name = "planet"
+[body]
+principal_moments = [{a}, {b}, 1]
+[initial]
+euler_angles = [0, "{tilt} deg", 0]
+angular_velocity = [0, 0, {spin}]
+[[loads]]
+kind = "gravity_gradient"
+gravitational_parameter = 1.32712440018e20
+orbit = {{semi_major_axis = "{distance} au", eccentricity = {eccentricity}}}
+[time]
+end = "{end} day"
+every = "{every} day"
+[output]
+record = ["obliquity", "node_longitude"]
+estimate = false
+"""
+
+
+@pytest.mark.parametrize("seed", seeds(3, 50))
+def test_the_free_nutation_of_random_planets(seed: int) -> None:
+    """Sampled every few days, it is labelled and unfolded."""
+    rng = np.random.default_rng([1, seed])
+    flat, uneven = 10 ** rng.uniform(-2.4, -1.8), 10 ** rng.uniform(-4, -3)
+    a, b = 1 - flat - uneven, 1 - flat
+    spin = 2 * np.pi / (86400 * rng.uniform(0.5, 1.5))
+    wobble = spin * np.sqrt((1 - a) * (1 - b) / (a * b))
+    every = rng.uniform(3, 9)
+    while not 0.1 < seen_at(spin + wobble, 86400 * every) * 86400 * every / np.pi < 0.9:
+        every = rng.uniform(3, 9)
+    values = {"tilt": rng.uniform(10, 40), "distance": rng.uniform(0.5, 1.0)}
+    values["eccentricity"] = rng.uniform(0, 0.1)
+    text = PLANET.format(a=a, b=b, spin=spin, every=every, end=every * 200, **values)
+    analysis = rigidsim.analyse(run_text(text), "obliquity.figure")
+    lines = {line.label.text: line for line in analysis.signals[0].lines}
+    nutation = lines["free_nutation"]
+    assert nutation.unfolded
+    assert not nutation.can_be_alias
+    # torque changes the wobble by some times what its stiffness, 3 G M / r^3, is of the spin's square
+    nearest = values["distance"] * 1.495978707e11 * (1 - values["eccentricity"])
+    softened = 3 * 1.32712440018e20 / nearest**3 / spin**2
+    assert float(nutation.frequency) - spin == pytest.approx(wobble, rel=1e-5 + 3 * softened)
+    assert all(line.can_be_alias == (not line.label.text) for line in lines.values())

@@ -1,0 +1,98 @@
+"""Gravity in any units, as expressions and of several fields: figures and timelines have its own vertical.
+
+The truth: a table of units by hand, and numpy. A body held at its centre of mass is no top, since gravity has
+no torque on it; one with a position flies.
+"""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+from support import run_text, seeds
+
+from rigidsim.look import signals
+from rigidsim.look.figures.catalogue import available
+from rigidsim.look.stages.registry import build_picture
+
+UNITS = {"m/s^2": 1.0, "cm/s^2": 0.01, "km/s^2": 1000.0, "mm/s^2": 0.001, "": 1.0}
+TEXT = """
+name = "held"
+[body]
+principal_moments = [1, 1, 0.5]
+mass = 2
+center_of_mass = {arm}
+[initial]
+{start}
+angular_velocity = [0.1, 0, 5]
+{loads}
+[time]
+end = 0.5
+samples = 11
+[output]
+record = ["quaternion", "angular_velocity"{more}]
+estimate = false
+timeline = false
+"""
+
+
+def component(rng: np.random.Generator) -> tuple[str, float]:
+    """A number as people write it, and its value in m/s^2."""
+    unit = list(UNITS)[rng.integers(len(UNITS))]
+    size = float(f"{rng.uniform(-9, 9) / UNITS[unit]:.4g}")
+    kind = rng.integers(3)
+    if kind == 0:
+        return f'"{size!r} {unit}"', size * UNITS[unit]
+    if kind == 1:
+        return '"pi"', np.pi
+    return f'"{size!r}*pi/3 {unit}"', size * np.pi / 3 * UNITS[unit]
+
+
+@pytest.mark.parametrize("seed", seeds(5, 60))
+def test_random_fields(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    fields = [[component(rng) for _ in range(3)] for _ in range(rng.integers(1, 3))]
+    loads = "".join(
+        f'[[loads]]\nkind = "uniform_gravity"\nacceleration = [{", ".join(text for text, _ in field)}]\n'
+        for field in fields
+    )
+    pull = np.sum([[value for _, value in field] for field in fields], axis=0)
+    kind = ("top", "balanced", "flight")[rng.integers(3)]
+    arm = "[0, 0, 0.3]" if kind == "top" else "[0, 0, 0]"
+    start, more = "", ""
+    if kind == "flight":
+        start, more = "position = [0, 0, 0]\nvelocity = [3, 0, 4]", ', "position"'
+    dataset = run_text(TEXT.format(arm=arm, start=start, loads=loads, more=more)).dataset
+    up = -pull / np.linalg.norm(pull)
+    assert signals.vertical(dataset) == pytest.approx(up, abs=1e-12)
+    assert ("tip" in available(dataset)) == (kind == "top")
+    picture = build_picture(dataset)[0]
+    drawn = [vector for stage in picture.stages for vector in stage.vectors if vector.name == "gravity"]
+    titles = {"top": "top on a fixed point", "flight": "flight in a uniform gravity"}
+    assert (picture.kind == titles.get(kind)) == (kind != "balanced")
+    assert len(drawn) == (kind != "balanced")
+    for vector in drawn:
+        way = vector.along / np.linalg.norm(vector.along)
+        assert way == pytest.approx(-up, abs=1e-9)
+
+
+@pytest.mark.parametrize("seed", seeds(2, 50))
+def test_many_sources(seed: int) -> None:
+    """Of up to 300 sources all are drawn whose tide is a thousandth of the strongest one's or more."""
+    rng = np.random.default_rng([2, seed])
+    dataset = run_text(TEXT.format(arm="[0, 0, 0]", start="", loads="", more="")).dataset
+    count = int(rng.integers(100, 300))
+    places, strengths = rng.normal(size=(count, 3)) * 1e8, 10 ** rng.uniform(8, 12, count)
+    told = [
+        {"what": "source", "gravitational_parameter": strength, "position": place}
+        for place, strength in zip(places.tolist(), strengths.tolist(), strict=True)
+    ]
+    arrows = build_picture(dataset.assign_attrs(surroundings=json.dumps(told)))[0].stages[0].arrows
+    drawn = {arrow.name: arrow.vectors[0] for arrow in arrows if arrow.name.startswith("source")}
+    tides = strengths / np.linalg.norm(places, axis=1) ** 3
+    seen = np.flatnonzero(tides >= 1e-3 * tides.max())
+    assert set(drawn) == {f"source{k}" for k in seen}
+    for k in seen:
+        way = drawn[f"source{k}"] / np.linalg.norm(drawn[f"source{k}"])
+        assert way == pytest.approx(places[k] / np.linalg.norm(places[k]), abs=1e-9)
