@@ -191,11 +191,17 @@ class Diagnostics:
             worst += (self.estimate.attitude or 0.0) if self.estimate is not None else 0.0
         if worst <= most:
             return
+        # which isn't below it when it is rounded to a digit
+        enough = (
+            f", or ask for accuracy_axis = {1.5 * worst:.1g} if that is enough"
+            if asked is None and worst < _DIRECTED
+            else ""
+        )
         yield Caution(
             WarningCode.MODEL_UNCERTAIN,
             f'[model] level = "{found.level}" leaves directions uncertain by about {worst:.2g} rad at the end'
             + ("" if asked is None else f", where accuracy_axis = {most:.2g} rad was asked for")
-            + "; choose a less averaged level, or a nearer end",
+            + f"; choose a less averaged level{enough}",
         )
 
     def _joining(self) -> Iterator[Caution]:
@@ -251,6 +257,8 @@ class Diagnostics:
         return shortest * float(system.rate_bound) * _STEPS_TO_SINGULARITY
 
 
+_DIRECTED = 0.3
+"""Error of a direction (rad) from which on it is of no use to anyone."""
 _LONG = 8192
 """Steps from which projecting invariants pays off (``experiments/precision_tradeoff.py``: from 1e4 rad on,
 some 2500 steps in double precision).

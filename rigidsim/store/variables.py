@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from rigidsim.scene.parts_of_values import part_name
+from rigidsim.scene.parts_of_values import parts_in as parts_in
 
 LABELS: dict[str, list[str]] = {
     "body_axis": ["x", "y", "z"],

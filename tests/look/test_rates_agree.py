@@ -35,17 +35,14 @@ def period(text: str) -> float:
     return float(number) * _UNITS[unit]
 
 
-@pytest.mark.parametrize(
-    ("name", "rows"), [("mars_precession", {}), ("earth_precession_averaged", {"time.every": "20 yr"})]
-)
-def test_precession_and_nutation(name: str, rows: dict[str, str]) -> None:
-    ready = rigidsim.load(CONFIGS / f"{name}.toml").replace(QUICK)
-    dataset = rigidsim.run(ready.replace(rows), out=None).dataset
+def test_precession_and_nutation() -> None:
+    ready = rigidsim.load(CONFIGS / "mars_precession.toml").replace(QUICK)
+    dataset = rigidsim.run(ready, out=None).dataset
     analysis = rigidsim.analyse(dataset, ["node_longitude.figure", "obliquity.figure"])
     node, tilt = analysis["node_longitude.figure"], analysis["obliquity.figure"]
     rate = float(node.rate.real)
     title = texts(dataset, "obliquity")
-    drawn = re.search(r"mean motion, (−?[\d.]+)(″|°)/yr", title)
+    drawn = re.search(r"mean motion,\s+(−?[\d.]+)(″|°)/yr", title)
     assert drawn is not None, title
     size = _ARCSEC if drawn[2] == "″" else np.pi / 180
     said = float(drawn[1].replace("−", "-"))

@@ -87,8 +87,7 @@ def test_the_free_nutation_of_random_planets(seed: int) -> None:
     nutation = lines["free_nutation"]
     assert nutation.unfolded
     assert not nutation.can_be_alias
-    # torque changes the wobble by some times what its stiffness, 3 G M / r^3, is of the spin's square
-    nearest = values["distance"] * 1.495978707e11 * (1 - values["eccentricity"])
-    softened = 3 * 1.32712440018e20 / nearest**3 / spin**2
-    assert float(nutation.frequency) - spin == pytest.approx(wobble, rel=1e-5 + 3 * softened)
+    # torques change the wobble a little, and a label may be off by a twentieth of a bin (docs/analysis.md)
+    bin_width = 2 * np.pi / (200 * every * 86400)
+    assert float(nutation.frequency) - spin == pytest.approx(wobble, abs=bin_width / 20)
     assert all(line.can_be_alias == (not line.label.text) for line in lines.values())

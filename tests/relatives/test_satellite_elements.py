@@ -10,7 +10,7 @@ import pytest
 from support import EPSILON, config, loaded, run_text, seeds, unoptimised_code
 
 import rigidsim
-from rigidsim.store.variables import parts_in
+from rigidsim.scene.parts_of_values import parts_in
 
 GM = "3.986004418e14"
 SAMPLES = 5

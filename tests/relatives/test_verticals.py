@@ -14,6 +14,7 @@ from support import run_text, seeds
 
 from rigidsim.look import signals
 from rigidsim.look.figures.catalogue import available
+from rigidsim.look.stages.bodies import Subject, source_arrows
 from rigidsim.look.stages.registry import build_picture
 
 UNITS = {"m/s^2": 1.0, "cm/s^2": 0.01, "km/s^2": 1000.0, "mm/s^2": 0.001, "": 1.0}
@@ -88,8 +89,8 @@ def test_many_sources(seed: int) -> None:
         {"what": "source", "gravitational_parameter": strength, "position": place}
         for place, strength in zip(places.tolist(), strengths.tolist(), strict=True)
     ]
-    arrows = build_picture(dataset.assign_attrs(surroundings=json.dumps(told)))[0].stages[0].arrows
-    drawn = {arrow.name: arrow.vectors[0] for arrow in arrows if arrow.name.startswith("source")}
+    dataset = dataset.assign_attrs(surroundings=json.dumps(told))
+    drawn = {arrow.name: arrow.vectors[0] for arrow in source_arrows(dataset, Subject.of(dataset), 1.0)}
     tides = strengths / np.linalg.norm(places, axis=1) ** 3
     seen = np.flatnonzero(tides >= 1e-3 * tides.max())
     assert set(drawn) == {f"source{k}" for k in seen}
