@@ -103,7 +103,7 @@ def circulation(time: Array, plane: Array) -> SecularLine | None:
 
 
 @dataclass(frozen=True)
-class Ellipse:
+class FittedEllipse:
     """``across cos(w t) ...``: complex amplitudes of both coordinates of a point, and w > 0, rad/s."""
 
     across: complex
@@ -122,7 +122,7 @@ class Ellipse:
         return np.stack([(self.across * phase).real, (self.up * phase).real], axis=1)
 
 
-def leading_ellipse(time: Array, longitude: Array, latitude: Array, shortened: float) -> Ellipse | None:
+def leading_ellipse(time: Array, longitude: Array, latitude: Array, shortened: float) -> FittedEllipse | None:
     """The strongest line of a pole's longitude, `shortened` by the sine of its obliquity, and latitude
     together (rows,), rad; None if neither has a line of 1.5 periods in the run, or they can't be analysed.
     """
@@ -145,7 +145,7 @@ def leading_ellipse(time: Array, longitude: Array, latitude: Array, shortened: f
         near = [x for x in signal.lines if abs(float(x.frequency) - rate) * span < _TURN / 2]
         return sum((_complex(x) for x in near[:1]), 0j)
 
-    return Ellipse(shortened * part(found[0]), part(found[1]), rate)
+    return FittedEllipse(shortened * part(found[0]), part(found[1]), rate)
 
 
 def _complex(line: SpectralLine) -> complex:

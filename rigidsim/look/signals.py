@@ -315,10 +315,8 @@ def lever(dataset: xarray.Dataset) -> Array | None:
 
 def is_top(dataset: xarray.Dataset) -> bool:
     """Whether the scene is a top whose axis is known in space (see ``lever``), or a top's tip is recorded."""
-    if "position" in dataset:
-        return False
     leaning = lever(dataset) is not None and pole(dataset, "figure") is not None
-    return leaning or values(dataset, "tip") is not None
+    return "position" not in dataset and (leaning or values(dataset, "tip") is not None)
 
 
 def across(axis: Array) -> tuple[Array, Array]:
@@ -332,12 +330,6 @@ def angle_between(directions: Array, others: Array) -> Array:
     """Angles (rows,), rad, between directions (rows, 3) and others (rows, 3) or another (3,)."""
     cosine = directions @ others if others.ndim == 1 else np.einsum("ti,ti->t", directions, others)
     return np.asarray(np.arctan2(np.linalg.norm(np.cross(directions, others), axis=1), cosine))
-
-
-def vertical(dataset: xarray.Dataset) -> Array:
-    """Unit vector (3,) against a uniform gravity; Z without any."""
-    pull = gravity(dataset)
-    return np.array([0.0, 0.0, 1.0]) if pull is None else np.asarray(-pull / np.linalg.norm(pull))
 
 
 def _frame_asked(dataset: xarray.Dataset) -> dict[str, Any]:

@@ -67,6 +67,12 @@ def gravity(dataset: xarray.Dataset) -> Array | None:
     return None
 
 
+def vertical(dataset: xarray.Dataset) -> Array:
+    """Unit vector (3,) against a uniform gravity; Z without any."""
+    pull = gravity(dataset)
+    return np.array([0.0, 0.0, 1.0]) if pull is None else np.asarray(-pull / np.linalg.norm(pull))
+
+
 def body_of(one: dict[str, Any]) -> KnownBody | None:
     """The known body with the gravitational parameter of what was told; None if it is no known one."""
     return known_body(float(one.get("gravitational_parameter") or 0.0))

@@ -245,11 +245,7 @@ def root_attributes(
     scene, system = prepared.scene, prepared.system
     platform: dict[str, Any] = {f"version_{k}": v for k, v in provenance.versions().items()}
     platform |= {f"code_{k}": v for k, v in provenance.code_target(parts.evaluator.code).items()}
-    exponents = {
-        "time": system.scaling.time,
-        "inertia": system.scaling.inertia,
-        "states": system.state_exponents,
-    }
+    exponents: dict[str, Any] = {"time": system.scaling.time, "inertia": system.scaling.inertia}
     return RootAttributes(
         title=scene.name,
         comment=scene.description,
@@ -276,7 +272,7 @@ def root_attributes(
         compact_mode=int(prepared.precision.compact or system.wide),
         high_accuracy=0,
         batch_size=1,
-        unit_exponents=json.dumps(exponents),
+        unit_exponents=json.dumps({**exponents, "states": system.state_exponents}),
         principal_moments=json.dumps([float(m) for m in scene.body.principal_moments]),
         principal_axes=json.dumps([[float(x) for x in a] for a in scene.body.principal_axes]),
         inertia_tensor=json.dumps([[float(x) for x in row] for row in scene.body.inertia]),
@@ -325,16 +321,10 @@ def _surroundings(prepared: InitialValueProblem) -> list[dict[str, Any]]:
     scene = prepared.scene
     locked = [x for found in scene.tabled.values() for x in found if not x.acts()]  # and drawn all the same
     shown = [load.pictured() for load in (*scene.loads, *locked, *prepared.python_loads)]
-    normal = scene.reference
-    shown.append(
-        {
-            "what": "frame",
-            "figure_axis": [float(x) for x in scene.figure.pole],
-            "reference_normal": None if normal is None else [float(x) for x in normal],
-        }
-    )
-    if scene.gravity is not None:
-        shown.append({"what": "gravity", "acceleration": [float(g) for g in scene.gravity]})
+    axes = scene.figure.pole, scene.reference, scene.gravity
+    pole, normal, pull = ([float(x) for x in axis] if axis else None for axis in axes)
+    shown.append({"what": "frame", "figure_axis": pole, "reference_normal": normal})
+    shown.append({"what": "gravity", "acceleration": pull} if pull else None)
     return [one for one in shown if one is not None]
 
 

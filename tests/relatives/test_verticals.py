@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from support import run_text, seeds
 
-from rigidsim.look import signals
+from rigidsim.look import surroundings
 from rigidsim.look.figures.catalogue import available
 from rigidsim.look.stages.bodies import Subject, source_arrows
 from rigidsim.look.stages.registry import build_picture
@@ -66,7 +66,7 @@ def test_random_fields(seed: int) -> None:
         start, more = "position = [0, 0, 0]\nvelocity = [3, 0, 4]", ', "position"'
     dataset = run_text(TEXT.format(arm=arm, start=start, loads=loads, more=more)).dataset
     up = -pull / np.linalg.norm(pull)
-    assert signals.vertical(dataset) == pytest.approx(up, abs=1e-12)
+    assert surroundings.vertical(dataset) == pytest.approx(up, abs=1e-12)
     assert ("tip" in available(dataset)) == (kind == "top")
     picture = build_picture(dataset)[0]
     drawn = [vector for stage in picture.stages for vector in stage.vectors if vector.name == "gravity"]

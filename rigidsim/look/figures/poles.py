@@ -180,7 +180,7 @@ def precesses(dataset: xarray.Dataset) -> bool:
     return timelines.orientations(dataset) is not None and signals.steady_momentum(dataset) is None
 
 
-def nutation_path(dataset: xarray.Dataset) -> tuple[Array, fits.Ellipse | None] | None:
+def nutation_path(dataset: xarray.Dataset) -> tuple[Array, fits.FittedEllipse | None] | None:
     """A precessing figure axis, else the momentum, less its mean motion (rows, 2), rad, if that stays small,
     and its strongest part.
 
@@ -202,7 +202,7 @@ def nutation_path(dataset: xarray.Dataset) -> tuple[Array, fits.Ellipse | None] 
 
 
 @panel(nutation_path)
-def nutation(axes: Axes, dataset: xarray.Dataset, found: tuple[Array, fits.Ellipse | None]) -> None:
+def nutation(axes: Axes, dataset: xarray.Dataset, found: tuple[Array, fits.FittedEllipse | None]) -> None:
     """Motion of the pole about its mean motion: longitude times sin(obliquity) across, obliquity up."""
     plane, ellipse = found
     scale, unit = angle_scale(plane)
@@ -233,7 +233,7 @@ def _tip(dataset: xarray.Dataset) -> tuple[Array, str, str] | None:
 def tip(axes: Axes, dataset: xarray.Dataset, found: tuple[Array, str, str]) -> None:
     """The tip of a top seen from above; its first turn about the vertical stands out."""
     path, unit_name, what = found
-    up = signals.vertical(dataset)
+    up = surroundings.vertical(dataset)
     across = np.eye(3)[1 if abs(up[0]) > 0.9 else 0]  # X and Y if Z is up
     across = across - (across @ up) * up
     across /= np.linalg.norm(across)
@@ -284,7 +284,7 @@ def path(axes: Axes, dataset: xarray.Dataset, position: Array) -> None:
 
 
 def _thrown(axes: Axes, dataset: xarray.Dataset, position: Array, scale: float, unit: str) -> None:
-    up = signals.vertical(dataset)
+    up = surroundings.vertical(dataset)
     height = position @ up
     level = position - height[:, None] * up
     way = level[-1] - level[0]

@@ -7,7 +7,7 @@ import numpy as np
 import xarray
 from matplotlib.axes import Axes
 
-from rigidsim.look import signals
+from rigidsim.look import signals, surroundings
 from rigidsim.look.figures.panel import angle_scale, angle_text, clock, number, panel, recorded
 from rigidsim.look.figures.style import BLUE, GREY, ORANGE, PALETTE, PINK, VIOLET, X, Y, Z, curve, key
 from rigidsim.look.fits import secular
@@ -288,7 +288,7 @@ def _tilt(dataset: xarray.Dataset) -> tuple[Array, str] | None:
     direction = signals.pole(dataset, "figure") if signals.is_top(dataset) else None
     if direction is None:
         return None
-    angle = signals.angle_between(direction, signals.vertical(dataset))
+    angle = signals.angle_between(direction, surroundings.vertical(dataset))
     return angle, "Tilt of the figure axis against the vertical"
 
 

@@ -213,7 +213,7 @@ def flight(dataset: xarray.Dataset, subject: Subject) -> Picture | None:
     arrows, trails, notes = vectors_of(dataset, subject, paths=False)
     *others, path = bodies.with_track(subject, subject.stage(arrows, trails), notes)
     assert path.translation is not None
-    up = signals.vertical(dataset)
+    up = surroundings.vertical(dataset)
     points = signals.finite_rows(path.translation)
     heights = points @ up
     middle = (points.min(axis=0) + points.max(axis=0)) / 2

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import xarray
 
-from rigidsim.look import signals
+from rigidsim.look import signals, surroundings
 from rigidsim.look.solids import Mesh
 from rigidsim.look.stages import parts
 from rigidsim.look.stages.bodies import FIELD, Subject, vectors_of
@@ -21,7 +21,7 @@ def picture(dataset: xarray.Dataset, subject: Subject) -> Picture | None:
     arm = signals.lever(dataset)
     if arm is None or subject.quaternion is None:
         return None
-    up = signals.vertical(dataset)
+    up = surroundings.vertical(dataset)
     axis = _figure(dataset, arm)
     symbol = _symbol(dataset, subject, arm, axis)
     if symbol is not None:
