@@ -24,7 +24,6 @@ from rigidsim.scene.validation_messages import nearest, shown
 from rigidsim.session.dataset import kernel_attributes
 from rigidsim.store.netcdf import check_version, root_attributes
 from rigidsim.store.provenance import read_attributes
-from rigidsim.workflows.ready_scenes import ALIASES, ready_scenes
 
 __all__ = ["Experiment", "Given", "as_experiment", "config_model", "load", "parse"]
 
@@ -46,6 +45,8 @@ def load(path: str | Path, *, overrides: Overrides = ()) -> Experiment:
     """
     if not isinstance(path, str | Path) or os.path.lexists(path):
         return load_file(path, overrides=overrides)
+    from rigidsim.workflows.ready_scenes import ALIASES, ready_scenes  # which files don't need
+
     name, scenes = str(path), ready_scenes()
     scene = scenes.get(ALIASES.get(name.lower(), name))
     if scene is None:
