@@ -84,7 +84,9 @@ def every_setting(exact: str = "", *, full: bool = False) -> list[Setting]:
         return both([Setting(precision)]) + (other if exact or precision != "quadruple" else [])
 
     loose = both([Setting(p, tolerance) for p, some in _TOLERANCES.items() for tolerance in some])
-    fast = [s for s in both([Setting("single")]) + loose if s.precision in ("single", "double")]
+    fast = both([Setting("double"), Setting("single")])
+    fast += [s for s in loose if s.precision in ("single", "double")]
+    fast.sort(key=lambda s: (s.hold_invariants, -(s.tolerance or 0.0)))
     tight = [
         replace(s, formulation=f)
         for p in ("double", "single", "extended")
@@ -94,8 +96,9 @@ def every_setting(exact: str = "", *, full: bool = False) -> list[Setting]:
     few = both([Setting("double", t, f) for t in _FEW_TOLERANCES for f in further])
     rest = [replace(s, formulation=f) for s in loose if s.precision != "quadruple" for f in further]
     listed = [
-        *best("double"),
-        *sorted(fast, key=lambda s: s.hold_invariants),
+        DEFAULT,
+        *best("double")[2 if exact else 0 :],
+        *fast,
         *best("extended"),
         *best("quadruple"),
         *loose,
