@@ -55,8 +55,10 @@ def load(path: str | Path, *, overrides: Overrides = ()) -> Experiment:
             raise ConfigError(Problem("file", what + "lists all scenes"), name)
         return load_file(path, overrides=overrides)
     if name != scene.stem:
-        as_table = isinstance(overrides, Mapping)
-        overrides = {"name": name, **overrides} if as_table else [f'name="{name}"', *overrides]
+        if isinstance(overrides, Mapping):
+            overrides = {"name": name, **overrides}
+        else:
+            overrides = [f'name="{name}"', *overrides]
     return load_file(scene, overrides=overrides)
 
 
