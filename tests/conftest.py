@@ -31,7 +31,9 @@ def pytest_runtest_protocol(item: pytest.Item) -> Iterator[object]:
     """
     from support import unoptimised_code
 
-    optimised = any(item.get_closest_marker(name) for name in ("optimised", "slow"))  # long runs step long
+    optimised = any(
+        item.get_closest_marker(name) for name in ("optimised", "slow", "campaign")
+    )  # long runs step long
     with nullcontext() if optimised else unoptimised_code():
         return (yield)
 

@@ -6,6 +6,7 @@ import fcntl
 import hashlib
 import math
 import os
+import random
 from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from datetime import UTC, datetime
@@ -176,22 +177,32 @@ def _unoptimised(make: Callable[..., Any], most: int) -> Callable[..., Any]:
     return made
 
 
-def cases(every: Iterable[Any], usual: Collection[Any]) -> list[Any]:
-    """Parameters of which only the usual ones are tried in each suite, the others among the long tests."""
+def first_seed() -> int:
+    """First of the day's random seeds; the environment variable ``RIGIDSIM_SEED`` (a whole number) overrides it."""
+    return int(os.environ.get("RIGIDSIM_SEED", f"{datetime.now(UTC):%y%m%d}000"))
+
+
+def cases(every: Iterable[Any], usual: Collection[Any], daily: int = 1) -> list[Any]:
+    """Parameters of which each suite tries the usual ones. ``daily`` of the others, drawn by the day, are long
+    tests, and the rest is run by hand (``pytest -m campaign``).
+    """
     every = list(every)
-    assert set(usual) <= set(every), "no such case"
-    return [case if case in usual else pytest.param(case, marks=pytest.mark.slow) for case in every]
+    others = [case for case in every if case not in usual]
+    assert len(others) + len(usual) == len(every), "no such case"
+    drawn = random.Random(first_seed()).sample(range(len(others)), min(daily, len(others)))
+    marks = [pytest.mark.slow if k in drawn else pytest.mark.campaign for k in range(len(others))]
+    marked = iter([pytest.param(case, marks=mark) for case, mark in zip(others, marks, strict=True)])
+    return [case if case in usual else next(marked) for case in every]
 
 
 def seeds(few: int, many: int) -> list[Any]:
-    """Seeds of random relatives: the few first in each suite, the others among the long tests. They change by
-    the day, unless the environment variable ``RIGIDSIM_SEED`` (a whole number) gives the first one; the name
-    of a failing test shows its seed.
+    """Seeds of random relatives, which change by the day: the few first in each suite, the others by hand
+    (``pytest -m campaign``). The name of a failing test shows its seed.
     """
-    first = int(os.environ.get("RIGIDSIM_SEED", f"{datetime.now(UTC):%y%m%d}000"))
+    first = first_seed()
     every = [pytest.param(seed, id=f"seed{seed}") for seed in range(first, first + few)]
     rest = range(first + few, first + many)
-    return every + [pytest.param(seed, id=f"seed{seed}", marks=pytest.mark.slow) for seed in rest]
+    return every + [pytest.param(seed, id=f"seed{seed}", marks=pytest.mark.campaign) for seed in rest]
 
 
 def assert_announced(announced: Sequence[float], true: Sequence[float], at_most: float = 10) -> None:

@@ -159,7 +159,7 @@ def test_the_scenes_have_every_entry_of_the_registries() -> None:
     assert {how for _, _, how in CASES} == set(FORMULATIONS)
 
 
-@pytest.mark.parametrize(("case"), cases(CASES, USUAL), ids="-".join)
+@pytest.mark.parametrize(("case"), cases(CASES, USUAL, daily=5), ids="-".join)
 def test_a_run_that_was_stopped_twice_has_the_same_bits(case: tuple[str, str, str], tmp_path: Path) -> None:
     whole = made(*case)
     assert whole.status == "finished"
@@ -203,7 +203,9 @@ def test_announced_errors_are_true(precision: str) -> None:
     assert_announced(announced, true)
 
 
-@pytest.mark.parametrize("case", cases([c for c in CASES if c[2] != "quaternion"], USUAL[1:]), ids="-".join)
+@pytest.mark.parametrize(
+    "case", cases([c for c in CASES if c[2] != "quaternion"], USUAL[1:], daily=3), ids="-".join
+)
 def test_formulations_agree(case: tuple[str, str, str]) -> None:
     scene, precision, _ = case
     runs = (made(scene, precision, how) for how in ("quaternion", case[2]))
@@ -211,7 +213,7 @@ def test_formulations_agree(case: tuple[str, str, str]) -> None:
     assert np.abs(one - other).max() <= 1000 * max(EPSILON[precision], 2.0**-63)
 
 
-@pytest.mark.parametrize("name", cases(FORMATS, ["csv"]))
+@pytest.mark.parametrize("name", cases(FORMATS, ["csv"], daily=3))
 def test_every_format_takes_a_resumed_run(name: str, tmp_path: Path) -> None:
     if name in ("parquet", "zarr"):
         pytest.importorskip({"parquet": "pyarrow"}.get(name, name))

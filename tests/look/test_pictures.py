@@ -17,6 +17,8 @@ import pytest
 
 pytest.importorskip("rerun")
 
+from support import cases
+
 import rigidsim
 from rigidsim.look.film import HeadlessViewer, NoGraphics, vulkan_drivers
 from rigidsim.look.timeline import write_timeline
@@ -25,7 +27,6 @@ from rigidsim.look.timeline.drawn import DrawnRun
 from rigidsim.look.timeline.writing import recording_to
 
 pytestmark = [
-    pytest.mark.slow,
     pytest.mark.skipif(not vulkan_drivers(), reason="no Vulkan driver: apt-get install mesa-vulkan-drivers"),
 ]
 
@@ -34,7 +35,7 @@ CONFIGS = sorted((Path(__file__).parents[2] / "configs").glob("*.toml"))
 ROWS = 3000
 
 
-@pytest.fixture(params=CONFIGS[::2], ids=lambda path: path.stem)
+@pytest.fixture(params=cases(CONFIGS, [], daily=4), ids=lambda path: path.stem)
 def run(request: pytest.FixtureRequest, ready: Ready) -> rigidsim.Run:
     return ready(request.param)
 
