@@ -178,13 +178,13 @@ def _unoptimised(make: Callable[..., Any], most: int) -> Callable[..., Any]:
 
 
 def first_seed() -> int:
-    """First of the day's random seeds; the environment variable ``RIGIDSIM_SEED`` (a whole number) overrides it."""
+    """First of the day's random seeds; the environment variable ``RIGIDSIM_SEED`` gives another."""
     return int(os.environ.get("RIGIDSIM_SEED", f"{datetime.now(UTC):%y%m%d}000"))
 
 
 def cases(every: Iterable[Any], usual: Collection[Any], daily: int = 1) -> list[Any]:
-    """Parameters of which each suite tries the usual ones. ``daily`` of the others, drawn by the day, are long
-    tests, and the rest is run by hand (``pytest -m campaign``).
+    """Parameters of which each suite tries the usual ones. ``daily`` of the others, drawn by the day, are
+    long tests, and the rest is run by hand (``pytest -m campaign``).
     """
     every = list(every)
     others = [case for case in every if case not in usual]
