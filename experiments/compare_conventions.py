@@ -11,7 +11,7 @@ Checked: the attitude error told is within 10 % of the true one (where that is a
 rates is as large as the true one, so that the convention is right or makes no difference; no loose
 integration is called a wrong model, no wrong model an integration error or agreement.
 
-Run: python -m experiments.compare_conventions [--files N] [--models N] [--seed N] [--no-rates]
+Run: python -m experiments.compare_conventions [--files N] [--models N] [--seed N] [--no-rates] [--mixed N]
 
 Exit: 1 if one fails
 """
@@ -219,6 +219,132 @@ def a_model(chance: random.Random, convention: Any, rates: bool = True) -> tuple
     return found, ""
 
 
+TRUTHS = ("right", "loose", "model", "rounded")
+WAYS = ("half", "opposite", "unrelated", "other axes", "other frame", "offset")
+SCENES = 12  # experiments that mixed files are of, so that few are compiled
+NEAR = 60.0  # deg from row to row, up to which a file has to be decided
+
+
+@dataclass(frozen=True)
+class Mixed:
+    """A random file: what is true of it, and what ``compare`` says."""
+
+    truth: str
+    way: str
+    rates: bool
+    uneven: bool
+    widest: float
+    error: float
+    label: str
+    found: Comparison
+
+    @property
+    def wrong(self) -> str:
+        """What is false about the verdict; empty if nothing is."""
+        verdict = self.found.verdict
+        if self.way:
+            return f"false {verdict}" if verdict in ("agrees", "integration_error", "wrong_model") else ""
+        right = {"right": "agrees", "rounded": "agrees", "loose": "integration_error", "model": "wrong_model"}
+        if self.error <= self.found.within:
+            return "" if verdict in ("agrees", "undecided") else f"false {verdict}"
+        return "" if verdict in (right[self.truth], "undecided") else f"false {verdict}"
+
+
+def a_mixed_file(seed: object) -> Mixed:
+    """Half of the files have no rates, a third has uneven rows, a third has rates that contradict the
+    attitudes; right files, loose integrations, other models and rounded numbers.
+    """
+    chance = random.Random(f"mixed {seed}")
+    model = Model.drawn(random.Random(f"scene {chance.randrange(SCENES)}"))
+    truth, size = chance.choice(TRUTHS), float(np.linalg.norm(model.rates))
+    kind = chance.choice(["none", "none", "none", "contradicting", "contradicting", "honest"])
+    uneven = chance.random() < 1 / 3
+    count = max(60, round(model.end * size / 10 ** chance.uniform(-1.5, -0.1)))
+    times = np.linspace(0, model.end, count)
+    if uneven:
+        lengths = np.array([0.05 + chance.random() for _ in range(count - 1)])
+        times = np.concatenate([[0.0], np.cumsum(lengths)]) / lengths.sum()
+        times = np.minimum(times, 1.0) * model.end
+        if chance.random() < 0.5:
+            times = np.delete(times, slice(count // 3, count // 3 + count // 8))
+    other, method, accuracy, label = model, "DOP853", 3e-14, truth
+    if truth == "loose":
+        method = chance.choice([m for m in METHODS if not uneven or m not in ("rk4", "heun")])
+        steps = method in ("rk4", "heun")
+        accuracy = 10 ** (chance.uniform(-2, -0.7) if steps else chance.uniform(-8, -3))
+        label = f"{method} {accuracy:.0e}"
+    if truth == "model":
+        change, axis = 10 ** chance.uniform(-4, -0.7), chance.randrange(3)
+        other = replace(model, moments=model.moments * (1 + change * np.eye(3)[axis]))
+        label = f"moment {axis} {change:+.0e}"
+    exact = model.rows("DOP853", 3e-14, times)
+    rows = exact if other is model and method == "DOP853" and accuracy < 1e-13 else other.rows(
+        method, accuracy, times
+    )  # fmt: skip
+    error = float(angles(rows, exact).max())
+    attitude, rates = rows[:, :4], rows[:, 4:]
+    way = chance.choice(WAYS) if kind == "contradicting" else ""
+    if way:
+        body = Rotation.from_quat(rows[:, [1, 2, 3, 0]])
+        shift = np.array([chance.gauss(0, 1) for _ in range(3)])
+        noise = np.array([[chance.gauss(0, size) for _ in range(3)] for _ in range(9)])
+        phases = np.cos(np.outer(times, np.arange(9)) * 2 / model.end)
+        rates = {
+            "half": lambda: rates / 2, "opposite": lambda: -rates, "unrelated": lambda: phases @ noise / 3,
+            "other axes": lambda: rates[:, [1, 2, 0]], "other frame": lambda: body.inv().apply(rates),
+            "offset": lambda: rates + shift / np.linalg.norm(shift) * size * 10 ** chance.uniform(-1.5, 0),
+        }[way]()  # fmt: skip
+    written_times = times
+    if truth == "rounded":
+        label = chance.choice(["float32", "times", "both", "digits"])
+        if label in ("float32", "both"):
+            attitude, rates = (x.astype(np.float32).astype(float) for x in (attitude, rates))
+        if label in ("times", "both"):
+            written_times = times.astype(np.float32).astype(float)
+        if label == "digits":
+            digits = chance.randrange(5, 12)
+            attitude, rates = np.round(attitude, digits), np.round(rates, digits)
+    order = chance.choice([[0, 1, 2, 3], [1, 2, 3, 0]])
+    columns = {"t": written_times, "q": attitude[:, order]} | ({} if kind == "none" else {"w": rates})
+    found = rigidsim.compare(rigidsim.parse(model.config), columns)
+    steps = np.linalg.norm(exact[:-1, 4:], axis=1) * np.diff(times)
+    return Mixed(
+        truth,
+        way,
+        kind != "none",
+        uneven,
+        float(np.degrees(steps.max())),
+        error,
+        f"{model.kind} {label}",
+        found,
+    )
+
+
+def mixed_campaign(count: int, seed: int, told: Callable[[str], None] = print) -> int:
+    """Judge so many mixed files, and print the table; the number of false verdicts."""
+    made = []
+    for number in range(count):
+        one = a_mixed_file(f"{seed} {number}")
+        made.append(one)
+        if one.wrong or (one.found.verdict == "undecided" and one.widest <= NEAR):
+            told(
+                f"{number}: {one.wrong or 'undecided'}: {one.label} {one.way} rates {one.rates} uneven "
+                f"{one.uneven}, {len(one.found.dataset.time)} rows, {one.widest:.0f} deg, true error "
+                f"{one.error:.2g}, {one.found.attitude_error.largest:.2g} found: {one.found.why}"
+            )
+    for name in (*TRUTHS, *WAYS):
+        some = [x for x in made if (x.way or x.truth) == name]
+        seen = Counter(x.found.verdict for x in some)
+        told(
+            f"{name:12} {len(some):4}  " + ", ".join(f"{verdict} {n}" for verdict, n in sorted(seen.items()))
+        )
+    near = [x for x in made if x.widest <= NEAR]
+    undecided = sum(x.found.verdict == "undecided" for x in near)
+    told(f"{undecided} undecided of {len(near)} files with rows at most {NEAR:g} deg apart")
+    told(", ".join(f"{n} {what}" for what, n in Counter(x.wrong or "right" for x in made).items()))
+    return sum(bool(x.wrong) for x in made)
+
+
 def campaign(
     files: int, models: int, seed: int, told: Callable[[str], None] = print, rates: bool = True
 ) -> int:
@@ -253,7 +379,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--models", type=int, default=16, help="that are others")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--no-rates", action="store_true", help="files have attitudes alone")
+    parser.add_argument("--mixed", type=int, default=0, help="files of all kinds, instead")
     given = parser.parse_args(arguments)
+    if given.mixed:
+        return 1 if mixed_campaign(given.mixed, given.seed) else 0
     return 1 if campaign(given.files, given.models, given.seed, rates=not given.no_rates) else 0
 
 

@@ -16,6 +16,8 @@ FEW = 9
 """Different numbers of one matrix, whose digits say nothing of a format."""
 _FIXED = 0.6  # share of numbers with the same count of decimals that a fixed format makes
 _DOUBLE_DIGITS = 15
+_SINGLE = 2.0**-24  # relative rounding of single precision
+_SINGLE_DIGITS = 7  # up to which numbers of few digits are taken for such, rather than for single precision
 
 # Sums of doubles end at 2^-1074 and stay below 2^1025: 1,400 digits hold each exactly.
 _EXACT = Context(prec=1400, Emax=10**6, Emin=-(10**6))
@@ -104,12 +106,13 @@ def converted(parts: Sequence[np.ndarray], unit: AngleUnit, bits: int) -> list[n
 
 
 def written_resolution(values: np.ndarray, narrow: bool, few: int = 0) -> float:
-    """Half the last digit in which numbers are written, from a sample of them; that of doubles at least. Up
-    to ``few`` different numbers, as those of a body at rest, are taken for exact.
+    """Half the last digit in which numbers are written, from a sample of them; that of doubles at least, or
+    that of single precision where all are such numbers. Up to ``few`` different numbers, as of a body at
+    rest, are taken for exact.
     """
     most = largest(values)
     if narrow:
-        return most * 2.0**-24
+        return most * _SINGLE
     places = np.linspace(0, values.size - 1, min(values.size, 300)).astype(int)
     some = picked(values.reshape(-1), places)
     if len(np.unique(some)) <= few:
@@ -117,7 +120,13 @@ def written_resolution(values: np.ndarray, narrow: bool, few: int = 0) -> float:
     written = [Decimal(repr(value)).normalize().as_tuple() for value in some.tolist()]
     decimals = [-int(exponent) for _, _, exponent in written]
     common = max(set(decimals), key=decimals.count)
-    if decimals.count(common) > _FIXED * len(decimals) and max(decimals) == common:
-        return 0.5 * 10.0**-common if common < _DOUBLE_DIGITS else most * 2.0**-53
     digits = max(len(mantissa) for _, mantissa, _ in written)
-    return most * (0.5 * 10.0 ** (1 - digits) if digits < _DOUBLE_DIGITS else 2.0**-53)
+    if decimals.count(common) > _FIXED * len(decimals) and max(decimals) == common:
+        found = 0.5 * 10.0**-common if common < _DOUBLE_DIGITS else most * 2.0**-53
+    else:
+        found = most * (0.5 * 10.0 ** (1 - digits) if digits < _DOUBLE_DIGITS else 2.0**-53)
+    with np.errstate(over="ignore"):
+        single = np.abs(some - some.astype(np.float32)) <= 0.5 * 10.0 ** -np.array(decimals, float)
+    if single.all() and digits > _SINGLE_DIGITS:
+        return max(found, most * _SINGLE)
+    return found

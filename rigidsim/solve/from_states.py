@@ -132,6 +132,32 @@ class FromStates:
             found[n] = engine.state
         return found
 
+    @cached_property
+    def _derivatives(self) -> Any:
+        options = dict(self._precision.options, compact_mode=self._system.wide)
+        return compiled_function([x for _, x in self._system.equations], self._system.variables, **options)
+
+    def slopes(self, states: np.ndarray, times: np.ndarray, added: np.ndarray | None = None) -> np.ndarray:
+        """Derivatives (rows, states) by time (s) of states in internal units.
+
+        Args:
+            added: angular accelerations (rows, 3), rad/s^2, body axes, beside the equations' own.
+        """
+        found = evaluate_rows(self._derivatives, states, times=self._internal(times)).T
+        found = np.ldexp(found, -self._system.scaling.time)
+        if added is not None:
+            found[:, self._places[4:]] += added / self._scales[self._places[4:]]
+        return found
+
+    @cached_property
+    def inertia(self) -> np.ndarray:
+        """Tensor (3, 3), kg m^2, body axes, of what turns with the body."""
+        return np.array([[float(x) for x in row] for row in self._system.scene.turning_inertia])
+
+    def accelerations(self, states: np.ndarray, times: np.ndarray) -> np.ndarray:
+        """Angular accelerations (rows, 3), rad/s^2, body axes."""
+        return self.slopes(states, times)[:, self._places[4:]] * self._scales[self._places[4:]]
+
     def attitude(self, states: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Quaternions (rows, 4) and angular velocities (rows, 3), rad/s, of states in internal units."""
         first, last = self._places[0], self._places[3]

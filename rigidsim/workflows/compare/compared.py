@@ -31,20 +31,35 @@ from rigidsim.workflows.compare.motion import OwnMotion, motion_at_all, own_moti
 from rigidsim.workflows.compare.own_steps import own_steps
 from rigidsim.workflows.compare.result import (
     INTEGRATION_ERROR,
+    UNDECIDED,
     AttitudeError,
     Comparison,
     Disagreement,
     FoundConvention,
 )
 from rigidsim.workflows.compare.saving import DRAWN, MOST_SHOWN, save_dataset, save_figure, save_timeline
-from rigidsim.workflows.compare.verdict import Evidence, judged
+from rigidsim.workflows.compare.verdict import (
+    Evidence,
+    agreement,
+    by_attitudes,
+    by_rates,
+    contradiction,
+    elsewhere,
+    elsewhere_alone,
+)
 from rigidsim.workflows.physics.models import rotation_vectors
 from rigidsim.workflows.read import Given, as_experiment
 
 WITHIN = 1e-9
 """Largest angle (rad) between attitudes that agree, if nothing else is asked for."""
+_ROUNDED = "the attitude error is that of its times, which are rounded"
+_CLOSE = 0.2  # of the last digit of times, to which the rounding of evenly spaced ones is known
+_RANDOM = 0.5  # correlation of neighbours, up to which errors are those of rounding
+_EXACT = 1e-13  # relative, of times in double precision
+_FAR_AWAY = 10.0  # spans of the file or of the experiment, beyond which times are counted from another zero
 _UNITS = ("s", "ms", "min", "h", "day", "yr")
 _FAR = np.log(0.02)  # the same, above which only conventions are tried in which it turns at its rates
+_NEARER = 1.0  # of these, by which attitudes that are nearer outweigh rates
 _BAD = np.log(0.15)  # mean logarithm of mismatches (rad), above which times in another unit are tried
 
 
@@ -120,6 +135,7 @@ class _Judging:
         self.told = list(self.given.told)
         self.turning: list[Turning] = []
         unit, found, sampled = self._convention()
+        self.unit = unit
         second = seconds_in(unit)
         times = gathered(self.given.times[rows] * second for rows in blocks_of(len(self.given.times)))
         own = motion_at_all(self.experiment, self.equations, times, sampled, self.told)
@@ -140,25 +156,28 @@ class _Judging:
         dataset = _dataset(times, errors, name, self.given.trajectory.source)
         rate_errors = None if rates is None else _distances(rates, own.rates)
         attitude_noise, rate_noise = self._noise(found, reading)
-        known = self._by_equations(times, theirs, rates, own, flight, attitude_noise, dataset)
-        rate = defects.motion_rate(times, own.rates if rates is None else rates)
-        floor = max(within, 4 * attitude_noise, 3 * own.uncertainty)
-        start = (float(errors[0]), 0.0 if rate_errors is None else float(rate_errors[0]))
-        windows, missing = (None, self.why_not) if known is None else (known.windows, known.missing)
+        steps = self._steps(times, own, rates)
+        rate = defects.motion_rate(times, own.rates)
+        largest_error, turn = largest(errors), float(np.median(steps))
+        floor, reason = max(within, 4 * attitude_noise, 3 * own.uncertainty), ""
+        reason = f"the attitude error is within {floor:.2g} rad everywhere"
+        rounded = None if largest_error <= floor else self._rounded_times(times, own, theirs, floor)
         seen = Evidence(
-            largest(errors),
-            floor,
-            attitude_noise,
+            largest_error,
+            max(floor, rounded or 0.0),
+            reason if rounded is None else f"{_ROUNDED} ({self.given.resolution[2]:.2g} s or less)",
+            attitude_noise + rate * self._time_noise(times),
             rate_noise,
-            start,
+            (float(errors[0]), 0.0 if rate_errors is None else float(rate_errors[0])),
             rate,
             float(times[-1] - times[0]),
-            windows,
-            missing,
+            None if rate_errors is None else largest(rate_errors),
+            turn,
         )
-        verdict, why = judged(seen)
+        known = self._by_equations(times, theirs, rates, own, flight, seen.attitude_noise, dataset)
+        verdict, why = agreement(seen) or self._judged(seen, known)
         local = None if known is None else known.local
-        if known is not None and local is not None and verdict == INTEGRATION_ERROR:
+        if known is not None and local is not None and verdict == INTEGRATION_ERROR and rates is not None:
             steps = own_steps(known.intervals, dataset["defect"].values, attitude_noise)
             local = local.having(order=steps.order, step_tolerance=steps.tolerance)
         if rate_errors is not None:
@@ -174,7 +193,7 @@ class _Judging:
             dataset["position_error"] = ("time", apart, {"units": "m", "long_name": "distance of positions"})
         dataset.attrs["verdict"] = verdict
         worst = max((int(np.argmax(errors[rows])) + rows.start for rows in blocks_of(count)), key=errors.item)
-        _, first = flagged(lambda rows: errors[rows] > floor, count)
+        _, first = flagged(lambda rows: errors[rows] > seen.floor, count)
         trajectory = self.given.trajectory
         made = Comparison(
             name=name,
@@ -183,17 +202,17 @@ class _Judging:
             span_s=float(times[-1] - times[0]),
             verdict=verdict,
             why=why,
-            within=floor,
+            within=seen.floor,
             resolution=attitude_noise,
             attitude_error=AttitudeError(
-                largest=float(errors[worst]),
+                largest=seen.largest,
                 rms=float(np.sqrt(mean_square(errors))),
                 time=float(times[worst]),
                 row=trajectory.row(worst),
             ),
-            rate_error=None if rate_errors is None else largest(rate_errors),
+            rate_error=seen.rate_error,
             position_error=position_error,
-            convention=_described(found, unit, reading, more),
+            convention=_described(found, self.given.named, unit, reading, more),
             drifts=[] if known is None else known.drifts,
             local_defects=local,
             first_disagreement=None
@@ -203,6 +222,75 @@ class _Judging:
         )
         made._dataset = dataset
         return made
+
+    def _judged(self, seen: Evidence, known: ByEquations | None) -> tuple[str, str]:
+        """The verdict of attitudes that aren't the experiment's."""
+        if known is None:
+            return UNDECIDED, f"model and integration can't be told apart: {self.why_not}"
+        found, windows = None, known.windows
+        if windows is not None:
+            rate_defects = float(np.sqrt(np.mean(windows.rates**2)))
+            attitude = float(np.sqrt(np.mean(windows.attitude**2)))
+            found = (
+                contradiction(seen, windows)
+                or elsewhere(seen, attitude, rate_defects, windows.length)
+                or by_rates(seen, windows)
+            )
+        if found is None:
+            alone = known.alone()
+            if alone is not None and windows is None:
+                slip = float(np.linalg.norm(alone.rates[0] - known.own.rates[alone.rows[0, 0]]))
+                found = elsewhere_alone(seen, alone, slip)
+            found = found or by_attitudes(seen, alone)
+        return found
+
+    def _steps(self, times: np.ndarray, own: OwnMotion, rates: np.ndarray | None) -> np.ndarray:
+        """Turns (rad) from some rows to the next ones, by the faster of both motions."""
+        rows = rows_compared(len(times) - 1)
+        both = [own.rates] if rates is None else [own.rates, rates]
+        fastest = np.max([np.linalg.norm(picked(x, rows), axis=1) for x in both], axis=0)
+        return np.asarray(fastest * (picked(times, rows + 1) - picked(times, rows)))
+
+    def _rounded_times(
+        self, times: np.ndarray, own: OwnMotion, theirs: np.ndarray, floor: float
+    ) -> float | None:
+        """Largest angle (rad) by which rounded times explain the error everywhere; None where they don't.
+
+        Attitudes at a time that is off by d are turned by the rate times d. Rounded times are off by half
+        their last digit at most: by what evenly spaced ones show, or by another amount in each row.
+        """
+        most = self.given.resolution[2] * seconds_in(self.unit)
+        rows = rows_compared(len(times))
+        parts = [picked(part, rows) for part in own.quaternions]
+        error = rotation_vectors([normalised(parts[0]), *parts[1:]], [picked(theirs, rows)])
+        rates = picked(own.rates, rows)
+        square = np.maximum(np.sum(rates**2, axis=1), 1e-300)
+        shifts = np.sum(error * rates, axis=1) / square
+        rest = np.linalg.norm(error - rates * shifts[:, None], axis=1)
+        size = np.linalg.norm(rates, axis=1)
+        bent = floor + size**2 * most**2  # which the change of the rate leaves
+        if (rest > bent).any() or (np.abs(shifts) > 1.1 * most + floor / np.sqrt(square)).any():
+            return None
+        even = picked(self._even(times), rows)
+        known = shifts + picked(times, rows) - even  # of which rounded ends leave a line
+        line = np.polyval(np.polyfit(even - even[0], known, 1), even - even[0])
+        spread = float(np.sum((shifts - shifts.mean()) ** 2))
+        alike = float(np.sum((shifts[1:] - shifts.mean()) * (shifts[:-1] - shifts.mean())))
+        by_digits = (np.abs(known - line) < _CLOSE * most + floor / np.sqrt(square)).all()
+        if spread == 0 or (abs(alike) > _RANDOM * spread and not by_digits):
+            return None
+        return float(1.1 * most * size.max() + floor)
+
+    def _even(self, times: np.ndarray) -> np.ndarray:
+        """As many times (s) evenly spaced."""
+        step = (times[-1] - times[0]) / (len(times) - 1)
+        return gathered(times[0] + step * np.arange(rows.start, rows.stop) for rows in blocks_of(len(times)))
+
+    def _time_noise(self, times: np.ndarray) -> float:
+        """Rounding of the times, s, rms, where these would be evenly spaced but for their digits."""
+        most, even = self.given.resolution[2] * seconds_in(self.unit), self._even(times)
+        apart = max(float(np.abs(times[rows] - even[rows]).max()) for rows in blocks_of(len(times)))
+        return most / np.sqrt(3) if _EXACT * abs(float(times[-1])) < apart <= 2 * most else 0.0
 
     def drawn(self, path: Path) -> Path:
         """Write the timeline of both, after ``compared``."""
@@ -216,7 +304,8 @@ class _Judging:
 
     def _convention(self) -> tuple[str, FoundReading, tuple[np.ndarray, OwnMotion]]:
         """Unit of the times and convention of the attitude, with the motion at the rows compared."""
-        units = (self.given.time_unit,) if self.given.time_unit else _UNITS
+        units = [self.given.time_unit] if self.given.time_unit else list(_UNITS)
+        self._refuse_far(units)
         rows = rows_compared(len(self.given.times))
         some = self.given.at(rows)
         best: tuple[str, FoundReading, tuple[np.ndarray, OwnMotion]] | None = None
@@ -249,13 +338,33 @@ class _Judging:
             )
         if best[1].score > _FAR:  # another model may be nearer in another convention: its rates tell
             unit, found, (kept, own) = best
-            self.turning = turning_readings(self.given, seconds_in(unit), signs=True)
+            self.turning = turning_readings(self.given, seconds_in(unit))
             allowed = {one.reading for one in self.turning}
-            best = unit, find_convention(some, own.quaternions[0], allowed), (kept, own)
+            turning = find_convention(some, own.quaternions[0], allowed)
+            if turning.score < found.score + _NEARER:
+                best = unit, turning, (kept, own)
+            else:  # its attitudes are near the experiment's, and these rates contradict them
+                self.turning = []
         if best[1].score > _BAD:
             why = "this is one in which it turns at its rates" if self.turning else "that found may be wrong"
             self.told.append(f"no convention tried brings it near the experiment: {why}")
         return best
+
+    def _refuse_far(self, units: list[str]) -> None:
+        """Refuse times that lie far from the experiment in all units, such as Unix seconds."""
+        first, last = float(self.given.times[0]), float(self.given.times[-1])
+        for unit in units:
+            second = seconds_in(unit)
+            away = max(first * second - self.end, self.begin - last * second)
+            if away <= _FAR_AWAY * max((last - first) * second, self.end - self.begin):
+                return
+        start = self.begin / seconds_in(units[0])
+        raise RigidsimError(
+            f"{self.given.trajectory.source}: its times, {first:.15g} to {last:.15g} {units[0]}, lie far "
+            f"from the experiment, {self.begin:.6g} to {self.end:.6g} s, as if counted from another zero "
+            f"(Unix seconds?); subtract {first - start:.15g} from each time, if its first row is the "
+            "experiment's start; or write dates, and give [time] epoch"
+        )
 
     def _flight(self, count: int) -> np.ndarray | None:
         if self.given.positions is None or self.given.velocities is None:
@@ -265,7 +374,7 @@ class _Judging:
 
     def _noise(self, found: FoundReading, reading: RateReading | None) -> tuple[float, float]:
         """Resolution of attitude (rad) and rates (rad/s) by the digits of the file."""
-        attitude, rates = self.given.resolution
+        attitude, rates, _ = self.given.resolution
         attitude *= np.pi / 180 if found.reading.unit == "deg" else 2.0
         if reading is None:
             return float(attitude), 0.0
@@ -325,10 +434,12 @@ def _dataset(times: np.ndarray, errors: np.ndarray, name: str, source: str) -> x
     )
 
 
-def _described(found: FoundReading, unit: str, rates: RateReading | None, more: list[str]) -> FoundConvention:
+def _described(
+    found: FoundReading, named: str, unit: str, rates: RateReading | None, more: list[str]
+) -> FoundConvention:
     reading, frames = found.reading, found.frames
     return FoundConvention(
-        order=reading.order,
+        order=named or reading.order,
         direction=reading.direction,
         sequence=reading.sequence,
         about=("fixed" if reading.fixed else "body") if reading.sequence else "",
@@ -336,7 +447,6 @@ def _described(found: FoundReading, unit: str, rates: RateReading | None, more: 
         time_unit=unit,
         rate_unit="" if rates is None else rates.unit,
         rate_axes="" if rates is None else rates.axes,
-        rate_sign="" if rates is None else "-" if rates.negative else "+",
         offset=frames.side,
         offset_angle=frames.angle,
         offset_quaternion=[float(x) for x in frames.turn],

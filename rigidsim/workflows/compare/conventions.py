@@ -32,6 +32,7 @@ _LEAST = 1e-9  # rad: mismatches below are alike
 _ALIKE = 0.35  # of mean natural logarithms: readings within a factor of 1.4 are equally near
 _OFFSET_GAIN = 3.0  # the same, that a constant offset has to gain: a factor of 20
 _OFFSET_LEAST = 1e-5  # rad; a smaller one is another start rather than another frame
+_UNLIKE = float(np.log(0.3))  # of relative mismatches: rates are near the experiment's in no reading
 _RATE_UNITS = {
     "rad/s": 1.0,
     "deg/s": np.pi / 180,
@@ -212,11 +213,10 @@ def _turns(read: np.ndarray, motion: np.ndarray) -> Iterator[tuple[str, np.ndarr
 
 @dataclass(frozen=True)
 class RateReading:
-    """How angular velocities are read: unit, axes ("body" or "space"), and whether with the other sign."""
+    """How angular velocities are read: unit, and axes ("body" or "space")."""
 
     unit: str
     axes: str
-    negative: bool
 
     def rates(self, given: np.ndarray, found: FoundReading, quaternions: np.ndarray) -> np.ndarray:
         """Angular velocities (rows, 3) in the experiment's body axes, rad/s.
@@ -224,7 +224,7 @@ class RateReading:
         Args:
             quaternions: attitudes of the same rows in the experiment's convention and axes.
         """
-        values = given * (_RATE_UNITS[self.unit] * (-1 if self.negative else 1))
+        values = given * _RATE_UNITS[self.unit]
         if self.axes == "body":
             return found.frames.of_body(values)
         if found.frames.side == "space":
@@ -233,9 +233,9 @@ class RateReading:
 
 
 def possible_rates(given: Attitudes) -> list[RateReading]:
-    """Units and axes in which rates may be written, the plainest first; none with the other sign."""
+    """Units and axes in which rates may be written, the plainest first."""
     units = [given.rate_unit] if given.rate_unit in _RATE_UNITS else list(_RATE_UNITS)
-    return [RateReading(str(unit), axes, False) for unit in units for axes in ("body", "space")]
+    return [RateReading(str(unit), axes) for unit in units for axes in ("body", "space")]
 
 
 def find_rates(
@@ -254,9 +254,7 @@ def find_rates(
     assert given.rates is not None
     size = float(np.sqrt(np.mean(np.sum(motion**2, axis=1)))) or 1.0
     tried = []
-    for reading in (
-        RateReading(x.unit, x.axes, sign) for x in possible_rates(given) for sign in (False, True)
-    ):
+    for reading in possible_rates(given):
         if allowed and reading not in allowed:
             continue
         read = reading.rates(given.rates, found, quaternions)
@@ -264,10 +262,6 @@ def find_rates(
         tried.append((float(np.mean(np.log(apart + _LEAST))), reading))
     best = min(score for score, _ in tried)
     near = [reading for score, reading in tried if score <= best + _ALIKE]
-    return near[0], [_rate_words(x) for x in near[1:]]
-
-
-def _rate_words(reading: RateReading) -> str:
-    return (
-        f"rates {'of the other sign ' if reading.negative else ''}along {reading.axes} axes, {reading.unit}"
-    )
+    if not allowed and best > _UNLIKE:  # near in no unit: as the columns are named
+        near = [reading for _, reading in tried[:1]]
+    return near[0], [f"rates along {x.axes} axes, {x.unit}" for x in near[1:]]

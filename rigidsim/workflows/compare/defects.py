@@ -19,12 +19,15 @@ import numpy as np
 
 from rigidsim.scene.row_rotations import conjugated, multiplied, normalised, turned, vector_of
 from rigidsim.solve.from_states import FromStates, RowStates
-from rigidsim.store.many_rows import picked, usual_step
+from rigidsim.store.many_rows import picked
 
 _WINDOW = 0.5  # times the rate of the motion: length of a window, where the rows allow it
 _PARTS = 4  # of a window
 _MOST_RATES = 20_000  # rows that the rate of a motion is the mean of
-_COARSEST = 4.0  # times the rate: length of a window beyond which the integral isn't resolved
+RESOLVED = 2.0
+"""rad that the motion may turn from row to row, beyond which the rows don't show how."""
+_ENOUGH = 0.5  # share of the windows with fewer parts that suffice
+_STEEP = 4.0  # sum of the absolute weights, beyond which rows lie too unevenly for a polynomial
 
 
 @dataclass(frozen=True)
@@ -74,6 +77,23 @@ def motion_rate(times: np.ndarray, rates: np.ndarray) -> float:
     return max(size, bend / size if size else 0.0)
 
 
+def windows_of_rows(times: np.ndarray, rate: float, length: float, parts: int, most: int) -> np.ndarray:
+    """Rows (windows, parts + 1) of at most so many windows whose rows are about equally far apart in time.
+
+    Args:
+        rate: of the motion, rad/s. length: of a window in rad of the motion, where the rows are close enough;
+            windows with a gap of more than ``RESOLVED`` are left out.
+    """
+    count = len(times)
+    starts = np.unique(np.linspace(0, max(count - 1 - parts, 0), most).astype(int))
+    steps = np.arange(parts + 1)
+    goals = picked(times, starts)[:, None] + length / rate * steps / parts
+    rows = np.maximum.accumulate(np.searchsorted(times, goals) - steps, axis=1) + steps
+    rows = rows[rows[:, -1] < count]
+    gaps = np.diff(picked(times, rows.ravel()).reshape(rows.shape), axis=1).max(axis=1, initial=0.0)
+    return np.asarray(rows[gaps * rate < RESOLVED])
+
+
 def row_defects(equations: FromStates, times: np.ndarray, states: RowStates, rows: np.ndarray) -> RowDefects:
     """Defects from some rows to the next ones; ``states`` are the trajectory's."""
     ends = ends_of(equations, states[rows], picked(times, rows), picked(times, rows + 1))
@@ -94,18 +114,14 @@ def window_defects(
     Args:
         rate: of the motion, rad/s.
     """
-    spacing = usual_step(times)
-    count = len(times)
-    stride = max(1, round(_WINDOW / (max(rate, 1e-300) * spacing * _PARTS)))
-    stride = min(stride, (count - 1) // _PARTS)
-    parts = _PARTS if stride else count - 1
-    stride = max(stride, 1)
-    while parts > 2 and parts * stride * spacing * rate > _COARSEST / 2:
-        parts -= 1
-    if parts < 2:
-        return None
-    starts = np.unique(np.linspace(0, count - 1 - parts * stride, most).astype(int))
-    found = [_one(equations, times, states, n + stride * np.arange(parts + 1)) for n in starts]
+    for parts in range(_PARTS, 1, -1):
+        windows = windows_of_rows(times, rate, _WINDOW, parts, most)
+        if parts > 2:
+            ends = picked(times, windows[:, -1]) - picked(times, windows[:, 0])
+            windows = windows[ends * rate < RESOLVED]
+        if len(windows) >= _ENOUGH * min(most, len(times) - parts):
+            break
+    found = [_one(equations, times, states, rows) for rows in windows]
     kept = [x for x in found if x is not None]
     if not kept:
         return None
@@ -135,6 +151,8 @@ def _one(
     places = (times[rows[1:]] - times[rows[0]]) / length
     powers = np.arange(1, len(places) + 1)
     weights = np.linalg.solve(places[None, :] ** powers[:, None], 1.0 / (powers + 1))
+    if np.abs(weights).sum() > _STEEP:
+        return None
     return theta[-1], length * weights @ along, apart[-1], float(length)
 
 
@@ -143,21 +161,3 @@ def _apart(equations: FromStates, theirs: np.ndarray, reference: np.ndarray) -> 
     one, other = equations.attitude(reference), equations.attitude(theirs)
     turn = multiplied(normalised(other[0]), conjugated(normalised(one[0])))
     return vector_of(turn), other[1] - one[1]
-
-
-def shot_rates(equations: FromStates, times: np.ndarray, states: RowStates, rows: np.ndarray) -> np.ndarray:
-    """Rates (rows, 3) with which the equations lead from the attitude of each row to that of the next: for
-    trajectories without rates, from the mean rate between the rows on, by three corrections.
-    """
-    here, there = picked(states.quaternions, rows), picked(states.quaternions, rows + 1)
-    near, own = picked(states.rates, rows), states[rows]
-    begin, end = picked(times, rows), picked(times, rows + 1)
-    spacing = end - begin
-    mean = vector_of(multiplied(conjugated(here), there)) / spacing[:, None]
-    fast = np.linalg.norm(near, axis=1) * spacing > np.pi * 0.8
-    rates = np.where(fast[:, None], near, mean)
-    for _ in range(4):
-        ends = ends_of(equations, equations.states(own, here, rates), begin, end)
-        reached, _ = equations.attitude(ends)
-        rates = rates + vector_of(multiplied(conjugated(reached), there)) / spacing[:, None]
-    return np.asarray(rates)

@@ -6,7 +6,7 @@ it, whatever acts on the body and whatever its moments are. A constant turn of t
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -36,12 +36,12 @@ class Turning:
     rates: RateReading
 
 
-def turning_readings(given: Attitudes, second: float, *, signs: bool) -> list[Turning]:
+def turning_readings(given: Attitudes, second: float) -> list[Turning]:
     """The readings that obey kinematics about equally well, the plainest first; none where rows are too far
     apart to tell, or where none does.
 
     Args:
-        second: s, the trajectory's unit of time. signs: whether rates may have the other sign.
+        second: s, the trajectory's unit of time.
     """
     if given.rates is None:
         return []
@@ -61,9 +61,8 @@ def turning_readings(given: Attitudes, second: float, *, signs: bool) -> list[Tu
         for plain in possible_rates(given):
             mean = (plain.rates(here.rates, found, before) + plain.rates(there.rates, found, after)) / 2
             size = float(np.linalg.norm(mean, axis=1).mean()) or 1.0
-            for negative in (False, True) if signs else (False,):
-                apart = np.linalg.norm(turns / steps - (-mean if negative else mean), axis=1) / size
-                mismatch = float(np.mean(np.log(apart + _LEAST)))
-                tried.append(Turning(mismatch, reading, replace(plain, negative=negative)))
+            apart = np.linalg.norm(turns / steps - mean, axis=1) / size
+            mismatch = float(np.mean(np.log(apart + _LEAST)))
+            tried.append(Turning(mismatch, reading, plain))
     best = min((one.mismatch for one in tried), default=0.0)
     return [one for one in tried if one.mismatch <= best + _ALIKE] if best < _GOOD else []

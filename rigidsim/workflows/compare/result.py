@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 AGREES, INTEGRATION_ERROR, WRONG_MODEL, UNDECIDED = "agrees", "integration_error", "wrong_model", "undecided"
+INCONSISTENT_RATES = "inconsistent_rates"
 
 
 class AttitudeError(SummaryPart):
@@ -33,7 +34,7 @@ class FoundConvention(SummaryPart):
     """How the trajectory is written.
 
     Attributes:
-        order: of quaternions, "wxyz" or "xyzw"; empty for others.
+        order: of a quaternion's columns in the file, "wxyz" or "xyzw"; empty for others.
         direction: "body_to_space" or "space_to_body": what its attitude takes vectors from and to.
         sequence: of Euler angles, with ``about`` "body" or "fixed" axes; empty for others.
         unit: of Euler angles. time_unit, rate_unit, rate_axes: of times and rates; empty without rates.
@@ -51,7 +52,6 @@ class FoundConvention(SummaryPart):
     time_unit: str
     rate_unit: str
     rate_axes: str
-    rate_sign: str
     offset: str
     offset_angle: float
     offset_quaternion: list[float]
@@ -75,7 +75,7 @@ class LocalDefects(SummaryPart):
         rows: number of rows that were started from.
         window_s: length of the windows that models are told from integrators by.
         unexplained: of the windows' attitude defects, rms of what differences of the rates don't explain
-            over rms of what they do.
+            over rms of what they do; without rates of what no added acceleration explains over all.
         missing_acceleration: rms, rad/s^2, that would explain the rates' defects, or the attitude's where
             the trajectory has no rates.
         order: of the tool's method, and step_tolerance: rad, that errors of its steps are held to, if rows
@@ -105,7 +105,7 @@ class Comparison(SummaryPart):
     """A trajectory of another tool beside an experiment.
 
     Attributes:
-        verdict: agrees, integration_error, wrong_model or undecided.
+        verdict: agrees, integration_error, wrong_model, inconsistent_rates or undecided.
         why: the verdict in words, with the numbers that it was given for.
         within: rad, what attitudes may differ by and agree.
         resolution: rad, of the trajectory's attitudes by the digits that they are written in.

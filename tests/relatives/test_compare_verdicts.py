@@ -1,0 +1,65 @@
+"""Files of other tools are judged rightly, with rates and without, at even and uneven rows.
+
+The truth is SciPy's DOP853 at 3e-14 over equations written in ``experiments/compare_conventions.py``.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from support import seeds
+
+import rigidsim
+from experiments.compare_conventions import NEAR, a_mixed_file
+from rigidsim.errors import RigidsimError
+
+
+@pytest.mark.parametrize("seed", seeds(3, 60))
+def test_no_verdict_is_false(seed: int) -> None:
+    one = a_mixed_file(seed)
+    assert not one.wrong, (one.label, one.way, one.found.why)
+    assert one.widest > NEAR or one.found.verdict != "undecided", (one.label, one.way, one.found.why)
+
+
+SPIN = """
+name = "spin"
+[body]
+principal_moments = [10, 14, 19]
+[initial]
+angular_velocity = [0, 0, -0.03]
+[time]
+end = 1400
+"""
+
+
+def spinning(rate: float, step: float) -> dict[str, np.ndarray]:
+    """A spin about z in closed form."""
+    times = np.arange(0, 1400.1, step)
+    half, none = rate * times / 2, 0 * times
+    quaternion = {"qx": none, "qy": none, "qz": np.sin(half), "qw": np.cos(half)}
+    return {"t": times, **quaternion, "wx": none, "wy": none, "wz": none + rate}
+
+
+def test_aliased_rows_do_not_agree() -> None:
+    """A whole turn more from row to row gives the same attitudes."""
+    other = spinning(2 * np.pi / 14 - 0.03, 14.0)
+    experiment = rigidsim.parse(SPIN)
+    found = rigidsim.compare(experiment, other)
+    assert found.attitude_error.largest < 1e-9
+    assert found.verdict == "undecided"
+    assert "other motions have the same rows" in found.why
+    assert rigidsim.compare(experiment, spinning(-0.03, 14.0)).verdict == "agrees"
+
+
+def test_the_order_of_columns_is_said() -> None:
+    assert rigidsim.compare(rigidsim.parse(SPIN), spinning(-0.03, 14.0)).convention.order == "xyzw"
+
+
+@pytest.mark.parametrize("zero", [1.7e9, 1.7e12, -1e9])
+def test_times_counted_from_another_zero_are_refused_with_the_shift(zero: float) -> None:
+    table = spinning(-0.03, 14.0)
+    table["t"] = table["t"] + zero
+    with pytest.raises(
+        RigidsimError, match=rf"another zero .*subtract {zero:.15g} from each time".replace("+", r"\+")
+    ):
+        rigidsim.compare(rigidsim.parse(SPIN), table)
