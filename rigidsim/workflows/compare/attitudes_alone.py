@@ -36,7 +36,7 @@ _NOTHING = 1e-8  # of the effect of the largest change, by differences in double
 _SPARE = 1.5  # times as many numbers as are fitted have to be there
 _PROGRESS = 4.0  # of the sum of squares, below which a further iteration is none
 _EXPLAINED = 1e-4  # share of the defects that is nothing
-_RANKS = (1e-7, 1e-5, 1e-3)  # of singular values, below which changes can't be told apart
+_RANKS = (1e-4, 1e-3, 1e-2)  # of singular values, of which derivatives by differences leave 1e-5
 
 
 @dataclass

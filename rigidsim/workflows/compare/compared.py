@@ -159,7 +159,7 @@ class _Judging:
         steps = self._steps(times, own, rates)
         rate = defects.motion_rate(times, own.rates)
         largest_error, turn = largest(errors), float(np.median(steps))
-        floor, reason = max(within, 4 * attitude_noise, 3 * own.uncertainty), ""
+        floor = max(within, 4 * attitude_noise, 3 * own.uncertainty)
         reason = f"the attitude error is within {floor:.2g} rad everywhere"
         rounded = None if largest_error <= floor else self._rounded_times(times, own, theirs, floor)
         seen = Evidence(
@@ -178,8 +178,8 @@ class _Judging:
         verdict, why = agreement(seen) or self._judged(seen, known)
         local = None if known is None else known.local
         if known is not None and local is not None and verdict == INTEGRATION_ERROR and rates is not None:
-            steps = own_steps(known.intervals, dataset["defect"].values, attitude_noise)
-            local = local.having(order=steps.order, step_tolerance=steps.tolerance)
+            own_step = own_steps(known.intervals, dataset["defect"].values, attitude_noise)
+            local = local.having(order=own_step.order, step_tolerance=own_step.tolerance)
         if rate_errors is not None:
             dataset["rate_error"] = (
                 "time",
