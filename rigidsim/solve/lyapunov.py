@@ -146,7 +146,7 @@ def _following(
         return found[:angles], found[angles:]
 
     here = plain()
-    turned = Turned.by(*here, done.parameters) if done.number else Turned.begun(system, *here)
+    turned = Turned.by(*here, done.parameters.tolist()) if done.number else Turned.begun(system, *here)
 
     def follow(_: TaylorEngine) -> bool:
         nonlocal turned

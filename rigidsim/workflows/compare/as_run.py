@@ -167,7 +167,7 @@ def _read(given: Attitudes, second: float) -> tuple[Reading, RateReading | None,
     if given.trajectory.settled:
         return (
             Reading("wxyz"),
-            RateReading("deg/s", "body", False),
+            RateReading("deg/s", "body"),
             [*told, "attitude and rates were taken between the frames that the file names"],
         )
     if given.time_unit is None:

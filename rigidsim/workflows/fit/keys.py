@@ -11,7 +11,7 @@ import numpy as np
 
 from rigidsim.errors import ConfigError, Problem
 from rigidsim.scene.config import Experiment, validated
-from rigidsim.scene.exact import Quantity, parse_number, parse_quantity
+from rigidsim.scene.exact import ExactNumber, Quantity, parse_number, parse_quantity
 from rigidsim.scene.fit_table import KnownWithin
 from rigidsim.scene.row_rotations import multiplied, of_vector
 from rigidsim.scene.scene import Scene, build_scene
@@ -182,9 +182,12 @@ def _given(sigmas: Mapping[str, KnownWithin], varied: VariedKey, key: str, index
 def _sigma(given: Any, varied: VariedKey, parameter: Any) -> float:
     """A standard deviation in SI, of a key or of a parameter."""
     anything = varied.name.startswith(("parameters", "states")) and varied.unit == "1"
-    number = parse_quantity(given) if anything else parse_number(given, varied.unit)
-    both = isinstance(number, Quantity) and isinstance(parameter, Quantity)
-    if both and powers(number.unit) != powers(parameter.unit):
+    number: ExactNumber = parse_quantity(given) if anything else parse_number(given, varied.unit)
+    if (
+        isinstance(number, Quantity)
+        and isinstance(parameter, Quantity)
+        and powers(number.unit) != powers(parameter.unit)
+    ):
         raise ValueError(f"given {shown(given)}, where {parameter.unit}, the parameter's unit, is needed")
     if not float(number) > 0:
         raise ValueError(f"given {shown(given)} as sigma; a standard deviation above zero is allowed")
