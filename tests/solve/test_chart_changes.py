@@ -5,13 +5,12 @@ asked for, continuous and as accurate as a quaternion's.
 from __future__ import annotations
 
 import math
-from pathlib import Path
+from itertools import product
 
 import numpy as np
 import pytest
 from support import angle_between, cases, law, run_text, same_bits, wide
 
-from rigidsim import resume
 from rigidsim.scene.fields import EULER_SEQUENCES
 from rigidsim.scene.rotations import AXES
 from rigidsim.session.session import Tuning
@@ -57,12 +56,6 @@ def attitude_from(sequence: str, angles: np.ndarray) -> np.ndarray:
     return result
 
 
-# --- the two charts ---------------------------------------------------------------------------------------
-
-
-# --- runs -------------------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("sequence", cases(EULER_SEQUENCES, ("zxz", "xyz")))
 def test_a_tumbling_body_keeps_its_attitude_in_each_sequence(sequence: str) -> None:
     text = tumbling(sequence)
@@ -94,7 +87,7 @@ def test_a_tumbling_body_keeps_its_attitude_in_each_sequence(sequence: str) -> N
     assert (np.abs(np.diff(np.rint(turns), axis=0))[~lost] == 0).all()
 
 
-@pytest.mark.parametrize("sequence", cases(EULER_SEQUENCES, ("zxz", "xyz", "yxy")))
+@pytest.mark.parametrize("sequence", cases(EULER_SEQUENCES, ("xyz",)))
 def test_a_run_may_start_in_the_singularity(sequence: str) -> None:
     start = f'euler_angles = [0.4, "{pole(sequence)}", 0.3]'
     run = run_text(tumbling(sequence, start, "end = 20\nsamples = 2001"), EULER, RECORD, estimate=True)
@@ -113,10 +106,14 @@ def test_a_run_may_start_in_the_singularity(sequence: str) -> None:
     assert (np.einsum("ij,ij->i", found[1:], found[:-1]) > 0.99).all()
 
 
-@pytest.mark.parametrize("offset", cases(["0", "1e-16", "1e-12", "1e-9"], ["0", "1e-12"]))
-@pytest.mark.parametrize("sequence", ["zxz", "zyx"])
-def test_a_pass_that_no_sampling_shows_goes_straight_through(sequence: str, offset: str) -> None:
+@pytest.mark.parametrize(
+    "case",
+    cases(product(["zxz", "zyx"], ["0", "1e-16", "1e-12", "1e-9"]), [("zyx", "0"), ("zxz", "1e-12")]),
+    ids="-".join,
+)
+def test_a_pass_that_no_sampling_shows_goes_straight_through(case: tuple[str, str]) -> None:
     """A body that spins about the line of nodes: the middle angle grows like t through 16 singularities."""
+    sequence, offset = case
     rates = [float(axis == sequence[1]) for axis in AXES]
     text = f"""
 name = "straight"
@@ -155,43 +152,14 @@ DRIVES = {
 }
 
 
-@pytest.mark.parametrize(
-    "time",
-    cases(["end = 60\nsamples = 301", "end = 200\nsamples = 4"], ["end = 200\nsamples = 4"]),
-    ids=["dense", "sparse"],
-)
-@pytest.mark.parametrize("sequence", ["zxz"])
-def test_the_bits_do_not_depend_on_how_it_is_driven(sequence: str, time: str) -> None:
-    text = tumbling(sequence, time=time)
+def test_the_bits_do_not_depend_on_how_it_is_driven() -> None:
+    text = tumbling("zxz", time="end = 200\nsamples = 4")
     plain = run_text(text, 'name="plain"', EULER)
     assert plain.summary["chart_changes"]["count"] > 10
     for pacing in DRIVES.values():
         driven = run_text(text, EULER, tuning=Tuning(pacing))
         same_bits(plain, driven)
         assert driven.summary["chart_changes"] == plain.summary["chart_changes"]
-
-
-@pytest.mark.parametrize("precision", cases(["double", "quadruple"], ["double"]))
-def test_a_resumed_run_has_the_same_bits(precision: str, runs: Path) -> None:
-    """Stopped after each few steps, in either chart."""
-    end = "end = 30\nsamples = 151" if precision == "double" else "end = 12\nsamples = 61"
-    steps = 13 if precision == "double" else 4
-    text = tumbling("zxz", time=end)
-    settings = [EULER, f'integrator.precision="{precision}"']
-    whole = run_text(text, 'name="whole"', *settings, out=runs)
-    every_step = Tuning(Pacing(chunk_seconds=0.0))  # a look at the guards after each
-    run = run_text(text, 'name="parts"', *settings, "limits.max_steps=7", tuning=every_step, out=runs)
-    sessions = 1
-    while run.status != "finished":
-        taken = run.summary["cost"]["steps"]
-        guard = f"limits.max_steps={5 + steps * (sessions % 5)}"
-        run = resume(run.folder.path, overrides=[guard], tuning=every_step)
-        assert run.summary["cost"]["steps"] > taken
-        sessions += 1
-    assert sessions > 3
-    same_bits(whole, run)
-    assert run.summary["chart_changes"] == whole.summary["chart_changes"]
-    assert whole.summary["chart_changes"]["count"] > 2
 
 
 def test_events_are_found_in_both_charts() -> None:

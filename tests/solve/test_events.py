@@ -3,19 +3,16 @@
 from __future__ import annotations
 
 import math
-from io import StringIO
 from itertools import pairwise
 from pathlib import Path
 
 import mpmath
 import numpy as np
 import pytest
-from rich.console import Console
 from support import EPSILON, amplification, angle_between, cases, config, law, run_text, wide
 
 import rigidsim
 from rigidsim import ConfigError
-from rigidsim.cli.screens.summary import print_summary
 from rigidsim.session.session import Tuning
 from rigidsim.solve.sampler import Pacing
 from rigidsim.solve.solvers.taylor.ways import Ways
@@ -54,10 +51,11 @@ def flip_interval() -> mpmath.mpf:
 
 @pytest.mark.parametrize(
     ("precision", "epsilon"),
-    [("double", 2.0**-52), pytest.param("quadruple", 2.0**-112, marks=pytest.mark.slow)],
+    [("double", 2.0**-52), pytest.param("quadruple", 2.0**-112, marks=pytest.mark.campaign)],
 )
 def test_flips_come_at_the_interval_of_the_closed_form(precision: str, epsilon: float) -> None:
-    run = run_text(FLIPS.format(samples=11) + FLIP, f'integrator.precision="{precision}"')
+    both = FLIP + FLIP.replace('"flip"', '"down"') + 'direction = "down"\n'
+    run = run_text(FLIPS.format(samples=11) + both, f'integrator.precision="{precision}"')
     names = [n for n in ("flip_time", "flip_time_lo", "flip_time_lo2") if n in run.dataset]
     with mpmath.workdps(50):
         times = [
@@ -72,20 +70,12 @@ def test_flips_come_at_the_interval_of_the_closed_form(precision: str, epsilon: 
         assert max(abs(x - flip_interval()) for x in intervals) < allowed
     # at the crossing the rate is zero to the rounding of its dense output
     assert np.abs(run.dataset["flip_angular_velocity"].values[:, 1]).max() < 100 * epsilon
-    assert run.summary["events"] == {"flip": len(times)}
-
-
-def test_directions_alternate() -> None:
-    both = FLIP + FLIP.replace('"flip"', '"down"') + 'direction = "down"\n'
-    run = run_text(FLIPS.format(samples=11) + both)
+    assert run.summary["events"] == {"flip": len(times), "down": (len(times) + 1) // 2}
     assert np.array_equal(run.dataset["down_time"], run.dataset["flip_time"][::2])
 
 
-@pytest.mark.parametrize(
-    "formulation", cases(["quaternion", "euler_angles", "rotation_matrix"], ["euler_angles"])
-)
-def test_events_do_not_depend_on_the_samples_or_on_how_the_run_is_driven(formulation: str) -> None:
-    setting = f'integrator.formulation="{formulation}"'
+def test_events_do_not_depend_on_the_samples_or_on_how_the_run_is_driven() -> None:
+    setting = 'integrator.formulation="euler_angles"'
     expected = run_text(FLIPS.format(samples=2001) + FLIP, setting).dataset.load()
     sparse = run_text(FLIPS.format(samples=3) + FLIP, setting, 'name="sparse"').dataset
     assert np.array_equal(expected["flip_time"], sparse["flip_time"])
@@ -113,7 +103,7 @@ def test_a_run_can_end_at_an_event() -> None:
 
 def test_a_coin_stops_when_it_lands(runs: Path) -> None:
     """Thrown up with 4 m/s from 0.2 m it lands at the root of its parabola; the time reached
-    is that of the event, to its last digit, wherever the engine's step ended, and people are told of it.
+    is that of the event, to its last digit, wherever the engine's step ended.
     """
     gravity, up, height = 10.0, 4.0, 0.2
     coin = config(
@@ -135,11 +125,6 @@ def test_a_coin_stops_when_it_lands(runs: Path) -> None:
         "summit": {"first": summit[0], "last": summit[0], "early": [summit[0]]},
     }
     assert run.summary["message"] == f"the run ended at an event, as asked: landed at {found:.9g} s"
-    printed = Console(width=200, record=True, file=StringIO())
-    print_summary(run.outcome, "here", printed)
-    said = [f"landed: 1, at {found:.9g} s", f"summit: 1, at {summit[0]:.9g} s", "never: 0"]
-    text = printed.export_text()
-    assert all(line in text for line in said)
 
 
 def test_events_read_attitude_position_and_time() -> None:
@@ -184,7 +169,6 @@ def test_events_read_attitude_position_and_time() -> None:
     [
         ('name = "a b"\nexpression = "wy"', "allowed: letters, digits and underscores"),
         ('name = "a"\nexpression = "x"', 'unknown name "x"'),
-        ('name = "a"\nexpression = "1 + 2"', "which never changes"),
         ('name = "a"\nexpression = "wy > 0"', "an event takes the difference"),
         ('name = "a"\nexpression = "wy"\naction = "halt"', "allowed: record, stop"),
         (
@@ -199,22 +183,22 @@ def test_bad_events_are_refused(event: str, message: str) -> None:
 
 
 @pytest.mark.parametrize("precision", cases(["double", "extended"], ["double"]))
-@pytest.mark.parametrize(("direction", "count"), [("down", 1), ("any", 1), ("up", 0)])
-def test_a_throw_from_the_ground_comes_down_within_the_first_step(
-    precision: str, direction: str, count: int
-) -> None:
+def test_a_throw_from_the_ground_comes_down_within_the_first_step(precision: str) -> None:
     """z = 3 t - g t^2 / 2 is zero at the start and at 6 / g; a body that hardly turns takes long steps."""
+    directions = {"down": 1, "any": 1, "up": 0}
     text = config(
         "principal_moments = [1, 1, 2]\nmass = 1",
         "angular_velocity = [0.1, 0, 0.1]\nposition = [0, 0, 0]\nvelocity = [0, 0, 3]",
         'kind = "uniform_gravity"\nacceleration = [0, 0, -9.75]',
         "end = 2\nsamples = 3",
         integrator=f'precision = "{precision}"',
-        more=f'[[events]]\nname = "ground"\nexpression = "z"\ndirection = "{direction}"\n',
+        more="".join(f'[[events]]\nname = "{d}"\nexpression = "z"\ndirection = "{d}"\n' for d in directions),
     )
-    times = run_text(text).dataset["ground_time"].values
-    assert len(times) == count
-    assert all(abs(times - 6 / 9.75) <= 4 * 2.0**-52)
+    data = run_text(text).dataset
+    for direction, count in directions.items():
+        times = data[f"{direction}_time"].values
+        assert len(times) == count
+        assert all(abs(times - 6 / 9.75) <= 4 * 2.0**-52)
 
 
 @pytest.mark.parametrize("precision", cases(["double", "extended"], ["double"]))

@@ -17,7 +17,6 @@ from rigidsim.model.kinematics import Kinematics
 from rigidsim.model.load import Load, Term
 from rigidsim.scene.sweeps.sweep import Sweep
 from rigidsim.session.verdict import Soundness, verdict_on
-from rigidsim.solve.problem import prepare
 from rigidsim.solve.projection import LATE
 from rigidsim.store import seal
 
@@ -37,10 +36,9 @@ def steps(run: rigidsim.Run) -> int:
     return int(run.summary["cost"]["steps"])
 
 
-@pytest.mark.parametrize("samples", [5, 5001])
-def test_a_run_of_fewer_steps_is_the_plain_one(samples: int) -> None:
+def test_a_run_of_fewer_steps_is_the_plain_one() -> None:
     end = 0.9 * LATE * STEP
-    plain, auto = (run_text(text(end, hold, samples=samples)) for hold in ("false", '"auto"'))
+    plain, auto = (run_text(text(end, hold)) for hold in ("false", '"auto"'))
     assert 0.8 * LATE < steps(auto) < LATE
     for name in ("quaternion", "angular_velocity", "energy", "energy_drift"):
         assert np.array_equal(bits(plain.dataset[name].values), bits(auto.dataset[name].values))
@@ -50,8 +48,7 @@ def test_a_run_of_fewer_steps_is_the_plain_one(samples: int) -> None:
     assert "hold_from_step" not in plain.dataset.attrs
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("formulation", cases(["quaternion", "euler_angles"], ["quaternion"]))
+@pytest.mark.parametrize("formulation", cases(["quaternion", "euler_angles"], []))
 def test_a_run_that_is_prolonged_past_the_count_is_the_run_in_one_go(
     formulation: str, tmp_path: Path
 ) -> None:
@@ -179,47 +176,14 @@ def test_the_guard_of_drifts_counts_what_was_put_back() -> None:
     assert stopped.dataset.sizes["time"] == int(np.argmax(past > limit)) + 1
 
 
-def test_where_nothing_can_be_held_it_means_nothing() -> None:
-    for load in (
-        'kind = "torque"\ncomponents = ["0.01*sin(t)", 0, 0]',
-        'kind = "gravity_gradient"\ngravitational_parameter = 1\n'
-        "orbit = {semi_major_axis = 1, eccentricity = 0.2, period = 7}",
-        'kind = "torque"\ncomponents = ["abs(wx)/9", 0, 0]',
-    ):
-        found = rigidsim.parse(
-            config(body=BODY, initial=SPIN, loads=load, output='record = ["angular_velocity"]',
-                   integrator='hold_invariants = "auto"', time="end = 1\nsamples = 2")
-        )  # fmt: skip
-        assert not prepare(found).holds_invariants
-    closed = text(10, '"auto"', more='method = "closed_form"')
-    assert not prepare(rigidsim.parse(closed)).holds_invariants
-
-
 DRIVEN = 'kind = "torque"\ncomponents = ["0.01*sin(t)", "0.02*cos(3*t)", 0]'
-TABLED = """kind = "gravity_gradient"
-gravitational_parameter = 1
-orbit = {table = "orbit.csv"}
-[tables."orbit.csv"]
-text = '''
-time, semi_major_axis, eccentricity, inclination, periapsis
--1000, 2, 0.1, 0.2, 0.0
-0, 2, 0.1, 0.2, 0.1
-1000, 2, 0.1, 0.2, 0.2
-2000, 2, 0.1, 0.2, 0.3
-3000, 2, 0.1, 0.2, 0.4
-4000, 2, 0.1, 0.2, 0.5
-5000, 2, 0.1, 0.2, 0.6
-6000, 2, 0.1, 0.2, 0.7
-'''
-"""
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("load", [DRIVEN, TABLED], ids=["of time", "by a table"])
-def test_equations_that_change_with_time_are_no_trouble(load: str) -> None:
+def test_equations_that_change_with_time_are_no_trouble() -> None:
     """The axial momentum of a symmetric body is kept whatever turns it across."""
     given = config(body="principal_moments = [1.1, 1.1, 0.7]", initial="angular_velocity = [0.1, 0.2, 3]",
-                   loads=load, time="end = 4000\nsamples = 5")  # fmt: skip
+                   loads=DRIVEN, time="end = 4000\nsamples = 5")  # fmt: skip
     plain, auto = (run_text(given, f"integrator.hold_invariants={hold}") for hold in ("false", '"auto"'))
     assert steps(auto) > 1.1 * LATE
     norm = auto.summary["invariants"]["quaternion_norm"]

@@ -56,9 +56,8 @@ def by_hand(times: np.ndarray, angle: float, rate: float) -> tuple[np.ndarray, n
     return *found, begin
 
 
-@pytest.mark.parametrize("torque", [PARKED, f"{RELAY}*sign(-2*psi) + {DRY}*sign(-wz)"])
-def test_swings_come_to_rest_where_and_when_they_do_by_hand(torque: str) -> None:
-    run = parked(torque)
+def test_swings_come_to_rest_where_and_when_they_do_by_hand() -> None:
+    run = parked(f"{RELAY}*sign(-2*psi) + {DRY}*sign(-wz)")
     assert run.status == "finished"
     times = run.dataset["time"].values
     angles, rates, over = by_hand(times, 0.5, 0.3)
@@ -74,7 +73,7 @@ def test_swings_come_to_rest_where_and_when_they_do_by_hand(torque: str) -> None
     assert (np.abs(psi[resting]) < 1e-30).all()
 
 
-@pytest.mark.parametrize("precision", cases(["extended", "quadruple", "single"], ["extended"]))
+@pytest.mark.parametrize("precision", cases(["extended", "quadruple", "single"], []))
 def test_they_do_in_all_precisions(precision: str) -> None:
     run = parked(PARKED, integrator=f'precision = "{precision}"')
     assert run.status == "finished"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from support import run_text
+from support import cases, run_text
 
 from experiments.sensitivity_campaign import BOUND, checked
 from experiments.sensitivity_scenes import case
@@ -56,17 +56,15 @@ def test_a_free_bodys_derivatives_obey_its_scaling_laws() -> None:
     assert np.abs(turned - np.eye(3)).max() < ROUNDING
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("number", range(100, 106))
+@pytest.mark.parametrize("number", cases(range(100, 106), []))
 def test_random_keys_and_scenes_agree_with_higher_precision(number: int) -> None:
     assert checked(case(number)).worst < BOUND
 
 
-@pytest.mark.parametrize(
-    "integrator",
-    ['formulation = "euler_angles"\nhold_invariants = true', 'precision = "extended"'],
-    ids=["charts and projection", "80 bits"],
-)
+WAYS = ['formulation = "euler_angles"\nhold_invariants = true', 'precision = "extended"']
+
+
+@pytest.mark.parametrize("integrator", cases(WAYS, WAYS[:1]), ids=["charts and projection", "80 bits"])
 def test_the_motions_bits_are_those_of_the_plain_run(integrator: str) -> None:
     """And the derivatives are those without a run, which begins nowhere anew."""
     text = FREE + f"[integrator]\n{integrator}\n"

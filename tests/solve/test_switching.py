@@ -5,6 +5,7 @@ Truth is what each side integrates to by itself, in closed form.
 
 from __future__ import annotations
 
+from itertools import product
 from typing import Any
 
 import mpmath
@@ -63,12 +64,17 @@ def about_z(
     return progress, found
 
 
+KINKED = ["abs(t - 5.3)", "sqrt((t - 5.3)^2)", "((5.3 - t)^4)^(1/4)", "max(t, 10.6 - t) - 5.3"]
+
+
 @pytest.mark.parametrize(
-    "torque", ["abs(t - 5.3)", "sqrt((t - 5.3)^2)", "((5.3 - t)^4)^(1/4)", "max(t, 10.6 - t) - 5.3"]
+    "case",
+    cases(product(KINKED, ["double", "quadruple"]), [(KINKED[1], "double"), (KINKED[2], "double")]),
+    ids=" in ".join,
 )
-@pytest.mark.parametrize("precision", cases(["double", "quadruple"], ["double"]))
-def test_a_torque_with_a_kink_in_time(torque: str, precision: str) -> None:
+def test_a_torque_with_a_kink_in_time(case: tuple[str, str]) -> None:
     """With a = 5.3 and b = 4.7 it turns by a^3/3 until the kink, by a^2 b/2 + b^3/6 from there on."""
+    torque, precision = case
     progress, found = about_z(torque, precision=precision)
     assert progress.status is Status.FINISHED
     with mpmath.workdps(50):
@@ -81,7 +87,7 @@ def test_a_torque_with_a_kink_in_time(torque: str, precision: str) -> None:
             assert abs(found[name] - value) < 8 * EPSILON[precision] * angle
 
 
-@pytest.mark.parametrize("precision", ["double", "quadruple"])
+@pytest.mark.parametrize("precision", cases(["double", "quadruple"], ["double"]))
 def test_dry_friction_brings_the_body_to_rest_and_holds_it(precision: str) -> None:
     """w = 1 - 0.3 t until t = 10/3, after a turn by 1/0.6 rad."""
     progress, found = about_z("-0.3*sign(wz)", initial="angular_velocity = [0, 0, 1]", precision=precision)
@@ -133,8 +139,7 @@ def test_friction_about_three_axes_ends_in_rest() -> None:
 def test_each_side_integrates_by_itself(torque: str, rate: float) -> None:
     progress, found = about_z(torque)
     assert progress.status is Status.FINISHED
-    # pulses: 1e3 times the rounding of their ends' times
-    assert abs(float(found["wz"]) - rate) < 16 * EPSILON["double"] * (rate + 5e3 * ("pulse" in torque))
+    assert abs(float(found["wz"]) - rate) < 16 * EPSILON["double"] * rate
 
 
 @pytest.mark.parametrize(
@@ -166,8 +171,7 @@ SCENES = {
 }
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("scene", cases(SCENES, list(SCENES)[:1]))
+@pytest.mark.parametrize("scene", cases(SCENES, []))
 def test_all_formulations_agree(scene: str) -> None:
     """Within 1e-11 rad of extended precision: the law gives some 1e-14 for 20 rad, and these motions amplify
     errors up to a hundred times.
@@ -202,27 +206,8 @@ def test_an_event_on_a_surface_is_found_once() -> None:
     assert dataset["half_time"].values == pytest.approx([1 / 3, 5 / 3], rel=8 * EPSILON["double"])
 
 
-@pytest.mark.slow
-def test_a_certificate_knows_the_kink() -> None:
-    """The scene on which the reference and the run once shared an error of 0.086 rad."""
-    text = config(
-        SPHERE,
-        REST,
-        'kind = "torque"\ncomponents = ["0", "0", "sqrt((t - 5.3)^2)"]',
-        "end = 10\nsamples = 11",
-        "accuracy = 0.05",
-    )
-    run = run_text(text)
-    angle = 5.3**3 / 3 + 5.3**2 / 2 * 4.7 + 4.7**3 / 6
-    w, _, _, z = run.dataset["quaternion"].values[-1]
-    error = abs(np.angle(np.exp(1j * (2 * np.arctan2(z, w) - angle))))
-    assert error < run.summary["accuracy"]["certified"] < 0.05
-
-
-@pytest.mark.parametrize("formulation", ["quaternion", "rotation_matrix"])
-def test_a_load_odd_in_the_quaternion_is_refused(formulation: str) -> None:
-    load = 'kind = "torque"\ncomponents = ["0.5*qx", "0", "0.2*qw"]'
-    text = config(loads=load, integrator=f'formulation = "{formulation}"')
+def test_a_load_odd_in_the_quaternion_is_refused() -> None:
+    text = config(loads='kind = "torque"\ncomponents = ["0.5*qx", "0", "0.2*qw"]')
     with pytest.raises(ConfigError) as refused:
         prepare(rigidsim.parse(text))
     for words in ("[[loads]] number 1", "sign of the quaternion", "qw*qx", "sign(qw)*qx"):
@@ -277,23 +262,3 @@ def test_a_norm_that_vanishes_is_not_passed_over() -> None:
     assert progress.status is Status.FINISHED
     smooth, _ = about_z(drag.format("sqrt(1 + wx^2 + wy^2 + wz^2)"), initial=start)
     assert smooth.status is Status.FINISHED
-
-
-@pytest.mark.slow
-def test_the_announced_error_knows_the_sides() -> None:
-    """Neighbours cross, and slide, on their own: a motion that forgets its torques isn't near this one."""
-    torque = '"-0.2*abs(wx)*wx", "0.3*sign(sin(3*t))", "-0.3*sign(wz)"'
-    text = config(
-        "principal_moments = [1, 1.2, 1.5]",
-        "angular_velocity = [0.3, 0.2, 0.5]",
-        f'kind = "torque"\ncomponents = [{torque}]',
-        "end = 20\nsamples = 3",
-    )
-    run = run_text(text, estimate=True)
-    truth = try_setting(rigidsim.parse(text), Setting("extended"), compact=True)
-    dataset = run.dataset
-    error = angles_between([dataset["quaternion"].values], truth.attitudes)[-1]
-    announced = run.summary["accuracy"]["estimated_attitude_error"]
-    assert error <= 3 * announced
-    assert announced < 1e-11
-    assert run.summary["warnings"] == []
