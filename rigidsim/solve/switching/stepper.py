@@ -131,7 +131,7 @@ class SwitchingStepper(SurfaceRoots):
         """Bound of a step just taken within which turns can be continued: series of many terms go far."""
         if not self._probe.unturned:
             return math.inf
-        pars = self._integrator.pars[: self.system.parameters]
+        pars = self._pars(self._probe.unturned)  # those of the engine are fewer where it slides
         after = np.array(self.state), self.time
         rates = [self._probe.rate(*there, pars) for there in ((before, time), after)]
         return MOST / max(sum(rates) / 2, 1e-300)
