@@ -7,27 +7,10 @@ import xarray
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-import rigidsim
 from rigidsim.accuracy.bench.dataset import advice
 from rigidsim.accuracy.bench.measure import RowStatus
-from rigidsim.accuracy.bench.plan import make_plan
 
-FREE = """
-name = "free"
-[body]
-principal_moments = [1, 2, 3]
-[initial]
-angular_velocity = [0.5, 0.25, 1]
-euler_angles = [0.2, 1.1, 0.7]
-[time]
-end = {end}
-samples = 11
-"""
 EPSILON = 2.0**-52
-
-
-def free(end: float = 100.0, text: str = FREE) -> rigidsim.Experiment:
-    return rigidsim.parse(text.format(end=end))
 
 
 def made_up(error: list[float], cost: list[float], status: list[str]) -> xarray.Dataset:
@@ -74,14 +57,3 @@ def test_the_advice_is_the_cheapest_that_keeps_the_accuracy(points: list[tuple[f
             assert row.error <= allowed
             assert row.less == (not full)
             assert row.cost == min(full or short)
-
-
-def test_of_a_long_motion_the_beginning_is_measured_and_that_is_said() -> None:
-    plan = make_plan(free(1e9), budget=20.0)
-    assert plan.part < 1e-3
-    assert plan.short < plan.part
-    assert plan.times[-1] <= 1e9 * plan.part
-    assert plan.times[plan.short_count - 1] <= 1e9 * plan.short
-    whole = make_plan(free(10.0), budget=20.0)
-    assert whole.part == whole.short == 1.0
-    assert whole.times[-1] == 10.0

@@ -59,9 +59,8 @@ class Slow(Observer):
         self.told.append(f"{title}: {fraction:.0%}")
 
 
-@pytest.mark.slow
 def test_choosing_and_certifying_are_in_the_cpu_seconds(tmp_path: Path) -> None:
-    slow, of = Slow(0.5), scene("integrator.accuracy=1e-9")
+    slow, of = Slow(0.2), scene("integrator.accuracy=1e-9")
     began = time.process_time()
     run = rigidsim.run(of, out=tmp_path, observer=slow)
     everything = time.process_time() - began
@@ -69,35 +68,16 @@ def test_choosing_and_certifying_are_in_the_cpu_seconds(tmp_path: Path) -> None:
     by_phase = cost["cpu_by_phase"]
     assert list(by_phase) == ["choose", "build", "integrate_and_record", "estimate", "dataset", "certify"]
     assert set(by_phase) == set(cost["seconds"]) - {"engine"}
-    assert min(by_phase["choose"], by_phase["certify"]) > 0.5
+    assert min(by_phase["choose"], by_phase["certify"]) > 0.2
     # what is neither: reading the clocks, and writing the summary twice
     assert sum(by_phase.values()) == pytest.approx(cost["cpu_seconds"], abs=0.1)
     assert cost["cpu_seconds"] == pytest.approx(everything, abs=0.1)
-    assert cost["wall_seconds"] > 1.0
+    assert cost["wall_seconds"] > 0.4
     assert slow.told[0] == "choosing free"
     assert any(told.startswith("double") for told in slow.told[1 : slow.told.index("integrate")])
     assert any(told.startswith("extended") for told in slow.told[slow.told.index("certify") :])
-
-
-def test_the_summary_table_tells_of_each_phase(tmp_path: Path) -> None:
-    run = rigidsim.run(scene("integrator.accuracy=1e-9"), out=tmp_path)
     out = io.StringIO()
     report.print_summary(run.outcome, "runs/free", Console(file=out, width=200))
     (line,) = [line for line in out.getvalue().splitlines() if line.startswith("CPU")]
     for phase in ("choose ", "build ", "integrate and record ", "dataset ", "certify "):
         assert phase in line
-
-
-@pytest.mark.slow
-def test_an_interrupted_run_remembers_what_choosing_took(tmp_path: Path) -> None:
-    run = rigidsim.run(
-        scene("integrator.accuracy=1e-9", "time.end=4000", "limits.max_steps=500"),
-        out=tmp_path,
-        observer=Slow(1.0),
-    )
-    assert run.status == "stopped: max_steps"
-    resumed = rigidsim.resume(run.folder.path, overrides=["limits.max_steps=1000000"])
-    cost = resumed.summary["cost"]
-    assert "choose" not in cost["cpu_by_phase"]  # nothing was chosen in this session
-    assert cost["cpu_by_phase"]["certify"] > 0
-    assert cost["cpu_seconds"] > 1.0  # of all sessions

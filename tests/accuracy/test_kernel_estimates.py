@@ -4,16 +4,11 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
 import pytest
 from support import angle_between, assert_announced, loaded, run_estimated, run_text
 
-import rigidsim
-from rigidsim.solve.problem import prepare
 from rigidsim.solve.shadow import carriers
-from rigidsim.solve.shadow.ensemble import PERTURBED
 
-DAY = 86400.0
 MOON = """
 name = "moon"
 [body]
@@ -150,51 +145,3 @@ def test_motions_are_followed_side_by_side_in_long_stretches(
     assert sum(noted["together"]) < 2 * steps
     assert len(noted["together"]) < 50
     assert run.summary["accuracy"]["estimated_how"].endswith("over the run")
-
-
-@pytest.mark.slow
-def test_a_long_run_is_followed_in_windows(noted: dict[str, list[float]]) -> None:
-    run = run_estimated(TUMBLING.format(days=2000))
-    steps, accuracy = run.summary["cost"]["steps"], run.summary["accuracy"]
-    assert steps > 80_000
-    assert "windows" in accuracy["estimated_how"]
-    assert len(noted["compiled"]) == 1
-    assert not noted["alone"]
-    assert sum(noted["together"]) < steps / 2
-
-
-def test_a_short_run_compiles_nothing(noted: dict[str, list[float]]) -> None:
-    run_estimated(MOON.format(core="", days=100))
-    assert not noted["compiled"]
-    assert sum(noted["alone"]) > 0
-
-
-def test_code_compiled_for_shadows_goes_through_the_blocks_as_the_run_does() -> None:
-    """From the start to the end in one stretch, with clocks that differ: the run's own motion."""
-    text = MOON.format(core="", days=400)
-    prepared = prepare(rigidsim.parse(text))
-    system = prepared.system
-    carrier = carriers.BatchCarrier(system, 1000, carriers.TIGHT)
-    initial = np.array([float(x) for x in system.initial])
-    states = np.repeat(initial[:, None, None], 1 + PERTURBED, axis=2)
-    late = 1e-9 * np.arange(1 + PERTURBED)[None]
-    begin, end = (np.full((1, 1), float(x)) + late for x in (prepared.clock.start, prepared.clock.at(200)))
-    moved, steps, reached = carrier.advance(np.zeros(1, dtype=int), states, begin, end, np.array([10_000]))
-    assert reached[0] == end[0, 0]
-    assert steps[0] >= 200
-    run = loaded(run_text(text))
-    places = [system.states.index(name) for name in ("qw", "qx", "qy", "qz")]
-    ours = moved[places, 0].T
-    theirs = np.repeat(run["quaternion"].values[-1:], 1 + PERTURBED, axis=0)
-    apart = angle_between(ours, theirs)
-    assert apart[0] < 1e-12
-    assert apart.max() < 1e-8  # who is late sees the Earth a little later
-
-
-def test_a_gravity_field_is_followed_in_long_stretches(noted: dict[str, list[float]]) -> None:
-    """Long expressions alone are no series of time, whose roundings last for four steps at most."""
-    field = 'mass = "7.3e22 kg"\ngravity_field = {radius = "1738 km", C = {"4,1" = -5.7e-6}}'
-    text = MOON.format(core=field, days=2000).replace('"earth"', '"earth"\ndegree = 4', 1)
-    assert prepare(rigidsim.parse(text)).system.wide
-    run_estimated(text)
-    assert len(noted["together"]) < 50

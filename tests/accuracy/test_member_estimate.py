@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from support import cases
 
 from experiments.sweep_coverage import KINDS, Found, found_of
 from rigidsim import parse
 from rigidsim.scene.sweeps.sweep import Sweep
 from rigidsim.session.members import MemberResults, warning_bits
-from rigidsim.solve.batch.lanes import BatchEngine
 from rigidsim.workflows.sweeps.members import run_members
 
 MEMBERS = 6
@@ -74,37 +74,7 @@ def test_a_member_whose_digits_are_gone_says_so() -> None:
     np.testing.assert_array_equal(warned > 0, gone)
 
 
-def test_a_lane_that_is_lost_takes_nobody_with_it(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Its error is as large as can be, and those beside it keep theirs."""
-    text = KINDS["free, short"].sweep("members", MEMBERS, 3).experiment.text
-    sweep = Sweep.of(parse(text))
-    whole = run_members(sweep, range(MEMBERS), ["final"]).kept
-    onward = BatchEngine.onward
-
-    def losing(engine: BatchEngine, most: int, states: np.ndarray, *rest: np.ndarray) -> tuple:
-        spoilt = states.copy()
-        # by rates alone: the second member's are known from its start
-        hit = np.abs(states[:3] - target[:, None]).max(axis=0) < 1e-6
-        spoilt[:, hit] = np.nan
-        return onward(engine, most, spoilt, *rest)
-
-    target = _first_rates(sweep, 1)
-    monkeypatch.setattr(BatchEngine, "onward", losing)
-    spoilt = run_members(sweep, range(MEMBERS), ["final"]).kept
-    expected = whole["attitude_error"].values.copy()
-    expected[1] = np.pi
-    np.testing.assert_array_equal(spoilt["attitude_error"].values, expected)
-
-
-def _first_rates(sweep: Sweep, member: int) -> np.ndarray:
-    from rigidsim.solve.batch.family import Families, Members
-
-    (_, numbers), *_ = Families(Members(sweep)).sort().groups
-    return np.asarray(numbers.initial[:3, numbers.members.tolist().index(member)])
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("kind", ["free", "satellites", "planar", "tops, asymmetric", "driven", "flights"])
+@pytest.mark.parametrize("kind", cases([*KINDS], [], daily=1))
 def test_announced_errors_are_true(kind: str) -> None:
     """As `experiments/sweep_coverage.py` has it, of few members: none may be more than ten times as wrong."""
     for _, found in found_of(kind, 16, 5):

@@ -42,13 +42,13 @@ def standard_errors(precision: str, tolerance: float | str, starts: int = STARTS
     return float(np.mean(errors) / (np.std(errors, ddof=1) / math.sqrt(starts)))
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 @pytest.mark.parametrize("precision", HORIZONS)
 def test_energy_errors_have_no_direction(precision: str) -> None:
     assert abs(standard_errors(precision, "auto")) < 3
 
 
-@pytest.mark.slow(35)
+@pytest.mark.campaign
 def test_at_a_tolerance_of_epsilon_they_had_one() -> None:
     """The same measurement sees what "auto" avoids; with more starts: rounding depends on the CPU."""
     assert standard_errors("single", EPSILON, 2 * STARTS) < -5

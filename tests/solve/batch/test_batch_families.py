@@ -5,9 +5,7 @@ from collections.abc import Sequence
 
 import heyoka as hy
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
-from support import config
+from support import cases, config
 
 from rigidsim import ConfigError, parse
 from rigidsim.scene.sweeps.sweep import Sweep
@@ -101,21 +99,20 @@ def _plain(expression: hy.expression) -> str:
     return re.sub(r"\(1\.0{16} \* (\w+)\)", r"\1", repr(hy.expression(expression)))
 
 
-@pytest.mark.parametrize(
-    ("text", "axes"),
-    [
-        (FREE, {"initial.angular_velocity[0]": (-2, 2), "body.principal_moments[1]": (1.6, 2.4)}),
-        (FREE, {"initial.angular_velocity[1]": (0.2, 0.9), "body.mass": (1, 9)}),
-        (ORBIT, {"loads[0].orbit.eccentricity": (0.01, 0.6), "loads[0].orbit.mean_anomaly": (0, 3)}),
-        (ORBIT, {"loads[0].gravitational_parameter": (0.5, 2), "initial.euler_angles[1]": (0.1, 3)}),
-        (PLANAR, {"initial.angular_velocity[2]": (0.5, 2), "initial.euler_angles[0]": (-3, 3)}),
-        (TOP, {"body.center_of_mass[2]": (0.1, 0.5), "body.principal_moments[2]": (0.3, 0.8)}),
-    ],
-)
-def test_members_have_the_numbers_of_their_own_builds(
-    text: str, axes: dict[str, tuple[float, float]]
-) -> None:
-    sweep = swept(text, {key: f"uniform = {list(span)}, count = 12" for key, span in axes.items()})
+SPANS = [
+    (FREE, {"initial.angular_velocity[0]": (-2, 2), "body.principal_moments[1]": (1.6, 2.4)}),
+    (FREE, {"initial.angular_velocity[1]": (0.2, 0.9), "body.mass": (1, 9)}),
+    (ORBIT, {"loads[0].orbit.eccentricity": (0.01, 0.6), "loads[0].orbit.mean_anomaly": (0, 3)}),
+    (ORBIT, {"loads[0].gravitational_parameter": (0.5, 2), "initial.euler_angles[1]": (0.1, 3)}),
+    (PLANAR, {"initial.angular_velocity[2]": (0.5, 2), "initial.euler_angles[0]": (-3, 3)}),
+    (TOP, {"body.center_of_mass[2]": (0.1, 0.5), "body.principal_moments[2]": (0.3, 0.8)}),
+]
+
+
+@pytest.mark.parametrize("number", cases(range(len(SPANS)), [0, 3, 4]))
+def test_members_have_the_numbers_of_their_own_builds(number: int) -> None:
+    text, axes = SPANS[number]
+    sweep = swept(text, {key: f"uniform = {list(span)}, count = 6" for key, span in axes.items()})
     families = assert_own_numbers(sweep)
     assert len(families.known) <= 6
     assert any(family.traced.parameters.nodes for family in families.known)
@@ -127,37 +124,6 @@ def test_members_met_later_have_the_numbers_of_their_own_builds() -> None:
     before = Families(Members(sweep, [4, 1]))
     before.sort()
     assert_own_numbers(sweep, known=before.known)
-
-
-@given(
-    st.lists(
-        st.sampled_from(["0", "1", "2.5", "1/3", "-0.7", "1e-9", "123456789012345678.125", "pi/4", "2^-30"]),
-        min_size=3,
-        max_size=3,
-    ),
-    st.sampled_from(["1", "1.5", "2", "2.5", "1.0000000000000000000001", "3.5", "1/3"]),
-)
-@settings(max_examples=6, deadline=None)
-def test_any_values_at_all(rates: list[str], moment: str) -> None:
-    other = ["0.1", "-1", "0.05"]
-    vectors = "[" + ", ".join(f"[{', '.join(repr(x) for x in v)}]" for v in (rates, other)) + "]"
-    axes = {
-        "initial.angular_velocity": f"values = {vectors}",
-        "body.principal_moments[1]": f'values = ["{moment}", "2"]',
-    }
-    sweep = swept(FREE, axes, mode="product")
-    found = Families(Members(sweep)).sort()
-    assert not found.alone
-    for member, error in found.refused.items():
-        with pytest.raises(ConfigError) as own:
-            prepare(sweep.experiment_of(member))
-        assert str(own.value) == str(error)
-    for family, numbers in found.groups:
-        for place, member in enumerate(numbers.members.tolist()):
-            own_problem = prepare(sweep.experiment_of(member))
-            start = [own_problem.precision.number(x) for x in own_problem.system.initial]
-            assert start == numbers.initial[:, place].tolist()
-            assert len(own_problem.system.states) == len(family.traced.system.states)
 
 
 def test_members_of_another_structure_are_another_family() -> None:
@@ -200,18 +166,3 @@ def test_what_a_batch_cannot_do_is_said(override: str, reason: Alone) -> None:
     assert batchable(parse(FREE), [key]) is None
     assert batchable(parse(FREE, overrides=[override]), [key]) is reason
     assert batchable(parse(FREE), ["time.end"]) is Alone.KEY
-
-
-def test_numbers_of_many_members_are_those_of_each_in_every_bit_of_the_scenes_arithmetic() -> None:
-    axes = {
-        "loads[0].orbit.eccentricity": "uniform = [0.01, 0.6], count = 3",
-        "loads[0].gravitational_parameter": "uniform = [1e-3, 1e9], count = 3",
-        "initial.euler_angles[1]": "uniform = [0.1, 3], count = 3",
-    }
-    families = Families(Members(swept(ORBIT, axes)))
-    for family, numbers in families.sort().groups:
-        graph = family.traced.graph  # whose values are those of the first member, worked out by mpmath
-        for node, value in enumerate(graph.values):
-            values, index = numbers.replay.number(node)
-            found = values if index is None else values[index[0]]
-            assert graph.context.mpf(str(found)) == value, graph.nodes[node]

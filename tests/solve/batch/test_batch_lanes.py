@@ -42,38 +42,19 @@ def by_member(blocks: list[BatchBlock]) -> dict[int, tuple[dict[str, np.ndarray]
     }
 
 
-@pytest.mark.parametrize(
-    ("text", "axes"),
-    [
-        (FREE, {"initial.angular_velocity[0]": (-2, 2), "body.principal_moments[1]": (1.6, 2.4)}),
-        pytest.param(
-            ORBIT,
-            {"loads[0].orbit.eccentricity": (0.01, 0.4), "initial.euler_angles[1]": (0.2, 1)},
-            marks=pytest.mark.slow,
-        ),
-        pytest.param(
-            PLANAR,
-            {"initial.angular_velocity[2]": (1.1, 2), "initial.euler_angles[0]": (-1, 1)},
-            marks=pytest.mark.slow,
-        ),
-        pytest.param(
-            TOP,
-            {"body.center_of_mass[2]": (0.1, 0.5), "initial.angular_velocity[2]": (3, 6)},
-            marks=pytest.mark.slow,
-        ),
-        pytest.param(
-            TORQUE,
-            {"parameters.k": (0.05, 0.2), "initial.angular_velocity[1]": (0.1, 0.5)},
-            marks=pytest.mark.slow,
-        ),
-        pytest.param(
-            FLIGHT,
-            {"initial.velocity[2]": (1, 5), "initial.angular_velocity[0]": (0.1, 1)},
-            marks=pytest.mark.slow,
-        ),
-    ],
-)
-def test_batches_agree_with_single_runs(text: str, axes: dict[str, tuple[float, float]]) -> None:
+SPANS = {
+    "free": (FREE, {"initial.angular_velocity[0]": (-2, 2), "body.principal_moments[1]": (1.6, 2.4)}),
+    "orbit": (ORBIT, {"loads[0].orbit.eccentricity": (0.01, 0.4), "initial.euler_angles[1]": (0.2, 1)}),
+    "planar": (PLANAR, {"initial.angular_velocity[2]": (1.1, 2), "initial.euler_angles[0]": (-1, 1)}),
+    "top": (TOP, {"body.center_of_mass[2]": (0.1, 0.5), "initial.angular_velocity[2]": (3, 6)}),
+    "torque": (TORQUE, {"parameters.k": (0.05, 0.2), "initial.angular_velocity[1]": (0.1, 0.5)}),
+    "flight": (FLIGHT, {"initial.velocity[2]": (1, 5), "initial.angular_velocity[0]": (0.1, 1)}),
+}
+
+
+@pytest.mark.parametrize("kind", cases(SPANS, ["free"]))
+def test_batches_agree_with_single_runs(kind: str) -> None:
+    text, axes = SPANS[kind]
     sweep = swept(text, {key: f"uniform = {list(span)}, count = 2" for key, span in axes.items()})
     found = by_member(blocks_of(sweep))
     assert sorted(found) == [0, 1]
@@ -108,14 +89,13 @@ def test_bits_depend_neither_on_neighbours_nor_on_place() -> None:
     assert np.abs(narrow[0][0]["quaternion"] - again[0][0]["quaternion"]).max() < 1e-11
 
 
-@pytest.mark.parametrize("samples", [3])
-def test_gaps_in_a_series_bound_the_steps_of_that_lane(samples: int) -> None:
+def test_gaps_in_a_series_bound_the_steps_of_that_lane() -> None:
     """From rest under k t, against the turn k t^3 / 6; every third lane turns already and isn't bounded."""
     text = config(
         "principal_moments = [1, 1, 1]",
         "angular_velocity = [0, 0, 0]",
         'kind = "torque"\ncomponents = ["0", "0", "k*t"]',
-        f"end = 4\nsamples = {samples}",
+        "end = 4\nsamples = 3",
         output='record = ["quaternion"]',
         more="[parameters]\nk = 0.1",
     )
