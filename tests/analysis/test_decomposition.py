@@ -99,18 +99,6 @@ def test_leading_lines_are_right_to_the_last_digit_and_faint_ones_are_found(real
     assert abs(found.sum.polynomial[1].real - 3) < 2e-15
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("real", [False, True])
-def test_beyond_double_precision_as_many_digits_are_right_as_samples_have(real: bool) -> None:
-    true = quasi_periodic(36000)
-    found = decompose(samples(true, real=real, parts=3), 10, 1, 1e-13)
-    rows = matched(found, true)
-    assert len(rows) == len(found.sum.frequencies) == 6
-    assert max(row[0] for row in rows[:5]) < 1e-28
-    assert max(row[1] for row in rows) < 1e-33
-    assert abs(found.sum.polynomial[1].real - 3) < 1e-32
-
-
 def test_rounded_sample_times_make_no_lines() -> None:
     # multiples of 0.1237 as doubles are off by a pattern of up to 1e-16 of the time: 1e-12 of a phase
     time = np.arange(60000) * 0.1237
@@ -159,13 +147,13 @@ def test_lines_that_are_too_close_are_announced() -> None:
 
 
 def test_errors_are_those_of_noise() -> None:
-    # the errors over what they are said to be have a standard deviation of 1 (60 draws: +-10 % each)
+    # the errors over what they are said to be have a standard deviation of 1 (40 draws: +-11 % each)
     rng = np.random.default_rng(7)
     count = 3000
     n = np.arange(count) - (count - 1) / 2
     clean = np.exp(2j * np.pi * 0.123456 * n) + 0.2 * np.exp(-2j * np.pi * 0.31 * n)
     pulls: list[tuple[float, float]] = []
-    for _ in range(30):
+    for _ in range(20):
         noise = 0.01 * (rng.standard_normal(count) + 1j * rng.standard_normal(count))
         values: Any = clean + noise
         found = decompose(SignalSamples(((values.real, values.imag),), False, 53, CONTEXT), 5, -1, 1e-12)
@@ -206,13 +194,9 @@ def folded(frequency: float, nyquist: float) -> float:
 
 
 @pytest.mark.parametrize("real", [False, True])
-def test_a_line_in_band_is_its_simplest_combination(real: bool) -> None:
+def test_a_line_is_its_simplest_combination_unfolded_through_the_known_frequencies(real: bool) -> None:
     found = label(2 * MONTH + NODE, 1e-12, KNOWN, math.pi, real=real)
     assert found == Label((0, 2, 1), "2 month + node", 0, ())
-
-
-@pytest.mark.parametrize("real", [False, True])
-def test_a_folded_line_is_unfolded_through_the_known_frequencies(real: bool) -> None:
     nyquist = math.pi / 20
     seen = folded(2 * MONTH, nyquist)
     found = label(abs(seen) if real else seen, 1e-12, KNOWN, nyquist, real=real)

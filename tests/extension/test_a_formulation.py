@@ -18,9 +18,7 @@ from typing import Any
 import heyoka as hy
 import numpy as np
 import pytest
-from killing import killed
-from scipy.integrate import solve_ivp
-from support import EPSILON, angle_between, config, law, loaded, run_text, same_bits, wide
+from support import EPSILON, angle_between, config, law, loaded, run_text, wide
 
 import rigidsim
 from rigidsim.model.formulations.formulation import Formulation, ModelPlan, formulates
@@ -148,33 +146,6 @@ def test_with_more_digits_it_is_as_much_nearer() -> None:
     assert wrong < 50 * law(EPSILON["extended"], 20, 2.0, 6.0)
 
 
-def test_it_is_the_motion_of_another_integrator() -> None:
-    """Euler's equations with gravity's torque, and quaternions, by scipy to 1e-11."""
-    moments, centre = np.array([1, 1.6, 2]), np.array([0.1, 0, 0.4])
-
-    def slopes(_: float, y: np.ndarray) -> np.ndarray:
-        rates, w, v = y[:3], y[3], y[4:]
-        down = 2 * (v * v[2] - w * np.cross(v, [0, 0, 1])) + (w * w - v @ v) * np.array([0, 0, 1])
-        torque = np.cross(centre, -down)
-        turning = (np.cross(moments * rates, rates) + torque) / moments
-        return np.array([*turning, -v @ rates / 2, *((w * rates + np.cross(v, rates)) / 2)])
-
-    data = loaded(run_text(text(end=10, samples=41)))
-    start = [0.3, 1.0, 0.5, *data["quaternion"].values[0]]
-    found = solve_ivp(slopes, (0, 10), start, "DOP853", data.time.values, rtol=1e-12, atol=1e-13)
-    assert angle_between(data["quaternion"].values, found.y[3:].T).max() < 1e-9
-    assert np.abs(data["angular_velocity"].values - found.y[:3].T).max() < 1e-9
-
-
-@pytest.mark.slow
-@pytest.mark.optimised  # as in the process that is killed
-def test_a_killed_run_resumes_bit_for_bit(tmp_path: Path) -> None:
-    given = text(end=20, samples=81)
-    done = rigidsim.resume(killed("test_a_formulation", given, tmp_path))
-    assert done.summary["cost"]["sessions"] == 2
-    same_bits(run_text(given), done)
-
-
 def test_sampling_changes_no_bit() -> None:
     few, many = (loaded(run_text(text(end=16, samples=samples))) for samples in (5, 257))
     assert (few["angular_velocity"].values == many["angular_velocity"].values[::64]).all()
@@ -182,13 +153,6 @@ def test_sampling_changes_no_bit() -> None:
         few["quaternion"].values / many["quaternion"].values[::64]
     )  # its sign is that of the sample before
     assert (np.abs(ratio) == 1).all()
-
-
-def test_plan_says_why_it_is_carried(tmp_path: Path) -> None:
-    plan = rigidsim.plan(rigidsim.parse(text()), out=tmp_path)
-    [why] = [row.why for row in plan.reasons if row.states == " ".join(SIGMA)]
-    assert 'formulation = "rodrigues" asks for it' in why
-    assert why.endswith(Rodrigues.why)
 
 
 def test_names_that_are_not_registered_are_refused() -> None:

@@ -13,8 +13,7 @@ import mpmath
 import numpy as np
 import pytest
 from equations import CLOSE, derivative
-from killing import killed
-from support import STARTS, assert_announced_from, config, run_text, same_bits, tried
+from support import STARTS, assert_announced_from, config, run_text, tried
 
 import rigidsim
 from rigidsim import ConfigError
@@ -120,18 +119,10 @@ def test_a_name_is_given_once_and_a_config_needs_keys() -> None:
 LONGER = config(loads=WIRE, time="end = 6\nsamples = 25")
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 def test_its_announced_errors_are_true() -> None:
     # true ones are some last bits of the attitude
     assert_announced_from(LONGER, STARTS, exact="quadruple", at_most=20)
-
-
-@pytest.mark.slow
-@pytest.mark.optimised  # as in the process that is killed
-def test_a_killed_run_resumes_bit_for_bit(tmp_path: Path) -> None:
-    done = rigidsim.resume(killed("test_a_load", LONGER, tmp_path))
-    assert done.summary["cost"]["sessions"] == 2
-    same_bits(run_text(LONGER), done)
 
 
 # --- loads that share an orbit ------------------------------------------------------------------------------
@@ -156,10 +147,6 @@ def test_two_loads_on_one_orbit_share_its_states() -> None:
     bound = 4 * 2.0**-52 * np.sqrt(one.steps) * 10 * float(mpmath.norm([0.3, 1.0, 0.5]))
     chord = np.abs(two.attitudes[0] - one.attitudes[0]).max()
     assert chord <= bound
-
-
-def test_loads_on_different_orbits_do_not() -> None:
-    other = ORBIT.replace("inclination = 0.3", "inclination = 0.4")
-    text = config(loads=[gradient("3/4"), gradient("5/4", other)])
-    states = prepare(rigidsim.parse(text)).system.states
+    other = gradient("5/4", ORBIT.replace("inclination = 0.3", "inclination = 0.4"))
+    states = prepare(rigidsim.parse(config(loads=[gradient("3/4"), other]))).system.states
     assert [name for name in states if name.startswith("cos_anomaly")] == ["cos_anomaly1", "cos_anomaly2"]

@@ -7,15 +7,12 @@ resumed as with rigidsim's own.
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from killing import killed
-from support import config, loaded, run_text, same_bits
+from support import config, loaded, run_text
 
-import rigidsim
 from rigidsim import ConfigError
 from rigidsim.model.kinematics import Kinematics
 from rigidsim.scene.attitude import rotation_matrix
@@ -63,11 +60,6 @@ def test_a_name_is_what_it_stands_for() -> None:
         np.testing.assert_allclose(found[name].values, written[name].values, rtol=0, atol=1e-12)
 
 
-def test_who_reads_it_brings_its_states() -> None:
-    plan = rigidsim.plan(rigidsim.parse(text(more="", output='record = ["angular_velocity"]')))
-    assert "torque reads it" in str(plan.as_dict()["reasons"])
-
-
 def test_its_unit_is_checked_and_others_are_told_where_it_is() -> None:
     with pytest.raises(ConfigError, match="can't be added"):
         run_text(text().replace("0.1*max(lux, 0.3)", "0.1*max(lux, 3 s)"))
@@ -75,11 +67,3 @@ def test_its_unit_is_checked_and_others_are_told_where_it_is() -> None:
         run_text(text().replace("a lamp", "the dark"))
     with pytest.raises(ConfigError, match=r'\[parameters\] lux: given the name "lux"'):
         run_text(text(more="[parameters]\nlux = 1"))
-
-
-@pytest.mark.slow
-@pytest.mark.optimised  # as in the process that is killed
-def test_a_killed_run_resumes_bit_for_bit(tmp_path: Path) -> None:
-    given = text(integrator="tolerance = 1e-12", time="end = 6\nsamples = 25")
-    done = rigidsim.resume(killed("test_a_name", given, tmp_path))
-    same_bits(run_text(given, estimate=True), done)

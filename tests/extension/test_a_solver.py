@@ -162,17 +162,6 @@ def test_it_records_a_dataset_with_true_errors_of_its_own(tmp_path: Path) -> Non
     assert rigidsim.verify(run.folder.path).identical
 
 
-@pytest.mark.slow
-def test_its_errors_are_of_fourth_order() -> None:
-    """16 times the tolerance is twice the step; terms of higher order, and rounding, are less than half."""
-    exact = exact_attitudes()
-    errors = [
-        angle_between(loaded(run_text(text(given)))["quaternion"].values, exact).max()
-        for given in (16e-8, 1e-8)
-    ]
-    assert 2 ** (ORDER - 1) < errors[0] / errors[1] < 2 ** (ORDER + 1)
-
-
 SHORT = {"time": "end = 6\nsamples = 25"}
 
 
@@ -196,24 +185,6 @@ def test_a_plan_is_of_its_steps_and_forecasts_no_errors(tmp_path: Path) -> None:
     run = run_text(text())
     assert plan.predicted.steps == pytest.approx(run.summary["cost"]["steps"], rel=1e-3)
     assert plan.predicted.attitude_error_rad is None
-
-
-@pytest.mark.slow
-def test_it_goes_on_after_any_step(tmp_path: Path) -> None:
-    given = text(1e-3, **SHORT)
-    run = run_text(given + "[limits]\nmax_steps = 13\n", out=tmp_path)
-    while not run.status.startswith("finished"):
-        assert run.status == "stopped: max_steps"
-        run = rigidsim.resume(run.folder.path)
-    assert run.summary["cost"]["sessions"] > 4
-    same_bits(run_text(given), run)
-
-
-def test_no_error_is_announced_where_it_tells_none(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(FixedSteps, "errors", lambda self: None)
-    accuracy = run_text(text(1e-4, **SHORT), estimate=True).summary["accuracy"]
-    assert accuracy["estimated_attitude_error"] is None
-    assert accuracy["estimated_how"] == "not estimated: its method tells no errors of its own"
 
 
 def test_scenes_that_it_does_not_solve_are_refused() -> None:

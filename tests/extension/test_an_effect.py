@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +16,7 @@ import numpy as np
 import pytest
 import test_a_solver  # noqa: F401  (which registers a solver)
 from killing import killed
-from support import config, loaded, run_text, same_bits
+from support import cases, config, loaded, run_text, same_bits
 
 import rigidsim
 from rigidsim.model.system import System
@@ -87,10 +88,13 @@ def text(method: str, samples: int = 201, end: float = 20.0, name: str = "driven
     )
 
 
-@pytest.mark.parametrize("samples", [2, 41, 4001])
-@pytest.mark.parametrize("method", METHODS)
-def test_the_motion_is_that_of_the_impulses(method: str, samples: int) -> None:
+CASES = list(product(METHODS, [2, 41, 4001]))
+
+
+@pytest.mark.parametrize("case", cases(CASES, [CASES[0], CASES[2], CASES[4]]), ids=str)
+def test_the_motion_is_that_of_the_impulses(case: tuple[str, int]) -> None:
     """In many steps at once, and within them: each impulse turns the body on from its time, at its rate."""
+    method, samples = case
     run = run_text(text(method, samples), estimate=method == "runge_kutta")
     data = loaded(run)
     passed = np.maximum(data.time.values[:, None] - EVERY * np.arange(1, 12), 0.0)
@@ -103,9 +107,8 @@ def test_the_motion_is_that_of_the_impulses(method: str, samples: int) -> None:
     assert wrong.max() < bound
 
 
-@pytest.mark.slow
 @pytest.mark.optimised  # as in the process that is killed
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("method", cases(METHODS, []))
 def test_a_killed_run_resumes_bit_for_bit(method: str, tmp_path: Path) -> None:
     given = text(method, 25, 6.0)
     done = rigidsim.resume(killed("test_an_effect", given, tmp_path))

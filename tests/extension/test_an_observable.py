@@ -11,8 +11,7 @@ from typing import Any
 import heyoka as hy
 import numpy as np
 import pytest
-from killing import killed
-from support import config, loaded, run_text, same_bits, wide
+from support import config, run_text, wide
 
 import rigidsim
 from rigidsim.errors import ConfigError
@@ -113,16 +112,3 @@ def test_one_that_is_conserved_is_watched_and_reproduced(tmp_path: Path) -> None
     found = run.dataset["momentum_squared_over_energy"].values
     np.testing.assert_allclose(found, expected, rtol=row["bound"])
     assert rigidsim.verify(run.folder.path).identical
-
-
-@pytest.mark.slow
-@pytest.mark.optimised  # as in the process that is killed
-def test_a_killed_run_resumes_bit_for_bit(tmp_path: Path) -> None:
-    done = rigidsim.resume(killed("test_an_observable", RECORDED, tmp_path))
-    whole = run_text(RECORDED, estimate=True)
-    same_bits(whole, done)
-    errors = [run.summary["accuracy"]["estimated_attitude_error"] for run in (whole, done)]
-    exact = loaded(run_text(RECORDED, 'integrator.precision="quadruple"'))["transverse_rate_squared"].values
-    true = np.abs(loaded(whole)["transverse_rate_squared"].values - exact).max()
-    assert errors[0] == errors[1]
-    assert 0 < true <= 100 * errors[0]

@@ -56,12 +56,6 @@ def test_short_runs_and_exact_ones_need_none() -> None:
     assert advised(run(LONG, changes={"integrator.method": "closed_form"})) == {}
 
 
-def test_a_closed_form_finds_no_events() -> None:
-    """It takes no steps: the advice would be refused."""
-    codes = advised(run(LONG + '\n[[events]]\nname = "flip"\nexpression = "wy"\n'))
-    assert set(codes) == {"hold_invariants"}
-
-
 def test_what_has_no_closed_form_is_promised_nothing() -> None:
     driven = config(
         time="end = 3000\nsamples = 11",

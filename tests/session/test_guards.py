@@ -5,7 +5,6 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -17,7 +16,7 @@ from rigidsim.solve.assembly import Assembly, assemble, sampler
 from rigidsim.solve.evaluate import Evaluator
 from rigidsim.solve.problem import InitialValueProblem, prepare
 from rigidsim.solve.sample_block import SampleBlock
-from rigidsim.solve.sampler import Pacing, Progress, SampleReceiver
+from rigidsim.solve.sampler import Pacing, SampleReceiver
 from rigidsim.solve.solvers.taylor.ways import Ways
 from rigidsim.solve.status import Status
 
@@ -76,7 +75,7 @@ def made(scene: str, stride: int) -> tuple[InitialValueProblem, Callable[[], Ass
     return prepared, again
 
 
-@pytest.mark.parametrize("scene", cases(SCENES, ("free", "charts", "events")))
+@pytest.mark.parametrize("scene", cases(SCENES, ("charts", "events")))
 def test_max_steps_is_never_exceeded_and_always_used_up(scene: str) -> None:
     """A step is a natural step of the engine, as ``cost.steps`` counts them; in sessions of so many each, the
     run has as many steps and the same bits as in one go, whichever way it takes.
@@ -103,9 +102,7 @@ def test_max_steps_is_never_exceeded_and_always_used_up(scene: str) -> None:
 
 @pytest.mark.parametrize(
     "scene",
-    cases(
-        ["free", "charts", "events", "surfaces", "many samples in a step"], ["free", "many samples in a step"]
-    ),
+    cases(["free", "charts", "events", "surfaces", "many samples in a step"], ["many samples in a step"]),
 )
 def test_a_run_that_is_stopped_within_a_step_goes_on_within_it(scene: str) -> None:
     """After every look at the guards; samples of a step may be handed over over several of them."""
@@ -128,45 +125,6 @@ def test_a_run_that_is_stopped_within_a_step_goes_on_within_it(scene: str) -> No
     assert kept.all() == reference
     if scene == "many samples in a step":
         assert sessions > 4 * total.steps  # a step of a thousand samples is interrupted many times
-
-
-@pytest.mark.parametrize("scene", ["free", "charts", "many samples in a step"])
-def test_ctrl_c_within_a_chunk_takes_it_back(scene: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Where a run looks after it; anywhere else, such as in a trial, it goes on its way."""
-    prepared, again = made(scene, stride=32)
-    parts = again()
-    kept = Kept(parts.evaluator)
-    total = sampler(prepared, parts, kept).run().steps
-    reference = kept.all()
-    parts = again()
-    kept = Kept(parts.evaluator)
-    corrected = parts.corrected.samples
-    calls = itertools.count(1)
-    heard: list[int] = []
-
-    def samples(*arguments: Any) -> SampleBlock:
-        if (call := next(calls)) % 3 == 0:  # after steps were taken, and some of their samples
-            heard.append(call)
-            raise KeyboardInterrupt
-        return corrected(*arguments)
-
-    monkeypatch.setattr(parts.corrected, "samples", samples)
-    with pytest.raises(KeyboardInterrupt):
-        sampler(prepared, parts, Kept(parts.evaluator), pacing=Pacing(chunk_seconds=0.0)).run()
-    parts, start = again(), None
-    status = Status.INTERRUPTED
-    while status is Status.INTERRUPTED:
-        heard.clear()
-
-        def look(_: Progress) -> Status | None:
-            return Status.INTERRUPTED if heard else None
-
-        loop = sampler(prepared, parts, kept, look, start, Pacing(chunk_seconds=0.0))
-        status, start = loop.run().status, loop.position()
-    assert status is Status.FINISHED
-    assert next(calls) > 6
-    assert loop.progress.steps == total
-    assert kept.all() == reference
 
 
 def test_max_drift_ends_with_the_first_sample_past_it(tmp_path: Path) -> None:
@@ -193,10 +151,9 @@ def test_max_drift_ends_with_the_first_sample_past_it(tmp_path: Path) -> None:
     same_bits(done, complete)
 
 
-@pytest.mark.parametrize("method", ["closed_form"])
-def test_max_drift_looks_at_the_last_sample_too(method: str, tmp_path: Path) -> None:
+def test_max_drift_looks_at_the_last_sample_too(tmp_path: Path) -> None:
     """Below a rounding no run keeps it; one that is short is over before guards are looked at again."""
-    closed = f'method = "{method}"'
+    closed = 'method = "closed_form"'
     text = config(time="end = 3\nsamples = 49", integrator=closed, output=PLAIN)
     data = loaded(run_text(text, out=tmp_path / "whole"))
     drift = np.abs(data["energy_drift"].values)

@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-import io
 import shutil
 from pathlib import Path
 
 import numpy as np
 import pytest
-from rich.console import Console
 from support import IMPATIENT, config, run_text
 
 import rigidsim
 from rigidsim import RunFolderError
-from rigidsim.cli.screens.summary import print_summary
 
 # spins about its middle axis and turns over: its spin leaves the cone about that axis and comes back
 FLIPPING = """
@@ -74,9 +71,6 @@ def test_a_variable_lost_on_the_way_is_warned_of(flipping: rigidsim.Run) -> None
     first = flipping.dataset.time.values[outside][0]
     assert f"at {outside.sum()} of 241 samples, first at {first:g} s" in told
     assert "more than 45 degrees from the figure axis" in told
-    shown = Console(file=io.StringIO(), width=400)
-    print_summary(flipping.outcome, "here", shown)
-    assert f"polar_motion at {outside.sum()} samples: undefined there, NaN" in shown.file.getvalue()
 
 
 def test_the_count_is_that_of_all_sessions(flipping: rigidsim.Run, tmp_path: Path) -> None:
@@ -143,14 +137,3 @@ def test_plan_warns_of_it(tmp_path: Path) -> None:
     assert said["end = 3\nsamples = 49"] == []
     assert len(said[VAST]) == 1
     assert "take fewer [time] samples" in said[VAST][0]
-
-
-def test_what_is_predicted_is_what_it_takes(tmp_path: Path) -> None:
-    """Segments beside labels of some kilobytes a file; a dataset is compressed by what repeats."""
-    text = config(
-        time="end = 20000\nsamples = 20001", output="estimate = false", more="[limits]\nmax_steps = 1000000"
-    )
-    predicted = rigidsim.plan(rigidsim.parse(text)).predicted
-    whole = run_text(text, out=tmp_path)
-    size = whole.folder.dataset.stat().st_size
-    assert size < 1.05 * predicted.dataset_bytes

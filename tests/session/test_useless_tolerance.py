@@ -6,15 +6,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from support import EPSILON, angle_between, config, run_text
+from support import EPSILON, angle_between, cases, config, run_text
 
 import rigidsim
 from rigidsim import ConfigError
 from rigidsim.scene.scene import build_scene
 from rigidsim.session.understood import cautions_of
 from rigidsim.solve.problem import prepare
-
-GRADIENT = 'kind = "gravity_gradient"\ngravitational_parameter = 1\norbit = {semi_major_axis = 1}'
 
 
 def told(integrator: str) -> list[str]:
@@ -26,12 +24,12 @@ def told(integrator: str) -> list[str]:
     return [caution.text for caution in cautions]
 
 
-@pytest.mark.parametrize("precision", EPSILON)
+@pytest.mark.parametrize("precision", cases(EPSILON, ["double"]))
 def test_a_tolerance_below_an_eighth_of_epsilon_is_warned_of(precision: str) -> None:
     name = f'precision = "{precision}"\n'
-    for factor in (0.13, 0.5, 1, 10, 1e3):
+    for factor in (0.13, 1e3):
         assert not told(f"{name}tolerance = {min(factor * EPSILON[precision], 1)!r}")
-    for factor in (0.12, 1e-3, 1e-5):
+    for factor in (0.12, 1e-5):
         (text,) = told(f"{name}tolerance = {factor * EPSILON[precision]!r}")
         assert (
             f"a tolerance below {EPSILON[precision] / 8:.3g} makes steps dearer and no error smaller" in text
@@ -55,16 +53,14 @@ def test_a_smaller_tolerance_gains_nothing() -> None:
     assert errors[1] > errors[0] / 10
 
 
-@pytest.mark.parametrize(
-    ("precision", "tolerance"), [("double", "1e-33"), ("double", '"1e-400"'), ("single", "1e-60")]
-)
+@pytest.mark.parametrize(("precision", "tolerance"), [("double", '"1e-400"'), ("single", "1e-60")])
 def test_one_far_below_is_refused_as_a_tolerance(precision: str, tolerance: str) -> None:
     """Also where the precision can't hold it: the scene's own numbers aren't at fault."""
     with pytest.raises(ConfigError, match=r"\[integrator\] tolerance: given .* gain nothing"):
         prepare(rigidsim.parse(config(integrator=f'precision = "{precision}"\ntolerance = {tolerance}')))
 
 
-@pytest.mark.parametrize("tolerance", ["0", "-1e-9", "nan", "inf", "2", '"1 m"', "true"])
+@pytest.mark.parametrize("tolerance", ["0", "nan", "2", '"1 m"'])
 def test_what_is_no_tolerance_is_refused(tolerance: str) -> None:
     with pytest.raises(ConfigError, match=r"\[integrator\] tolerance: given "):
         rigidsim.parse(config(integrator=f"tolerance = {tolerance}"))
@@ -76,13 +72,3 @@ def test_lost_digits_are_blamed_on_the_loose_tolerance() -> None:
     assert "digits are gone" in warning
     assert 'choose tolerance = "auto"' in warning
     assert "higher precision" not in warning
-
-
-@pytest.mark.parametrize("formulation", ["auto", "planar", "quaternion", "euler_angles"])
-def test_a_scene_without_a_closed_form_is_told_so_first(formulation: str) -> None:
-    """A planar gradient among them, whose equations are planar though the config says auto."""
-    text = config("principal_moments = [1, 1.75, 2]", "angular_velocity = [0, 0, 1]", GRADIENT,
-                  integrator=f'method = "closed_form"\nformulation = "{formulation}"')  # fmt: skip
-    with pytest.raises(ConfigError, match="a gravity-gradient load has no closed form here") as refused:
-        prepare(rigidsim.parse(text))
-    assert "formulation" not in str(refused.value)

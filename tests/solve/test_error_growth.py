@@ -19,12 +19,6 @@ samples = 101
 """
 
 
-@pytest.mark.parametrize("rates", ["[1, 1e-3, 1e-3]", "[1e-3, 1e-3, 1]"])
-def test_spin_about_an_outer_axis_is_stable(rates: str) -> None:
-    run = run_text(SPIN.format(rates=rates, end=500))
-    assert run.summary["accuracy"]["amplification"] == 1
-
-
 def test_spin_about_the_middle_axis_amplifies_by_no_more_than_the_inverse_square_of_its_offset() -> None:
     """A passage takes (2 / rate) log(1/offset), so errors grow by up to 1/offset^2 in it; the rate is
     1 / sqrt 3, and the first passage begins half-way.
@@ -70,10 +64,3 @@ def test_hyperion_tumbles_beyond_prediction() -> None:
     longer = extended.summary["accuracy"]["predictable_seconds"] - accuracy["predictable_seconds"]
     # eleven bits more are lost, at rates between which the local one varies
     assert math.log(2.0**11) / 0.24 < longer < math.log(2.0**11) / 0.06
-
-
-def test_fast_spin_on_a_circular_orbit_is_predictable() -> None:
-    regular = run_text(SATELLITE.format(rates="[0, 0, 20]", eccentricity=0))
-    assert regular.summary["accuracy"]["error_growth_rate"] == 0
-    assert regular.summary["accuracy"]["predictable_seconds"] is None
-    assert not regular.summary["warnings"]

@@ -125,7 +125,7 @@ def test_nested_kinks_are_met_however_narrow(shape: str) -> None:
     """Also within the spacing of the times: nothing is passed over, no zero is taken for its neighbour."""
     # two moments in two numbers, each to half a spacing of the second, and two roundings of the rate
     for spacings in (0.3, 50.0):
-        assert impulse(shape, spacings, "single") <= 1 / spacings + 4
+        assert impulse(shape, spacings, "single") <= 1 / spacings + 2
 
 
 def test_pulses_beyond_two_numbers_are_refused_with_the_reason() -> None:
