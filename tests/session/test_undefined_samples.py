@@ -137,3 +137,14 @@ def test_plan_warns_of_it(tmp_path: Path) -> None:
     assert said["end = 3\nsamples = 49"] == []
     assert len(said[VAST]) == 1
     assert "take fewer [time] samples" in said[VAST][0]
+
+
+def test_what_is_predicted_is_what_it_takes(tmp_path: Path) -> None:
+    """Segments beside labels of some kilobytes a file; a dataset is compressed by what repeats."""
+    text = config(
+        time="end = 20000\nsamples = 20001", output="estimate = false", more="[limits]\nmax_steps = 1000000"
+    )
+    predicted = rigidsim.plan(rigidsim.parse(text)).predicted
+    whole = run_text(text, out=tmp_path)
+    size = whole.folder.dataset.stat().st_size
+    assert size < 1.05 * predicted.dataset_bytes

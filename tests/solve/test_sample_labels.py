@@ -102,6 +102,7 @@ def test_samples_lie_where_they_are_written() -> None:
     assert times("end = 1.05\nevery = 0.1")[-1] == 1.0  # an end off the grid isn't sampled
     assert times("times = [0, 0.1, 0.25, 7]").tolist() == [0, 0.1, 0.25, 7]
     assert times('times = ["1 h", "1 d"]').tolist() == [3600, 86400]
+    assert run_text(SPIN + "times = [5]").dataset["time"].values.tolist() == [5]
 
 
 def test_samples_that_a_precision_can_not_tell_apart_are_refused() -> None:
