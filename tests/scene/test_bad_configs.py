@@ -68,34 +68,22 @@ WHOLE = ("moment", "rate", "name")  # whose problems are of the value itself
 IN_ONE_TABLE: dict[str, list[tuple[str, ...]]] = {
     "moment": [
         ('"two"', 'given "two"'),
-        ("\"__import__('os')\"", "given \"__import__('os')\""),
         ("true", "given true", 'a number (in kg m^2), or a string such as "8.008e37 kg m^2", is allowed'),
         ("{a = 1}", "given a table"),
         ("nan", "given nan; finite numbers are allowed"),
-        ("-inf", "given -inf; finite numbers are allowed"),
         ('"2 kg m"', 'given "2 kg m"', "is not a unit of the dimension asked for, which is kg m^2"),
-        ('"2 kg m^^2"', '"kg m^^2" is not a unit; write'),
         ('"2 kg m^99"', '"kg m^99" is not a unit'),
-        ('"1/0"', 'given "1/0"', "other than zero"),
         ('"10^99999"', 'given "10^99999"', "a whole exponent of at most 5000"),
-        ('"2^0.5"', 'given "2^0.5"', "as in 2^-20"),
         ('"1e9^2"', "base between 1e-6 and 1e6"),
-        ("1e99999", "given 1e+99999", "at most 5000"),
-        ('"1e99999"', 'given "1e99999"', "at most 5000"),
     ],
     "part": [
         ('colour = "red"', "colour", "unknown key", "allowed: euler_angles"),
         ("length = 2", "length", "that a sphere doesn't have", "allowed: radius"),
-        ("quaternion = [0, 0, 0, 0]", "quaternion", "given zero"),
         ("quaternion = [1, 0, 0, 0], euler_angles = [0, 0, 0]", "euler_angles", "given beside quaternion"),
         ('euler_angles = [0, 0, 0], euler_sequence = "zzx"', "euler_sequence", 'given "zzx"'),
-        ('euler_sequence = "zyx"', "euler_sequence", "given without euler_angles"),
     ],
     "ball": [
         ("str = 1", "str", "unknown key", "allowed: center"),
-        ('"a[0]" = 1', "a[0]", "unknown key"),
-        ("reference = 3", "reference", "given 3"),
-        ('reference = ["a", 0, 0]', "reference[0]", 'given "a"', "6378 km"),
         ("reference = [1, 2]", "reference", "given 2 entries; exactly 3 are needed"),
         ("center_of_mass = [0, 0, 1]", "center_of_mass", "it follows from shape; remove it"),
     ],
@@ -103,52 +91,26 @@ IN_ONE_TABLE: dict[str, list[tuple[str, ...]]] = {
         ("", "size", "missing; a cuboid needs it: 3 positive lengths"),
         ("size = [1, 2]", "size", "given 2 lengths; a cuboid has 3"),
         ("size = [1, 2, -3]", "size[2]", "given -3; a positive length"),
-        ("size = [1, 2, 3]\nradius = 1", "radius", "given a dimension that a cuboid doesn't have"),
     ],
     "body": [
-        ("principal_moment = [1, 2, 2]", "principal_moment", "unknown key"),
         ("points = [{mass = 1, position = [0, 0, 1], charge = 1}]", "points[0].charge", "unknown key"),
         ('shape = "spere"\nmass = 1\nradius = 1', "shape", 'given "spere"', 'did you mean "sphere"?'),
         ('preset = "erth"', "preset", 'given "erth"', 'did you mean "earth"?', "allowed: apophis, "),
         ("points = [{mass = 1}]", "points[0].position", "missing; it must be given"),
-        ("inertia_tensor = [1, 2, 3]", "inertia_tensor[0]", "given 1; an array of 3 is allowed"),
-        ("principal_moments = [1, 2]", "principal_moments", "given 2 entries; exactly 3"),
         ("inertia_tensor = [[1, 0, 0], [0, 1], [0, 0, 1]]", "inertia_tensor[1]", "exactly 3 are needed"),
         ("inertia_tensor = [[1, 0.1, 0], [0.2, 1, 0], [0, 0, 1]]", "inertia_tensor[1][0]", "given 0.2, but"),
         ("inertia_tensor = [[1, 2, 0], [2, 1, 0], [0, 0, 1]]", "inertia_tensor", "principal moments -1.0,"),
-        ("principal_moments = [0, 0, 0]", "principal_moments", "all moments are zero"),
         ("principal_moments = [0, 0, 1]", "principal_moments", "at most one can be zero (a rod's)"),
         ("principal_moments = [1, 2, 3.25]", "principal_moments", "1.0, 2.0, 3.25", "I1 + I2 >= I3"),
         ("inertia_tensor = [[4, 0, 0], [0, 1, 0.5], [0, 0.5, 1]]", "inertia_tensor", "0.5, 1.5, 4.0"),
-        ("principal_moments = [1, 2, 2]\nreference = [0, 0, 1]", "reference", "only shape, points and"),
-        ("principal_moments = [1, 2, 2]\nradius = 2", "radius", "which only a shape has; remove it"),
         ('shape = "sphere"\nmass = 1', "radius", "missing; a sphere needs it: a positive length"),
-        (
-            'shape = "tube"\nmass = 1\ninner_radius = 2\nouter_radius = 1\nheight = 1',
-            "inner_radius",
-            "given 2.0 m; at most outer_radius (1.0 m) is allowed",
-        ),
-        ('shape = "torus"\nmass = 1\nminor_radius = 2\nmajor_radius = 1', "minor_radius", "given 2.0 m; at"),
         ('shape = "sphere"\nradius = 1', "mass", "missing; this body needs a mass"),
-        ('shape = "sphere"\nradius = 1\nmass = -1\n', "mass", "given -1; a positive mass"),
         (
             'shape = "cone"\nradius = 1\nheight = 1\nmass = 1\nreference = "corner"',
             "reference",
             "allowed here: center_of_mass, apex, or a point [x, y, z]",
         ),
-        (
-            "points = [{mass = 1, position = [0, 0, 1]}, {mass = 1, position = [0, 1, 0]}]\nmass = 3",
-            "mass",
-            "it follows from points; remove it",
-        ),
         ("points = []", "points", "given an empty array; at least one entry is needed"),
-        ("points = [{mass = 1, position = [0, 0, 1]}]", "points", "all moments are zero"),
-        ("points = [{mass = -1, position = [0, 0, 1]}]", "points[0].mass", "given -1; a positive mass"),
-        ('parts = [{shape = "sphere", mass = 1}]', "parts[0].radius", "a sphere needs it"),
-        ('shape = "box"\nmass = 1\n', "shape", 'did you mean "cuboid"?'),
-        ('preset = "earth"\nmass = -1', "mass", "a positive mass is allowed"),
-        ('preset = "earth"\nradius = 1', "radius", "which only a shape has; remove it"),
-        ('preset = "earth"\npoints = []\nshape = "sphere"', "points", "at least one entry is needed"),
     ],
     "rate": [
         (
@@ -158,145 +120,98 @@ IN_ONE_TABLE: dict[str, list[tuple[str, ...]]] = {
             "units for rad/s: rpm; for rad: rad deg",
         ),
         ('"2 Hz"', '"Hz" may count turns or radians; write "turn/s"'),
-        ('"2 Radian/s"', 'unknown unit "Radian"; did you mean "radian"?'),
     ],
     "spin": [
         ('euler_angles = ["1 s", 0, 0]', "euler_angles[0]", "which is rad"),
-        ('quaternion = ["1 m", 0, 0, 0]', "quaternion[0]", '"m" is a unit, where only a number without one'),
         ("angular_momentum = [1, 0, 0]", "angular_momentum", "given beside angular_velocity"),
-        ("quaternion = [1, 0, 0, 0]\neuler_angles = [0, 0, 0]", "euler_angles", "given beside quaternion"),
         ("quaternion = [0, 0, 0, 0]", "quaternion", "given zero", "[w, x, y, z]"),
-        ("quaternion = [1, 0, 0]", "quaternion", "given 3 entries; exactly 4"),
     ],
     "initial": [
         ("angular_velocty = [1, 0, 0]", "angular_velocty", 'did you mean "angular_velocity"?'),
         ('angular_velocity = "fast"', "angular_velocity", 'given "fast"; an array of 3 is allowed'),
-        ("omega = [1, 0, 0]", "omega", 'did you mean "angular_velocity"?'),
         ("", "angular_velocity", "missing", "exactly one of angular_velocity, angular_momentum"),
     ],
     "name": [
         ("3", "given 3; a string is allowed"),
         ('"a/b"', 'given "a/b"', "allowed: 1 to 100 letters, digits, dots, underscores and hyphens"),
         ('".."', 'given ".."', "not dots alone"),
-        ('"a\\n"', "allowed: 1 to 100 letters, digits, dots, underscores and hyphens"),
     ],
     "top": [
         ('nmae = "y"', "nmae", "unknown key", 'did you mean "name"?'),
         ("loads = 3", "[[loads]]", "given 3; an array is allowed"),
-        ('torque = "x"', "torque", "unknown key", "rotors, states"),
         ('[states]\nname = "s"', "[[states]]", "write [[states]] in double brackets"),
-        ('loads = ["gravity"]', "[[loads]] number 1", 'given "gravity"; a table is allowed'),
-        ("sweep = {axes = [3]}", "[sweep] axes", "given [3]; a table of keys and their values is allowed"),
     ],
     "until 10": [
         ("samples = 5\nevery = 1", "every", "given beside samples"),
-        ("samples = 1", "samples", "given 1; 2 to 1e12 are allowed"),
         ("samples = 10_000_000_000_000", "samples", "given 10000000000000; 2 to 1e12"),
         ("every = 0", "every", "given 0.0 s; a positive time is allowed"),
         ("every = 11", "every", "given 11.0 s, longer than the whole run"),
-        ("every = 1e-15", "every", "asks for 1.0e+16 samples; at most 1e12 are allowed"),
     ],
     "until 1": [
-        ("stop = 3", "stop", "unknown key", "allowed: end, epoch, every"),
         ('epoch = "2029-04-13T21:46:00"', "epoch", 'given "2029-04-13T21:46:00", without its time scale'),
         ('unit = "parsec"', "unit", 'given "parsec"', 'unknown unit "parsec"', "a unit of time is allowed"),
         ('unit = "km"', "unit", 'given "km"', "of the dimension asked for, which is s", 'such as "day"'),
-        ('unit = "30 day"', "unit", 'given "30 day"', "not the name of a unit of time"),
-        ("epoch = 2029-04-13", "epoch", 'given "2029-04-13", without its time scale'),
         ('epoch = "2999-01-01 UTC"', "epoch", "UTC is known from 1960-01-01 to"),
         ("samples = 11.0", "samples", "given 11.0", "a whole number, without point or exponent, is allowed"),
-        ("samples = true", "samples", "given true", "a whole number, without point or exponent, is allowed"),
     ],
     "time": [
         ("samples = 3", "end", "missing; it must be given, unless times are"),
         ("end = 0", "end", "given 0.0 s; after start (0.0 s) is allowed"),
         ("times = [1, 2, 2]", "times[2]", "given 2.0 after 2.0; times must increase"),
-        ("times = [-1, 1]", "times[0]", "given -1.0 s; start (0.0 s) or later is allowed"),
         ("end = 3\ntimes = [1, 2, 4]", "times[2]", "given 4.0 s; end (3.0 s) or earlier is allowed"),
-        ("times = []", "times", "given an empty array; at least one time is needed"),
     ],
     "integrator": [
-        ('precison = "double"', "precison", 'did you mean "precision"?'),
         ('precision = "doubel"', "precision", 'given "doubel"'),
-        ('formulation = "quaternions"', "formulation", 'given "quaternions"', 'did you mean "quaternion"?'),
         ('method = "rk4"', "method", 'given "rk4"', "allowed: taylor"),
         ('euler_sequence = "zzx"', "euler_sequence", 'given "zzx"', "allowed: xyx, xyz", "zyz"),
-        ("precision = true", "precision", "given true"),
-        ('tolerance = "fast"', "tolerance", 'given "fast"', '"auto"'),
         ("hold_invariants = 1", "hold_invariants", "given 1; true, false or"),
-        ("precision = 5000", "precision", "given 5000"),
         ("tolerance = 0", "tolerance", "given 0; allowed: above 0 and at most 1"),
-        ("tolerance = 2", "tolerance", "given 2;", "at most 1", '"auto"'),
         ('formulation = "canonical"', "formulation", "singularity of the sequence zxz"),
         ("accuracy = 0", "accuracy", "given 0", "an angle above 0 and below pi"),
-        ('accuracy = "high"', "accuracy", '"high"'),
     ],
     "output": [
-        ('recrod = ["energy"]', "recrod", 'did you mean "record"?', "allowed: estimate, lyapunov, "),
         ('record = ["angular_velocity", "enegry"]', "record[1]", 'given "enegry"', 'did you mean "energy"?'),
-        ('record = "energy"', "record", 'given "energy"; an array is allowed'),
         ("timeline = 1", "timeline", "given 1; true or false is allowed"),
         ("record = []", "record", "given an empty array", "leave the key out"),
         ('record = ["energy", "energy"]', "record", "named twice; name each once"),
         ('record = ["position"]', "record", 'given "position"', "no position", "leave it out"),
         ('record = ["potential_energy"]', "record", 'given "potential_energy"', "no load"),
-        ('record = ["angular_momentum_vertical"]', "record", "no load that marks a vertical"),
         ('record = ["angular_momentum_axial"]', "record", "this scene has none; leave it out"),
-        ("timeline_rows = 1", "timeline_rows", "given 1; at least 2"),
-        ("lyapunov = 1", "lyapunov", "given 1; true or false is allowed"),
     ],
     "limits": [
         ("wal_time = 1", "wal_time", 'did you mean "wall_time"?'),
         ("max_steps = 1e9", "max_steps", "given 1e+9"),
         ("wall_time = -1", "wall_time", "given -1; a positive number"),
-        ("max_steps = 0", "max_steps", "given 0; at least 1 is allowed"),
-        ("max_drift = -1e-9", "max_drift", "given -1e-09; a positive number"),
     ],
     "source": [
         ("position = [1, 0, 0]\norbit = {semi_major_axis = 1}", "orbit", "given orbit and position"),
         ("position = [0, 0, 0]", "position", "given the origin", "another point is allowed"),
         ("orbit = {semi_major_axis = 1, eccentricity = 1}", "orbit.eccentricity", "given 1.0"),
         ("orbit = {eccentricity = 0.1}", "orbit.semi_major_axis", "missing"),
-        ("orbit = {semi_major_axis = -1}", "orbit.semi_major_axis", "given -1.0 m"),
-        ("orbit = {semi_major_axis = 1, eccentricty = 0.1}", "orbit.eccentricty", "unknown key"),
     ],
     "torque": [
         ("components = [1, 0, 0]\ntorque = [1, 0, 0]", "torque", "unknown key", "allowed: components"),
-        ('components = ["0", "0", "1"]\nframe = "bdy"', "frame", 'given "bdy"', 'did you mean "body"?'),
         ('components = ["0", "2*vx", "1"]', "components[1]", 'column 3: unknown name "vx"'),
         ('components = ["().__class__", "0", "1"]', "components[0]", "column"),
     ],
     "load": [
-        ('kind = "uniform_gravity"\nacceleraton = [0, 0, -1]', "acceleraton", 'did you mean "acceleration"?'),
         ('kind = "uniform_gravty"', "kind", 'given "uniform_gravty"', 'did you mean "uniform_gravity"?'),
         ("acceleration = [0, 0, -1]", "kind", "missing"),
         ('kind = "friction"', "kind", 'given "friction"; did you mean "viscous_torque" or "torque"?'),
-        ('kind = "gravity"', "kind", "uniform_gravity is a weight"),
         ('kind = "gravity_gradient"\ngravitational_parameter = 1', "orbit", "given none"),
-        (
-            'kind = "gravity_gradient"\ngravitational_parameter = -1\nposition = [1, 0, 0]',
-            "gravitational_parameter",
-            "given -1",
-        ),
         ('kind = "central_gravity"\ngravitational_parameter = 1', "kind", 'given "central_gravity" for a'),
         ('kind = "viscous_torque"\ncoefficients = [1, -2, 3]', "coefficients[1]", "given -2"),
     ],
     "more": [
         ('[integratr]\nprecision = "double"', "integratr", "unknown key", 'did you mean "integrator"?'),
-        ('[frame]\naxes = "EME200"', "[frame] axes", 'given "EME200"; did you mean "EME2000"?; allowed:'),
         ('[integrator2]\nprecision = "double', "TOML", "can't be read", "line 1"),
         ("[time]\nend = 2", "TOML", 'Cannot declare "time" twice', "line"),
-        ('[[events]]\nname = "flip"', "[[events]] number 1 expression", "missing"),
         ("[sweep.axes]\n'time.end' = {values = [1, 2]}", "[sweep]", "many members", "rigidsim.sweep(...)"),
         ("[parameters]\nwx = 1", "[parameters]", 'given the name "wx"', "which expressions use already"),
-        ('[parameters]\n"a b" = 1', "[parameters]", 'given the name "a b"'),
-        ('[parameters]\nk = "1 parsec"', "[parameters] k", 'unknown unit "parsec"'),
     ],
 }
 FLYING = "angular_velocity = [1, 0, 0]\nvelocity = [0, 0, 0]"
 ROD = {"body": 'shape = "rod"\nmass = 1\nlength = 1'}
-CONE = {"body": 'shape = "cone"\nmass = 1\nradius = 1\nheight = 1\nreference = "apex"'}
-HEAVY = {"body": "principal_moments = [1, 2, 2]\nmass = 1"}
 ASKEW = {"body": "principal_moments = [1, 2, 2]\nmass = 1\ncenter_of_mass = [0, 0, 1]"}
 SUN = SOURCE + 'ephemeris = "sun"'
 FIXED = SOURCE + "position = [1, 0, 0]"
@@ -305,24 +220,14 @@ TWO_SOURCES = {"body": 'shape = "sphere"\nradius = 1\nmass = 1\nprincipal_moment
 # tables, where, phrases
 IN_SEVERAL: list[tuple[Any, ...]] = [
     ({"top": ""}, "name", "missing; it must be given"),
-    ({"top": 'name = "x"\nbody = 3', "body": None}, "[body]", "given 3; a table is allowed"),
     ({"loads": SUN, "more": '[frame]\naxes = "ICRF"'}, "[frame] axes", 'is in "ecliptic J2000"; write that'),
-    ({"body": "principal_moments = [1, 1e99999999999999999999, 2]"}, "TOML", "out of range"),
     ({"body": "mass = 1"}, "[body]", "given no source of inertia", "exactly one of principal_moments, "),
     (TWO_SOURCES, "[body]", "given principal_moments and shape", "exactly one of principal_moments, "),
     ({"top": "name = box"}, "TOML", "at line 1", 'stand in quotes: "box"'),
-    ({"top": 'name = "a"\nname = "b"'}, "TOML", "can't be read", "at line 2, column"),
     ({"time": "end = 10 s"}, "TOML", 'numbers with units, stand in quotes: "10 s"'),
     (ROD | {"initial": "angular_velocity = [1, 0, 0.5]"}, "[initial] angular_velocity", "a spin about"),
-    (ROD | {"initial": "angular_momentum = [1, 0, 0.5]"}, "[initial] angular_momentum", "a part along"),
     ({"initial": FLYING}, "[body] mass", "missing; a body with a position or velocity needs it"),
-    ({"initial": FLYING} | CONE, "[body] reference", "turns about its centre of mass"),
     ({"initial": FLYING} | ASKEW, "[body] center_of_mass", "turns about its centre of mass"),
-    (
-        {"initial": FLYING, "body": "principal_moments = [1, 2, 2]\nmass = 1"} | RATES,
-        "[integrator] formulation",
-        'choose "auto"',
-    ),
     (
         {"loads": FIXED} | RATES,
         "[integrator] formulation",
@@ -383,17 +288,12 @@ def test_refused_with_a_message_that_helps(
 GOOD_CASES: dict[str, dict[str, str | None]] = {
     "as it is": {},
     "plate: I1 + I2 = I3": {"body": "principal_moments = [1, 2, 3]"},
-    "plate of decimals that aren't doubles": {"body": "principal_moments = [0.1, 0.2, 0.3]"},
-    # 0.1 + 0.2 in double: a tensor printed by a program breaks the inequality by one rounding
     "plate printed by a double program": {"body": "principal_moments = [0.1, 0.2, 0.30000000000000004]"},
     "rod at rest along its axis": ROD | {"initial": "angular_velocity = [1, 2, 0]"},
     "one digit": {"integrator": "precision = 1"},
-    "tolerance one": {"integrator": "tolerance = 1"},
-    "longest name": {"top": f'name = "{"a" * 100}"'},
     "every as long as the run": {"time": "end = 10\nevery = 10"},
     "a single time": {"time": "times = [5]"},
     "zero gravity needs no mass": {"loads": 'kind = "uniform_gravity"'},
-    "false for what comes later": {"integrator": "hold_invariants = false", "output": "lyapunov = false"},
     "Euler start in another sequence": {"integrator": 'formulation = "euler_angles"\neuler_sequence = "xyz"'},
 }
 
@@ -404,39 +304,39 @@ def test_accepted(case: str) -> None:
     assert prepare(experiment).scene.config == experiment.config
 
 
-def test_all_problems_of_the_file_are_reported_at_once() -> None:
-    text = config(
-        top='name = "a/b"',
-        body="principal_moments = [1, true, 2]\nmas = 3",
-        loads='kind = "torque"',
-        integrator='precision = "doubel"\nhold_invariants = true',
-        output="record = []",
-    )
-    problems = refused(lambda: prepare(parse(text)))
-    assert sorted(problem.where for problem in problems) == [
-        "[[loads]] number 1 components",
-        "[body] mas",
-        "[body] principal_moments[1]",
-        "[integrator] precision",
-        "[output] record",
-        "name",
-    ]
-
-
-def test_all_problems_of_the_mechanics_are_reported_at_once() -> None:
-    text = config(
-        body="principal_moments = [1, 2, 4]",
-        initial="angular_velocity = [1, 0, 0]\nquaternion = [0, 0, 0, 0]",
-        time="end = -1",
-        limits="wall_time = 0",
-    )
-    problems = refused(lambda: prepare(parse(text)))
-    assert [problem.where for problem in problems] == [
-        "[body] principal_moments",
-        "[initial] quaternion",
-        "[time] end",
-        "[limits] wall_time",
-    ]
+@pytest.mark.parametrize(
+    ("tables", "places"),
+    [
+        (
+            {
+                "top": 'name = "a/b"',
+                "body": "principal_moments = [1, true, 2]\nmas = 3",
+                "loads": 'kind = "torque"',
+                "output": "record = []",
+            },
+            [
+                "[[loads]] number 1 components",
+                "[body] mas",
+                "[body] principal_moments[1]",
+                "[output] record",
+                "name",
+            ],
+        ),
+        (
+            {
+                "body": "principal_moments = [1, 2, 4]",
+                "initial": "angular_velocity = [1, 0, 0]\nquaternion = [0, 0, 0, 0]",
+                "time": "end = -1",
+                "limits": "wall_time = 0",
+            },
+            ["[body] principal_moments", "[initial] quaternion", "[limits] wall_time", "[time] end"],
+        ),
+    ],
+    ids=["text", "mechanics"],
+)
+def test_all_problems_are_reported_at_once(tables: dict[str, str | None], places: list[str]) -> None:
+    problems = refused(lambda: prepare(parse(config(**tables))))
+    assert sorted(problem.where for problem in problems) == places
 
 
 def test_the_text_counts_the_problems_and_names_the_file() -> None:
@@ -452,7 +352,6 @@ def test_the_text_counts_the_problems_and_names_the_file() -> None:
     ("content", "phrases"),
     [
         (b"\xff\xfe\x00", ["file: not UTF-8 text (byte 0); save it as UTF-8"]),
-        (b'name = "\xe9"', ["file: not UTF-8 text (byte 8)"]),
         (b"name = ", ["TOML: can't be read: Invalid value (at end of document)"]),
         (b"a = [" * 100_000, ["TOML: can't be read"]),
         (b"# " + b"x" * 4_000_000, ["file: 4000002 bytes; a config has at most 4000000"]),
@@ -477,7 +376,7 @@ def test_missing_file_and_folder(tmp_path: Path) -> None:
         assert f"file: can't be read: {why}" in str(caught.value)
 
 
-@pytest.mark.parametrize("command", ["run", "plan"])
+@pytest.mark.parametrize("command", ["run"])
 @pytest.mark.parametrize(
     ("tables", "where", "phrases"),
     [
@@ -501,25 +400,7 @@ def test_the_command_line_says_it_and_leaves_no_folder(
     assert not out.exists()
 
 
-def test_one_bad_config_among_good_ones_stops_the_command_before_any_run(tmp_path: Path) -> None:
-    good, bad, out = tmp_path / "good.toml", tmp_path / "bad.toml", tmp_path / "runs"
-    good.write_text(config(), encoding="utf-8")
-    bad.write_text(config(time="end = true"), encoding="utf-8")
-    result = CliRunner().invoke(app, ["run", str(good), str(bad), "--out", str(out)])
-    assert result.exit_code == 2
-    assert "bad.toml: 1 problem" in result.stderr
-    assert not out.exists()
-
-
-def test_the_command_line_names_a_missing_file(tmp_path: Path) -> None:
-    result = CliRunner().invoke(app, ["run", str(tmp_path / "none.toml"), "--out", str(tmp_path / "runs")])
-    assert result.exit_code == 2
-    assert "none.toml" in result.stderr
-    assert "can't be read: No such file" in result.stderr
-    assert not (tmp_path / "runs").exists()
-
-
-@pytest.mark.parametrize("given", [3, None, {"name": "x"}])
+@pytest.mark.parametrize("given", [3])
 def test_what_is_no_path_is_refused_in_words(given: Any) -> None:
     with pytest.raises(ConfigError, match=r"path: given .*; the path of a config is allowed"):
         load(given)

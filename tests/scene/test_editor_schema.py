@@ -12,9 +12,7 @@ from typing import Any
 
 import pytest
 
-from rigidsim.scene.bodies.presets import PRESETS
 from rigidsim.scene.editor_schema import editor_schema
-from rigidsim.scene.registry import LOAD_KINDS, OBSERVABLES
 
 ROOT = Path(__file__).parents[2]
 READY = [*ROOT.glob("configs/**/*.toml")]
@@ -40,39 +38,6 @@ def test_every_table_and_key_says_what_it_is(schema: dict[str, Any]) -> None:
     silent = [name for name, of in tables(schema) if not of.get("description")]
     silent += [name for name, key in keys(schema).items() if not key.get("description")]
     assert silent == []
-
-
-def test_numbers_name_their_units(schema: dict[str, Any]) -> None:
-    found = keys(schema)
-    assert found["Initial.angular_velocity"]["description"].endswith("[rad/s]")
-    assert found["Body.inertia_tensor"]["x-unit"] == "kg m^2"
-    assert found[".parameters"]["description"].endswith("[SI, or any unit]")
-    named = {name: key["x-unit"] for name, key in found.items() if key.get("x-unit") not in (None, "1", "")}
-    assert len(named) > 40
-    assert [
-        name for name, unit in named.items() if not found[name]["description"].endswith(f"[{unit}]")
-    ] == []
-
-
-def test_defaults_are_as_one_would_write_them(schema: dict[str, Any]) -> None:
-    found = keys(schema)
-    defaults = {name: key["default"] for name, key in found.items() if "default" in key}
-    assert defaults["Time.start"] == 0
-    assert defaults["UniformGravityFields.acceleration"] == [0, 0, -9.80665]
-    assert defaults["Integrator.tolerance"] == "auto"
-    assert None not in defaults.values()  # TOML has no null
-    assert not any(isinstance(value, dict) for value in defaults.values())
-
-
-def test_fixed_values_are_enumerated(schema: dict[str, Any]) -> None:
-    found = keys(schema)
-    assert found["Body.preset"]["enum"] == list(PRESETS)
-    assert found["Output.record"]["items"]["anyOf"][0]["enum"] == list(OBSERVABLES)
-    assert len(found["Integrator.euler_sequence"]["enum"]) == 12
-    kinds = {
-        table["properties"]["kind"]["const"] for _, table in tables(schema) if "kind" in table["properties"]
-    }
-    assert kinds == set(LOAD_KINDS)
 
 
 # --- an editor's own checker --------------------------------------------------------------------------------
@@ -105,14 +70,8 @@ def test_ready_configs_are_right_for_an_editor(schema: dict[str, Any], tmp_path:
     [
         ('"cuboid"', '"cubid"', '"cubid" is not one of'),
         ("angular_velocity", "angular_velocty", "angular_velocty"),
-        ("[0, 2, 1e-3]", "[0, 2]", "has less than 3 items"),
         ("[0, 2, 1e-3]", '[0, "fast", 1e-3]', "fast"),
-        ("end = 120", "end = 120\nprecision = 3", "precision"),
         ('"double"', '"doble"', "doble"),
-        ('"double"', "251", "251"),
-        ('"double"', "15\ntolerance = 2", "2"),
-        ('"double"', '15\neuler_sequence = "zzx"', "zzx"),
-        ('"double"', '15\n[output]\nrecord = ["quaternions"]', "quaternions"),
         ('"double"', '15\n[[loads]]\nkind = "gravity"', "gravity"),
     ],
 )

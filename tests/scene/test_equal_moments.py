@@ -77,17 +77,12 @@ def test_turned_symmetric_bodies_are_symmetric() -> None:
         )
 
 
-def test_turned_spheres_have_no_axis_of_their_own() -> None:
-    random = np.random.default_rng(26)
-    body, _ = turned([0.7, 0.7, 0.7], random)
-    found = scene(body.replace("0.7000000000000001", "0.7"))
-    assert found.figure.described in ("body axis z, as good as any of a sphere",)
-
-
 @pytest.mark.parametrize(
     ("difference", "digits", "precision"),
-    [(2e-5, 17, '"double"'), (1e-12, 17, '"double"'), (1e-12, 17, '"quadruple"'), (1e-20, 40, '"quadruple"'),
-     (1e-28, 34, '"quadruple"')],
+    [
+    (1e-12, 17, '"double"'),
+    (1e-28, 34, '"quadruple"'),
+],
 )  # fmt: skip
 def test_nearly_symmetric_bodies_have_three_moments(difference: float, digits: int, precision: str) -> None:
     """As long as the digits tell them: here in 60 digits, written with as many as said."""

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import re
 from decimal import Decimal
 from fractions import Fraction
 
 import mpmath
-import numpy as np
 import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
@@ -72,54 +70,28 @@ def test_toml_keeps_the_digits(number: Decimal) -> None:
         assert time.end == ExactNumber(Fraction(number))
 
 
-@given(st.integers(-(10**9), 10**9), st.integers(1, 10**9))
-def test_quotients(numerator: int, denominator: int) -> None:
-    expected = Fraction(numerator, denominator)
-    assert parse_number(f"{numerator}/{denominator}", "1").rational == expected
-    assert parse_number(f"{numerator} / {denominator} km", "m").rational == expected * 1000
-
-
-@given(st.integers(1, 1000), st.integers(-60, 60))
-def test_powers(base: int, power: int) -> None:
-    expected = Fraction(base) ** power
-    assert parse_number(f"{base}^{power}", "1").rational == expected
-    assert parse_number(f"{base}**{power} kg", "kg").rational == expected
-
-
 # ---- units ------------------------------------------------------------------------------------------------
 
 # written, SI unit, value in mpmath by the unit's definition
 UNITS = [
-    ("1 deg", "rad", lambda m: m.pi / 180),
     ("23.44 deg", "rad", lambda m: m.mpf(2344) / 100 * m.pi / 180),
     ("84381.406 arcsec", "rad", lambda m: m.mpf(84381406) / 1000 * m.pi / 648000),
     ("1 turn", "rad", lambda m: 2 * m.pi),
-    ("1 rad", "rad", lambda m: m.mpf(1)),
-    ("430 day", "s", lambda m: m.mpf(430 * 86400)),
     ("1 yr", "s", lambda m: m.mpf(31557600)),
-    ("7.292115e-5 rad/s", "rad/s", lambda m: m.mpf(7292115) / m.mpf(10) ** 11),
-    ("5 rpm", "rad/s", lambda m: m.pi / 6),
     ("50.307 arcsec/yr", "rad/s", lambda m: m.mpf(50307) / 1000 * m.pi / 648000 / 31557600),
     ("3 s^-1", "rad/s", lambda m: m.mpf(3)),
-    ("8.008e37 kg m^2", "kg m^2", lambda m: m.mpf(8008) * m.mpf(10) ** 34),
     ("1 g cm^2", "kg m^2", lambda m: m.mpf(1) / 10**7),
-    ("0.6 Da Å^2", "kg m^2", lambda m: m.mpf(6) / 10 * m.mpf("1.66053906892e-27") / m.mpf(10) ** 20),
     (
         "0.6 dalton angstrom^2",
         "kg m^2",
         lambda m: m.mpf(6) / 10 * m.mpf("1.66053906892e-27") / m.mpf(10) ** 20,
     ),
-    ("1 J s", "kg m^2/s", lambda m: m.mpf(1)),
-    ("6378.1366 km", "m", lambda m: m.mpf(63781366) / 10),
-    ("1 au", "m", lambda m: m.mpf(149597870700)),
     ("1 g0", "m/s^2", lambda m: m.mpf(980665) / 100000),
     ("1/3 t", "kg", lambda m: m.mpf(1000) / 3),
     ("pi/4", "rad", lambda m: m.pi / 4),
-    ("-3*pi/4 rad", "rad", lambda m: -3 * m.pi / 4),
     ("π/2", "1", lambda m: m.pi / 2),
     ("2*pi/365.25 rad/day", "rad/s", lambda m: 2 * m.pi / (m.mpf(36525) * 864)),
     ("pi deg", "rad", lambda m: m.pi**2 / 180),
-    ("2*3/4*5", "1", lambda m: m.mpf(15) / 2),
 ]
 
 
@@ -129,29 +101,6 @@ def test_units_to_fifty_digits(written: str, unit: str, value) -> None:
     # three operations of CONTEXT (128 bits past fifty digits) on either side
     assert abs(parse_number(written, unit).at(CONTEXT) - expected) <= 8 * CONTEXT.eps * abs(expected)
     assert float(parse_number(written, unit)) == float(expected)
-
-
-@pytest.mark.parametrize(
-    ("written", "message"),
-    [
-        ("pirad", "a number, or a string of a number and a unit, is allowed"),
-        ("pi/0", "a divisor other than zero is allowed"),
-        ("pi^0.5", "a power of pi has a whole exponent of at most 64"),
-        ("sqrt(2)", '"pi/4" or'),
-        ("2^3^2", '"^2" is not a unit'),
-        ("*".join(["2"] * 21), "at most 20 factors are allowed"),
-        ("*".join(["9^5000"] * 15), "write fewer digits or a larger unit"),
-    ],
-)
-def test_what_is_no_number(written: str, message: str) -> None:
-    with pytest.raises(ValueError, match=re.escape(message)):
-        parse_number(written, "1")
-
-
-def test_a_number_knows_whether_its_unit_was_written() -> None:
-    assert parse_number("40", "rad").assumed == parse_number(Decimal(40), "rad").assumed == "rad"
-    assert parse_number("40 rad", "rad").assumed == parse_number("40 deg", "rad").assumed == ""
-    assert parse_number(40, "1").assumed == ""
 
 
 # ---- into the working precision ---------------------------------------------------------------------------
@@ -179,16 +128,6 @@ def test_every_precision_rounds_to_nearest(name: str | int, number: Decimal) -> 
     assert abs(got - exact) <= abs(exact) * Fraction(2) ** -bits
 
 
-@pytest.mark.parametrize("name", NAMES)
-@given(number=decimals)
-def test_scalars_make_the_round_trip(name: str | int, number: Decimal) -> None:
-    precision = precision_of(name)
-    scalar = precision.number(parse_number(number, "1").at(context_for(name)))
-    parts = precision.parts(np.array([scalar], dtype=precision.scalar))
-    assert sum(Fraction(float(part[0])) for part in parts) == as_fraction(precision.exact(scalar))
-    assert precision.number(precision.exact(scalar)) == scalar
-
-
 # ---- all the way through a scene --------------------------------------------------------------------------
 
 FORTY = "1.234567890123456789012345678901234567891"
@@ -210,16 +149,6 @@ def test_forty_digits_reach_the_scene_and_the_states() -> None:
     assert as_fraction(prepared.system.initial[0]) * unit == as_fraction(scene.angular_velocity[0])
 
 
-def test_degrees_per_second_reach_the_states_with_fifty_digits_of_pi() -> None:
-    prepared = prepare(parse(scene_text(rate='"1 deg/s"', integrator="precision = 50")))
-    with mpmath.workprec(400):
-        expected = mpmath.pi / 180
-        unit = mpmath.mpf(2) ** prepared.system.state_exponents[0]
-        got = prepared.precision.exact(prepared.precision.number(prepared.system.initial[0])) * unit
-        # half a unit in the last place; pi as a double is wrong by 1e-16
-        assert abs(got - expected) <= expected * mpmath.mpf(2) ** -prepared.precision.bits
-
-
 def test_the_precision_decides_what_a_tenth_is() -> None:
     rates = {}
     for name in ("double", "quadruple", "50"):
@@ -231,9 +160,3 @@ def test_the_precision_decides_what_a_tenth_is() -> None:
     tenth = Fraction(1, 10)
     errors = [abs(rates[name] - tenth) for name in ("double", "quadruple", "50")]
     assert errors[0] > 10**15 * errors[1] > 10**15 * 10**14 * errors[2]
-
-
-def test_tolerance_as_text() -> None:
-    prepared = prepare(parse(scene_text(integrator='precision = 50\ntolerance = "1e-40"')))
-    error = as_fraction(prepared.precision.exact(prepared.tolerance)) - Fraction(1, 10**40)
-    assert abs(error) <= Fraction(1, 10**40) * Fraction(2) ** -prepared.precision.bits

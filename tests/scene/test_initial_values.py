@@ -43,10 +43,6 @@ def refused(loads: str, initial: str = "", precision: str = "double") -> str:
         ("1/wx", "(wx = 0.0)"),
         ("1/(t-2)", "(t = 2.0)"),
         ("log(wy - 1)", "(wy = 0.5)"),
-        ("sqrt(-wz)", "(wz = 1.0)"),
-        ("wx^-2", "(wx = 0.0)"),
-        ("1/psi", "(psi = 0.0)"),
-        ("log(phi - 1/4)", "(phi = 0.25)"),
         ("exp(wy*1e6)", "(wy = 0.5)"),
         ("atan2(wx, psi)", "(wx = 0.0, psi = 0.0)"),
     ],
@@ -82,7 +78,7 @@ def test_a_value_that_is_lost_later_is_no_matter_of_the_start() -> None:
     assert 4 < run.summary["engine_time"] <= 5
 
 
-@pytest.mark.parametrize("precision", ["double", "extended", "quadruple"])
+@pytest.mark.parametrize("precision", ["double", "quadruple"])
 def test_loads_from_python(precision: str) -> None:
     class Pole(LoadModel):
         title = "pole"
@@ -96,18 +92,10 @@ def test_loads_from_python(precision: str) -> None:
         prepare(experiment, loads=[Pole()])
 
 
-def test_a_state_named_like_something_else_is_told_where_it_stands() -> None:
-    rotor = '[[rotors]]\nname = "w"\naxis = [0, 0, 1]\nmoment = 0.1\n'
-    state = '[[states]]\nname = "{}"\nderivative = "wz"\n'
-    said = refused(rotor + state.format("a") + state.format("rate_w"))
-    assert '[[states]] number 2 name: two things are called "rate_w" in expressions' in said
-    assert "one of [[rotors]]" in said
-
-
 NO_DERIVATIVE = "has no finite derivative at the start"
 
 
-@pytest.mark.parametrize("precision", ["single", "double", "quadruple"])
+@pytest.mark.parametrize("precision", ["double", "quadruple"])
 @pytest.mark.parametrize("derivative", ["sqrt(s)", "asin(1 - s)", "s^1.5"])
 def test_a_derivative_without_derivative_at_the_start_is_refused(derivative: str, precision: str) -> None:
     state = f'[[states]]\nname = "s"\nderivative = "{derivative}"\n'
@@ -136,8 +124,3 @@ def test_roots_that_have_series_are_none_of_these(derivative: str) -> None:
     state = f'[[states]]\nname = "s"\nderivative = "{derivative}"\n'
     run = run_text(SCENE.format(initial="", loads=state, precision="double"))
     assert run.status == "finished"
-
-
-def test_cassini_alone_leads_to_all_four() -> None:
-    with pytest.raises(ConfigError, match='"cassini_1" or "cassini_2" or "cassini_3" or "cassini_4"'):
-        rigidsim.parse(SCENE.format(initial='equilibrium = "cassini"', loads="", precision="double"))

@@ -25,13 +25,9 @@ end = 10
 # override, (text to replace, by)
 EDITS = {
     "top key": ("name=other", ('name = "base"', 'name = "other"')),
-    "quoted string": ('name="other"', ('name = "base"', 'name = "other"')),
-    "nested number": ("time.end=20", ("end = 10", "end = 20")),
-    "spaces": (" time.end = 20 ", ("end = 10", "end = 20")),
     "decimal as written": ("time.end=0.1", ("end = 10", "end = 0.1")),
     "number with a unit": ("time.end=430 day", ("end = 10", 'end = "430 day"')),
     "array": ("body.principal_moments=[2, 2, 3]", ("[1, 2, 2.5]", "[2, 2, 3]")),
-    "index": ("body.principal_moments[2]=3", ("2.5", "3")),
     "index of a table": ("loads[0].acceleration[2]=-1.62", ("-9.8", "-1.62")),
     "bool": ("output.timeline=false", ("end = 10", "end = 10\n[output]\ntimeline = false")),
     "new table": (
@@ -45,18 +41,12 @@ EDITS = {
 
 
 @pytest.mark.parametrize("case", EDITS)
-def test_an_override_is_the_edit(case: str) -> None:
+def test_an_override_is_the_edit_and_stands_in_the_text_that_is_run(case: str) -> None:
+    """One value per key, where the key stands; the text and the settings as given are kept, too."""
     override, (old, new) = EDITS[case]
     assert BASE.count(old) == 1
-    edited = parse(BASE.replace(old, new)).config
-    assert parse(BASE, overrides=[override]).config == edited != parse(BASE).config
-
-
-@pytest.mark.parametrize("case", EDITS)
-def test_what_is_run_stands_in_its_text(case: str) -> None:
-    """One value per key, where the key stands; the text and the settings as given are known beside it."""
-    override = EDITS[case][0]
     experiment = parse(BASE, overrides=[override])
+    assert experiment.config == parse(BASE.replace(old, new)).config != parse(BASE).config
     assert parse(experiment.text).config == experiment.config
     assert experiment.given == BASE
     assert experiment.settings == (override.strip(),)
@@ -76,7 +66,6 @@ def test_comments_and_order_stay() -> None:
     "text",
     [
         BASE + "#:set time.end=20\n",
-        "#:set time.end=20\n" + BASE,
         BASE.replace('"base"', '"base"\ndescription = """\n#:set time.end=20\n"""'),
     ],
 )
@@ -109,11 +98,8 @@ def test_without_overrides_the_text_is_as_given(tmp_path: Path) -> None:
     ("override", "where", "phrase"),
     [
         ("time.end", "--set time.end", "write KEY=VALUE on one line, such as time.end=10"),
-        ("=3", "--set =3", "write KEY=VALUE"),
         ('name="""a\nb"""', '--set name="""a\nb"""', "on one line"),
-        ("time..end=3", "--set time..end=3", '"" is not a key'),
         ("body.principal_moments[x]=1", "--set body.principal_moments[x]=1", "an index counted from 0"),
-        ("body.principal_moments[-1]=1", "--set body.principal_moments[-1]=1", "an index counted from 0"),
         (
             "body.principal_moments[0=1",
             "--set body.principal_moments[0=1",
@@ -124,15 +110,10 @@ def test_without_overrides_the_text_is_as_given(tmp_path: Path) -> None:
             "--set body.principal_moments[9]=1",
             'there is nothing at "9" to set',
         ),
-        ("body.principal_moments[0][0]=1", "--set body.principal_moments[0][0]=1", 'nothing at "0" to set'),
-        ("loads[1].kind=x", "--set loads[1].kind=x", 'there is nothing at "1" to set'),
         ("time.end.value=1", "--set time.end.value=1", 'there is nothing at "value" to set'),
-        ("body[0]=1", "--set body[0]=1", 'there is nothing at "0" to set'),
-        ("body.principal_moments.x=1", "--set body.principal_moments.x=1", 'there is nothing at "x" to set'),
         ("tiem.end=1", "tiem", 'did you mean "time"?'),
         ("time.ned=1", "[time] ned", 'did you mean "end"?'),
         ("time.end=true", "[time] end", "given true"),
-        ("time.end=ten", "[time] end", 'given "ten"'),
     ],
 )
 def test_bad_overrides(override: str, where: str, phrase: str) -> None:

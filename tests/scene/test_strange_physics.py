@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from kernel_scenes import moon, satellite, system
 from support import cases
-from test_field_files import ROWS, gfc, saved, tab
+from test_field_files import ROWS, gfc, saved
 from test_field_files import text as field_scene
 
 from rigidsim import ConfigError, load, parse
@@ -60,29 +60,30 @@ def figure(j2: float = 1e-3, radius: str = "6378 km", pole: str = "[0, 0, 1]") -
 
 REFUSED = {
     "a path no system takes": (moon(f"{LONG}.bsp"), "which can't be looked for (File name too long)"),
-    "a name no system takes": (moon(LONG), "which is no installed package"),
     "a module": (moon("os"), "which is a package, but none of an ephemeris"),
     "no kernel": (moon().replace('[ephemeris]\nkernel = "de421"\n', ""), "neither [[bodies]] nor an [ephem"),
     "one source twice": (
         moon(sources=("earth",)).replace("[time]", f"{LOAD}[time]"),
-        'number 2 source: given "earth", as in another gravity_gradient'),
+        'number 2 source: given "earth", as in another gravity_gradient',
+    ),
     "with the body itself": (moon(sources=("earth_moon_barycenter",)), 'contains that of "moon"'),
-    "a part and the whole": (
-        satellite(("earth_moon_barycenter", "moon")).replace('"earth"', '"sun"'), 'contains that of "moon"'),
     "bodies, a part and the whole": (
-        system(("earth", "moon", "earth_moon_barycenter")), 'whose mass contains that of "earth"'),
+        system(("earth", "moon", "earth_moon_barycenter")),
+        'whose mass contains that of "earth"',
+    ),
     "a coefficient that no mass has": (lumps('C = {"3,0" = 50}'), 'given 50.0 as "3,0" in C (unnormalized)'),
     "a source in the field's radius": (lumps('C = {"3,0" = 1e-6}', "1e9"), "within the radius of [body]"),
     "friction without end": (orbit("core = {moment = 1e-3, friction = 1e10}"), "core.friction: given 1e+10"),
-    "a core of nothing": (orbit("core = {moment = 1e-300, friction = 1e-8}"), "core.friction: given 1e-08"),
     "J2 beyond a ring": (figure(10), "figure.J2: given 10; -1 (a needle along the pole) to 0.5 (a ring)"),
-    "a source over the body": (figure(radius="4e5 km"), "the source comes to 384400 km from the body"),
     "a pole beyond its theory": (
-        figure(pole='"iau1976"').replace('"10 day"', '"9000 yr"'), "90 centuries from J2000"),
+        figure(pole='"iau1976"').replace('"10 day"', '"9000 yr"'),
+        "90 centuries from J2000",
+    ),
     "the Earth's pole elsewhere": (
         moon().replace('source = "sun"', 'source = "sun"\n' + FIGURE % (1e-7, "7e5 km", '"iau1976"')),
-        'figure.pole: given "iau1976", the Earth\'s pole, for the source "sun"'),
-}  # fmt: skip
+        'figure.pole: given "iau1976", the Earth\'s pole, for the source "sun"',
+    ),
+}
 
 
 @pytest.mark.parametrize("name", REFUSED)
@@ -98,11 +99,8 @@ FILES = {
         gfc().replace("radius 17", "radius 1738e3\nradius 17"),
         "has the radius 1738e3 and 1700000",
     ),
-    "two norms": (gfc("norm fully_normalized\nnorm unnormalized"), "has the norm fully_normalized and unn"),
     "a strange degree": (gfc().replace("max_degree 4", "max_degree ²"), "has max_degree ²; a whole number"),
-    "no number": (gfc().replace("radius 1700000.0", "radius nan"), "which has the radius 'nan'; a number"),
     "too large": (gfc(rows=ROWS | {(3, 1): (50.0, 0.0)}), "no mass within 2 radii has more than"),
-    "half a degree": (tab().replace("4, 4, 1", "4.5, 4.5, 1"), "has the degree 4.5; a whole number"),
 }
 
 
@@ -124,16 +122,14 @@ def test_a_device_is_no_file_of_a_field(tmp_path: Path) -> None:
 DOUBTFUL = {
     "an elastic body's radius in km": (
         orbit("mass = 7.3e22\nelasticity = {love_number = 0.02, radius = 1738}"),
-        "length_without_unit", '[body] elasticity radius: given 1738 without a unit'),
+        "length_without_unit",
+        "[body] elasticity radius: given 1738 without a unit",
+    ),
     "km^3/s^2": (moon(sources={"earth": 398600.44}), "length_without_unit", 'write "398600.44 km^3/s^2"'),
     "another's": (moon(sources={"earth": 1.327124e20}), "strength_contradicts", "which is the Sun's, for"),
-    "of a mass": (
-        system().replace('"sun"\n', '"sun"\ngravitational_parameter = 3.986e14\n'),
-        "strength_contradicts", "[[bodies]] number 1 gravitational_parameter: given 3.986e+14"),
     "no host's": (satellite(("moon", "sun")), "host_without_gravity", 'given "earth", whose own gravity no'),
-    "km": (satellite().replace('"42164 km"', "42164"), "length_without_unit", 'write "42164 km"'),
     "in the Sun": (satellite().replace('host = "earth"\n', ""), "below_surface", "centre of the Sun"),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("name", DOUBTFUL)
@@ -182,17 +178,10 @@ def rewritten(file: str, change: Callable[[bytes], bytes]) -> Callable[[Path], o
 
 DAMAGED = {
     "header": (rewritten("constants.npy", lambda x: x[:20] + b"z" + x[21:]), "constants.npy is damaged"),
-    "size": (rewritten("constants.npy", lambda x: x.replace(b"(231,)", b"(9999999999999,)")), "is damaged"),
-    "numbers alone": (lambda place: np.save(place / "constants.npy", np.arange(5.0)), "is damaged"),
     "ratio of masses": (constant("EMRAT", 8.13), "EMRAT is 8.13, which is 81.3 in all kernels"),
-    "no number": (constant("EMRAT", np.inf), "constants.npy is damaged"),
-    "unit": (constant("AU", 1.0), "AU is 1, which is 149597870.7 in all kernels"),
     "strength": (constant("GMB", 1.8e-9), "G M of earth is"),
     "span": (constant("jalpha", 2524624.5), "it ends at JD 2524624.5, and begins at 2524624.5"),
-    "zeros": (blocks("moon", lambda x: 0 * x), '"moon" about "earth" is 0 to 0 au away'),
     "metres": (blocks("moon", lambda x: 1000 * x), '"earth" moves at 17.7 to 42.9'),
-    "half": (blocks("moon", lambda x: x[: len(x) // 2]), '"moon" about "earth" moves at'),
-    "no terms": (blocks("moon", lambda x: x[:, :, :0]), "jpl-moon.npy is damaged"),
     "another's": (blocks("sun", lambda x: np.load(PACKAGE / "jpl-venus.npy")), '"sun" is '),
 }
 

@@ -31,13 +31,7 @@ def found(angles: str = "[0, 1, 0]", inclination: str = "1", anomaly: str = "0")
 
 @pytest.mark.parametrize(
     "angles",
-    [
-        "[0.4, 1.0, -0.3]",
-        "[6.28, -6.28, 0]",  # within a turn
-        '["40 deg", "60 deg", "30 deg"]',
-        '["40 rad", "60 rad", "-30 rad"]',  # said, so meant
-        '["3*pi", "-10*pi/3", "20 pi"]',  # nobody has degrees with pi in them
-    ],
+    ["[6.28, -6.28, 0]", '["40 deg", "60 deg", "30 deg"]', '["3*pi", "-10*pi/3", "20 pi"]'],
 )
 def test_no_false_alarm(angles: str) -> None:
     assert found(angles) == []
@@ -76,10 +70,7 @@ time.end = "1 day"
     ("time", "said"),
     [
         ('end = 30\nunit = "day"', 'write "30 day" if that is meant, "30 s" if not'),
-        ('end = 30\nunit = "day"', "taken as seconds: 0.000347 day"),
-        ('end = 31557600\nunit = "yr"', ""),  # a year
-        ('end = "30 s"\nunit = "day"', ""),  # said, so meant
-        ('end = 30\nunit = "ms"', ""),
+        ('end = "30 s"\nunit = "day"', ""),
         ("end = 30", ""),
     ],
 )
@@ -94,14 +85,7 @@ def test_an_end_meant_in_the_unit_of_times_is_pointed_out(time: str, said: str) 
 
 @pytest.mark.parametrize(
     ("expression", "codes"),
-    [
-        ("theta - 90", ["never_happens"]),
-        ("-90 + theta", ["never_happens"]),
-        ("theta - 90 deg", []),
-        ("theta - 3", []),
-        ("psi - 90", []),  # outer angles keep their turns
-        ("theta*t - 90", []),
-    ],
+    [("theta - 90", ["never_happens"]), ("theta - 90 deg", []), ("psi - 90", [])],
 )
 def test_events_that_never_happen(expression: str, codes: list[str]) -> None:
     text = CONFIG.format(angles="[0, 1, 0]", inclination="0", anomaly="0")
