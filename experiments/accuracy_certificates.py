@@ -11,26 +11,18 @@ Run: python -m experiments.accuracy_certificates [--full] [--out DIR] [--first N
 
 from __future__ import annotations
 
-import argparse
 import math
-import sys
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from pathlib import Path
-
-if not __package__:  # as a script
-    sys.path.insert(0, str(Path(__file__).parents[1]))
 
 import numpy as np
 
 import rigidsim
-from experiments import common
-from experiments.common import Check
+from experiments.common import BLUE, GREY, ORANGE, Answer, Check, Curve, Panel, Picture, Study
 from experiments.random_scenes import KINDS, RandomScene, random_scene
 from rigidsim.accuracy.comparison import angles_between, parts_of
 from rigidsim.errors import ConfigError
 
-NAME = "accuracy_certificates"
 _LONG = 2000.0  # rad: beyond, the truth is the closed form
 _TIGHT = 1e-15  # rad: below, quadruple precision is no truth
 
@@ -121,40 +113,27 @@ def checks(outcomes: Sequence[Outcome]) -> list[Check]:
     ]
 
 
-def _figure(outcomes: Sequence[Outcome], out: Path) -> None:
-    run = [o for o in outcomes if not o.stopped]
-    asked, certified, true = (
-        np.array(x) for x in zip(*((o.scene.accuracy, o.certified, o.true) for o in run), strict=True)
-    )
-    axes = (figure := common.new_figure(8, 5.2, "An accuracy asked for is kept and certified")).subplots()
+def picture(outcomes: Sequence[Outcome]) -> Picture:
+    """True and certified errors over the accuracies asked for."""
+    run = [(o.scene.accuracy, o.certified, o.true) for o in outcomes if not o.stopped]
+    asked, certified, true = np.array(run).T
     ends = np.array([asked.min() / 3, asked.max() * 3])
-    axes.loglog(ends, ends, color=common.GREY, linewidth=1, label="accuracy asked for")
-    axes.vlines(asked, np.maximum(true, 1e-40), certified, color="#cccccc", linewidth=0.8)
-    axes.loglog(asked, certified, "v", color=common.ORANGE, markersize=4, label="certified")
-    axes.loglog(asked, true, "o", color=common.BLUE, markersize=3, label="true")
-    common.tidy(
-        axes, "attitude error asked for, rad", "attitude error, rad", "true <= certified <= asked for"
-    )
-    axes.legend(frameon=False, loc="upper left")
-    common.save(figure, out, NAME)
+    return Picture("An accuracy asked for is kept and certified", "a", [
+        Panel("true <= certified <= asked for", "attitude error asked for, rad", "attitude error, rad", [
+            Curve(ends, ends, "accuracy asked for", GREY),
+            Curve(asked, certified, "certified", ORANGE, "v", 1),
+            Curve(asked, true, "true", BLUE, "o", 0.8),
+        ], "xy", legend="upper left"),
+    ], (8, 5.2))  # fmt: skip
 
 
-def main(argv: Sequence[str] | None = None) -> int:
-    """The command; returns its exit code."""
-    parser = argparse.ArgumentParser(prog=f"python -m experiments.{NAME}")
-    common.add_arguments(parser)
-    parser.add_argument("--first", type=int, default=0, metavar="N", help="number of the first scene")
-    parser.add_argument("--count", type=int, metavar="M", help="how many scenes")
-    parser.add_argument("--seed", type=int, default=0)
-    arguments = parser.parse_args(argv)
-    count = arguments.count or (300 if arguments.full else 2 * len(KINDS))
-    outcomes = campaign(range(arguments.first, arguments.first + count), arguments.seed)
-    _figure(outcomes, arguments.out)
-    found = checks(outcomes)
-    print(common.table(found, NAME))
-    print(f"figure: {arguments.out / NAME}.png")
-    return int(not all(check.passed for check in found))
+@Study
+def certificates(full: bool, first: int = 0, count: int = 0, seed: int = 0) -> Answer:
+    """Scenes from the first on; 300 of them with --full."""
+    count = count or (300 if full else 2 * len(KINDS))
+    outcomes = campaign(range(first, first + count), seed)
+    return checks(outcomes), picture(outcomes)
 
 
 if __name__ == "__main__":
-    raise SystemExit(main())
+    raise SystemExit(certificates.main())

@@ -35,19 +35,15 @@ import re
 import sys
 import tempfile
 from dataclasses import dataclass
-from pathlib import Path
-
-if not __package__:  # as a script
-    sys.path.insert(0, str(Path(__file__).parents[1]))
+from typing import Any
 
 import numpy as np
 
 import rigidsim
-from experiments.common import BLUE, CONFIGS, GREY, ORANGE, Check, main, new_figure, save, tidy
+from experiments.common import BLUE, CONFIGS, GREY, ORANGE, Answer, Check, Curve, Panel, Picture, Study
 from experiments.measure import matrices
 from experiments.tumbling import Tumbling, excitation_of, polhode, tumbling, tumbling_of
 
-NAME = "apophis_flyby"
 CONFIG = CONFIGS / "sweeps" / "apophis_flyby.toml"
 SEED = 2029
 HOUR = 3600.0
@@ -192,7 +188,8 @@ def config() -> str:
     return text + mark + "".join(axes).replace("], [", "],\n    [")
 
 
-def study(full: bool, out: Path) -> list[Check]:
+@Study
+def study(full: bool) -> Answer:
     """Many members through the pass, the figure, the checks."""
     members = 8192 if full else 512
     drawn = draws(members)
@@ -232,7 +229,7 @@ def study(full: bool, out: Path) -> list[Check]:
     print(f"  in short-axis mode after the pass: {after.short.mean():.3f}")
     for name, (low, middle, high) in quantiles.items():
         print(f"  {name}: median {middle:.3g}, 5 to 95 % {low:.3g} to {high:.3g}")
-    draw(drawn, after, poles, shift, ratio, out)
+    figure = picture(drawn, after, poles, shift)
     likely = "Benson et al. 2023, abstract; likely: more than half"
     could = "Benson et al. 2023, abstract, to the one digit it has; one in 1000 beyond"
     published, error = PUBLISHED_EXCITATION
@@ -248,67 +245,48 @@ def study(full: bool, out: Path) -> list[Check]:
         Check("place two days after, off Kepler's hyperbola", astray, 0, 1e-9, "1",
               "closed form; the body's size makes (170 m / 38,000 km)^2 = 2e-11", "absolute"),
         Check("largest drift over its bound", max(drifts), 0, 1, "1", "round-off law", "absolute"),
-    ]  # fmt: skip
+    ], figure  # fmt: skip
 
 
 def _longitude(poles: np.ndarray) -> np.ndarray:
     return np.asarray(np.arctan2(poles[:, 1], poles[:, 0]))
 
 
-def draw(
-    drawn: Draws, after: Tumbling, poles: np.ndarray, shift: np.ndarray, ratio: np.ndarray, out: Path
-) -> None:
+def picture(drawn: Draws, after: Tumbling, poles: np.ndarray, shift: np.ndarray) -> Picture:
     """Poles, periods and excitation, before and after."""
-    stay = float(after.short.mean())
-    title = f"After the Earth: {100 * stay:.0f} % still in short-axis mode, poles and periods scattered"
-    figure = new_figure(14, 5.2, title)
-    sky = figure.add_subplot(131, projection="polar")
-    for directions, color, size, label in ((poles, ORANGE, 3, "after"), (drawn.poles, BLUE, 3, "before")):
-        away = 90 + np.degrees(np.arcsin(np.clip(directions[:, 2], -1, 1)))
-        sky.plot(
-            _longitude(directions),
-            away,
-            ".",
-            color=color,
-            markersize=size,
-            alpha=0.5,
-            label=label,
-            markeredgewidth=0,
-        )
-    sky.set_rlim(0, float(np.quantile(90 + np.degrees(np.arcsin(poles[:, 2])), 0.998)))
-    sky.set_title("Pole, in degrees from the ecliptic's south pole", fontsize=10.5)
-    sky.set_xticks(np.radians(np.arange(0, 360, 45)))
-    sky.legend(loc="lower left", fontsize=9, markerscale=4, bbox_to_anchor=(-0.12, -0.08))
-    plane = figure.add_subplot(132)
-    for rows, color, label in (
-        (after.short, ORANGE, "after, short-axis mode"),
-        (~after.short, GREY, "after, long-axis mode"),
-    ):
-        hours = 2 * np.pi / after.effective[rows] / HOUR
-        plane.plot(hours, after.excitation[rows], ".", color=color, markersize=2.5, label=label)
-    plane.plot(
-        2 * np.pi / drawn.state.effective / HOUR,
-        drawn.state.excitation,
-        ".",
-        color=BLUE,
-        markersize=2.5,
-        label="before",
+
+    def away(directions: np.ndarray) -> np.ndarray:
+        return np.asarray(90 + np.degrees(np.arcsin(np.clip(directions[:, 2], -1, 1))))
+
+    def hours(effective: np.ndarray) -> np.ndarray:
+        return 2 * np.pi / effective / HOUR
+
+    def ticks(axes: Any) -> None:
+        axes.set_xticks([10, 20, 30, 50, 100], ["10", "20", "30", "50", "100"])
+        axes.minorticks_off()
+
+    sky = [Curve(_longitude(one), away(one), label, color, ".", 0.7, {"alpha": 0.5, "markeredgewidth": 0})
+           for one, label, color in ((poles, "after", ORANGE), (drawn.poles, "before", BLUE))]  # fmt: skip
+    plane = [Curve(hours(after.effective[rows]), after.excitation[rows], label, color, ".", 0.6)
+             for rows, label, color in ((after.short, "after, short-axis mode", ORANGE),
+                                        (~after.short, "after, long-axis mode", GREY))]  # fmt: skip
+    plane.append(Curve(hours(drawn.state.effective), drawn.state.excitation, "before", BLUE, ".", 0.6))
+    stay, limit = (
+        100 * after.short.mean(),
+        Curve(10, None, "10°, which Benson et al. 2023 call likely", ORANGE),
     )
-    tidy(plane, "effective period 2π L/2E (h)", "excitation E/E0", "How fast, and how much it tumbles")
-    plane.set(xscale="log")
-    plane.set_xticks([10, 20, 30, 50, 100], ["10", "20", "30", "50", "100"])
-    plane.minorticks_off()
-    plane.legend(loc="upper right", fontsize=9, markerscale=4)
-    count = figure.add_subplot(133)
-    count.hist(shift, bins=np.arange(0, 61, 1.5), color=BLUE, alpha=0.8)
-    count.axvline(10, color=ORANGE, linewidth=1.2, label="10°, which Benson et al. 2023 call likely")
-    tidy(count, "pole shifted by (degrees)", "members", f"Median {np.median(shift):.0f}°")
-    count.legend(loc="upper right", fontsize=9)
-    save(figure, out, NAME)
+    title = f"After the Earth: {stay:.0f} % still in short-axis mode, poles and periods scattered"
+    return Picture(title, "abc", [
+        Panel("Pole, in degrees from the ecliptic's south pole", "", "", sky, legend="lower left",
+              limits={"ylim": (0, float(np.quantile(away(poles), 0.998)))}),
+        Panel("How fast, and how much it tumbles", "effective period 2π L/2E (h)", "excitation E/E0", plane,
+              "x", legend="upper right", more=ticks),
+        Panel(f"Median {np.median(shift):.0f}°", "pole shifted by (degrees)", "members", [limit],
+              more=lambda axes: axes.hist(shift, bins=np.arange(0, 61, 1.5), color=BLUE, alpha=0.8)),
+    ], (14, 5.2), {"per_subplot_kw": {"a": {"projection": "polar"}}})  # fmt: skip
 
 
 if __name__ == "__main__":
-    if "--config" in sys.argv:
-        print(config(), end="")
-        sys.exit(0)
-    sys.exit(main(study, NAME))
+    if "--config" not in sys.argv:
+        raise SystemExit(study.main())
+    print(config(), end="")

@@ -19,12 +19,7 @@ Run: python -m experiments.apophis_real_sky [--full] [--out DIR]
 
 from __future__ import annotations
 
-import sys
 import tempfile
-from pathlib import Path
-
-if not __package__:  # as a script
-    sys.path.insert(0, str(Path(__file__).parents[1]))
 
 import numpy as np
 
@@ -35,19 +30,19 @@ from experiments.common import (
     CONFIGS,
     GREY,
     ORANGE,
+    Answer,
     Check,
+    Curve,
+    Panel,
+    Picture,
     Result,
-    main,
-    new_figure,
-    save,
+    Study,
     simulate,
-    tidy,
 )
 from experiments.measure import matrices
 from experiments.real_bodies import apophis
 from experiments.tumbling import Tumbling, tumbling_of
 
-NAME = "apophis_real_sky"
 SCENE = CONFIGS / "kernels" / "apophis_2029.toml"
 AU = 149597870.7  # km
 HORIZONS = 0.00025409077441363115 * AU
@@ -110,7 +105,8 @@ def hyperbolas(drawn: flyby.Draws) -> tuple[np.ndarray, np.ndarray]:
     return rates, momentum / np.linalg.norm(momentum, axis=1)[:, None]
 
 
-def study(full: bool, out: Path) -> list[Check]:
+@Study
+def study(full: bool) -> Answer:
     """The orbit, and members on both."""
     drawn = flyby.draws(96 if full else 24)
     scene = simulate(SCENE, "output.estimate=false", "time.every='1 min'")
@@ -121,7 +117,7 @@ def study(full: bool, out: Path) -> list[Check]:
     other_rates, other_poles = hyperbolas(drawn)
     after, alone = tumbling_of(drawn.moments, rates), tumbling_of(drawn.moments, other_rates)
     shift, apart = angle(poles, drawn.poles), angle(poles, other_poles)
-    _draw(out, scene, drawn, after, shift, apart)
+    figure = picture(scene, drawn, after, shift, apart)
     likely = "Benson et al. 2023, abstract; likely: more than half"
     none = "none; little beside what isn't known of the rotation"
     return [
@@ -141,7 +137,7 @@ def study(full: bool, out: Path) -> list[Check]:
               "absolute"),
         Check("effective rate over that about the Earth alone, median",
               float(np.median(after.effective / alone.effective)), 1.0, 1e-3, "1", none, "absolute"),
-    ]  # fmt: skip
+    ], figure  # fmt: skip
 
 
 def angle(one: np.ndarray, other: np.ndarray) -> np.ndarray:
@@ -150,41 +146,31 @@ def angle(one: np.ndarray, other: np.ndarray) -> np.ndarray:
         np.linalg.norm(np.cross(one, other), axis=1), (one * other).sum(axis=1))))  # fmt: skip
 
 
-def _draw(
-    out: Path, scene: Result, drawn: flyby.Draws, after: Tumbling, shift: np.ndarray, apart: np.ndarray
-) -> None:
+def picture(
+    scene: Result, drawn: flyby.Draws, after: Tumbling, shift: np.ndarray, apart: np.ndarray
+) -> Picture:
     """The pass and the momentum, and members on both orbits."""
-    figure = new_figure(
-        14, 4.8, "Apophis past the Earth: a new rotation, to which Moon and Sun hardly matter"
-    )
-    near, turned, worth = figure.subplots(1, 3)
     hours = scene.values("time") / 3600 - 48
-    near.semilogy(hours, np.linalg.norm(scene.values("position"), axis=1) / 1e6, color=BLUE, linewidth=1.2)
-    near.axhline(384.4, color=GREY, linewidth=0.8, linestyle="--")
-    tidy(near, "hours from perigee", "1000 km", "Distance from the Earth (dashed: the Moon's)")
     momentum = scene.values("angular_momentum")
-    poles = momentum / np.linalg.norm(momentum, axis=1)[:, None]
-    turned.plot(
-        hours,
-        angle(poles, np.broadcast_to(poles[0], poles.shape)),
-        color=BLUE,
-        linewidth=1.2,
-        label="pole, deg",
-    )
-    share = np.linalg.norm(momentum, axis=1) / np.linalg.norm(momentum[0])
-    turned.plot(hours, 100 * (share - 1), color=ORANGE, linewidth=1.2, label="size, %")
-    turned.set_xlim(-12, 12)
-    turned.legend(loc="center right", frameon=False, fontsize=9)
-    tidy(turned, "hours from perigee", "change", "Angular momentum of the ready scene")
+    size = np.linalg.norm(momentum, axis=1)
+    poles = momentum / size[:, None]
     ratio = after.effective / drawn.state.effective
-    worth.semilogy(shift, apart, "o", color=BLUE, markersize=5, label="pole, deg")
-    worth.semilogy(
-        shift, 100 * np.abs(ratio - 1), "o", color=ORANGE, markersize=5, label="change of the rate, %"
-    )
-    worth.legend(loc="center right", frameon=False, fontsize=9)
-    tidy(worth, "pole shifted by, deg", "", "Members: worth of Moon, Sun and planets (blue)")
-    save(figure, out, NAME)
+    title = "Apophis past the Earth: a new rotation, to which Moon and Sun hardly matter"
+    return Picture(title, "abc", [
+        Panel("Distance from the Earth (dashed: the Moon's)", "hours from perigee", "1000 km", [
+            Curve(hours, np.linalg.norm(scene.values("position"), axis=1) / 1e6),
+            Curve(None, 384.4, "", GREY, "--", 0.8),
+        ], "y"),
+        Panel("Angular momentum of the ready scene", "hours from perigee", "change", [
+            Curve(hours, angle(poles, np.broadcast_to(poles[0], poles.shape)), "pole, deg"),
+            Curve(hours, 100 * (size / size[0] - 1), "size, %", ORANGE),
+        ], limits={"xlim": (-12, 12)}, legend="center right"),
+        Panel("Members: worth of Moon, Sun and planets (blue)", "pole shifted by, deg", "", [
+            Curve(shift, apart, "pole, deg", BLUE, "o"),
+            Curve(shift, 100 * np.abs(ratio - 1), "change of the rate, %", ORANGE, "o"),
+        ], "y", legend="center right"),
+    ], (14, 4.8))  # fmt: skip
 
 
 if __name__ == "__main__":
-    sys.exit(main(study, NAME))
+    raise SystemExit(study.main())

@@ -9,7 +9,7 @@ compiled code is warm on both sides. Of the first rows and the warm one what is 
 with them it stands beside, over at most three pairs. Absolute times depend on what else the machine does.
 
 Run: python -m experiments.benchmark [--pairs 7] [--rows sparse,dense,...] [--quick] [--out DIR]
-     [--scratch DIR] [--python numba=/other/bin/python] [--given FILE.json ...] [--into README.md]
+     [--scratch DIR] [--given FILE.json ...] [--into README.md]
 Rows of ``--given`` files aren't measured again unless ``--rows`` names them; with ``--into`` table and notes
 replace what stands between that file's lines ``<!-- benchmark -->`` and ``<!-- end of benchmark -->``.
 Exit code 1 if a ratio is above its bound (never with ``--quick``). 1e8 samples take some 15 GB of disk and
@@ -27,9 +27,6 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
 from typing import Any
-
-if not __package__:  # as a script
-    sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from experiments.benchmarking import satellite
 from experiments.benchmarking.processes import Figures
@@ -149,9 +146,9 @@ def _look_at(result: Result, ours: Path, bare: Path) -> None:
     result.differences = farthest(ours, bare)
 
 
-def measure_satellite(pairs: int, pythons: dict[str, str], *, quick: bool) -> list[Result]:
+def measure_satellite(pairs: int, *, quick: bool) -> list[Result]:
     """The rows without closed form."""
-    found = satellite.costs(repeats=pairs, quick=quick, pythons=pythons)
+    found = satellite.costs(repeats=pairs, quick=quick)
     results = []
     for error in satellite.ERRORS:
         work = f"satellite without closed form at {error:.0e} rad, {satellite.radians(quick=quick):.2g} rad"
@@ -247,9 +244,6 @@ def main(argv: Sequence[str] | None = None) -> int:
         "--out", type=Path, default=DEFAULT_OUT, help="of table and figure (default: %(default)s)"
     )
     parser.add_argument("--scratch", type=Path, help="where runs are written")
-    parser.add_argument(
-        "--python", action="append", default=[], metavar="PEER=PATH", help="of another environment"
-    )
     arguments = parser.parse_args(argv)
     given = [Result.of(one) for path in arguments.given for one in json.loads(path.read_text())]
     found = {result.key: result for result in given}  # the last that is given counts
@@ -269,8 +263,7 @@ def main(argv: Sequence[str] | None = None) -> int:
             measured.append(measure(row, arguments.pairs, arguments.scratch, judged=not arguments.quick))
             print(measured[-1].line, file=sys.stderr, flush=True)
     if SATELLITE in wanted:
-        pythons = dict(given.split("=", 1) for given in arguments.python)
-        measured += measure_satellite(arguments.pairs, pythons, quick=arguments.quick)
+        measured += measure_satellite(arguments.pairs, quick=arguments.quick)
     found |= {result.key: result for result in measured}
     order = {key: place for place, key in enumerate(known)}
     for row in rows(quick=False):

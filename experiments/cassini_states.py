@@ -22,18 +22,25 @@ from __future__ import annotations
 
 import sys
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 import numpy as np
 
-if not __package__:  # as a script
-    sys.path.insert(0, str(Path(__file__).parents[1]))
-
-from experiments.common import BLUE, GREY, ORANGE, Check, Result, main, new_figure, save, simulate, tidy
+from experiments.common import (
+    BLUE,
+    GREY,
+    ORANGE,
+    Answer,
+    Check,
+    Curve,
+    Panel,
+    Picture,
+    Result,
+    Study,
+    simulate,
+)
 from rigidsim.scene.arithmetic import context_for, hansen
 from rigidsim.scene.bodies.presets import PRESETS
 
-NAME = "cassini_states"
 DAY, YEAR = 86400.0, 31557600.0
 CONFIG = """
 name = "{name}"
@@ -288,7 +295,8 @@ def find(case: Case) -> Found:
     )
 
 
-def study(full: bool, out: Path) -> list[Check]:
+@Study
+def study(full: bool) -> Answer:
     """Both states against theory, the full model and what was observed."""
     checks, shown = [], []
     for whole in (MOON, MERCURY):
@@ -322,28 +330,26 @@ def study(full: bool, out: Path) -> list[Check]:
         Check("Mercury: obliquity", (mercury - MERCURY.inclination) * 60, 2.04, 0.04, "arcmin",
               "Margot et al. 2012, +- 0.08"),
     ]  # fmt: skip
-    draw(shown, out)
-    return checks
+    figure = picture(shown)
+    return checks, figure
 
 
-def draw(shown: list[tuple[Case, Found]], out: Path) -> None:
+def picture(shown: list[tuple[Case, Found]]) -> Picture:
     """The pole's path about its state, in the frame of the node."""
-    figure = new_figure(11.5, 5.6, "Cassini's states: the pole in the frame that turns with the orbit's node")
-    for number, (case, found) in enumerate(shown, start=1):
-        axes = figure.add_subplot(1, 2, number)
-        centre = mean(found.paths[1])
+    panels = []
+    for case, found in shown:
         labels = ("from the balance", "from the state found", "the same by the linear theory")
         drawn = list(zip(found.paths, (GREY, BLUE, ORANGE), labels, strict=True))
-        for path, color, label in drawn if case.name == "mercury" else drawn[:2]:
-            axes.plot(*np.degrees(path - centre).T * 3600, color=color, linewidth=0.8, label=label)
-        axes.plot(0, 0, "+", color=GREY, markersize=12)
-        where = f"{np.degrees(found.angle):.4f} deg from the node's pole"
-        title = f"{case.name.title()}, state {case.state}: {where}"
-        tidy(axes, "along the node (arcsec)", "across (arcsec)", title)
-        axes.legend(fontsize=9)
-        axes.set_aspect("equal", adjustable="datalim")
-    save(figure, out, NAME)
+        curves = [Curve(*np.degrees(path - mean(found.paths[1])).T * 3600, label, color, width=0.8)
+                  for path, color, label in (drawn if case.name == "mercury" else drawn[:2])]  # fmt: skip
+        title = (
+            f"{case.name.title()}, state {case.state}: {np.degrees(found.angle):.4f} deg from the node's pole"
+        )
+        panels.append(Panel(title, "along the node (arcsec)", "across (arcsec)",
+                            [*curves, Curve(0, 0, "", GREY, "+", 3)], equal=True))  # fmt: skip
+    title = "Cassini's states: the pole in the frame that turns with the orbit's node"
+    return Picture(title, "ab", panels, (11.5, 5.6))
 
 
 if __name__ == "__main__":
-    sys.exit(main(study, NAME))
+    raise SystemExit(study.main())

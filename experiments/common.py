@@ -1,16 +1,17 @@
 """What all studies share: checks and their table, the command line, runs in a temporary folder, figures.
 
-A study is a module with ``study(full, out)``: it writes ``out/NAME.png`` and returns its checks; ``main``
-makes a command of it, which ends with exit code 1 if any check fails.
+A study is a module whose text asks a question and whose ``study(full)``, under ``@Study``, returns checks
+and a picture; its command writes ``out/NAME.png`` and ends with exit code 1 if a check fails.
 """
 
 from __future__ import annotations
 
 import argparse
+import inspect
 import math
 import tempfile
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
 
@@ -26,8 +27,6 @@ CONFIGS = Path(__file__).parents[1] / "configs"
 DEFAULT_OUT = Path("runs/experiments")
 BLUE, ORANGE, GREEN, RED, GREY = "#2166ac", "#e08214", "#1b9e77", "#b2182b", "#636363"
 EPSILON = {"single": 2.0**-23, "double": 2.0**-52, "extended": 2.0**-63, "quadruple": 2.0**-112}
-
-Study = Callable[[bool, Path], "list[Check]"]
 
 
 @dataclass(frozen=True)
@@ -100,26 +99,6 @@ def table(checks: Sequence[Check], title: str = "") -> str:
             f"{verdict}",
         ]
     )
-
-
-def main(study: Study, name: str, argv: Sequence[str] | None = None) -> int:
-    """Run one study from the command line.
-
-    Args:
-        study: the module's.
-        name: of the module, for the table and the figure.
-        argv: arguments; the command line's by default.
-
-    Returns:
-        The exit code: 0, or 1 if a check failed.
-    """
-    parser = argparse.ArgumentParser(prog=f"python -m experiments.{name}")
-    add_arguments(parser)
-    arguments = parser.parse_args(argv)
-    checks = study(arguments.full, arguments.out)
-    print(table(checks, name))
-    print(f"figure: {arguments.out / name}.png")
-    return int(not checks or not all(check.passed for check in checks))
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -224,3 +203,133 @@ def save(figure: Figure, out: Path, name: str) -> Path:
     path = out / f"{name}.png"
     figure.savefig(path, dpi=130)
     return path
+
+
+@dataclass(frozen=True)
+class Curve:
+    """A line, or dots, in matplotlib's style; without x or y a level from side to side.
+
+    Attributes:
+        width: of lines, and 4 of them the diameter of markers.
+        more: further options of ``Axes.plot``.
+    """
+
+    x: Any
+    y: Any
+    label: str = ""
+    color: str = BLUE
+    style: str = "-"
+    width: float = 1.2
+    more: Mapping[str, Any] = field(default_factory=dict)
+
+    def draw(self, axes: Any) -> None:
+        """Onto axes."""
+        options = {"color": self.color, "linewidth": self.width, **self.more}
+        if self.label:
+            options["label"] = self.label
+        if self.x is None:
+            axes.axhline(self.y, linestyle=self.style, **options)
+        elif self.y is None:
+            axes.axvline(self.x, linestyle=self.style, **options)
+        else:
+            axes.plot(self.x, self.y, self.style, **{"markersize": 4 * self.width, **options})
+
+
+@dataclass(frozen=True)
+class Panel:
+    """Curves with their labels.
+
+    Attributes:
+        log: which axes are logarithmic: "", "x", "y" or "xy".
+        equal: whether both axes have one scale.
+        legend: where it stands; none without labels.
+        limits: ``xlim``, ``ylim`` and what else ``Axes.set`` takes.
+        more: what curves can't say, drawn onto the axes.
+    """
+
+    title: str
+    xlabel: str
+    ylabel: str
+    curves: Sequence[Curve] = ()
+    log: str = ""
+    equal: bool = False
+    legend: str = "best"
+    limits: Mapping[str, Any] = field(default_factory=dict)
+    more: Callable[[Any], None] = lambda axes: None
+
+    def draw(self, axes: Any) -> None:
+        """Onto axes."""
+        for curve in self.curves:
+            curve.draw(axes)
+        axes.set(**{f"{axis}scale": "log" for axis in self.log})
+        if self.equal:
+            axes.set_aspect("equal", adjustable="datalim")
+        tidy(axes, self.xlabel, self.ylabel, self.title)
+        self.more(axes)
+        axes.set(**self.limits)
+        if axes.get_legend_handles_labels()[1]:
+            axes.legend(loc=self.legend, fontsize=9, framealpha=0.8)
+
+
+@dataclass(frozen=True)
+class Picture:
+    """Panels under a title that answers the study's question.
+
+    Attributes:
+        layout: a mosaic of letters, one for each panel in order ("ab;cc").
+        size: inches.
+        options: of ``Figure.subplot_mosaic``: ``height_ratios``, ``per_subplot_kw`` ...
+    """
+
+    title: str
+    layout: str
+    panels: Sequence[Panel]
+    size: tuple[float, float] = (11.0, 5.5)
+    options: Mapping[str, Any] = field(default_factory=dict)
+
+    def figure(self) -> Figure:
+        """The figure."""
+        figure = new_figure(*self.size, self.title)
+        axes = figure.subplot_mosaic(self.layout, **self.options)
+        for letter, panel in zip(sorted(axes), self.panels, strict=True):
+            panel.draw(axes[letter])
+        return figure
+
+
+Answer = tuple[list[Check], Picture | None]
+"""Checks, and the picture if there is one."""
+
+
+class Study:
+    """A study of motions: ``@Study`` over ``study(full) -> Answer`` makes a command of its module.
+
+    Attributes:
+        name: of the module.
+        question: the module's text.
+    """
+
+    def __init__(self, measure: Callable[..., Answer]) -> None:
+        self.measure = measure
+        self.name = Path(measure.__code__.co_filename).stem
+        self.question = str(measure.__globals__["__doc__"])
+
+    def __call__(self, full: bool, out: Path, **more: Any) -> list[Check]:
+        """Measure, and save the picture as ``out/NAME.png``."""
+        checks, picture = self.measure(full, **more)
+        if picture is not None:
+            save(picture.figure(), out, self.name)
+        return checks
+
+    def main(self, argv: Sequence[str] | None = None) -> int:
+        """The command, with the function's further arguments as options; exit code 1 if a check failed."""
+        parser = argparse.ArgumentParser(
+            prog=f"python -m experiments.{self.name}",
+            description=self.question,
+            formatter_class=argparse.RawDescriptionHelpFormatter,
+        )
+        add_arguments(parser)
+        for option in list(inspect.signature(self.measure).parameters.values())[1:]:
+            parser.add_argument(f"--{option.name}", type=type(option.default), default=option.default)
+        checks = self(**vars(parser.parse_args(argv)))
+        print(table(checks, self.name))
+        return int(not checks or not all(check.passed for check in checks))

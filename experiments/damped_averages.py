@@ -21,12 +21,8 @@ from __future__ import annotations
 
 import sys
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
-
-if not __package__:  # as a script
-    sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from experiments.common import (
     BLUE,
@@ -34,17 +30,17 @@ from experiments.common import (
     GREY,
     ORANGE,
     RED,
+    Answer,
     Check,
+    Curve,
+    Panel,
+    Picture,
     Result,
-    main,
-    new_figure,
-    save,
+    Study,
     simulate,
-    tidy,
 )
 from rigidsim.errors import ConfigError
 
-NAME = "damped_averages"
 CONFIG = """
 name = "damped"
 [body]
@@ -252,7 +248,8 @@ def campaign(count: int) -> tuple[list[Check], np.ndarray, int]:
     return checks, found, refused
 
 
-def study(full: bool, out: Path) -> list[Check]:
+@Study
+def study(full: bool) -> Answer:
     """All of it; see the module's text."""
     size, end = (2.5e-5, 5e4) if full else (2.5e-4, 5e3)
     scenes = {
@@ -273,57 +270,43 @@ def study(full: bool, out: Path) -> list[Check]:
     slopes, errors = orders(sizes)
     rows, ratios, refused = campaign(40 if full else 10)
     print(f"random bodies: {refused} refused", file=sys.stderr)
-    draw(scenes, runs, (sizes, errors), ratios, out)
-    return checks + slopes + rows
+    figure = picture(scenes["tumbler"], runs["tumbler"], (sizes, errors), ratios)
+    return checks + slopes + rows, figure
 
 
-def draw(
-    scenes: dict[str, Scene],
-    runs: dict[str, dict[str, Result]],
+def picture(
+    scene: Scene,
+    both: dict[str, Result],
     ordered: tuple[np.ndarray, dict[str, np.ndarray]],
     ratios: np.ndarray,
-    out: Path,
-) -> None:
+) -> Picture:
     """The wobble, the distances, their order, and the random bodies."""
-    figure = new_figure(11.5, 8.2, "A damped rotation: its average beside every rotation")
-    scene, both = scenes["tumbler"], runs["tumbler"]
     averaged, full = both["spin_averaged"], both["full"]
-    time, colors = averaged.values("time"), (BLUE, ORANGE, GREEN)
-    axes = figure.add_subplot(2, 2, 1)
-    axes.plot(time, np.degrees(wobble(full)), ".", color=GREY, markersize=2, label="full")
-    pairs = zip(averaged.values("energy"), averaged.values("angular_momentum_norm"), strict=True)
+    time, energy, colors = averaged.values("time"), averaged.values("energy"), (BLUE, ORANGE, GREEN)
+    pairs = zip(energy, averaged.values("angular_momentum_norm"), strict=True)
     bounds = np.degrees([extremes(scene.moments, e, s) for e, s in pairs])
-    for i, label in enumerate(("averaged: extremes", None)):
-        axes.plot(time, bounds[:, i], color=RED, linewidth=1.4, label=label)
-    energy = averaged.values("energy")
-    left = f"{100 * energy[-1] / energy[0]:.0f} % of the energy left at the end"
-    tidy(axes, "time (s)", "wobble (deg)", left)
-    axes.legend(fontsize=8, markerscale=4, loc="upper right")
-    axes = figure.add_subplot(2, 2, 2)
-    for color, (name, error) in zip(colors, distances(averaged, full).items(), strict=True):
-        axes.semilogy(time, np.maximum(error, 1e-12), ".", color=color, markersize=2, label=ANNOUNCED[name])
-        axes.axhline(averaged.summary["modelling"][name], color=color, linewidth=0.9, linestyle="--")
-    tidy(axes, "time (s)", "distance (rad, relative)", "average from full; dashed: announced")
-    axes.set_ylim(bottom=float(min(np.median(x) for x in distances(averaged, full).values())) / 30)
-    axes.legend(fontsize=8, markerscale=4, loc="lower right")
-    axes = figure.add_subplot(2, 2, 3)
-    sizes, errors = ordered
-    for color, (name, values) in zip(colors, errors.items(), strict=True):
-        axes.loglog(sizes, values, "o-", color=color, markersize=4, linewidth=0.8, label=ANNOUNCED[name])
+    away, (sizes, errors) = distances(averaged, full), ordered
+    along, order, beside = [], [], [Curve(None, 1.0, "", RED, width=1)]
+    for i, (color, (name, label)) in enumerate(zip(colors, ANNOUNCED.items(), strict=True)):
+        along += [Curve(time, np.maximum(away[name], 1e-12), label, color, ".", 0.5),
+                  Curve(None, averaged.summary["modelling"][name], "", color, "--", 0.9)]  # fmt: skip
+        order.append(Curve(sizes, errors[name], label, color, "o-"))
+        beside.append(Curve(np.arange(len(ratios)), ratios[:, i], label, color, "o"))
     line = errors["angular_momentum_norm"][0] / 2 * sizes / sizes[0]
-    axes.loglog(sizes, line, color=GREY, linewidth=0.8, linestyle=":", label="first order")
-    tidy(axes, "coefficient of the torque (N m s)", "largest distance", "the same share lost")
-    axes.xaxis.set_minor_formatter("")
-    axes.legend(fontsize=8, loc="lower right")
-    axes = figure.add_subplot(2, 2, 4)
-    for i, (color, label) in enumerate(zip(colors, ANNOUNCED.values(), strict=True)):
-        axes.plot(np.arange(len(ratios)), ratios[:, i], "o", color=color, markersize=4, label=label)
-    axes.axhline(1.0, color=RED, linewidth=1.0)
-    tidy(axes, "random body", "true error over announced", "below the line: covered")
-    axes.set_ylim(0.0, 1.2 * max(1.0, float(ratios.max())))
-    axes.legend(fontsize=8, loc="lower left")
-    save(figure, out, NAME)
+    order.append(Curve(sizes, line, "first order", GREY, ":", 0.8))
+    least = float(min(np.median(x) for x in away.values())) / 30
+    return Picture("A damped rotation: its average beside every rotation", "ab;cd", [
+        Panel(f"{100 * energy[-1] / energy[0]:.0f} % of the energy left at the end", "time (s)",
+              "wobble (deg)", [Curve(time, np.degrees(wobble(full)), "full", GREY, ".", 0.5),
+               *(Curve(time, bounds[:, i], label, RED)
+                 for i, label in enumerate(("averaged: extremes", "")))], legend="upper right"),
+        Panel("average from full; dashed: announced", "time (s)", "distance (rad, relative)", along, "y",
+              limits={"ylim": (least, None)}, legend="lower right"),
+        Panel("the same share lost", "coefficient of the torque (N m s)", "largest distance", order, "xy"),
+        Panel("below the line: covered", "random body", "true error over announced", beside,
+              limits={"ylim": (0, 1.2 * max(1.0, float(ratios.max())))}, legend="lower left"),
+    ], (11.5, 8.2))  # fmt: skip
 
 
 if __name__ == "__main__":
-    sys.exit(main(study, NAME))
+    raise SystemExit(study.main())

@@ -18,32 +18,27 @@ Run: python -m experiments.earth_free_nutation [--full] [--out DIR]
 
 from __future__ import annotations
 
-import sys
-from pathlib import Path
+from typing import Any
 
 import mpmath
 import numpy as np
 
-if not __package__:  # as a script
-    sys.path.insert(0, str(Path(__file__).parents[1]))
-
 from experiments.common import (
-    BLUE,
     CONFIGS,
     GREY,
     ORANGE,
     RED,
+    Answer,
     Check,
+    Curve,
+    Panel,
+    Picture,
     Result,
-    main,
-    new_figure,
-    save,
+    Study,
     simulate,
-    tidy,
 )
 from experiments.measure import phase_rate
 
-NAME = "earth_free_nutation"
 FLATTENING = "0.00327379492"  # (C-A)/C, Mathews, Herring & Buffett 2002
 SPIN = "7.292115e-5"  # rad/s, nominal (Groten 2004)
 DIAMETERS = (12756, 12714)  # km, equatorial and polar
@@ -57,7 +52,8 @@ def pole_rate(result: Result) -> float:
     return phase_rate(result.values("time"), np.arctan2(w[:, 1], w[:, 0]))
 
 
-def study(full: bool, out: Path, flattening: str = FLATTENING) -> list[Check]:
+@Study
+def study(full: bool, flattening: str = FLATTENING) -> Answer:
     """Both Earths against Euler; see the module's text.
 
     Args:
@@ -96,50 +92,34 @@ def study(full: bool, out: Path, flattening: str = FLATTENING) -> list[Check]:
         Check("NOT Chandler's period (axes)", days["axes"], sum(CHANDLER) / 2,
               (CHANDLER[1] - CHANDLER[0]) / 2, "days", "as above", "apart"),
     ]  # fmt: skip
-    draw(measured, days, out)
-    return checks
+    figure = picture(measured, days)
+    return checks, figure
 
 
-def draw(result: Result, days: dict[str, float], out: Path) -> None:
-    """The pole's path over one turn, and the three periods side by side."""
-    title = f"A rigid Earth nutates in {days['measured moments']:.2f} days, not in Chandler's 427 to 435"
-    figure = new_figure(11, 5.2, title)
-    left, right = figure.subplots(1, 2, width_ratios=[1, 1.5])
-    w = result.values("angular_velocity")
-    time = result.values("time") / DAY
-    arcsec = np.degrees(w[:, :2] / w[:, 2:3]) * 3600
-    turn = time <= days["measured moments"]
-    left.plot(*arcsec[turn].T, color=BLUE, linewidth=2)
-    left.plot(0, 0, "+", color=GREY, markersize=11)
-    left.annotate("figure axis", (0, 0), (0.012, 0.012), color=GREY, fontsize=9)
-    for day in range(0, 304, 50):
-        left.plot(*arcsec[day], "o", color=BLUE, markersize=5)
-        left.annotate(
-            f"day {day}",
-            arcsec[day],
-            arcsec[day] * (0.8 if day else 0.72) + (0, 0.012 * (day == 0)),
-            ha="center",
-            va="center",
-            fontsize=8.5,
-        )
-    tidy(left, "pole along x (arcsec)", "pole along y (arcsec)", "One turn of the pole, in the body")
-    left.set_aspect("equal")
-    span = time <= 900
-    right.axvspan(*CHANDLER, color=RED, alpha=0.25, label="Chandler's period, 427 to 435 d (elastic Earth)")
-    right.plot(time[span], arcsec[span, 0], color=BLUE, label="rigid Earth: pole along x")
+def picture(result: Result, days: dict[str, float]) -> Picture:
+    """The pole's path over one turn, and the three periods."""
     period = days["measured moments"]
-    for number, label in ((1, f"{period:.2f} d and twice that"), (2, None)):
-        right.axvline(number * period, color=ORANGE, linestyle="--", linewidth=1.2, label=label)
-    tidy(
-        right,
-        "time (mean solar days)",
-        "pole along x (arcsec)",
-        "Measured moments, (C - A)/C = 0.00327379492",
-    )
-    right.set_ylim(-0.23, 0.33)
-    right.legend(loc="upper right", fontsize=9, framealpha=1)
-    save(figure, out, NAME)
+    w, time = result.values("angular_velocity"), result.values("time") / DAY
+    arcsec = np.degrees(w[:, :2] / w[:, 2:3]) * 3600
+    turn, span, marks = time <= period, time <= 900, arcsec[0:304:50]
+
+    def named(axes: Any) -> None:
+        for number, mark in enumerate(marks):
+            axes.annotate(f"day {50 * number}", 0.8 * mark, ha="center", va="center", fontsize=8.5)
+
+    periods = [Curve(n * period, None, label, ORANGE, "--")
+               for n, label in ((1, f"{period:.2f} d and twice that"), (2, ""))]  # fmt: skip
+    band = lambda axes: axes.axvspan(*CHANDLER, color=RED, alpha=0.25, label="Chandler's period (elastic)")  # noqa: E731
+    return Picture(f"A rigid Earth nutates in {period:.2f} days, not in Chandler's 427 to 435", "ab", [
+        Panel("One turn of the pole, in the body", "pole along x (arcsec)", "pole along y (arcsec)",
+              [Curve(*arcsec[turn].T, width=2), Curve(*marks.T, style="o"), Curve(0, 0, "", GREY, "+", 3)],
+              equal=True, more=named),
+        Panel("Measured moments, (C - A)/C = 0.00327379492", "time (mean solar days)",
+              "pole along x (arcsec)",
+              [Curve(time[span], arcsec[span, 0], "rigid Earth: pole along x"), *periods],
+              limits={"ylim": (-0.23, 0.33)}, legend="upper right", more=band),
+    ], (11, 5.2), {"width_ratios": [1, 1.5]})  # fmt: skip
 
 
 if __name__ == "__main__":
-    sys.exit(main(study, NAME))
+    raise SystemExit(study.main())

@@ -24,28 +24,23 @@ Run: python -m experiments.earth_obliquity [--full] [--out DIR]      half a minu
 from __future__ import annotations
 
 import sys
-from pathlib import Path
 
 import numpy as np
 
-if not __package__:  # as a script
-    sys.path.insert(0, str(Path(__file__).parents[1]))
-
 from experiments.common import (
-    BLUE,
     CONFIGS,
     GREY,
     ORANGE,
+    Answer,
     Check,
+    Curve,
+    Panel,
+    Picture,
     Result,
-    main,
-    new_figure,
-    save,
+    Study,
     simulate,
-    tidy,
 )
 
-NAME = "earth_obliquity"
 TABLE = CONFIGS / "tables" / "earth_secular.csv"
 YEAR, ARCSEC = 31557600.0, np.pi / 648000
 SUN, MOON = "1.32712440018e20", "4.902800e12"
@@ -197,7 +192,8 @@ def sun_alone() -> Check:
     return Check(name, share, 0.0, 0.01, "1", "a hundredth, as asked", "absolute")
 
 
-def study(full: bool, out: Path) -> list[Check]:
+@Study
+def study(full: bool) -> Answer:
     """Both orbits, and the Sun alone; see the module's text."""
     planes, years = normals(), columns()[:, 0]
     end = float(years[-1])
@@ -229,32 +225,23 @@ def study(full: bool, out: Path) -> list[Check]:
         *beside(1000 if full else 50),
         sun_alone(),
     ]  # fmt: skip
-    draw(fixed, years, tilt, out)
-    return checks
+    figure = picture(fixed, years, tilt)
+    return checks, figure
 
 
-def draw(fixed: Result, years: np.ndarray, tilt: np.ndarray, out: Path) -> None:
+def picture(fixed: Result, years: np.ndarray, tilt: np.ndarray) -> Picture:
     """Obliquity along time, and the orbit's plane."""
-    figure = new_figure(
-        11.5, 5.6, "The Earth over a million years: obliquity on a fixed and on its moving orbit"
-    )
-    axes = figure.add_subplot(2, 1, 1)
     still = obliquity(fixed.values("momentum_axis"), np.array([[0.0, 0.0, 1.0]]))
-    axes.plot(years / 1000, tilt, color=BLUE, linewidth=1.2, label="moving orbit")
-    axes.plot(
-        fixed.values("time") / YEAR / 1000,
-        np.degrees(still),
-        color=ORANGE,
-        linewidth=1.2,
-        label="fixed orbit",
-    )
-    tidy(axes, "", "obliquity (deg)", "")
-    axes.legend(fontsize=9, loc="upper center", ncols=2)
-    axes = figure.add_subplot(2, 1, 2)
-    axes.plot(years / 1000, columns()[: len(years), 2], color=GREY, linewidth=1.2)
-    tidy(axes, "time from J2000 (kyr)", "orbit's inclination (deg)", "")
-    save(figure, out, NAME)
+    title = "The Earth over a million years: obliquity on a fixed and on its moving orbit"
+    return Picture(title, "a;b", [
+        Panel("", "", "obliquity (deg)", [
+            Curve(years / 1000, tilt, "moving orbit"),
+            Curve(fixed.values("time") / YEAR / 1000, np.degrees(still), "fixed orbit", ORANGE),
+        ], legend="upper center"),
+        Panel("", "time from J2000 (kyr)", "orbit's inclination (deg)",
+              [Curve(years / 1000, columns()[: len(years), 2], "", GREY)]),
+    ], (11.5, 5.6))  # fmt: skip
 
 
 if __name__ == "__main__":
-    sys.exit(main(study, NAME))
+    raise SystemExit(study.main())

@@ -18,14 +18,10 @@ import hashlib
 import json
 import math
 import os
-import sys
 import time
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict
 from pathlib import Path
-
-if not __package__:  # as a script
-    sys.path.insert(0, str(Path(__file__).parents[1]))
 
 import numpy as np
 

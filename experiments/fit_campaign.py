@@ -30,9 +30,6 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 from scipy.stats import chi2, kstest
 
-if not __package__:  # as a script
-    sys.path.insert(0, str(Path(__file__).parents[1]))
-
 import rigidsim
 from experiments.compare_conventions import Model
 

@@ -20,19 +20,27 @@ Run: python -m experiments.fitted_bodies [--full] [--out DIR]
 
 from __future__ import annotations
 
-import sys
 import tempfile
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from matplotlib.figure import Figure
-
-if not __package__:  # as a script
-    sys.path.insert(0, str(Path(__file__).parents[1]))
 
 import rigidsim
-from experiments.common import BLUE, CONFIGS, GREEN, GREY, ORANGE, RED, Check, main, new_figure, save
+from experiments.common import (
+    BLUE,
+    CONFIGS,
+    GREEN,
+    GREY,
+    ORANGE,
+    RED,
+    Answer,
+    Check,
+    Curve,
+    Panel,
+    Picture,
+    Study,
+)
 
 BOOK = """
 name = "book"
@@ -106,51 +114,44 @@ def motion(text: str, times: np.ndarray) -> Any:
     return rigidsim.run(listed, out=None, progress=False).dataset
 
 
-def toutatis(axes: Any) -> list[Check]:
+def within(name: str, measured: float, expected: float, error: float, source: str, unit: str = "1") -> Check:
+    """A number within an absolute error, which is three sigmas for fitted values."""
+    return Check(name, measured, expected, error, unit, source, "absolute")
+
+
+def toutatis() -> tuple[list[Check], Panel]:
     """The fit of 1992."""
     found = rigidsim.fit(CONFIGS / "fits" / "toutatis_1992.toml")
     residuals = np.rad2deg(np.linalg.norm(found.dataset["residual_1"].values, axis=1))
-    axes.plot(found.dataset["time_1"] / 86400, residuals, "o-", color=BLUE, label="attitudes")
     used = found.dataset["used_2"].values.astype(bool)
     rates = np.rad2deg(np.abs(found.dataset["residual_2"].values).max(axis=1)) * 86400
     times = found.dataset["time_2"].values / 86400
-    axes.plot(times[used], rates[used], "s", color=ORANGE, label="rates, deg/day")
-    axes.plot(times[~used], rates[~used], "x", color=RED, ms=9, label="left out")
-    axes.set(
-        title="Toutatis 1992: what is left", xlabel="days since 9 November 1992", ylabel="deg", yscale="log"
-    )
-    axes.legend()
+    panel = Panel("Toutatis 1992: what is left", "days since 9 November 1992", "deg", [
+        Curve(found.dataset["time_1"] / 86400, residuals, "attitudes", BLUE, "o-"),
+        Curve(times[used], rates[used], "rates, deg/day", ORANGE, "s"),
+        Curve(times[~used], rates[~used], "left out", RED, "x", 2),
+    ], "y")  # fmt: skip
     source = "Takahashi et al. 2013; three scaled sigmas"
     checks = [
-        Check(
-            f"Toutatis: moment {name}",
-            found.value(key),
-            value,
-            3 * _scaled(found, key),
-            "1",
-            source,
-            "absolute",
-        )
+        within(f"Toutatis: moment {name}", found.value(key), value, 3 * _scaled(found, key), source)
         for name, key, value in (("I2", MOMENTS[0], 3.0836), ("I3", MOMENTS[1], 3.235))
     ]
     rms = float(np.rad2deg(found.data[0].rms))
-    checks.append(
-        Check("Toutatis: attitudes, rms", rms, 0.0, 7.7, "deg", "their solution leaves 7.7", "absolute")
-    )
+    checks.append(within("Toutatis: attitudes, rms", rms, 0.0, 7.7, "their solution leaves 7.7", "deg"))
     misprints = [float(one.row.removeprefix("line ")) for one in found.outliers]
     source = "rates that no solution fits, of 7 and 14 December"
     checks += [
-        Check(f"Toutatis: misprint {n}", line, expected, 0.0, "line", source, "absolute")
+        within(f"Toutatis: misprint {n}", line, expected, 0.0, source, "line")
         for n, (line, expected) in enumerate(zip(misprints, (8.0, 15.0), strict=True), start=1)
     ]
-    return checks
+    return checks, panel
 
 
 def _scaled(found: Any, key: str) -> float:
     return float(next(one.scaled_sigma for one in found.parameters if one.key == key))
 
 
-def book(axes: Any, folder: Path) -> list[Check]:
+def book(folder: Path) -> tuple[list[Check], Panel]:
     """A gyroscope on a book."""
     times = np.arange(1, 121) / 100
     true = motion(BOOK, times)["angular_velocity"].values
@@ -163,24 +164,22 @@ def book(axes: Any, folder: Path) -> list[Check]:
     fit = f"[fit]\nparameters = {keys}\n".replace("'", '"')
     fit += "".join(f'prior."parameters.b{a}" = {{sigma = "0.1 rad/s"}}\n' for a in "xyz")
     found = rigidsim.fit(rigidsim.parse(start + fit + sets))
+    curves = []
     for n, (name, color) in enumerate(zip("xyz", (RED, GREEN, BLUE), strict=True)):
-        axes.plot(times, seen[:, n], ".", ms=2, color=color)
         left = found.dataset[f"residual_{n + 1}"].values[:, 0]
-        axes.plot(times, seen[:, n] - left, color=color, lw=1, label=name)
-    axes.set(title="a telephone on a tossed book: its gyroscope", xlabel="time, s", ylabel="rad/s")
-    axes.legend(ncols=3)
+        curves += [Curve(times, seen[:, n], "", color, ".", 0.5),
+                   Curve(times, seen[:, n] - left, name, color, width=1)]  # fmt: skip
     truth = dict(zip(MOMENTS[:2], (13.0, 20.0), strict=True))
     truth |= {f"parameters.b{a}": float(b) for a, b in zip("xyz", BIAS, strict=True)}
     source = "the simulated truth; three sigmas"
-    return [
-        Check(
-            f"book: {key}", found.value(key), value, 3 * float(found.sigma(key) or 0), "1", source, "absolute"
-        )
+    checks = [
+        within(f"book: {key}", found.value(key), value, 3 * float(found.sigma(key) or 0), source)
         for key, value in truth.items()
     ]
+    return checks, Panel("a telephone on a tossed book: its gyroscope", "time, s", "rad/s", curves)
 
 
-def satellite(axes: Any, folder: Path) -> list[Check]:
+def satellite(folder: Path) -> tuple[list[Check], Panel]:
     """What attitudes along up to two orbits tell of a satellite's moments."""
     times = np.linspace(0, 2 * ORBIT, 401)[1:]
     checks: list[Check] = []
@@ -203,36 +202,19 @@ def satellite(axes: Any, folder: Path) -> list[Check]:
         told[name] = found
         if name == "with a wheel":
             relative = 100 * np.array(sigmas) / [900, 1000, 400]
-            for n, (axis, color) in enumerate(zip("xyz", (RED, GREEN, BLUE), strict=True)):
-                axes.plot(spans, relative[:, n], "o-", color=color, label=f"moment {axis}")
-            axes.axhline(100, color=GREY, lw=0.8)
-            axes.set(
-                title="a satellite's moments by attitudes to 0.1 deg", xlabel="orbits that were observed",
-                ylabel="sigma, % of the moment", yscale="log",
-            )  # fmt: skip
-            axes.legend()
+            curves = [Curve(spans, relative[:, n], f"moment {axis}", color, "o-")
+                      for n, (axis, color) in enumerate(zip("xyz", (RED, GREEN, BLUE), strict=True))]  # fmt: skip
     for key, value in zip(MOMENTS, (900.0, 1000.0, 400.0), strict=True):
         found = told["with a wheel"]
         source = "the simulated truth; three sigmas"
         tolerance = 3 * float(found.sigma(key) or 0)
-        checks.append(
-            Check(f"satellite: {key}", found.value(key), value, tolerance, "kg m^2", source, "absolute")
-        )
-    names = {name for one in told["without"].undetermined for name in one.keys}
-    axes.text(0.03, 0.05, "without the wheel only their ratios show", transform=axes.transAxes, color=GREY)
+        checks.append(within(f"satellite: {key}", found.value(key), value, tolerance, source, "kg m^2"))
+    names = {name for one in told["without"].undetermined for name in one.keys} & {*MOMENTS}
     source = "torques of a gravity gradient are as large as the moments"
-    checks.append(
-        Check(
-            "satellite without its wheel: undetermined",
-            len(names & {*MOMENTS}),
-            3,
-            0,
-            "keys",
-            source,
-            "absolute",
-        )
-    )
-    return checks
+    checks.append(within("satellite without its wheel: undetermined", len(names), 3, 0, source, "keys"))
+    title = "a satellite's moments by attitudes to 0.1 deg (without the wheel only their ratios show)"
+    curves.append(Curve(None, 100, "", GREY, width=0.8))
+    return checks, Panel(title, "orbits that were observed", "sigma, % of the moment", curves, "y")
 
 
 def _turned(quaternion: np.ndarray, vector: np.ndarray) -> np.ndarray:
@@ -243,7 +225,7 @@ def _turned(quaternion: np.ndarray, vector: np.ndarray) -> np.ndarray:
     return np.asarray(made.as_quat()[[3, 0, 1, 2]])
 
 
-def moon(axes: Any, folder: Path) -> list[Check]:
+def moon(folder: Path) -> tuple[list[Check], Panel]:
     """DE421's Moon by its own librations, from a perturbed start, and perturbed beta and gamma."""
     from experiments.bare import moon as bare
 
@@ -277,10 +259,8 @@ def moon(axes: Any, folder: Path) -> list[Check]:
     found = rigidsim.fit(begun)
     left = found.dataset["residual_1"].values / MAS
     years = days / 365.25
-    for n, (axis, color) in enumerate(zip("XYZ", (RED, GREEN, BLUE), strict=True)):
-        axes.plot(years, left[:, n], color=color, lw=1, label=axis)
-    axes.set(title="DE421's Moon, fitted: what is left", xlabel="years since 1969", ylabel="mas")
-    axes.legend(ncols=3)
+    curves = [Curve(years, left[:, n], axis, color, width=1)
+              for n, (axis, color) in enumerate(zip("XYZ", (RED, GREEN, BLUE), strict=True))]  # fmt: skip
     largest = float(np.linalg.norm(left, axis=1).max())
     checks = [Check("Moon: residual at most", largest, 0.0, 1.0, "mas", "DE421's librations", "absolute")]
     fitted = [found.value(key) for key in MOMENTS[:2]] + [moments[2]]
@@ -295,7 +275,7 @@ def moon(axes: Any, folder: Path) -> list[Check]:
     ):
         source = "DE421's constants; three sigmas"
         checks.append(Check(f"Moon: {name}", pair[1], pair[0], 3 * sigma, "1", source, "absolute"))
-    return checks
+    return checks, Panel("DE421's Moon, fitted: what is left", "years since 1969", "mas", curves)
 
 
 def _moments(scene: Any) -> list[Any]:
@@ -311,24 +291,18 @@ def _quaternions(matrices: np.ndarray) -> np.ndarray:
     return np.asarray(Rotation.from_matrix(matrices).as_quat()[:, [3, 0, 1, 2]])
 
 
-def study(full: bool, out: Path) -> list[Check]:
+@Study
+def study(full: bool) -> Answer:
     """All four, and their figure."""
-    figure: Figure = new_figure(12, 8.5, "What observations tell of real bodies")
-    axes = figure.subplots(2, 2).ravel()
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        checks = toutatis(axes[0])
-        checks += book(axes[1], folder)
-        checks += satellite(axes[2], folder)
-        if full:
-            checks += moon(axes[3], folder)
-        else:
-            axes[3].set_axis_off()
-    for one in axes:
-        one.grid(True, color="#dddddd", linewidth=0.6)
-    save(figure, out, "fitted_bodies")
-    return checks
+        found = [toutatis(), book(folder), satellite(folder), *([moon(folder)] if full else [])]
+    checks = [check for some, _ in found for check in some]
+    panels = [panel for _, panel in found]
+    return checks, Picture(
+        "What observations show of real bodies", "ab;cd" if full else "ab;c.", panels, (12, 8.5)
+    )
 
 
 if __name__ == "__main__":
-    sys.exit(main(study, "fitted_bodies"))
+    raise SystemExit(study.main())

@@ -21,15 +21,10 @@ Run: python -m experiments.flip_period [--full] [--out DIR]
 from __future__ import annotations
 
 import math
-import sys
-from pathlib import Path
 from typing import Any
 
 import mpmath
 import numpy as np
-
-if not __package__:  # as a script
-    sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from experiments.closed_forms import FreeTop, free_top
 from experiments.common import (
@@ -38,17 +33,17 @@ from experiments.common import (
     GREEN,
     GREY,
     ORANGE,
+    Answer,
     Check,
+    Curve,
+    Panel,
+    Picture,
     Result,
-    main,
-    new_figure,
-    save,
+    Study,
     simulate,
-    tidy,
 )
 from experiments.measure import crossings
 
-NAME = "flip_period"
 MOMENTS = (1, 2, 3)
 FLIPS = 3
 PER_UNIT = 50  # samples per 1/p
@@ -98,7 +93,8 @@ def worst(top: FreeTop, reversals: list[Any]) -> Any:
     return max(intervals, key=lambda interval: abs(interval - top.flip))
 
 
-def study(full: bool, out: Path) -> list[Check]:
+@Study
+def study(full: bool) -> Answer:
     """Offsets from 1e-1 to 1e-12."""
     cases = {
         "double": range(1, 13) if full else (1, 2, 3, 6, 12),
@@ -128,48 +124,30 @@ def study(full: bool, out: Path) -> list[Check]:
                         Check("NOT in double at offset 1e-12", interval, top.flip, 1.0, "s",
                               "d^2 = 1e-24 < eps: the flip comes early by about ln(d^2/eps)/p", "apart")
                     )  # fmt: skip
-        draw(found, kept, out)
-    return checks
+        figure = picture(found)
+    return checks, figure
 
 
-def draw(found: dict[str, list[tuple[int, float, float, float]]], kept: dict[int, Result], out: Path) -> None:
-    """Period against offset, its error, and three of the motions."""
-    title = (
-        "Ten times nearer the separatrix, 2 ln(10)/p longer until the flip: down to 1e-12, in enough digits"
-    )
-    figure = new_figure(12, 7.4, title)
-    grid = figure.add_gridspec(2, 2, height_ratios=[1, 1.5])
-    motion, period, error = (figure.add_subplot(cell) for cell in (grid[0, :], grid[1, 0], grid[1, 1]))
-    for exponent, shade in zip((3, 6, 12), ("#9ecae1", "#4292c6", "#08306b"), strict=True):
-        result = kept.get(exponent)
-        if result is not None:
-            motion.plot(result.values("time"), result.values("angular_velocity")[:, 1], color=shade,
-                        label=f"offset 1e-{exponent}")  # fmt: skip
-    tidy(motion, "time (s)", "w_y (rad/s)", "Rate about the middle axis: it dwells, and flips")
-    motion.legend(loc="center", bbox_to_anchor=(0.79, 0.5), fontsize=9, framealpha=1)
+def picture(found: dict[str, list[tuple[int, float, float, float]]]) -> Picture:
+    """Period against offset, and its error."""
     offsets = np.logspace(-1, -12, 100)
     curve = [float(free_top([mpmath.mpf(m) for m in MOMENTS], [mpmath.mpf(0), 1, mpmath.mpf(d)]).flip)
              for d in offsets]  # fmt: skip
-    period.semilogx(offsets, curve, color=GREY, linewidth=1.2, label="2K(k)/p")
-    for precision, rows in found.items():
-        exponents, values, errors, allowed = (
-            np.array(column, dtype=float) for column in zip(*rows, strict=True)
-        )
-        style = {"color": COLORS[precision], "label": precision, "linestyle": "none", "markersize": 7}
-        marker = {"double": "s", "extended": "^", "quadruple": "o"}[precision]
-        period.semilogx(10**-exponents, values, marker=marker, markerfacecolor="none", **style)
-        error.loglog(10**-exponents, np.maximum(errors, 1e-36), marker=marker, **style)
-        error.loglog(10**-exponents, allowed, color=COLORS[precision], linewidth=1, linestyle="--")
-    period.invert_xaxis()
-    error.invert_xaxis()
-    tidy(period, "offset d from the separatrix (rad/s)", "time between flips (s)",
-         "Double precision loses it where d^2 < eps")  # fmt: skip
-    tidy(error, "offset d from the separatrix (rad/s)", "error (s)",
-         "Error; dashed: what rounding explains, ~ eps / d^2")  # fmt: skip
-    period.legend(loc="upper left", fontsize=9, framealpha=1)
-    error.legend(loc="upper left", fontsize=9, framealpha=1)
-    save(figure, out, NAME)
+    periods, errors = [Curve(offsets, curve, "2K(k)/p", GREY)], []
+    for (precision, rows), color, marker in zip(found.items(), (ORANGE, GREEN, BLUE), "s^o", strict=True):
+        exponents, values, error, allowed = np.array(rows, dtype=float).T
+        periods.append(Curve(10**-exponents, values, precision, color, marker, 1.7))
+        errors += [Curve(10**-exponents, np.maximum(error, 1e-36), precision, color, marker, 1.7),
+                   Curve(10**-exponents, allowed, "", color, "--", 1)]  # fmt: skip
+    title = "Ten times nearer the separatrix, 2 ln(10)/p longer until the flip: to 1e-12, in enough digits"
+    xlabel, limits = "offset d from the separatrix (rad/s)", {"xlim": (0.3, 3e-13)}
+    return Picture(title, "ab", [
+        Panel("Double precision loses it where d^2 < eps", xlabel, "time between flips (s)", periods, "x",
+              limits=limits),
+        Panel("Error; dashed: what rounding explains, ~ eps / d^2", xlabel, "error (s)", errors, "xy",
+              limits=limits),
+    ], (12, 5.2))  # fmt: skip
 
 
 if __name__ == "__main__":
-    sys.exit(main(study, NAME))
+    raise SystemExit(study.main())

@@ -18,12 +18,8 @@ Run: python -m experiments.flip_sphere [--full] [--out DIR]
 
 from __future__ import annotations
 
-import sys
 import tempfile
-from pathlib import Path
-
-if not __package__:  # as a script
-    sys.path.insert(0, str(Path(__file__).parents[1]))
+from typing import Any
 
 import mpmath
 import numpy as np
@@ -36,14 +32,14 @@ from experiments.common import (
     EPSILON,
     GREY,
     ORANGE,
+    Answer,
     Check,
-    main,
-    new_figure,
-    save,
-    tidy,
+    Curve,
+    Panel,
+    Picture,
+    Study,
 )
 
-NAME = "flip_sphere"
 CONFIG = CONFIGS / "sweeps" / "flip_sphere.toml"
 MOMENTS = (1, 2, 3)
 
@@ -63,7 +59,8 @@ def closed(spin: np.ndarray) -> tuple[float, float, float, mpmath.mpf]:
     return float(p), float(square), float(beyond), flip
 
 
-def study(full: bool, out: Path) -> list[Check]:
+@Study
+def study(full: bool) -> Answer:
     """The map, the figure, the checks."""
     polar, azimuths = (128, 256) if full else (32, 64)
     settings = [f'sweep.axes."initial.angular_velocity".grid=[{polar}, {azimuths}]']
@@ -96,78 +93,60 @@ def study(full: bool, out: Path) -> list[Check]:
     print(f"{len(spins)} directions ({engines}): flips every {flips.min():.3f} to {flips.max():.3f} s")
     print(f"deviation: largest {np.nanmax(errors):.1e} s, relative {np.nanmax(relative):.1e}, median "
           f"{np.nanmedian(relative):.1e}; {np.nanmax(errors / allowed):.2f} of the bound")  # fmt: skip
-    draw(spins.reshape(polar, azimuths, 3), flips, errors, allowed, np.abs(beyond) / square, out)
+    figure = picture(spins.reshape(polar, azimuths, 3), flips, errors, allowed, np.abs(beyond) / square)
     source = "2K(k)/p; 3 x round-off of L^2 - 2 E B over its value, over p"
     return [
         Check("directions without two flips", missing, 0, 0.5, "1", f"none dwells for {end:g} s", "absolute"),
         Check("directions that circle another axis", wrong, 0, 0.5, "1", "Poinsot; none may", "absolute"),
         Check("deviation of a flip time over what rounding explains, largest",
               float(np.nanmax(errors / allowed)), 0, 1, "1", source, "absolute"),
-    ]  # fmt: skip
+    ], figure  # fmt: skip
 
 
-def draw(
-    spins: np.ndarray,
-    flips: np.ndarray,
-    errors: np.ndarray,
-    allowed: np.ndarray,
-    beyond: np.ndarray,
-    out: Path,
-) -> None:
+def picture(
+    spins: np.ndarray, flips: np.ndarray, errors: np.ndarray, allowed: np.ndarray, beyond: np.ndarray
+) -> Picture:
     """The sphere with the middle axis in its centre, and deviations towards the separatrices."""
     polar, azimuths, _ = spins.shape
-    figure = new_figure(
-        13, 5.6, "A spin flips every 2K/p: soon about the stable axes, ever later near the separatrices"
-    )
-    sphere = figure.add_subplot(121, projection="mollweide")
-    fine = 16  # parts of a row, whose edges are straight lines on paper
-    latitudes = np.pi / 2 - np.arccos(np.linspace(1, -1, fine * polar + 1))
-    longitudes = np.linspace(-np.pi, np.pi, azimuths + 1)
-    centred = np.roll(flips.reshape(polar, azimuths), azimuths // 4, axis=1)  # azimuth 90 degrees: +y
-    centred = np.repeat(centred, fine, axis=0)
-    shown = sphere.pcolormesh(
-        longitudes, latitudes, centred, norm=LogNorm(), cmap="magma", rasterized=True, shading="flat"
-    )
     angle = np.linspace(0, 2 * np.pi, 721)
     a, b, c = MOMENTS
     lean = np.sqrt(a * (b - a) / (c * (c - b)))  # w_z / w_x on the separatrices
-    for sign in (1, -1):
-        x, y, z = (
-            np.cos(angle) / np.hypot(1, lean),
-            np.sin(angle),
-            sign * lean * np.cos(angle) / np.hypot(1, lean),
-        )
-        longitude = np.mod(np.arctan2(y, x) + np.pi / 2, 2 * np.pi) - np.pi
-        order = np.argsort(longitude)
-        for half in (longitude[order] < 0, longitude[order] >= 0):
-            sphere.plot(longitude[order][half], np.arcsin(z)[order][half], color="white", linewidth=0.8)
-    box = {"boxstyle": "round,pad=0.2", "facecolor": "white", "alpha": 0.8, "linewidth": 0}
     named = {"middle axis": (0, 0.33), "smallest": (-np.pi / 2, 0), "−x": (np.pi / 2, 0),
              "largest": (0, 1.3), "−z": (0, -1.3)}  # fmt: skip
-    for name, place in named.items():
-        sphere.annotate(name, place, ha="center", va="center", fontsize=9, bbox=box)
-    sphere.set(xticklabels=[], yticklabels=[])
-    sphere.set_title("Directions of the spin in the body; white: separatrices", fontsize=10.5)
-    bar = figure.colorbar(shown, ax=sphere, orientation="horizontal", pad=0.04, shrink=0.75,
-                          label="time from flip to flip (s), at 1 rad/s")  # fmt: skip
-    ticks = [tick for tick in (3, 4, 5, 7, 10, 15, 20, 30, 50) if flips.min() <= tick <= flips.max()]
-    bar.set_ticks(ticks, labels=[str(tick) for tick in ticks], minor=False)
-    bar.ax.minorticks_off()
-    sphere.plot(0, 0, "+", color="white", markersize=9)
-    beside = figure.add_subplot(122)
-    beside.loglog(
-        beyond, np.maximum(errors, 1e-17), ".", color=BLUE, markersize=2.5, label="run less closed form"
-    )
+
+    def sphere(axes: Any) -> None:
+        fine = 16  # parts of a row, whose edges are straight lines on paper
+        latitudes = np.pi / 2 - np.arccos(np.linspace(1, -1, fine * polar + 1))
+        longitudes = np.linspace(-np.pi, np.pi, azimuths + 1)
+        centred = np.roll(flips.reshape(polar, azimuths), azimuths // 4, axis=1)  # azimuth 90 degrees: +y
+        shown = axes.pcolormesh(longitudes, latitudes, np.repeat(centred, fine, axis=0), norm=LogNorm(),
+                                cmap="magma", rasterized=True, shading="flat")  # fmt: skip
+        for sign in (1, -1):
+            x, y = np.cos(angle) / np.hypot(1, lean), np.sin(angle)
+            longitude = np.mod(np.arctan2(y, x) + np.pi / 2, 2 * np.pi) - np.pi
+            axes.plot(longitude, np.arcsin(sign * lean * x), ".", color="white", markersize=1)
+        for name, place in named.items():
+            axes.annotate(name, place, ha="center", va="center", fontsize=9,
+                          bbox={"boxstyle": "round,pad=0.2", "facecolor": "white", "alpha": 0.8})  # fmt: skip
+        axes.set(xticklabels=[], yticklabels=[])
+        bar = axes.figure.colorbar(shown, ax=axes, orientation="horizontal", pad=0.04, shrink=0.75,
+                                   label="time from flip to flip (s), at 1 rad/s")  # fmt: skip
+        ticks = [tick for tick in (3, 4, 5, 7, 10, 15, 20, 30, 50) if flips.min() <= tick <= flips.max()]
+        bar.set_ticks(ticks, labels=[str(tick) for tick in ticks], minor=False)
+        bar.ax.minorticks_off()
+
     order = np.argsort(beyond)
-    beside.loglog(
-        beyond[order], allowed[order], color=ORANGE, linewidth=1, label="what rounding explains (3 x its law)"
-    )
-    beside.axhline(EPSILON["double"], color=GREY, linewidth=1, linestyle=":", label="eps")
-    tidy(beside, "distance from the separatrices, |L² − 2EB| / L²", "deviation of the flip time (s)",
-         "One dot a direction")  # fmt: skip
-    beside.legend(loc="upper right", fontsize=9)
-    save(figure, out, NAME)
+    title = "A spin flips every 2K/p: soon about the stable axes, ever later near the separatrices"
+    return Picture(title, "ab", [
+        Panel("Directions of the spin in the body; white: separatrices", "", "", more=sphere),
+        Panel("One dot a direction", "distance from the separatrices, |L² − 2EB| / L²",
+              "deviation of the flip time (s)", [
+                  Curve(beyond, np.maximum(errors, 1e-17), "run less closed form", BLUE, ".", 0.6),
+                  Curve(beyond[order], allowed[order], "what rounding explains (3 x its law)", ORANGE),
+                  Curve(None, EPSILON["double"], "eps", GREY, ":"),
+              ], "xy", legend="upper right"),
+    ], (13, 5.6), {"per_subplot_kw": {"a": {"projection": "mollweide"}}})  # fmt: skip
 
 
 if __name__ == "__main__":
-    sys.exit(main(study, NAME))
+    raise SystemExit(study.main())

@@ -29,37 +29,31 @@ Run: python -m experiments.heavy_top_regimes [--full] [--out DIR]
 from __future__ import annotations
 
 import math
-import sys
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import mpmath
 import numpy as np
-
-if not __package__:  # as a script
-    sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from experiments.closed_forms import HeavyTop, heavy_top
 from experiments.common import (
     BLUE,
     CONFIGS,
     GREEN,
-    GREY,
     ORANGE,
     RED,
+    Answer,
     Check,
+    Curve,
+    Panel,
+    Picture,
     Result,
-    main,
-    new_figure,
+    Study,
     round_off,
-    save,
     simulate,
-    tidy,
 )
 from experiments.measure import crossings, matrices, phase_rate, tilt, value_at
 
-NAME = "heavy_top_regimes"
 A, C, MASS, GRAVITY, ARM = ("2e-4", "1e-4", "0.1", "9.80665", "0.04")
 RECORD = 'output.record=["angular_velocity", "quaternion"]'
 READY = CONFIGS / "heavy_top_nutating.toml"
@@ -253,63 +247,37 @@ def pendulum_checks(full: bool) -> list[Check]:
     return checks
 
 
-def study(full: bool, out: Path) -> list[Check]:
+@Study
+def study(full: bool) -> Answer:
     """Every regime; see the module's text."""
     with mpmath.workdps(40):
         nutations, paths = nutation_checks(full)
         precessions = precession_checks(full)
         sleepers, tilts = sleeping_checks()
         pendulums = pendulum_checks(full)
-        draw(paths, tilts, out)
-        return nutations + precessions + sleepers + pendulums
+        figure = picture(paths, tilts)
+        return nutations + precessions + sleepers + pendulums, figure
 
 
-def draw(paths: dict[str, Result], tilts: dict[str, Result], out: Path) -> None:
-    """Paths of the axis seen from above, tilts against time with the closed form's turning angles."""
-    figure = new_figure(
-        12, 7.6, "The heavy top keeps to its elliptic integrals: cusps, loops, waves, and sleep"
-    )
-    grid = figure.add_gridspec(2, 3, height_ratios=[1.15, 1])
-    colors = dict(zip(paths, (BLUE, ORANGE, GREEN), strict=True))
-    for number, (name, result) in enumerate(paths.items()):
-        axes = figure.add_subplot(grid[0, number])
-        top = closed("30", REGIMES[name])
-        path = axis(result)[:2000]
-        for u in (top.u1, top.u2):
-            radius = float(mpmath.sqrt(1 - u * u))
-            axes.add_patch(_circle(radius))
-        axes.plot(path[:, 0], path[:, 1], color=colors[name], linewidth=1.4)
-        low, high = (math.degrees(float(mpmath.acos(u))) for u in (top.u1, top.u2))
-        tidy(axes, "axis along X", "axis along Y" if not number else "",
-             f"{name}: {high:.2f} to {low:.2f} deg in {float(top.nutation) * 1e3:.2f} ms")  # fmt: skip
-        axes.set_aspect("equal")
-    axes = figure.add_subplot(grid[1, 0:2])
-    for name, result in paths.items():
-        part = result.values("time") <= 0.5
-        degrees = np.degrees(tilt(result.values("quaternion")))
-        axes.plot(result.values("time")[part], degrees[part], color=colors[name], label=name)
-        top = closed("30", REGIMES[name])
-        for u in (top.u1, top.u2):
-            axes.axhline(math.degrees(float(mpmath.acos(u))), color=colors[name], linestyle=":", linewidth=1)
-    tidy(axes, "time (s)", "tilt (deg)", "Tilt; dotted: turning angles of the closed form")
-    axes.set_ylim(26.5, 47.5)
-    axes.legend(loc="upper right", ncols=3, fontsize=9, framealpha=1)
-    axes = figure.add_subplot(grid[1, 2])
-    for (name, result), color in zip(tilts.items(), (BLUE, RED), strict=True):
-        degrees = np.degrees(tilt(result.values("quaternion")))
-        axes.semilogy(result.values("time")[1:], degrees[1:], color=color, label=f"{name} the threshold")
-    tidy(axes, "time (s)", "tilt (deg)", "Sleeping top, pushed by 1e-6 rad/s")
-    axes.set_ylim(1e-6, 500)
-    axes.set_xlim(0, 30)
-    axes.legend(loc="upper left", fontsize=9, framealpha=1)
-    save(figure, out, NAME)
-
-
-def _circle(radius: float) -> Any:
-    from matplotlib.patches import Circle
-
-    return Circle((0, 0), radius, fill=False, color=GREY, linestyle=":", linewidth=1)
+def picture(paths: dict[str, Result], tilts: dict[str, Result]) -> Picture:
+    """Tilts against time: with the closed form's turning angles, and near the sleeping threshold."""
+    curves = []
+    for (name, result), color in zip(paths.items(), (BLUE, ORANGE, GREEN), strict=True):
+        part, top = result.values("time") <= 0.5, closed("30", REGIMES[name])
+        curves.append(Curve(result.values("time")[part], np.degrees(tilt(result.values("quaternion")))[part],
+                            name, color))  # fmt: skip
+        curves += [Curve(None, math.degrees(mpmath.acos(u)), "", color, ":", 1) for u in (top.u1, top.u2)]
+    sleeping = [
+        Curve(result.values("time")[1:], np.degrees(tilt(result.values("quaternion")))[1:],
+              f"{name} the threshold", color)
+        for (name, result), color in zip(tilts.items(), (BLUE, RED), strict=True)
+    ]  # fmt: skip
+    title = "The heavy top keeps to its elliptic integrals: cusps, loops, waves, and sleep"
+    return Picture(title, "ab", [
+        Panel("Tilt; dotted: turning angles of the closed form", "time (s)", "tilt (deg)", curves),
+        Panel("Sleeping top, pushed by 1e-6 rad/s", "time (s)", "tilt (deg)", sleeping, "y"),
+    ], (12, 5))  # fmt: skip
 
 
 if __name__ == "__main__":
-    sys.exit(main(study, NAME))
+    raise SystemExit(study.main())

@@ -31,21 +31,30 @@ from __future__ import annotations
 
 import sys
 from dataclasses import dataclass
-from pathlib import Path
+from typing import Any
 
 import heyoka as hy
 import numpy as np
 
-if not __package__:  # as a script
-    sys.path.insert(0, str(Path(__file__).parents[1]))
-
 import rigidsim
-from experiments.common import BLUE, GREEN, GREY, ORANGE, RED, Check, main, new_figure, save, simulate, tidy
+from experiments.common import (
+    BLUE,
+    GREEN,
+    GREY,
+    ORANGE,
+    RED,
+    Answer,
+    Check,
+    Curve,
+    Panel,
+    Picture,
+    Study,
+    simulate,
+)
 from experiments.measure import matrices
 from rigidsim.scene.bodies.presets import PRESETS
 from rigidsim.solve.problem import prepare
 
-NAME = "hyperion"
 PERIOD = 21.3  # days
 ONE = 1e-5  # a multiplier this near to 1 counts as 1
 STATES = {  # k, m, stable in attitude? (Wisdom, Peale & Mignard 1984)
@@ -235,7 +244,8 @@ def e_fold(motion: Motion, state: Resonance) -> float:
     return float(50 / np.polyfit(np.arange(len(largest)), np.log(largest), 1)[0])
 
 
-def study(full: bool, out: Path) -> list[Check]:
+@Study
+def study(full: bool) -> Answer:
     """Stability, Lyapunov rates, pictures; see the module's text."""
     motion = Motion()
     checks = []
@@ -288,62 +298,61 @@ def study(full: bool, out: Path) -> list[Check]:
             Check(f"Lyapunov rate, {name}, {len(lean)} x {revolutions} revolutions", rate, RATES[name],
                   tolerance, "n", "re-computed (the paper: about 0.1); 15 %, shorter runs 30 %")
         )  # fmt: skip
-    draw(motion, shown, exponents, out)
-    return checks
+    figure = picture(motion, shown, exponents)
+    return checks, figure
 
 
-def draw(motion: Motion, shown: dict[str, Resonance], exponents: dict[str, Exponent], out: Path) -> None:
+def picture(motion: Motion, shown: dict[str, Resonance], exponents: dict[str, Exponent]) -> Picture:
     """Surface of section, loss of attitude, wandering axis, convergence."""
-    figure = new_figure(
-        12, 9.5, "Hyperion tumbles: no attitude in the chaotic zone or at the synchronous state lasts"
-    )
-    (section, tilt), (sky, rates) = figure.subplots(2, 2)
-    starts = [(t, w) for t in (0.0, np.pi / 2) for w in np.arange(0.05, 3.0, 0.1)]
-    for theta, spin in starts:
-        path = motion.samples(motion.state(theta, spin), 250, 250)
+
+    def section(theta: float, spin: float, turns: int, color: str, size: float) -> Curve:
+        path = motion.samples(motion.state(theta, spin), turns, turns)
         angle = np.degrees(2 * np.arctan2(path[:, 6], path[:, 3])) % 180
-        section.plot(angle, path[:, 2] * motion.rate, ".", color=BLUE, markersize=1.1, alpha=0.7)
-    path = motion.samples(motion.state(np.pi / 2, 1.0), 3000, 3000)
-    angle = np.degrees(2 * np.arctan2(path[:, 6], path[:, 3])) % 180
-    section.plot(angle, path[:, 2] * motion.rate, ".", color=GREY, markersize=0.9, zorder=0)
-    for name, one in shown.items():
-        colour = GREEN if STATES[name][2] else RED
-        section.plot(np.degrees(one.theta), one.spin, "o", color=colour, markersize=7, clip_on=False,
-                     markerfacecolor="none", markeredgewidth=1.8)  # fmt: skip
-        section.annotate(name, (np.degrees(one.theta), one.spin), xytext=(7, 4), textcoords="offset points",
-                         color=colour, fontweight="bold", fontsize=10)  # fmt: skip
-    tidy(section, "long axis from pericentre, mod 180 (deg)", "w at pericentre (n)",
-         "In the plane: section at pericentre (grey: the chaotic zone)")  # fmt: skip
-    section.set_xlim(0, 180)
-    section.set_ylim(0, 3)
-    turns, per = 40, 100
-    result = simulate(CONFIG.format(tilt=TILT, end=turns * 2 * np.pi, samples=turns * per + 1))
+        return Curve(angle, path[:, 2] * motion.rate, "", color, ".", size, {"zorder": 1})
+
+    def named(axes: Any) -> None:
+        for name, one in shown.items():
+            color, place = GREEN if STATES[name][2] else RED, (np.degrees(one.theta), one.spin)
+            axes.plot(*place, "o", color=color, markersize=7, clip_on=False, markerfacecolor="none", mew=1.8)
+            axes.annotate(name, place, (7, 4), textcoords="offset points", color=color, fontweight="bold")
+
+    def pointing(axes: Any) -> None:
+        longitude, latitude = (
+            np.degrees(np.arctan2(spin[:, 1], spin[:, 0])),
+            np.degrees(np.arcsin(spin[:, 2])),
+        )
+        points = axes.scatter(longitude, latitude, c=time, s=2.5, cmap="viridis")
+        axes.figure.colorbar(points, ax=axes, label="time (revolutions)")
+
+    sections = [section(np.pi / 2, 1.0, 3000, GREY, 0.22)]
+    sections += [section(t, w, 250, BLUE, 0.28) for t in (0.0, np.pi / 2) for w in np.arange(0.05, 3.0, 0.1)]
+    result = simulate(CONFIG.format(tilt=TILT, end=80 * np.pi, samples=4001))
     axes = matrices(result.values("quaternion"))
     short, w = axes[:, :, 2], np.einsum("nij,nj->ni", axes, result.values("angular_velocity"))
-    time = result.values("time") / (2 * np.pi)
-    spin = w / np.linalg.norm(w, axis=1)[:, None]
-    tilt.semilogy(time, np.degrees(np.arctan2(np.hypot(*short[:, :2].T), short[:, 2])), color=BLUE,
-                  label="shortest axis", linewidth=1)  # fmt: skip
-    tilt.semilogy(time, np.degrees(np.arctan2(np.hypot(*spin[:, :2].T), spin[:, 2])), color=ORANGE,
-                  label="axis of rotation", linewidth=1)  # fmt: skip
-    tidy(tilt, "time (revolutions)", "angle from the orbit's normal (deg)",
-         "A tilt of 0.01 rad doesn't stay one")  # fmt: skip
-    tilt.legend(loc="lower right", fontsize=9)
-    longitude, latitude = np.degrees(np.arctan2(spin[:, 1], spin[:, 0])), np.degrees(np.arcsin(spin[:, 2]))
-    points = sky.scatter(longitude, latitude, c=time, s=2.5, cmap="viridis")
-    figure.colorbar(points, ax=sky, label="time (revolutions)")
-    tidy(sky, "longitude (deg)", "latitude (deg)", "Where the axis of rotation points, in space")
-    sky.set_xlim(-180, 180)
-    sky.set_ylim(-90, 90)
-    for (name, one), colour in zip(exponents.items(), (BLUE, ORANGE), strict=True):
+    time, spin = result.values("time") / (2 * np.pi), w / np.linalg.norm(w, axis=1)[:, None]
+    axes_of = ((short, "shortest axis", BLUE), (spin, "axis of rotation", ORANGE))
+    away = [
+        Curve(time, np.degrees(np.arctan2(np.hypot(*one[:, :2].T), one[:, 2])), label, color, width=1)
+        for one, label, color in axes_of
+    ]
+    rates = []
+    for (name, one), color in zip(exponents.items(), (BLUE, ORANGE), strict=True):
         label = f"{name}: {one.rate:.3f} ± {one.error:.3f} n"
-        rates.semilogx(np.arange(1, len(one.running) + 1), one.running, color=colour, label=label)
-        rates.axhline(RATES[name], color=colour, linestyle="--", linewidth=0.9)
-    tidy(rates, "revolutions", "largest Lyapunov rate so far (n)", "Convergence (dashed: expected)")
-    rates.set_ylim(0, 0.25)
-    rates.legend(loc="upper right", fontsize=9)
-    save(figure, out, NAME)
+        rates += [Curve(np.arange(1, len(one.running) + 1), one.running, label, color),
+                  Curve(None, RATES[name], "", color, "--", 0.9)]  # fmt: skip
+    title = "Hyperion tumbles: no attitude in the chaotic zone or at the synchronous state lasts"
+    return Picture(title, "ab;cd", [
+        Panel("In the plane: section at pericentre (grey: the chaotic zone)",
+              "long axis from pericentre, mod 180 (deg)", "w at pericentre (n)", sections, more=named,
+              limits={"xlim": (0, 180), "ylim": (0, 3)}),
+        Panel("A tilt of 0.01 rad doesn't stay one", "time (revolutions)",
+              "angle from the orbit's normal (deg)", away, "y", legend="lower right"),
+        Panel("Where the axis of rotation points, in space", "longitude (deg)", "latitude (deg)",
+              more=pointing, limits={"xlim": (-180, 180), "ylim": (-90, 90)}),
+        Panel("Convergence (dashed: expected)", "revolutions", "largest Lyapunov rate so far (n)", rates, "x",
+              limits={"ylim": (0, 0.25)}, legend="upper right"),
+    ], (12, 9.5))  # fmt: skip
 
 
 if __name__ == "__main__":
-    sys.exit(main(study, NAME))
+    raise SystemExit(study.main())

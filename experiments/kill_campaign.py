@@ -27,14 +27,10 @@ from __future__ import annotations
 import argparse
 import random
 import signal
-import sys
 import tempfile
 import time
 from collections.abc import Sequence
 from pathlib import Path
-
-if not __package__:  # as a script
-    sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from experiments.durability.damages import damage_files
 from experiments.durability.disks import fill_disks, lock_disks

@@ -14,8 +14,6 @@ zero at 1.3e5 rad, in 80 bits (23 for 22.83) that of 16 starts 3.2 at 3e4 rad, a
 0.61 to 0.66 and 1.63. With an eighth of epsilon (orders 11 and 24) they are 1.7 and 0.2. Double precision (20
 for 19.02) shows none. (tests/solve/test_auto_tolerance.py)
 
-Series that ``DIR/long_horizon.h5`` has for the same settings aren't measured again.
-
 Run: python -m experiments.long_horizon [--full] [--out DIR]
 Reduced: single to 1e4, double to 1e5 rad, extended to 1e4; --full: 1e5, 1e7 and 1e6 (an hour and a half).
 """
@@ -26,24 +24,17 @@ import math
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
-from typing import Any
-
-if not __package__:  # as a script
-    sys.path.insert(0, str(Path(__file__).parents[1]))
 
 import mpmath
 import numpy as np
 import xarray
 
 import rigidsim
-from experiments.common import BLUE, EPSILON, GREY, ORANGE, Check, main, new_figure, save, tidy
+from experiments.common import BLUE, EPSILON, GREY, ORANGE, Answer, Check, Curve, Panel, Picture, Study
 from rigidsim.accuracy.comparison import angles_between
 from rigidsim.accuracy.setting import Setting
 from rigidsim.accuracy.trial import try_setting
-from rigidsim.solve.problem import auto_tolerance
 
-NAME = "long_horizon"
 STARTS = 12
 PER_DECADE = 4
 REDUCED = {"single": 1e4, "double": 1e5, "extended": 1e4}
@@ -102,11 +93,6 @@ def experiment(body: str, start: int, end: float) -> rigidsim.Experiment:
     return rigidsim.parse(BODIES[body].format(a=a, b=b, c=c, end=repr(end)))
 
 
-def tolerance(precision: str) -> float:
-    """What "auto" is."""
-    return auto_tolerance(EPSILON[precision])
-
-
 def measure(body: str, precision: str, held: bool, horizon: float, starts: int = STARTS) -> xarray.Dataset:
     """Absolute errors of every start at every time: dimensions ``start``, ``time``."""
     moments = times(horizon)
@@ -128,7 +114,7 @@ def measure(body: str, precision: str, held: bool, horizon: float, starts: int =
             "cpu_seconds": (("start",), cpu),
         },
         coords={"quantity": list(QUANTITIES), "time": moments[grown]},
-        attrs={"body": body, "precision": precision, "held": int(held), "tolerance": tolerance(precision)},
+        attrs={"body": body, "precision": precision, "held": int(held)},
     )
 
 
@@ -186,46 +172,37 @@ def checks(measured: Sequence[xarray.Dataset]) -> list[Check]:
     return found
 
 
-def draw(measured: Sequence[xarray.Dataset], out: Path) -> Path:
+def picture(measured: Sequence[xarray.Dataset]) -> Picture:
     """Medians, quartiles and lines: a row for each body, a column for each quantity."""
-    figure = new_figure(
-        14, 8.6, "Errors over long runs: random walks, t^1/2 and t^3/2, unless the invariants are held"
-    )
-    grid = figure.subplots(len(BODIES), len(QUANTITIES), squeeze=False)
-    colors = {"single": GREY, "double": BLUE, "extended": ORANGE}
-    for row, body in zip(grid, BODIES, strict=True):
-        for axes, quantity in zip(row, QUANTITIES, strict=True):
+    panels = []
+    for body in BODIES:
+        for quantity in QUANTITIES:
+            curves = []
             for data in measured:
                 if data.attrs["body"] == body:
-                    _curve(axes, data, quantity, colors[data.attrs["precision"]])
-            axes.set_xscale("log")
-            axes.set_yscale("log")
+                    curves += _curves(data, quantity)
             unit = "rad" if quantity == "attitude" else "relative"
-            tidy(axes, "time, radians of the fastest rate", f"{quantity} error, {unit}", body)
-            axes.legend(fontsize=7.5, loc="upper left", frameon=False)
-            low, high = axes.get_ylim()
-            axes.set_ylim(low, high * (high / low) ** 0.42)  # room for the legend
-    return save(figure, out, NAME)
+            labels = "time, radians of the fastest rate", f"{quantity} error, {unit}"
+            panels.append(Panel(body, *labels, curves, "xy", legend="upper left"))
+    title = "Errors over long runs: random walks, t^1/2 and t^3/2, unless the invariants are held"
+    return Picture(title, "abc;def", panels, (14, 8.6))
 
 
-def _curve(axes, data: xarray.Dataset, quantity: str, color: str) -> None:  # type: ignore[no-untyped-def]
-    held = bool(data.attrs["held"])
-    least = EPSILON[data.attrs["precision"]] / 16  # zeros are below what the evaluation resolves
+def _curves(data: xarray.Dataset, quantity: str) -> list[Curve]:
+    precision, held, moments = data.attrs["precision"], bool(data.attrs["held"]), data["time"].values
+    color = {"single": GREY, "double": BLUE, "extended": ORANGE}[precision]
+    least = EPSILON[precision] / 16  # zeros are below what the evaluation resolves
     values = np.maximum(data["error"].sel(quantity=quantity).values, least)
-    moments = data["time"].values
-    low, middle, high = np.percentile(values, (25, 50, 75), axis=0)
-    fitted = fit(data, quantity)
-    label = f"{data.attrs['precision']}{', held' if held else ''}"
+    fitted, label = fit(data, quantity), f"{precision}{', held' if held else ''}"
+    curves = []
     if fitted is not None:
         label += f": t^({fitted.exponent:.2f} ± {fitted.sigma:.2f})"
-    axes.fill_between(moments, low, high, color=color, alpha=0.18 if not held else 0.1, linewidth=0)
-    axes.plot(
-        moments, middle, "o" if not held else "s", color=color, markersize=4, label=label,
-        markerfacecolor=color if held else "white",
-    )  # fmt: skip
-    if fitted is not None:
         span = np.array([fitted.start, fitted.end])
-        axes.plot(span, fitted.factor * span**fitted.exponent, color=color, linewidth=1.1)
+        curves.append(Curve(span, fitted.factor * span**fitted.exponent, "", color))
+    low, middle, high = np.percentile(values, (25, 50, 75), axis=0)
+    marker = {"markerfacecolor": "white" if held else color}
+    curves.append(Curve(moments, middle, label, color, "s" if held else "o", 1, marker))
+    return curves + [Curve(moments, edge, "", color, ":", 0.6) for edge in (low, high)]
 
 
 def markdown(measured: Sequence[xarray.Dataset]) -> str:
@@ -246,47 +223,18 @@ def markdown(measured: Sequence[xarray.Dataset]) -> str:
     return "\n".join(lines)
 
 
-def long_horizon(full: bool, out: Path) -> list[Check]:
+@Study
+def long_horizon(full: bool) -> Answer:
     """Measure, draw, print the exponents."""
-    horizons = FULL if full else REDUCED
     measured = []
-    there = kept(out)
     for body in BODIES:
-        for precision, horizon in horizons.items():
+        for precision, horizon in (FULL if full else REDUCED).items():
             for held in (False, True):
-                key = (body, precision, int(held), tolerance(precision), STARTS, times(horizon)[-1])
-                if key in there:
-                    measured.append(there[key])
-                    continue
                 print(f"{body}, {precision}, {'held' if held else 'plain'}", file=sys.stderr, flush=True)
                 measured.append(measure(body, precision, held, horizon))
-                keep(measured, out)
-    draw(measured, out)
     print(markdown(measured))
-    return checks(measured)
-
-
-def keep(measured: Sequence[xarray.Dataset], out: Path) -> None:
-    """What is there so far, as ``long_horizon.h5``: a group for each series."""
-    out.mkdir(parents=True, exist_ok=True)
-    for n, data in enumerate(measured):
-        mode = "w" if n == 0 else "a"
-        data.to_netcdf(out / f"{NAME}.h5", mode=mode, group=f"series_{n}", engine="h5netcdf")
-
-
-def kept(out: Path) -> dict[tuple[Any, ...], xarray.Dataset]:
-    """What an earlier run left, by settings."""
-    found: dict[tuple[Any, ...], xarray.Dataset] = {}
-    path = out / f"{NAME}.h5"
-    if path.exists():
-        for group in xarray.open_groups(path, engine="h5netcdf").values():
-            if "error" in group:
-                data = group.load()
-                attrs = (data.attrs.get(name) for name in ("body", "precision", "held", "tolerance"))
-                found[*attrs, data.sizes["start"], float(data["time"][-1])] = data
-            group.close()  # the file is to be written anew
-    return found
+    return checks(measured), picture(measured)
 
 
 if __name__ == "__main__":
-    sys.exit(main(long_horizon, NAME))
+    raise SystemExit(long_horizon.main())

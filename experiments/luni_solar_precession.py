@@ -13,45 +13,35 @@ Held against (physics: P1 and the first-order nutation, see ``averaged`` and ``n
 - the 18.6-year nutation, 9.2022 arcsec in obliquity and 17.235 in longitude, to 0.5 %, of first order too;
 - the drifts of the invariants, against the bound that the run itself gives for rounding.
 --full goes once round the whole cycle of 25,772 years, some 1e7 rotations, and reports its cost on stderr.
---cost compares with a bare heyoka script of the same equations, in one process, median of three: the
-integration alone in wall seconds, all with compilation and dataset in CPU seconds.
-What makes the difference is each sample: a thousand days apart both cost the same, nearer it is dearer.
 
-Run: python -m experiments.luni_solar_precession [--full] [--cost] [--out DIR]
+Run: python -m experiments.luni_solar_precession [--full] [--out DIR]
 """
 
 from __future__ import annotations
 
 import resource
-import statistics
 import sys
 import time
-from pathlib import Path
 from typing import Any
 
 import mpmath
 import numpy as np
 
-if not __package__:  # as a script
-    sys.path.insert(0, str(Path(__file__).parents[1]))
-
-import rigidsim
 from experiments.common import (
     BLUE,
     GREEN,
-    GREY,
     ORANGE,
+    Answer,
     Check,
+    Curve,
+    Panel,
+    Picture,
     Result,
-    main,
-    new_figure,
-    save,
+    Study,
     simulate,
-    tidy,
 )
 from experiments.measure import matrices
 
-NAME = "luni_solar_precession"
 DAY, YEAR = 86400, 365.25 * 86400  # s; Julian year
 ARCSEC = np.pi / 648000
 H, OBLIQUITY, SPIN = "0.00327379492", "84381.406", "1.00273790935"  # (C-A)/C, arcsec, turns a day
@@ -177,7 +167,8 @@ def run(bodies: str, days: float, samples: int) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def study(full: bool, out: Path) -> list[Check]:
+@Study
+def study(full: bool) -> Answer:
     """Each body alone and both; see the module's text."""
     days = float(NODE)
     found = {"Sun": run("Sun", 2 * float(SUN["period"]), 732)}
@@ -216,81 +207,33 @@ def study(full: bool, out: Path) -> list[Check]:
             Check(f"largest drift over its bound, {name}", one["drift"], 0.0, 1.0, "1",
                   "invariants; the bound of the run's own summary", "absolute")
         )  # fmt: skip
-    draw(found, out)
-    return checks
+    figure = picture(found)
+    return checks, figure
 
 
-def draw(found: dict[str, Any], out: Path) -> None:
+def picture(found: dict[str, Any]) -> Picture:
     """The equinox going back, and the ellipse of the nutation."""
-    both = found["both"]
+    both, first, turn = found["both"], node_terms(), np.linspace(0, 2 * np.pi, 400)
+    across, up = both["residuals"]
+    tilt = np.sin(float(OBLIQUITY) * ARCSEC)
+    a, b = first["longitude"] * tilt, first["obliquity"]
     title = (
         f"Sun and Moon turn the Earth's axis by {both['rate']:.2f} arcsec a year, nodding once in 18.6 years"
     )
-    figure = new_figure(11.5, 5.4, title)
-    left, right = figure.subplots(1, 2, width_ratios=[1.55, 1])
-    left.plot(both["t"], both["path"], color=BLUE, label=f"both: {both['rate']:.3f} arcsec/yr")
-    for name, color in (("Moon", ORANGE), ("Sun", GREEN)):
-        one = found[name]
-        left.plot(one["t"], one["path"], color=color, label=f"{name}: {one['rate']:.3f} arcsec/yr")
-    tidy(
-        left, "time (Julian years)", "precession in longitude (arcsec)", "Longitude: a line and the nutation"
-    )
-    left.legend(loc="upper left", fontsize=9)
-    across, up = both["residuals"]
-    across = across * np.sin(float(OBLIQUITY) * ARCSEC)
-    right.plot(across, up, color=BLUE, linewidth=0.6, label="figure axis, daily, the line removed")
-    turn = np.linspace(0, 2 * np.pi, 400)
-    first = node_terms()
-    a = first["longitude"] * np.sin(float(OBLIQUITY) * ARCSEC)
-    label = f"first order: {first['obliquity']:.2f} by {a:.2f} arcsec"
-    right.plot(
-        a * np.sin(turn), first["obliquity"] * np.cos(turn), "--", color=ORANGE, linewidth=1.6, label=label
-    )
-    right.plot(0, 0, "+", color=GREY, markersize=10)
-    tidy(
-        right,
-        "longitude times sin(obliquity) (arcsec)",
-        "obliquity (arcsec)",
-        "Nutation over one turn of the node",
-    )
-    right.set_aspect("equal")
-    right.set_ylim(-11, 15.5)
-    right.legend(loc="upper center", fontsize=8.5, framealpha=1)
-    save(figure, out, NAME)
-
-
-def cost(years: float, every: float) -> None:
-    """Compare CPU seconds with a bare script of the same equations and samples; prints one line."""
-    import heyoka as hy
-
-    from rigidsim.solve.problem import prepare
-
-    samples = round(years * 365.25 / every) + 1
-    text = config("both", years * 365.25, samples)
-    runs = []
-    for _ in range(3):
-        system = prepare(rigidsim.parse(text)).system
-        began = time.process_time()
-        bare = hy.taylor_adaptive(system.equations, [float(x) for x in system.initial])
-        compiled = time.perf_counter()  # as the run's own summary
-        end = years * YEAR / 2.0**system.scaling.time
-        bare.propagate_grid(np.linspace(0.0, end, samples))
-        bare_all, bare_run = time.process_time() - began, time.perf_counter() - compiled
-        began = time.process_time()
-        seconds = simulate(text).summary["cost"]["seconds"]
-        ours_all, ours_run = time.process_time() - began, seconds["integrate_and_record"]
-        runs.append((ours_run / bare_run, ours_all / bare_all, bare_run, ours_run, bare_all, ours_all))
-    a, b, c, d, e, f = (statistics.median(column) for column in zip(*runs, strict=True))
-    print(
-        f"{years:g} yr, a sample every {every:g} d, medians of 3: integrating {d / years * 1e3:.2f} ms/yr "
-        f"against {c / years * 1e3:.2f} ms/yr, ratio {a:.3f} (allowed 1.15); compilation included "
-        f"{f:.2f} s against {e:.2f} s, ratio {b:.2f}"
-    )
+    return Picture(title, "ab", [
+        Panel("Longitude: a line and the nutation", "time (Julian years)", "precession (arcsec)", [
+            Curve(one["t"], one["path"], f"{name}: {one['rate']:.3f} arcsec/yr", color)
+            for name, one, color in (("both", both, BLUE), ("Moon", found["Moon"], ORANGE),
+                                     ("Sun", found["Sun"], GREEN))
+        ]),
+        Panel("Nutation over one turn of the node", "longitude times sin(obliquity) (arcsec)",
+              "obliquity (arcsec)", [
+                  Curve(across * tilt, up, "figure axis, daily, the line removed", width=0.6),
+                  Curve(a * np.sin(turn), b * np.cos(turn), f"first order: {b:.2f} by {a:.2f} arcsec", ORANGE,
+                        "--", 1.6),
+              ], equal=True, legend="upper center", limits={"ylim": (-11, 15.5)}),
+    ], (11.5, 5.4), {"width_ratios": [1.55, 1]})  # fmt: skip
 
 
 if __name__ == "__main__":
-    if "--cost" in sys.argv:
-        for length, spacing in ((10, 1), (10, 100), (200, 10), (200, 1000)):
-            cost(length, spacing)
-        sys.exit()
-    sys.exit(main(study, NAME))
+    raise SystemExit(study.main())

@@ -23,11 +23,6 @@ Run: python -m experiments.mars_rotation [--full] [--out DIR]
 from __future__ import annotations
 
 import math
-import sys
-from pathlib import Path
-
-if not __package__:  # as a script
-    sys.path.insert(0, str(Path(__file__).parents[1]))
 
 import numpy as np
 
@@ -37,17 +32,17 @@ from experiments.common import (
     GREY,
     ORANGE,
     RED,
+    Answer,
     Check,
+    Curve,
+    Panel,
+    Picture,
     Result,
-    main,
-    new_figure,
-    save,
+    Study,
     simulate,
-    tidy,
 )
 from experiments.real_bodies import mars
 
-NAME = "mars_rotation"
 SCENE = CONFIGS / "kernels" / "mars_nutation.toml"
 START = 2442412.5 - 2451545.0
 H, POLAR = 0.00537997, 0.36368397603343121822
@@ -67,14 +62,15 @@ def run(*settings: str) -> tuple[np.ndarray, Result]:
     return START + result.values("time") / 86400, result
 
 
-def study(full: bool, out: Path) -> list[Check]:
+@Study
+def study(full: bool) -> Answer:
     """Precession, amplitudes, amplifications."""
     days, result = run()
     rigid = mars.fit(days, result.values("figure_axis"), (FREE,))
     _, fluid = run(f"body.core={{moment={CORE.moment!r}, flattening={CORE.flattening!r}}}")
     core = mars.fit(days, fluid.values("figure_axis"), (FREE, CORE.free_nutation(SPIN)))
     scale = factor(rigid)
-    _draw(out, days, result, rigid, core, scale)
+    figure = picture(days, result, rigid, core, scale)
     return [
         Check("precession, with the geodetic one", rigid.rates[0] + mars.GEODETIC, mars.PRECESSION, 0.02,
               "mas/yr", "Konopliv et al. 2016; H is fitted to it, in six digits", "absolute"),
@@ -83,7 +79,7 @@ def study(full: bool, out: Path) -> list[Check]:
         Check("precession that the published series goes with", -rigid.rates[0] / scale, 7576.0, 35.0,
               "mas/yr", "Folkner et al. 1997; its error", "absolute"),
         *amplifications(rigid, core),
-    ]  # fmt: skip
+    ], figure  # fmt: skip
 
 
 def factor(rigid: mars.Nutation) -> float:
@@ -127,56 +123,41 @@ def amplifications(rigid: mars.Nutation, core: mars.Nutation) -> list[Check]:
     return checks
 
 
-def _draw(
-    out: Path, days: np.ndarray, result: Result, rigid: mars.Nutation, core: mars.Nutation, scale: float
-) -> None:
+def picture(
+    days: np.ndarray, result: Result, rigid: mars.Nutation, core: mars.Nutation, scale: float
+) -> Picture:
     """The pole's path, amplitudes beside the published ones, and the core's resonance."""
-    figure = new_figure(14, 5.2, "A rigid Mars nutates as published, and a core amplifies it as foretold")
-    path, bars, response = figure.subplots(1, 3)
     psi, tilt = mars.angles(result.values("figure_axis"))
     later = (days > 0) & (days < 687)
     along = np.radians(rigid.start[0]) + rigid.rates[0] * mars.MAS * days / 365.25
     size = math.sin(math.radians(rigid.start[1]))
-    path.plot(
-        size * (psi - along)[later] / mars.MAS,
-        (tilt - math.radians(rigid.start[1]))[later] / mars.MAS,
-        color=BLUE,
-        linewidth=1.0,
-    )
-    path.set_aspect("equal", adjustable="datalim")
-    tidy(
-        path,
-        "longitude × sin(obliquity), mas",
-        "obliquity, mas",
-        "Nutation in the first Martian year after J2000",
+    path = Curve(
+        size * (psi - along)[later] / mars.MAS, (tilt - math.radians(rigid.start[1]))[later] / mars.MAS
     )
     harmonics = np.arange(1, mars.HARMONICS + 1)
-    for which, (what, color) in enumerate((("longitude", BLUE), ("obliquity", ORANGE))):
-        bare = [rigid.amplitudes(k)[which] - mars.published(k)[which] for k in harmonics]
-        scaled = [rigid.amplitudes(k)[which] / scale - mars.published(k)[which] for k in harmonics]
-        bars.plot(harmonics, bare, "o", color=color, markerfacecolor="white", label=f"{what}, as it is")
-        bars.plot(harmonics, scaled, "o", color=color, label=f"{what}, all over {scale:.4f}")
-    bars.axhspan(-0.5, 0.5, color=GREY, alpha=0.15, linewidth=0)
-    bars.legend(loc="upper right", frameon=False, fontsize=9)
-    tidy(bars, "harmonic of the year", "mas", "Amplitudes less the published ones (grey: 0.5 mas)")
-    period = np.concatenate([np.linspace(-900, -90, 4000), np.linspace(90, 900, 1000)])
+    bars = [
+        Curve(harmonics, [rigid.amplitudes(k)[which] / over - mars.published(k)[which] for k in harmonics],
+              f"{what}, {label}", color, "o", more={"markerfacecolor": "white"} if over == 1 else {})
+        for which, (what, color) in enumerate((("longitude", BLUE), ("obliquity", ORANGE)))
+        for over, label in ((1, "as it is"), (scale, f"all over {scale:.4f}"))
+    ]  # fmt: skip
+    period = np.concatenate([np.linspace(-900, -90, 4000), [np.nan], np.linspace(90, 900, 1000)])
     curve = np.array([CORE.response(2 * math.pi / p, SPIN) for p in period])
     curve[np.abs(curve) > 4] = np.nan
-    curve[np.argmin(np.abs(period))] = np.nan  # no line across zero
-    response.plot(period, curve, color=GREY, linewidth=1.0, label="linearised equations")
     shown = [k for k in (-3, -2, -1, 1, 2, 3, 4) if abs(rigid.circles[k]) > 1]
-    found = [abs(core.circles[k] / rigid.circles[k]) for k in shown]
-    response.plot([2 * math.pi / (k * ANNUAL) for k in shown], found, "o", color=RED, label="runs")
-    response.set_ylim(-1, 4)
-    response.legend(loc="upper right", frameon=False, fontsize=9)
-    tidy(
-        response,
-        "period, days (retrograde: negative)",
-        "",
-        "Amplified by a core of F = 0.07, free in −240 days",
-    )
-    save(figure, out, NAME)
+    runs = [abs(core.circles[k] / rigid.circles[k]) for k in shown]
+    title = "A rigid Mars nutates as published, and a core amplifies it as foretold"
+    return Picture(title, "abc", [
+        Panel("Nutation in the first Martian year after J2000", "longitude × sin(obliquity), mas",
+              "obliquity, mas", [path], equal=True),
+        Panel("Amplitudes less the published ones (grey: 0.5 mas)", "harmonic of the year", "mas",
+              [*bars, *(Curve(None, y, "", GREY, ":") for y in (-0.5, 0.5))], legend="upper right"),
+        Panel("Amplified by a core of F = 0.07, free in −240 days", "period, days (negative: back)", "", [
+            Curve(period, curve, "linearised equations", GREY, width=1),
+            Curve([2 * math.pi / (k * ANNUAL) for k in shown], runs, "runs", RED, "o"),
+        ], limits={"ylim": (-1, 4)}, legend="upper right"),
+    ], (14, 5.2))  # fmt: skip
 
 
 if __name__ == "__main__":
-    sys.exit(main(study, NAME))
+    raise SystemExit(study.main())

@@ -27,11 +27,6 @@ Run: python -m experiments.mercury_librations [--full] [--out DIR]
 from __future__ import annotations
 
 import math
-import sys
-from pathlib import Path
-
-if not __package__:  # as a script
-    sys.path.insert(0, str(Path(__file__).parents[1]))
 
 import numpy as np
 
@@ -41,16 +36,16 @@ from experiments.common import (
     GREY,
     ORANGE,
     RED,
+    Answer,
     Check,
-    main,
-    new_figure,
-    save,
+    Curve,
+    Panel,
+    Picture,
+    Study,
     simulate,
-    tidy,
 )
 from experiments.real_bodies import mercury
 
-NAME = "mercury_librations"
 SCENE = CONFIGS / "kernels" / "mercury_libration.toml"
 START = 2415083.0 - 2451545.0
 IAU = (38.421252, -4.043124, -0.39744, -0.091404, -0.020556)
@@ -76,7 +71,8 @@ def free_period(ratio: float) -> float:
     return 87.9691 / math.sqrt(3 * ratio * (7 * e / 2 - 123 * e**3 / 16 + 489 * e**5 / 128)) / mercury.YEAR
 
 
-def study(full: bool, out: Path) -> list[Check]:
+@Study
+def study(full: bool) -> Answer:
     """Lines of three runs."""
     ratio = 4 * 0.8067e-5 / 0.346
     days, turned = run()
@@ -112,48 +108,40 @@ def study(full: bool, out: Path) -> list[Check]:
         Check("the same by the formula", loose.period, free_period(4e-5 / 0.34), 1e-3, "yr",
               "first order; the eccentricity changes"),
     ]  # fmt: skip
-    _draw(out, days, turned, real)
-    return checks
+    figure = picture(days, turned, real)
+    return checks, figure
 
 
-def _draw(out: Path, days: np.ndarray, turned: np.ndarray, real: mercury.Libration) -> None:
+def picture(days: np.ndarray, turned: np.ndarray, real: mercury.Libration) -> Picture:
     """A few orbits, 150 years, and amplitudes by the period of the free libration."""
-    figure = new_figure(14, 5.0, "Mercury's librations: 38 arcsec each year, and as much again with Jupiter")
-    year, long, resonance = figure.subplots(1, 3)
     rest = turned / mercury.ARCSEC - np.polyval(np.polyfit(days, turned / mercury.ARCSEC, 1), days)
-    m = mercury.anomaly(days)
-    annual = sum(a * np.sin((k + 1) * m) for k, a in enumerate(real.annual))
-    observed = sum(a * np.sin((k + 1) * m) for k, a in enumerate(IAU))
-    slow = rest - annual
-    few = slice(0, 132)
-    span = days[few] - days[0]
-    year.plot(span, annual[few] + slow[few] - slow[few].mean(), color=BLUE, linewidth=1.2, label="run")
-    year.plot(span, observed[few], color=ORANGE, linewidth=1.0, linestyle="--", label="the IAU's lines")
-    year.set_ylim(-48, 62)
-    year.legend(loc="upper right", frameon=False, fontsize=9)
-    tidy(year, "days", "arcsec", "Libration in longitude, three years of Mercury")
-    years = 2000 + days / mercury.YEAR
-    long.plot(years, rest, color=GREY, linewidth=0.2, label="all")
-    long.plot(years, slow, color=RED, linewidth=1.2, label="without that of 88 days")
-    long.set_ylim(-100, 135)
-    long.legend(loc="upper right", frameon=False, fontsize=9)
-    tidy(long, "", "arcsec", "150 years: Jupiter's line of 11.86 years")
+    m, few = mercury.anomaly(days), slice(0, 132)
+    annual, observed = (
+        sum(a * np.sin((k + 1) * m) for k, a in enumerate(lines)) for lines in (real.annual, IAU)
+    )
+    slow, span, years = rest - annual, days[few] - days[0], 2000 + days / mercury.YEAR
     period = np.linspace(10, 20, 2001)
+    resonance = [Curve(period, real.annual[0] * (real.period / period) ** 2, "88 days", GREY, width=1),
+                 Curve(real.period, real.annual[0], "", GREY, "o")]  # fmt: skip
     for line, color, name in ((11.862, RED, "Jupiter, 11.86 yr"), (5.663, BLUE, "Venus, 5.66 yr"),
                               (14.73, ORANGE, "Saturn, 14.73 yr")):  # fmt: skip
         push = abs(real.forced[line] * ((real.period / line) ** 2 - 1))
         amplitude = push / np.maximum(np.abs((period / line) ** 2 - 1), 1e-6)
-        resonance.semilogy(period, amplitude, color=color, linewidth=1.0, label=name)
-        resonance.plot(real.period, real.forced[line], "o", color=color)
-    resonance.plot(
-        period, real.annual[0] * (real.period / period) ** 2, color=GREY, linewidth=1.0, label="88 days"
-    )
-    resonance.plot(real.period, real.annual[0], "o", color=GREY)
-    resonance.set_ylim(0.3, 1000)
-    resonance.legend(loc="upper right", frameon=False, fontsize=9)
-    tidy(resonance, "period of the free libration, yr", "amplitude, arcsec", "Near resonance (dots: the run)")
-    save(figure, out, NAME)
+        resonance += [Curve(period, amplitude, name, color, width=1),
+                      Curve(real.period, real.forced[line], "", color, "o")]  # fmt: skip
+    title = "Mercury's librations: 38 arcsec each year, and as much again with Jupiter"
+    return Picture(title, "abc", [
+        Panel("Libration in longitude, three years of Mercury", "days", "arcsec", [
+            Curve(span, annual[few] + slow[few] - slow[few].mean(), "run"),
+            Curve(span, observed[few], "the IAU's lines", ORANGE, "--", 1),
+        ], limits={"ylim": (-48, 62)}, legend="upper right"),
+        Panel("150 years: Jupiter's line of 11.86 years", "", "arcsec", [
+            Curve(years, rest, "all", GREY, width=0.2), Curve(years, slow, "without that of 88 days", RED),
+        ], limits={"ylim": (-100, 135)}, legend="upper right"),
+        Panel("Near resonance (dots: the run)", "period of the free libration, yr", "amplitude, arcsec",
+              resonance, "y", limits={"ylim": (0.3, 1000)}, legend="upper right"),
+    ], (14, 5.0))  # fmt: skip
 
 
 if __name__ == "__main__":
-    sys.exit(main(study, NAME))
+    raise SystemExit(study.main())

@@ -20,12 +20,8 @@ Run: python -m experiments.moon_free_librations [--full] [--out DIR]
 from __future__ import annotations
 
 import math
-import sys
 from dataclasses import dataclass
-from pathlib import Path
-
-if not __package__:  # as a script
-    sys.path.insert(0, str(Path(__file__).parents[1]))
+from typing import Any
 
 import numpy as np
 
@@ -37,16 +33,16 @@ from experiments.common import (
     GREY,
     ORANGE,
     RED,
+    Answer,
     Check,
-    main,
-    new_figure,
-    save,
+    Curve,
+    Panel,
+    Picture,
+    Study,
     simulate,
-    tidy,
 )
 from experiments.real_bodies import free_librations as free
 
-NAME = "moon_free_librations"
 SCENE = CONFIGS / "kernels" / "moon_since_1969.toml"
 START = 2415056.5  # 1900-02-06
 ARCSEC = math.radians(1 / 3600)
@@ -144,10 +140,11 @@ def circular() -> tuple[float, float, float]:
     return month / math.sqrt(3 * GAMMA), 1 / ((1 - fast) / month - 1 / free.NODE), month / slow
 
 
-def study(full: bool, out: Path) -> list[Check]:
+@Study
+def study(full: bool) -> Answer:
     """Three periods of four Moons."""
     found = {name: modes(settings) for name, settings in MOONS.items()}
-    _draw(out, found)
+    figure = picture(found)
     real, rigid = found["with a core"], found["rigid, degree 2"]
     checks = [
         Check(f"{mode}, DE421's whole Moon", period, seen, allowed, "d",
@@ -164,45 +161,36 @@ def study(full: bool, out: Path) -> list[Check]:
         Check("longitude, a rigid Moon, by a circular orbit", rigid.periods[0], circular()[0], 0.015, "d",
               "linearised equations; eccentricity and inclination"),
     ]  # fmt: skip
-    return checks
+    return checks, figure
 
 
-def _draw(out: Path, found: dict[str, Modes]) -> None:
+def picture(found: dict[str, Modes]) -> Picture:
     """Free librations of the real Moon as they are, and each mode's period of each Moon."""
-    figure = new_figure(
-        14,
-        7.2,
-        "The Moon's free librations: those of a rigid Moon, and those that are observed",
-    )
-    path, swing, *panels = (
-        figure.add_subplot(2, 6, place) for place in ((1, 2), (3, 6), (7, 8), (9, 10), (11, 12))
-    )
     real = found["with a core"]
     days, slow = free.smoothed(real.days, real.body)
-    path.plot(slow[:, 0], slow[:, 1], color=BLUE, linewidth=1.0)
-    path.set_aspect("equal", adjustable="datalim")
-    tidy(path, "about x, arcsec", "about y, arcsec", "Wobble, 74.6 years: the axis in the body")
-    swing.plot(1900.1 + days / 365.25, slow[:, 2], color=ORANGE, linewidth=0.8)
-    tidy(swing, "", "about z, arcsec", "Longitude, 2.9 years")
-    colors = (RED, ORANGE, GREEN, BLUE)
-    for k, (panel, mode) in enumerate(zip(panels, MODES, strict=True)):
-        for row, (one, color) in enumerate(zip(found.values(), colors, strict=True)):
-            panel.plot(one.periods[k], row, "o", color=color, markersize=8)
-        panel.axvline(DE430[k], color=GREY, linewidth=1.0, label="in DE430")
-        panel.axvline(DE421[k], color=GREY, linewidth=1.0, linestyle="--", label="in DE421")
-        panel.set_yticks(range(len(found)), list(found) if k == 0 else [""] * len(found))
-        panel.set_ylim(-0.5, len(found) + 0.2)
-        panel.ticklabel_format(axis="x", useOffset=False)
-        panel.locator_params(axis="x", nbins=5)
-        panel.legend(loc="upper right", frameon=False, fontsize=8, ncols=2)
-        tidy(
-            panel,
-            "days",
-            "",
-            {"longitude": "Longitude", "latitude": "Latitude, from the node", "wobble": "Wobble"}[mode],
-        )
-    save(figure, out, NAME)
+
+    def periods(k: int, title: str) -> Panel:
+        def named(axes: Any) -> None:
+            axes.set_yticks(range(len(found)), list(found) if k == 0 else [""] * len(found))
+            axes.ticklabel_format(axis="x", useOffset=False)
+            axes.locator_params(axis="x", nbins=5)
+
+        colors = (RED, ORANGE, GREEN, BLUE)
+        dots = [Curve(one.periods[k], row, "", colors[row], "o", 2) for row, one in enumerate(found.values())]
+        lines = [Curve(DE430[k], None, "in DE430", GREY), Curve(DE421[k], None, "in DE421", GREY, "--")]
+        limits = {"ylim": (-0.5, len(found) + 0.2)}
+        return Panel(title, "days", "", [*dots, *lines], legend="upper right", limits=limits, more=named)
+
+    titles = ("Longitude", "Latitude, from the node", "Wobble")
+    title = "The Moon's free librations: those of a rigid Moon, and those that are observed"
+    return Picture(title, "aabbbb;ccddee", [
+        Panel("Wobble, 74.6 years: the axis in the body", "about x, arcsec", "about y, arcsec",
+              [Curve(*slow[:, :2].T)], equal=True),
+        Panel("Longitude, 2.9 years", "", "about z, arcsec",
+              [Curve(1900.1 + days / 365.25, slow[:, 2], "", ORANGE, width=0.8)]),
+        *(periods(k, title) for k, title in enumerate(titles)),
+    ], (14, 7.2))  # fmt: skip
 
 
 if __name__ == "__main__":
-    sys.exit(main(study, NAME))
+    raise SystemExit(study.main())

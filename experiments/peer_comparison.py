@@ -11,7 +11,6 @@ is read off a peer's points: of all its settings the cheapest, interpolated in t
 isn't installed is left out with a message.
 
 Run: python -m experiments.peer_comparison [--repeats 3] [--full] [--peers heyoka,rigidsim,...]
-     [--python numbalsoda=/other/bin/python]
 """
 
 from __future__ import annotations
@@ -22,7 +21,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from experiments.common import BLUE, DEFAULT_OUT, GREEN, GREY, ORANGE, RED, new_figure, save, tidy
+from experiments.common import BLUE, DEFAULT_OUT, GREY, RED, new_figure, save, tidy
 from experiments.peers import ADAPTERS
 from experiments.peers.campaign import BARE, OURS, Measured, measure
 from experiments.peers.curves import Point, cost_at, frontier
@@ -46,10 +45,6 @@ _STYLES = {
     "rigidsim, rotation": (BLUE, ":", "v", 3),
     "rigidsim, Euler": (BLUE, ":", "X", 3),
     "numba DOP853": (RED, "-", "o", 3.5),
-    "numbalsoda DOP853": (ORANGE, "-", "o", 3.5),
-    "numbalsoda LSODA": (ORANGE, ":", "s", 3),
-    "REBOUND": (GREEN, "-", "o", 3.5),
-    "diffrax": ("#7570b3", "-", "o", 3.5),
     "scipy DOP853, numba": (GREY, "-", "s", 3),
     "scipy DOP853, Python": (GREY, ":", "o", 3),
     "scipy LSODA": (GREY, "--", "^", 3),
@@ -162,9 +157,6 @@ def arguments_of(argv: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument("--scenes", default=",".join(SCENES), help="default: %(default)s")
     parser.add_argument("--peers", default=",".join(ADAPTERS), help="default: %(default)s")
     parser.add_argument("--cap", type=float, default=10.0, help="CPU seconds after which a curve ends")
-    parser.add_argument(
-        "--python", action="append", default=[], metavar="PEER=PYTHON", help="interpreter for a peer"
-    )
     arguments = parser.parse_args(argv)
     for option, known in (("peers", ADAPTERS), ("scenes", SCENES)):
         chosen = getattr(arguments, option).split(",")
@@ -180,7 +172,6 @@ def main(argv: Sequence[str] | None = None) -> int:
     arguments = arguments_of(argv)
     ends = 1 if arguments.short else 2
     cases = [(name, end) for name in arguments.scenes for end in SCENES[name].ends[:ends]]
-    pythons = dict(text.split("=", 1) for text in arguments.python)
     measured = measure(
         arguments.peers,
         cases,
@@ -188,7 +179,6 @@ def main(argv: Sequence[str] | None = None) -> int:
         stride=1 if arguments.full else 3,
         fill=0.05,
         cap=arguments.cap,
-        pythons=pythons,
     )
     print("\n".join([*rows(measured, cases), "", *settings(measured, cases), ""]))
     for peer, seconds in measured.imports.items():

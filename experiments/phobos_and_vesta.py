@@ -21,30 +21,24 @@ Run: python -m experiments.phobos_and_vesta [--full] [--out DIR]
 from __future__ import annotations
 
 import math
-import sys
-from pathlib import Path
-
-if not __package__:  # as a script
-    sys.path.insert(0, str(Path(__file__).parents[1]))
 
 import numpy as np
 
 from experiments.common import (
     BLUE,
     CONFIGS,
-    GREY,
     ORANGE,
     RED,
+    Answer,
     Check,
+    Curve,
+    Panel,
+    Picture,
     Result,
-    main,
-    new_figure,
-    save,
+    Study,
     simulate,
-    tidy,
 )
 
-NAME = "phobos_and_vesta"
 PHOBOS, VESTA = (CONFIGS / "bodies" / f"{name}.toml" for name in ("phobos_libration", "vesta_nutation"))
 DAY, YEAR = 86400.0, 365.25
 MAS = math.radians(1 / 3.6e6)
@@ -93,7 +87,8 @@ def vesta(polar: float = 0.4) -> tuple[Result, float, float, float]:
     return result, float(node[1]) * YEAR / MAS / 1000, float(tilt[0]), math.hypot(*tilt[5:7]) / MAS
 
 
-def study(full: bool, out: Path) -> list[Check]:
+@Study
+def study(full: bool) -> Answer:
     """Both bodies."""
     moon, swing, loose = phobos()
     rock, rate, tilt, nutation = vesta()
@@ -102,7 +97,7 @@ def study(full: bool, out: Path) -> list[Check]:
     h = J2 / 0.4
     secular = -1.5 * ORBIT**2 / SPIN * h * math.cos(tilt) * (1 - FLAT**2) ** -1.5 * YEAR / MAS / 1000
     half = 0.75 * ORBIT / SPIN * h * math.sin(tilt) * (1 - 2.5 * FLAT**2) / MAS
-    _draw(out, moon, rock, swing, nutation)
+    figure = picture(moon, rock, swing, nutation)
     abstract = "Rambaux 2013, abstract"
     return [
         Check("Phobos, once in an orbit", -swing, 1.1, 0.05, "deg", "Rambaux et al. 2012; one digit",
@@ -120,38 +115,30 @@ def study(full: bool, out: Path) -> list[Check]:
         Check("Vesta, the nutation by the formula", nutation, half, 0.005, "mas", "first order; e^4, n/w"),
         Check("Vesta's precession by the formula", rate, secular, 0.001, "arcsec/yr",
               "average; the nutations' squares, and that 22 years are no whole number of cycles"),
-    ]  # fmt: skip
+    ], figure  # fmt: skip
 
 
-def _draw(out: Path, moon: Result, rock: Result, swing: float, nutation: float) -> None:
+def picture(moon: Result, rock: Result, swing: float, nutation: float) -> Picture:
     """Phobos towards Mars and about its mean rotation; Vesta's obliquity and node."""
-    figure = new_figure(
-        13, 5.0, "Phobos rocks by 1.1 degrees in each orbit, Vesta nods by 2 arcsec twice a year"
-    )
-    rocking, nodding = figure.subplots(1, 2)
-    few = slice(0, 401)
-    days = moon.values("time")[few] / DAY
-    facing = -np.degrees(moon.values("libration")[few, 0])  # counted as the rotation, like the other one
-    rocking.plot(days * 24, facing, color=BLUE, linewidth=1.2, label="long axis from the direction of Mars")
-    own = swing * np.sin(ANOMALISTIC * days)
-    rocking.plot(days * 24, own, color=RED, linewidth=1.2, label="from uniform rotation")
-    rocking.set_ylim(-3.4, 4.6)
-    rocking.legend(loc="upper right", frameon=False, fontsize=9)
-    tidy(rocking, "hours", "deg", f"Phobos: {abs(swing):.2f}° of its own, the rest is optical")
+    days = moon.values("time")[:401] / DAY
+    facing = -np.degrees(moon.values("libration")[:401, 0])  # counted as the rotation, like the other one
     years = rock.values("time") / DAY / YEAR
-    for name, color, label in (
-        ("obliquity", BLUE, "obliquity"),
-        ("node_longitude", ORANGE, "node less its precession"),
-    ):
+    nodding = []
+    for name, color, label in (("obliquity", BLUE, "obliquity"),
+                               ("node_longitude", ORANGE, "node less its precession")):  # fmt: skip
         values = rock.dataset[name].sel(axis="figure").values
         rest = values - np.polyval(np.polyfit(years, values, 1), years)
-        nodding.plot(years, rest / MAS / 1000, color=color, linewidth=1.2, label=label)
-    nodding.axhline(0, color=GREY, linewidth=0.6)
-    nodding.set_ylim(-6.5, 9)
-    nodding.legend(loc="upper right", frameon=False, fontsize=9)
-    tidy(nodding, "years", "arcsec", f"Vesta: {nutation / 1000:.2f} arcsec in obliquity, twice in 3.6 years")
-    save(figure, out, NAME)
+        nodding.append(Curve(years, rest / MAS / 1000, label, color))
+    title = "Phobos rocks by 1.1 degrees in each orbit, Vesta nods by 2 arcsec twice a year"
+    return Picture(title, "ab", [
+        Panel(f"Phobos: {abs(swing):.2f}° of its own, the rest is optical", "hours", "deg", [
+            Curve(days * 24, facing, "long axis from the direction of Mars"),
+            Curve(days * 24, swing * np.sin(ANOMALISTIC * days), "from uniform rotation", RED),
+        ], limits={"ylim": (-3.4, 4.6)}, legend="upper right"),
+        Panel(f"Vesta: {nutation / 1000:.2f} arcsec in obliquity, twice in 3.6 years", "years", "arcsec",
+              nodding, limits={"ylim": (-6.5, 9)}, legend="upper right"),
+    ], (13, 5.0))  # fmt: skip
 
 
 if __name__ == "__main__":
-    sys.exit(main(study, NAME))
+    raise SystemExit(study.main())

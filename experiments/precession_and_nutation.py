@@ -22,30 +22,14 @@ Run: python -m experiments.precession_and_nutation [--full] [--out DIR]        (
 from __future__ import annotations
 
 import sys
-from pathlib import Path
 from typing import Any
 
 import mpmath
 import numpy as np
 
-if not __package__:  # as a script
-    sys.path.insert(0, str(Path(__file__).parents[1]))
-
 import rigidsim
-from experiments.common import (
-    BLUE,
-    GREY,
-    ORANGE,
-    RED,
-    Check,
-    main,
-    new_figure,
-    save,
-    simulate,
-    tidy,
-)
+from experiments.common import BLUE, GREY, ORANGE, RED, Answer, Check, Curve, Panel, Picture, Study, simulate
 
-NAME = "precession_and_nutation"
 DAY, YEAR = 86400, 365.25 * 86400
 ARCSEC = np.pi / 648000
 SIDEREAL_YEAR, SIDEREAL_MONTH = "365.256363", "27.321661"  # days
@@ -136,7 +120,8 @@ def period(name: str) -> float:
     }[name]  # fmt: skip
 
 
-def study(full: bool, out: Path) -> list[Check]:
+@Study
+def study(full: bool) -> Answer:
     """Daily, every 20 days, and each half synodic month."""
     daily = simulate(config(200, "1" if full else "4")).dataset
     found = rigidsim.analyse(daily, lines=30)
@@ -146,8 +131,8 @@ def study(full: bool, out: Path) -> list[Check]:
     blind = rigidsim.analyse(folded, ["node_longitude.figure"], lines=12)
     checks = precession(found) + nutation(found) + unfolding(found, thin, blind)
     print(listing(found), file=sys.stderr)
-    draw(found, thin, out)
-    return checks
+    figure = picture(found, thin)
+    return checks, figure
 
 
 def precession(found: Any) -> list[Check]:
@@ -235,48 +220,40 @@ def listing(found: Any) -> str:
     return "\n".join(rows)
 
 
-def draw(found: Any, thin: Any, out: Path) -> None:
+def picture(found: Any, thin: Any) -> Picture:
     """The spectrum of the longitude with its lines, from dense samples and from 20-day ones."""
-    rate = -float(found["node_longitude.figure"].rate) * YEAR / ARCSEC
-    figure = new_figure(
-        12,
-        7.4,
-        f"A rigid Earth under Sun and Moon: {rate:.3f} arcsec/yr, and the lines of its nutation in longitude",
-    )
-    upper, lower = figure.subplots(2, 1, sharex=True)
-    title = (
-        "all samples",
-        "a sample every 20 days: shorter periods are folded, unfolded where one name fits",
-    )
-    for axes, analysis, text in zip((upper, lower), (found, thin), title, strict=True):
+
+    def panel(analysis: Any, title: str, xlabel: str) -> Panel:
         signal = analysis["node_longitude.figure"]
         frequency, size = signal.spectrum
-        axes.loglog(frequency[1:] * YEAR / (2 * np.pi), size[1:] / ARCSEC, color="#9fb6cd", linewidth=0.7)
-        taken: list[tuple[float, float]] = []
-        for line in signal.lines:
-            x, y = float(line.frequency) * YEAR / (2 * np.pi), float(line.amplitude) / ARCSEC
-            color = RED if line.unfolded else GREY if line.ambiguous or not line.label.text else BLUE
-            axes.vlines(x, 1e-6, y, color=color, linewidth=1.4)
-            room = all(abs(np.log10(x / a)) > 0.14 or abs(np.log10(y / b)) > 0.9 for a, b in taken)
-            if y > 3e-2 and room:
-                taken.append((x, y))
-                days = line.period / DAY
-                said = f"{days:.2f} d" if days < 1000 else f"{days / 365.25:.2f} yr"
-                axes.annotate(f"{line.label.text}\n{said}", (x, y), (0, 5), textcoords="offset points",
-                              ha="center", fontsize=7.5,
-                              bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.4,
-                                    "alpha": 0.8})  # fmt: skip
-        nyquist = analysis.nyquist * YEAR / (2 * np.pi)
-        axes.axvline(nyquist, color=ORANGE, linestyle="--", linewidth=1)
-        axes.annotate(
-            "Nyquist", (nyquist, 1.6e-6), (4, 0), textcoords="offset points", fontsize=8, color=ORANGE
-        )
-        axes.set_ylim(1e-6, 3e3)
-        axes.set_xlim(0.02, 220)
-        tidy(axes, "", "amplitude (arcsec)", text)
-    lower.set_xlabel("turns per year")
-    save(figure, out, NAME)
+        turns = YEAR / (2 * np.pi)
+
+        def lines(axes: Any) -> None:
+            taken: list[tuple[float, float]] = []
+            for line in signal.lines:
+                x, y = float(line.frequency) * turns, float(line.amplitude) / ARCSEC
+                color = RED if line.unfolded else GREY if line.ambiguous or not line.label.text else BLUE
+                axes.vlines(x, 1e-6, y, color=color, linewidth=1.4)
+                room = all(abs(np.log10(x / a)) > 0.14 or abs(np.log10(y / b)) > 0.9 for a, b in taken)
+                if y > 3e-2 and room:
+                    taken.append((x, y))
+                    days = line.period / DAY
+                    said = f"{days:.2f} d" if days < 1000 else f"{days / 365.25:.2f} yr"
+                    axes.annotate(f"{line.label.text}\n{said}", (x, y), (0, 5), textcoords="offset points",
+                                  ha="center", fontsize=7.5)  # fmt: skip
+
+        return Panel(title, xlabel, "amplitude (arcsec)", [
+            Curve(frequency[1:] * turns, size[1:] / ARCSEC, "", "#9fb6cd", width=0.7),
+            Curve(analysis.nyquist * turns, None, "Nyquist", ORANGE, "--", 1),
+        ], "xy", limits={"ylim": (1e-6, 3e3), "xlim": (0.02, 220)}, legend="lower left",
+            more=lines)  # fmt: skip
+
+    rate = -float(found["node_longitude.figure"].rate) * YEAR / ARCSEC
+    title = f"A rigid Earth under Sun and Moon: {rate:.3f} arcsec/yr, and its lines of nutation in longitude"
+    folded = "a sample every 20 days: shorter periods are folded, unfolded where one name fits"
+    panels = [panel(found, "all samples", ""), panel(thin, folded, "turns per year")]
+    return Picture(title, "a;b", panels, (12, 7.4))
 
 
 if __name__ == "__main__":
-    sys.exit(main(study, NAME))
+    raise SystemExit(study.main())

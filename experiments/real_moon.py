@@ -23,15 +23,10 @@ Run: python -m experiments.real_moon [--full] [--out DIR]      --full: costs, an
 
 from __future__ import annotations
 
-import sys
-from collections.abc import Mapping, Sequence
-from pathlib import Path
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-
-if not __package__:  # as a script
-    sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from experiments.bare import blocks
 from experiments.bare import moon as bare
@@ -42,16 +37,16 @@ from experiments.common import (
     GREY,
     ORANGE,
     RED,
+    Answer,
     Check,
+    Curve,
+    Panel,
+    Picture,
     Result,
-    main,
-    new_figure,
-    save,
+    Study,
     simulate,
-    tidy,
 )
 
-NAME = "real_moon"
 SCENE = CONFIGS / "kernels" / "moon_since_1969.toml"
 START = 2440400.5
 DAY = 86400.0
@@ -122,7 +117,8 @@ def _inline(values: Mapping[str, float]) -> str:
     return "{" + ", ".join(f'"{key}" = {value!r}' for key, value in sorted(values.items())) + "}"
 
 
-def study(full: bool, out: Path) -> list[Check]:
+@Study
+def study(full: bool) -> Answer:
     """Librations, effects, the bare program, another package, and the announced error."""
     whole = simulate(SCENE, *SPARSE[:2])
     rest = left_over(whole)
@@ -150,8 +146,8 @@ def study(full: bool, out: Path) -> list[Check]:
     if full:  # what a machine with other work on it would not show
         checks += _cost(days)
     checks += _announced(full, whole)
-    _draw(out, whole, rest, found)
-    return checks
+    figure = picture(whole, rest, found)
+    return checks, figure
 
 
 def _same(name: str, result: Result, other: Mapping[str, Any]) -> Check:
@@ -211,37 +207,27 @@ def seen_from_earth(result: Result) -> tuple[np.ndarray, np.ndarray, np.ndarray]
     return 1969.486 + days / 365.25, np.degrees(longitude), np.degrees(latitude)
 
 
-def _draw(out: Path, whole: Result, rest: np.ndarray, found: Mapping[str, np.ndarray]) -> None:
+def picture(whole: Result, rest: np.ndarray, found: Mapping[str, np.ndarray]) -> Picture:
     """Librations in longitude and latitude, and residuals by effect."""
-    figure = new_figure(11, 8.5, "The Moon since 1969: nothing fitted, within a milliarcsecond of DE421")
-    top, bottom = figure.subplots(2, 1, height_ratios=[1, 1.7])
-    years, longitude, latitude = seen_from_earth(
+    days, longitude, latitude = seen_from_earth(
         simulate(SCENE, *SPARSE, "time.every=1 day", "time.end=1200 day")
     )
-    top.plot(years, longitude, color=BLUE, linewidth=1.0, label="longitude")
-    top.plot(years, latitude, color=ORANGE, linewidth=1.0, label="latitude")
-    top.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), frameon=False, fontsize=9)
-    tidy(top, "", "deg", "The Earth in the Moon's sky: librations in longitude and latitude")
     years = 1969.486 + whole.values("time") / DAY / 365.25
-    lines: Sequence[Any] = sorted(found.items(), key=lambda item: -rms(item[1]))
-    colors = ["#67001f", RED, ORANGE, "#bf812d", GREEN, BLUE, "#762a83"]
-    for (name, vectors), color in zip(lines, colors, strict=True):
-        label = f"without {EFFECTS[name][0]}: {_size(rms(vectors))}"
-        bottom.semilogy(years, np.linalg.norm(vectors, axis=1), color=color, linewidth=0.8, label=label)
-    bottom.semilogy(
-        years,
-        np.linalg.norm(rest, axis=1),
-        color="black",
-        linewidth=1.0,
-        label=f"everything: {_size(rms(rest))}",
-    )
-    bottom.axhline(ALLOWED, color=GREY, linewidth=0.8, linestyle="--")
-    bottom.set_ylim(1e-2, 4e4)
-    bottom.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), frameon=False, fontsize=9)
-    tidy(
-        bottom, "year", "mas", "Rotation from DE421's librations with one effect left out (rms in the legend)"
-    )
-    save(figure, out, NAME)
+    colors = ["#67001f", RED, ORANGE, "#bf812d", GREEN, BLUE, "#762a83", "black"]
+    lines = [(f"without {EFFECTS[name][0]}", vectors)
+             for name, vectors in sorted(found.items(), key=lambda item: -rms(item[1]))]  # fmt: skip
+    curves = [
+        Curve(years, np.linalg.norm(vectors, axis=1), f"{label}: {_size(rms(vectors))}", color, width=0.8)
+        for (label, vectors), color in zip([*lines, ("everything", rest)], colors, strict=True)
+    ]
+    title = "The Moon since 1969: nothing fitted, within a milliarcsecond of DE421"
+    return Picture(title, "a;b", [
+        Panel("The Earth in the Moon's sky: librations in longitude and latitude", "", "deg",
+              [Curve(days, longitude, "longitude"), Curve(days, latitude, "latitude", ORANGE)]),
+        Panel("Rotation from DE421's librations with one effect left out (rms in the legend)", "year", "mas",
+              [*curves, Curve(None, ALLOWED, "", GREY, "--", 0.8)], "y", limits={"ylim": (1e-2, 4e6)},
+              legend="upper left"),
+    ], (11, 8.5), {"height_ratios": [1, 1.7]})  # fmt: skip
 
 
 def _size(mas: float) -> str:
@@ -249,4 +235,4 @@ def _size(mas: float) -> str:
 
 
 if __name__ == "__main__":
-    sys.exit(main(study, NAME))
+    raise SystemExit(study.main())

@@ -15,28 +15,22 @@ Run: python -m experiments.rigid_earth [--full] [--out DIR]
 
 from __future__ import annotations
 
-import sys
-from pathlib import Path
-
-if not __package__:  # as a script
-    sys.path.insert(0, str(Path(__file__).parents[1]))
-
 from experiments.bare import precession
 from experiments.common import (
     BLUE,
     CONFIGS,
     ORANGE,
+    Answer,
     Check,
+    Curve,
+    Panel,
+    Picture,
     Result,
-    main,
-    new_figure,
-    save,
+    Study,
     simulate,
-    tidy,
 )
 from experiments.real_bodies import nutation
 
-NAME = "rigid_earth"
 SCENE = CONFIGS / "kernels" / "rigid_earth_nutation.toml"
 START = 2442412.5
 DAY = 86400.0
@@ -66,45 +60,36 @@ def fitted(result: Result) -> nutation.Nutations:
     return nutation.fit(dates, result.values("figure_axis"), 1 / (1 - H))
 
 
-def study(full: bool, out: Path) -> list[Check]:
+@Study
+def study(full: bool) -> Answer:
     """Five amplitudes at three levels."""
     runs = [run(level) for level in range(len(LEVELS))]
     fits = [fitted(result) for result in runs]
-    _draw(out, runs[-1], fits[-1])
+    figure = picture(runs[-1], fits[-1])
     return [
         Check(f"{line}, {name}", fit.amplitude(line), published, 0.5, "mas",
               "rigid-Earth series; lines that 50 years can't tell apart", "absolute")
         for name, fit in zip(LEVELS, fits, strict=True)
         for line, (_, _, published) in nutation.PUBLISHED.items()
-    ]  # fmt: skip
+    ], figure  # fmt: skip
 
 
-def _draw(out: Path, result: Result, fit: nutation.Nutations) -> None:
+def picture(result: Result, fit: nutation.Nutations) -> Picture:
     """The pole's nutation about the mean pole of date, and what the fit leaves."""
     dates = START + result.values("time") / DAY
     poles = precession.to_date(dates, result.values("figure_axis"))[:, :2] / precession.ARCSEC
-    figure = new_figure(11, 5.5, "A rigid Earth's pole about the mean pole of date, 1975 to 2025")
-    left, right = figure.subplots(1, 2)
-    left.plot(*poles.T, color=BLUE, linewidth=0.4)
-    left.set_aspect("equal")
-    tidy(
-        left,
-        "dpsi sin eps, arcsec",
-        "deps, arcsec",
-        "Nutation: 18.6 years, with half a year and half a month",
-    )
     years = 2000 + (dates - 2451545.0) / 365.25
     # one above the other, by 3 mas: daily samples of both would cover each other
-    for rest, color, shift, label in (
-        (fit.rest.real, ORANGE, 1.5, "dpsi sin eps"),
-        (fit.rest.imag, BLUE, -1.5, "deps"),
-    ):
-        right.plot(years, rest + shift, color=color, linewidth=0.3)
-        right.text(years[0], shift + 1.42, f"{label}, shifted by {shift:g} mas", color=color, va="bottom")
-    right.set_ylim(-3.2, 3.4)
-    tidy(right, "year", "mas", f"Left over by {len(fit.circles)} circles above 0.1 mas and a cubic")
-    save(figure, out, NAME)
+    rest = [Curve(years, part + shift, f"{label}, shifted by {shift:g} mas", color, width=0.3)
+            for part, color, shift, label in ((fit.rest.real, ORANGE, 1.5, "dpsi sin eps"),
+                                              (fit.rest.imag, BLUE, -1.5, "deps"))]  # fmt: skip
+    left = f"Left over by {len(fit.circles)} circles above 0.1 mas and a cubic"
+    return Picture("A rigid Earth's pole about the mean pole of date, 1975 to 2025", "ab", [
+        Panel("Nutation: 18.6 years, with half a year and half a month", "dpsi sin eps, arcsec",
+              "deps, arcsec", [Curve(*poles.T, width=0.4)], equal=True),
+        Panel(left, "year", "mas", rest, limits={"ylim": (-3.2, 3.9)}, legend="upper left"),
+    ])  # fmt: skip
 
 
 if __name__ == "__main__":
-    sys.exit(main(study, NAME))
+    raise SystemExit(study.main())

@@ -25,15 +25,9 @@ Run: python -m experiments.round_off_ensemble [--full] [--out DIR]
 
 from __future__ import annotations
 
-import sys
 import tempfile
 from dataclasses import dataclass
 from fractions import Fraction
-from pathlib import Path
-from typing import Any
-
-if not __package__:  # as a script
-    sys.path.insert(0, str(Path(__file__).parents[1]))
 
 import numpy as np
 import xarray
@@ -46,15 +40,15 @@ from experiments.common import (
     GREEN,
     GREY,
     ORANGE,
+    Answer,
     Check,
-    main,
-    new_figure,
-    save,
-    tidy,
+    Curve,
+    Panel,
+    Picture,
+    Study,
 )
 from rigidsim.scene.parts_of_values import parts_in
 
-NAME = "round_off_ensemble"
 CONFIG = CONFIGS / "sweeps" / "round_off.toml"
 FINER = {"single": "double", "double": "extended", "extended": "quadruple"}
 COLORS = {"single": ORANGE, "double": BLUE, "extended": GREEN}
@@ -200,7 +194,8 @@ def growth(ensemble: Ensemble, errors: np.ndarray, power: float, law: float) -> 
     )
 
 
-def study(full: bool, out: Path) -> list[Check]:
+@Study
+def study(full: bool) -> Answer:
     """Three ensembles, the figure, the checks."""
     sizes = {"single": (96, 8192), "double": (192, 32768), "extended": (48, 8192)}
     few = {"single": (24, 1024), "double": (64, 8192), "extended": (16, 512)}
@@ -225,46 +220,32 @@ def study(full: bool, out: Path) -> list[Check]:
                 Check(f"constant over the law: {name}", constant, 0.525, 0.475, "1",
                       "announced as a bound; between 1/20 and 1", "absolute"),
             ]  # fmt: skip
-    draw_figure(shown, out)
-    return checks
+    figure = picture(shown)
+    return checks, figure
 
 
-def draw_figure(shown: list[tuple[Ensemble, Growth, Growth]], out: Path) -> None:
-    """Errors against time with their bars; the law; what is left of it."""
-    figure = new_figure(
-        12.5, 6.4, "Rounding walks: energy errs like t^0.5, attitude like t^1.5, in every precision"
-    )
-    grid = figure.add_gridspec(2, 2, height_ratios=[2.4, 1])
+def picture(shown: list[tuple[Ensemble, Growth, Growth]]) -> Picture:
+    """Errors against time with their bars, the law, and both as ratios."""
+    panels: dict[int, tuple[Panel, Panel]] = {}
     for column, (what, power) in enumerate((("energy (relative)", 0.5), ("attitude (rad)", 1.5))):
-        above, below = figure.add_subplot(grid[0, column]), figure.add_subplot(grid[1, column])
-        for ensemble, attitude, energy in shown:
-            found, errors = (attitude, ensemble.attitude) if column else (energy, np.abs(ensemble.energy))
-            law = ensemble.law[0 if column else 1] * ensemble.time**power
-            color = COLORS[ensemble.precision]
-            low, high = np.quantile(errors, [0.05, 0.95], axis=0)
-            seen = low > 0
-            above.fill_between(
-                ensemble.time[seen], low[seen], high[seen], color=color, alpha=0.15, linewidth=0
-            )
+        above, below = [], [Curve(None, 1, "", GREY, "--", 1)]
+        for (ensemble, *pair), color in zip(shown, (ORANGE, BLUE, GREEN), strict=True):
+            found, law = pair[1 - column], ensemble.law[1 - column] * ensemble.time**power
             label = f"{ensemble.precision}: exponent {found.exponent[0]:.2f} ± {found.exponent[1]:.2f}"
-            style: dict[str, Any] = {"color": color, "fmt": ".", "markersize": 5, "linewidth": 1}
-            above.errorbar(ensemble.time, found.rms, 2 * found.bar, label=label, **style)
-            above.plot(ensemble.time, law, "--", color=color, linewidth=1)
-            below.errorbar(ensemble.time, found.rms / law, 2 * found.bar / law, **style)
-        above.plot([], [], "--", color=GREY, label="the law")
-        above.set(xscale="log", yscale="log")
-        below.set(xscale="log", ylim=(0, None))
-        below.axhline(1, color=GREY, linewidth=1, linestyle="--")
-        tidy(
-            above,
-            "",
-            f"error of the {what}",
-            "root mean square ± 2 error bars; shade: 5 to 95 % of the members",
-        )
-        tidy(below, "time (s), 1 rad/s", "over the law")
-        above.legend(loc="upper center", bbox_to_anchor=(0.5, -0.07), ncol=2, fontsize=9)  # beside all points
-    save(figure, out, NAME)
+            above += [Curve(ensemble.time, found.rms, label, color, "o"),
+                      Curve(ensemble.time, law, "", color, "--", 1)]  # fmt: skip
+            below += [Curve(ensemble.time, found.rms / law, "", color, "o"),
+                      *(Curve(ensemble.time, (found.rms + k * found.bar) / law, "", color, ":", 0.8)
+                        for k in (-2, 2))]  # fmt: skip
+        panels[column] = (
+            Panel("root mean square; dashed: the law", "", f"error of the {what}", above, "xy"),
+            Panel("dotted: ± 2 error bars", "time (s), 1 rad/s", "over the law", below, "x",
+                  limits={"ylim": (0, None)}),
+        )  # fmt: skip
+    title = "Rounding walks: energy errs like t^0.5, attitude like t^1.5, in every precision"
+    order = [panels[0][0], panels[1][0], panels[0][1], panels[1][1]]
+    return Picture(title, "ab;cd", order, (12.5, 6.4), {"height_ratios": [2, 1]})
 
 
 if __name__ == "__main__":
-    sys.exit(main(study, NAME))
+    raise SystemExit(study.main())

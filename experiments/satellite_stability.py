@@ -17,21 +17,16 @@ Run: python -m experiments.satellite_stability [--full] [--out DIR]
 
 from __future__ import annotations
 
-import sys
 import tempfile
 from fractions import Fraction
-from pathlib import Path
-
-if not __package__:  # as a script
-    sys.path.insert(0, str(Path(__file__).parents[1]))
+from typing import Any
 
 import numpy as np
 
-from experiments.common import BLUE, ORANGE, Check, main, new_figure, save, tidy
+from experiments.common import BLUE, ORANGE, Answer, Check, Curve, Panel, Picture, Study
 from rigidsim.workflows.read import parse
 from rigidsim.workflows.sweeps.sweep import sweep
 
-NAME = "satellite_stability"
 ORBITS = 20
 PLAIN = 7.0
 """Logarithm of what a motion without exponential growth may make of a vector; see above."""
@@ -85,7 +80,8 @@ def growth_rate(roll: np.ndarray, yaw: np.ndarray) -> np.ndarray:
     return np.asarray(np.where(rates < 1e-7, 0.0, rates))  # the root of what rounding left of a zero
 
 
-def study(full: bool, out: Path) -> list[Check]:
+@Study
+def study(full: bool) -> Answer:
     """The map, the figure, the checks."""
     side = 96 if full else 32
     cells = [(roll, yaw) for yaw in ratios(side) for roll in ratios(side)]
@@ -108,38 +104,39 @@ def study(full: bool, out: Path) -> list[Check]:
     apart = float(np.abs(grown - rate)[measured].max())
     gyroscopic = stable & (roll < 0)
     source = "DeBra & Delp 1961"
-    _figure(values, grown, rate, out)
+    figure = picture(values, grown, rate)
     return [
         Check("stable satellites that tumble", wrong[0], 0, 0.5, "1", source, "absolute"),
         Check("unstable satellites that stay", wrong[1], 0, 0.5, "1", source, "absolute"),
         Check("growth over exp(r t), logarithm, largest", apart, 0, PLAIN, "1", source, "absolute"),
         Check("stable cells of DeBra & Delp's small region", int((gyroscopic & (grown < PLAIN)).sum()),
               int(gyroscopic.sum()), 0.5, "1", source, "absolute"),
-    ]  # fmt: skip
+    ], figure  # fmt: skip
 
 
-def _figure(values: np.ndarray, grown: np.ndarray, rate: np.ndarray, out: Path) -> None:
-    figure = new_figure(10.5, 5.0)
-    axes, beside = figure.subplots(1, 2, width_ratios=[1.25, 1])
-    edges = (-1, 1)
-    cut = np.clip(grown, 0, 40)
-    shown = axes.imshow(cut, origin="lower", extent=(*edges, *edges), interpolation="nearest")
-    fine = np.linspace(-0.998, 0.998, 900)
-    theory = growth_rate(*np.meshgrid(fine, fine))
-    axes.contour(fine, fine, (theory > 0).astype(float), levels=[0.5], colors="white", linewidths=1.0)
-    figure.colorbar(shown, ax=axes, label="ln of the largest growth (cut at 40)")
-    title = f"Growth of a displacement over {ORBITS} orbits; white: DeBra & Delp 1961"
-    tidy(axes, "k_R = (C - A) / B  (A yaw, B roll, C pitch)", "k_Y = (C - B) / A", title)
-    axes.grid(False)
-    told = rate < 40
-    beside.plot(rate[told], grown[told], ".", color=BLUE, markersize=4)
-    line = np.array([0, 40])
-    beside.plot(line, line, color=ORANGE)
-    beside.fill_between(line, line - PLAIN, line + PLAIN, color=ORANGE, alpha=0.15, linewidth=0)
-    tidy(beside, "r T of the linear motion", "ln of the largest growth", "One dot a satellite; band: allowed")
-    beside.set(xlim=(-1, 40), ylim=(0, 42))
-    save(figure, out, NAME)
+def picture(values: np.ndarray, grown: np.ndarray, rate: np.ndarray) -> Picture:
+    """The map with the theory's border, and growth against growth."""
+
+    def shown(axes: Any) -> None:
+        image = axes.imshow(np.clip(grown, 0, 40), origin="lower", extent=(-1, 1, -1, 1))
+        fine = np.linspace(-0.998, 0.998, 900)
+        theory = growth_rate(*np.meshgrid(fine, fine))
+        axes.contour(fine, fine, (theory > 0).astype(float), levels=[0.5], colors="white", linewidths=1.0)
+        axes.figure.colorbar(image, ax=axes, label="ln of the largest growth (cut at 40)")
+        axes.grid(False)
+
+    line, known = np.array([0, 40]), rate < 40
+    allowed = [
+        Curve(line, line + PLAIN * k, "" if k else "r T", ORANGE, ":" if k else "-") for k in (-1, 0, 1)
+    ]
+    return Picture("", "ab", [
+        Panel(f"Growth of a displacement over {ORBITS} orbits; white: DeBra & Delp 1961",
+              "k_R = (C - A) / B  (A yaw, B roll, C pitch)", "k_Y = (C - B) / A", more=shown),
+        Panel("One dot a satellite; dotted: allowed", "r T of the linear motion", "ln of the largest growth",
+              [Curve(rate[known], grown[known], "", BLUE, ".", 1), *allowed],
+              limits={"xlim": (-1, 40), "ylim": (0, 42)}),
+    ], (10.5, 5.0), {"width_ratios": [1.25, 1]})  # fmt: skip
 
 
 if __name__ == "__main__":
-    sys.exit(main(study, NAME))
+    raise SystemExit(study.main())

@@ -18,21 +18,15 @@ Run: python -m experiments.spectral_lines [--full] [--out DIR]
 
 from __future__ import annotations
 
-import sys
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import mpmath
 import numpy as np
 
-if not __package__:  # as a script
-    sys.path.insert(0, str(Path(__file__).parents[1]))
-
 import rigidsim
-from experiments.common import BLUE, GREY, Check, main, new_figure, save, simulate, tidy
+from experiments.common import BLUE, GREY, Answer, Check, Curve, Panel, Picture, Study, simulate
 
-NAME = "spectral_lines"
 PERIODS = 10000
 FEW = 2.618  # samples a period in quadruple precision, where each takes milliseconds: harmonics are folded
 CONFIG = """
@@ -202,7 +196,8 @@ def librations() -> list[Check]:
     ]
 
 
-def study(full: bool, out: Path) -> list[Check]:
+@Study
+def study(full: bool) -> Answer:
     """All scenes."""
     checks = []
     with mpmath.workdps(50):
@@ -221,32 +216,34 @@ def study(full: bool, out: Path) -> list[Check]:
                 analysis = case.analysis("quadruple", ["angular_velocity"])
                 checks += checks_of(case, analysis, 1e-28, "quadruple")
     checks += librations()
-    draw(drawn, out)
-    return checks
+    figure = picture(drawn)
+    return checks, figure
 
 
-def draw(drawn: list[tuple[Case, Any]], out: Path) -> None:
+def picture(drawn: list[tuple[Case, Any]]) -> Picture:
     """The lines of the rates across the figure axis, down to 1e-12 of the largest."""
-    figure = new_figure(12, 8.4, "Ten thousand periods in double precision: lines of wx + i wy, by name")
-    for axes, (case, analysis) in zip(figure.subplots(len(drawn), 1), drawn, strict=True):
+
+    def panel(case: Case, analysis: Any) -> Panel:
         signal = analysis["angular_velocity.x+iy"]
-        unit = float(max(case.exact.values()))
-        largest = float(signal.lines[0].amplitude)
+        unit, largest = float(max(case.exact.values())), float(signal.lines[0].amplitude)
         frequency, size = signal.spectrum
-        axes.semilogy(frequency / unit, size / largest, color="#9fb6cd", linewidth=0.7)
-        for line in signal.lines:
-            x, y = float(line.frequency) / unit, float(line.amplitude) / largest
-            axes.vlines(x, 1e-15, y, color=BLUE if line.label.text else GREY, linewidth=1.5)
-            axes.annotate(
-                line.label.text, (x, y), (0, 4), textcoords="offset points", ha="center", fontsize=7.5
-            )
-        axes.set_ylim(1e-15, 1e3)
         reach = max(abs(float(line.frequency)) for line in signal.lines) / unit * 1.15
-        axes.set_xlim(-reach, reach)
+
+        def lines(axes: Any) -> None:
+            for line in signal.lines:
+                x, y = float(line.frequency) / unit, float(line.amplitude) / largest
+                axes.vlines(x, 1e-15, y, color=BLUE if line.label.text else GREY, linewidth=1.5)
+                axes.annotate(line.label.text, (x, y), (0, 4), textcoords="offset points", ha="center",
+                              fontsize=7.5)  # fmt: skip
+
         fastest = max(case.exact, key=lambda name: case.exact[name])
-        tidy(axes, f"frequency / {fastest}", "amplitude / largest", case.name)
-    save(figure, out, NAME)
+        return Panel(case.name, f"frequency / {fastest}", "amplitude / largest",
+                     [Curve(frequency / unit, size / largest, "", "#9fb6cd", width=0.7)], "y", more=lines,
+                     limits={"ylim": (1e-15, 1e3), "xlim": (-reach, reach)})  # fmt: skip
+
+    title = "Ten thousand periods in double precision: lines of wx + i wy, by name"
+    return Picture(title, "a;b;c", [panel(*one) for one in drawn], (12, 8.4))
 
 
 if __name__ == "__main__":
-    sys.exit(main(study, NAME))
+    raise SystemExit(study.main())

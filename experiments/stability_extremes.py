@@ -10,25 +10,19 @@ precisions, steps to 1e8 radians, and a campaign of random scenes.
 
 from __future__ import annotations
 
-import argparse
 import sys
 import traceback
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 
-if not __package__:  # as a script
-    sys.path.insert(0, str(Path(__file__).parents[1]))
-
-from experiments.common import BLUE, GREEN, GREY, ORANGE, RED, add_arguments, new_figure, save, tidy
+from experiments.common import BLUE, GREEN, GREY, ORANGE, RED, Answer, Check, Curve, Panel, Picture, Study
 from experiments.extremes.judging import Verdict, judge
 from experiments.extremes.random_scenes import random_case
 from experiments.extremes.scenes import ANY, Extreme, all_scenes
 
-NAME = "stability_extremes"
 SEED = 20240607
 RANDOM_SCENES = 1200
 KINDS = ("right", "announced", "refused", "SILENT")
@@ -94,7 +88,7 @@ def campaign(count: int, seed: int, tell: Tell) -> list[Verdict]:
     return found
 
 
-def table(found: dict[Way, list[Verdict]]) -> str:
+def tabulated(found: dict[Way, list[Verdict]]) -> str:
     """One row per extreme, one column per way; in brackets the largest error that was announced."""
     rows = dict.fromkeys(v.scene.row for verdicts in found.values() for v in verdicts)
     lines = [
@@ -124,57 +118,39 @@ def totals(verdicts: Sequence[Verdict]) -> str:
     return f"{len(verdicts)} runs: " + ", ".join(f"{counts[kind]} {kind}" for kind in KINDS)
 
 
-def draw(verdicts: Sequence[Verdict], out: Path) -> Path:
+def picture(verdicts: Sequence[Verdict]) -> Picture:
     """Errors over what the runs said of them: all below the line of a factor three, or announced in words."""
-    figure = new_figure(9, 6.5, "No error is larger than the run says, unless it says so in words")
-    axes = figure.subplots()
-    shown = [v for v in verdicts if v.kind in ("right", "announced", "SILENT") and v.estimate is not None]
+    line = np.array([1e-20, 1e2])
+    curves = [Curve(line, 3 * line, "3 x estimate", GREY),
+              Curve(1e-2, None, "digits gone: warned from here on", BLUE, ":", 0.8)]  # fmt: skip
     for kind, color in (("right", GREEN), ("announced", ORANGE), ("SILENT", RED)):
         for warned, marker in ((False, "o"), (True, "x")):
-            picked = [v for v in shown if v.kind == kind and bool(v.text) == warned]
+            picked = [(min(max(v.estimate, 1e-20), 1e2), max(v.error, 1e-20)) for v in verdicts
+                      if v.kind == kind and bool(v.text) == warned and v.estimate is not None]  # fmt: skip
             if picked:
-                x = [min(max(v.estimate or 0.0, 1e-20), 1e2) for v in picked]
-                y = [max(v.error, 1e-20) for v in picked]
                 label = f"{kind}{', warned in words' if warned else ''} ({len(picked)})"
-                axes.plot(x, y, marker, color=color, markersize=4, alpha=0.6, label=label, linestyle="none")
-    line = np.array([1e-20, 1e2])
-    axes.plot(line, 3 * line, color=GREY, linewidth=1, label="3 x estimate")
-    axes.axvline(1e-2, color=BLUE, linewidth=0.8, linestyle=":", label="digits gone: warned from here on")
-    axes.set_xscale("log")
-    axes.set_yscale("log")
-    axes.legend(fontsize=8, loc="upper left")
-    tidy(
-        axes,
-        "the run's own estimate, rad (1e2: larger)",
-        "largest error against the closed form, rad (rates: relative)",
-    )
-    return save(figure, out, NAME)
+                curves.append(Curve(*np.array(picked).T, label, color, marker, 1))
+    panel = Panel("", "the run's own estimate, rad (1e2: larger)",
+                  "largest error against the closed form, rad (rates: relative)", curves, "xy",
+                  legend="upper left")  # fmt: skip
+    return Picture("No error is larger than the run says, unless it says so in words", "a", [panel], (9, 6.5))
 
 
-def main(argv: Sequence[str] | None = None) -> int:
-    """The command; exit code 1 where anything was wrong in silence."""
-    parser = argparse.ArgumentParser(prog=f"python -m experiments.{NAME}")
-    add_arguments(parser)
-    parser.add_argument(
-        "--random", type=int, default=None, help=f"random scenes ({RANDOM_SCENES} with --full)"
-    )
-    arguments = parser.parse_args(argv)
+@Study
+def extremes(full: bool, random: int = -1) -> Answer:
+    """The table, and so many random scenes (1200 with --full)."""
     tell = lambda text: print(text, file=sys.stderr, flush=True)  # noqa: E731
-    ways = WAYS + (MORE_WAYS if arguments.full else ())
-    found = examine(all_scenes(arguments.full), ways, tell)
-    print(table({way: v for way, v in found.items() if way in WAYS}))
-    if arguments.full:
-        print("\n" + table({way: v for way, v in found.items() if way in MORE_WAYS}))
+    found = examine(all_scenes(full), WAYS + (MORE_WAYS if full else ()), tell)
+    for ways in (WAYS, MORE_WAYS) if full else (WAYS,):
+        print(tabulated({way: found[way] for way in ways}) + "\n")
     verdicts = [v for part in found.values() for v in part]
-    print("\n" + totals(verdicts))
-    count = arguments.random if arguments.random is not None else RANDOM_SCENES if arguments.full else 0
-    if count:
-        random = campaign(count, SEED, tell)
-        print("random scenes: " + totals(random))
-        verdicts += random
-    print(f"figure: {draw(verdicts, arguments.out)}")
-    return int(not verdicts or any(v.kind == "SILENT" for v in verdicts))
+    print(totals(verdicts))
+    drawn = campaign(random if random >= 0 else RANDOM_SCENES if full else 0, SEED, tell)
+    print("random scenes: " + totals(drawn))
+    silent = sum(v.kind == "SILENT" for v in verdicts + drawn)
+    check = Check("runs that are wrong in silence", silent, 0, 0.0, "1", "none may", "absolute")
+    return [check], picture(verdicts + drawn)
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    raise SystemExit(extremes.main())

@@ -17,21 +17,15 @@ Run: python -m experiments.sweep_coverage [--members 60] [--seed 1] [--only KIND
 
 from __future__ import annotations
 
-import argparse
 import math
-import sys
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
-
-if not __package__:  # as a script
-    sys.path.insert(0, str(Path(__file__).parents[1]))
 
 import mpmath
 import numpy as np
 
-from experiments.common import BLUE, DEFAULT_OUT, GREY, ORANGE, Check, new_figure, save, table, tidy
+from experiments.common import BLUE, GREY, ORANGE, Answer, Check, Curve, Panel, Picture, Study
 from experiments.coverage.judging import gone_through
 from experiments.coverage.sweep_kinds import KINDS
 from rigidsim.scene.config import Experiment, parse
@@ -41,7 +35,6 @@ from rigidsim.solve.problem import prepare
 from rigidsim.solve.status import Status
 from rigidsim.workflows.sweeps.members import run_members
 
-NAME = "sweep_coverage"
 _MEMBERS, _SEED = 60, 1
 _CHEAP, _FEW_MEMBERS = ("free, short", "planar", "tops", "driven", "flights"), 8
 _WARM = 16  # members, in batches of up to 8; one alone would leave their compilation to whoever is first
@@ -124,61 +117,40 @@ def _way(mine: np.ndarray, there: list[mpmath.mpf]) -> float:
         return float(mpmath.norm([float(a) - b for a, b in zip(mine, there, strict=True)]))
 
 
-def study(full: bool, out: Path) -> list[Check]:
+@Study
+def study(full: bool, members: int = 0, seed: int = _SEED, only: str = "") -> Answer:
     """All kinds, or some members of the cheap ones; the figure, the checks."""
-    kinds, members = (tuple(KINDS), _MEMBERS) if full else (_CHEAP, _FEW_MEMBERS)
-    return covered(kinds, members, _SEED, out)
-
-
-def main(argv: Sequence[str] | None = None) -> int:
-    """Run all kinds; exit code 1 if a promise was broken."""
-    parser = argparse.ArgumentParser(prog="python -m experiments.sweep_coverage")
-    parser.add_argument("--members", type=int, default=_MEMBERS, help="of each kind")
-    parser.add_argument("--seed", type=int, default=_SEED)
-    parser.add_argument("--only", nargs="*", default=list(KINDS), choices=list(KINDS))
-    parser.add_argument("--out", type=Path, default=DEFAULT_OUT, help="folder of the figure")
-    arguments = parser.parse_args(argv)
-    checks = covered(arguments.only, arguments.members, arguments.seed, arguments.out)
-    print(table(checks, NAME))
-    return int(not all(check.passed for check in checks))
-
-
-def covered(kinds: Sequence[str], members: int, seed: int, out: Path) -> list[Check]:
-    """So many members of some kinds, told one by one, drawn and judged."""
+    members = members or (_MEMBERS if full else _FEW_MEMBERS)
     told: list[tuple[str, Found]] = []
     print(
         "kind                      members  >3x  >10x unwarned  worst  median announced/true  gone  CPU ratio"
     )
-    for kind in kinds:
+    for kind in only.split() or (KINDS if full else _CHEAP):
         for what, found in found_of(kind, members, seed):
             print(line(kind, what, found), flush=True)
             told.append((what, found))
-    draw(told, out)
-    return judged([found for what, found in told if what == "attitude"])
+    return judged([found for what, found in told if what == "attitude"]), picture(told)
 
 
-def draw(told: Sequence[tuple[str, Found]], out: Path) -> None:
+def picture(told: Sequence[tuple[str, Found]]) -> Picture:
     """True errors over the announced ones, attitudes beside positions."""
-    figure = new_figure(11, 5.6, "True errors of sweeps' members stay below three times the announced ones")
-    kinds = {"attitude": "rad", "position": "m"}
-    both = [what for what in kinds if any(name == what for name, _ in told)]
-    for place, what in enumerate(both):
-        axes = figure.add_subplot(1, len(both), place + 1)
+    panels = []
+    for what, unit in (("attitude", "rad"), ("position", "m")):
         mine = [found for name, found in told if name == what]
-        announced, true, warned = (
-            np.concatenate([getattr(found, part) for found in mine])
-            for part in ("announced", "true", "warned")
-        )
+        if not mine:
+            continue
+        announced, true, warned = (np.concatenate([getattr(found, part) for found in mine])
+                                   for part in ("announced", "true", "warned"))  # fmt: skip
         seen = np.maximum(true, _SEEN)
-        axes.loglog(announced[~warned], seen[~warned], ".", color=BLUE, label="members")
-        if warned.any():
-            axes.loglog(announced[warned], seen[warned], "x", color=GREY, label="that say no digits are left")
         ends = np.array([min(announced.min(), seen.min()) / 2, 2 * max(announced.max(), seen.max())])
-        axes.loglog(ends, ends, color=GREY, linewidth=1, label="as announced")
-        axes.loglog(ends, _MOST_RATIO * ends, color=ORANGE, linewidth=1, label="three times that")
-        tidy(axes, f"announced error ({kinds[what]})", f"true error ({kinds[what]})", f"{what} at the end")
-        axes.legend(loc="upper left", fontsize=9)
-    save(figure, out, NAME)
+        panels.append(Panel(f"{what} at the end", f"announced error ({unit})", f"true error ({unit})", [
+            Curve(announced[~warned], seen[~warned], "members", BLUE, "."),
+            Curve(announced[warned], seen[warned], "that say no digits are left", GREY, "x"),
+            Curve(ends, ends, "as announced", GREY),
+            Curve(ends, _MOST_RATIO * ends, "three times that", ORANGE),
+        ], "xy", legend="upper left"))  # fmt: skip
+    title = "True errors of sweeps' members stay below three times the announced ones"
+    return Picture(title, "ab"[: len(panels)], panels)
 
 
 def line(kind: str, what: str, found: Found) -> str:
@@ -217,4 +189,4 @@ def judged(found: Sequence[Found]) -> list[Check]:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    raise SystemExit(study.main())

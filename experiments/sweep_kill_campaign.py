@@ -29,9 +29,6 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
-if not __package__:  # as a script
-    sys.path.insert(0, str(Path(__file__).parents[1]))
-
 import numpy as np
 import xarray
 

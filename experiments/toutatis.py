@@ -18,33 +18,27 @@ Run: python -m experiments.toutatis [--full] [--out DIR]
 
 from __future__ import annotations
 
-import sys
-from pathlib import Path
-
 import mpmath
 import numpy as np
-
-if not __package__:  # as a script
-    sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from experiments.closed_forms import free_top
 from experiments.common import (
     BLUE,
     GREY,
     ORANGE,
+    Answer,
     Check,
+    Curve,
+    Panel,
+    Picture,
     Result,
-    main,
-    new_figure,
+    Study,
     round_off,
-    save,
     simulate,
-    tidy,
 )
 from experiments.measure import matrices, mean_rate, spectral_rate
 from rigidsim.scene.bodies.presets import PRESETS
 
-NAME = "toutatis"
 MOMENTS = ("3.09", "3.22", "1")
 RATES = tuple(rate.split()[0] for rate in PRESETS["toutatis"].rotation)  # deg/day
 PUBLISHED = {"rotation": 5.41, "precession": 7.35}  # days, Hudson & Ostro 1995
@@ -74,7 +68,8 @@ def long_axis(result: Result) -> tuple[np.ndarray, np.ndarray]:
     return np.arctan2(axis @ np.cross(up, east), axis @ east), np.arccos(axis @ up)
 
 
-def study(full: bool, out: Path) -> list[Check]:
+@Study
+def study(full: bool) -> Answer:
     """Both periods against the paper and the closed form."""
     result = simulate(CONFIG.format(days=10000 if full else 1000))
     time, w = result.values("time"), result.values("angular_velocity")
@@ -102,51 +97,26 @@ def study(full: bool, out: Path) -> list[Check]:
         Check("precession of the long axis", precession, exact["precession"],
               bound * precession / rotation, "d", "closed form with Pi(n, k); tolerance as above"),
     ]  # fmt: skip
-    draw(result, rotation, precession, out)
-    return checks
+    figure = picture(result, rotation, precession)
+    return checks, figure
 
 
-def draw(result: Result, rotation: float, precession: float, out: Path) -> None:
-    """The long axis' path in space, the rates, and the azimuth's two-frequency growth."""
-    title = f"Toutatis: {rotation:.3f} days about its long axis, which precesses in {precession:.3f} days"
-    figure = new_figure(11.5, 6.2, title)
-    grid = figure.add_gridspec(2, 2, width_ratios=[1, 1.45])
-    sky, rates, wobble = (figure.add_subplot(cell) for cell in (grid[:, 0], grid[0, 1], grid[1, 1]))
-    azimuth, angle = long_axis(result)
-    time = result.values("time") / DAY
-    momentum = result.values("angular_momentum")[0]
-    up = momentum / np.linalg.norm(momentum)
-    east = np.cross(up, [1.0, 0.0, 0.0])
-    east /= np.linalg.norm(east)
-    rock = matrices(result.values("quaternion"))[:, :, 0]  # the body's x axis, on its equator
-    sky.plot(
-        (rock @ east)[time <= 60], (rock @ np.cross(up, east))[time <= 60], color="#9ecae1", linewidth=0.9
-    )
-    turn = time <= precession
-    sky.plot(*(np.sin(angle) * [np.cos(azimuth), np.sin(azimuth)])[:, turn], color=BLUE, linewidth=2.6)
-    sky.plot(0, 0, "o", color=ORANGE)
-    sky.annotate("L, fixed in space", (0, 0), (0.06, 0.05), color=ORANGE, fontsize=9.5)
-    tidy(sky, "east of L (unit radius)", "north of L (unit radius)",
-         f"Seen along L: the long axis over {precession:.2f} days (bold),\n"
-         "a rock on the equator over 60 days")  # fmt: skip
-    sky.set_aspect("equal")
-    sky.set_xticks([-1, -0.5, 0, 0.5, 1])
-    sky.set_yticks([-1, -0.5, 0, 0.5, 1])
-    w = np.degrees(result.values("angular_velocity")) * DAY
-    short = time <= 30
-    for column, name, color in zip(range(3), "xyz", (BLUE, GREY, ORANGE), strict=True):
-        rates.plot(time[short], w[short, column], color=color, label=f"w{name}")
-    tidy(rates, "", "rate (deg/day)", f"Body rates: period 4K/p = {rotation:.3f} days")
-    rates.set_ylim(-42, 135)
-    rates.legend(ncols=3, loc="upper right", fontsize=9, framealpha=1)
+def picture(result: Result, rotation: float, precession: float) -> Picture:
+    """The rates, and the azimuth of the long axis less its mean growth."""
+    time, (azimuth, _) = result.values("time") / DAY, long_axis(result)
+    short, w = time <= 30, np.degrees(result.values("angular_velocity")) * DAY
     growth = np.degrees(np.unwrap(azimuth))
-    sign = np.sign(growth[-1])
-    uneven = sign * (growth - growth[0]) - 360 * time / precession
-    wobble.plot(time[short], (uneven - uneven.mean())[short], color=BLUE)
-    tidy(wobble, "time (days)", "azimuth of the long axis\nless its mean growth (deg)",
-         f"Precession: uneven twice per rotation, on top of 360 deg in {precession:.3f} days")  # fmt: skip
-    save(figure, out, NAME)
+    uneven = np.sign(growth[-1]) * (growth - growth[0]) - 360 * time / precession
+    rates = [Curve(time[short], w[short, k], f"w{name}", color)
+             for k, (name, color) in enumerate(zip("xyz", (BLUE, GREY, ORANGE), strict=True))]  # fmt: skip
+    title = f"Toutatis: {rotation:.3f} days about its long axis, which precesses in {precession:.3f} days"
+    return Picture(title, "a;b", [
+        Panel(f"Body rates: period 4K/p = {rotation:.3f} days", "", "rate (deg/day)", rates),
+        Panel(f"Precession: uneven twice per rotation, on top of 360 deg in {precession:.3f} days",
+              "time (days)", "azimuth less its mean growth (deg)",
+              [Curve(time[short], (uneven - uneven.mean())[short])]),
+    ])  # fmt: skip
 
 
 if __name__ == "__main__":
-    sys.exit(main(study, NAME))
+    raise SystemExit(study.main())

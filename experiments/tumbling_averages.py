@@ -23,29 +23,25 @@ from __future__ import annotations
 
 import sys
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 from scipy.integrate import solve_ivp
-
-if not __package__:  # as a script
-    sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from experiments.common import (
     BLUE,
     GREEN,
     GREY,
     ORANGE,
+    Answer,
     Check,
+    Curve,
+    Panel,
+    Picture,
     Result,
-    main,
-    new_figure,
-    save,
+    Study,
     simulate,
-    tidy,
 )
 
-NAME = "tumbling_averages"
 DAY, YEAR, UNIT = 86400.0, 31557600.0, 149597870700.0
 SUN = 1.32712440018e20
 CONFIG = """
@@ -244,7 +240,8 @@ def asteroid(full: bool, found: dict[str, Result]) -> list[Check]:
     return checks
 
 
-def study(full: bool, out: Path) -> list[Check]:
+@Study
+def study(full: bool) -> Answer:
     """Both bodies; see the module's text."""
     tumbler: dict[str, Result] = {}
     toutatis: dict[str, Result] = {}
@@ -252,50 +249,40 @@ def study(full: bool, out: Path) -> list[Check]:
     checks = beside(TUMBLER, "tumbler", orbits * TUMBLER.period, 5001, tumbler)
     checks += kept(tumbler["full"], moments_of(tumbler["full"]))
     checks += asteroid(full, toutatis)
-    draw(tumbler, toutatis, out)
-    return checks
+    figure = picture(tumbler, toutatis)
+    return checks, figure
 
 
-def draw(tumbler: dict[str, Result], toutatis: dict[str, Result], out: Path) -> None:
+def picture(tumbler: dict[str, Result], toutatis: dict[str, Result]) -> Picture:
     """Distances from the full motion, and the wobble in it."""
-    figure = new_figure(11.5, 8.2, "Tumbling bodies under the Sun: averages beside every rotation")
-    for number, (title, found, unit) in enumerate(
-        (("tumbler", tumbler, TUMBLER), ("Toutatis", toutatis, TOUTATIS))
-    ):
-        axes = figure.add_subplot(2, 2, 1 + number)
+    ways = (("tumbler", tumbler, TUMBLER), ("Toutatis", toutatis, TOUTATIS))
+    panels = []
+    for title, found, unit in ways:
+        curves = []
         for level, color in AVERAGES.items():
             orbits = found[level].values("time")[1:] / unit.period
-            axes.semilogy(
-                orbits, apart(found[level], found["full"])[1:], ".", color=color, markersize=2, label=level
-            )
             announced = float(found[level].summary["modelling"]["momentum_axis"])
-            axes.axhline(announced, color=color, linewidth=0.8, linestyle="--")
-        tidy(
-            axes,
-            "revolutions",
-            "momentum's direction, distance (rad)",
-            f"{title}; dashed: announced at the end",
-        )
-        axes.legend(fontsize=8, markerscale=4, loc="lower right")
-    axes = figure.add_subplot(2, 2, 3)
+            curves += [Curve(orbits, apart(found[level], found["full"])[1:], level, color, ".", 0.6),
+                       Curve(None, announced, "", color, "--", 0.8)]  # fmt: skip
+        panels.append(
+            Panel(f"{title}; dashed: announced at the end", "revolutions",
+                  "momentum's direction, distance (rad)", curves, "y", legend="lower right")
+        )  # fmt: skip
     whole = tumbler["full"]
-    axes.plot(whole.values("time") / TUMBLER.period, np.degrees(wobble(whole)), ".", color=GREY, markersize=2)
     energy, momentum = (float(whole.values(name).mean()) for name in ("energy", "angular_momentum_norm"))
-    for bound in extremes(moments_of(whole), energy, momentum):
-        axes.axhline(np.degrees(bound), color=GREEN, linewidth=1.2)
-    tidy(
-        axes,
-        "revolutions",
-        "figure axis from the momentum (deg)",
-        "tumbler, full; green: extremes of the free motion",
+    swings = [Curve(whole.values("time") / TUMBLER.period, np.degrees(wobble(whole)), "", GREY, ".", 0.5)]
+    swings += [Curve(None, np.degrees(bound), "", GREEN)
+               for bound in extremes(moments_of(whole), energy, momentum)]  # fmt: skip
+    path = Curve(*toutatis["long"].values("momentum_axis")[:, :2].T, width=0.6)
+    panels += [
+        Panel("tumbler, full; green: extremes of the free motion", "revolutions",
+              "figure axis from the momentum (deg)", swings),
+        Panel("Toutatis: momentum's direction over 100,000 years", "X", "Y", [path], equal=True),
+    ]  # fmt: skip
+    return Picture(
+        "Tumbling bodies under the Sun: averages beside every rotation", "ab;cd", panels, (11.5, 8.2)
     )
-    axes = figure.add_subplot(2, 2, 4)
-    path = toutatis["long"].values("momentum_axis")
-    axes.plot(*path[:, :2].T, color=BLUE, linewidth=0.6)
-    tidy(axes, "X", "Y", "Toutatis: momentum's direction over 100,000 years")
-    axes.set_aspect("equal", adjustable="datalim")
-    save(figure, out, NAME)
 
 
 if __name__ == "__main__":
-    sys.exit(main(study, NAME))
+    raise SystemExit(study.main())

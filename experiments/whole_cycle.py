@@ -18,12 +18,8 @@ from __future__ import annotations
 
 import sys
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
-
-if not __package__:  # as a script
-    sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from experiments.common import (
     BLUE,
@@ -31,16 +27,16 @@ from experiments.common import (
     GREEN,
     GREY,
     ORANGE,
+    Answer,
     Check,
+    Curve,
+    Panel,
+    Picture,
     Result,
-    main,
-    new_figure,
-    save,
+    Study,
     simulate,
-    tidy,
 )
 
-NAME = "whole_cycle"
 CONFIG = CONFIGS / "earth_precession_averaged.toml"
 INTEGRATED = CONFIGS / "bodies" / "earth_moon_sun.toml"
 YEAR = 31557600.0
@@ -100,7 +96,8 @@ def told(level: Level, result: Result) -> None:
     print(f"{level.label:32s} {result.steps:12,d} steps, integrate and record {cpu:.3g} s", file=sys.stderr)
 
 
-def study(full: bool, out: Path) -> list[Check]:
+@Study
+def study(full: bool) -> Answer:
     """All levels beside the full motion; see the module's text."""
     span = ("25760 yr", "28 yr") if full else ("56 yr", "0.2 yr")
     resolved = run(FULL, *span)
@@ -126,8 +123,8 @@ def study(full: bool, out: Path) -> list[Check]:
             )
             title = f"{level.label}: axes from the full motion's, over what is announced"
             checks.append(Check(title, ratio, 0.0, 1.0, "1", "summary.json, modelling", "absolute"))
-    draw(resolved, results, out)
-    return [*checks, integrated(40 if full else 4)]
+    figure = picture(resolved, results)
+    return [*checks, integrated(40 if full else 4)], figure
 
 
 def integrated(years: int) -> Check:
@@ -153,20 +150,18 @@ def integrated(years: int) -> Check:
     return Check(title, largest / announced, 0.0, 1.0, "1", "summary.json, modelling", "absolute")
 
 
-def draw(resolved: Result, results: dict[Level, Result], out: Path) -> None:
-    """Differences along time."""
-    figure = new_figure(11.5, 5.2, "The whole precession: averaged motions less the full one")
-    years = resolved.values("time") / YEAR
-    for number, (name, words) in enumerate(SHOWN.items(), start=1):
-        axes = figure.add_subplot(1, 2, number)
-        for level, result in results.items():
-            # both axes are drawn: momentum and figure lie apart by a nutation of 1e-8 rad
-            difference = np.abs(apart(result, resolved, name)).max(axis=1)
-            axes.semilogy(years[1:], difference[1:], ".", color=level.color, markersize=2, label=level.label)
-        tidy(axes, "time (yr)", f"{words}, difference (rad)", "")
-        axes.legend(fontsize=8, markerscale=4, loc="lower right")
-    save(figure, out, NAME)
+def picture(resolved: Result, results: dict[Level, Result]) -> Picture:
+    """Differences along time, of both axes: momentum and figure lie apart by a nutation of 1e-8 rad."""
+    years = resolved.values("time")[1:] / YEAR
+    return Picture("The whole precession: averaged motions less the full one", "ab", [
+        Panel("", "time (yr)", f"{words}, difference (rad)", [
+            Curve(years, np.abs(apart(result, resolved, name)).max(axis=1)[1:], level.label, level.color, ".",
+                  0.5)
+            for level, result in results.items()
+        ], "y", legend="lower right")
+        for name, words in SHOWN.items()
+    ], (11.5, 5.2))  # fmt: skip
 
 
 if __name__ == "__main__":
-    sys.exit(main(study, NAME))
+    raise SystemExit(study.main())

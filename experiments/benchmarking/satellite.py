@@ -15,7 +15,7 @@ from experiments.peers.curves import cost_at
 from experiments.peers.own_runs import PROPAGATED
 from experiments.peers.scenes import SCENES
 
-COMPILED = ("numba", "numbalsoda")
+COMPILED = ("numba",)
 """Peers with a compiled DOP853."""
 ERRORS = (1e-6, 1e-9)
 _SCENE = "satellite"
@@ -45,16 +45,15 @@ def radians(*, quick: bool) -> float:
     return scene.rate * scene.ends[0 if quick else 1]
 
 
-def costs(*, repeats: int, quick: bool, pythons: dict[str, str] | None = None) -> Costs:
+def costs(*, repeats: int, quick: bool) -> Costs:
     """Measure them in fresh processes, in turn.
 
     Args:
         quick: the short horizon.
-        pythons: interpreters of peers that live in another environment.
     """
     case = _SCENE, SCENES[_SCENE].ends[0 if quick else 1]
     fill = 0.05 if quick else _FILL
-    measured = measure([OURS, *COMPILED], [case], repeats=repeats, fill=fill, pythons=pythons)
+    measured = measure([OURS, *COMPILED], [case], repeats=repeats, fill=fill)
     found = Costs(notes=[note for note in measured.notes if "left out" in note or "broke" in note])
     for error in ERRORS:
         points = measured.of(*case, OURS)

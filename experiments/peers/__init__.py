@@ -19,11 +19,8 @@ from dataclasses import dataclass
 ADAPTERS = {
     "heyoka": "bare_heyoka",
     "rigidsim": "own_runs",
-    "numbalsoda": "numba_lsoda",
     "numba": "numba_dop853",
-    "rebound": "rebound_bs",
     "scipy": "scipy_ivp",
-    "diffrax": "diffrax_rk",
     "mujoco": "mujoco_steps",
 }
 """Package that must be there: module of its adapter."""

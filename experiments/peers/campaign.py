@@ -50,7 +50,6 @@ def measure(
     fill: float = 0.05,
     fewest: int = 2,
     cap: float = 10.0,
-    pythons: dict[str, str] | None = None,
 ) -> Measured:
     """Run the peers in turn, each in fresh processes.
 
@@ -62,7 +61,6 @@ def measure(
         fill: CPU seconds of calls per setting, the fastest of which counts.
         fewest: calls at least, but of slow ones.
         cap: CPU seconds of one call from which tighter settings of a peer are left out.
-        pythons: interpreters of peers that live in another environment.
 
     Returns:
         What there is, after Ctrl-C as well.
@@ -78,7 +76,7 @@ def measure(
         request |= {"fill": fill, "fewest": fewest}
         print(f"repeat {number + 1} of {repeats}: {peer}", file=sys.stderr, flush=True)
         try:
-            records = _child(peer, request, (pythons or {}).get(peer, sys.executable))
+            records = _child(peer, request)
         except KeyboardInterrupt:
             measured.notes.append(f"interrupted in repeat {number + 1} of {repeats}, at {peer}")
             break
@@ -87,9 +85,9 @@ def measure(
     return measured
 
 
-def _child(peer: str, request: dict[str, Any], python: str) -> list[dict[str, Any]]:
+def _child(peer: str, request: dict[str, Any]) -> list[dict[str, Any]]:
     root = Path(__file__).parents[2]
-    command = [python, "-m", "experiments.peers.child", peer, json.dumps(request)]
+    command = [sys.executable, "-m", "experiments.peers.child", peer, json.dumps(request)]
     done = subprocess.run(command, capture_output=True, text=True, cwd=root, env=_environment())
     records = [json.loads(line) for line in done.stdout.splitlines() if line.startswith("{")]
     if done.returncode:
@@ -103,18 +101,12 @@ def _environment() -> dict[str, str]:
     return os.environ | {"OMP_NUM_THREADS": "1", "NUMBA_NUM_THREADS": "1"}
 
 
-def how_to_install(peer: str) -> str:
-    """A command."""
-    extra = "peers-fortran" if peer == "numbalsoda" else "peers"
-    return f'pip install "rigidsim[{extra}]"'
-
-
 def _note(
     measured: Measured, peer: str, record: dict[str, Any], truths: dict[Any, Any], slow: set[tuple[Any, ...]]
 ) -> None:
     note = ""
     if "absent" in record:
-        note = f"{peer} left out: {record['absent']}; install it with {how_to_install(peer)}"
+        note = f"{peer} left out: {record['absent']}; install it with pip install 'rigidsim[peers]'"
     elif "broke" in record:
         note = f"{peer} broke down: {record['broke']}"
     elif "import_seconds" in record:

@@ -16,16 +16,15 @@ import pytest
 import xarray
 from matplotlib.image import imread
 
-from experiments import benchmark, long_horizon, peer_comparison, precision_tradeoff
+from experiments import benchmark, long_horizon, peer_comparison
 from experiments.benchmarking.rows import rows
 from experiments.peers import ADAPTERS, campaign
 from experiments.peers.scenes import SCENES
-from rigidsim.accuracy.setting import Setting
 
 ROOT = Path(__file__).parents[2]
 
 from experiments import all as everything  # noqa: E402
-from experiments import closed_forms, common  # noqa: E402
+from experiments import closed_forms  # noqa: E402
 from experiments.common import Check  # noqa: E402
 
 IN_CI = {  # about how many seconds they take; `python -m experiments.all` runs all, before a version
@@ -58,7 +57,7 @@ def test_study_passes_and_draws(name: str, tmp_path: Path) -> None:
 def test_every_study_is_in_the_list_and_every_command_in_the_guide() -> None:
     folder = ROOT / "experiments"
     texts = {path.stem: path.read_text(encoding="utf-8") for path in folder.glob("*.py")}
-    assert {name for name, text in texts.items() if "\ndef study(" in text} == set(everything.STUDIES)
+    assert {name for name, text in texts.items() if "\n@Study\ndef study(" in text} == set(everything.STUDIES)
     guide = (folder / "README.md").read_text(encoding="utf-8")
     commands = {name for name, text in texts.items() if '__name__ == "__main__"' in text}
     missing = sorted(name for name in commands if f"`{name}`" not in guide and f".{name}`" not in guide)
@@ -74,20 +73,19 @@ def test_a_wrong_expected_value_makes_the_exit_code_1(
     arguments = ["--out", str(tmp_path)]
     assert everything.main(["earth_free_nutation", "toutatis", *arguments]) == 0
     assert "all passed" in capsys.readouterr().out
-    wrong = functools.partial(earth.study, flattening="0.003273795")  # the eighth digit
-    monkeypatch.setattr(earth, "study", wrong)
-    assert common.main(earth.study, earth.NAME, arguments) == 1
+    wrong = functools.partial(earth.study.measure, flattening="0.003273795")  # the eighth digit
+    monkeypatch.setattr(earth.study, "measure", wrong)
+    assert earth.study.main(arguments) == 1
     assert "FAILED" in capsys.readouterr().out
     assert everything.main(["earth_free_nutation", *arguments]) == 1
     assert "**FAILED**" in capsys.readouterr().out
 
 
 @pytest.mark.slow
-def test_a_study_runs_as_a_script(tmp_path: Path) -> None:
-    script = ROOT / "experiments" / "earth_free_nutation.py"
+def test_a_study_runs_as_a_command(tmp_path: Path) -> None:
     done = subprocess.run(
-        [sys.executable, str(script), "--out", str(tmp_path / "out")],
-        capture_output=True, text=True, cwd=tmp_path, check=False,
+        [sys.executable, "-m", "experiments.earth_free_nutation", "--out", str(tmp_path / "out")],
+        capture_output=True, text=True, cwd=ROOT, check=False,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
     assert "all passed" in done.stdout
@@ -239,31 +237,6 @@ def test_the_command_prints_ratios_and_draws(tmp_path: Path, capsys: pytest.Capt
     assert float(row.split("|")[4]) > 5
     pixels = imread(tmp_path / "peer_comparison.png")[:, :, :3]
     assert 0.01 < (pixels < 0.9).any(axis=2).mean() < 0.9
-
-
-# ---- the study of what accuracy costs: its choices are right, and one of its scenes is measured
-
-A, B, C = Setting("single"), Setting("double"), Setting("extended")
-
-
-@pytest.fixture(scope="module")
-def points() -> precision_tradeoff.Points:
-    return precision_tradeoff.measure_scene("asymmetric_top", to=1e3, processes=1)
-
-
-@pytest.mark.slow(29)
-def test_a_scene_is_measured_at_each_horizon(points: precision_tradeoff.Points) -> None:
-    assert list(points) == [1e2, 1e3]
-    short, long = ({p.setting: p for p in points[h]} for h in (1e2, 1e3))
-    assert Setting("quadruple") in short
-    assert Setting("quadruple") not in long  # not measured so far, and not extrapolated
-    default = precision_tradeoff.DEFAULT
-    assert short[default].cost == long[default].cost == 1.0
-    assert all(long[s].error >= short[s].error for s in long)  # the largest so far
-    closed = Setting("double", method="closed_form")
-    assert long[closed].cost == pytest.approx(short[closed].cost / 10)  # as many samples in ten times the run
-    assert long[closed].error < 1e-14  # it doesn't grow: some eps
-    assert all(check.passed for check in precision_tradeoff.checks({"asymmetric_top": points}))
 
 
 # ---- the study of long runs: its fit knows the laws, and its measurement the closed form
