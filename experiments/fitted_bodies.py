@@ -202,8 +202,8 @@ def satellite(folder: Path) -> tuple[list[Check], Panel]:
         told[name] = found
         if name == "with a wheel":
             relative = 100 * np.array(sigmas) / [900, 1000, 400]
-            curves = [Curve(spans, relative[:, n], f"moment {axis}", color, "o-")
-                      for n, (axis, color) in enumerate(zip("xyz", (RED, GREEN, BLUE), strict=True))]  # fmt: skip
+            colors = (RED, GREEN, BLUE)
+            curves = [Curve(spans, relative[:, n], f"moment {'xyz'[n]}", colors[n], "o-") for n in range(3)]
     for key, value in zip(MOMENTS, (900.0, 1000.0, 400.0), strict=True):
         found = told["with a wheel"]
         source = "the simulated truth; three sigmas"
