@@ -2,12 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import pytest
 from support import angle_between, assert_announced, loaded, run_estimated, run_text
-
-from rigidsim.solve.shadow import carriers
 
 MOON = """
 name = "moon"
@@ -99,49 +95,3 @@ def test_announced_errors_are_true() -> None:
             announced.append(run.summary["accuracy"]["estimated_attitude_error"])
             true.append(angle_between(loaded(run)["quaternion"].values, truth).max())
         assert_announced(announced, true)
-
-
-@pytest.fixture
-def noted(monkeypatch: pytest.MonkeyPatch) -> dict[str, list[float]]:
-    """Of what carries shadows: code compiled, motions carried by themselves, steps taken together."""
-    found: dict[str, list[float]] = {"compiled": [], "alone": [], "together": []}
-    compiled, alone = carriers.BatchCarrier.__init__, carriers.StepperCarrier.__init__
-    together, by_itself = carriers.BatchCarrier.advance, carriers.OwnCarrier.advance
-
-    def compile_(self: carriers.BatchCarrier, *given: Any) -> None:
-        found["compiled"].append(1)
-        compiled(self, *given)
-
-    def make(self: carriers.StepperCarrier, *given: Any) -> None:
-        found["alone"].append(1)
-        alone(self, *given)
-
-    def advance(self: carriers.BatchCarrier, *given: Any) -> Any:
-        went = together(self, *given)
-        found["together"].append(float(went[1][0]))
-        return went
-
-    def advance_alone(self: carriers.OwnCarrier, *given: Any) -> Any:
-        went = by_itself(self, *given)
-        found["alone"].append(float(went[1][0]))
-        return went
-
-    monkeypatch.setattr(carriers.BatchCarrier, "__init__", compile_)
-    monkeypatch.setattr(carriers.StepperCarrier, "__init__", make)
-    monkeypatch.setattr(carriers.BatchCarrier, "advance", advance)
-    monkeypatch.setattr(carriers.OwnCarrier, "advance", advance_alone)
-    return found
-
-
-@pytest.mark.parametrize("tolerance", ['"auto"', "1e-9"])
-def test_motions_are_followed_side_by_side_in_long_stretches(
-    noted: dict[str, list[float]], tolerance: str
-) -> None:
-    """Four at once, at a low order: not one by one by the run's own steps, which took four times the run."""
-    run = run_estimated(MOON.format(core="", days=5000), f"integrator.tolerance={tolerance}")
-    steps = run.summary["cost"]["steps"]
-    assert len(noted["compiled"]) == 1
-    assert not noted["alone"]
-    assert sum(noted["together"]) < 2 * steps
-    assert len(noted["together"]) < 50
-    assert run.summary["accuracy"]["estimated_how"].endswith("over the run")

@@ -18,7 +18,7 @@ from typing import Any
 import heyoka as hy
 import numpy as np
 import pytest
-from support import EPSILON, angle_between, config, law, loaded, run_text, wide
+from support import angle_between, config, loaded, run_text, wide
 
 import rigidsim
 from rigidsim.model.formulations.formulation import Formulation, ModelPlan, formulates
@@ -138,21 +138,6 @@ def test_its_errors_are_announced_and_true(tmp_path: Path) -> None:
     for invariant in run.summary["invariants"].values():
         assert invariant["largest_drift"] < invariant["bound"]
     assert rigidsim.verify(run.folder.path).identical
-
-
-def test_with_more_digits_it_is_as_much_nearer() -> None:
-    exact = attitudes("quaternion", "quadruple", 6.0, 25)
-    wrong = angle_between(attitudes("rodrigues", "extended", 6.0, 25), exact).max()
-    assert wrong < 50 * law(EPSILON["extended"], 20, 2.0, 6.0)
-
-
-def test_sampling_changes_no_bit() -> None:
-    few, many = (loaded(run_text(text(end=16, samples=samples))) for samples in (5, 257))
-    assert (few["angular_velocity"].values == many["angular_velocity"].values[::64]).all()
-    ratio = (
-        few["quaternion"].values / many["quaternion"].values[::64]
-    )  # its sign is that of the sample before
-    assert (np.abs(ratio) == 1).all()
 
 
 def test_names_that_are_not_registered_are_refused() -> None:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -12,19 +10,13 @@ from support import cases, config, loaded, run_text, same_bits
 
 import rigidsim
 from rigidsim.session.session import Tuning
-from rigidsim.solve.assembly import Assembly, assemble, sampler
-from rigidsim.solve.evaluate import Evaluator
-from rigidsim.solve.problem import InitialValueProblem, prepare
-from rigidsim.solve.sample_block import SampleBlock
-from rigidsim.solve.sampler import Pacing, SampleReceiver
+from rigidsim.solve.sampler import Pacing
 from rigidsim.solve.solvers.taylor.ways import Ways
-from rigidsim.solve.status import Status
 
 PLAIN = "estimate = false"  # which is the larger part of such short runs
 DRIVES = {
     "as measured": Pacing(),
     "one step at a time": Pacing(chunk_seconds=0.0, solver=Ways(grid_rows=0, least_block_steps=10**9)),
-    "short grids": Pacing(chunk_seconds=1e-5),
     "blocks": Pacing(solver=Ways(block_steps=13, least_block_steps=1, skip_from=1e9, grid_rows=0)),
     "skips too far": Pacing(solver=Ways(skip_from=2.0, skip_margin=1.7, grid_rows=0)),
 }
@@ -43,88 +35,24 @@ SCENES = {
 }
 
 
-class Kept(SampleReceiver):
-    """Everything recorded, in memory."""
-
-    def __init__(self, evaluator: Evaluator) -> None:
-        self.evaluator = evaluator
-        self.blocks: list[dict[str, list[np.ndarray]]] = []
-
-    def take(self, block: SampleBlock) -> None:
-        self.blocks.append(self.evaluator.evaluate(block) | {"time": [block.times.astype(float)]})
-
-    def all(self) -> dict[str, bytes]:
-        return {
-            f"{name}, part {n}": np.concatenate([block[name][n] for block in self.blocks]).tobytes()
-            for name, parts in self.blocks[0].items()
-            for n in range(len(parts))
-        }
-
-
-def made(scene: str, stride: int) -> tuple[InitialValueProblem, Callable[[], Assembly]]:
-    """Assembled once, and put back to its start for each use."""
-    prepared = prepare(rigidsim.parse(SCENES[scene]))
-    parts = assemble(prepared, stride=stride)
-    begin, fresh = parts.corrected.boundary(), parts.evaluator.continuity
-
-    def again() -> Assembly:
-        parts.corrected.back_to(begin)
-        parts.evaluator.continuity = type(fresh)()
-        return parts
-
-    return prepared, again
-
-
-@pytest.mark.parametrize("scene", cases(SCENES, ("charts", "events")))
-def test_max_steps_is_never_exceeded_and_always_used_up(scene: str) -> None:
+@pytest.mark.parametrize("scene", cases(SCENES, ("events",)))
+def test_max_steps_is_never_exceeded_and_always_used_up(scene: str, tmp_path: Path) -> None:
     """A step is a natural step of the engine, as ``cost.steps`` counts them; in sessions of so many each, the
     run has as many steps and the same bits as in one go, whichever way it takes.
     """
-    prepared, again = made(scene, stride=32)
-    parts = again()
-    kept = Kept(parts.evaluator)
-    total = sampler(prepared, parts, kept).run().steps
-    reference = kept.all()
-    for (drive, pacing), most in zip(DRIVES.items(), itertools.cycle([1, 7, 31, 33, 90])):
-        parts, start = again(), None
-        kept = Kept(parts.evaluator)
-        before, status = 0, Status.MAX_STEPS
-        while status is Status.MAX_STEPS:
-            limit = before + most
-            loop = sampler(prepared, parts, kept, start=start, pacing=pacing, most_steps=limit)
-            status = loop.run().status
-            start = loop.position()
-            assert loop.progress.steps == min(limit, total), drive
-            before = start.boundary.mark.steps
-        assert status is Status.FINISHED, drive
-        assert kept.all() == reference, drive
-
-
-@pytest.mark.parametrize(
-    "scene",
-    cases(["free", "charts", "events", "surfaces", "many samples in a step"], ["many samples in a step"]),
-)
-def test_a_run_that_is_stopped_within_a_step_goes_on_within_it(scene: str) -> None:
-    """After every look at the guards; samples of a step may be handed over over several of them."""
-    prepared, again = made(scene, stride=32)
-    parts = again()
-    kept = Kept(parts.evaluator)
-    total = sampler(prepared, parts, kept).run()
-    reference = kept.all()
-    parts, start = again(), None
-    kept = Kept(parts.evaluator)
-    pacing = Pacing(chunk_seconds=0.0, rows_waiting=64)
-    sessions, status = 0, Status.INTERRUPTED
-    while status is Status.INTERRUPTED:
-        answers = iter([None, None, *[Status.INTERRUPTED] * 2])
-        loop = sampler(prepared, parts, kept, lambda _, answers=answers: next(answers), start, pacing)
-        status, start, sessions = loop.run().status, loop.position(), sessions + 1
-    assert status is Status.FINISHED
-    assert loop.progress.steps == total.steps
-    assert sessions > 5
-    assert kept.all() == reference
-    if scene == "many samples in a step":
-        assert sessions > 4 * total.steps  # a step of a thousand samples is interrupted many times
+    whole = run_text(SCENES[scene])
+    total = whole.summary["cost"]["steps"]
+    for number, (drive, pacing) in enumerate(DRIVES.items()):
+        most, tuning = total // 2 - number, Tuning(pacing)
+        guard = f"limits.max_steps={most}"
+        run = run_text(SCENES[scene], guard, out=tmp_path / str(number), tuning=tuning)
+        sessions = 1
+        while run.status == "stopped: max_steps":
+            assert run.summary["cost"]["steps"] == sessions * most, drive
+            run, sessions = rigidsim.resume(run.folder.path, tuning=tuning), sessions + 1
+        assert (run.status, run.summary["cost"]["steps"]) == ("finished", total), drive
+        assert sessions >= 3
+        same_bits(run, whole)
 
 
 def test_max_drift_ends_with_the_first_sample_past_it(tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""Bit for bit: twice the same config, however it is driven, and one bare call of heyoka."""
+"""Bit for bit: however a run is driven or sampled, and one bare call of heyoka."""
 
 from __future__ import annotations
 
@@ -9,16 +9,13 @@ import heyoka as hy
 import numpy as np
 import pytest
 import xarray
-from support import cases
+from support import cases, run_text, same_bits
 
 import rigidsim
-from rigidsim.solve.assembly import assemble, sampler
-from rigidsim.solve.evaluate import Evaluator
+from rigidsim.session.session import Tuning
 from rigidsim.solve.problem import prepare
-from rigidsim.solve.sample_block import SampleBlock
-from rigidsim.solve.sampler import Pacing, SampleReceiver
+from rigidsim.solve.sampler import Pacing
 from rigidsim.solve.solvers.taylor.ways import Ways
-from rigidsim.solve.status import Status
 
 pytestmark = pytest.mark.optimised
 
@@ -50,30 +47,6 @@ DRIVES = {
 }
 
 
-class Collected(SampleReceiver):
-    """Everything recorded, in memory."""
-
-    def __init__(self, evaluator: Evaluator) -> None:
-        self.evaluator = evaluator
-        self.blocks: list[dict[str, list[np.ndarray]]] = []
-
-    def take(self, block: SampleBlock) -> None:
-        self.blocks.append(self.evaluator.evaluate(block) | {"time": [block.times]})
-
-
-def driven(text: str, pacing: Pacing, stride: int) -> dict[str, np.ndarray]:
-    prepared = prepare(rigidsim.parse(text))
-    parts = assemble(prepared, stride=stride)
-    collected = Collected(parts.evaluator)
-    progress = sampler(prepared, parts, collected, pacing=pacing).run()
-    assert progress.status is Status.FINISHED
-    return {
-        f"{name}, part {n}": np.concatenate([block[name][n] for block in collected.blocks])
-        for name, pieces in collected.blocks[0].items()
-        for n in range(len(pieces))
-    }
-
-
 WAYS = [("quaternion", "dense"), ("euler_angles", "sparse"), ("euler_angles", "a sample per step")]
 
 
@@ -84,12 +57,9 @@ def test_the_bits_do_not_depend_on_how_it_is_driven(
     formulation, grid = way
     record = 'record = ["angular_velocity", "quaternion", "euler_angles", "energy"]'
     text = free_body(GRIDS[grid], formulation=formulation, output=record)
-    plain = driven(text, Pacing(), stride=8)  # many strides in a short run
-    for name, pacing in DRIVES.items():
-        other = driven(text, pacing, stride=8)
-        assert list(plain) == list(other)
-        for column in plain:
-            assert plain[column].tobytes() == other[column].tobytes(), (name, column)
+    plain = run_text(text)
+    for pacing in DRIVES.values():
+        same_bits(plain, run_text(text, tuning=Tuning(pacing)))
 
 
 def test_the_sample_grid_does_not_change_the_motion(tmp_path: Path, free_body: Callable[..., str]) -> None:

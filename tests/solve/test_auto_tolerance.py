@@ -10,14 +10,12 @@ import math
 
 import numpy as np
 import pytest
-from support import config
+from support import EPSILON, config, loaded, run_text
 
 import rigidsim
-from rigidsim.solve.problem import auto_tolerance, prepare
 
 STARTS = 24
 HORIZONS = {"single": 131_072.0, "extended": 65_536.0}  # rad
-EPSILON = 2.0**-23
 
 
 def scene(start: int, precision: str = "single", tolerance: float | str = "auto") -> rigidsim.Experiment:
@@ -51,26 +49,13 @@ def test_energy_errors_have_no_direction(precision: str) -> None:
 @pytest.mark.campaign
 def test_at_a_tolerance_of_epsilon_they_had_one() -> None:
     """The same measurement sees what "auto" avoids; with more starts: rounding depends on the CPU."""
-    assert standard_errors("single", EPSILON, 2 * STARTS) < -5
+    assert standard_errors("single", EPSILON["single"], 2 * STARTS) < -5
 
 
-def test_auto_leaves_an_order_to_spare() -> None:
+def test_what_auto_stands_for_is_recorded() -> None:
     """Double precision's epsilon needs an order of 19.02, and so leaves 0.98; others leave at most 0.3."""
     for precision, below in (("single", 3), ("double", 0), ("extended", 3), ("quadruple", 3)):
-        prepared = prepare(scene(0, precision))
-        epsilon = float(prepared.precision.epsilon)
-        assert prepared.effective_tolerance == math.ldexp(epsilon, -below)
-        assert prepared.effective_tolerance == auto_tolerance(epsilon)
-        assert prepared.law_tolerance == epsilon  # a tighter tolerance makes rounding no smaller
-    given = prepare(rigidsim.parse(scene(0).text, overrides=["integrator.tolerance=1e-5"]))
-    assert given.effective_tolerance == pytest.approx(1e-5, rel=EPSILON)
-    assert given.law_tolerance == given.effective_tolerance
-
-
-def test_what_auto_stands_for_is_recorded(tmp_path: object) -> None:
-    of = rigidsim.parse(scene(0).text, overrides=["time.end=10", "output.timeline=false"])
-    run = rigidsim.run(of, out=str(tmp_path))
-    assert run.summary["tolerance"] == 2.0**-26
-    with run.dataset as dataset:
-        assert dataset.attrs["tolerance"] == 2.0**-26
-        assert dataset.attrs["taylor_order"] == 11
+        run = rigidsim.run(scene(0, precision), changes={"time.end": 10}, out=None)
+        assert run.summary["tolerance"] == math.ldexp(EPSILON[precision], -below)
+        assert run.dataset.attrs["tolerance"] == run.summary["tolerance"]
+    assert loaded(run_text(scene(0).text, "time.end=10")).attrs["taylor_order"] == 11

@@ -2,19 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
 
-import heyoka as hy
 import numpy as np
 import pytest
 from support import cases, config, loaded, run_text, same_bits
 
 import rigidsim
 from rigidsim.session.session import Observer, Tuning
-from rigidsim.solve.compiled import CodeStore, kept_in
 from rigidsim.solve.sampler import Pacing, Progress
 from rigidsim.store import netcdf
 from rigidsim.store.segments import SegmentLimits
@@ -50,21 +45,6 @@ class KillsAt(Observer):
             raise Killed
 
 
-@contextmanager
-def engines_made(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[str]]:
-    """Names of heyoka's makers of engines, as often as they are called; none is kept from before."""
-    made: list[str] = []
-
-    def counted(name: str) -> Any:
-        make = getattr(hy, name)
-        return lambda *args, **options: made.append(name) or make(*args, **options)
-
-    with monkeypatch.context() as patch, kept_in(CodeStore()):
-        for name in ("taylor_adaptive", "taylor_adaptive_batch"):
-            patch.setattr(hy, name, counted(name))
-        yield made
-
-
 def killed(experiment: rigidsim.Experiment, out: Path) -> Path:
     """The folder of a run that was killed after three of its eight blocks."""
     with pytest.raises(Killed):
@@ -73,22 +53,6 @@ def killed(experiment: rigidsim.Experiment, out: Path) -> Path:
     assert (folder / "segments").is_dir()
     assert not (folder / "dataset.h5").exists()
     return folder
-
-
-def test_no_engine_is_compiled_from_the_start_to_the_verdict(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    with engines_made(monkeypatch) as made:
-        run = rigidsim.resume(killed(top("double", estimate=True), tmp_path), tuning=EAGER)
-        assert rigidsim.verify(run.folder.path).identical
-        assert run.summary["accuracy"]["estimated_attitude_error"] > 0
-        assert made == []
-        with run.dataset as dataset:
-            assert "taylor_order" not in dataset.attrs
-            assert {"code_target_cpu", "code_fast_math", "compact_mode"} <= set(dataset.attrs)
-        # what steps does compile some, and is seen to; a plan's pilot steps whatever the method
-        rigidsim.plan(top("double"), out=tmp_path)
-        assert "taylor_adaptive" in made
 
 
 @pytest.mark.parametrize("precision", cases(PRECISIONS, ("double",)))

@@ -12,24 +12,14 @@ from pathlib import Path
 from typing import Any
 
 import heyoka as hy
-import numpy as np
 import pytest
 from support import config, run_text, same_bits
 
 import rigidsim
-from rigidsim.solve.compiled import compiled_function
 
 pytestmark = pytest.mark.optimised
 
 x, v = hy.make_vars("x", "v")
-
-
-def test_functions_are_told_apart_by_the_sign_of_a_zero() -> None:
-    """Expressions that differ in nothing else count as equal."""
-    zeros = [hy.expression(0.0), hy.expression(-0.0)]
-    assert zeros[0] == zeros[1]
-    signs = [np.signbit(compiled_function([zero], [x])(np.array([1.0]))[0]) for zero in zeros]
-    assert signs == [False, True]
 
 
 def test_a_second_run_compiles_nothing_and_is_the_same(

@@ -3,13 +3,55 @@
 import numpy as np
 import pytest
 from support import EPSILON, cases, config
-from test_batch_families import FREE, ORBIT, PLANAR, TOP, TORQUE, swept
 
 import rigidsim
+from rigidsim import parse
 from rigidsim.scene.sweeps.sweep import Sweep
 from rigidsim.solve.batch.family import Families, Members
 from rigidsim.solve.batch.run import BatchBlock, BatchRun
 from rigidsim.solve.status import Status
+
+FREE = config(
+    "principal_moments = [1, 2, 2.5]\nmass = 2",
+    "angular_velocity = [0.1, 1.0, 0.05]",
+    time="end = 10\nsamples = 5",
+    output='record = ["angular_velocity", "quaternion", "energy"]',
+)
+ORBIT = config(
+    "principal_moments = [1, 1.5, 1.8]",
+    "angular_velocity = [0.01, 0.02, 1.1]\neuler_angles = [0.3, 0.1, 0]",
+    'kind = "gravity_gradient"\ngravitational_parameter = 1\norbit = {semi_major_axis = 1, '
+    'eccentricity = 0.1, inclination = 0.2, mean_anomaly = 0.4, period = "2*pi"}',
+    "end = 20\nsamples = 5",
+    output='record = ["angular_velocity", "quaternion"]',
+)
+PLANAR = (
+    ORBIT.replace("[0.01, 0.02, 1.1]", "[0, 0, 1.1]")
+    .replace("[0.3, 0.1, 0]", "[0.3, 0, 0]")
+    .replace("inclination = 0.2", "inclination = 0")
+)
+TOP = config(
+    "principal_moments = [1, 1, 0.5]\nmass = 1\ncenter_of_mass = [0, 0, 0.3]",
+    "angular_velocity = [0.1, 0.2, 5]\neuler_angles = [0, 0.5, 0]",
+    'kind = "uniform_gravity"\nacceleration = [0, 0, -9.8]',
+    "end = 2\nsamples = 5",
+    output='record = ["angular_velocity"]',
+)
+TORQUE = config(
+    "principal_moments = [1, 2, 2.5]",
+    "angular_velocity = [0.1, 0.2, 1]",
+    'kind = "torque"\ncomponents = ["k*sin(t)^2/2", "0", "-k*wz"]\nframe = "body"',
+    "end = 10\nsamples = 5",
+    output='record = ["angular_velocity", "quaternion"]',
+    more='[parameters]\nk = 0.1\n[[events]]\nname = "flip"\nexpression = "wx - k/3"',
+)
+
+
+def swept(text: str, axes: dict[str, str], mode: str = "zip") -> Sweep:
+    """A sweep of a config."""
+    lines = [f'axes."{key}" = {{{spec}, name = "axis_{n}"}}' for n, (key, spec) in enumerate(axes.items())]
+    return Sweep.of(parse(f'{text}\n[sweep]\nmode = "{mode}"\nseed = 7\n' + "\n".join(lines)))
+
 
 FLIGHT = config(
     "principal_moments = [1, 2, 2.5]\nmass = 3",

@@ -7,8 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 from support import cases
-from test_batch_families import FREE, ORBIT, PLANAR, TORQUE, swept
-from test_batch_lanes import blocks_of, by_member
+from test_batch_lanes import FREE, ORBIT, PLANAR, TORQUE, blocks_of, by_member, swept
 
 import rigidsim
 
