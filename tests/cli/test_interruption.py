@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import signal
 import subprocess
 import time
@@ -13,10 +12,9 @@ from typing import Any
 import numpy as np
 import pytest
 import xarray
-from support import OFTEN, cases, same_bits
+from support import cases, same_bits
 
 import rigidsim
-from rigidsim.cli.app import exit_code
 
 pytestmark = pytest.mark.optimised  # as the processes that these are held against
 
@@ -26,16 +24,6 @@ Start = Callable[..., subprocess.Popen[str]]
 FOREVER = 1e9
 GUARDED = "[limits]\nwall_time = 3600"  # a run that may be stopped isn't refused for want of room
 PATIENCE = 2.0  # seconds; half a second is promised, measured are 0.2 to 0.4, and machines are noisy
-
-# precision, spacing of the samples in seconds, signal
-LONG = {
-    "double, dense": ('"double"', 0.0625, signal.SIGINT),
-    "double, a sample per many steps": ('"double"', 16.0, signal.SIGINT),
-    "double, sparse": ('"double"', 8192.0, signal.SIGTERM),
-    "quadruple, dense": ('"quadruple"', 0.125, signal.SIGINT),
-    "50 digits, dense": ("50", 0.125, signal.SIGTERM),
-    "50 digits, sparse": ("50", 16.0, signal.SIGINT),
-}
 
 
 def integrating(process: subprocess.Popen[str]) -> None:
@@ -63,12 +51,18 @@ def assert_first_samples(partial: xarray.Dataset, full: xarray.Dataset) -> int:
     return count
 
 
-@pytest.mark.parametrize("case", cases(LONG, ("double, sparse",)))
-def test_an_interrupted_run_keeps_what_it_has(case: str, config: Config, start: Start) -> None:
-    precision, spacing, number = LONG[case]
+LONG = [("50", 0.125, signal.SIGINT), ('"double"', 8192.0, signal.SIGTERM)]
+
+
+@pytest.mark.parametrize("case", cases(LONG, LONG[1:]))
+def test_an_interrupted_run_keeps_what_it_has(
+    case: tuple[str, float, signal.Signals], config: Config, start: Start
+) -> None:
+    """And the whole command ends."""
+    precision, spacing, number = case
     long = f"end = {FOREVER}\nevery = {spacing}"
     name = config(time=long, integrator=f"precision = {precision}", rest=GUARDED)
-    process = start("run", name)
+    process = start("run", name, config("next"))
     integrating(process)
     time.sleep(0.6)
     sent = time.monotonic()
@@ -80,6 +74,7 @@ def test_an_interrupted_run_keeps_what_it_has(case: str, config: Config, start: 
     assert "free  interrupted" in out
     assert "rigidsim: the run was interrupted; what was integrated is kept" in err
     assert "Traceback" not in err
+    assert not Path("runs/next").exists()
 
     run = rigidsim.open_run("runs/free")
     assert run.status == "interrupted"
@@ -117,109 +112,20 @@ def test_ctrl_c_while_the_engine_is_compiled(config: Config, start: Start) -> No
     assert rigidsim.resume("runs/free").status == "finished"
 
 
-@pytest.mark.slow
-def test_an_interruption_ends_the_whole_command(config: Config, start: Start) -> None:
-    long = config("a", time=f"end = {FOREVER}\nevery = 1", rest=GUARDED)
-    process = start("run", long, config("b"))
-    integrating(process)
-    process.send_signal(signal.SIGINT)
-    process.communicate(timeout=30)
-    assert process.returncode == 130
-    assert not Path("runs/b").exists()
-
-
-@pytest.mark.slow
-def test_a_killed_run_opens_as_running(config: Config, start: Start) -> None:
-    """Before its first segment, when nothing is saved yet."""
-    process = start("run", config(time=f"end = {FOREVER}\nevery = 1", rest=GUARDED))
-    integrating(process)
-    time.sleep(0.2)
-    process.send_signal(signal.SIGKILL)
-    process.wait(timeout=10)
-    for path in (["runs/free"], ["runs/free", "--json"]):
-        info = start("info", *path)
-        out, err = info.communicate(timeout=30)
-        assert info.returncode == 0, err
-        assert "running" in out
-    assert json.loads(out) == {"status": "running", "message": "the run is under way, or was killed"}
-
-
-@pytest.mark.slow
-def test_a_killed_run_keeps_its_segments(config: Config, start: Start) -> None:
-    process = start(
-        "run",
-        config(time=f"end = {FOREVER}\nevery = 0.125", integrator='precision = "quadruple"', rest=GUARDED),
-        prelude=OFTEN,
-    )
-    integrating(process)
-    deadline = time.monotonic() + 30
-    while len(list(Path("runs/free/segments").glob("[0-9]*.h5"))) < 2:
-        assert time.monotonic() < deadline
-        time.sleep(0.02)
-    process.send_signal(signal.SIGKILL)
-    process.wait(timeout=10)
-    info = start("info", "runs/free")
-    out, err = info.communicate(timeout=30)
-    assert info.returncode == 0, err
-    assert "running" in out
-    assert " samples of " in out
-    run = rigidsim.open_run("runs/free")
-    assert run.status == "running"
-    full = config("full", time="end = 8\nevery = 0.125", integrator='precision = "quadruple"')
-    with run.dataset as partial, rigidsim.run(full).dataset as whole:
-        np.testing.assert_array_equal(partial.time, np.arange(partial.sizes["time"]) / 8)
-        assert assert_first_samples(partial, whole) > 20
-
-
-@pytest.mark.parametrize("phase", ["dataset", "timeline"])
-def test_ctrl_c_after_the_integration(phase: str, config: Config, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The dataset is either whole or still in segments, and the message says which."""
-    import rigidsim.look.timeline as timeline
+def test_ctrl_c_while_the_dataset_is_written(config: Config, monkeypatch: pytest.MonkeyPatch) -> None:
+    """All is still in segments; what a timeline left out is in workflows/test_resume.py."""
     from rigidsim.store.segments import SegmentWriter
 
     def interrupted(*_: Any, **__: Any) -> None:
         raise KeyboardInterrupt
 
-    if phase == "dataset":
-        monkeypatch.setattr(SegmentWriter, "complete", interrupted)
-    else:
-        monkeypatch.setattr(timeline, "write_timeline", interrupted)
+    monkeypatch.setattr(SegmentWriter, "complete", interrupted)
     experiment = rigidsim.load(config(), overrides=["output.timeline=true"])
     run = rigidsim.run(experiment)
     assert run.status == "interrupted"
     assert run.summary["exit_code"] == 130
     assert run.summary == rigidsim.open_run("runs/free").summary
-    assert run.folder.dataset.exists() == (phase == "timeline")
-    said = {"dataset": "all samples are saved as segments", "timeline": "the dataset is complete"}
-    assert said[phase] in run.summary["message"]
+    assert not run.folder.dataset.exists()
+    assert "all samples are saved as segments" in run.summary["message"]
     with run.dataset as dataset:
         assert dataset.sizes["time"] == 49
-
-
-# ---- exit codes of commands that Ctrl-C ends, wherever it finds them
-
-
-def interrupted_as(kind: type[Exception]) -> int:
-    """What a library does to Ctrl-C that comes while it works."""
-    try:
-        raise KeyboardInterrupt
-    except KeyboardInterrupt as signal:
-        raise kind("initialization failed") from signal
-
-
-def test_an_import_that_was_interrupted_is_an_interruption(capsys: pytest.CaptureFixture[str]) -> None:
-    assert exit_code(lambda: interrupted_as(ImportError)) == 130
-    assert capsys.readouterr().err == "rigidsim: interrupted\n"
-
-
-def test_what_goes_wrong_after_an_interruption_is_not_hidden() -> None:
-    with pytest.raises(ValueError, match="initialization failed"):
-        exit_code(lambda: interrupted_as(ValueError))
-
-
-def test_a_library_that_cannot_be_loaded_is_not_an_interruption() -> None:
-    def command() -> int:
-        raise ImportError("no such library")
-
-    with pytest.raises(ImportError, match="no such library"):
-        exit_code(command)

@@ -39,21 +39,6 @@ def test_table_dataset_and_figure(config: Callable[..., str], rigidsim_command: 
         assert ran.exit_code == 0, ran.stderr
 
 
-@pytest.mark.slow
-def test_the_printed_table_says_what_was_measured(
-    config: Callable[..., str], rigidsim_command: Callable[..., Any]
-) -> None:
-    name = config(time="end = 1e7\nsamples = 5")
-    told = rigidsim_command("tradeoff", name, "--budget", "6", "--repeats", "1", "--out", "elsewhere")
-    assert told.exit_code == 0, told.stderr
-    assert "for this accuracy, use this" in told.stdout
-    assert "keys of [integrator]" in told.stdout
-    assert "nothing is extrapolated" in told.stdout
-    assert "the first 0." in told.stdout
-    assert "closed form to 50 digits" in told.stdout
-    assert Path("elsewhere/free_tradeoff/tradeoff.h5").exists()
-
-
 def test_impossible_requests_end_with_a_message(
     config: Callable[..., str], rigidsim_command: Callable[..., Any]
 ) -> None:

@@ -8,9 +8,6 @@ from typing import Any
 
 import pytest
 
-from rigidsim.cli.screens.words import advice_line, next_lines
-from rigidsim.store.summary_parts import Advice, AdviceCode
-
 LONG = "end = 12000\nsamples = 101"
 ESTIMATED = ("--set", "output.estimate=true")
 DETAILS = "rigidsim info runs/free   (invariants, start, cost by phase)"
@@ -40,6 +37,7 @@ def said(lines: list[str], label: str) -> list[str]:
 
 def test_a_long_run_is_told_what_would_do_better(screen: Callable[..., list[str]]) -> None:
     lines = screen("--set", "integrator.hold_invariants=false", time=LONG)
+    assert lines[0].split() == ["free", "finished"]
     assert " ".join(said(lines, "verdict")).startswith("sound: every drift is within what rounding explains")
     told = "\n".join(lines)
     assert "hold_invariants = true would bring" in told
@@ -48,43 +46,10 @@ def test_a_long_run_is_told_what_would_do_better(screen: Callable[..., list[str]
     assert max(map(len, lines)) <= 80
 
 
-def test_what_can_be_relied_on_comes_first_and_all_of_it_on_eight_lines(
-    screen: Callable[..., list[str]],
-) -> None:
-    lines = screen()
-    assert lines[0].split() == ["free", "finished"]
-    assert lines[1].startswith("verdict  sound")
-    assert lines[2].startswith("attitude uncertain by about")
-    assert len(lines) <= 8
-    whole = screen("--force", "--verbose")
-    assert any(line.startswith("angular_momentum ") for line in whole)
-    assert said(whole, "CPU")
-
-
-def test_warnings_follow_the_verdict_whatever_else_is_left_out(screen: Callable[..., list[str]]) -> None:
-    lines = screen(initial="angular_velocity = [0.1, 1, 0.05]\neuler_angles = [40, 60, 30]")
-    labels = [line.split()[0] for line in lines if not line.startswith(" ")]
-    assert labels[1:3] == ["verdict", "warning"]
-
-
 def test_a_run_that_a_guard_stopped_is_resumed_next(screen: Callable[..., list[str]]) -> None:
     lines = screen("--set", "limits.max_steps=1")
     assert said(lines, "next") == ["rigidsim resume runs/free", DETAILS]
     assert not any(line.startswith("advice") for line in lines)
-
-
-def test_commands_quote_places_with_spaces() -> None:
-    assert next_lines("finished", 0, "my runs/free")[0] == "rigidsim view 'my runs/free'"
-    assert next_lines("finished", 0, "") == []
-    assert next_lines("stopped: non-finite state", 3, "runs/free") == []
-
-
-def test_every_code_has_its_words_and_others_none() -> None:
-    for code in AdviceCode:
-        line = advice_line(Advice(code=code.value, now=1e-8, then=1e-12)) or ""
-        assert "1e-12" in line
-        assert ("1.0e-08" in line) == (code is not AdviceCode.AVERAGED)  # an error of axes, not of attitudes
-    assert advice_line(Advice(code="of a later version", now=1e-8, then=1e-12)) is None
 
 
 # ---- what was understood of a config is echoed in units that show a mistake at once

@@ -3,10 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-import math
 import re
-import shutil
-import subprocess
 from collections.abc import Callable
 from fractions import Fraction
 from pathlib import Path
@@ -25,7 +22,7 @@ from hypothesis import strategies as st
 import rigidsim
 from rigidsim.solve.precision import Precision, precision_of
 
-PRECISIONS = ['"single"', '"double"', '"extended"', '"quadruple"', "50"]
+PRECISIONS = ['"double"', '"quadruple"']
 
 HEAVY_TOP = """\
 name = "top"
@@ -116,17 +113,6 @@ def test_every_reader_reads_the_same(free: tuple[str, rigidsim.Run]) -> None:
                 np.testing.assert_array_equal(values, raw[name][:], strict=True)
 
 
-@pytest.mark.skipif(shutil.which("ncdump") is None, reason="ncdump isn't installed")
-def test_ncdump_reads_it(free: tuple[str, rigidsim.Run]) -> None:
-    done = subprocess.run(
-        ["ncdump", "-h", str(free[1].folder.dataset)], capture_output=True, text=True, check=True
-    )
-    assert "time = 49 ;" in done.stdout
-    assert "double angular_velocity(time, body_axis) ;" in done.stdout
-    assert 'angular_velocity:units = "rad s-1" ;' in done.stdout
-    assert "energy:invariant = 1" in done.stdout
-
-
 @pytest.mark.parametrize("which", ["free", "top"])
 def test_variables_carry_labels_and_attributes(
     which: str, free: tuple[str, rigidsim.Run], top: rigidsim.Run
@@ -137,6 +123,9 @@ def test_variables_carry_labels_and_attributes(
         assert set(map(str, dataset.coords)) - {"time", "time_lo", "time_lo2", "time_lo3"} == used
         for dim in used:
             assert dataset[dim].values.tolist() == LABELS[dim]
+        if which == "top":
+            assert dataset.euler_angles.attrs["euler_sequence"] == "zxz"
+            assert dataset.euler_angles.attrs["convention"] == "intrinsic"
         plain = [v for v in map(str, dataset.data_vars) if not re.search(r"_lo\d*$|_drift$", v)]
         assert set(plain) == set(expected)
         for name, (dims, units, frame, invariant) in expected.items():
@@ -147,12 +136,6 @@ def test_variables_carry_labels_and_attributes(
             assert variable.attrs.get("frame") == (frame if frame else None)
             assert variable.attrs.get("invariant", 0) == int(invariant)
             assert (f"{name}_drift" in dataset) == invariant
-
-
-def test_euler_angles_name_their_sequence(top: rigidsim.Run) -> None:
-    with top.dataset as dataset:
-        assert dataset.euler_angles.attrs["euler_sequence"] == "zxz"
-        assert dataset.euler_angles.attrs["convention"] == "intrinsic"
 
 
 @pytest.mark.parametrize("which", ["free", "top"])
@@ -204,24 +187,17 @@ def test_root_attributes_tell_where_it_comes_from(free: tuple[str, rigidsim.Run]
     assert attributes["steps"] == run.summary["cost"]["steps"] > 0
     assert attributes["wall_seconds"] > 0
     assert attributes["cpu_seconds"] > 0
-    for moment in ("started_at", "finished_at"):
-        assert re.fullmatch(r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d\+00:00", attributes[moment])
-
-
-def test_the_summary_knows_the_dataset(free: tuple[str, rigidsim.Run]) -> None:
-    run = free[1]
     content = run.folder.dataset.read_bytes()
     assert run.summary["dataset_sha256"] == hashlib.sha256(content).hexdigest()
     assert run.summary["samples"] == run.summary["samples_planned"] == 49
-
-
-# Times
+    for moment in ("started_at", "finished_at"):
+        assert re.fullmatch(r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d\+00:00", attributes[moment])
 
 
 # Every digit
 
 
-NAMES: list[str | int] = ["single", "double", "extended", "quadruple", 20, 50, 100, 250]
+NAMES: list[str | int] = ["single", "extended", "quadruple", 50]
 
 
 def _array(precision: Precision, values: list[Any]) -> np.ndarray:
@@ -234,7 +210,7 @@ def _number(precision: Precision, value: Fraction) -> Any:
 
 
 @pytest.mark.parametrize("name", NAMES)
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=25, deadline=None)
 @given(data=st.data())
 def test_parts_are_exact(name: str | int, data: st.DataObject) -> None:
     precision = precision_of(name)
@@ -263,19 +239,3 @@ def test_parts_are_exact(name: str | int, data: st.DataObject) -> None:
             for part in reversed(parts):
                 total += mpmath.mpf(float(part[i]))
             assert total == mpmath.mpf(value.numerator) / value.denominator
-
-
-@pytest.mark.parametrize("name", NAMES)
-def test_parts_keep_the_signs_of_zeros_and_what_is_not_finite(name: str | int) -> None:
-    precision = precision_of(name)
-
-    def scalar(value: float) -> Any:
-        return hy.real(value, precision.bits) if precision.scalar is hy.real else precision.scalar(value)
-
-    special = [0.0, -0.0, math.inf, -math.inf, math.nan, 1.5]
-    lead, *rest = precision.parts(_array(precision, [scalar(x) for x in special]))
-    np.testing.assert_array_equal(lead, special)
-    assert np.signbit(lead).tolist()[:4] == [False, True, False, True]
-    for part in rest:
-        assert part.tolist() == [0.0] * 6
-        assert np.signbit(part[:2]).tolist() == [False, True]  # -0.0 + 0.0 would lose the sign

@@ -14,31 +14,13 @@ import pytest
 
 import rigidsim
 from rigidsim import RunFolderError
-from rigidsim.store.atomic import replacing, replacing_folder
+from rigidsim.store.atomic import replacing
 from rigidsim.store.summary import read_summary
 
 
 @pytest.fixture
 def finished(tmp_path: Path, free_body: Callable[..., str]) -> rigidsim.Run:
     return rigidsim.run(rigidsim.parse(free_body()), out=tmp_path)
-
-
-def partial(folder: Path, free_body: Callable[..., str]) -> rigidsim.Run:
-    """A run that a guard stopped."""
-    text = free_body("end = 1e6\nevery = 1") + "[limits]\nmax_steps = 500\n"
-    return rigidsim.run(rigidsim.parse(text), out=folder)
-
-
-def test_what_a_finished_run_consists_of(finished: rigidsim.Run, free_body: Callable[..., str]) -> None:
-    assert sorted(p.name for p in finished.folder.path.iterdir()) == [
-        "checkpoint.h5",
-        "config.toml",
-        "dataset.h5",
-        "summary.json",
-    ]
-    assert finished.folder.config.read_text() == free_body()
-    assert json.loads(finished.folder.summary.read_text()) == finished.summary
-    assert finished.status == "finished"
 
 
 def test_a_finished_run_is_not_overwritten(finished: rigidsim.Run, free_body: Callable[..., str]) -> None:
@@ -67,17 +49,6 @@ def test_force_replaces_all_of_it(finished: rigidsim.Run, free_body: Callable[..
     assert "samples = 9" in again.folder.config.read_text()
 
 
-def test_an_unfinished_run_is_not_overwritten(tmp_path: Path, free_body: Callable[..., str]) -> None:
-    stopped = partial(tmp_path, free_body)
-    assert stopped.status == "stopped: max_steps"
-    assert stopped.folder.segments.is_dir()
-    with pytest.raises(RunFolderError, match="holds an unfinished run; force=True replaces it"):
-        rigidsim.run(rigidsim.parse(free_body()), out=tmp_path)
-    again = rigidsim.run(rigidsim.parse(free_body()), out=tmp_path, force=True)
-    assert again.status == "finished"
-    assert not again.folder.segments.exists()
-
-
 @pytest.mark.parametrize("force", [False, True])
 def test_foreign_files_are_left_alone(force: bool, tmp_path: Path, free_body: Callable[..., str]) -> None:
     (tmp_path / "free").mkdir()
@@ -89,58 +60,56 @@ def test_foreign_files_are_left_alone(force: bool, tmp_path: Path, free_body: Ca
     assert thesis.read_text() == "years of work"
 
 
-@pytest.mark.parametrize("where", ["a file as parent", "/proc"])
-def test_a_place_that_cannot_be_written(where: str, tmp_path: Path, free_body: Callable[..., str]) -> None:
-    """/proc refuses even root."""
-    out = Path("/proc/rigidsim-test") if where == "/proc" else tmp_path / "file" / "runs"
+def test_a_place_that_cannot_be_written(tmp_path: Path, free_body: Callable[..., str]) -> None:
+    """/proc refuses even root; and a config that can't run writes nothing."""
     (tmp_path / "file").touch()
-    with pytest.raises(RunFolderError, match=r"can't be written: .+; choose another out"):
-        rigidsim.run(rigidsim.parse(free_body()), out=out)
-
-
-def test_a_config_that_cannot_run_writes_nothing(tmp_path: Path, free_body: Callable[..., str]) -> None:
+    for out in (Path("/proc/rigidsim-test"), tmp_path / "file" / "runs"):
+        with pytest.raises(RunFolderError, match=r"can't be written: .+; choose another out"):
+            rigidsim.run(rigidsim.parse(free_body()), out=out)
     text = free_body("end = 1", formulation="canonical").replace("[0.2, 1.1, 0.7]", "[0.2, 0, 0.7]")
     with pytest.raises(rigidsim.ConfigError, match="singularity"):
         rigidsim.run(rigidsim.parse(text), out=tmp_path / "runs")
     assert not (tmp_path / "runs").exists()
 
 
-@pytest.mark.parametrize("name", ["", "dataset.h5", "summary.json", "config.toml"])
-def test_a_run_is_found_by_its_folder_or_a_file_in_it(name: str, finished: rigidsim.Run) -> None:
-    opened = rigidsim.open_run(finished.folder.path / name)
-    assert opened.folder == finished.folder
-    assert opened.summary == finished.summary
+def test_an_unfinished_run_opens_and_is_not_overwritten(
+    tmp_path: Path, free_body: Callable[..., str]
+) -> None:
+    text = free_body("end = 1e6\nevery = 1") + "[limits]\nmax_steps = 500\n"
+    stopped = rigidsim.run(rigidsim.parse(text), out=tmp_path)
+    assert stopped.status == "stopped: max_steps"
+    assert stopped.folder.segments.is_dir()
+    opened = rigidsim.open_run(str(stopped.folder.path))
+    assert opened.status == "stopped: max_steps"
     with opened.dataset as dataset:
-        assert dataset.sizes["time"] == 49
+        assert dataset.attrs["status"] == "stopped: max_steps"
+        assert dataset.sizes["time"] == opened.summary["samples"] > 10
+        np.testing.assert_array_equal(dataset.time, np.arange(dataset.sizes["time"]))
+    with pytest.raises(RunFolderError, match="holds an unfinished run; force=True replaces it"):
+        rigidsim.run(rigidsim.parse(free_body()), out=tmp_path)
+    again = rigidsim.run(rigidsim.parse(free_body()), out=tmp_path, force=True)
+    assert again.status == "finished"
+    assert not again.folder.segments.exists()
 
 
-def test_a_partial_run_opens(tmp_path: Path, free_body: Callable[..., str]) -> None:
-    stopped = partial(tmp_path, free_body)
-    for path in (stopped.folder.path, str(stopped.folder.path)):
-        opened = rigidsim.open_run(path)
-        assert opened.status == "stopped: max_steps"
-        with opened.dataset as dataset:
-            assert dataset.attrs["status"] == "stopped: max_steps"
-            assert dataset.sizes["time"] == opened.summary["samples"] > 10
-            np.testing.assert_array_equal(dataset.time, np.arange(dataset.sizes["time"]))
-
-
-@pytest.mark.parametrize("what", ["missing", "empty folder", "folder of other things"])
-def test_no_run_there(what: str, tmp_path: Path) -> None:
-    path = tmp_path / "nothing"
-    if what != "missing":
-        path.mkdir()
-    if what == "folder of other things":
-        (path / "config.toml").touch()
-    with pytest.raises(RunFolderError, match=r"no run here; give a run folder \(runs/NAME\) or its dataset"):
-        rigidsim.open_run(path)
-
-
-@pytest.mark.parametrize("content", [b"", b'{"status": "fini', b"[]", b"\xff\xfe"])
-def test_a_damaged_summary_is_refused(content: bytes, finished: rigidsim.Run) -> None:
-    finished.folder.summary.write_bytes(content)
-    with pytest.raises(RunFolderError, match=r"summary\.json: is damaged or no summary"):
-        rigidsim.open_run(finished.folder.path)
+def test_a_run_is_found_by_its_folder_or_a_file_in_it(
+    finished: rigidsim.Run, free_body: Callable[..., str], tmp_path: Path
+) -> None:
+    names = ["checkpoint.h5", "config.toml", "dataset.h5", "summary.json"]
+    assert sorted(p.name for p in finished.folder.path.iterdir()) == names
+    assert finished.folder.config.read_text() == free_body()
+    assert json.loads(finished.folder.summary.read_text()) == finished.summary
+    for name in ("", *names[1:]):
+        opened = rigidsim.open_run(finished.folder.path / name)
+        assert opened.folder == finished.folder
+        assert opened.summary == finished.summary
+        assert opened.outcome == finished.outcome
+    nothing = tmp_path / "nothing"
+    for _ in range(2):  # missing, then a folder of other things
+        with pytest.raises(RunFolderError, match=r"no run here; give a run folder \(runs/NAME\) or its"):
+            rigidsim.open_run(nothing)
+        nothing.mkdir(exist_ok=True)
+        (nothing / "config.toml").touch()
 
 
 def test_a_run_without_a_summary_was_killed(finished: rigidsim.Run) -> None:
@@ -157,30 +126,10 @@ def test_a_run_without_a_summary_was_killed(finished: rigidsim.Run) -> None:
 # ---- ``summary.json``: what is written is what is read; what isn't a summary is refused
 
 # hundreds of turns between samples, of a quaternion that matrices don't carry: a warning is certain
-BLURRED = (
-    "[body]\nprincipal_moments = [1, 2, 2.5]\n[initial]\nangular_velocity = [0.3, 1.0, 0.5]\n"
-    '[time]\nend = 3000\nsamples = 3\n[output]\ntimeline = false\nrecord = ["quaternion"]\n'
-    '[integrator]\nformulation = "rotation_matrix"\n'
-)
 
 
-@pytest.fixture(scope="module")
-def run(tmp_path_factory: pytest.TempPathFactory) -> rigidsim.Run:
-    text = 'name = "blurred"\n' + BLURRED
-    return rigidsim.run(rigidsim.parse(text), out=tmp_path_factory.mktemp("runs"))
-
-
-def test_what_a_run_returns_is_what_it_wrote(run: rigidsim.Run) -> None:
-    written = json.loads(run.folder.summary.read_text())
-    assert run.summary == written
-    assert list(run.summary) == list(written)
-    opened = rigidsim.open_run(run.folder.path)
-    assert opened.summary == written
-    assert opened.outcome == run.outcome
-
-
-def test_an_older_summary_is_read_and_written_again_as_it_is(run: rigidsim.Run, tmp_path: Path) -> None:
-    older = {**run.summary, "of_another_version": [1, {"x": 2.5}]}
+def test_an_older_summary_is_read_and_written_again_as_it_is(finished: rigidsim.Run, tmp_path: Path) -> None:
+    older = {**finished.summary, "of_another_version": [1, {"x": 2.5}]}
     for key in ("warning_codes", "method", "hold_invariants", "lyapunov", "events", "chart_changes"):
         older.pop(key)
     path = tmp_path / "summary.json"
@@ -198,15 +147,19 @@ DAMAGES: dict[str, tuple[Callable[[dict[str, Any]], Any], str]] = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("what", DAMAGES)
-def test_a_damaged_one_is_refused_by_its_place(what: str, run: rigidsim.Run, tmp_path: Path) -> None:
-    content = json.loads(json.dumps(run.summary))
-    DAMAGES[what][0](content)
-    path = tmp_path / "summary.json"
-    path.write_text(json.dumps(content))
-    with pytest.raises(RunFolderError, match="is damaged or no summary of rigidsim") as refusal:
-        read_summary(path)
-    assert DAMAGES[what][1] in str(refusal.value)
+def test_a_damaged_summary_is_refused_by_its_place(finished: rigidsim.Run) -> None:
+    path = finished.folder.summary
+    for content in (b"", b'{"status": "fini', b"[]", b"\xff\xfe"):
+        path.write_bytes(content)
+        with pytest.raises(RunFolderError, match=r"summary\.json: is damaged or no summary"):
+            rigidsim.open_run(finished.folder.path)
+    for damage, place in DAMAGES.values():
+        summary = json.loads(json.dumps(finished.summary))
+        damage(summary)
+        path.write_text(json.dumps(summary))
+        with pytest.raises(RunFolderError, match="is damaged or no summary of rigidsim") as refusal:
+            rigidsim.open_run(path.parent)
+        assert place in str(refusal.value)
 
 
 # ---- what takes the place of a file or folder is whole, or nothing changes
@@ -231,22 +184,3 @@ def test_a_file_that_fails_leaves_the_old_one_and_no_remains(tmp_path: Path) -> 
         assert place.read_text() == "old"
     assert place.read_text() == "new"
     assert sorted(path.name for path in tmp_path.iterdir()) == ["file", "other"]
-
-
-def test_a_file_that_was_not_written_is_an_error(tmp_path: Path) -> None:
-    with pytest.raises(FileNotFoundError), replacing(tmp_path / "file"):
-        pass
-
-
-def test_a_folder_that_fails_leaves_the_old_one_and_no_remains(tmp_path: Path) -> None:
-    place = tmp_path / "folder"
-    for text in ("old", "new"):
-        with replacing_folder(place) as new:
-            new.mkdir()
-            (new / text).write_text(text)
-        assert [path.name for path in place.iterdir()] == [text]
-    with suppress(Cut), replacing_folder(place) as new:
-        new.mkdir()
-        raise Cut
-    assert [path.name for path in place.iterdir()] == ["new"]
-    assert list(tmp_path.iterdir()) == [place]

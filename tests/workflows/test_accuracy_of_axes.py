@@ -31,7 +31,6 @@ def apart(one: rigidsim.Run, other: rigidsim.Run) -> float:
     ("level", "settings", "code"),
     [
         ("full", ["integrator.tolerance=1e-5", "integrator.accuracy_axis=1e-9"], "not_certified"),
-        ("spin_averaged", ["integrator.accuracy_axis=1e-9"], "model_uncertain"),
         ("spin_averaged", ["integrator.tolerance=0.1"], "model_uncertain"),
         ("spin_averaged", ["output.estimate=false"], "not_certified"),
     ],

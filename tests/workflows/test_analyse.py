@@ -70,18 +70,8 @@ def test_lines_of_a_free_body_are_multiples_of_its_period(tmp_path: Path) -> Non
 
 
 @pytest.mark.slow
-def test_digits_over_ten_thousand_periods(tmp_path: Path) -> None:
-    run, exact = tumbling(10000, "double", "1.5", tmp_path, '"angular_velocity", "figure_axis"')
-    with mpmath.workdps(40):
-        analysis = rigidsim.analyse(run, ["angular_velocity", "figure_axis"])
-        assert max(wrong(analysis, exact, 1e-3)) < 1e-14
-        # faint ones: eps over their share of the largest line and over the angle turned
-        assert max(wrong(analysis, exact, 1e-12)) < 2.0**-52 / 1e-12 / (2 * np.pi * 10000)
-
-
-@pytest.mark.slow(80)
-def test_digits_of_quadruple_precision_over_ten_thousand_periods(tmp_path: Path) -> None:
-    run, exact = tumbling(10000, "quadruple", "4", tmp_path)
+def test_digits_of_quadruple_precision_over_a_thousand_periods(tmp_path: Path) -> None:
+    run, exact = tumbling(1000, "quadruple", "4", tmp_path)
     with mpmath.workdps(60):
         analysis = rigidsim.analyse(run, "angular_velocity")
         assert max(wrong(analysis, exact, 1e-3)) < 1e-28
@@ -217,26 +207,26 @@ def test_any_dataset_with_frequencies_of_ones_own() -> None:
     assert all(not line.label.text for line in rigidsim.analyse(made_up()).signals[0].lines)
 
 
-@pytest.mark.parametrize(
-    ("dataset", "options", "message"),
-    [
-        (made_up().isel(time=slice(0, 10)), {}, "has 10 samples; analyse needs at least 32"),
-        (
-            made_up().isel(time=[*range(100), *range(102, 200)]),
-            {},
-            "samples aren't equidistant: 0.5 to 1.5 s",
-        ),
-        (made_up().rename(time="t"), {}, "no coordinate time"),
-        (made_up(), {"variables": "tilt"}, "no signal 'tilt'; there are obliquity, spin_rate"),
-        (made_up(), {"lines": 0}, "given lines = 0; 1 to 500 are allowed"),
-        (made_up(), {"floor": 2.0}, "given floor = 2"),
-        (made_up(), {"window": 99}, "window of order 99; 1 to 20"),
-        (made_up().where(lambda d: d.time != 3), {}, "not all samples are finite"),
-    ],
-)
-def test_what_cannot_be_analysed_is_refused(dataset: Any, options: dict[str, Any], message: str) -> None:
-    with pytest.raises(RigidsimError, match=message.replace("(", r"\(")):
-        rigidsim.analyse(dataset, **options)
+REFUSED: list[tuple[Any, dict[str, Any], str]] = [
+    (made_up().isel(time=slice(0, 10)), {}, "has 10 samples; analyse needs at least 32"),
+    (
+        made_up().isel(time=[*range(100), *range(102, 200)]),
+        {},
+        "samples aren't equidistant: 0.5 to 1.5 s",
+    ),
+    (made_up().rename(time="t"), {}, "no coordinate time"),
+    (made_up(), {"variables": "tilt"}, "no signal 'tilt'; there are obliquity, spin_rate"),
+    (made_up(), {"lines": 0}, "given lines = 0; 1 to 500 are allowed"),
+    (made_up(), {"floor": 2.0}, "given floor = 2"),
+    (made_up(), {"window": 99}, "window of order 99; 1 to 20"),
+    (made_up().where(lambda d: d.time != 3), {}, "not all samples are finite"),
+]
+
+
+def test_what_cannot_be_analysed_is_refused() -> None:
+    for dataset, options, message in REFUSED:
+        with pytest.raises(RigidsimError, match=message):
+            rigidsim.analyse(dataset, **options)
 
 
 def test_the_command_prints_a_table_and_writes_dataset_and_figure(tmp_path: Path) -> None:
@@ -254,18 +244,8 @@ def test_the_command_prints_a_table_and_writes_dataset_and_figure(tmp_path: Path
         assert saved["label"][0, 0].item() == "wobble"
         assert saved.sizes["line"] == 3
         first, error = float(saved["frequency"][0, 0]), float(saved["frequency_error"][0, 0])
-    told = CliRunner().invoke(
-        app,
-        [
-            "analyse",
-            str(folder),
-            "--json",
-            "--variable",
-            "angular_velocity.z",
-            "--out",
-            str(tmp_path / "a.nc"),
-        ],
-    )
+    options = ["--json", "--variable", "angular_velocity.z", "--out", str(tmp_path / "a.nc")]
+    told = CliRunner().invoke(app, ["analyse", str(folder), *options])
     found = json.loads(told.stdout)
     assert [signal["name"] for signal in found["signals"]] == ["angular_velocity.z"]
     assert found["signals"][0]["lines"][0]["frequency_rad_per_s"] == pytest.approx(2 * first, abs=20 * error)

@@ -45,8 +45,6 @@ KEEPING_PACE = (
     .replace("spin_averaged", "orbit_averaged")
     .replace('["20 deg", "50 deg"]', '["5 deg", "8 deg"]')
 )
-OVER_ORBITS = SPINNING.replace("spin_averaged", "orbit_averaged").replace("end = 10", "end = 100")
-OPEN = SPINNING.replace('"spin_averaged"', '"auto"\n[integrator]\naccuracy_axis = 1e-3')
 MIXED = SPINNING.replace('axes."initial.euler_angles[1]"', 'axes."model.level"').replace(
     '["20 deg", "50 deg"], name = "lean"', '["spin_averaged", "full"]'
 )
@@ -81,31 +79,9 @@ def test_a_sweep_keeps_and_tells_the_error_of_each_model(tmp_path: Path) -> None
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("text", [DAMPED, KEEPING_PACE, OVER_ORBITS, OPEN])
+@pytest.mark.parametrize("text", [DAMPED, KEEPING_PACE])
 def test_so_does_every_kind_of_average(text: str, tmp_path: Path) -> None:
     as_single_runs(text, tmp_path)
-
-
-@pytest.mark.slow
-def test_such_a_sweep_is_resumed_verified_drawn_and_planned(tmp_path: Path) -> None:
-    whole = rigidsim.sweep(rigidsim.parse(SPINNING), out=tmp_path)
-    before = whole.dataset.load()
-    next(whole.folder.tiles.glob("*")).unlink()
-    whole.folder.dataset.unlink()
-    place = str(whole.folder.path)
-    commands = [
-        ["resume", place],
-        ["verify", place],
-        ["plot", place, "--what", "modelling_error"],
-        ["export", place, "--format", "csv", "--out", str(tmp_path / "precessing.csv")],
-    ]
-    for command in commands:
-        done = CliRunner().invoke(app, command)
-        assert done.exit_code == 0, done.output
-    again = rigidsim.sweep(rigidsim.parse(SPINNING), out=tmp_path).dataset
-    assert again.drop_attrs().identical(before.drop_attrs())
-    made = rigidsim.plan(single_member(rigidsim.parse(SPINNING), 0))
-    assert made.predicted.modelling_seconds > 0
 
 
 @pytest.mark.slow

@@ -16,9 +16,7 @@ from scipy.spatial.transform import Rotation
 
 import rigidsim
 from experiments import compare_conventions
-from rigidsim.accuracy.bench.plan import DEFAULT
 from rigidsim.workflows.compare.as_run import open_any
-from rigidsim.workflows.tradeoff import with_others
 
 MOMENTS = np.array([1.0, 2.0, 2.5])
 START = np.array([0.3, 1.0, -0.4])
@@ -85,9 +83,8 @@ def test_agrees(experiment: rigidsim.Experiment) -> None:
     assert "<table>" in found._repr_html_()
 
 
-@pytest.mark.parametrize("step", [0.2, 0.05])
-def test_a_large_step_is_an_integration_error(experiment: rigidsim.Experiment, step: float) -> None:
-    times, q, w = by_steps(step)
+def test_errors_of_steps_and_tolerances_are_integration_errors(experiment: rigidsim.Experiment) -> None:
+    times, q, w = by_steps(0.05)
     found = rigidsim.compare(experiment, {"t": times, "q": q, "w": w})
     assert found.verdict == "integration_error"
     exact = theirs(1e-13, rows=len(times))[1]
@@ -95,36 +92,8 @@ def test_a_large_step_is_an_integration_error(experiment: rigidsim.Experiment, s
     signs = np.sign(np.einsum("ij,ij->i", unit, exact))[:, None]
     true = (4 * np.arcsin(np.linalg.norm(unit * signs - exact, axis=1) / 2)).max()
     assert found.attitude_error.largest == pytest.approx(true, rel=0.01)
-
-
-@pytest.mark.parametrize("tolerance", [1e-4, 1e-7])
-@pytest.mark.parametrize("rows", [pytest.param(31, marks=pytest.mark.slow), 241])
-def test_a_loose_tolerance_is_an_integration_error(
-    experiment: rigidsim.Experiment, tolerance: float, rows: int
-) -> None:
-    times, q, w = theirs(tolerance, rows=rows)
+    times, q, w = theirs(1e-7)
     assert rigidsim.compare(experiment, {"t": times, "q": q, "w": w}).verdict == "integration_error"
-
-
-@pytest.mark.parametrize("moments", [[1.0, 2.0, 2.525], [1.0, 2.0, 2.5001], [1.2, 2.0, 2.5]])
-@pytest.mark.parametrize("rows", [pytest.param(31, marks=pytest.mark.slow), 241])
-def test_other_moments_are_a_wrong_model(
-    experiment: rigidsim.Experiment, moments: list[float], rows: int
-) -> None:
-    times, q, w = theirs(moments=np.array(moments), rows=rows)
-    found = rigidsim.compare(experiment, {"t": times, "q": q, "w": w})
-    assert found.verdict == "wrong_model"
-    assert found.convention.order == "wxyz"
-
-
-def test_a_missing_load_is_a_wrong_model(experiment: rigidsim.Experiment) -> None:
-    braked = experiment.having(['loads=[{kind="viscous_torque",coefficients=[0.001,0.001,0.001]}]'])
-    times, q, w = theirs()
-    found = rigidsim.compare(braked, {"t": times, "q": q, "w": w})
-    assert found.verdict == "wrong_model"
-    assert found.local_defects is not None
-    missing = found.local_defects.missing_acceleration
-    assert missing == pytest.approx(float(np.sqrt(np.mean(np.sum((0.001 * w / MOMENTS) ** 2, 1)))), rel=0.1)
 
 
 def test_unequal_steps_tell_the_order(experiment: rigidsim.Experiment) -> None:
@@ -234,7 +203,7 @@ SEQUENCES = ["zxz", "zyz", "xyx", "xzx", "yxy", "yzy", "zyx", "xyz", "xzy", "yxz
 TRAJECTORY = theirs(1e-13, rows=61)
 
 
-@settings(deadline=None, max_examples=10, suppress_health_check=[HealthCheck.too_slow])
+@settings(deadline=None, max_examples=6, suppress_health_check=[HealthCheck.too_slow])
 @given(
     sequence=st.sampled_from(["", *SEQUENCES]), fixed=st.booleans(), inverse=st.booleans(),
     last=st.booleans(), degrees=st.booleans(), space=st.booleans(),
@@ -296,8 +265,8 @@ def test_a_motion_in_a_plane_leaves_the_convention_undecided() -> None:
     assert len(found.convention.undecided) > 3
 
 
-def test_times_in_days(experiment: rigidsim.Experiment) -> None:
-    times, q, _ = theirs(1e-12)
+def test_times_in_days_or_mixed_units(experiment: rigidsim.Experiment) -> None:
+    times, q, w = theirs(1e-12)
     found = rigidsim.compare(experiment, pandas.DataFrame({
         "time [day]": times / 86400, "qw": q[:, 0], "qx": q[:, 1], "qy": q[:, 2], "qz": q[:, 3],
     }))  # fmt: skip
@@ -306,6 +275,9 @@ def test_times_in_days(experiment: rigidsim.Experiment) -> None:
     unnamed = rigidsim.compare(experiment, {"t": times * 1000, "q": q})
     assert unnamed.convention.time_unit == "ms"
     assert any("ms" in text for text in unnamed.told)
+    mixed = np.where(np.arange(100) < 98, times[:100] / 100, times[:100] * 100)
+    found = rigidsim.compare(experiment, {"t_s": mixed, "q": q[:100], "w": w[:100]})
+    assert any("mixed units" in text for text in found.told)
 
 
 def write(path: Path, times: np.ndarray, q: np.ndarray, w: np.ndarray, form: str = "%.17g") -> Path:
@@ -314,18 +286,12 @@ def write(path: Path, times: np.ndarray, q: np.ndarray, w: np.ndarray, form: str
     return path
 
 
-def test_few_digits_are_no_error(experiment: rigidsim.Experiment, tmp_path: Path) -> None:
-    found = rigidsim.compare(experiment, write(tmp_path / "short.csv", *theirs(), form="%.6f"))
-    assert found.verdict == "agrees"
-    assert 1e-7 < found.resolution < 1e-5
-
-
 @pytest.mark.parametrize("suffix", ["csv", "parquet", "nc"])
 def test_files(experiment: rigidsim.Experiment, tmp_path: Path, suffix: str) -> None:
     times, q, w = theirs(1e-12)
     path = tmp_path / f"theirs.{suffix}"
-    if suffix == "csv":
-        write(path, times, q, w)
+    if suffix == "csv":  # whose few digits are no error
+        write(path, times, q, w, "%.6f")
     elif suffix == "parquet":
         pytest.importorskip("pyarrow")
         pandas.DataFrame(
@@ -336,7 +302,9 @@ def test_files(experiment: rigidsim.Experiment, tmp_path: Path, suffix: str) -> 
         xarray.Dataset(dims, {"time": times}).to_netcdf(path, engine="h5netcdf")
     figure = tmp_path / "seen.png" if suffix == "csv" else None
     found = rigidsim.compare(experiment, path, out=tmp_path / "seen.h5", figure=figure)
-    assert found.attitude_error.largest < 1e-9
+    assert found.verdict == "agrees"
+    assert found.attitude_error.largest < (1e-9 if suffix != "csv" else 1e-5)
+    assert (1e-7 < found.resolution < 1e-5) == (suffix == "csv")
     assert figure is None or figure.stat().st_size > 20_000
     with xarray.open_dataset(tmp_path / "seen.h5") as saved:
         assert saved["attitude_error"].attrs["units"] == "rad"
@@ -354,25 +322,6 @@ def test_a_message(experiment: rigidsim.Experiment, tmp_path: Path) -> None:
     assert found.verdict == "agrees"
     assert found.convention.order == "xyzw"
     assert found.rows == 31
-    # the same in XML
-    rows = [line.split() for line in path.read_text().splitlines() if line.startswith("2024") and " " in line]
-    names = ("EPOCH", "Q1", "Q2", "Q3", "QC")
-    states = "".join(
-        "<attitudeState><quaternionEphemeris>"
-        + "".join(f"<{name}>{value}</{name}>" for name, value in zip(names, row, strict=True))
-        + "</quaternionEphemeris></attitudeState>"
-        for row in rows
-    )
-    about = "<ATTITUDE_DIR>A2B</ATTITUDE_DIR><TIME_SYSTEM>UTC</TIME_SYSTEM>"
-    about += "<ATTITUDE_TYPE>quaternion</ATTITUDE_TYPE>"
-    xml = tmp_path / "free.xml"
-    xml.write_text(
-        '<?xml version="1.0"?><aem id="CCSDS_AEM_VERS" version="1.0"><body><segment>'
-        f"<metadata>{about}</metadata><data>{states}</data></segment></body></aem>"
-    )
-    again = rigidsim.compare(dated, xml)
-    assert again.attitude_error == found.attitude_error.having(row=again.attitude_error.row)
-    assert again.attitude_error.row.startswith("row ")
 
 
 def test_a_kernel(experiment: rigidsim.Experiment, tmp_path: Path) -> None:
@@ -392,32 +341,6 @@ def test_a_kernel(experiment: rigidsim.Experiment, tmp_path: Path) -> None:
         rigidsim.compare(experiment, path, kernels=[clock])
 
 
-def test_points_of_the_tradeoff(experiment: rigidsim.Experiment, tmp_path: Path) -> None:
-    """A tool that took 40 times the default's CPU time for each simulated second stands there."""
-    times, q, w = theirs(1e-6, rows=61)
-    path = write(tmp_path / "theirs.csv", times, q, w)
-    found = rigidsim.compare(experiment, path)
-    measured = xarray.Dataset(
-        {"cpu_seconds": ("setting", [3.0]), "measured_time": ("setting", [2 * END])},
-        {"setting": [DEFAULT.title], "time": [0.0, END / 2]},
-    )
-    put = with_others(measured, [(found, 60.0)])
-    assert put["other_cpu_ratio"].item() == pytest.approx(60 / END / (3 / (2 * END)))
-    errors = found.dataset["attitude_error"]
-    assert put["other_error"].item() == errors[errors["time"] <= END / 2].max()
-    with pytest.raises(rigidsim.RigidsimError, match="positive CPU time"):
-        rigidsim.tradeoff(experiment, others=[(path, -1.0)])
-
-
-def test_variables_are_exported(experiment: rigidsim.Experiment, tmp_path: Path) -> None:
-    rigidsim.run(experiment, out=tmp_path)
-    [path] = rigidsim.export(tmp_path / "free", "csv", tmp_path / "some.csv", variables=["energy"])
-    assert list(pandas.read_csv(path, comment="#").columns) == ["time", "energy"]
-    for names, kind, told in ((["no"], "csv", "given no; allowed: "), (["energy"], "aem", "prescribes")):
-        with pytest.raises(rigidsim.RigidsimError, match=told):
-            rigidsim.export(tmp_path / "free", kind, tmp_path / "none", variables=names)
-
-
 def at(row: int, value: float, values: np.ndarray) -> np.ndarray:
     """Values with a row multiplied."""
     return np.where(np.arange(len(values))[:, None] == row, value * values, values)
@@ -427,46 +350,32 @@ BROKEN = {
     "not finite": (lambda t, q, w: (t, at(7, np.nan, q), w), "line 9: qw is no finite"),
     "twice": (lambda t, q, w: (np.where(t == t[5], t[4], t), q, w), "line 7 has the time of the row before"),
     "unsorted": (lambda t, q, w: (t[::-1], q, w), "line 3 is earlier than the row before; sort the rows"),
-    "few": (lambda t, q, w: (t[:2], q[:2], w[:2]), "2 rows; at least 3"),
     "none": (lambda t, q, w: (t[:0], q[:0], w[:0]), "0 rows; at least 3"),
     "no rotation": (lambda t, q, w: (t, at(3, 2.0, q), w), "line 5: a quaternion of norm 2"),
     "before": (lambda t, q, w: (t - 5, q, w), "before the experiment's start"),
 }
 
 
-@pytest.mark.parametrize("name", BROKEN)
-def test_what_cannot_be_used_is_refused(experiment: rigidsim.Experiment, tmp_path: Path, name: str) -> None:
-    broken, told = BROKEN[name]
-    path = write(tmp_path / "broken.csv", *broken(*theirs(1e-6, rows=21)))
-    with pytest.raises(rigidsim.RigidsimError, match=told):
-        rigidsim.compare(experiment, path)
-
-
-def test_other_files_are_refused(experiment: rigidsim.Experiment, tmp_path: Path) -> None:
-    empty, bare, odd = tmp_path / "empty.csv", tmp_path / "bare.csv", tmp_path / "odd.xyz"
-    empty.write_text("")
-    bare.write_text("0,1,0,0,0\n1,1,0,0,0\n")
-    odd.write_text("?")
-    for path, told in (
-        (empty, "empty"),
-        (bare, "line of names"),
-        (odd, "no known kind"),
+def test_what_cannot_be_used_is_refused(experiment: rigidsim.Experiment, tmp_path: Path) -> None:
+    good, path = theirs(1e-6, rows=21), tmp_path / "broken.csv"
+    files: list[tuple[Any, str]] = [
+        ({"t": [0.0, 1, 2], "wx": [0.0, 1, 2]}, "no attitude"),
+        ({"q": np.ones((4, 4))}, "no time"),
         (tmp_path / "x.csv", "no such"),
+    ]
+    for name, content, told in (
+        ("empty.csv", "", "empty"),
+        ("bare.csv", "0,1,0,0,0\n1,1,0,0,0\n", "line of names"),
+        ("odd.xyz", "?", "no known kind"),
     ):
+        (tmp_path / name).write_text(content)
+        files.append((tmp_path / name, told))
+    for given_file, told in files:
         with pytest.raises(rigidsim.RigidsimError, match=told):
-            rigidsim.compare(experiment, path)
-    with pytest.raises(rigidsim.RigidsimError, match="no attitude"):
-        rigidsim.compare(experiment, {"t": [0.0, 1, 2], "wx": [0.0, 1, 2]})
-    with pytest.raises(rigidsim.RigidsimError, match="no time"):
-        rigidsim.compare(experiment, {"q": np.ones((4, 4))})
-
-
-def test_mixed_units_of_time_are_told(experiment: rigidsim.Experiment) -> None:
-    times, q, w = theirs(1e-12)
-    q, w = q[:100], w[:100]
-    mixed = np.where(np.arange(100) < 98, times[:100] / 100, times[:100] * 100)
-    found = rigidsim.compare(experiment, {"t_s": mixed, "q": q, "w": w})
-    assert any("mixed units" in text for text in found.told)
+            rigidsim.compare(experiment, given_file)
+    for broken, told in BROKEN.values():
+        with pytest.raises(rigidsim.RigidsimError, match=told):
+            rigidsim.compare(experiment, write(path, *broken(*good)))
 
 
 def test_flights(experiment: rigidsim.Experiment) -> None:
@@ -479,10 +388,3 @@ def test_flights(experiment: rigidsim.Experiment) -> None:
     found = rigidsim.compare(flying, {"t": times, "q": q, "w": w, "position": place, "velocity": speed})
     assert found.position_error == pytest.approx(0.5)
     assert found.verdict == "agrees"
-
-
-@pytest.mark.slow
-def test_a_campaign() -> None:
-    """The study's few files and models, of which the last once made times of another unit fit better."""
-    told: list[str] = []
-    assert compare_conventions.campaign(12, 16, 1, told.append) == 0, told

@@ -12,7 +12,6 @@ import pytest
 import xarray
 
 import rigidsim
-from experiments import fit_campaign
 from rigidsim.errors import ConfigError, RigidsimError, RunFolderError
 from rigidsim.workflows.fit import fitting
 from rigidsim.workflows.fit.predictions import ByDifferences
@@ -167,7 +166,7 @@ def test_of_a_free_body_only_ratios_of_moments_show_and_no_attitude_by_rates_alo
     assert "undetermined" in found._repr_html_()
 
 
-@pytest.mark.slow(40)
+@pytest.mark.slow
 def test_differences_of_runs_give_the_same_fit_as_variational_equations(
     here: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -252,11 +251,11 @@ def test_several_starts_find_what_one_misses(here: Path) -> None:
     keys = '[fit]\nparameters = ["initial.attitude[2]", "initial.angular_velocity[2]"]\n'
     keys += 'prior."initial.angular_velocity" = {sigma = 1.0}\n'
     one = rigidsim.fit(rigidsim.parse(far + keys + TURN))
-    many = rigidsim.fit(rigidsim.parse(far + keys + "starts = 12\n" + TURN))
+    many = rigidsim.fit(rigidsim.parse(far + keys + "starts = 6\n" + TURN))
     assert abs(one.value("initial.angular_velocity[2]") - SPIN) > 0.1
     assert many.value("initial.angular_velocity[2]") == pytest.approx(SPIN, abs=0.02)
-    assert len(many.starts) == 12
-    assert any("of 12 starts" in text for text in many.told)
+    assert len(many.starts) == 6
+    assert any("of 6 starts" in text for text in many.told)
 
 
 def test_dates_count_leap_seconds_and_rows_outside_are_told(here: Path) -> None:
@@ -274,25 +273,23 @@ def test_dates_count_leap_seconds_and_rows_outside_are_told(here: Path) -> None:
 
 BAD: dict[str, tuple[list[Any], str, str]] = {
     "not finite": ([[0, 1], [1, "nan"]], "", r"line 3: x is no finite number \(\"nan\"\)"),
-    "a word": ([[0, "?"], [1, 2]], "", r"line 2: x is no finite number \(\"\?\"\)"),
     "repeated": ([[0, 1], [2, 2], [0, 1]], "", r"line 4 repeats line 2"),
     "outside": ([[20, 1], [21, 2]], "", r"no row lies within the run \(0 to 10 s\)"),
     "a unit of another kind": ([[0, 1], [1, 2]], 'unit = "kg"', "kg"),
-    "an unknown unit": ([[0, 1], [1, 2]], 'unit = "furlong"', "unknown unit"),
     "no column": ([[0, 1], [1, 2]], 'time = "utc"', 'has no column "utc"; its columns are time, x'),
     "no leap second": ([["2015-12-31T23:59:60", 1], ["2016-12-31T23:59:58", 1]], "", "no leap second then"),
 }
 
 
-@pytest.mark.parametrize("name", BAD)
-def test_bad_rows_are_refused_by_their_line(name: str, here: Path) -> None:
-    rows, more, message = BAD[name]
-    table(here / "bad.csv", ["time", "x"], list(zip(*rows, strict=True)))
-    text = (here / "bad.csv").read_text().removeprefix("# observed\n")
-    (here / "bad.csv").write_text(text)
-    config = FREE + '[fit]\nparameters = ["initial.angular_velocity[0]"]\n'
-    with pytest.raises(RigidsimError, match=message):
-        rigidsim.fit(rigidsim.parse(config + data("bad.csv", "energy", ["x"], 0.1, more)))
+ONE = FREE + '[fit]\nparameters = ["initial.angular_velocity[0]"]\n'
+
+
+def test_bad_rows_are_refused_by_their_line(here: Path) -> None:
+    for rows, more, message in BAD.values():
+        lines = ["time,x", *(f"{t},{x}" for t, x in rows)]
+        (here / "bad.csv").write_text("\n".join(lines) + "\n")
+        with pytest.raises(RigidsimError, match=message):
+            rigidsim.fit(rigidsim.parse(ONE + data("bad.csv", "energy", ["x"], 0.1, more)))
 
 
 WRONG = {
@@ -308,30 +305,22 @@ WRONG = {
 }
 
 
-@pytest.mark.parametrize("table_of_fit", WRONG)
-def test_wrong_keys_are_refused(table_of_fit: str, here: Path) -> None:
-    (here / "x.csv").write_text("time,x\n1,1\n2,2\n")
-    with pytest.raises(ConfigError, match=WRONG[table_of_fit]):
-        rigidsim.fit(rigidsim.parse(FREE + f"[fit]\n{table_of_fit}\n" + data("x.csv", "energy", ["x"], 1)))
+SEEN = data("x.csv", "energy", ["x"], 1)
+OBSERVED = (("enrgy", "no variable that can be recorded"), ("position", "no position"),
+            ("quaternion", "has 4"), ("2*pi", "never changes"))  # fmt: skip
 
 
-def test_what_cannot_be_observed_is_refused(here: Path) -> None:
+def test_wrong_keys_and_observables_are_refused(here: Path) -> None:
     (here / "x.csv").write_text("time,x\n1,1\n2,2\n")
-    text = FREE + '[fit]\nparameters = ["initial.angular_velocity[0]"]\n'
-    for observable, message in (("enrgy", "no variable that can be recorded"), ("position", "no position"),
-                                ("quaternion", "has 4"), ("2*pi", "never changes")):  # fmt: skip
+    refused = [
+        *((f"{FREE}[fit]\n{keys}\n{SEEN}", why) for keys, why in WRONG.items()),
+        *((ONE + data("x.csv", observable, ["x"], 1), why) for observable, why in OBSERVED),
+        (FREE, "it names parameters"),
+    ]
+    for text, message in refused:
         with pytest.raises(ConfigError, match=message):
-            rigidsim.fit(rigidsim.parse(text + data("x.csv", observable, ["x"], 1)))
-    dates = data("x.csv", "energy", ["x"], 1, 'time = "day"')
+            rigidsim.fit(rigidsim.parse(text))
     (here / "x.csv").write_text("day,x\n2017-01-01T00:00,1\n2017-01-01T00:00:02,2\n")
-    undated = text.replace('epoch = "2016-12-31T23:59:55 UTC"', "")
+    undated = ONE.replace('epoch = "2016-12-31T23:59:55 UTC"', "")
     with pytest.raises(ConfigError, match="give it one"):
-        rigidsim.fit(rigidsim.parse(undated + dates))
-    with pytest.raises(ConfigError, match="it names parameters"):
-        rigidsim.fit(rigidsim.parse(FREE))
-
-
-@pytest.mark.slow(120)
-def test_errors_of_random_fits_are_as_large_as_their_sigmas_say() -> None:
-    told: list[str] = []
-    assert fit_campaign.campaign(16, 8, 2, told.append) == 0, told
+        rigidsim.fit(rigidsim.parse(undated + data("x.csv", "energy", ["x"], 1, 'time = "day"')))

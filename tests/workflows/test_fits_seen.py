@@ -6,7 +6,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import xarray
 from typer.testing import CliRunner
 
 pytest.importorskip("rerun")
@@ -89,7 +88,13 @@ def test_a_fit_is_viewed_by_its_folder_from_the_command_line(
     assert {f"/scene/body/figure_axis_uncertainty/{part}" for part in ("rim", "surface")} <= entities
 
 
-def test_a_fitted_config_that_was_changed_is_refused(fits: Path) -> None:
+def test_what_is_no_finished_fit_is_refused(fits: Path, tmp_path: Path) -> None:
+    """Nor is a fit a run, nor one whose fitted config was changed."""
+    with pytest.raises(RunFolderError, match="is a fit, no run"):
+        rigidsim.open_run(fits)
+    (tmp_path / "begun.json").write_text("{}")
+    with pytest.raises(RunFolderError, match="unfinished fit"):
+        runs_of([tmp_path])
     fitted = fits / "fitted.toml"
     text = fitted.read_text()
     fitted.write_text(text.replace("[2, 2, 2]", "[2, 2, 2.5]"))
@@ -98,23 +103,3 @@ def test_a_fitted_config_that_was_changed_is_refused(fits: Path) -> None:
     with pytest.raises(RunFolderError, match="was it changed"):
         runs_of([fits])
     fitted.write_text(text)
-
-
-def test_a_fit_is_no_run_and_says_what_shows_it(fits: Path) -> None:
-    with pytest.raises(RunFolderError, match="is a fit, no run"):
-        rigidsim.open_run(fits)
-
-
-def test_an_unfinished_fit_is_not_shown(tmp_path: Path) -> None:
-    (tmp_path / "begun.json").write_text("{}")
-    with pytest.raises(RunFolderError, match="unfinished fit"):
-        runs_of([tmp_path])
-
-
-def test_without_a_covariance_the_motion_alone_is_shown(fits: Path) -> None:
-    from rigidsim.workflows.fit.seen import fitted_run
-    from rigidsim.workflows.read import load
-
-    bare = xarray.load_dataset(fits / "dataset.h5").drop_vars("attitude_covariance")
-    picture, _ = build_picture(fitted_run(load(fits / "fitted.toml"), bare).dataset)
-    assert not picture.stages[0].cones

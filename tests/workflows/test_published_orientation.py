@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import shutil
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -14,7 +13,7 @@ import numpy as np
 import pytest
 import spiceypy
 from scipy.spatial.transform import Rotation
-from support import EAGER, run_text
+from support import run_text
 
 import rigidsim
 from rigidsim.cli.commands.info import info
@@ -93,11 +92,14 @@ def write_librations(path: Path, begin: float, days: int) -> Path:
     return path
 
 
-@pytest.mark.parametrize("axes", ["ICRF", "ecliptic J2000"])
-@pytest.mark.parametrize("precision", ["double", "quadruple", "single"])
+@pytest.mark.parametrize(
+    ("axes", "precision"), [("ICRF", "double"), ("ecliptic J2000", "quadruple"), ("ICRF", "single")]
+)
 def test_elements_of_the_iau_are_their_formulas(axes: str, precision: str) -> None:
     settings = f'frame.axes="{axes}"', f'integrator.precision="{precision}"'
+    before = spiceypy.ktotal("ALL")
     found = run_text(asked(), *settings).dataset
+    assert spiceypy.ktotal("ALL") == before
     right, north, meridian = of_mars(AHEAD + found.time.values)
     turned = 1e-9 if precision == "single" else 0.0  # of times that single precision rounds
     for name, degrees in (("right_ascension", right), ("prime_meridian", meridian)):
@@ -158,51 +160,13 @@ def test_a_binary_kernel_is_its_series(tmp_path: Path) -> None:
     assert found.attrs["orientation_of"] == "axes 31006"
 
 
-@pytest.mark.slow
-def test_it_is_resumed_and_verified_in_every_bit(tmp_path: Path) -> None:
-    kernels = tmp_path / "kernels"
-    kernels.mkdir()
-    shutil.copy(IAU, kernels)
-    text = asked(kernels / "iau2015.tpc", "moon")
-    whole = run_text(text, 'name="whole"', tmp_path)
-    part = run_text(text, 'name="part"', "limits.max_steps=20", tmp_path, tuning=EAGER)
-    assert part.status == "stopped: max_steps"
-    done = rigidsim.resume(tmp_path / "part", overrides={"limits.max_steps": 10**6})
-    assert done.status == "finished"
-    for name, variable in whole.dataset.variables.items():
-        assert np.array_equal(variable.values, done.dataset[name].values), name
-    assert rigidsim.verify(tmp_path / "part").identical
-    shutil.move(kernels, tmp_path / "elsewhere")  # looked for beside the config, and where folders are named
-    with pytest.raises(rigidsim.RigidsimError, match="RIGIDSIM_KERNELS"):
-        rigidsim.verify(tmp_path / "part")
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("RIGIDSIM_KERNELS", str(tmp_path / "elsewhere"))
-        assert rigidsim.verify(tmp_path / "part").identical
-        changed = tmp_path / "elsewhere" / "iau2015.tpc"
-        changed.write_text(changed.read_text().replace("38.3213", "38.3214"))
-        with pytest.raises(rigidsim.RigidsimError, match=r'"iau2015.tpc" of SHA-256 .* but the one found'):
-            rigidsim.verify(tmp_path / "part")
-
-
-def test_members_of_a_sweep_have_it(tmp_path: Path) -> None:
-    text = asked().replace("[output]", "[sweep]\naxes.\"body.principal_moments[2]\" = {values = [1.3, 1.4]}\n"
-                           'keep = ["final", "series"]\n[output]')  # fmt: skip
-    swept = rigidsim.sweep(rigidsim.parse(text), out=tmp_path, workers=1)
-    one = run_text(asked(), "body.principal_moments[2]=1.4").dataset
-    with swept.dataset as found:
-        assert np.array_equal(found.published_angle.values[1], one.published_angle.values)
-        assert found.published_angle_final.values[1] == one.published_angle.values[-1]
-        assert found.attrs["orientation_kernel"] == "iau2015.tpc"
-
-
-def test_it_is_drawn() -> None:
-    drawn = figure(run_text(asked()).dataset, "published")
+def test_it_is_drawn_and_info_tells_how_far_the_run_is(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    run = run_text(asked(), tmp_path)
+    drawn = figure(run.dataset, "published")
     titles = [axes.get_title(loc="left") for axes in drawn.axes]
     assert any("iau2015.tpc" in title for title in titles), titles
-
-
-def test_info_tells_how_far_the_run_is(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    run = run_text(asked(), tmp_path)
     info(tmp_path / "top", as_json=False)
     told = re.search(
         r"published +at most (\S+)° from the attitude in iau2015.tpc, (\S+)°", capsys.readouterr().out
@@ -213,12 +177,6 @@ def test_info_tells_how_far_the_run_is(tmp_path: Path, capsys: pytest.CaptureFix
     assert float(told[2]) == pytest.approx(float(angle.mean()), rel=1e-3)
 
 
-def test_the_pool_of_spice_is_left_as_it_was() -> None:
-    before = spiceypy.ktotal("ALL")
-    run_text(asked())
-    assert spiceypy.ktotal("ALL") == before
-
-
 def _cut(path: Path) -> None:
     path.write_bytes(path.read_bytes()[:2500])
 
@@ -227,57 +185,50 @@ def _other(path: Path) -> None:
     path.write_bytes(b"DAF/SPK " + path.read_bytes()[8:])
 
 
-@pytest.mark.parametrize(
-    ("settings", "said"),
-    [
-        (['output.orientation="iau2015"'], "is no path"),
-        (['output.orientation="./nowhere.tpc"'], "isn't there"),
-        (['output.orientation="./"'], "is a folder"),
-        (['output.orientation_of="marz"'], "has nothing of .*marz.*did you mean.*mars.*moon, mars"),
-        (['output.orientation_of="saturn"'], "it has moon, mars"),
-        (['output.orientation_of="-99"'], "it has moon, mars"),
-        (["output.orientation_of="], "no body is named"),
-        (["output.orientation="], "without .output. orientation"),
-        (["time.epoch="], r"\[time\] epoch"),
-        (["frame.axes="], r"\[frame\] axes"),
-        (['frame.axes="EME2000"'], "0.02 arcsec"),
-        (['output.record=["angular_velocity"]'], "name quaternion"),
-        (['integrator.formulation="rates"'], "which this model hasn't"),
-    ],
-)
-def test_nonsense_is_refused(settings: list[str], said: str) -> None:
-    with pytest.raises(rigidsim.ConfigError, match=said):
-        run_text(asked(), *settings)
+REFUSED = [
+    (['output.orientation="iau2015"'], "is no path"),
+    (['output.orientation="./nowhere.tpc"'], "isn't there"),
+    (['output.orientation="./"'], "is a folder"),
+    (['output.orientation_of="marz"'], "has nothing of .*marz.*did you mean.*mars.*moon, mars"),
+    (['output.orientation_of="-99"'], "it has moon, mars"),
+    (["output.orientation_of="], "no body is named"),
+    (["output.orientation="], "without .output. orientation"),
+    (["time.epoch="], r"\[time\] epoch"),
+    (["frame.axes="], r"\[frame\] axes"),
+    (['frame.axes="EME2000"'], "0.02 arcsec"),
+    (['output.record=["angular_velocity"]'], "name quaternion"),
+    (['integrator.formulation="rates"'], "which this model hasn't"),
+]
 
 
-@pytest.mark.parametrize(
-    ("spoil", "said"),
-    [
-        (_cut, "SPICE refuses|damaged"),
-        (_other, r"positions of bodies, which \[ephemeris\] kernel takes"),
-        (lambda path: path.write_bytes(b""), "is no PCK"),
-        (lambda path: path.write_text("KPL/PCK\n\\begindata\nBODY499_POLE_RA = ( 1 2\n"), "SPICE refuses"),
-        (lambda path: path.write_text("KPL/PCK\n\\begindata\nBODY499_POLE_RA = (1 2 3)\n"), "SPICE refuses"),
-        (lambda path: path.write_text("KPL/PCK\nnothing\n"), "no pole of any body"),
-    ],
-)
-def test_damaged_kernels_are_refused(tmp_path: Path, spoil: Callable[[Path], Any], said: str) -> None:
+def test_nonsense_is_refused() -> None:
+    for settings, said in REFUSED:
+        with pytest.raises(rigidsim.ConfigError, match=said):
+            run_text(asked(), *settings)
+
+
+DAMAGED: list[tuple[Callable[[Path], Any], str]] = [
+    (_cut, "SPICE refuses|damaged"),
+    (_other, r"positions of bodies, which \[ephemeris\] kernel takes"),
+    (lambda path: path.write_bytes(b""), "is no PCK"),
+    (lambda path: path.write_text("KPL/PCK\n\\begindata\nBODY499_POLE_RA = (1 2 3)\n"), "SPICE refuses"),
+    (lambda path: path.write_text("KPL/PCK\nnothing\n"), "no pole of any body"),
+]
+
+
+def test_damaged_kernels_are_refused(tmp_path: Path) -> None:
+    late = write_librations(tmp_path / "late.bpc", 2447970.5, 160)
+    with pytest.raises(rigidsim.ConfigError, match=r"which goes from 1990-03.* but the run from 1990-03-04"):
+        run_text(asked(late, None))
     kernel = write_librations(tmp_path / "moon.bpc", 2447900.5, 160)
-    spoil(kernel)
-    with pytest.raises(rigidsim.ConfigError, match=said):
-        run_text(asked(kernel))
-
-
-@pytest.mark.parametrize(("begin", "of", "said"), [
-    (2447970.5, None, "which goes from 1990-03.* but the run from 1990-03-04"),
-    (2447900.5, "301", "a number of those that it has is allowed: 31006"),
-])  # fmt: skip
-def test_binary_kernels_without_the_run_are_refused(
-    tmp_path: Path, begin: float, of: str | None, said: str
-) -> None:
-    kernel = write_librations(tmp_path / "moon.bpc", begin, 160)
-    with pytest.raises(rigidsim.ConfigError, match=said):
-        run_text(asked(kernel, of))
+    with pytest.raises(rigidsim.ConfigError, match="a number of those that it has is allowed: 31006"):
+        run_text(asked(kernel, "301"))
+    whole = kernel.read_bytes()
+    for spoil, said in DAMAGED:
+        kernel.write_bytes(whole)
+        spoil(kernel)
+        with pytest.raises(rigidsim.ConfigError, match=said):
+            run_text(asked(kernel))
 
 
 def test_without_spiceypy_it_is_told(monkeypatch: pytest.MonkeyPatch) -> None:

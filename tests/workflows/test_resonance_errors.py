@@ -40,7 +40,7 @@ def test_what_is_not_measured_says_why_and_that_nothing_is_known() -> None:
 
 @pytest.mark.slow
 def test_announced_errors_of_librating_bodies_are_true() -> None:
-    """Four of those that ``python -m experiments.averaging.resonances`` counts."""
-    found = [axis for _, axes in members(4, seed=11) for axis in axes]
-    assert len(found) >= 6
+    """Two of those that ``python -m experiments.averaging.resonances`` counts."""
+    found = [axis for _, axes in members(2, seed=11) for axis in axes]
+    assert len(found) >= 3
     assert sound(found)

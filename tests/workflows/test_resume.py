@@ -18,74 +18,32 @@ from rigidsim.store import atomic, provenance
 
 # arguments of ``config``, which by default is an asymmetric free body
 FREE: dict[str, str] = {}
-TOP = {
-    "body": 'principal_moments = [1, 1, "0.3 kg m^2"]\nmass = 1\ncenter_of_mass = [0, 0, 0.2]',
-    "initial": "angular_velocity = [0.1, 0.2, 9]\neuler_angles = [0.2, 0.6, 0.7]",
-    "loads": 'kind = "uniform_gravity"',
-}
 DRIVEN = {"loads": 'kind = "torque"\ncomponents = ["0.1*sin(t)", "0", "0.05*wx"]'}
 SWITCHING = {
     "loads": 'kind = "torque"\ncomponents = ["0.1*sign(sin(3*t))", "-0.2*abs(wy)*wy", "0.05*max(wx, wz)"]'
 }
-TURNING = {"loads": 'kind = "torque"\ncomponents = ["0", "-0.05*wrap(phi)", "-0.01*psi"]'}
 FRICTION = {"loads": 'kind = "torque"\ncomponents = ["0", "-0.05*wy", "-0.2*sign(wz)"]'}
-LIBRATION = {
-    "loads": 'kind = "gravity_gradient"\ngravitational_parameter = 1\n'
-    "orbit = {semi_major_axis = 2, eccentricity = 0.1, inclination = 0.3, period = 17}"
-}
-FLIGHT = {
-    "body": 'shape = "cuboid"\nsize = [1, 2, 3]\nmass = 2',
-    "initial": "angular_velocity = [0.3, 1.0, 0.5]\nposition = [4, 0, 1]\nvelocity = [0, 0.5, 0.1]",
-    "loads": 'kind = "central_gravity"\ngravitational_parameter = 1',
-}
 # no double residual holds their last bits
 TINY = {"initial": 'angular_velocity = ["1e-250", 1.0, "1e-290"]\neuler_angles = [0.2, 1.1, 0.7]'}
 EVENTS = '[[events]]\nname = "flip"\nexpression = "wz"\n'
 
 # tables, [integrator], [time], rest
 CASES = {
-    "single": (FREE, 'precision = "single"', "end = 60\nsamples = 121", ""),
-    "double, dense": (FREE, "", "end = 60\nsamples = 1201", ""),
     "double, sparse": (FREE, "", "end = 2000\nsamples = 4", ""),
-    "double, rates": (FREE, 'formulation = "rates"', "end = 60\nsamples = 121",
-                      'record = ["angular_velocity"]\n'),
-    "double, quaternion and derived angles": (FREE, "", "end = 60\nsamples = 121",
-                      'record = ["quaternion", "euler_angles", "energy"]\n'),
     "double, sparse, derived angles": (FREE, "", "end = 3000\nsamples = 31",
                                        'record = ["quaternion", "euler_angles"]\n'),
-    "double, Euler angles": (FREE, 'formulation = "euler_angles"', "end = 60\nsamples = 121", ""),
-    "double, rotation matrix": (FREE, 'formulation = "rotation_matrix"', "end = 60\nsamples = 121", ""),
-    "double, canonical": (TOP, 'formulation = "canonical"', "end = 40\nsamples = 401", ""),
     "double, uneven times": (FREE, "", "times = [0, 0.01, 7, 7.001, 90, 90.5, 200, 201]", ""),
-    "double, held invariants": (FREE, "hold_invariants = true", "end = 600\nsamples = 41", ""),
-    "double, held invariants, angles": (FREE, 'hold_invariants = true\nformulation = "euler_angles"',
-                                        "end = 300\nsamples = 601", ""),
     "extended, held invariants, events": (FREE, 'hold_invariants = true\nprecision = "extended"',
                                           "end = 600\nsamples = 601", EVENTS),
     "double, sensitivities": (DRIVEN, "", "end = 60\nsamples = 121",
                               'sensitivity = ["initial.attitude", "body.principal_moments[0]"]\n'),
-    "extended, sensitivities, sparse": (FREE, 'precision = "extended"\nformulation = "euler_angles"',
-                                        "end = 600\nsamples = 13",
-                                        'sensitivity = ["initial.angular_velocity[1]"]\n'),
-    "double, driven": (DRIVEN, "", "end = 60\nsamples = 121", ""),
     "double, switching": (SWITCHING, "", "end = 40\nsamples = 81", EVENTS),
-    "double, switching, Euler angles": (TURNING, 'formulation = "euler_angles"',
-                                        "end = 40\nsamples = 81", ""),
     "extended, sliding": (FRICTION, 'precision = "extended"', "end = 20\nsamples = 41", EVENTS),
-    "double, gravity gradient": (LIBRATION, "", "end = 60\nsamples = 121", ""),
-    "double, six degrees of freedom": (FLIGHT, "", "end = 60\nsamples = 121", ""),
     "double, events": (FREE, "", "end = 100\nsamples = 101", EVENTS),
     "double, events, angles, dates": (FREE, 'formulation = "euler_angles"',
                                       'end = 60\nsamples = 13\nepoch = "2016-12-31T23:59:30 UTC"', EVENTS),
     "double, ended by an event": (DRIVEN, "", "end = 500\nsamples = 501",
                                   '[[events]]\nname = "late"\nexpression = "t - 123.45"\naction = "stop"\n'),
-    "extended": (FREE, 'precision = "extended"', "end = 60\nsamples = 121", ""),
-    "extended, Euler angles, events": (FREE, 'precision = "extended"\nformulation = "euler_angles"',
-                                       "end = 60\nsamples = 61", EVENTS),
-    "quadruple": (FREE, 'precision = "quadruple"', "end = 20\nsamples = 81", ""),
-    "quadruple, tiny components": (TINY, 'precision = "quadruple"', "end = 10\nsamples = 21", ""),
-    "quadruple, driven, events": (DRIVEN, 'precision = "quadruple"', "end = 15\nsamples = 31", EVENTS),
-    "30 digits": (FREE, "precision = 30", "end = 10\nsamples = 41", ""),
     "30 digits, tiny components": (TINY, "precision = 30", "end = 5\nsamples = 11", ""),
     "50 digits, angles": (FREE, 'precision = 50\nformulation = "euler_angles"', "end = 4\nsamples = 9", ""),
 }  # fmt: skip
@@ -110,27 +68,10 @@ def resumed_to_the_end(run: rigidsim.Run, *overrides: str, most: int = 400) -> t
     raise AssertionError(f"not finished after {most} sessions")
 
 
-# the others in code that compiles faster: whether a run is cut or not, it is the same code
-UNROLLED = ("single", "double, dense", "double, sparse", "double, Euler angles", "quadruple")
-USUAL = (
-    "double, sparse, derived angles",
-    "30 digits, tiny components",
-)
+USUAL = ("double, uneven times", "30 digits, tiny components")
 
 
-@pytest.mark.parametrize(
-    "case",
-    [
-        pytest.param(
-            c,
-            marks=[
-                *([pytest.mark.optimised] if c in UNROLLED else []),
-                *([] if c in USUAL else [pytest.mark.slow]),
-            ],
-        )
-        for c in CASES
-    ],
-)
+@pytest.mark.parametrize("case", cases(CASES, USUAL))
 def test_a_run_cut_many_times_is_the_run_in_one_go(case: str, tmp_path: Path) -> None:
     text = text_of(case)
     whole = rigidsim.run(rigidsim.parse(text), out=tmp_path / "whole", tuning=IMPATIENT)
@@ -160,26 +101,25 @@ def short(tmp_path_factory: pytest.TempPathFactory) -> tuple[str, rigidsim.Run]:
     return text, rigidsim.run(rigidsim.parse(text), out=tmp_path_factory.mktemp("whole"))
 
 
-MOMENTS = ("before the name", "after the name", "folder not synced")
-
-
 class Cut(BaseException):
     """As sudden as a kill: nothing is saved after it."""
 
 
-@pytest.mark.parametrize("moment", cases(MOMENTS, ("before the name",)))
-@pytest.mark.parametrize(
-    "target",
-    cases(
-        ["00000000.h5", "00000003.h5", "dataset.h5", "checkpoint.h5", "summary.json"],
-        ["dataset.h5"],
-    ),
-)
+CRASHES = [
+    ("before the name", "dataset.h5"),
+    ("after the name", "00000003.h5"),
+    ("after the name", "dataset.h5"),
+    ("folder not synced", "checkpoint.h5"),
+    ("before the name", "summary.json"),
+]
+
+
+@pytest.mark.parametrize("crash", cases(CRASHES, CRASHES[:1]))
 def test_a_crash_at_any_file(
-    moment: str, target: str, short: tuple[str, rigidsim.Run], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    crash: tuple[str, str], short: tuple[str, rigidsim.Run], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The files of a run come into being one by one; between any two a process can die."""
-    text, whole = short
+    (moment, target), (text, whole) = crash, short
     replace, sync = os.replace, atomic.sync_folder
     named = []
 
@@ -221,7 +161,7 @@ def test_a_full_disk_while_the_dataset_is_written(tmp_path: Path, monkeypatch: p
     whole = rigidsim.run(rigidsim.parse(text), out=tmp_path / "whole")
     size = whole.folder.dataset.stat().st_size
     write = Sink.write
-    for room in (0, 3000, size // 2, size - 3000):
+    for room in (0, size // 2):
 
         def small(self: Sink, content: Any) -> int:
             before = resource.getrlimit(resource.RLIMIT_FSIZE)
@@ -240,20 +180,16 @@ def test_a_full_disk_while_the_dataset_is_written(tmp_path: Path, monkeypatch: p
         same_bits(whole, rigidsim.resume(out / "cut"))
 
 
-@pytest.mark.parametrize(
-    "limits", cases(["max_steps = 100", 'wall_time = "1 ms"', "max_drift = 1e-17"], ["max_steps = 100"])
-)
-def test_a_guard_can_be_moved_when_resuming(limits: str, tmp_path: Path) -> None:
+def test_a_guard_can_be_moved_when_resuming(tmp_path: Path) -> None:
+    limits = "max_steps = 100"
     text = text_with("end = 60\nsamples = 121")
     whole = rigidsim.run(rigidsim.parse(text), out=tmp_path / "whole", tuning=IMPATIENT)
     stopped = rigidsim.run(
         rigidsim.parse(text.replace("[limits]\n", f"[limits]\n{limits}\n")), out=tmp_path, tuning=IMPATIENT
     )
-    key = limits.split(" =")[0]
-    assert stopped.status == f"stopped: {key}"
+    assert stopped.status == "stopped: max_steps"
     assert stopped.summary["exit_code"] == 3
-    far = {"max_steps": "1000000", "wall_time": "1 h", "max_drift": "1"}[key]
-    done = rigidsim.resume(stopped.folder.path, overrides=[f"limits.{key}={far}"], tuning=IMPATIENT)
+    done = rigidsim.resume(stopped.folder.path, overrides=["limits.max_steps=1000000"], tuning=IMPATIENT)
     assert done.status == "finished"
     same_bits(whole, done)
     assert limits in done.folder.config.read_text()  # the config is the one that was given
@@ -284,29 +220,18 @@ def test_its_announced_errors_are_those_of_the_run_in_one_go(
     assert done.summary["accuracy"] == whole.summary["accuracy"]
 
 
-def test_only_guards_can_be_set(tmp_path: Path) -> None:
-    stopped = rigidsim.run(
-        rigidsim.parse(text_with("end = 300\nevery = 1", "max_steps = 10")), out=tmp_path, tuning=IMPATIENT
-    )
-    with pytest.raises(RunFolderError, match=r"time\.end=7: would change the experiment; only limits\.KEY"):
-        rigidsim.resume(stopped.folder.path, overrides=["time.end=7"], tuning=IMPATIENT)
-
-
 # --- a later end ------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("times", ["end = 60\nevery = 0.5"])
-@pytest.mark.parametrize(
-    "case", cases(["double, events", "double, Euler angles", "quadruple"], ["double, events"])
-)
-@pytest.mark.parametrize("begun", cases(["finished", "partial"], ["finished"]))
-def test_a_later_end(case: str, times: str, begun: str, tmp_path: Path) -> None:
+LATER = [("double, events", "finished"), ("50 digits, angles", "partial")]
+
+
+@pytest.mark.parametrize("given", cases(LATER, LATER[:1]))
+def test_a_later_end(given: tuple[str, str], tmp_path: Path) -> None:
     """A finished run goes on, and an unfinished one, with the bits of a run that was as long at once."""
-    scale = 10 if "quadruple" in case else 1
-    times = times.replace("60", str(60 // scale))
-    end = 90 // scale
-    later = times.replace(f"end = {60 // scale}", f"end = {end}")
-    later = later.replace("samples = 121", "samples = 181")
+    case, begun = given
+    first, end = (6, 9) if "digits" in case else (60, 90)
+    times, later = (f"end = {last}\nevery = 0.5" for last in (first, end))
     whole = rigidsim.run(rigidsim.parse(text_of(case, later)), out=tmp_path / "whole", tuning=IMPATIENT)
     guard = "max_steps = 5" if begun == "partial" else ""
     run = rigidsim.run(rigidsim.parse(text_of(case, times, guard)), out=tmp_path / "cut", tuning=IMPATIENT)
@@ -320,46 +245,20 @@ def test_a_later_end(case: str, times: str, begun: str, tmp_path: Path) -> None:
     assert rigidsim.verify(done.folder.path).identical
 
 
-@pytest.mark.slow
-def test_a_prolonged_run_that_is_killed_is_resumed_to_its_later_end(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    whole = rigidsim.run(
-        rigidsim.parse(text_with("end = 90\nsamples = 181")), out=tmp_path / "whole", tuning=EAGER
-    )
-    run = rigidsim.run(
-        rigidsim.parse(text_with("end = 60\nsamples = 121")), out=tmp_path / "cut", tuning=EAGER
-    )
-    replace = os.replace
-
-    def crashing(source: Any, to: Any) -> None:
-        if Path(to).name == "00000002.h5":
-            raise Cut
-        replace(source, to)
-
-    with monkeypatch.context() as patch:
-        patch.setattr(os, "replace", crashing)
-        with pytest.raises(Cut):
-            rigidsim.resume(run.folder.path, until="90", tuning=EAGER)
-    done = rigidsim.resume(run.folder.path, tuning=EAGER)
-    same_bits(whole, done)
-
-
-@pytest.mark.parametrize(
-    ("until", "says"),
-    [
+def test_what_would_change_the_experiment_leaves_a_finished_run_finished(tmp_path: Path) -> None:
+    run = rigidsim.run(rigidsim.parse(text_with("end = 60\nsamples = 121")), out=tmp_path)
+    before = {p.name: p.read_bytes() for p in run.folder.path.iterdir()}
+    for until, says in (
         ("50", "no later than the run's end"),
         ("60", "no later than the run's end"),
         ("60.3", "lies between two samples of the grid"),
         ("-inf", "time"),
         ("soon", "time"),
-    ],
-)
-def test_a_bad_later_end_leaves_a_finished_run_finished(until: str, says: str, tmp_path: Path) -> None:
-    run = rigidsim.run(rigidsim.parse(text_with("end = 60\nsamples = 121")), out=tmp_path)
-    before = {p.name: p.read_bytes() for p in run.folder.path.iterdir()}
-    with pytest.raises((RunFolderError, ConfigError), match=says):
-        rigidsim.resume(run.folder.path, until=until)
+    ):
+        with pytest.raises((RunFolderError, ConfigError), match=says):
+            rigidsim.resume(run.folder.path, until=until)
+    with pytest.raises(RunFolderError, match=r"time\.end=7: would change the experiment; only limits\.KEY"):
+        rigidsim.resume(run.folder.path, overrides=["time.end=7"])
     assert {p.name: p.read_bytes() for p in run.folder.path.iterdir()} == before
 
 
@@ -441,53 +340,49 @@ def test_nothing_saved_begins_anew(tmp_path: Path, monkeypatch: pytest.MonkeyPat
 CHANGES = {
     "a value": (lambda t: t.replace("0.3, 1.0", "0.3, 1.1"), r"line 5 is .*1\.1, 0\.5.*it was .*1\.0, 0\.5"),
     "a comment": (lambda t: "# mine\n" + t, 'line 1 is "# mine"'),
-    "a table at the end": (lambda t: t + '[[events]]\nname = "e"\nexpression = "wz"\n', "lines"),
-    "a setting at the end": (lambda t: t + "#:set body.principal_moments=[1,2,2.6]\n", "lines"),
 }
 
 
-@pytest.mark.parametrize("change", cases(list(CHANGES)[:2], ["a comment"]))
-def test_a_changed_config_is_refused(change: str, tmp_path: Path) -> None:
+def test_a_changed_config_is_refused(tmp_path: Path) -> None:
     text = text_with("end = 60\nsamples = 121", "max_steps = 20")
     run = rigidsim.run(rigidsim.parse(text), out=tmp_path, tuning=IMPATIENT)
-    edit, says = CHANGES[change]
-    run.folder.config.write_text(edit(text))
-    with pytest.raises(RunFolderError, match=rf"config\.toml: was changed since the run began \(.*{says}"):
-        rigidsim.resume(run.folder.path, tuning=IMPATIENT)
+    for edit, says in CHANGES.values():
+        run.folder.config.write_text(edit(text))
+        with pytest.raises(
+            RunFolderError, match=rf"config\.toml: was changed since the run began \(.*{says}"
+        ):
+            rigidsim.resume(run.folder.path, tuning=IMPATIENT)
     run.folder.config.write_text(text)
     assert resumed_to_the_end(run)[0].status == "finished"
 
 
-def test_another_process_at_work_is_not_disturbed(tmp_path: Path) -> None:
-    run = rigidsim.run(
-        rigidsim.parse(text_with("end = 300\nevery = 1", "max_steps = 150")), out=tmp_path, tuning=IMPATIENT
-    )
+def test_another_process_or_a_link_is_not_disturbed(tmp_path: Path) -> None:
+    text = text_with("end = 300\nevery = 1", "max_steps = 150")
+    run = rigidsim.run(rigidsim.parse(text), out=tmp_path, tuning=IMPATIENT)
     before = sorted((p.name, p.read_bytes()) for p in run.folder.segments.iterdir())
     with run.folder.locked():
         with pytest.raises(RunFolderError, match="another process is at work there"):
             rigidsim.resume(run.folder.path, tuning=IMPATIENT)
         with pytest.raises(RunFolderError, match="another process is at work there"):
-            rigidsim.run(run.folder.config, out=tmp_path, force=True, tuning=IMPATIENT)
+            rigidsim.run(rigidsim.parse(text), out=tmp_path, force=True, tuning=IMPATIENT)
+    elsewhere = tmp_path / "elsewhere"
+    for what in ("segments", "segments/00000000.h5", "config.toml", ".dataset.h5.partial"):
+        place = run.folder.path / what
+        there = place.exists()
+        if there:
+            place.rename(elsewhere)
+        else:
+            elsewhere.write_text("mine")
+        place.symlink_to(elsewhere)
+        with pytest.raises(RunFolderError, match=r"is a symbolic link, which no run writes"):
+            rigidsim.resume(run.folder.path, tuning=IMPATIENT)
+        place.unlink()
+        if there:
+            elsewhere.rename(place)
+        else:
+            assert elsewhere.read_text() == "mine"
     assert sorted((p.name, p.read_bytes()) for p in run.folder.segments.iterdir()) == before
     assert resumed_to_the_end(run)[0].status == "finished"
-
-
-@pytest.mark.parametrize("what", ["segments", "segments/00000000.h5", "config.toml", ".dataset.h5.partial"])
-def test_links_out_of_the_folder_are_refused(what: str, tmp_path: Path) -> None:
-    run = rigidsim.run(
-        rigidsim.parse(text_with("end = 300\nevery = 1", "max_steps = 20")),
-        out=tmp_path / "r",
-        tuning=IMPATIENT,
-    )
-    place, elsewhere = run.folder.path / what, tmp_path / "elsewhere"
-    if place.exists():
-        place.rename(elsewhere)
-    else:
-        elsewhere.write_text("mine")
-    place.symlink_to(elsewhere)
-    with pytest.raises(RunFolderError, match=r"is a symbolic link, which no run writes"):
-        rigidsim.resume(run.folder.path, tuning=IMPATIENT)
-    assert elsewhere.exists()
 
 
 def test_other_versions_are_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

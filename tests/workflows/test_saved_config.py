@@ -8,7 +8,6 @@ import pytest
 from support import IMPATIENT, config, loaded
 
 import rigidsim
-from rigidsim import RunFolderError
 from rigidsim.workflows.read import embedded
 
 TEXT = config(time="end = 10 # long\nevery = 0.5", more="# the end", name="cut")
@@ -52,13 +51,3 @@ def test_what_was_given_outlives_a_resume(tmp_path: Path) -> None:
     assert rigidsim.parse(TEXT, overrides=attributes["config_set"].splitlines()).text == attributes["config"]
     assert done.folder.config.read_text() == attributes["config"]
     assert rigidsim.verify(done.folder.path).identical
-
-
-def test_an_earlier_end_is_no_prolonging(tmp_path: Path) -> None:
-    run = guarded(TEXT, tmp_path)
-    text = run.folder.config.read_text()
-    run.folder.config.write_text(text.replace("end = 60", "end = 50"))
-    with pytest.raises(RunFolderError, match="was changed since the run began"):
-        rigidsim.resume(run.folder.path)
-    run.folder.config.write_text(text.replace("end = 60", "end = 65"))
-    assert loaded(rigidsim.resume(run.folder.path, overrides=["limits.max_steps=100000"])).time[-1] == 65

@@ -93,94 +93,71 @@ def _span(text: str, settings: tuple[str, ...]) -> tuple[Fraction, Fraction]:
     return config.start.rational, config.end.rational
 
 
-@pytest.mark.parametrize("kind", ["ck", "pck"])
+@pytest.fixture(scope="module")
+def sat(tmp_path_factory: pytest.TempPathFactory) -> Any:
+    """The satellite's run with its announced error."""
+    return run_text(SATELLITE, "output.estimate=true", tmp_path_factory.mktemp("runs"))
+
+
+T2029, POLE = Fraction(924083160), ("initial.quaternion=[1, 0, 0, 0]", "initial.angular_velocity=[0, 0, 0.1]")
+UTC = "2020-04-13T21:46:00 UTC"  # known to a double of seconds
+SLOW = ('initial.angular_velocity=["1e-8 rad/s", "2e-8 rad/s", "2.6e-6 rad/s"]', 'time.end="3652 day"',
+        'time.epoch="1985-06-28T00:00:00 TDB"')  # fmt: skip
+KINKS = 'loads=[{kind = "torque", components = ["0.01*abs(sin(t/10))", "0", "0"]}]'
+TURNED = Rotation.from_rotvec([np.radians(84381.406 / 3600), 0, 0])
+
+
 @pytest.mark.parametrize(
-    ("settings", "ahead"),
+    ("kind", "settings", "ahead", "says"),
     [
-        ((), Fraction(924083160)),
-        (('time.epoch="1969-06-28T00:00:00 TDB"',), Fraction(-962884800)),
-        (('time.epoch="J2000"', "initial.angular_velocity=[1, 30, 120]", "time.end=2"),
-         Fraction(0)),
-        (("time.start=-250.5", "time.end=0.5", "time.samples=3"), Fraction(924083160)),
-        pytest.param(('integrator.precision="quadruple"',), Fraction(924083160), marks=pytest.mark.slow),
+        ("ck", ("time.start=-250.5", "time.end=0.5", "time.samples=3"), T2029, ""),
+        ("pck", ('time.epoch="1969-06-28T00:00:00 TDB"',), Fraction(-962884800), ""),
+        ("ck", ('time.epoch="J2000"', "initial.angular_velocity=[1, 30, 120]", "time.end=0.5"),
+         Fraction(0), ""),
+        ("ck", (f'time.epoch="{UTC}"',), parse_epoch(UTC).since_j2000(), ""),
+        # the ecliptic is turned to the equator
+        ("ck", ('frame.axes="ecliptic J2000"',), T2029, "84381.406"),
+        ("pck", ('frame.axes="ecliptic J2000"',), T2029, "84381.406"),
+        # the angles of a PCK aren't defined at the equator's own pole
+        ("pck", POLE, T2029, "relative to ECLIPJ2000"),
+        # ten years of a body of the Moon's rate, and an eighth of a second
+        pytest.param("pck", SLOW, Fraction(-457963200), "", marks=pytest.mark.slow),
+        ("ck", ("time.end=0.125",), T2029, ""),
     ],
 )  # fmt: skip
-def test_spice_reads_the_run(kind: str, settings: tuple[str, ...], ahead: Fraction, tmp_path: Path) -> None:
+def test_spice_reads_the_run(
+    kind: str, settings: tuple[str, ...], ahead: Fraction, says: str, tmp_path: Path
+) -> None:
+    before = spiceypy.ktotal("ALL")
     _, files = written(SATELLITE, kind, tmp_path, *settings)
-    agrees(SATELLITE, settings, files, ahead, "SAT")
-
-
-@pytest.mark.parametrize("kind", ["ck", "pck"])
-def test_ecliptic_axes_are_turned_to_the_equator(kind: str, tmp_path: Path) -> None:
-    setting = 'frame.axes="ecliptic J2000"'
-    _, files = written(SATELLITE, kind, tmp_path, setting)
-    turn = Rotation.from_rotvec([np.radians(84381.406 / 3600), 0, 0])
-    agrees(SATELLITE, (setting,), files, Fraction(924083160), "SAT", turn=turn)
-    assert "84381.406" in told(files[0])
-
-
-def test_a_date_in_utc_is_known_to_a_double_of_seconds(tmp_path: Path) -> None:
-    setting = 'time.epoch="2020-04-13T21:46:00 UTC"'
-    _, files = written(SATELLITE, "ck", tmp_path, setting)
-    agrees(SATELLITE, (setting,), files, parse_epoch("2020-04-13T21:46:00 UTC").since_j2000(), "SAT")
-
-
-@pytest.mark.slow
-def test_long_and_short_spans(tmp_path: Path) -> None:
-    """Ten years of a body of the Moon's rate, and an eighth of a second."""
-    slow = ('initial.angular_velocity=["1e-8 rad/s", "2e-8 rad/s", "2.6e-6 rad/s"]', 'time.end="3652 day"',
-            'time.epoch="1985-06-28T00:00:00 TDB"')  # fmt: skip
-    _, files = written(SATELLITE, "pck", tmp_path, *slow)
-    agrees(SATELLITE, slow, files, Fraction(-457963200), "SAT")
-    assert files[0].stat().st_size < 4e6
-    short = ("time.end=0.125",)
-    _, files = written(SATELLITE, "ck", tmp_path, *short)
-    agrees(SATELLITE, short, files, Fraction(924083160), "SAT", count=40)
-
-
-def test_a_body_about_the_earths_pole_has_a_pck(tmp_path: Path) -> None:
-    """In the ecliptic's axes, since the angles aren't defined at the equator's own pole."""
-    settings = ("initial.quaternion=[1, 0, 0, 0]", "initial.angular_velocity=[0, 0, 0.1]")
-    _, files = written(SATELLITE, "pck", tmp_path, *settings)
-    agrees(SATELLITE, settings, files, Fraction(924083160), "SAT")
-    assert "relative to ECLIPJ2000" in told(files[0])
-
-
-def test_what_the_comments_say(tmp_path: Path) -> None:
-    run, files = written(
-        SATELLITE, "ck", tmp_path, "output.estimate=true", object_id="-82", object_name="my craft"
+    assert spiceypy.ktotal("ALL") == before
+    assert not list(tmp_path.glob(".*"))
+    turn = TURNED if "ecliptic" in settings[0] else None
+    agrees(
+        SATELLITE, settings, files, ahead, "SAT", turn=turn, count=40 if "time.end=0.125" in settings else 300
     )
+    assert says in told(files[0])
+    assert files[0].stat().st_size < 4e6
+
+
+def test_what_the_comments_say(sat: Any, tmp_path: Path) -> None:
+    naming = Naming(object_id="-82", object_name="my craft")
+    files = export(sat, "ck", out=tmp_path / "craft.ck", naming=naming)
     text = told(files[0])
-    error = run.dataset.attrs["attitude_error"]
-    assert f"as the run announces it: {error:.2g} rad" in text
-    assert run.dataset.attrs["config_sha256"] in text
-    assert f"rigidsim {run.dataset.attrs['version_rigidsim']}" in text
+    attributes = sat.dataset.attrs
+    assert f"as the run announces it: {attributes['attitude_error']:.2g} rad" in text
+    assert attributes["config_sha256"] in text
+    assert f"rigidsim {attributes['version_rigidsim']}" in text
     assert "frame MY_CRAFT relative to J2000" in text
     assert "body: -82" in text
     assert "2029-04-13T21:46:00 TDB is time zero" in text
     assert "at most" in text
-    with loaded(*files):
-        number = spiceypy.namfrm("MY_CRAFT")
-        assert spiceypy.frinfo(number)[0] == -82
-
-
-def test_kernels_of_different_runs_can_be_loaded_together(tmp_path: Path) -> None:
-    _, one = written(SATELLITE, "ck", tmp_path, 'name="one"')
-    one = [file.rename(file.with_stem("one")) for file in one]
-    _, two = written(SATELLITE, "ck", tmp_path, 'name="two"', "initial.quaternion=[1, 0, 0, 0]")
-    with loaded(*one, *two):
-        both = [spiceypy.pxform("J2000", name, 924083200.0) for name in ("ONE", "TWO")]
+    # kernels of different runs are loaded together
+    _, other = written(SATELLITE, "ck", tmp_path, 'name="two"', POLE[0])
+    with loaded(*files, *other):
+        assert spiceypy.frinfo(spiceypy.namfrm("MY_CRAFT"))[0] == -82
+        both = [spiceypy.pxform("J2000", name, 924083200.0) for name in ("MY_CRAFT", "TWO")]
     assert np.abs(both[0] - both[1]).max() > 0.1
-
-
-def test_nothing_is_left_of_it(tmp_path: Path) -> None:
-    before = spiceypy.ktotal("ALL")
-    written(SATELLITE, "pck", tmp_path)
-    assert spiceypy.ktotal("ALL") == before
-    assert not list(tmp_path.glob(".*"))
-
-
-TORQUE = '[[loads]]\nkind = "torque"\ncomponents = ["0.01*abs(sin(t/10))", "0", "0"]\n'
 
 
 @pytest.mark.parametrize(
@@ -193,43 +170,33 @@ TORQUE = '[[loads]]\nkind = "torque"\ncomponents = ["0.01*abs(sin(t/10))", "0", 
         ("ck", [], {"object_name": "IAU_MOON"}, "which SPICE has already"),
         ("ck", [], {"object_name": "a name that is far too long for it"}, "shorter name"),
         ("pck", [], {"object_id": "nobody"}, "--object-id"),
-        (
-            "pck",
-            ["initial.angular_velocity=[0.02, 0.1, 0.001]", "time.end=20000"],
-            {},
-            "format ck",
-        ),
+        ("pck", ["initial.angular_velocity=[0.02, 0.1, 0.001]", "time.end=20000"], {}, "format ck"),
         ("ck", ["initial.angular_velocity=[0, 0, 1e7]", "time.end=1e-3"], {}, "apart"),
         ("ck", ["time.end=1e-6"], {}, "epoch nearer to J2000"),
+        pytest.param("ck", [KINKS, "time.end=100"], {}, "kinks", marks=pytest.mark.slow),
     ],
 )
 def test_what_cant_be_written_is_refused(
-    kind: str, settings: list[str], naming: dict[str, str], said: str, tmp_path: Path
+    kind: str, settings: list[str], naming: dict[str, str], said: str, sat: Any, tmp_path: Path
 ) -> None:
+    run = run_text(SATELLITE, *settings, tmp_path) if settings else sat
     with pytest.raises(rigidsim.RigidsimError, match=said):
-        written(SATELLITE, kind, tmp_path, *settings, **naming)
+        export(run, kind, out=tmp_path / f"out.{kind}", naming=Naming(**naming))
     assert not list(tmp_path.glob("out*"))
 
 
-def test_without_spiceypy_it_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sys.modules, "spiceypy", None)
-    with pytest.raises(rigidsim.RigidsimError, match=re.escape('pip install "rigidsim[spice]"')):
-        written(SATELLITE, "ck", tmp_path)
-
-
-@pytest.mark.slow
-def test_kinks_are_refused(tmp_path: Path) -> None:
-    with pytest.raises(rigidsim.RigidsimError, match="kinks"):
-        written(SATELLITE + TORQUE, "ck", tmp_path)
-
-
-def test_existing_files_and_unfinished_runs_are_refused(tmp_path: Path) -> None:
-    run, files = written(SATELLITE, "ck", tmp_path)
+def test_files_that_exist_and_runs_that_are_unfinished_are_refused(
+    sat: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    files = export(sat, "ck", out=tmp_path / "out.ck")
     files[0].unlink()
     with pytest.raises(rigidsim.RigidsimError, match=r"out\.tsc: exists"):
-        export(run, "ck", out=files[0])
+        export(sat, "ck", out=files[0])
     with pytest.raises(rigidsim.RigidsimError, match="that of a file beside it"):
-        export(run, "ck", out=files[1], force=True)
+        export(sat, "ck", out=files[1], force=True)
     part = run_text(SATELLITE, 'name="part"', "limits.max_steps=5", "time.end=5000", tmp_path, tuning=EAGER)
     with pytest.raises(rigidsim.RigidsimError, match="max_steps"):
         export(part, "ck", out=tmp_path / "part.bc")
+    monkeypatch.setitem(sys.modules, "spiceypy", None)
+    with pytest.raises(rigidsim.RigidsimError, match=re.escape('pip install "rigidsim[spice]"')):
+        export(sat, "ck", out=tmp_path / "none.ck")

@@ -10,13 +10,11 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable
-from concurrent.futures import Future
-from concurrent.futures.process import BrokenProcessPool
 from pathlib import Path
 from typing import Any
 
 import h5py
+import netCDF4
 import numpy as np
 import pytest
 from typer.testing import CliRunner
@@ -25,13 +23,10 @@ import rigidsim
 from rigidsim import ConfigError, RunFolderError, open_sweep, parse
 from rigidsim import sweep as run_sweep
 from rigidsim.cli.app import app
-from rigidsim.look.figures.sweep_maps import drawable, sweep_figure
-from rigidsim.solve.batch.lanes import recommended_width
 from rigidsim.store.seal import seal
 from rigidsim.store.sweeps.folder import SweepFolder
-from rigidsim.workflows.sweeps.members import batches_of, run_members, sweep_of
+from rigidsim.workflows.sweeps.members import run_members, sweep_of
 from rigidsim.workflows.sweeps.sweep import resume_sweep
-from rigidsim.workflows.sweeps.ways import Workers
 
 pytestmark = pytest.mark.optimised  # compared with runs of other processes
 
@@ -110,21 +105,13 @@ def test_members_are_single_runs_with_labels(folder: Path) -> None:
     kept = min(2, len(found))
     np.testing.assert_array_equal(cell.middle_times.values[:kept], found[:kept])
     assert cell.middle_first == found[0]
+    assert sweep.summary["outcomes"] == {"finished": 6}
+    with netCDF4.Dataset(folder / "dataset.h5") as file:
+        assert file["angular_velocity_final"].dimensions == ("w3", "C", "body_axis")
+        assert "[sweep]" in file.config
     np.testing.assert_allclose(
         cell.middle_angular_velocity.values[:kept], single.middle_angular_velocity.values[:kept], atol=1e-13
     )
-
-
-def test_every_reader_opens_it_and_it_is_chunked(folder: Path) -> None:
-    import netCDF4
-
-    with netCDF4.Dataset(folder / "dataset.h5") as file:
-        assert file["angular_velocity_final"].dimensions == ("w3", "C", "body_axis")
-        assert file.kind == "sweep"
-        assert "[sweep]" in file.config
-    summary = json.loads((folder / "summary.json").read_text())
-    assert summary["outcomes"] == {"finished": 6}
-    assert sum(summary["engines"].values()) == 6
 
 
 def test_given_again_it_computes_nothing(folder: Path) -> None:
@@ -154,29 +141,6 @@ def test_a_longer_axis_and_one_more_output_compute_only_what_is_new(tmp_path: Pa
         swept(tmp_path, (CONFIG + SWEEP).replace("end = 5", "end = 6"))
 
 
-@pytest.mark.slow  # variational equations compiled for each member
-def test_indicators_come_from_a_tangent_vector_that_is_not_kept(tmp_path: Path) -> None:
-    text = (CONFIG + SWEEP).replace("end = 5", "end = 200").replace("samples = 6", "samples = 201")
-    text = (
-        text.replace('"rates"', '"auto"')
-        .replace('["final"]', '["final", "megno", "fli", "lyapunov"]')
-        .replace("0.1, 3]", "0.1, 1]")
-    )
-    dataset = swept(tmp_path, text).dataset
-    assert "tangent_growth_final" not in dataset
-    assert "angular_velocity_final" in dataset
-    changes = {"time.end": 200, "time.samples": 201, "integrator.formulation": "auto"}
-    changes |= {"initial.angular_velocity[2]": 0.1}
-    changes |= {"output.record": ["angular_velocity", "energy", "tangent_growth"]}
-    alone = parse(CONFIG).replace(changes)
-    growth = rigidsim.run(alone, out=None).dataset.tangent_growth.values
-    # in a batch, whose roundings are others
-    assert dataset.fli[0, 0] == pytest.approx(growth.max(), rel=1e-11)
-    assert dataset.lyapunov[0, 0] == pytest.approx(growth[-1] / 200, rel=1e-11)
-    assert dataset.growth_time[0, 0] == 200
-    assert abs(dataset.megno[0, 0] - 2) < 0.5  # a free body's motion is regular
-
-
 PLANAR_MAP = """\
 name = "planar_map"
 [body]
@@ -204,9 +168,8 @@ axes."initial.angular_velocity[2]" = {linspace = [0, 3, 5], name = "rate"}
 """
 
 
-@pytest.mark.parametrize("samples", [2, 21])
-def test_an_indicator_moves_no_bit_of_what_else_is_kept(samples: int) -> None:
-    config = PLANAR_MAP.replace("SAMPLES", str(samples))
+def test_an_indicator_moves_no_bit_of_what_else_is_kept() -> None:
+    config = PLANAR_MAP.replace("SAMPLES", "21")
     found = {}
     for keep in (("final",), ("final", "megno")):
         sweep = sweep_of(config.replace('["final"]', json.dumps(keep)))
@@ -220,34 +183,11 @@ def test_an_indicator_moves_no_bit_of_what_else_is_kept(samples: int) -> None:
     assert np.isfinite(without["angular_velocity_final"]).all()
 
 
-MANY_ENDS = (
-    CONFIG
-    + """\
-[sweep]
-mode = "zip"
-keep = ["final"]
-axes."initial.angular_velocity[2]" = {step = [0.1, 0.01, COUNT], name = "w3"}
-axes."time.end" = {step = [5, 0.01, COUNT], name = "end"}
-"""
-)
-
-
-@pytest.mark.slow  # sixty-six systems of equations
-def test_members_that_are_added_run_as_those_before(tmp_path: Path) -> None:
-    begun = swept(tmp_path, MANY_ENDS.replace("COUNT", "3"))
-    kept = begun.dataset.angular_velocity_final.values
-    longer = swept(tmp_path, MANY_ENDS.replace("COUNT", "66"))
-    assert all(engine.startswith("batch of") for engine in longer.summary["engines"])
-    np.testing.assert_array_equal(longer.dataset.angular_velocity_final.values[:3], kept)
-    told = CliRunner().invoke(app, ["verify", str(tmp_path / "box"), "--members", "9"])
-    assert told.exit_code == 0, told.output
-
-
 def test_what_is_kept_of_a_member_has_the_same_bits_alone_and_in_company() -> None:
     keep = ("final", "extremes", "means", "megno", "fli", "lyapunov")
     sweep = sweep_of(PLANAR_MAP.replace("SAMPLES", "200").replace('["final"]', json.dumps(keep)))
     together = run_members(sweep, range(sweep.count), keep).kept
-    for member in (1, 4, 7, 13):
+    for member in (1, 13):
         alone = run_members(sweep, [member], keep).kept
         for name, variable in alone.items():
             assert variable.values[0].tobytes() == together[name].values[member].tobytes(), name
@@ -306,10 +246,13 @@ axes."initial.angular_velocity[2]" = {values = [0.1, 3]}
     assert any("didn't end well" in text for text in sweep.summary["warnings"])
 
 
+LARGEST = ", ".join("2.9" if i == 40 else f"2.0{i:02}" for i in range(75))
 BAD = {
+    # on no edge of the product; another value of either axis would make it possible
     "one bad member among many": (
-        'axes."body.principal_moments[2]" = {linspace = [1.5, 3.5, 300], name = "C"}',
-        "triangle|largest is more than the sum",
+        f'axes."body.principal_moments[2]".values = [{LARGEST}]\n'
+        'axes."body.principal_moments[0]".values = [1, 0.5, 1]',
+        r"member 121 .*2\.9.*0\.5.*principal moments",
     ),
     "unknown key": ('axes."initial.angular_velocty[2]" = {values = [1]}', 'did you mean "angular_velocity"'),
     "name of the dataset's": ('axes."time.end" = {values = [1], name = "steps"}', "needs itself"),
@@ -317,24 +260,13 @@ BAD = {
 }
 
 
-@pytest.mark.parametrize("case", BAD)
-def test_bad_sweeps_are_refused_before_work_begins(case: str, tmp_path: Path) -> None:
-    table, told = BAD[case]
-    config = CONFIG.partition("[[events]]")[0] if case == "nothing to keep" else CONFIG
-    with pytest.raises(ConfigError, match=told):
-        swept(tmp_path, f"{config}[sweep]\n{table}\n")
+def test_bad_sweeps_are_refused_before_work_begins(tmp_path: Path) -> None:
+    for case, (table, told) in BAD.items():
+        config = CONFIG.partition("[[events]]")[0] if case == "nothing to keep" else CONFIG
+        with pytest.raises(ConfigError, match=told) as refused:
+            swept(tmp_path, f"{config}[sweep]\n{table}\n")
+        assert len(refused.value.problems) == 1
     assert not list(tmp_path.iterdir())
-
-
-def test_one_bad_member_among_many_is_refused_before_work_begins(tmp_path: Path) -> None:
-    """It lies on no edge of the product; another value of either axis would make it possible."""
-    largest = ", ".join("2.9" if i == 40 else f"2.0{i:02}" for i in range(75))
-    axes = f'"body.principal_moments[2]".values = [{largest}]\n'
-    axes += '"body.principal_moments[0]".values = [1, 0.5, 1]\n'
-    with pytest.raises(ConfigError, match=r"member 121 .*2\.9.*0\.5.*principal moments") as refused:
-        swept(tmp_path, f"{CONFIG}[sweep.axes]\n{axes}")
-    assert len(refused.value.problems) == 1
-    assert not (tmp_path / "box").exists()
 
 
 def test_shares_make_the_same_dataset(folder: Path, tmp_path: Path) -> None:
@@ -395,21 +327,6 @@ def test_what_a_batch_estimates_is_told_of_all_and_of_one(tmp_path: Path) -> Non
     assert "its members are 0 to 1" in refused.output
 
 
-def test_plan_and_check_know_sweeps(tmp_path: Path) -> None:
-    path = tmp_path / "c.toml"
-    path.write_text(CONFIG + SWEEP)
-    made = json.loads(CliRunner().invoke(app, ["plan", str(path), "--json"]).stdout)
-    assert (made["members"], made["tiles"], made["tile"]) == (6, 3, 2)
-    assert [axis["name"] for axis in made["axes"]] == ["w3", "C"]
-    assert made["predicted"]["total_seconds"] > 0
-    shown = CliRunner().invoke(app, ["check", str(path)])
-    assert shown.exit_code == 0
-    path.write_text(CONFIG + SWEEP.replace("2.75", "9"))
-    shown = CliRunner().invoke(app, ["check", str(path)])
-    assert shown.exit_code == 2
-    assert "member 1" in shown.output
-
-
 def _killed_sweep(tmp_path: Path, *options: str) -> SweepFolder:
     """A sweep whose process group is killed when a tile is there."""
     (tmp_path / "c.toml").write_text(CONFIG + SWEEP.replace("tile = 2", "tile = 1"))
@@ -458,68 +375,3 @@ def test_workers_make_the_same_dataset_though_one_dies(folder: Path, tmp_path: P
     assert killer.killed
     expected = open_sweep(folder).dataset.angular_velocity_final
     np.testing.assert_array_equal(found.dataset.angular_velocity_final.values, expected.values)
-
-
-def test_no_tile_is_lost_to_a_pool_that_breaks(folder: Path) -> None:
-    """A worker may die while the next tile is handed in, which the pool then refuses."""
-
-    class Pool:
-        taken = 0
-
-        def submit(self, function: Callable[..., int], *of: object) -> Future[int]:
-            Pool.taken += 1
-            if Pool.taken in (1, 3, 4):
-                raise BrokenProcessPool("a worker died")
-            done: Future[int] = Future()
-            done.set_result(function(*of))
-            return done
-
-        def shutdown(self, **_: object) -> None: ...
-
-    class Breaking(Workers):
-        def _started(self) -> Pool:  # type: ignore[override]
-            return Pool()
-
-    (generation,) = SweepFolder(open_sweep(folder).folder.path).generations()
-    tiles, workers = range(generation.tiles), Breaking(2)
-    with workers.ready_for(sweep_of(generation.config)):
-        assert sorted(tile for tile, _ in workers.images(generation, tiles)) == list(tiles)
-
-
-def test_every_kept_quantity_can_be_drawn(folder: Path) -> None:
-    """A map has the values of the dataset, in the order of its axes, and labels with units."""
-    with open_sweep(folder).dataset as dataset:
-        names = drawable(dataset)
-        assert {"angular_velocity_final", "energy_mean", "middle_first"} <= set(names)
-        for name in names:
-            assert sweep_figure(dataset, name).axes
-        axes = sweep_figure(dataset, "angular_velocity_final[1]").axes[0]
-        (mesh,) = axes.collections
-        shown = np.sort(np.asarray(mesh.get_array()).ravel())
-        np.testing.assert_allclose(shown, np.sort(dataset.angular_velocity_final.values[..., 1].ravel()))
-        assert "rad/s" in axes.get_xlabel() + axes.get_ylabel()
-        with pytest.raises(ValueError, match="is nothing that this sweep kept; allowed: "):
-            sweep_figure(dataset, "velocity")
-
-
-def test_a_check_leaves_members_that_cannot_be_traced_to_their_runs() -> None:
-    """Where half of the members can't share equations, the other half still runs in batches."""
-    text = (
-        CONFIG.replace('"wx"', '"wx - k*wy"')
-        + """\
-[parameters]
-k = 1
-[sweep]
-keep = ["final"]
-axes."integrator.precision" = {values = ["double", "extended"], name = "precision"}
-axes."parameters.k" = {linspace = [1, 2, 150], name = "k"}
-"""
-    )
-    sweep = sweep_of(text)
-    batches = batches_of(text)
-    assert batches.apart is None
-    refused, accepted = batches.refused(range(sweep.count))
-    assert not refused
-    assert accepted == 150
-    engines = set(run_members(sweep, [0, 149, 150, 299], ["final"]).engines)
-    assert engines == {f"batch of {recommended_width()}", "alone"}

@@ -14,7 +14,7 @@ from typer.testing import CliRunner
 from rigidsim import ConfigError, RunFolderError, SavedSweep, open_sweep, parse
 from rigidsim import sweep as run_sweep
 from rigidsim.cli.app import app
-from rigidsim.workflows.sweeps.sweep import SweepObserver, resume_sweep
+from rigidsim.workflows.sweeps.sweep import SweepObserver
 
 CONFIG = """\
 name = "box"
@@ -90,6 +90,11 @@ def test_a_damaged_tile_is_told_with_its_remedy_which_works(out: Path, finished:
     content = bytearray(tile.read_bytes())
     content[len(content) // 2] ^= 1
     tile.write_bytes(content)
+    for command in ("info", "resume"):
+        told = CliRunner().invoke(app, [command, str(out / "box")])
+        assert told.exit_code == 2
+        assert "g000-0000001.h5: is damaged or was edited" in told.stderr
+        assert "dataset.h5, which holds its members, is whole" in told.stderr
     for _ in range(2):
         with pytest.raises(RunFolderError, match=r"g000-0000001\.h5.*remove it, and rigidsim\.resume"):
             swept(out, LONGER)
@@ -98,20 +103,6 @@ def test_a_damaged_tile_is_told_with_its_remedy_which_works(out: Path, finished:
     assert run == 2
     fresh, _ = swept(out / "fresh", LONGER)
     assert same(found, fresh)
-
-
-def test_a_damaged_tile_of_a_finished_sweep_is_told_though_its_dataset_is_whole(out: Path) -> None:
-    tile = out / "box" / "tiles" / "g000-0000001.h5"
-    content = bytearray(tile.read_bytes())
-    content[len(content) // 2] ^= 1
-    tile.write_bytes(content)
-    for command in ("info", "resume"):
-        told = CliRunner().invoke(app, [command, str(out / "box")])
-        assert told.exit_code == 2
-        assert "g000-0000001.h5: is damaged or was edited" in told.stderr
-        assert "dataset.h5, which holds its members, is whole" in told.stderr
-    tile.unlink()
-    assert CliRunner().invoke(app, ["resume", str(out / "box")]).exit_code == 0
 
 
 def test_impossible_members_are_marked_where_that_is_asked_and_the_others_run(tmp_path: Path) -> None:
@@ -151,44 +142,6 @@ def test_what_is_gone_from_earlier_tiles_is_computed_again(out: Path) -> None:
     assert whole.drop_attrs().identical(again.dataset.drop_attrs())
 
 
-def test_a_damaged_dataset_is_told_with_its_remedy_which_works(out: Path, finished: Path) -> None:
-    dataset = out / "box" / "dataset.h5"
-    content = bytearray(dataset.read_bytes())
-    content[len(content) // 2] ^= 1
-    dataset.write_bytes(content)
-    remedy = r"remove it, and rigidsim\.resume"
-    with pytest.raises(RunFolderError, match=remedy):
-        swept(out)
-    with pytest.raises(RunFolderError, match=remedy):
-        resume_sweep(out / "box")
-    with pytest.raises(RunFolderError, match=remedy):
-        _ = open_sweep(out / "box").dataset
-    for option in ((), ("--json",)):
-        told = CliRunner().invoke(app, ["info", str(out / "box"), *option])
-        assert told.exit_code == 2
-        assert "is damaged or was edited" in told.stderr
-    dataset.unlink()
-    again, run = swept(out)
-    assert run == 0
-    assert same(again, swept(finished)[0])
-
-
-def test_fewer_events_kept_than_before_are_fewer(tmp_path: Path) -> None:
-    events = CONFIG.replace("[sweep]\n", '[sweep]\nkeep = ["final", "events"]\nmost_events = 3\n')
-    assert swept(tmp_path, events)[0].dataset.flip_times.sizes["flip_occurrence"] == 3
-    fewer = swept(tmp_path, events.replace("most_events = 3", "most_events = 1"))[0].dataset
-    assert fewer.flip_times.sizes["flip_occurrence"] == 1
-    assert fewer.flip_count.max() > 1
-    np.testing.assert_array_equal(fewer.flip_times[:, 0], fewer.flip_first)
-
-
-def test_shares_need_tiles_of_a_length_that_is_told(tmp_path: Path) -> None:
-    many = CONFIG.replace("tile = 2\n", "").replace("0.1, 6]", "0.01, 65]")
-    with pytest.raises(ConfigError, match=r"\[sweep\] tile: missing.*tile = 64"):
-        run_sweep(parse(many), out=tmp_path, tiles=(0, 1))
-    assert not list(tmp_path.iterdir())
-
-
 def test_axes_can_be_given_as_dictionaries(tmp_path: Path) -> None:
     axes = {"time.end": {"values": [1, 2, 3]}, "initial.angular_velocity": {"sphere": 1, "count": 2}}
     changes = {"sweep": {"tile": 100, "axes": axes}}
@@ -201,7 +154,12 @@ REFUSED = {
         'axes."initial.angular_velocity[3]" = {values = [1]}',
         'velocity[3]": there is nothing at "3" to set; the array there has entries 0 to 2',
     ),
-    "a load that there isn't": ('axes."loads[0].coefficients[0]" = {values = [1]}', 'nothing at "0" to set'),
+    "a number beyond the range": (
+        'axes."initial.angular_velocity[2]" = {values = [1, "1e400"], name = "w"}', "1e400",
+    ),
+    "a model without its loads": (
+        'axes."model.level" = {values = ["full", "spin_averaged"], name = "level"}', "spin_averaged",
+    ),
     "a parameter of no expression": (
         'axes."parameters.k" = {values = [1, 2]}', 'no expression uses the parameter "k"',
     ),
@@ -223,13 +181,12 @@ REFUSED = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("case", REFUSED)
-def test_a_bad_sweep_is_told_where_and_why(case: str, tmp_path: Path) -> None:
-    table, told = REFUSED[case]
-    with pytest.raises(ConfigError) as caught:
-        swept(tmp_path, CONFIG.partition("[sweep]")[0] + f"[sweep]\n{table}\n")
-    assert told in str(caught.value)
-    assert len(caught.value.problems) == 1
+def test_a_bad_sweep_is_told_where_and_why(tmp_path: Path) -> None:
+    for table, told in REFUSED.values():
+        with pytest.raises(ConfigError) as caught:
+            swept(tmp_path, CONFIG.partition("[sweep]")[0] + f"[sweep]\n{table}\n")
+        assert told in str(caught.value)
+        assert len(caught.value.problems) == 1
     assert not list(tmp_path.iterdir())
 
 
@@ -255,18 +212,3 @@ def test_a_script_without_a_guard_is_told_what_it_lacks(tmp_path: Path) -> None:
     )
     subprocess.run(command, cwd=tmp_path, check=True, capture_output=True, timeout=300)
     assert open_sweep(tmp_path / "runs" / "box").finished
-
-
-@pytest.mark.parametrize(
-    ("axis", "said"),
-    [
-        ('axes."initial.angular_velocity[2]" = {values = [1, "1e400"], name = "w"}', "1e400"),
-        ('axes."model.level" = {values = ["full", "spin_averaged"], name = "level"}', "spin_averaged"),
-    ],
-)
-def test_a_member_whose_equations_cannot_be_built_is_refused_beforehand(
-    tmp_path: Path, axis: str, said: str
-) -> None:
-    with pytest.raises(ConfigError, match=said):
-        run_sweep(parse(f"{CONFIG.partition('[sweep]')[0]}[sweep]\n{axis}\n"), out=tmp_path)
-    assert not list(tmp_path.iterdir())

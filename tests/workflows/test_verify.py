@@ -14,7 +14,6 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from support import CONFIGS, cases
 
 import rigidsim
 from rigidsim import RunFolderError
@@ -57,7 +56,7 @@ def test_identical_from_the_dataset_alone(original: Path, tmp_path: Path) -> Non
     assert embedded(alone).text == TEXT
 
 
-@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=30, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(where=st.floats(0, 1, exclude_max=True), bit=st.integers(0, 7))
 def test_any_flipped_bit_is_known_before_anything_is_read(
     where: float, bit: int, original: Path, tmp_path: Path
@@ -70,7 +69,7 @@ def test_any_flipped_bit_is_known_before_anything_is_read(
         seal.check_seal(damaged)
 
 
-@settings(max_examples=4, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=2, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(data=st.data())
 def test_a_bit_flipped_under_a_good_seal_is_found_by_integrating(
     data: st.DataObject, original: Path, tmp_path: Path
@@ -98,23 +97,17 @@ def test_a_bit_flipped_under_a_good_seal_is_found_by_integrating(
         assert verdict.difference.sample == index // int(np.prod(file[name].shape[1:]))
 
 
-@pytest.mark.parametrize("digit", [("0.3, 1.0", "0.3, 1.0000000000000002"), ("2.5]", "2.4]")])
-def test_a_changed_digit_in_the_embedded_config(
-    digit: tuple[str, str], original: Path, tmp_path: Path
-) -> None:
-    path = forged(
-        original, tmp_path / "forged.h5", lambda file: file.attrs.modify("config", TEXT.replace(*digit))
-    )
+def test_a_changed_digit_in_the_config(original: Path, tmp_path: Path) -> None:
+    """In the dataset, or beside it."""
+    changed = TEXT.replace("0.3, 1.0", "0.3, 1.0000000000000002")
+    path = forged(original, tmp_path / "forged.h5", lambda file: file.attrs.modify("config", changed))
     verdict = rigidsim.verify(path)
     assert not verdict.identical
-    assert "angular_velocity" in verdict.differing or "angular_momentum" in verdict.differing
+    assert "angular_velocity" in verdict.differing
     assert verdict.difference is not None
-
-
-def test_a_changed_digit_in_the_config_beside_it(tmp_path: Path) -> None:
-    run = rigidsim.run(rigidsim.parse(TEXT), out=tmp_path)
-    run.folder.config.write_text(TEXT.replace("1.0, 0.5", "1.0, 0.6"))
-    verdict = rigidsim.verify(run.folder.path)
+    folder = shutil.copytree(original.parent, tmp_path / "run")
+    (folder / "config.toml").write_text(TEXT.replace("1.0, 0.5", "1.0, 0.6"))
+    verdict = rigidsim.verify(folder)
     assert not verdict.identical
     assert verdict.differing == []
     assert 'line 5 is "angular_velocity = [0.3, 1.0, 0.6]"' in verdict.problems[0]
@@ -147,13 +140,6 @@ def test_a_dataset_exchanged_for_a_run_of_the_same_config(tmp_path: Path) -> Non
         _ = one.dataset
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("path", cases(CONFIGS[::3], []), ids=lambda p: p.stem)
-def test_every_ready_scene_is_identical(path: Path, ready: Callable[..., rigidsim.SavedRun]) -> None:
-    verdict = rigidsim.verify(ready(path).folder.path)
-    assert verdict.identical, verdict.as_dict()
-
-
 def edited(folder: Path, change: Callable[[dict[str, Any]], Any]) -> None:
     path = folder / "summary.json"
     summary = json.loads(path.read_text())
@@ -169,44 +155,22 @@ def complete(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return rigidsim.run(rigidsim.parse(text), out=tmp_path_factory.mktemp("runs")).folder.path
 
 
-# what is edited, and how the problem names it
-EDITS: dict[str, tuple[Callable[[dict[str, Any]], Any], str]] = {
-    "status": (lambda s: s.update(status="stopped: max_drift"), "status is 'stopped: max_drift', 'finished'"),
-    "steps": (lambda s: s["cost"].update(steps=s["cost"]["steps"] + 1), "cost.steps is "),
-    "largest drift": (lambda s: s["invariants"]["energy"].update(largest_drift=1e-17),
-                      "invariants.energy.largest_drift is 1e-17, "),
-    "final drift": (lambda s: s["invariants"]["energy"].update(final_drift=0.0),
-                    "invariants.energy.final_drift is 0.0, "),
-    "initial value": (lambda s: s["invariants"]["energy"].update(
-        initial=np.nextafter(s["invariants"]["energy"]["initial"], 9)), "invariants.energy.initial is "),
-    "put back": (lambda s: s["invariants"]["energy"].update(put_back=0.0),
-                 "invariants.energy.put_back is 0.0"),
-    "no drift": (lambda s: s["invariants"].pop("energy"), "there is no invariants.energy"),
-    "an invariant more": (lambda s: s["invariants"].update(helicity=s["invariants"]["energy"]),
-                          "invariants.helicity is "),
-    "precision": (lambda s: s.update(precision="quadruple"), "precision is 'quadruple', 'double'"),
-    "not held": (lambda s: s.update(hold_invariants=False), "hold_invariants is False, True"),
-    "events": (lambda s: s["events"].update(flip=3), "events.flip is 3, 0 when run again"),
-    "time reached": (lambda s: s.update(time_reached=7.0), "time_reached is 7.0, 2000.0 when run again"),
-    "dataset": (lambda s: s.update(dataset_sha256="0" * 64), "was written for another dataset"),
-    "timeline": (lambda s: s.update(timeline_sha256="0" * 64), "timeline.rrd: was damaged or changed"),
-}  # fmt: skip
-
-
-@pytest.mark.parametrize("what", cases(EDITS, list(EDITS)[::7]))
-def test_a_summary_that_was_edited_by_hand(what: str, complete: Path, tmp_path: Path) -> None:
+def test_a_summary_that_was_edited_by_hand(complete: Path, tmp_path: Path) -> None:
+    """The first claim that doesn't hold is named, and how many others there are."""
     folder = shutil.copytree(complete, tmp_path / "run")
-    edited(folder, EDITS[what][0])
+    edited(folder, lambda s: s["invariants"]["energy"].update(largest_drift=1e-17, put_back=0.0))
+    edited(folder, lambda s: s["invariants"].pop("angular_momentum"))
+    edited(folder, lambda s: s["cost"].update(steps=s["cost"]["steps"] + 1))
     verdict = rigidsim.verify(folder)
     assert not verdict.identical
     assert verdict.differing == []
-    assert len(verdict.problems) == 1
-    assert EDITS[what][1] in verdict.problems[0]
-    named = "timeline.rrd" if what == "timeline" else "summary.json"
-    assert verdict.problems[0].startswith(str(folder / named))
+    (problem,) = verdict.problems
+    assert problem.startswith(str(folder / "summary.json"))
+    assert "(and 3 more of its claims don't hold)" in problem
 
 
 def test_a_summary_is_true_but_for_times_and_machines(complete: Path, tmp_path: Path) -> None:
+    """And the timeline is the one that the summary names."""
     folder = shutil.copytree(complete, tmp_path / "run")
 
     def elsewhere(summary: dict[str, Any]) -> None:
@@ -215,30 +179,23 @@ def test_a_summary_is_true_but_for_times_and_machines(complete: Path, tmp_path: 
         summary["provenance"]["cpu_model"] = "another"
 
     edited(folder, elsewhere)
-    verdict = rigidsim.verify(folder)
-    assert verdict.identical, verdict.problems
-
-
-@pytest.mark.parametrize("how", cases(["lost", "bit", "link"], ["bit"]))
-def test_the_timeline_that_the_summary_names(how: str, complete: Path, tmp_path: Path) -> None:
-    folder = shutil.copytree(complete, tmp_path / "run")
     path = folder / "timeline.rrd"
     content = bytearray(path.read_bytes())
-    if how == "bit":
-        content[len(content) // 2] ^= 4
-        path.write_bytes(content)
-    else:
-        path.unlink()
-    if how == "link":
-        path.symlink_to(complete / "timeline.rrd")
-    (problem,) = rigidsim.verify(folder).problems
-    assert problem.startswith(f"{path}: {'was damaged' if how == 'bit' else 'is missing'}")
+    content[len(content) // 2] ^= 4
+    path.write_bytes(content)
+    verdict = rigidsim.verify(folder)
+    (problem,) = verdict.problems
+    assert problem.startswith(f"{path}: was damaged")
 
 
-def test_a_summary_that_is_gone(complete: Path, tmp_path: Path) -> None:
-    copy = shutil.copytree(complete, tmp_path / "v")
-    (copy / "summary.json").unlink()
-    verdict = rigidsim.verify(copy)
+def test_a_summary_or_a_timeline_that_is_gone(complete: Path, original: Path, tmp_path: Path) -> None:
+    folder = shutil.copytree(original.parent, tmp_path / "v")
+    (folder / "summary.json").unlink()
+    verdict = rigidsim.verify(folder)
     assert not verdict.identical
     assert verdict.differing == []
     assert any("summary.json: is missing" in problem for problem in verdict.problems)
+    folder = shutil.copytree(complete, tmp_path / "w")
+    (folder / "timeline.rrd").unlink()
+    (problem,) = rigidsim.verify(folder).problems
+    assert problem.startswith(f"{folder / 'timeline.rrd'}: is missing")
