@@ -320,7 +320,6 @@ def test_a_message(experiment: rigidsim.Experiment, tmp_path: Path) -> None:
     [path] = rigidsim.export(tmp_path / "free", "aem", tmp_path / "free.aem")
     found = rigidsim.compare(dated, path)
     assert found.verdict == "agrees"
-    assert found.convention.order == "xyzw"
     assert found.rows == 31
 
 
