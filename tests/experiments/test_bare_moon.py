@@ -91,7 +91,7 @@ def test_two_years_of_the_full_moon_are_de421s():
     assert _left_over(732.0)["rms"] < 0.1
 
 
-@pytest.mark.slow(60)
+@pytest.mark.campaign  # two minutes
 def test_fifty_years_and_what_each_effect_is_worth():
     """real amounts in arcsec, nothing fitted, of the published comparison (total rms over 1969-2019)."""
     full = _left_over(18264.0)

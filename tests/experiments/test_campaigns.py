@@ -14,13 +14,12 @@ from hypothesis import strategies as st
 import rigidsim
 from experiments import accuracy_certificates as study
 from experiments import error_coverage, kill_campaign
-from experiments.coverage.families import FAMILIES, coverage_scene
 from experiments.coverage.judging import Judged
 from experiments.durability.judging import Tally, check_after, check_complete, saved_rows
 from experiments.durability.scenes import same, text_of
 from experiments.extremes import judging
 from experiments.extremes.random_scenes import random_case
-from experiments.random_scenes import KINDS, random_scene
+from experiments.random_scenes import random_scene
 from experiments.same_bits import ROOT, Scene, Version, compared
 from experiments.sweep_kill_campaign import WAYS, campaign
 from rigidsim.accuracy.certificate import Certificate, certify
@@ -54,7 +53,7 @@ def test_lost_rows_and_changed_bits_are_failures(finished: RunFolder) -> None:
     assert tally.failures[1:] == ["changed: energy differs", "changed: energy"]
 
 
-@pytest.mark.slow(40)
+@pytest.mark.campaign  # 40 s
 def test_a_small_campaign(capfd: pytest.CaptureFixture[str]) -> None:
     arguments = "--kills 3 --full-disks 1 --read-only 1 --damages 6 --seconds 240"  # seconds at most
     assert kill_campaign.main(arguments.split()) == 0
@@ -117,23 +116,6 @@ def test_broken_promises_are_found() -> None:
     assert any("median announced over true" in line for line in error_coverage.broken_promises(wide))
 
 
-def test_families_take_turns_and_scenes_are_reproducible() -> None:
-    names = [coverage_scene(n).family for n in range(len(FAMILIES))]
-    assert names == list(FAMILIES)
-    assert coverage_scene(5) == coverage_scene(5) != coverage_scene(5, seed=2)
-
-
-@pytest.mark.slow(40)
-def test_a_share_of_the_campaign(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    numbers = range(0, len(FAMILIES), 3)
-    first = error_coverage.campaign(numbers, 1, tmp_path)
-    assert not error_coverage.broken_promises(first)
-    capsys.readouterr()
-    again = error_coverage.campaign(numbers, 1, tmp_path)
-    assert [one.true for one in again if one.true == one.true] == [o.true for o in first if o.true == o.true]
-    assert not capsys.readouterr().out  # nothing was judged once more
-
-
 # ---- the study of extremes: random scenes are never wrong in silence, and it sees one that is
 
 
@@ -150,15 +132,6 @@ def test_random_extremes_are_never_wrong_in_silence(data: st.DataObject) -> None
 
 
 # ---- the certificates' study finds what it should, and would find a certificate that lies
-
-
-def test_scenes_are_the_same_each_time_and_of_every_kind() -> None:
-    scenes = [random_scene(number) for number in range(len(KINDS))]
-    assert scenes == [random_scene(number) for number in range(len(KINDS))]
-    assert {scene.kind for scene in scenes} == set(KINDS)
-    assert scenes[0].text != random_scene(0, seed=1).text
-    for scene in scenes:
-        rigidsim.parse(scene.text)
 
 
 @pytest.mark.slow

@@ -1,7 +1,5 @@
 """The ready scene of the real Moon, beside DE421's librations and the same equations in heyoka alone."""
 
-from pathlib import Path
-
 import pytest
 
 pytest.importorskip("de421")
@@ -23,11 +21,4 @@ def test_without_a_delay_both_are_the_same_to_rounding() -> None:
     """And keys beside the preset count one by one."""
     result = simulate(real_moon.SCENE, *real_moon.SPARSE, YEAR, "body.elasticity.delay=0")
     other = bare.Moon("de421", ["delay"]).integrate(368.0)["quaternion"][::2]
-    assert real_moon.apart(result, other) < 1e-12
-
-
-def test_a_rigid_body_without_a_core_is_the_bare_programs_too(tmp_path: Path) -> None:
-    settings = ("body.elasticity.love_number=0", "body.core.moment=0")
-    result = simulate(real_moon.SCENE, *real_moon.SPARSE, YEAR, *settings)
-    other = bare.Moon("de421", ["distortion", "core"]).integrate(368.0)["quaternion"][::2]
     assert real_moon.apart(result, other) < 1e-12

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from itertools import combinations
-from pathlib import Path
-from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -14,7 +12,6 @@ import xarray
 pytest.importorskip("matplotlib")
 
 from matplotlib.figure import Figure
-from matplotlib.image import imread
 from matplotlib.text import Text
 
 from rigidsim.look import figures
@@ -29,11 +26,6 @@ ARCSEC = 1000 * MAS
 
 def titles(figure: Figure) -> list[str]:
     return [axes.get_title("left") or axes.get_title() for axes in figure.axes]
-
-
-def inked(path: Path) -> float:
-    """Part of a picture that isn't white."""
-    return float((imread(path)[..., :3].min(axis=2) < 0.9).mean())
 
 
 def texts(figure: Figure) -> list[Text]:
@@ -162,26 +154,6 @@ def test_polar_motion_of_the_earth_is_a_circle_with_its_period() -> None:
     assert page.axes[1].get_xlabel() == "time [yr]"
 
 
-def test_recorded_polar_motion_is_drawn_as_it_is() -> None:
-    dataset = earth()
-    recorded = np.stack([np.full(1001, 3 * MAS), np.linspace(0, 5 * MAS, 1001)], axis=1)
-    dataset["polar_motion"] = (("time", "polar_motion_component"), recorded)
-    line = figures.figure(dataset, "polar_motion").axes[0].get_lines()[1]
-    np.testing.assert_allclose(line.get_ydata(), np.linspace(0, 5, 1001))
-
-
-def test_the_page_of_a_spin_tells_what_changes_beside_it() -> None:
-    dataset = earth()
-    growing = np.linspace(1, 2, 1001)[:, None] * np.array([8.01e37, 8.01e37, 8.04e37])
-    varying = dataset.assign(principal_moments=(("time", "body_axis"), growing, {"units": "kg m2"}))
-    page = figures.figure(varying)
-    assert titles(page)[:2] == ["Angular velocity, body axes", "Principal moments of inertia"]
-    np.testing.assert_array_equal(page.axes[1].get_lines()[2].get_ydata(), growing[:, 2])
-    marked = {"units": "rad", "given_by": "[[states]]"}
-    own = dataset.assign(slosh=("time", np.linspace(0, 0.1, 1001), marked))
-    assert titles(figures.figure(own))[:2] == ["Angular velocity, body axes", "Own state slosh"]
-
-
 def test_obliquity_and_longitude_have_axes_of_their_own_and_say_what_was_taken_off() -> None:
     dataset = precessing()
     page = figures.figure(dataset, "obliquity")
@@ -201,36 +173,12 @@ def test_obliquity_and_longitude_have_axes_of_their_own_and_say_what_was_taken_o
     )
 
 
-@pytest.mark.slow
-def test_the_page_of_a_run_with_axes_alone_is_about_their_precession() -> None:
-    dataset = precessing()  # as of an averaged model: neither attitude nor rates
-    page = figures.figure(dataset.assign_attrs(formulation="orbit_averaged"))
-    shown = [title.split(" less")[0].split(":")[0].split(" (")[0] for title in titles(page)]
-    assert shown[:4] == ["Obliquity", "Longitude of the node", "Nutation", "Path of the pole in space"]
-    said = [text.get_text() for text in texts(page)]
-    assert "model" in said
-    assert "formulation" not in said
-    alone = dataset.drop_vars(["obliquity", "node_longitude"])
-    tilt, node = (dataset[name].values[:, 1] for name in ("obliquity", "node_longitude"))
-    axis = np.stack([np.sin(tilt) * np.sin(node), -np.sin(tilt) * np.cos(node), np.cos(tilt)], axis=1)
-    alone = alone.assign(momentum_axis=(("time", "space_axis"), axis))  # of a tumbling body
-    assert {"obliquity", "nutation", "pole_path"} <= set(figures.available(alone))
-    assert titles(figures.figure(alone))[0] == titles(page)[0]
-
-
 def test_nutation_ellipse_has_its_period_and_its_axes() -> None:
     page = figures.figure(precessing(years=60), "nutation")
     (axes,) = page.axes
     (label,) = [t.get_text() for t in axes.get_legend().get_texts() if "semi-axes" in t.get_text()]
     assert label == "18.6 yr: semi-axes 9.2″, 6.9″"
     assert axes.get_ylabel() == "Δobliquity [arcsec]"
-
-
-def test_pole_of_a_free_body_circles_the_momentum(symmetric_top: Build) -> None:
-    paths, center, _ = figures.catalogue.poles.pole_paths(symmetric_top())
-    assert center == "momentum"
-    np.testing.assert_allclose(np.hypot(*paths["figure"].T), 0.5, rtol=1e-9)  # its tilt against L
-    assert "once round in 6.28" in titles(figures.figure(symmetric_top(), "pole_path"))[0].replace("\n", " ")
 
 
 def test_tip_of_a_top_is_seen_from_above_with_its_first_turn() -> None:
@@ -323,23 +271,6 @@ def test_unknown_and_impossible_figures_are_refused_with_those_there_are(symmetr
         figures.figure(symmetric_top(), "spectrum")
     rates = symmetric_top()[["angular_velocity"]].assign_attrs(symmetric_top().attrs)
     assert figures.available(rates) == ["overview", "polhode", "momentum_sphere", "rates"]
-
-
-@pytest.mark.slow
-def test_png_and_svg_are_files_of_their_kind(symmetric_top: Build, tmp_path: Path) -> None:
-    assert figures.save_figure(symmetric_top(), tmp_path / "f.png") == tmp_path / "f.png"
-    assert min(imread(tmp_path / "f.png").shape[:2]) > 600
-    assert 0.01 < inked(tmp_path / "f.png") < 0.6
-    figures.save_figure(heavy_top(), tmp_path / "f.svg", "tip")
-    assert ElementTree.parse(tmp_path / "f.svg").getroot().tag.endswith("svg")
-    assert {path.name for path in tmp_path.iterdir()} == {"f.png", "f.svg"}
-
-
-@pytest.mark.parametrize("name", ["f.pdf", "f", "f.png.txt"])
-def test_other_suffix_is_refused_with_those_allowed(symmetric_top: Build, tmp_path: Path, name: str) -> None:
-    with pytest.raises(ValueError, match=r"must be one of \.png, \.svg"):
-        figures.save_figure(symmetric_top(), tmp_path / name)
-    assert not list(tmp_path.iterdir())
 
 
 # units and numbers

@@ -120,17 +120,6 @@ def test_a_wheel_steadies_the_middle_axis_beyond_its_threshold(rate: float, stab
     assert one.unstable is not stable
 
 
-def test_of_equal_moments_isolated_equilibria_alone_are_told() -> None:
-    ring = Gyrostat(np.diag([2.0, 2.0, 3.0]), np.zeros(3), 1.0)
-    assert [abs(one.direction[2]) for one in ring.equilibria] == [1, 1]
-    beside = Gyrostat(np.diag([2.0, 2.0, 3.0]), np.array([0.1, 0.2, 0]), 1.0)  # along both equal axes
-    across = np.array([2, -1, 0]) / np.sqrt(5)
-    assert len(beside.equilibria) in (2, 4)
-    assert all(abs(one.direction @ across) < 1e-9 for one in beside.equilibria)
-    ball = Gyrostat(np.eye(3), np.zeros(3), 1.0)
-    assert ball.equilibria == ball.separatrices() == []
-
-
 def test_separatrices_of_a_body_alone_are_those_of_poinsot() -> None:
     moments = np.array([1.0, 2.0, 2.5])
     body = Gyrostat(np.diag(moments), np.zeros(3), 3.0)
@@ -168,13 +157,6 @@ def test_the_path_of_a_run_keeps_to_the_sphere_and_to_a_level(two: xarray.Datase
     assert gyrostat is not None
     energy = gyrostat.energy(path / gyrostat.size)
     np.testing.assert_allclose(energy, energy[0], rtol=1e-12)
-
-
-def test_under_a_torque_from_outside_there_is_no_sphere() -> None:
-    text = TWO_ROTORS + '[[loads]]\nkind = "torque"\ncomponents = ["0.1", "0", "0"]\n'
-    dataset = rigidsim.run(rigidsim.parse(text), out=None).dataset.load()
-    assert gyrostats.path(dataset) is None
-    assert {"rotors", "rates"} < set(figures.available(dataset)) - {"momentum_sphere"}
 
 
 def test_the_page_is_about_the_rotors(two: xarray.Dataset, driven: xarray.Dataset) -> None:
@@ -236,37 +218,7 @@ def test_rotors_are_in_the_recording_and_turn_by_their_rates(
     np.testing.assert_allclose(np.einsum("tij,tj->ti", matrix, shares[0] + shares[1]), shares[2], atol=2e-6)
 
 
-def test_a_body_with_rotors_has_neither_polhode_surfaces_nor_poinsots_construction(tmp_path: Path) -> None:
-    still = TWO_ROTORS.replace("[0.3, 1, -0.2]", "[0, 1, 0]").replace("rate = 300", "rate = 0")
-    dataset = rigidsim.run(rigidsim.parse(still), out=None).dataset.load()  # of constant w . I w, too
-    picture = build_picture(dataset)[0]
-    assert [stage.root for stage in picture.stages] == ["scene"]
-    at_rest = still.replace("rate = 2", "rate = 0").replace('name = "free"', 'name = "free"\nfixed = true')
-    dataset = rigidsim.run(rigidsim.parse(at_rest), out=None).dataset.load()
-    assert [stage.root for stage in build_picture(dataset)[0].stages] == ["scene", "poinsot"]
-
-
-def test_rotors_that_are_drawn_slower_share_a_factor() -> None:
-    text = TWO_ROTORS.replace("fixed = true", "").replace("rate = 2", "rate = 40")
-    dataset = rigidsim.run(rigidsim.parse(text), out=None).dataset.load()
-    words = [line.words for line in build_picture(dataset)[0].stages[0].lines if line.words]
-    assert words == [f"rotor {name}, drawn turning 50 times slower" for name in ("free", "kept")]
-
-
-def test_a_flight_has_its_rotors_where_the_body_is_to_scale(two: xarray.Dataset) -> None:
-    time = two["time"].values
-    moving = two.assign(position=(("time", "space_axis"), np.stack([9 * time, 0 * time, -time], axis=1)))
-    stages = build_picture(moving)[0].stages
-    assert [set(stage.frames) for stage in stages] == [{"body/rotor_free", "body/rotor_kept"}, set()]
-    solids = [solid for solid in stages[0].solids if solid.name == "disc"]
-    reach = max(float(mesh.vertices.max()) for mesh in stages[0].meshes)
-    for solid, axis in zip(solids, ([1, 0, 1], [0, 1, 0]), strict=True):
-        middle = solid.mesh.vertices.mean(axis=0)
-        np.testing.assert_allclose(np.cross(middle, axis), 0, atol=1e-2)  # on its axis
-        assert middle @ axis > 0.5 * reach  # and outside
-
-
-@pytest.mark.parametrize("size", [0.9, 0.3, 0.01])
+@pytest.mark.parametrize("size", [0.3, 0.01])
 def test_a_rotor_has_the_size_of_its_moment_or_is_said_to_be_enlarged(size: float) -> None:
     """A cylinder ``size`` times as large in radius and height has size^5 of the moment."""
     text = f"""
@@ -287,43 +239,3 @@ rate = 3
     (told,) = [note for note in picture.notes if "rotor wheel" in note]
     assert ("enlarged" in told) == (size == 0.01)
     assert drawn / whole > 10 * size if size == 0.01 else drawn / whole == pytest.approx(size, rel=1e-6)
-
-
-@pytest.mark.slow
-def test_of_moments_that_vary_no_sphere_is_drawn() -> None:
-    text = DRIVEN.replace("[50, 90, 110]", '[50, 90, "110 - 10*sin(t/10)"]')
-    dataset = rigidsim.run(rigidsim.parse(text), out=None).dataset.load()
-    assert "momentum_sphere" not in figures.available(dataset)
-    assert "body_momentum" not in {arrow.name for arrow in build_picture(dataset)[0].stages[0].arrows}
-    assert "Rates of the rotors, relative to the body" in [
-        axes.get_title("left") for axes in figures.figure(dataset).axes
-    ]
-
-
-def test_a_rotor_whose_rate_is_not_recorded_is_told_of() -> None:
-    text = """
-name = "unseen"
-[body]
-principal_moments = [1, 2, 3]
-[initial]
-angular_velocity = [0.1, 1, 0.1]
-[[rotors]]
-name = "free"
-axis = [0, 0, 1]
-moment = 0.1
-rate = 3
-[[rotors]]
-name = "kept"
-axis = [0, 1, 0]
-moment = 0.1
-rate = 3
-fixed = true
-[time]
-end = 10
-samples = 11
-[output]
-record = ["quaternion"]
-"""
-    picture = build_picture(rigidsim.run(rigidsim.parse(text), out=None).dataset)[0]
-    assert "not drawn, since rotor_rate isn't recorded: rotor free" in picture.notes
-    assert [spot.label for spot in picture.stages[0].spots if spot.name.startswith("rotor")] == ["kept"]

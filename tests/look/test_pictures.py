@@ -148,18 +148,3 @@ def test_films_have_moving_frames(tmp_path: Path, ready: Ready) -> None:
     film.render(tmp_path / "t.rrd", tmp_path / "t.png")
     with Image.open(tmp_path / "t.png") as picture:
         assert picture.size == film.SIZE
-
-
-def test_an_mp4_film_has_its_frames(tmp_path: Path, ready: Ready) -> None:
-    encoder = pytest.importorskip("imageio_ffmpeg")
-    from rigidsim.look import film
-
-    with ready("heavy_top_fast").dataset as dataset:
-        write_timeline(dataset, tmp_path / "t.rrd", rows=ROWS)
-    film.render(tmp_path / "t.rrd", tmp_path / "t.mp4", seconds=0.5)
-    frames = encoder.read_frames(str(tmp_path / "t.mp4"))
-    told = next(frames)
-    assert (told["size"], told["fps"]) == (film.SIZE, film.FRAMES_PER_SECOND[".mp4"])
-    pictures = [np.frombuffer(frame, dtype=np.uint8).astype(int) for frame in frames]
-    assert len(pictures) == 15
-    assert np.abs(pictures[7] - pictures[0]).max() > 60  # it moves

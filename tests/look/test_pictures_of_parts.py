@@ -59,7 +59,6 @@ def test_the_sun_and_the_moon_stand_where_they_are() -> None:
     [
         ({"part": "left"}, "page, scene, plots is allowed"),
         ({"at": "40"}, "outside of the run; 0 s to 20 s is allowed"),
-        ({"at": "3 kg"}, "--at: given '3 kg'"),
     ],
 )
 def test_odd_pictures_are_refused(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from pathlib import Path
+from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -13,10 +13,9 @@ from rigidsim.look.figures import figure
 from rigidsim.look.stages.registry import build_picture
 from rigidsim.scene.readable import YEAR
 
-CONFIGS = Path(__file__).parents[2] / "configs"
+Ready = Callable[..., rigidsim.SavedRun]
 _UNITS = {"d": 86400.0, "yr": YEAR, "kyr": 1e3 * YEAR, "s": 1.0, "min": 60.0, "h": 3600.0}
 _ARCSEC = np.pi / 648000
-QUICK = {"output.timeline": False, "output.estimate": False}
 
 
 def texts(dataset: object, what: str) -> str:
@@ -35,9 +34,8 @@ def period(text: str) -> float:
     return float(number) * _UNITS[unit]
 
 
-def test_precession_and_nutation() -> None:
-    ready = rigidsim.load(CONFIGS / "mars_precession.toml").replace(QUICK)
-    dataset = rigidsim.run(ready, out=None).dataset
+def test_precession_and_nutation(ready: Ready) -> None:
+    dataset = ready("mars_precession").dataset
     analysis = rigidsim.analyse(dataset, ["node_longitude.figure", "obliquity.figure"])
     node, tilt = analysis["node_longitude.figure"], analysis["obliquity.figure"]
     rate = float(node.rate.real)
@@ -57,9 +55,8 @@ def test_precession_and_nutation() -> None:
     assert period(once[1]) == pytest.approx(2 * np.pi / abs(rate), rel=5e-3)
 
 
-def test_polar_motion() -> None:
-    ready = rigidsim.load(CONFIGS / "earth_free_nutation.toml").replace(QUICK)
-    dataset = rigidsim.run(ready, out=None).dataset
+def test_polar_motion(ready: Ready) -> None:
+    dataset = ready("earth_free_nutation").dataset
     pattern = r"([\d.]+ \w+)\n(counter)?clockwise|once round in ([\d.]+ \w+)"
     said = re.search(pattern, texts(dataset, "polar_motion"))
     assert said is not None

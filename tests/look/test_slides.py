@@ -22,7 +22,7 @@ from rigidsim.look import figures
 Build = Callable[..., xarray.Dataset]
 
 
-@pytest.mark.parametrize("ground", ["light", "dark"])
+@pytest.mark.parametrize("ground", ["dark"])
 def test_a_slide_is_one_panel_in_letters_that_stand_out(symmetric_top: Build, ground: str) -> None:
     page = figures.figure(symmetric_top(), "rates")
     slide = figures.for_slides(symmetric_top(), "rates", ground)

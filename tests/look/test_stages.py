@@ -12,7 +12,7 @@ import xarray
 from scipy.spatial.transform import Rotation
 
 from rigidsim.look.stages.registry import build_picture
-from rigidsim.look.states import charts_of, sections_of, states_of
+from rigidsim.look.states import sections_of, states_of
 
 Build = Callable[..., xarray.Dataset]
 
@@ -81,12 +81,6 @@ KINDS = {
 @pytest.mark.parametrize("kind", KINDS)
 def test_the_stage_is_that_of_the_scene(symmetric_top: Build, kind: str) -> None:
     assert picture(KINDS[kind](symmetric_top(count=101))).kind == kind
-
-
-def test_a_motion_under_an_unknown_torque_gets_the_generic_stage(symmetric_top: Build) -> None:
-    dataset = symmetric_top(count=101)
-    dataset["angular_velocity"] = dataset["angular_velocity"] * np.linspace(1, 2, 101)[:, None]
-    assert picture(dataset).kind == "motion of a rigid body"
 
 
 def averaged(dataset: xarray.Dataset, axis: str, drawn: xarray.Dataset) -> xarray.Dataset:
@@ -181,52 +175,3 @@ def test_events_have_a_lane_and_a_section(symmetric_top: Build) -> None:
     assert len(plane.points) == 12
     stopped = states_of(dataset.assign_attrs(status="max_drift"), 0.0, 20.0)[-1]
     assert (stopped.values, stopped.seconds.tolist()) == (["running", "max drift"], [0.0, 20.0])
-
-
-def test_a_run_in_euler_angles_has_a_lane_of_its_charts(symmetric_top: Build) -> None:
-    """The asked sequence is left where its middle angle nears 0 or half a turn, and found again later."""
-    dataset = symmetric_top(count=721)
-    turn = np.linspace(0.0, 2 * np.pi, 721)  # about X: sin of the middle angle of zxz is that of the turn
-    zero = np.zeros(721)
-    dataset["quaternion"] = (
-        ("time", "quaternion_component"),
-        np.stack([np.cos(turn / 2), np.sin(turn / 2), zero, zero], axis=1),
-    )
-    assert charts_of(dataset) == []
-    named = dataset.assign_attrs(
-        formulation="euler_angles", euler_sequence="zxz", euler_partner_sequence="zxy"
-    )
-    (lane,) = charts_of(named)
-    # it begins in the singularity; the partner's factor, abs(cos), falls below a half at 60 degrees
-    assert (lane.name, lane.values) == ("chart", ["zxy", "zxz", "zxy", "zxz", "zxy"])
-    degrees = 360 * lane.seconds[1:] / dataset["time"].values[-1]
-    np.testing.assert_allclose(degrees, [60, 150, 240, 330], atol=0.51)
-    assert charts_of(named.drop_vars("quaternion")) == []
-
-
-def test_point_masses_beside_the_body_are_pointed_to(symmetric_top: Build) -> None:
-    """From the one that the body is, not from the origin."""
-    dataset = earth(symmetric_top(count=11))
-    place = np.zeros((11, 3, 3))
-    place[:, 0] = [-1.5e11, 0, 0]  # the Sun
-    place[:, 1] = [0, 1e9, 0]  # the Earth, where the body is
-    place[:, 2] = [0, 1e9, 4e8]
-    dataset["point_mass_position"] = (("time", "point_mass", "space_axis"), place, {"units": "m"})
-    dataset = dataset.assign_coords(point_mass=["sun", "earth", "moon"])
-    dataset = dataset.assign_attrs(config='[body]\nhost = "earth"\n')
-    arrows = {arrow.label: arrow for arrow in picture(dataset).stages[0].arrows}
-    assert {"to the Sun", "to the Moon"} <= set(arrows)
-    moon, sun = (arrows[name].vectors[0] for name in ("to the Moon", "to the Sun"))
-    np.testing.assert_allclose(moon / np.linalg.norm(moon), [0, 0, 1], atol=1e-15)
-    np.testing.assert_allclose(sun / np.linalg.norm(sun), [-1, 0, 0], atol=0.01)
-
-
-def test_of_a_tumbling_body_without_attitude_the_momentum_is_shown_alone(symmetric_top: Build) -> None:
-    top = symmetric_top(count=101)
-    dataset = averaged(top, "momentum", top)
-    found, _ = build_picture(dataset)
-    assert found.kind == "axes in space"
-    (stage,) = found.stages
-    assert (stage.meshes, stage.quaternion) == ([], None)
-    (arrow,) = stage.arrows
-    np.testing.assert_allclose(arrow.vectors, 1.45 * dataset["momentum_axis"].values, rtol=1e-12)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
 import numpy as np
@@ -43,31 +42,6 @@ def test_plates_lie_where_the_config_puts_them_with_two_sides(shuttlecock: xarra
             a, b, c = mesh.vertices[side].reshape(-1, 3, 3).transpose(1, 0, 2)
             area = np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2
             assert area == pytest.approx(0.03, rel=1e-6)  # 300 cm^2
-
-
-def test_a_plate_of_one_side_has_a_bare_back_and_solid_parts_stay() -> None:
-    text = """
-        name = "plate"
-        [body]
-        shape = "sphere"
-        radius = "20 cm"
-        mass = "1 kg"
-        [[body.surfaces]]
-        radius = "20 cm"
-        [[body.surfaces]]
-        normal = [0, 1, 0]
-        area = "1 m^2"
-        [initial]
-        angular_velocity = [0, 0, 1]
-        [time]
-        end = 1
-        samples = 2
-        """
-    drawing = rigidsim.run(rigidsim.parse(text), out=None).dataset.attrs["drawing"]
-    assert [one["solid"] for one in json.loads(drawing)] == ["sphere", "plate"]
-    plate = body_meshes(drawing)[1]
-    assert (plate.normals[(plate.colors == GREY).all(axis=1)] @ [0, 1, 0] < -0.999).all()
-    assert (plate.colors == GREY).all(axis=1).any()
 
 
 def test_the_angle_to_the_wind_is_that_of_the_velocity_in_turning_air(shuttlecock: xarray.Dataset) -> None:

@@ -40,12 +40,6 @@ def test_the_first_time_of_an_event_comes_first_with_a_line_for_each_of_few_valu
     assert len(sweep_figure(dataset, "spin_final[1]").axes[0].get_lines()) == 3
 
 
-def test_an_axis_of_many_values_makes_a_map() -> None:
-    page = sweep_figure(swept(12))
-    assert not page.axes[0].get_lines()
-    assert len(page.axes[0].collections) == 1
-
-
 def members_of(**axes: np.ndarray) -> xarray.Dataset:
     """A sweep's dataset over these axes, with a number and the time of an event of each member."""
     shape = tuple(len(values) for values in axes.values())

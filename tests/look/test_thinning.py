@@ -10,9 +10,7 @@ pytest.importorskip("matplotlib")
 
 from rigidsim.look.figures.composing import compose, shown_rows
 from rigidsim.look.figures.timelines import rates
-from rigidsim.look.plots import Plot
 from rigidsim.look.thinning import by_extremes, thin
-from rigidsim.look.timeline.plotting import aggregation
 
 FAST = 0.039
 
@@ -36,13 +34,6 @@ def test_extremes_of_two_strides_stand_in_two_rows() -> None:
     assert np.abs(growth).max() <= 2 * 100 * 2 / 400_001 * 1.01
     part = dataset.isel(time=slice(0, 4001))
     np.testing.assert_array_equal(by_extremes(part, 4001)["angular_velocity"], part["angular_velocity"])
-
-
-def test_the_viewer_draws_extremes_where_any_component_is_fast_within_a_pixel() -> None:
-    plot = Plot("angular_velocity", "", "leading")
-    table = by_extremes(long_run(), 100_001)["angular_velocity"].values
-    assert aggregation(plot, table).name == "MinMax"  # beside the large one the small one is fast, too
-    assert aggregation(plot, table[:, :1]).name == "Average"
 
 
 def test_a_panel_of_many_swings_shows_the_whole_run_and_its_beginning() -> None:

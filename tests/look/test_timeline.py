@@ -11,12 +11,8 @@ import xarray
 
 pytest.importorskip("rerun")
 
-import rigidsim
-from rigidsim.look.plots import plan_plots
-from rigidsim.look.thinning import thin
 from rigidsim.look.timeline import write_timeline
 from rigidsim.look.timeline.writing import CHUNK
-from rigidsim.scene.parts_of_values import parts_in
 
 Build = Callable[..., xarray.Dataset]
 Read = Callable[[Path, str], dict[str, np.ndarray]]
@@ -66,18 +62,6 @@ def test_values_of_plots_are_float64(symmetric_top: Build, read_back: Read, tmp_
     drift = read_back(tmp_path / "t.rrd", "/plots/drift/all")["Scalars:scalars"]
     np.testing.assert_allclose(drift[100:], np.log10(1e-16 * np.arange(100, 1001)), rtol=1e-12)
     assert np.isfinite(drift[0])  # the drift of zero at the start
-
-
-def test_thinned_run_keeps_its_first_and_last_rows(
-    symmetric_top: Build, read_back: Read, tmp_path: Path
-) -> None:
-    dataset = symmetric_top(count=9998)
-    assert write_timeline(dataset, tmp_path / "t.rrd", rows=1000) == 910
-    rows = read_back(tmp_path / "t.rrd", "/scene/body")
-    steps = rows["step"]
-    assert (len(steps), steps[0], steps[-1]) == (910, 0, 9997)
-    wanted = dataset["quaternion"].values[steps][:, [1, 2, 3, 0]]
-    np.testing.assert_allclose(rows["Transform3D:quaternion"], wanted, rtol=0, atol=2.0**-25)
 
 
 def test_only_the_rows_shown_are_read_from_a_file(symmetric_top: Build, tmp_path: Path) -> None:
@@ -167,20 +151,6 @@ def with_position(dataset: xarray.Dataset, position: np.ndarray) -> xarray.Datas
     return dataset.assign(position=(("time", "space_axis"), position, {"units": "m"}))
 
 
-def test_body_that_moves_a_little_carries_its_arrows_along(
-    symmetric_top: Build, read_back: Read, tmp_path: Path
-) -> None:
-    dataset = symmetric_top(size=2.0)
-    position = np.outer(np.linspace(0, 8, 1001), [1.0, 0.0, 0.5])
-    write_timeline(with_position(dataset, position), tmp_path / "t.rrd")
-    body = read_back(tmp_path / "t.rrd", "/scene/body")
-    assert len(body["Transform3D:quaternion"]) == len(body["Transform3D:translation"]) == 1001
-    centre = read_back(tmp_path / "t.rrd", "/scene/centre")["Transform3D:translation"]
-    np.testing.assert_array_equal(centre, body["Transform3D:translation"])
-    reach = float(page(tmp_path / "t.rrd", "picture").split("reach: 1 unit = ")[1].split()[0])
-    np.testing.assert_allclose(centre * reach, position, atol=1e-5)
-
-
 def test_orbit_gets_a_track_view_with_the_body_enlarged(
     symmetric_top: Build, read_back: Read, tmp_path: Path
 ) -> None:
@@ -194,45 +164,11 @@ def test_orbit_gets_a_track_view_with_the_body_enlarged(
     assert "times too large" in page(tmp_path / "t.rrd", "picture")
 
 
-def test_a_variable_nobody_foresaw_gets_a_plot(symmetric_top: Build, read_back: Read, tmp_path: Path) -> None:
-    dataset = symmetric_top(count=20)
-    dataset["kovalevskaya_constant"] = ("time", np.arange(20.0), {"units": "s^-4"})
-    dataset["tensor"] = (("time", "a", "b"), np.arange(80.0).reshape(20, 2, 2))
-    dataset["flag"] = ("time", np.arange(20) % 2 == 0)
-    dataset["note"] = ("time", np.array(["text"] * 20))
-    dataset["energy_lo"] = ("time", np.zeros(20), {"residual_of": "energy"})
-    write_timeline(dataset, tmp_path / "t.rrd")
-    rows = read_back(tmp_path / "t.rrd", "/plots/kovalevskaya_constant")
-    np.testing.assert_array_equal(rows["Scalars:scalars"], np.arange(20.0))
-    tensor = read_back(tmp_path / "t.rrd", "/plots/tensor")["Scalars:scalars"]
-    np.testing.assert_array_equal(tensor, np.arange(80.0).reshape(20, 4))
-    found = entities(tmp_path / "t.rrd")
-    assert "/plots/flag" in found
-    assert not {"/plots/note", "/plots/energy_lo"} & found
-
-
-def test_one_sample_is_a_picture_too(symmetric_top: Build, tmp_path: Path) -> None:
-    assert write_timeline(symmetric_top().isel(time=[0]), tmp_path / "t.rrd") == 1
-
-
 def test_run_that_ended_in_nan_is_still_shown(symmetric_top: Build, tmp_path: Path) -> None:
     dataset = symmetric_top(count=50).copy(deep=True)
     for name in ("quaternion", "angular_velocity", "angular_momentum", "energy_drift"):
         dataset[name][-3:] = np.nan
     assert write_timeline(dataset, tmp_path / "t.rrd") == 50
-
-
-def test_page_states_the_config_and_the_largest_drift(symmetric_top: Build, tmp_path: Path) -> None:
-    write_timeline(symmetric_top(), tmp_path / "t.rrd")
-    text = page(tmp_path / "t.rrd")
-    assert text.startswith("**Free symmetric top**: a free top")
-    assert 'name = "top"' in page(tmp_path / "t.rrd", "config")
-    assert "| invariant | energy |" in text
-    assert "| initial | 0.4 J |" in text
-    assert "| largest drift | 1.00e-13 |" in text
-    assert "of the rows shown" not in text
-    write_timeline(symmetric_top(), tmp_path / "t.rrd", rows=100)
-    assert "largest drift of the rows shown" in page(tmp_path / "t.rrd")
 
 
 def test_dataset_without_samples_is_refused(symmetric_top: Build, tmp_path: Path) -> None:
@@ -242,29 +178,3 @@ def test_dataset_without_samples_is_refused(symmetric_top: Build, tmp_path: Path
 
 
 # ---- which variables of a recorded run are shown as variables of their own
-
-
-@pytest.mark.parametrize(("digits", "parts"), [("50", 4)])
-def test_no_residual_is_a_variable_of_its_own(
-    digits: str, parts: int, free_body: Callable[..., str], tmp_path: Path
-) -> None:
-    """However many float64 numbers a value takes: 50 digits are 169 bits, four times 53 with room."""
-    run = rigidsim.run(rigidsim.parse(free_body("end = 1\nsamples = 4", precision=digits)), out=tmp_path)
-    with run.dataset as dataset:
-        assert len(parts_in(dataset, "angular_velocity")) == parts
-        shown = thin(dataset, 10)
-        assert {"angular_velocity", "quaternion", "energy", "energy_drift"} <= set(shown)
-        assert not any("_lo" in str(name) for name in shown)
-
-
-@pytest.mark.parametrize("unit", ["rad/s", "rad s-1"])
-@pytest.mark.parametrize(
-    ("size", "shown", "factor"), [(7.3e-5, "µrad/s", 1e6), (2.0, "rad/s", 1.0), (1e-20, "rad/s", 1.0)]
-)
-def test_rates_have_prefixes_as_datasets_write_their_unit(
-    unit: str, size: float, shown: str, factor: float
-) -> None:
-    rates = np.linspace(0.5, 1.0, 4) * size
-    (plot,) = plan_plots(xarray.Dataset({"rate": ("time", rates, {"units": unit})}))
-    assert plot.title == f"Rate [{shown}]"
-    np.testing.assert_allclose(plot.series[0].values[:, 0], rates * factor, rtol=1e-14)

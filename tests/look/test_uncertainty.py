@@ -30,19 +30,6 @@ def attitudes(count: int) -> np.ndarray:
     return rotation_matrix(np.random.default_rng(3).standard_normal((count, 4)))
 
 
-def test_half_angles_are_roots_of_the_covariance_across_the_axis() -> None:
-    turning = attitudes(50)
-    known = np.diag([0.03**2, 0.01**2, 0.07**2])  # body axes: about x, y and the figure axis z itself
-    found = AxisUncertainty.of(Z, turning, turning @ known @ turning.transpose(0, 2, 1))
-    np.testing.assert_allclose(found.half_angles, np.tile([0.03, 0.01], (50, 1)), rtol=1e-12)
-    np.testing.assert_allclose(found.about, 0.07, rtol=1e-12)
-    # a turn about x moves z along y: the cone is 0.03 wide there, and 0.01 along x
-    rim = found.rim(10.0)
-    np.testing.assert_allclose(np.linalg.norm(rim, axis=2), 1.0, rtol=1e-14)
-    np.testing.assert_allclose(np.abs(rim[:, :, 1]).max(axis=1), np.sin(0.3), rtol=1e-12)
-    np.testing.assert_allclose(np.abs(rim[:, :, 0]).max(axis=1), np.sin(0.1), rtol=1e-12)
-
-
 def test_half_angles_are_roots_of_eigenvalues_for_any_covariance_and_axis() -> None:
     rng = np.random.default_rng(8)
     turning, mixed = attitudes(20), rng.standard_normal((20, 3, 3))
@@ -90,16 +77,7 @@ def test_a_cone_that_stays_in_space_turns_against_the_body_that_carries_it(symme
 
 @pytest.mark.parametrize(
     ("largest", "factor"),
-    [
-        (0.3, 1.0),
-        (1.0, 1.0),
-        (0.2, 2.0),
-        (0.0436, 10.0),
-        (1e-3, 300.0),
-        (1e-9, 3e8),
-        (1.5, 1 / 2),
-        (60.0, 1 / 100),
-    ],
+    [(1.0, 1.0), (0.2, 2.0), (1e-3, 300.0), (60.0, 1 / 100)],
 )
 def test_cones_that_cannot_be_seen_are_drawn_by_a_round_factor(largest: float, factor: float) -> None:
     assert drawn_factor(largest) == pytest.approx(factor, rel=1e-12)
@@ -119,26 +97,6 @@ def test_the_factor_stands_in_the_legend_and_true_angles_are_plotted(symmetric_t
     assert not any(COVARIANCE in series.name for plot in plots for series in plot.series)
 
 
-def test_no_cone_is_drawn_where_nothing_bounds_it(symmetric_top: Top) -> None:
-    top, covariance = symmetric_top(count=11), np.tile(0.04 * np.eye(3), (11, 1, 1))
-    covariance[4:] = np.nan
-    picture, _ = build_picture(with_covariance(top, covariance))
-    (cone,) = picture.stages[0].cones
-    sizes = np.linalg.norm(cone.rim, axis=2)
-    assert (sizes[:4] > 1).all()
-    assert not sizes[4:].any()
-    assert any("undetermined" in note for note in picture.notes)
-    _, subject = build_picture(top)
-    assert subject.attitude is not None
-    axis = subject.attitude @ Z  # turned about the axis alone: across it, rounding is left
-    about = 0.01 * axis[:, :, None] * axis[:, None, :]
-    moves = "none of the fitted numbers moves it"
-    for unseen, why in ((np.full((11, 3, 3), np.nan), "no bounds"), (0 * about, moves), (about, moves)):
-        picture, _ = build_picture(with_covariance(top, unseen))
-        assert not picture.stages[0].cones
-        assert any(why in note for note in picture.notes)
-
-
 def test_the_recording_has_the_cone_in_body_axes(
     symmetric_top: Top, read_back: Callable[[Path, str], dict[str, np.ndarray]], tmp_path: Path
 ) -> None:
@@ -153,24 +111,3 @@ def test_the_recording_has_the_cone_in_body_axes(
     corners = cone.rim.shape[1]
     np.testing.assert_array_equal(vertices[:, 1 : 1 + corners], cone.rim.astype(np.float32))
     np.testing.assert_array_equal(vertices[:, 1 + corners :], -cone.rim.astype(np.float32))
-
-
-def test_cones_side_by_side_each_have_their_factor_in_the_legend(symmetric_top: Top, tmp_path: Path) -> None:
-    from rerun.chunk import RrdReader
-
-    from rigidsim.look.timeline.comparison import write_comparison
-
-    top, path = symmetric_top(count=11), tmp_path / "t.rrd"
-    runs = [
-        (name, with_covariance(top, np.tile(x**2 * np.eye(3), (11, 1, 1))))
-        for name, x in (("a", 0.3), ("b", 1e-3))
-    ]
-    write_comparison(runs, path)
-    words = [
-        label
-        for chunk in RrdReader(path).stream()
-        if chunk.entity_path == "/legend/words"
-        for label in chunk.to_record_batch().column("Points2D:labels")[0].as_py()
-    ]
-    assert "■ a: 1 sigma of the figure axis" in words
-    assert "■ b: 1 sigma of the figure axis, drawn × 300" in words

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import subprocess
 import sys
-import tempfile
 from collections.abc import Callable
 from pathlib import Path
 
@@ -16,37 +15,10 @@ pytest.importorskip("rerun")
 import rerun as rr
 
 from rigidsim.look import film, viewer
-from rigidsim.look.timeline import write_timeline
 from rigidsim.look.timeline.comparison import MOST, write_comparison
 from rigidsim.look.timeline.writing import LiveRecording
 
 Build = Callable[..., xarray.Dataset]
-
-
-@pytest.mark.slow  # the viewer starts
-def test_picture_of_a_run_shows_the_body_and_its_plots(
-    symmetric_top: Build, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    from matplotlib.image import imread
-
-    write_timeline(symmetric_top(), tmp_path / "t.rrd")
-    temporary = tmp_path / "temporary"
-    temporary.mkdir()
-    monkeypatch.setenv("TMPDIR", str(temporary))
-    monkeypatch.setattr(tempfile, "tempdir", None)
-    try:
-        film.render(tmp_path / "t.rrd", tmp_path / "t.png")
-    except film.NoGraphics as reason:
-        pytest.skip(str(reason))
-    assert not list(temporary.iterdir())
-    picture = imread(tmp_path / "t.png")[..., :3]
-    height, width = picture.shape[:2]
-    scene = picture[int(0.1 * height) : int(0.6 * height), : int(0.5 * width)]
-    plots = picture[int(0.1 * height) : int(0.9 * height), int(0.6 * width) :]
-    # Background, panels and text are grey; the disk, the arrows and the curves are not.
-    for part, least in ((scene, 0.02), (plots, 0.002)):
-        colorful = np.ptp(part, axis=2) > 0.2
-        assert colorful.mean() > least
 
 
 def test_missing_file_is_named(tmp_path: Path) -> None:
@@ -81,15 +53,6 @@ def test_viewer_listens_on_this_machine_only_and_sends_no_statistics(
         assert command[command.index("--bind") + 1] == "127.0.0.1"
     assert "--serve-web" in commands[1]
     assert "--serve-web" not in commands[0]
-
-
-def test_no_driver_is_said_plainly(
-    symmetric_top: Build, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    (tmp_path / "t.rrd").write_bytes(b"")
-    monkeypatch.setattr(film, "vulkan_drivers", lambda: [])
-    with pytest.raises(film.NoGraphics, match="mesa-vulkan-drivers"):
-        film.render(tmp_path / "t.rrd", tmp_path / "t.png")
 
 
 def test_importing_the_package_loads_neither_rerun_nor_matplotlib() -> None:
