@@ -18,10 +18,10 @@ import typer
 import rigidsim
 import rigidsim.workflows.read  # everything is registered
 from rigidsim.cli.app import app
+from rigidsim.scene.cautions import WarningCode
 from rigidsim.scene.editor_schema import editor_schema
 from rigidsim.scene.registry import OBSERVABLES
 from rigidsim.solve.status import Status
-from rigidsim.store.summary_parts import WarningCode
 from rigidsim.store.variables import LABELS
 
 FILE = Path(__file__).parent / "data" / "promised.json"

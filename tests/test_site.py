@@ -117,8 +117,8 @@ def test_the_reference_has_every_key_command_and_variable(pages: Path) -> None:
 
 @pytest.mark.slow
 def test_every_warning_and_status_has_its_remedy() -> None:
+    from rigidsim.scene.cautions import WarningCode
     from rigidsim.solve.status import Status
-    from rigidsim.store.summary_parts import WarningCode
 
     text = (ROOT / "docs" / "troubleshooting.md").read_text(encoding="utf-8")
     codes = {code.value for code in WarningCode}

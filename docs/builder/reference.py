@@ -310,8 +310,8 @@ def _directive(kind: str, name: str, *, members: bool = False) -> str:
 
 def codes_page() -> str:
     """Statuses of runs and codes of warnings."""
+    from rigidsim.scene.cautions import WarningCode
     from rigidsim.solve.status import Status
-    from rigidsim.store.summary_parts import WarningCode
 
     statuses = [[code(found.value), found.message, str(found.exit_code)] for found in Status]
     warnings = [[code(found.value), _why(found.value)] for found in WarningCode]

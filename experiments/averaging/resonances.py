@@ -23,8 +23,8 @@ import numpy as np
 
 import rigidsim
 from rigidsim.errors import ConfigError
+from rigidsim.scene.cautions import WarningCode
 from rigidsim.store.summary import Summary
-from rigidsim.store.summary_parts import WarningCode
 
 AXES = ["momentum_axis", "figure_axis"]
 TIMES, MOST, PART = 3.0, 10.0, 0.99

@@ -11,11 +11,11 @@ import rigidsim
 from experiments.coverage.families import CoverageScene
 from experiments.coverage.judging import MOST_STEPS, Judged, gone_through
 from rigidsim.errors import ConfigError
+from rigidsim.scene.cautions import WarningCode
 from rigidsim.scene.config import Experiment
 from rigidsim.session.diagnostics import Diagnostics
 from rigidsim.solve.problem import InitialValueProblem, prepare
 from rigidsim.solve.status import Status
-from rigidsim.store.summary_parts import WarningCode
 
 _AXES = ("momentum_axis", "figure_axis")
 

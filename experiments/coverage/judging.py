@@ -14,6 +14,7 @@ import rigidsim
 from experiments.coverage import moments
 from experiments.coverage.families import SAMPLES, CoverageScene
 from rigidsim.errors import ConfigError
+from rigidsim.scene.cautions import WarningCode
 from rigidsim.session.diagnostics import Diagnostics
 from rigidsim.session.recorder import SampleStatistics
 from rigidsim.solve.assembly import Assembly, assemble, sampler
@@ -22,7 +23,6 @@ from rigidsim.solve.problem import InitialValueProblem, prepare
 from rigidsim.solve.sample_block import SampleBlock
 from rigidsim.solve.sampler import Progress, SampleReceiver
 from rigidsim.solve.status import Status
-from rigidsim.store.summary_parts import WarningCode
 
 MOST_STEPS = 100_000
 """Of a scene; what would take longer is cut off, and counted as that."""

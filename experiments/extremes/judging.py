@@ -18,6 +18,7 @@ import rigidsim
 from experiments.extremes.scenes import Extreme
 from rigidsim.accuracy.error_law import round_off_law
 from rigidsim.errors import ConfigError
+from rigidsim.scene.cautions import WarningCode
 from rigidsim.session.diagnostics import Diagnostics
 from rigidsim.session.recorder import SampleStatistics
 from rigidsim.solve.assembly import assemble, sampler
@@ -27,7 +28,6 @@ from rigidsim.solve.problem import InitialValueProblem, prepare
 from rigidsim.solve.sample_block import SampleBlock
 from rigidsim.solve.sampler import SampleReceiver
 from rigidsim.solve.status import Status
-from rigidsim.store.summary_parts import WarningCode
 
 FACTOR = 3.0
 """Between an error and the law or estimate that covers it."""

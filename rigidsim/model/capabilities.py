@@ -246,9 +246,9 @@ class Beside(Protocol):
 
 @runtime_checkable
 class Unaveraged(Protocol):
-    """Why no average over the rotation takes it."""
+    """Why no average over the rotation takes it, and what to do with it instead."""
 
-    unaveraged: str
+    unaveraged: tuple[str, str]
 
 
 # --- how it acts ------------------------------------------------------------------------------------------

@@ -95,10 +95,7 @@ def keeps(m: Mechanics, axis: Vector, loads: Sequence[Load] | None = None) -> bo
 
 def _turns_about(m: Mechanics, load: Load, axis: Vector) -> bool:
     """Whether it may have a torque about a unit axis in space."""
-    if isinstance(load, TurnsAbout):
-        return load.turns_about(m, axis)
-    up = m.numbers.up
-    return getattr(load, "about_vertical", True) or up is None or norm(m.scene.context, cross(up, axis)) != 0
+    return not isinstance(load, TurnsAbout) or load.turns_about(m, axis)
 
 
 def field_axis(m: Mechanics) -> Vector | None:

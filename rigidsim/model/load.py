@@ -18,10 +18,10 @@ from rigidsim.model.rotations import Symbolic
 from rigidsim.model.si import speaks_si
 from rigidsim.model.state_blocks import StateBlock
 from rigidsim.scene.arithmetic import Vector
+from rigidsim.scene.cautions import Caution
 from rigidsim.scene.registry import SceneLoad
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.validation_messages import shown
-from rigidsim.store.summary_parts import Caution
 
 Term = tuple[Vector, Symbolic]
 """A constant vector (mpf) times an expression."""

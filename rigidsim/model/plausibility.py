@@ -14,13 +14,13 @@ from rigidsim.model.load_words import ASTRONOMICAL_UNIT, length_text, span_words
 from rigidsim.scene import attitude
 from rigidsim.scene.arithmetic import Vector, apply, dot, hansen, norm
 from rigidsim.scene.bodies.presets import KNOWN, KnownBody, known_body
+from rigidsim.scene.cautions import Caution, WarningCode
 from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.orbit_keys import PACES, Elements
 from rigidsim.scene.orbits import KeplerOrbit
 from rigidsim.scene.point_masses import GRAVITATIONAL_CONSTANT
 from rigidsim.scene.readable import span_text
 from rigidsim.scene.scene import Scene
-from rigidsim.store.summary_parts import Caution, WarningCode
 
 _CUBIC_KILOMETRE = 1e9  # m^3
 _AS_PUBLISHED = 1e-3  # relative difference up to which a number is a published one in other units

@@ -13,6 +13,7 @@ from rigidsim.accuracy.models.modelling import measure_modelling
 from rigidsim.accuracy.models.side_by_side import Unmeasured
 from rigidsim.errors import ConfigError
 from rigidsim.model.capabilities import gradient_source_of
+from rigidsim.scene.cautions import Caution, WarningCode
 from rigidsim.scene.choices import FULL, REDUCED
 from rigidsim.scene.readable import TimeWords, span_text
 from rigidsim.session.recorder import SampleStatistics
@@ -24,7 +25,7 @@ from rigidsim.solve.problem import InitialValueProblem, prepare
 from rigidsim.solve.sampler import Progress
 from rigidsim.solve.stepper import OwnErrors
 from rigidsim.solve.taylor_stepper import TaylorStepper
-from rigidsim.store.summary_parts import Advice, AdviceCode, Caution, Modelling, WarningCode
+from rigidsim.store.summary_parts import Advice, AdviceCode, Modelling
 
 NEAR_SINGULAR = 1e-3
 """Singular factor below which Euler angles lose digits near their singularity."""

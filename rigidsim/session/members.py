@@ -11,12 +11,13 @@ from itertools import accumulate
 import numpy as np
 
 from rigidsim.errors import ConfigError, RigidsimError
+from rigidsim.scene.cautions import WarningCode
 from rigidsim.session.kept import MemberSeries, joined, kept, kept_events, kept_of_series
 from rigidsim.solve.status import Status
 from rigidsim.store.netcdf import joined_parts
 from rigidsim.store.run import MemoryRun
 from rigidsim.store.summary import Summary
-from rigidsim.store.summary_parts import Modelling, WarningCode
+from rigidsim.store.summary_parts import Modelling
 from rigidsim.store.sweeps.tiles import Kept, KeptVariable
 
 

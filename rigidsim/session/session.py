@@ -11,6 +11,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from rigidsim.scene.cautions import Caution
 from rigidsim.session.recorder import SampleStatistics
 from rigidsim.solve.checkpoint import Arrays, numbers
 from rigidsim.solve.compiled import building, give_up, take_up
@@ -18,7 +19,7 @@ from rigidsim.solve.problem import InitialValueProblem
 from rigidsim.solve.sampler import Pacing, Progress
 from rigidsim.solve.status import Status
 from rigidsim.store.segments import SegmentLimits
-from rigidsim.store.summary_parts import ENGINE, Caution
+from rigidsim.store.summary_parts import ENGINE
 
 
 class Observer:

@@ -7,6 +7,7 @@ from typing import Any
 
 from rigidsim.accuracy.models.modelling import modelling_of
 from rigidsim.model.capabilities import table_of
+from rigidsim.scene.cautions import Caution
 from rigidsim.session.dataset import unused_variables
 from rigidsim.session.diagnostics import Diagnostics, advice_on
 from rigidsim.session.session import Effort, Phases
@@ -21,7 +22,6 @@ from rigidsim.store.summary import Summary, as_fields
 from rigidsim.store.summary_parts import (
     Accuracy,
     BitForBit,
-    Caution,
     Cost,
     InvariantDrift,
     Lyapunov,

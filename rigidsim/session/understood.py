@@ -6,6 +6,7 @@ from rigidsim.model.load import Load, loads_of
 from rigidsim.model.plausibility import about_named_strength, about_radius
 from rigidsim.scene import attitude
 from rigidsim.scene.arithmetic import Vector, working_bits
+from rigidsim.scene.cautions import Caution, WarningCode
 from rigidsim.scene.readable import TimeWords
 from rigidsim.scene.registry import OF_BODY
 from rigidsim.scene.scene import Scene
@@ -18,7 +19,7 @@ from rigidsim.scene.suspicions import (
 )
 from rigidsim.solve.problem import InitialValueProblem
 from rigidsim.store.summary import Span, Start, UnderstoodBody
-from rigidsim.store.summary_parts import Caution, Three, WarningCode
+from rigidsim.store.summary_parts import Three
 
 
 def body_of(scene: Scene) -> UnderstoodBody:

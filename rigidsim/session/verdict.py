@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 from enum import Enum
 
+from rigidsim.scene.cautions import WarningCode
 from rigidsim.store.summary import Summary
-from rigidsim.store.summary_parts import WarningCode
 
 
 class Soundness(Enum):

@@ -11,12 +11,12 @@ from typing import Annotated, Any, Self
 from pydantic import Field, StrictBool, StrictInt, StrictStr, ValidationError
 
 from rigidsim.errors import RunFolderError, run_again
+from rigidsim.scene.cautions import Caution
 from rigidsim.scene.choices import DEFAULT_METHOD
 from rigidsim.store.summary_parts import (
     Accuracy,
     Advice,
     BitForBit,
-    Caution,
     ChartChanges,
     Claim,
     Cost,

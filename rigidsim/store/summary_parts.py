@@ -1,7 +1,7 @@
 """Parts of the summaries of runs: fields and which of them are claims, codes, cost, invariants, accuracy."""
 
 from dataclasses import dataclass
-from enum import Enum, StrEnum
+from enum import Enum
 from typing import Annotated, Any, ClassVar, Self
 
 from pydantic import (
@@ -56,39 +56,6 @@ ENGINE = "engine"
 """Key beside the phases in ``Cost.seconds``: time that the engine alone took of integrating and recording."""
 
 
-class WarningCode(StrEnum):
-    """Why a result can't be trusted, or not wholly: the words of summaries.
-
-    Datasets of sweeps hold a bit for each in this order, so that new ones come last.
-    """
-
-    DRIFT = "drift"
-    SINGULARITY = "singularity"
-    NO_EFFECT = "no_effect"
-    ATTITUDE_UNCERTAIN = "attitude_uncertain"
-    RATES_UNCERTAIN = "rates_uncertain"
-    NOT_JOINED = "not_joined"
-    SET_ASIDE = "set_aside"
-    BEGUN_ANEW = "begun_anew"
-    NOT_CERTIFIED = "not_certified"
-    ANGLE_WITHOUT_UNIT = "angle_without_unit"
-    EPHEMERIS_OF_EARTH = "ephemeris_of_earth"
-    NEVER_HAPPENS = "never_happens"
-    TIME_WITHOUT_UNIT = "time_without_unit"
-    MODEL_UNCERTAIN = "model_uncertain"
-    UNDEFINED = "undefined"
-    LENGTH_WITHOUT_UNIT = "length_without_unit"
-    BELOW_SURFACE = "below_surface"
-    PERIOD_CONTRADICTS = "period_contradicts"
-    GRAVITY_UPWARDS = "gravity_upwards"
-    NEAR_RESONANCE = "near_resonance"
-    MODEL_UNMEASURED = "model_unmeasured"
-    DELAY_TOO_LONG = "delay_too_long"
-    FRICTION_STIFF = "friction_stiff"
-    STRENGTH_CONTRADICTS = "strength_contradicts"
-    HOST_WITHOUT_GRAVITY = "host_without_gravity"
-
-
 class UnmeasuredCode(Enum):
     """Why the error of an averaged model isn't known; ``value`` stands in summaries."""
 
@@ -107,14 +74,6 @@ class AdviceCode(Enum):
     HOLD_INVARIANTS = "hold_invariants"
     CLOSED_FORM = "closed_form"
     AVERAGED = "averaged"
-
-
-@dataclass(frozen=True)
-class Caution:
-    """A warning: its code (a ``WarningCode``, or a later version's word), and its text for people."""
-
-    code: str
-    text: str
 
 
 Digest = Annotated[StrictStr, Field(pattern=r"^[0-9a-f]{64}$")]

@@ -9,6 +9,7 @@ import numpy as np
 
 from rigidsim.errors import FORCE, RunFolderError, either
 from rigidsim.model.load import Load
+from rigidsim.scene.cautions import Caution, WarningCode
 from rigidsim.scene.config import Experiment, Overrides, parse
 from rigidsim.scene.python_values import assignments_of
 from rigidsim.scene.scene import build_scene
@@ -29,7 +30,6 @@ from rigidsim.store.run import SavedRun, open_run
 from rigidsim.store.seal import check_seal
 from rigidsim.store.segments import Chain, read_chain
 from rigidsim.store.summary import Summary
-from rigidsim.store.summary_parts import Caution, WarningCode
 from rigidsim.workflows.read import as_begun, embedded, refuse_other_kernel, text_difference
 from rigidsim.workflows.run import certified
 

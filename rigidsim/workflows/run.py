@@ -10,6 +10,7 @@ from rigidsim.accuracy.choice import Choice, choose_level, chosen
 from rigidsim.accuracy.setting import Setting, asked_of_attitude, leaves_choice, wanted
 from rigidsim.errors import ConfigError
 from rigidsim.model.load import Load
+from rigidsim.scene.cautions import Caution, WarningCode
 from rigidsim.scene.choices import AUTO, FULL
 from rigidsim.session.dataset import refuse_taken_names
 from rigidsim.session.execution import execute
@@ -22,7 +23,6 @@ from rigidsim.store.folder import RunFolder
 from rigidsim.store.outputs import refuse_inputs
 from rigidsim.store.run import MemoryRun, Run, SavedRun
 from rigidsim.store.summary import Summary
-from rigidsim.store.summary_parts import Caution, WarningCode
 from rigidsim.workflows.read import Experiment, Given, as_experiment
 
 AnyRun = TypeVar("AnyRun", bound=Run)

@@ -370,7 +370,7 @@ def test_a_field_takes_a_mass_and_a_centre() -> None:
 def test_no_average_takes_the_field() -> None:
     text = config(BODY, "angular_velocity = [0, 0, 50]", gradient_of())
     with pytest.raises(
-        ConfigError, match=re.escape("has no average; the gradient alone has one (set degree = 2)")
+        ConfigError, match=re.escape("has no average, which the gradient alone has; set degree = 2, or")
     ):
         prepare(rigidsim.parse(text, overrides=['model.level="spin_averaged"']))
 

@@ -15,10 +15,10 @@ import rigidsim
 from experiments.coverage.families import coverage_scene
 from experiments.random_scenes import random_scene
 from rigidsim import parse
+from rigidsim.scene.cautions import Caution
 from rigidsim.scene.scene import build_scene
 from rigidsim.scene.sweeps.sweep import Sweep
 from rigidsim.session.understood import cautions_of
-from rigidsim.store.summary_parts import Caution
 
 ROOT = Path(__file__).parents[2]
 EARTH = 'gravitational_parameter = "3.986004418e14 m^3/s^2"\n'

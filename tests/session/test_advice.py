@@ -9,8 +9,9 @@ from support import config
 
 import rigidsim
 from rigidsim.cli.screens.words import verdict_line
+from rigidsim.scene.cautions import WarningCode
 from rigidsim.session.verdict import LEAST, Soundness, verdict_on
-from rigidsim.store.summary_parts import AdviceCode, WarningCode
+from rigidsim.store.summary_parts import AdviceCode
 
 LONG = config(  # some 24,000 steps
     time="end = 12000\nsamples = 101", integrator="hold_invariants = false", estimate=True

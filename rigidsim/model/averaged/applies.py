@@ -8,7 +8,6 @@ momentum by U / (L nu) elsewhere.
 """
 
 import math
-import re
 from collections.abc import Sequence
 
 import numpy as np
@@ -39,7 +38,7 @@ SWING = 0.05
 """Largest angle (rad) by which the terms averaged away may swing the momentum or the figure axis: errors are
 of second order in it, and beyond it a percent of the precession would be the best to hope for.
 """
-_ASKS = re.compile(": (leave it out|set it to false|remove them)$")
+_FULL = 'choose level = "full"'
 _WEAK = 1e-7  # of the largest harmonic
 PASSING = -math.log(_WEAK)
 """Least ratio of the body's frequencies to the angular rate of a source that passes by: its torque has less
@@ -52,13 +51,13 @@ def refuse_scene(scene: Scene, loads: Sequence[Load]) -> None:
     config, level, integrator = scene.config, scene.config.model.level, scene.config.integrator
     sources = [source for load in loads if (source := gradient_source_of(load)) is not None]
     alone = [load for load in loads if gradient_source_of(load) is None]
-    against = carried_beside(loads)
+    against, instead = carried_beside(loads), ""
     if scene.free_flight:
         against = "the body has a position and flies"
     elif against:
         pass
     elif strange := [load.unaveraged for load in having(Unaveraged, loads)]:
-        against = strange[0]
+        against, instead = strange[0]
     elif not loads:
         against = "no torque acts, so that the direction of the angular momentum rests"
     elif max(scene.body.principal_moments) == min(scene.body.principal_moments):
@@ -76,28 +75,28 @@ def refuse_scene(scene: Scene, loads: Sequence[Load]) -> None:
     elif all(w == 0 for w in scene.angular_velocity):
         against = "the body starts at rest"
     elif integrator.formulation != "auto":
-        against = (
-            f'[integrator] formulation = "{integrator.formulation}" carries every rotation: leave it out'
-        )
+        against = f'[integrator] formulation = "{integrator.formulation}" carries every rotation'
+        instead = "leave it out"
     elif not integrator.has_steps:
-        against = f'[integrator] method = "{integrator.method}" is of the full motion: leave it out'
+        against = f'[integrator] method = "{integrator.method}" is of the full motion'
+        instead = "leave it out"
     elif integrator.hold_invariants is True:
-        against = "[integrator] hold_invariants = true is for the full motion's: set it to false"
+        against, instead = "[integrator] hold_invariants = true is for the full motion's", "set it to false"
     elif integrator.accuracy is not None or integrator.accuracy_position is not None:
         against = "[integrator] accuracy is the attitude's, which needs every rotation"
     elif config.events:
-        against = "[[events]] read the full state: remove them"
+        against, instead = "[[events]] read the full state", "remove them"
     elif scene.states:
-        against = "[[states]] go with every rotation: remove them"
+        against, instead = "[[states]] go with every rotation", "remove them"
     elif config.output.lyapunov:
-        against = "[output] lyapunov is of the full motion: set it to false"
+        against, instead = "[output] lyapunov is of the full motion", "set it to false"
     elif scene.bodies is not None and scene.bodies.full:
         against = 'coupling = "full" makes the bodies feel every rotation of this one'
         raise refused(level, against, 'set [body] coupling to "one_way", or choose level = "full"')
     elif level == ORBIT_AVERAGED and (unsuited := [x for x in map(_unsuited, sources) if x]):
         raise refused(level, *unsuited[0])
     if against:
-        raise refused(level, against)
+        raise refused(level, against, f"{instead}, or {_FULL}" if instead else _FULL)
     if alone and config.model.short_period:
         what = f"given true, but what {alone[0].title} does within a rotation isn't added back; "
         raise ConfigError(Problem("[model] short_period", what + "set it to false"))
@@ -186,7 +185,7 @@ def _refuse_resonance(
         held = (2 * k[None, :] == i[:, None] * kept.multiple) & (rate < source.motion / 2)
     met = bool((own & ((rate < slow) | (swing > SWING))).any())
     keeps = scene.config.model.level == ORBIT_AVERAGED
-    remedy = 'choose level = "full"'
+    remedy = _FULL
     if keeps and met:
         slow, swing = np.where(held, 0.0, slow), np.where(held, 0.0, swing)
     elif met and not keeps:
@@ -280,7 +279,6 @@ def _refuse_slow_orbit(scene: Scene, spectrum: BodySpectrum, source: Source) -> 
         )
 
 
-def refused(level: str, against: str, remedy: str = 'choose level = "full"') -> ConfigError:
+def refused(level: str, against: str, remedy: str = _FULL) -> ConfigError:
     """The error for an average that doesn't apply."""
-    joined = f", or {remedy}" if _ASKS.search(against) else f"; {remedy}"
-    return ConfigError(Problem("[model] level", f'given "{level}", but {against}{joined}'))
+    return ConfigError(Problem("[model] level", f'given "{level}", but {against}; {remedy}'))

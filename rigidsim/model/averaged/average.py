@@ -214,7 +214,7 @@ def _left_out_at_start(
     integral = space.T @ integral @ space
     total = np.zeros(3)
     for source in sources:
-        pull = source.pull(scene.context, scene.start)
+        pull = source.pull_at_start(scene)
         if pull is not None:
             product = float(source.strength) * pull @ integral
             # r x (I r) is the sum over a, b of r_a r_b e_a x I e_b

@@ -70,9 +70,7 @@ class OrbitPlace:
 
 @dataclass(frozen=True)
 class Ellipse:
-    """MassDistribution (e, e^2, sqrt(1 - e^2), whether e is known to be 0) and mean motion; numbers (mpf) or
-    expressions.
-    """
+    """Shape (e, e^2, sqrt(1 - e^2), whether e is known to be 0) and mean motion; mpf or expressions."""
 
     eccentricity: Any
     square: Any

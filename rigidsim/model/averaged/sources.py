@@ -64,7 +64,7 @@ class Source:
         return self.strength if axis == 1 else self.strength / axis**3
 
     def ellipse(self, context: Any, time: Any) -> Ellipse:
-        """MassDistribution and mean motion of the source's orbit at a time, numbers (mpf)."""
+        """Shape and mean motion of the source's orbit at a time, numbers (mpf)."""
         if self.of.table is not None:
             found = self.of.table.at(time)
             square = found["k"] ** 2 + found["h"] ** 2
@@ -108,15 +108,16 @@ class Source:
         tilt, node, periapsis = ((context.cos(x), context.sin(x)) for x in angles)
         return OrbitPlace(context.cos(anomaly), context.sin(anomaly), *plane_vectors(tilt, node, periapsis))
 
-    def pull(self, context: Any, time: Any) -> np.ndarray | None:
-        """(a/r)^3 r r^T, (3, 3), at a time (a point mass: at the start); None for an ephemeris."""
-        place = self.of.placement.at(context, time)
-        if place is not None:
+    def pull_at_start(self, scene: Scene) -> np.ndarray | None:
+        """(a/r)^3 r r^T, (3, 3), where the run begins; None for a series of time."""
+        placement, context, time = self.of.placement, scene.context, scene.start
+        if placement.of_time:
+            return None
+        if not self.has_elements:
+            place = placement.at_start(scene)
             length = norm(context, place)
             direction = np.array([float(x / length) for x in place])
-            return np.outer(direction, direction) * float(self.of.placement.distance(context) / length) ** 3
-        if not self.has_elements:
-            return None
+            return np.outer(direction, direction) * float(placement.distance(context) / length) ** 3
         e, at = float(self.ellipse(context, time).eccentricity), self.place(context, time)
         c, s = float(at.cosine), float(at.sine)
         x, y = c - e, math.sqrt(1 - e * e) * s

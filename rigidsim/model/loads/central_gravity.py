@@ -32,6 +32,7 @@ from rigidsim.model.plausibility import (
 )
 from rigidsim.model.rotations import Symbolic
 from rigidsim.scene.arithmetic import Vector, cross, norm, unit_vectors
+from rigidsim.scene.cautions import Caution
 from rigidsim.scene.exact import ZERO
 from rigidsim.scene.fields import BodyName, GravitationalParameter, Metre, Rate, Triple
 from rigidsim.scene.orbit_keys import Orbit
@@ -39,7 +40,6 @@ from rigidsim.scene.orbits import attracting_body
 from rigidsim.scene.point_masses import closest, kepler_reach
 from rigidsim.scene.registry import Surroundings, register_load
 from rigidsim.scene.scene import Scene
-from rigidsim.store.summary_parts import Caution
 
 _ROUNDED = 0.999  # of the distance for which estimates are made, and the pericentre but for rounding
 

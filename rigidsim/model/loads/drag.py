@@ -21,6 +21,7 @@ from rigidsim.model.plausibility import about_altitude
 from rigidsim.model.rotations import Symbolic
 from rigidsim.scene.bodies.outside import Plate
 from rigidsim.scene.bodies.presets import known_body
+from rigidsim.scene.cautions import Caution
 from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.expressions.parser import parse_expression
 from rigidsim.scene.expressions.tree import Expression, ExpressionError
@@ -28,7 +29,6 @@ from rigidsim.scene.fields import Dimensionless, Metre, NumberOrFormula
 from rigidsim.scene.initial_values import start_values
 from rigidsim.scene.registry import LoadFields, Surroundings, register_load
 from rigidsim.scene.scene import Scene
-from rigidsim.store.summary_parts import Caution
 
 Density = Annotated[Any, NumberOrFormula("kg/m^3")]
 

@@ -99,7 +99,7 @@ class EarthField:
 
     def over(self, m: Kinematics, centre: Vector, size: Any) -> list[Symbolic]:
         """B over a size (mpf, T), space axes."""
-        which = IGRF, self.epoch, self.harmonics.degree, *map(id, centre)  # the size is of the same
+        which = IGRF, self.epoch, self.harmonics.degree, *centre, size
         if which not in m.made:
             unit = m.scene.context.ldexp(m.scene.context.one, m.scaling.length)
             ratio = self.harmonics.radius / unit

@@ -67,7 +67,7 @@ class EddyCurrents(InMagneticField):
     Fields = EddyCurrentsFields
     title = "eddy_currents"
     described = "a load of eddy currents"
-    unaveraged = "the torque of eddy currents has no average: leave it out, or use viscous_torque"
+    unaveraged = "the torque of eddy currents has no average", "leave it out, use viscous_torque"
 
     @classmethod
     def resolve(cls, fields: EddyCurrentsFields, around: Surroundings) -> EddyCurrents:

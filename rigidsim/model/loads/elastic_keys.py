@@ -7,6 +7,7 @@ from typing import Any
 
 from rigidsim.errors import ConfigError, Problem
 from rigidsim.model.load_words import length_text, span_words
+from rigidsim.scene.cautions import Caution, WarningCode
 from rigidsim.scene.effect_parts import EffectPart
 from rigidsim.scene.kernels.kernel import Sight
 from rigidsim.scene.registry import SceneLoad, Surroundings, names_of
@@ -14,7 +15,6 @@ from rigidsim.scene.scene import Scene
 from rigidsim.scene.schema import Config
 from rigidsim.scene.tracing.numbers import plain
 from rigidsim.scene.validation_messages import nearest
-from rigidsim.store.summary_parts import Caution, WarningCode
 
 WHERE = "[body] elasticity"
 _FLUID = "1.5"  # Love number of a homogeneous fluid, the largest that there is

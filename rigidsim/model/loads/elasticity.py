@@ -43,13 +43,13 @@ from rigidsim.model.scaling import Scaling, source_rate
 from rigidsim.model.two_part import rounded
 from rigidsim.scene.arithmetic import Matrix, Vector, apply, dot, norm, working_epsilon
 from rigidsim.scene.attitude import rotation_matrix
+from rigidsim.scene.cautions import Caution
 from rigidsim.scene.kernels.kernel import Sight
 from rigidsim.scene.point_masses import GRAVITATIONAL_CONSTANT
 from rigidsim.scene.registry import Surroundings, register_of_body
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.schema import Config
 from rigidsim.scene.tracing.numbers import plain
-from rigidsim.store.summary_parts import Caution
 
 T = TypeVar("T")
 _MOST = 0.1  # of a moment, up to which a linear response makes sense

@@ -32,13 +32,13 @@ from rigidsim.model.scaling import exponent, largest_rates
 from rigidsim.model.state_blocks import StateBlock
 from rigidsim.scene.arithmetic import Matrix, Vector, apply, cross, dot, norm, unit_vectors
 from rigidsim.scene.bodies.body import RigidBody
+from rigidsim.scene.cautions import Caution, WarningCode
 from rigidsim.scene.effect_parts import EffectPart
 from rigidsim.scene.frame import unique_axis
 from rigidsim.scene.registry import Surroundings, register_of_body
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.schema import Config
 from rigidsim.scene.tracing.numbers import plain
-from rigidsim.store.summary_parts import Caution, WarningCode
 
 STATES = ("core_wx", "core_wy", "core_wz")
 _ROUNDING_OF_INPUT = 1e-14  # relative, of moments that a double-precision program printed

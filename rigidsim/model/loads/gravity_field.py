@@ -87,7 +87,8 @@ class FieldAttraction(Load):
     described = "the body's gravity field"
     has_source = False
     unaveraged = (
-        "the gravity field of degree 3 and more has no average; the gradient alone has one (set degree = 2)"
+        "the gravity field of degree 3 and more has no average, which the gradient alone has",
+        "set degree = 2",
     )
 
     @property

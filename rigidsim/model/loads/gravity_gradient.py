@@ -24,6 +24,7 @@ from rigidsim.model.placements.series import PlacedBySeries
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.two_part import as_factor
 from rigidsim.scene.arithmetic import Vector, norm
+from rigidsim.scene.cautions import Caution
 from rigidsim.scene.epochs import J2000, Epoch
 from rigidsim.scene.fields import BodyName, GravitationalParameter, Metre, Triple
 from rigidsim.scene.frame import ECLIPTIC
@@ -32,7 +33,6 @@ from rigidsim.scene.orbit_keys import OrbitFields
 from rigidsim.scene.orbits import KeplerOrbit, attracting_body, resolve_orbit, resolve_tabulated_orbit
 from rigidsim.scene.registry import Surroundings, register_load
 from rigidsim.scene.scene import Scene
-from rigidsim.store.summary_parts import Caution
 
 _PLACES = ("orbit", "satellite_orbit", "position", "ephemeris", "source")
 """Keys that tell how a source is placed."""

@@ -25,10 +25,10 @@ from rigidsim.model.placements.kernel_body import PlacedByKernel, kernel_body
 from rigidsim.model.plausibility import about_named_strength, about_start, named_body
 from rigidsim.model.rotations import Symbolic, length
 from rigidsim.scene.arithmetic import Vector, dot, norm, unit_vectors
+from rigidsim.scene.cautions import Caution, WarningCode
 from rigidsim.scene.kernels.kernel import Sight
 from rigidsim.scene.registry import Surroundings
 from rigidsim.scene.scene import Scene
-from rigidsim.store.summary_parts import Caution, WarningCode
 
 
 @dataclass(frozen=True)

@@ -27,6 +27,7 @@ from rigidsim.model.plausibility import about_orbit, implied_strength
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.two_part import rounded
 from rigidsim.scene.arithmetic import Vector, dot, norm
+from rigidsim.scene.cautions import Caution
 from rigidsim.scene.earth_axes import STRENGTH, UNLIKE
 from rigidsim.scene.effect_parts import EffectPart
 from rigidsim.scene.exact import ExactNumber
@@ -34,7 +35,6 @@ from rigidsim.scene.orbits import KeplerOrbit, resolve_orbit
 from rigidsim.scene.registry import Surroundings
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.tracing.numbers import plain
-from rigidsim.store.summary_parts import Caution
 
 _FIELD_CONSTANT = "1e-7"
 """mu_0 / 4 pi, T m/A: CODATA 2022 has 0.99999999987(16) times this, measured since the SI of 2019."""

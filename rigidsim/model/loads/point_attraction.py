@@ -27,11 +27,11 @@ from rigidsim.model.placements.point_mass import PlacedAsMass
 from rigidsim.model.plausibility import about_start, about_strength, attracting
 from rigidsim.model.rotations import Symbolic, apply, length, transpose, unit
 from rigidsim.scene.arithmetic import Vector, cross, norm, unit_vectors
+from rigidsim.scene.cautions import Caution
 from rigidsim.scene.kernels.series import exactly
 from rigidsim.scene.point_masses import GRAVITATIONAL_CONSTANT, PointMasses, closest
 from rigidsim.scene.registry import Surroundings
 from rigidsim.scene.scene import Scene
-from rigidsim.store.summary_parts import Caution
 
 
 class PointAttraction(Load):

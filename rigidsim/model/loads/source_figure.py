@@ -122,7 +122,7 @@ class FigureAttraction(Load):
     title = "figure"
     described = "the figure of a source"
     has_source = False
-    unaveraged = "the figure of a source has no average: leave figure out"
+    unaveraged = "the figure of a source has no average", "leave figure out"
 
     @property
     def reads(self) -> frozenset[str]:  # type: ignore[override]

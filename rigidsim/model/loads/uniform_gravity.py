@@ -16,11 +16,11 @@ from rigidsim.model.load_words import direction_text, value_text
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.scaling import potential_amplitude
 from rigidsim.scene.arithmetic import Vector, across, cross, norm, unit_vectors
+from rigidsim.scene.cautions import Caution, WarningCode
 from rigidsim.scene.exact import ExactNumber, parse_number
 from rigidsim.scene.fields import Acceleration, Triple
 from rigidsim.scene.registry import LoadFields, Surroundings, register_load
 from rigidsim.scene.scene import Scene
-from rigidsim.store.summary_parts import Caution, WarningCode
 
 STANDARD_GRAVITY = 9.80665  # m/s^2
 _ON_EARTH = (

@@ -17,11 +17,11 @@ from rigidsim.model.placements.placement import Circuit, Placement, SourceMotion
 from rigidsim.model.plausibility import about_named_strength
 from rigidsim.model.rotations import Symbolic
 from rigidsim.scene.arithmetic import Vector
+from rigidsim.scene.cautions import Caution
 from rigidsim.scene.kernels.ephemeris import Ephemeris
 from rigidsim.scene.kernels.kernel import Sight
 from rigidsim.scene.registry import Surroundings
 from rigidsim.scene.scene import Scene
-from rigidsim.store.summary_parts import Caution
 
 _LUNISOLAR = frozenset({"sun", "earth", "moon", "earth_moon_barycenter"})
 _BOTH, _PARTS = "earth_moon_barycenter", ("earth", "moon")
@@ -105,6 +105,7 @@ class PlacedByKernel(Placement):
         return self.at(scene.context, scene.start)
 
     def at(self, context: Any, time: Any) -> Vector:
+        """Place (mpf, m) at a time of the scene, s."""
         return self.ephemeris.place(context, self.sight, time)
 
     # --- sizes, from samples in double precision ----------------------------------------------------------

@@ -15,13 +15,13 @@ from rigidsim.model.orbit_planes import OrbitPlane
 from rigidsim.model.orbits.point_mass_states import PointMassPair
 from rigidsim.model.rotations import Symbolic
 from rigidsim.scene.arithmetic import Vector
+from rigidsim.scene.cautions import Caution
 from rigidsim.scene.epochs import Epoch
 from rigidsim.scene.kernels.kernel import Sight
 from rigidsim.scene.orbit_tables.pieces import TabulatedOrbit
 from rigidsim.scene.orbits import KeplerOrbit
 from rigidsim.scene.registry import LoadFields
 from rigidsim.scene.scene import Scene
-from rigidsim.store.summary_parts import Caution
 
 
 @dataclass(frozen=True)
@@ -122,10 +122,6 @@ class Placement(ABC):
     def motion_at_start(self, scene: Scene) -> tuple[Vector, Vector, Vector]:
         """The same at the start (mpf, SI)."""
         raise NotImplementedError
-
-    def at(self, context: Any, time: Any) -> Vector | None:
-        """Place (mpf, m) at a time of the scene, if it is known without an orbit's elements."""
-        return None
 
     def nearest(self, context: Any) -> Any:
         """Least distance, m (mpf), for sizes of torques."""

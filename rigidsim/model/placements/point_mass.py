@@ -62,10 +62,6 @@ class PlacedAsMass(Placement):
     def at_start(self, scene: Scene) -> Vector:
         return self.pair.place
 
-    def at(self, context: Any, time: Any) -> Vector:
-        """The place at the start, whatever the time."""
-        return self.pair.place
-
     def circuit(self, context: Any) -> Circuit:
         least, rate = self.pair.encounter(context)
         if (ellipse := self.pair.ellipse(context)) is None:

@@ -17,10 +17,10 @@ from rigidsim.model.placements.placement import Circuit, Placement, SourceMotion
 from rigidsim.model.plausibility import about_distance, about_orbit, about_spin, about_strength, attracting
 from rigidsim.model.rotations import Symbolic
 from rigidsim.scene.arithmetic import Vector, across, norm, parallel
+from rigidsim.scene.cautions import Caution
 from rigidsim.scene.orbit_tables.pieces import TabulatedOrbit
 from rigidsim.scene.orbits import KeplerOrbit
 from rigidsim.scene.scene import Scene
-from rigidsim.store.summary_parts import Caution
 
 
 @dataclass(frozen=True)
@@ -41,9 +41,6 @@ class PlacedAtRest(Placement):
         return m.fixed(self._direction(m.scene.context)), None
 
     def at_start(self, scene: Scene) -> Vector:
-        return self.position
-
-    def at(self, context: Any, time: Any) -> Vector:
         return self.position
 
     def motion(self, m: Kinematics) -> SourceMotion:

@@ -11,6 +11,7 @@ import numpy as np
 
 from rigidsim.accuracy.estimates.members import MemberErrors, MemberEstimates
 from rigidsim.errors import ConfigError
+from rigidsim.scene.cautions import WarningCode
 from rigidsim.scene.sweeps.sweep import FITS, Sweep
 from rigidsim.session.dataset import dataset_variables
 from rigidsim.session.kept import MemberSeries, Points, kept_events, kept_of_series
@@ -29,7 +30,6 @@ from rigidsim.solve.batch.family import Alone, AxisNumbers, Families, Family, Me
 from rigidsim.solve.batch.run import BatchBlock, BatchRun
 from rigidsim.solve.problem import prepare
 from rigidsim.solve.status import Status
-from rigidsim.store.summary_parts import WarningCode
 from rigidsim.store.sweeps.tiles import Kept, KeptVariable
 from rigidsim.store.variables import Variable
 
