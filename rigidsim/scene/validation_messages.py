@@ -11,10 +11,10 @@ from pydantic import BaseModel, ValidationError
 from rigidsim.errors import ConfigError, Problem
 
 _TABLES = (
-    "body", "initial", "loads", "bodies", "rotors", "states", "frame", "time", "integrator", "output",
-    "limits", "parameters", "events", "sweep", "tables",
+    "body", "initial", "loads", "bodies", "rotors", "states", "ephemeris", "frame", "time", "model",
+    "integrator", "output", "limits", "parameters", "events", "sweep", "fit", "tables",
 )  # fmt: skip
-_ARRAYS_OF_TABLES = ("loads", "bodies", "rotors", "states", "events")
+_ARRAYS_OF_TABLES = ("loads", "bodies", "rotors", "states", "events", "fit.data")
 _MEANT = {
     "box": "cuboid", "brick": "cuboid", "ball": "sphere", "disc": "disk", "hoop": "ring", "bar": "rod",
     "stick": "rod", "pipe": "tube", "rectangle": "plate", "square": "plate", "donut": "torus",
@@ -98,12 +98,13 @@ def key_path(location: Iterable[str | int]) -> str:
     parts = list(location)
     if not parts:
         return "config"
-    if parts[0] in _TABLES:
+    names = [".".join(map(str, parts[:count])) for count in (1, 2)]
+    if array := [name for name in names if name in _ARRAYS_OF_TABLES]:
+        head, rest = f"[[{array[0]}]]", parts[names.index(array[0]) + 1 :]
+        if rest and isinstance(rest[0], int):
+            head, rest = f"{head} number {rest[0] + 1}", rest[1:]
+    elif parts[0] in _TABLES:
         head, rest = f"[{parts[0]}]", parts[1:]
-        if parts[0] in _ARRAYS_OF_TABLES:
-            head = f"[[{parts[0]}]]"
-            if rest and isinstance(rest[0], int):
-                head, rest = f"{head} number {rest[0] + 1}", rest[1:]
     else:
         head, rest = "", parts
     path = "".join(f"[{p}]" if isinstance(p, int) else f".{_key(p)}" for p in rest).removeprefix(".")
@@ -164,8 +165,9 @@ def _what(table: type[BaseModel] | None, error: Mapping[str, Any]) -> str:
         word = given if isinstance(given, str) else shown(given)
         near = meant(word, names, effect=effect)
         return f"given {shown(given)}{near}; allowed: {', '.join(names)}"
-    if kind == "list_type" and isinstance(given, Mapping) and location[0] in _ARRAYS_OF_TABLES:
-        return f"given a table; an array of them is allowed: write [[{location[0]}]] in double brackets"
+    name = ".".join(map(str, location))
+    if kind == "list_type" and isinstance(given, Mapping) and name in _ARRAYS_OF_TABLES:
+        return f"given a table; an array of them is allowed: write [[{name}]] in double brackets"
     if kind in _WORDS:
         return _WORDS[kind].format(given=shown(given), msg=error["msg"], **context)
     return str(error["msg"])

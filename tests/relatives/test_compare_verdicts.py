@@ -63,3 +63,18 @@ def test_times_counted_from_another_zero_are_refused_with_the_shift(zero: float)
         RigidsimError, match=rf"another zero .*subtract {zero:.15g} from each time".replace("+", r"\+")
     ):
         rigidsim.compare(rigidsim.parse(SPIN), table)
+
+
+@pytest.mark.parametrize("seed", seeds(3, 60))
+def test_a_wrong_rate_is_no_rounding_of_even_times(seed: int) -> None:
+    """Attitudes that fall behind evenly look like times that do; even times show no rounding, though."""
+    random = np.random.default_rng(seed)
+    step = float(random.choice([0.5, 1, 2, 5, 10, 20, 50]))
+    rate = random.uniform(0.1, 1.0) / step  # rad from row to row
+    wrong = rate * (1 + random.choice([-1, 1]) * 10 ** random.uniform(-5, -3))
+    scene = rigidsim.parse(SPIN.replace("-0.03", repr(rate)))
+    for names in (("wx", "wy", "wz"), ()):
+        tables = [spinning(x, step) for x in (wrong, rate)]
+        kept = [{k: v for k, v in one.items() if k[0] != "w" or k in names} for one in tables]
+        assert rigidsim.compare(scene, kept[0]).verdict != "agrees"
+        assert rigidsim.compare(scene, kept[1]).verdict == "agrees"

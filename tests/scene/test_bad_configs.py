@@ -12,6 +12,7 @@ from typer.testing import CliRunner
 
 from rigidsim import ConfigError, load, parse
 from rigidsim.cli.app import app
+from rigidsim.scene.editor_schema import editor_schema
 from rigidsim.solve.problem import prepare
 
 GOOD = {
@@ -206,6 +207,9 @@ IN_ONE_TABLE: dict[str, list[tuple[str, ...]]] = {
         ('[integratr]\nprecision = "double"', "integratr", "unknown key", 'did you mean "integrator"?'),
         ('[integrator2]\nprecision = "double', "TOML", "can't be read", "line 1"),
         ("[time]\nend = 2", "TOML", 'Cannot declare "time" twice', "line"),
+        ('[model]\nlevel = "flat"', "[model] level", 'given "flat"', "allowed: full"),
+        ("[fit.data]\nsigma = 1", "[[fit.data]]", "write [[fit.data]] in double brackets"),
+        ("[[fit.data]]\nfile = 3", "[[fit.data]] number 1 file", "given 3; a string is allowed"),
         ("[sweep.axes]\n'time.end' = {values = [1, 2]}", "[sweep]", "many members", "rigidsim.sweep(...)"),
         ("[parameters]\nwx = 1", "[parameters]", 'given the name "wx"', "which expressions use already"),
     ],
@@ -404,3 +408,18 @@ def test_the_command_line_says_it_and_leaves_no_folder(
 def test_what_is_no_path_is_refused_in_words(given: Any) -> None:
     with pytest.raises(ConfigError, match=r"path: given .*; the path of a config is allowed"):
         load(given)
+
+
+def test_every_table_is_named_in_brackets() -> None:
+    """An unknown key, or a missing one, in each table that the schema of editors shows."""
+    schema = editor_schema()
+    for name, field in schema["properties"].items():
+        text = str(field)
+        if "$ref" not in text or name in (*GOOD, "parameters", "tables"):  # there already, or open to any key
+            continue
+        array = "'array'" in text
+        written = f"[[{name}]]" if array else f"[{name}]"
+        with pytest.raises(ConfigError) as refused:
+            parse(config(more=f"{written}\nno_such_key = 1"))
+        where = f"{written} number 1 no_such_key" if array else f"{written} no_such_key"
+        assert where in [problem.where for problem in refused.value.problems]

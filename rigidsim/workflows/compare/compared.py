@@ -276,7 +276,8 @@ class _Judging:
         line = np.polyval(np.polyfit(even - even[0], known, 1), even - even[0])
         spread = float(np.sum((shifts - shifts.mean()) ** 2))
         alike = float(np.sum((shifts[1:] - shifts.mean()) * (shifts[:-1] - shifts.mean())))
-        by_digits = (np.abs(known - line) < _CLOSE * most + floor / np.sqrt(square)).all()
+        uneven = (np.abs(known - shifts) > _EXACT * abs(float(times[-1]))).any()  # even ones show no rounding
+        by_digits = uneven and (np.abs(known - line) < _CLOSE * most + floor / np.sqrt(square)).all()
         if spread == 0 or (abs(alike) > _RANDOM * spread and not by_digits):
             return None
         return float(1.1 * most * size.max() + floor)
