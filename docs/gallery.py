@@ -87,7 +87,7 @@ def table(rows: list[list[str]]) -> str:
     return "\n".join("| " + " | ".join(line) + " |" for line in lines)
 
 
-def told(config: Path) -> tuple[str, str]:
+def described(config: Path) -> tuple[str, str]:
     """Description of a config, and what to look for, from its own comments."""
     text = config.read_text(encoding="utf-8")
     comment = re.match(r"(?:#[^\n]*\n)+", text)
@@ -139,23 +139,20 @@ def page(rows: list[list[str]]) -> str:
     """docs/gallery.md."""
     parts = [
         "<!-- blocks: slow -->\n# Gallery",
-        "Every config in `configs/`, run and drawn by two commands (`python -m docs.gallery` generates this "
-        "page):",
+        "Two commands run and draw any config of `configs/` (`python -m docs.gallery` generates this page):",
         "```sh\nrigidsim run configs/heavy_top_nutating.toml\nrigidsim plot runs/heavy_top_nutating\n```",
-        "For each config the page shows the timeline, stopped at one moment (`rigidsim view "
-        "runs/heavy_top_nutating --png timeline.png`; `python -m docs.gallery --timelines` draws them all), "
-        "and the figure drawn by `plot`.",
-        "In the documentation's site (`python docs/build.py`) a *Play* button below some of the pictures "
-        "loads the scene into rerun's viewer: 14 MB once, and 1 MB for each scene, from the site itself.",
+        "Each config has two pictures: the timeline at one moment (`rigidsim view runs/heavy_top_nutating --png "
+        "timeline.png`), and the figure of `plot`. On the documentation's site a *Play* button below some "
+        "pictures loads the scene into rerun's viewer (14 MB once, and 1 MB for each scene).",
         "## Numbers",
         "The table gives the announced error of the attitude at the end, the largest drift of any invariant, "
-        "and that drift relative to what rounding explains (50 tolerance sqrt(steps)). For an averaged model "
-        "the error is that of its axes; the error of the integration is negligible in comparison. A large "
-        "error with a tiny drift means that the motion amplifies errors: the body flips, or falls.",
+        "and this drift relative to the rounding bound (50 tolerance sqrt(steps)). An averaged model has the "
+        "error of its axes. A large error with a tiny drift means that the motion amplifies errors: the body "
+        "flips, or falls.",
         "<!-- slow output: python -m docs.gallery --table -->\n" + table(rows),
     ]
     for config in CONFIGS:
-        description, look = told(config)
+        description, look = described(config)
         parts.append(f"## {config.stem}")
         path = config.relative_to(ROOT).as_posix()
         parts.append(f"*{description}.* [{config.name}](../{path})")
@@ -164,7 +161,7 @@ def page(rows: list[list[str]]) -> str:
         parts.append(f"![Figure drawn by rigidsim plot](figures/gallery/{config.stem}.png)")
     parts.append("## Sweeps")
     for config in sorted((ROOT / "configs" / "sweeps").glob("*.toml")):
-        description, _ = told(config)
+        description, _ = described(config)
         parts.append(
             f"*{description}.* [{config.name}](../configs/sweeps/{config.name}), by `rigidsim sweep`."
         )
