@@ -141,9 +141,9 @@ def page(rows: list[list[str]]) -> str:
         "<!-- blocks: slow -->\n# Gallery",
         "Two commands run and draw any config of `configs/` (`python -m docs.gallery` generates this page):",
         "```sh\nrigidsim run configs/heavy_top_nutating.toml\nrigidsim plot runs/heavy_top_nutating\n```",
-        "Each config has two pictures: the timeline at one moment (`rigidsim view runs/heavy_top_nutating --png "
-        "timeline.png`), and the figure of `plot`. On the documentation's site a *Play* button below some "
-        "pictures loads the scene into rerun's viewer (14 MB once, and 1 MB for each scene).",
+        "Each config has two pictures: the timeline at one moment (`rigidsim view runs/heavy_top_nutating "
+        "--png timeline.png`), and the figure of `plot`. On the documentation's site a *Play* button below "
+        "some pictures loads the scene into rerun's viewer (14 MB once, and 1 MB for each scene).",
         "## Numbers",
         "The table gives the announced error of the attitude at the end, the largest drift of any invariant, "
         "and this drift relative to the rounding bound (50 tolerance sqrt(steps)). An averaged model has the "
