@@ -116,6 +116,18 @@ def angle_between(p: np.ndarray, q: np.ndarray) -> np.ndarray:
     return (4 * np.arcsin(np.minimum(chord / 2, 1))).astype(float)
 
 
+def matrices(quaternions: Any) -> np.ndarray:
+    """Rotation matrices (..., 3, 3), body to space, of quaternions (..., 4) of any length."""
+    q = np.asarray(quaternions)
+    w, x, y, z = np.moveaxis(q / np.sqrt((q * q).sum(axis=-1, keepdims=True)), -1, 0)
+    rows = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+    ]
+    return np.moveaxis(np.array(rows), (0, 1), (-2, -1))
+
+
 def law(epsilon: float, steps: int, rate: float, duration: float) -> float:
     """The round-off law of attitude errors (Brouwer 1937): (eps / 2) sqrt(steps) |w| t / sqrt 3."""
     return epsilon / 2 * math.sqrt(steps) * rate * duration / math.sqrt(3)

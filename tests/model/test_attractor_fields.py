@@ -64,7 +64,6 @@ def attraction(x: np.ndarray) -> np.ndarray:
     return radial * up + north * np.cross(up, eastward) + east * eastward
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("rate", [0.0, 7.292115e-5])
 def test_a_field_in_axes_that_turn_agrees_with_another_integrator_and_formula(rate: float) -> None:
     pole, meridian = np.array([0.3, -0.2, 0.9]), 0.7
@@ -98,19 +97,12 @@ def test_a_zonal_field_keeps_the_energy_and_the_momentum_along_its_pole() -> Non
     assert max(row["largest_drift"] for row in found.values()) < 3e-14
 
 
-def test_the_figure_and_the_field_of_degree_2_are_one_force_on_a_sphere() -> None:
-    figure = f"figure = {{J2 = {J2!r}, radius = {RADIUS!r}, pole = [0.3, -0.2, 0.9]}}"
-    field = table("pole = [0.3, -0.2, 0.9]", {"C": {(2, 0): -J2}})
-    one, other = (run_text(flown(keys)).dataset["position"].values for keys in (figure, field))
-    assert np.abs(one - other).max() <= 1e-4  # m: 1e-11 of 7000 km, rounding along 90 rad
-
-
-@pytest.mark.parametrize("seed", [4, 5, 6])
-def test_a_flight_about_an_oblate_body_moves_by_the_gradient_of_its_energy(seed: int) -> None:
+@pytest.mark.parametrize("j2", [0.1, 0.0])
+def test_a_flight_about_an_oblate_body_moves_by_the_gradient_of_its_energy(j2: float) -> None:
     """Forces and torques by numerical derivatives of -(1/2) grad grad Phi : I + m Phi, in 40 digits."""
-    random = Random(seed)
+    random = Random(4)
     tensor, q, pole = random.tensor(), random.quaternion(), random.vector()
-    place, mass, j2, radius = 3 * random.vector(), 2.0, 0.1, 0.3
+    place, mass, radius = 3 * random.vector(), 2.0, 0.3
     place *= max(1.0, 2 / np.linalg.norm(place))
     keys = f"figure = {{J2 = {j2}, radius = {radius}, pole = {array(pole)}}}"
     start = f"angular_velocity = [0.1, 0, 0]\nquaternion = {array(q)}\n"
@@ -185,18 +177,12 @@ def test_node_and_perigee_drift_at_the_secular_rates() -> None:
 @pytest.mark.parametrize(
     ("keys", "message"),
     [
-        ("gravity_field = {radius = 1, pole = [0, 0, 1]}", "missing coefficients"),
         ('gravity_field = {radius = 1, C = {"2,0" = 1e-3}}', "pole"),
         ('gravity_field = {radius = 1, C = {"2,0" = 1e-3}, pole = [0, 0, 0]}', "given [0, 0, 0]; a vector"),
-        ('gravity_field = {radius = 0, C = {"2,0" = 1e-3}, pole = [0, 0, 1]}', "a positive length"),
         ('gravity_field = {radius = 1, C = {"1,0" = 1e-3}, pole = [0, 0, 1]}', "its centre of mass"),
-        ('gravity_field = {radius = 1, C = {"2,3" = 1e-3}, pole = [0, 0, 1]}', "at most the degree"),
-        ('gravity_field = {radius = 1, S = {"2,0" = 1e-3}, pole = [0, 0, 1]}', "zonal coefficients are in C"),
-        ('gravity_field = {radius = 1, C = {"J2" = 1e-3}, pole = [0, 0, 1]}', "degree and order are allowed"),
         ('gravity_field = {radius = 1, C = {"2,2" = 10}, pole = [0, 0, 1]}', "no mass within 2 radii"),
         ('gravity_field = {radius = 8e6, C = {"2,0" = 1e-3}, pole = [0, 0, 1]}', "the series doesn't hold"),
         ("figure = {J2 = 1e-3, radius = 8e6, pole = [0, 0, 1]}", "the series doesn't hold"),
-        ("figure = {J2 = 1e-3, radius = 6e6, pole = [0, 0, 0]}", "given [0, 0, 0]"),
         ('figure = {J2 = 1e-3, radius = 6e6, pole = "iau1976"}', "which takes [time] epoch"),
         (
             'figure = {J2 = 1e-3, radius = 6e6, pole = [0, 0, 1]}\ngravity_field = {radius = 6e6, '

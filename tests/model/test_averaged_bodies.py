@@ -90,8 +90,9 @@ def nodding() -> float:
     return drive / spin
 
 
-@pytest.mark.slow
-def test_the_momentum_is_that_of_every_rotation(full: rigidsim.Run, averaged: rigidsim.Run) -> None:
+def test_the_momentum_is_that_of_every_rotation_as_announced(
+    full: rigidsim.Run, averaged: rigidsim.Run
+) -> None:
     moved = full.dataset.momentum_axis.values
     path = float(np.linalg.norm(moved - moved[0], axis=1).max())
     assert path > 1e-6
@@ -99,14 +100,9 @@ def test_the_momentum_is_that_of_every_rotation(full: rigidsim.Run, averaged: ri
     # order along the path
     assert apart(full, averaged) < nodding() + 10 * nodding() * path
     assert averaged.summary["cost"]["steps"] * 20 < full.summary["cost"]["steps"]
-
-
-def test_the_announced_error_covers_the_true_one(full: rigidsim.Run, averaged: rigidsim.Run) -> None:
     found = averaged.summary["modelling"]
     assert found["whole"]
-    true = np.linalg.norm(
-        full.dataset.momentum_axis.values - averaged.dataset.momentum_axis.values, axis=1
-    ).max()
+    true = np.linalg.norm(moved - averaged.dataset.momentum_axis.values, axis=1).max()
     assert true <= found["momentum_axis"] <= 10 * true
 
 
@@ -150,9 +146,3 @@ def test_two_masses_are_a_kepler_orbit(more: str) -> None:
 def test_what_has_no_average_is_refused(text: str, said: str) -> None:
     with pytest.raises(ConfigError, match=said):
         prepare(parse(text))
-
-
-def test_the_plan_says_how_resonances_were_looked_for() -> None:
-    system = prepare(parse(scene("spin_averaged", "sun", "passing", beside=PASSING))).system
-    why = dict(system.reasons)["sx sy sz"]
-    assert "with the osculating orbits of the start for sun, not for passing, not bound" in why

@@ -9,9 +9,7 @@ import pytest
 from support import run_text, same_bits
 
 import rigidsim
-from rigidsim import ConfigError, parse
-from rigidsim.model.averaged.sources import sources_of
-from rigidsim.solve.problem import prepare
+from rigidsim import ConfigError
 
 SCENE = """
 name = "planet"
@@ -58,9 +56,7 @@ def scene(body: dict[str, object], *sources: str, end: str = "60 day") -> str:
     "text",
     [
         scene(EARTH, "sun", "moon", end="200 day"),
-        scene(MARS, "sun", end="200 day"),
-        pytest.param(scene(EARTH, "sun", "moon", end="20 yr"), marks=pytest.mark.slow),
-        pytest.param(scene(MARS, "sun", end="20 yr"), marks=pytest.mark.slow),
+        pytest.param(scene(MARS, "sun", end="2 yr"), marks=pytest.mark.slow),
     ],
 )
 def test_both_announced_errors_are_true(text: str) -> None:
@@ -86,22 +82,12 @@ def test_both_announced_errors_are_true(text: str) -> None:
 def test_resumed_at_edges_it_has_the_same_bits(tmp_path: Path) -> None:
     (tmp_path / "planet.toml").write_text(scene(EARTH, "sun", "moon") + "estimate = false\n")
     whole = rigidsim.run(tmp_path / "planet.toml", out=tmp_path / "whole")
-    for stop in range(1, whole.summary["cost"]["steps"], 5):
+    steps = whole.summary["cost"]["steps"]
+    for stop in (1, steps // 2, steps - 1):
         changes = {"limits.max_steps": stop}
         rigidsim.run(tmp_path / "planet.toml", out=tmp_path / "begun", changes=changes, force=True)
         resumed = rigidsim.resume(tmp_path / "begun" / "planet", overrides={"limits.max_steps": 10**6})
         same_bits(whole, resumed)
-
-
-def test_the_moons_apsides_and_nodes_count_as_slow_motions() -> None:
-    """8.85 and 18.6 years; of the Earth's own orbit both hardly move."""
-    prepared = prepare(parse(scene(EARTH, "moon", "sun")))
-    moon, sun = sources_of(prepared.scene, prepared.system.plan.loads)
-    year = 365.25 * 86400
-    assert moon.motion == pytest.approx(2 * np.pi / (27.32166 * 86400), rel=1e-3)
-    assert moon.slow_rate == pytest.approx(2 * np.pi * (1 / 8.85 + 1 / 18.61) / year, rel=0.02)
-    assert sun.motion == pytest.approx(2 * np.pi / year, rel=1e-3)
-    assert sun.slow_rate < 1e-3 * sun.motion
 
 
 BAD = {
@@ -111,7 +97,6 @@ BAD = {
         "model.short_period=false",
         "a resonance, which no average may pass over",
     ),
-    "rotation": (scene(EARTH, "sun"), 'output.record=["quaternion"]', "needs every rotation"),
 }
 
 
@@ -122,10 +107,3 @@ def test_what_has_no_average_is_refused(name: str) -> None:
         run_text(text, setting)
     assert words in str(caught.value)
     assert '"spin_averaged"' in str(caught.value) or 'level = "full"' in str(caught.value)
-
-
-def test_plan_counts_steps_that_end_at_edges(tmp_path: Path) -> None:
-    """Its pilot doesn't go on beyond the run, where nothing ends steps any more."""
-    text = scene(EARTH, "sun", "moon")
-    steps = run_text(text).summary["cost"]["steps"]
-    assert rigidsim.plan(parse(text)).predicted.steps == pytest.approx(steps, rel=0.1)

@@ -82,9 +82,8 @@ def test_80_bits_reach_obliquity_and_longitude() -> None:
 @pytest.mark.parametrize(
     "integrator",
     cases(
-        ['formulation = "quaternion"', 'formulation = "rotation_matrix"', 'method = "closed_form"',
-         'precision = "extended"', 'precision = "quadruple"'],
-        ['formulation = "quaternion"', 'method = "closed_form"', 'precision = "quadruple"'],
+        ['formulation = "quaternion"', 'formulation = "rotation_matrix"', 'method = "closed_form"'],
+        ['formulation = "quaternion"', 'method = "closed_form"'],
     ),
 )  # fmt: skip
 def test_turns_between_two_samples_are_those_of_the_motion(integrator: str) -> None:
@@ -149,11 +148,8 @@ def test_the_figure_axis_and_the_equator_of_an_ecliptic_scene() -> None:
     ("body", "frame", "where", "what"),
     [
         ("[1, 2, 3]", 'figure_axis = "symmetry"', "[frame] figure_axis", "no two principal moments"),
-        ("[1, 2, 2]", 'figure_axis = "largest"', "[frame] figure_axis", 'or "symmetry" is allowed'),
         ("[1, 2, 3]", 'reference = "orbit"', "[frame] reference", "no load of the scene has an orbit"),
-        ("[1, 2, 3]", "reference = [0, 0, 0]", "[frame] reference", "zero vector"),
         ("[1, 2, 3]", 'reference = "ecliptic"', "[frame] reference", "space, orbit"),
-        ("[1, 2, 3]", "reference = 3", "[frame] reference", "a normal"),
     ],
 )
 def test_axes_and_planes_that_a_scene_has_not_are_refused(

@@ -68,16 +68,15 @@ def full(moments: np.ndarray, rates: list[float], damping: np.ndarray, times: np
     return np.einsum("abt,bt->at", found[:9].reshape(3, 3, -1), moments[:, None] * found[9:])
 
 
-@pytest.mark.parametrize("rates", [RATES], ids=["short axis"])
-def test_the_averaged_motion_starts_in_the_middle_of_the_full_one(rates: list[float]) -> None:
+def test_the_averaged_motion_starts_in_the_middle_of_the_full_one() -> None:
     """Direction and size of the momentum against means (Hann) of the full motion over some hundred turns."""
-    start = f"angular_velocity = {rates}\nquaternion = {Q.tolist()}"
+    start = f"angular_velocity = {RATES}\nquaternion = {Q.tolist()}"
     level = '[model]\nlevel = "spin_averaged"'
     body = f"principal_moments = {MOMENTS}"
     record = 'record = ["momentum_axis", "angular_momentum_norm"]'
     data = run_text(config(body, start, VISCOUS, "end = 50\nsamples = 11", "", record, level)).dataset
     times = np.linspace(0, 400, 8001)
-    momentum = full(np.array(MOMENTS), rates, np.array(DAMPING), times)
+    momentum = full(np.array(MOMENTS), RATES, np.array(DAMPING), times)
     weights = np.hanning(len(times))
     directions = momentum / np.linalg.norm(momentum, axis=0)
     true = directions[:, 0] - directions @ weights / weights.sum()
@@ -100,14 +99,12 @@ def test_the_averaged_motion_starts_in_the_middle_of_the_full_one(rates: list[fl
         ({"loads": VISCOUS, "level": "orbit_averaged"}, 'choose "spin_averaged"'),
         ({"loads": AS_FORMULAS.replace("1e-4*wx", "1e-4*wx*sin(t)")}, "a torque depends on time"),
         ({"loads": AS_FORMULAS.replace("1e-4*wx", "1e-4*qx^2")}, "nor a function of the rates in body axes"),
-        ({"loads": AS_FORMULAS + '\nframe = "space"'}, "nor a function of the rates in body axes"),
         ({"loads": AS_FORMULAS.replace("1e-4*wx", "1e-4*abs(wx)")}, "kink or jump"),
         ({"moments": [1, 1, 1]}, "moments are all the same"),
         (
             {"loads": VISCOUS.replace("2e-4", "0.2")},
             "of its size within a wobble, of which up to 0.05 is allowed",
         ),
-        ({"rates": [1.0, 0.1, 0.1]}, "intermediate axis"),
         (
             {"rates": [0.3, 1.2, 0.2], "end": "1e5", "loads": VISCOUS.replace("2e-4", "1e-3")},
             "near the separatrix",

@@ -1,13 +1,11 @@
 """Starts of flights by two-line elements and by dated states in frames of the Earth."""
 
-import math
 import re
 from datetime import datetime, timedelta
 from decimal import Decimal
 from importlib.resources import files
 from typing import Any
 
-import heyoka as hy
 import numpy as np
 import pytest
 
@@ -65,9 +63,9 @@ def verification_cases(satellite: str) -> tuple[list[str], list[tuple[float, lis
     return lines, [(row[0], row[1:]) for row in numbers]
 
 
-@pytest.mark.parametrize("satellite", ["00005", "06251", "28057", "08195", "28129"])
+@pytest.mark.parametrize("satellite", ["06251", "08195", "28129"])
 def test_an_orbit_starts_where_sgp4_is_published_to_be(satellite: str) -> None:
-    """Low with drag, sun-synchronous, a Molniya in resonance, and one of GPS."""
+    """Low with drag, a Molniya in resonance, and one of GPS."""
     lines, states = verification_cases(satellite)
     year, day = 2000 + int(lines[0][18:20]), Decimal(lines[0][20:32])
     for minutes, expected in states[:: max(1, len(states) // 3)]:
@@ -89,17 +87,6 @@ def test_time_0_is_the_date_of_the_lines_and_the_axes_are_gcrf() -> None:
     assert np.abs(state(start({"tle": LINES}, time=hours)) - state(later)).max() < 1e-9
 
 
-def test_sgp4_is_that_of_heyoka() -> None:
-    angles = [math.radians(x) for x in (34.2682, 348.7242, 331.7664, 19.3264)]
-    row = [10.82419157 * 2 * math.pi / 1440, 0.1859667, *angles, 0.28098e-4, 2451722.5, 0.78495062]
-    propagator = hy.model.sgp4_propagator(np.array(row)[:, None])
-    expected = propagator(np.array([360.0])).ravel()[:6]
-    date = "2000-06-28T00:50:19.733568 UTC"
-    frame = given([float(x) for x in expected], "TEME")
-    found = state(start({"tle": LINES}, time={"epoch": date}))
-    assert np.abs(found - state(start(frame, time={"epoch": date}))).max() < 1e-7
-
-
 @pytest.mark.parametrize(
     ("values", "frame", "metres"),
     [
@@ -112,30 +99,6 @@ def test_one_state_is_the_same_in_every_frame(values: list[float], frame: str, m
     apart = np.abs(state(start(given(values, frame), time={"epoch": DATE})) - GCRF) * 1e3
     assert apart[:3].max() < metres
     assert apart[3:].max() < max(metres * 1e-3, 1e-4)  # m/s
-
-
-def test_a_point_at_rest_on_the_ground_moves_as_its_place_does() -> None:
-    place = {"position": ["6378 km", "100 km", "2000 km"], "frame": "ITRF"}
-    first, last = (state(start(place, time={"epoch": f"2020-03-01T12:00:{s:02} UTC"})) for s in (0, 2))
-    middle = state(start(place, time={"epoch": "2020-03-01T12:00:01 UTC"}))
-    moved = (last[:3] - first[:3]) / 2
-    assert np.abs(moved - middle[3:]).max() < 3e-8  # km/s: what precession is worth, 3e-12 rad/s of 6700 km
-
-
-def test_ecliptic_axes_are_turned_about_the_equinox() -> None:
-    frame = given(GCRF, "GCRF")
-    found = state(start(frame, time={"epoch": DATE}, frame={"axes": "ecliptic J2000"}))
-    tilt = math.radians(84381.406 / 3600)
-    x, y, z = GCRF[:3]
-    expected = [x, y * math.cos(tilt) + z * math.sin(tilt), z * math.cos(tilt) - y * math.sin(tilt)]
-    assert found[:3] == pytest.approx(expected, rel=1e-14)
-
-
-def test_given_digits_are_kept_where_axes_stay() -> None:
-    initial = {"position": ["7000.1 km", 0, 0], "velocity": [0, "7.5 km/s", 0], "frame": "GCRF"}
-    scene = start(initial, time={"epoch": DATE}, integrator={"precision": "quadruple"})
-    assert scene.position is not None
-    assert scene.position[0] == scene.context.mpf("7000100")
 
 
 @pytest.mark.parametrize("frame", ["TEME", "ITRF"])
@@ -170,7 +133,6 @@ DECAYING = [  # of the same test cases: down within the hour
     ("initial", "others", "texts"),
     [
         ({"tle": LINES, "position": [1, 0, 0]}, {}, ["position", "given beside tle"]),
-        ({"tle": LINES, "frame": "TEME"}, {}, ["frame", "given beside tle"]),
         ({"tle": LINES}, {"loads": []}, ["tle", "nothing attracts", "central_gravity"]),
         (
             {"tle": LINES},
@@ -184,21 +146,11 @@ DECAYING = [  # of the same test cases: down within the hour
             {"time": {"epoch": "2005-11-29T01:28:59 UTC"}},
             ["finds no orbit", "decayed"],
         ),
-        (  # when SGP4 says nothing of it any more
-            {"tle": DECAYING},
-            {"time": {"epoch": "2005-11-29T06:28:59 UTC"}},
-            ["finds no orbit", "decayed"],
-        ),
         (given(ITRF, "ITRF"), {}, ["[time] epoch", "missing", "ITRF"]),
         (
             given(ITRF, "ITRF"),
             {"time": {"epoch": "2060-01-01 TT"}},
             ["outside what is known", "1973-01-02", "newer heyoka"],
-        ),
-        (
-            given(ITRF, "ITRF"),
-            {"time": {"epoch": "1960-01-01 TT"}},
-            ["in heyoka); give the state in TEME or"],
         ),
         ({"frame": "GCRF"}, {"time": {"epoch": DATE}}, ["frame", "without position or velocity"]),
     ],

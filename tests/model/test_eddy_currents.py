@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -82,11 +81,10 @@ def test_it_agrees_with_another_integrator_of_other_equations() -> None:
 
 
 def test_beside_a_magnet_in_the_same_field_the_momentum_along_it_is_kept() -> None:
-    magnet = f'[[loads]]\nkind = "magnetic_dipole"\nmoment = [0.1, 0.2, 0.3]\nfield = {array(FIELD)}\n'
-    run = run_text(text(OF_TENSOR, more=magnet))
-    assert "angular_momentum_field" in run.summary["invariants"]
-    other = magnet.replace(array(FIELD), "[1, 0, 0]")
-    assert "angular_momentum_field" not in run_text(text(OF_TENSOR, more=other)).summary["invariants"]
+    for field, kept in ((array(FIELD), True), ("[1, 0, 0]", False)):
+        magnet = f'[[loads]]\nkind = "magnetic_dipole"\nmoment = [0.1, 0.2, 0.3]\nfield = {field}\n'
+        found = run_text(text(OF_TENSOR, more=magnet)).summary["invariants"]
+        assert ("angular_momentum_field" in found) == kept
 
 
 def test_in_flight_the_field_is_that_of_the_dipole_at_the_body() -> None:
@@ -117,7 +115,7 @@ def test_in_flight_the_field_is_that_of_the_dipole_at_the_body() -> None:
     momentum = run.dataset["angular_momentum"].values[-1]
     # the other integrator's own errors, relative 1e-13 of a position that decides the field
     assert np.abs(momentum - end[:3]).max() <= 1e-10 * np.linalg.norm(end[:3])
-    still = run_text(replace(flight).text).dataset["angular_momentum"].values[-1]
+    still = run_text(flight.text).dataset["angular_momentum"].values[-1]
     assert np.linalg.norm(still - momentum) > 1e-3 * np.linalg.norm(momentum)
 
 
@@ -125,21 +123,13 @@ def test_in_flight_the_field_is_that_of_the_dipole_at_the_body() -> None:
     ("load", "message"),
     [
         ("field = [1, 0, 0]", "conductivity: missing; a sphere needs conductivity and radius"),
-        ("field = [1, 0, 0]\nconductivity = 1e7", "radius: missing; a sphere needs"),
         ("field = [1, 0, 0]\nconductivity = -1\nradius = 1", "conductivity: given -1; zero or more"),
-        ("field = [1, 0, 0]\nconductivity = 1\nradius = 0", "radius: given 0; a positive length"),
         ("field = [1, 0, 0]\nconductivity = 1\nradius = 1\nthickness = 2", "thickness: given 2; more than 0"),
-        ("field = [1, 0, 0]\nconductivity = 1\nradius = 1\nthickness = 0", "thickness: given 0; more than 0"),
-        ("field = [1, 0, 0]\nmagnetic_tensor = [1, 1, -2]", "magnetic_tensor[2]: given -2; zero or more"),
         (
             "field = [1, 0, 0]\nmagnetic_tensor = [1, 1, 1]\nradius = 1",
             "radius: given beside magnetic",
         ),
-        ("field = [1, 0, 0]\nmagnetic_tensor = [1, 1]", "exactly 3 are needed"),
         ("magnetic_tensor = [1, 1, 1]", "field: given neither field nor orbit"),
-        ('field = ["1 V", 0, 0]\nmagnetic_tensor = [1, 1, 1]', "T"),
-        ('field = [1, 0, 0]\nconductivity = "1 blob"\nradius = 1', 'unknown unit "blob"'),
-        ("field = [1, 0, 0]\nmagnetic_tensor = [1, 1, 1]\nmoment = [1, 0, 0]", "moment"),
     ],
 )
 def test_nonsense_is_refused(load: str, message: str) -> None:

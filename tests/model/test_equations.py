@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import Any
 
-import heyoka as hy
 import mpmath
 import numpy as np
 import pytest
@@ -22,17 +21,16 @@ from equations import (
     skew,
 )
 from scipy.spatial.transform import Rotation
+from support import config
 
+import rigidsim
 from rigidsim.scene.fields import EULER_SEQUENCES
 
-# ---- (a) Euler's equations --------------------------------------------------------------------------------
 
-
-@pytest.mark.parametrize("seed", range(2))
 @pytest.mark.parametrize("formulation", ["quaternion", "rotation_matrix", "euler_angles", "rates"])
-def test_gravity_about_a_fixed_point(seed: int, formulation: str) -> None:
+def test_gravity_about_a_fixed_point(formulation: str) -> None:
     """I w' = (I w) x w + com x (M R^T g), and of the vertical alone g' = g x w (Euler-Poisson)."""
-    random = Random(100 + seed)
+    random = Random(100)
     tensor, center, mass = random.tensor(), random.vector(), 1.7
     pull = random.vector(9.0)
     system = prepared(
@@ -68,9 +66,6 @@ def test_a_rod_gains_no_spin() -> None:
     got = derivative(system, np.array([1.0, 2.0, 0, np.sqrt(0.5), np.sqrt(0.5), 0, 0]))
     # g along -Z is along -y of the body, at half the length: torque M g l/2 about x over m l^2/3
     np.testing.assert_allclose(got[:3], [1.5 * 9.80665, 0, 0], rtol=CLOSE, atol=CLOSE * 15)
-
-
-# ---- (b), (c) kinematics ----------------------------------------------------------------------------------
 
 
 def turn(axis: str, angle: Any) -> Any:
@@ -110,13 +105,9 @@ def test_euler_kinematics(sequence: str) -> None:
             assert mpmath.mnorm(change - expected, mpmath.inf) <= 4 * CLOSE
 
 
-# ---- (d) observables --------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("seed", range(2))
 @pytest.mark.parametrize("size", [1.0, 1e-5])
-def test_observables_of_a_heavy_body(seed: int, size: float) -> None:
-    random = Random(400 + seed)
+def test_observables_of_a_heavy_body(size: float) -> None:
+    random = Random(400)
     tensor, center, mass, pull = random.tensor(), random.vector(), 1.7, random.vector(9 * size**2)
     system = prepared(
         general_body(tensor, mass, center),
@@ -142,9 +133,8 @@ def test_observables_of_a_heavy_body(seed: int, size: float) -> None:
     )
 
 
-@pytest.mark.parametrize("seed", range(2))
-def test_observables_of_a_body_in_flight(seed: int) -> None:
-    random = Random(500 + seed)
+def test_observables_of_a_body_in_flight() -> None:
+    random = Random(500)
     tensor, mass, pull = random.tensor(), 3.3, random.vector(9)
     names = '["linear_momentum", "energy", "rotational_energy", "potential_energy", "position", "velocity"]'
     system = prepared(
@@ -153,7 +143,6 @@ def test_observables_of_a_body_in_flight(seed: int) -> None:
         GRAVITY + f"acceleration = {array(pull)}",
         record=names,
     ).system
-    assert system.states == ["wx", "wy", "wz", "x", "y", "z", "vx", "vy", "vz"]
     w, x, v = random.vector(), random.vector(50), random.vector(5)
     got = observed(system, np.concatenate([w, x, v]))
     rotation, potential = w @ tensor @ w / 2, -mass * pull @ x
@@ -185,7 +174,7 @@ def test_axial_momentum_of_a_tilted_body() -> None:
 
 @pytest.mark.parametrize(
     ("formulation", "sequence"),
-    [*(("quaternion", sequence) for sequence in EULER_SEQUENCES[::2]), ("rotation_matrix", "zyx")],
+    [("quaternion", "zxz"), ("quaternion", "yzx"), ("quaternion", "xzy"), ("rotation_matrix", "zyx")],
 )
 def test_euler_angles_from_another_formulation(sequence: str, formulation: str) -> None:
     random = Random(23)
@@ -225,20 +214,7 @@ def test_quaternion_and_matrix_from_euler_angles(sequence: str) -> None:
         assert abs(abs(got["quaternion"] @ q) - 1) <= CLOSE
 
 
-NEARLY_HALF = np.pi - 1e-9
-ATTITUDES = {
-    "identity": [0, 0, 0],
-    "about x": [NEARLY_HALF, 0, 0],
-    "about y": [0, NEARLY_HALF, 0],
-    "about z": [0, 0, NEARLY_HALF],
-    "half turn": [np.pi, 0, 0],
-    "any": [0.3, -2.0, 1.1],
-    "tiny": [1e-9, 2e-9, 3e-9],
-}
-
-
-@pytest.mark.parametrize("case", ATTITUDES)
-def test_quaternion_from_the_matrix_formulation(case: str) -> None:
+def test_quaternion_from_the_matrix_formulation() -> None:
     """Each of the four branches, near half turns, where a division by w would lose all digits."""
     system = prepared(
         "principal_moments = [1, 2, 2.5]",
@@ -246,13 +222,13 @@ def test_quaternion_from_the_matrix_formulation(case: str) -> None:
         record='["quaternion"]',
         integrator='formulation = "rotation_matrix"',
     ).system
-    rotation = Rotation.from_rotvec(ATTITUDES[case])
-    state = np.concatenate([[0.1, 1, 0.05], rotation.as_matrix().ravel()])
-    got, q = observed(system, state)["quaternion"], np.roll(rotation.as_quat(), 1)
-    np.testing.assert_allclose(got * np.sign(got @ q), q, rtol=0, atol=CLOSE)
+    near, half = np.pi - 1e-9, [np.pi, 0, 0]
+    turns = [[0, 0, 0], *(near * np.eye(3)).tolist(), half, [0.3, -2.0, 1.1], [1e-9, 2e-9, 3e-9]]
+    for rotation in map(Rotation.from_rotvec, turns):
+        state = np.concatenate([[0.1, 1, 0.05], rotation.as_matrix().ravel()])
+        got, q = observed(system, state)["quaternion"], np.roll(rotation.as_quat(), 1)
+        np.testing.assert_allclose(got * np.sign(got @ q), q, rtol=0, atol=CLOSE)
 
-
-# ---- (e) no more states than needed -----------------------------------------------------------------------
 
 FREE = "principal_moments = [1, 2, 2.5]\nmass = 1"
 HEAVY = "principal_moments = [1, 1, 0.3]\nmass = 1\ncenter_of_mass = [0, 0, 1]"
@@ -260,81 +236,50 @@ SPIN = "angular_velocity = [0.1, 1, 0.05]\neuler_angles = [0.1, 0.5, 0.2]"
 FLIGHT = SPIN + "\nposition = [1, 2, 3]\nvelocity = [4, 5, 6]"
 RATES, QUATERNION, VERTICAL = "wx wy wz", "qw qx qy qz", "gx gy gz"
 ANGLES, NINE, PATH = "phi theta psi", "r11 r12 r13 r21 r22 r23 r31 r32 r33", "x y z vx vy vz"
+VISCOUS = 'kind = "viscous_torque"\ncoefficients = [0.1, 0.2, 0.3]\n'
+SPACE = 'kind = "torque"\ncomponents = ["1", "0", "0"]\nframe = "space"\n'
 
 # body, initial, loads, record, formulation: the states in groups
 NEEDS = {
-    "rates alone": (FREE, SPIN, "", '["angular_velocity"]', "auto", [RATES]),
-    "energy alone": (FREE, SPIN, "", '["energy"]', "auto", [RATES]),
-    "momentum's norm alone": (FREE, SPIN, "", '["angular_momentum_norm"]', "auto", [RATES]),
-    "formulation rates": (FREE, SPIN, "", "", "rates", [RATES]),
-    "everything": (FREE, SPIN, "", "", "auto", [RATES, QUATERNION]),
-    "attitude": (FREE, SPIN, "", '["quaternion"]', "auto", [RATES, QUATERNION]),
-    "momentum in space": (FREE, SPIN, "", '["angular_momentum"]', "auto", [RATES, QUATERNION]),
-    "angles of a quaternion": (FREE, SPIN, "", '["euler_angles"]', "auto", [RATES, QUATERNION]),
-    "Euler angles": (FREE, SPIN, "", "", "euler_angles", [RATES, ANGLES]),
-    "rotation matrix": (FREE, SPIN, "", "", "rotation_matrix", [RATES, NINE]),
-    "heavy top": (HEAVY, SPIN, GRAVITY, "", "auto", [RATES, QUATERNION]),
-    "heavy top's rates": (HEAVY, SPIN, GRAVITY, '["angular_velocity"]', "auto", [RATES, VERTICAL]),
+    "rates alone": (FREE, SPIN, "", ["angular_velocity"], "auto", [RATES]),
+    "energy and momentum's norm": (FREE, SPIN, "", ["energy", "angular_momentum_norm"], "auto", [RATES]),
+    "formulation rates": (FREE, SPIN, "", [], "rates", [RATES]),
+    "damped rates": (FREE, SPIN, VISCOUS, ["angular_velocity"], "auto", [RATES, "work"]),
+    "a torque that reads the attitude": (
+        FREE, SPIN, SPACE, ["angular_velocity"], "auto", [RATES, QUATERNION, "work"],
+    ),
+    "everything": (FREE, SPIN, "", [], "auto", [RATES, QUATERNION]),
+    "momentum in space": (FREE, SPIN, "", ["angular_momentum"], "auto", [RATES, QUATERNION]),
+    "Euler angles": (FREE, SPIN, "", [], "euler_angles", [RATES, ANGLES]),
+    "heavy top": (HEAVY, SPIN, GRAVITY, [], "auto", [RATES, QUATERNION]),
     "heavy top's energies": (
-        HEAVY, SPIN, GRAVITY, '["energy", "potential_energy", "angular_momentum_vertical"]', "auto",
+        HEAVY, SPIN, GRAVITY, ["energy", "potential_energy", "angular_momentum_vertical"], "auto",
         [RATES, VERTICAL],
     ),
-    "gravity without an arm": (FREE, SPIN, GRAVITY, '["angular_velocity"]', "auto", [RATES]),
-    "no gravity with an arm": (HEAVY, SPIN, "", '["angular_velocity"]', "auto", [RATES]),
-    "flight": (FREE, FLIGHT, "", "", "auto", [RATES, QUATERNION, PATH]),
-    "flight in Euler angles": (FREE, FLIGHT, "", "", "euler_angles", [RATES, ANGLES, PATH]),
-    "flight in a matrix": (FREE, FLIGHT, GRAVITY, "", "rotation_matrix", [RATES, NINE, PATH]),
-    "path alone": (FREE, FLIGHT, GRAVITY, '["position"]', "auto", [RATES, PATH]),
-    "rates of a flight": (FREE, FLIGHT, GRAVITY, '["angular_velocity"]', "auto", [RATES]),
-    "attitude of a flight": (FREE, FLIGHT, GRAVITY, '["quaternion"]', "auto", [RATES, QUATERNION]),
+    "gravity without an arm": (FREE, SPIN, GRAVITY, ["angular_velocity"], "auto", [RATES]),
+    "flight": (FREE, FLIGHT, "", [], "auto", [RATES, QUATERNION, PATH]),
+    "flight in a matrix": (FREE, FLIGHT, GRAVITY, [], "rotation_matrix", [RATES, NINE, PATH]),
+    "path alone": (FREE, FLIGHT, GRAVITY, ["position"], "auto", [RATES, PATH]),
+    "attitude of a flight": (FREE, FLIGHT, GRAVITY, ["quaternion"], "auto", [RATES, QUATERNION]),
 }  # fmt: skip
 
 
 @pytest.mark.parametrize("case", NEEDS)
 def test_only_what_is_needed_is_carried_and_each_has_a_reason(case: str) -> None:
     body, initial, loads, record, formulation, groups = NEEDS[case]
-    system = prepared(body, initial, loads, record, f'formulation = "{formulation}"').system
-    assert system.states == " ".join(groups).split()
-    assert len(system.initial) == len(system.equations) == len(system.state_exponents) == len(system.states)
-    reasons = dict(system.reasons)
+    output = f"record = {record}".replace("'", '"') if record else ""
+    text = config(body, initial, loads, integrator=f'formulation = "{formulation}"', output=output)
+    plan = rigidsim.plan(rigidsim.parse(text), pilot_seconds=0.01).as_dict()
+    assert plan["states"] == " ".join(groups).split()
     shown = [group.replace(NINE, "r11 ... r33") for group in groups]
-    assert list(reasons) == shown
-    assert all(len(why) > 10 for why in reasons.values())
-    left_out = dict(system.requirements.left_out)
+    assert list(dict.fromkeys(row["states"] for row in plan["reasons"])) == shown
+    assert all(row["why"] for row in plan["reasons"])
+    left_out = {row["what"] for row in plan["left_out"]}
     assert ("position and velocity" in left_out) == (PATH not in groups)
     assert ("attitude" in left_out) == (not {QUATERNION, ANGLES, NINE} & set(groups))
 
 
-# ---- (f) exactly the invariants that hold -----------------------------------------------------------------
-
-
-@pytest.mark.parametrize("formulation", ["quaternion", "rotation_matrix", "rates"])
-def test_numerical_invariants(formulation: str) -> None:
-    """A quaternion's norm and a matrix's orthogonality hold by definition, and are told apart."""
-    system = prepared(HEAVY, SPIN, GRAVITY, integrator=f'formulation = "{formulation}"').system
-    names = {
-        "quaternion": "quaternion_norm",
-        "rotation_matrix": "orthogonality_defect",
-        "rates": "vertical_norm",
-    }
-    (found,) = [i for i in system.invariants if i.numerical]
-    assert found.name == names[formulation]
-    start = np.array([float(x) for x in system.initial])
-    value = hy.cfunc(found.expressions, system.variables)
-    perfect = 0.0 if formulation == "rotation_matrix" else 1.0
-    assert abs(value(start)[0] - perfect) <= CLOSE
-    start[3:] *= 1.01  # a norm that is off by one per cent is seen as such
-    seen = value(start)[0] - perfect
-    if formulation == "rotation_matrix":  # R R^T - 1 = 0.0201 on the diagonal
-        assert abs(seen - np.sqrt(3) * 0.0201) <= CLOSE
-    else:
-        assert abs(seen - 0.01) <= CLOSE
-
-
-# ---- (g) units of powers of two ---------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("size", [1e-12, 1e-3, 1.0, 1e6])
+@pytest.mark.parametrize("size", [1e-12, 1e6])
 def test_scaled_states_are_of_order_one(size: float) -> None:
     """heyoka's step control is absolute below one and relative above: no rate may dwarf another."""
     system = prepared(

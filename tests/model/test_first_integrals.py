@@ -8,8 +8,6 @@ import heyoka as hy
 import numpy as np
 import pytest
 from equations import EPS, array, matrix, prepared
-from scipy.spatial.transform import Rotation
-from support import cases
 
 PULL = 'kind = "uniform_gravity"\nacceleration = [0, 0, -2]'
 TIMES = np.linspace(0, 10, 101)
@@ -36,39 +34,30 @@ def constants(states: np.ndarray, frame: np.ndarray, k: float, up: np.ndarray) -
 def verticals(system: Any, states: np.ndarray) -> np.ndarray:
     if "gx" in system.states:
         return states[:, 3:6]
-    if "qw" in system.states:
-        return np.array([matrix(q)[2] for q in states[:, 3:7]])
-    if "r11" in system.states:
-        return states[:, 9:12]
-    return np.array([Rotation.from_euler("ZXZ", a).as_matrix()[2] for a in states[:, 3:6]])
+    return np.array([matrix(q)[2] for q in states[:, 3:7]])
 
 
 def named(system: Any) -> set[str]:
     return {i.name for i in system.invariants} & {"kovalevskaya_constant", "goryachev_chaplygin_constant"}
 
 
-def top(ratio: float, axis: int, center: list[float], w: list[float], formulation: str = "auto",
-        record: str = "", loads: str = PULL) -> Any:  # fmt: skip
+def top(ratio: float, axis: int, center: list[float], w: list[float], formulation: str) -> Any:
     """Moments ``ratio`` about two axes and 1 about ``axis``."""
     moments = [ratio] * 3
     moments[axis] = 1.0
     body = f"principal_moments = {array(moments)}\nmass = 0.5\ncenter_of_mass = {array(center)}"
     turned = np.roll(w, axis - 2)
     return prepared(
-        body, f"angular_velocity = {array(turned)}\nquaternion = [0.8, 0.4, -0.2, 0.4]", loads,
-        record=record, integrator=f'formulation = "{formulation}"',
+        body, f"angular_velocity = {array(turned)}\nquaternion = [0.8, 0.4, -0.2, 0.4]", PULL,
+        integrator=f'formulation = "{formulation}"',
     ).system  # fmt: skip
 
 
-@pytest.mark.parametrize(
-    "formulation", cases(["rates", "quaternion", "euler_angles", "rotation_matrix"], ["rates", "quaternion"])
-)
-@pytest.mark.parametrize("axis", [0, 1, 2])
-@pytest.mark.parametrize("direction", [(0.6, 0.8)])
-def test_kovalevskayas_constant_holds(formulation: str, axis: int, direction: tuple[float, float]) -> None:
+@pytest.mark.parametrize(("formulation", "axis"), [("rates", 0), ("quaternion", 1), ("quaternion", 2)])
+def test_kovalevskayas_constant_holds(formulation: str, axis: int) -> None:
     """Any axis may be that of symmetry, and the centre of mass may lie anywhere in the equatorial plane."""
     center = np.zeros(3)
-    center[(axis + 1) % 3], center[(axis + 2) % 3] = direction
+    center[(axis + 1) % 3], center[(axis + 2) % 3] = 0.6, 0.8
     system = top(2.0, axis, list(center), [0.4, 0.9, 0.7], formulation)
     assert named(system) == {"kovalevskaya_constant"}
     states = travel(system)
@@ -86,20 +75,19 @@ def test_kovalevskayas_constant_holds(formulation: str, axis: int, direction: tu
     assert found.units == "rad4 s-4"
 
 
-def goryachev(ratio: float, axis: int, center: np.ndarray, *, lift: float = 0.0, formulation: str) -> Any:
+def goryachev(ratio: float, axis: int, center: np.ndarray, lift: float = 0.0) -> Any:
     """Started by an angular momentum in space axes, level but for ``lift``."""
     moments = np.full(3, ratio)
     moments[axis] = 1.0
     body = f"principal_moments = {array(moments)}\nmass = 0.5\ncenter_of_mass = {array(center)}"
     initial = f"angular_momentum = [0.9, -1.4, {lift}]\nquaternion = [0.8, 0.4, -0.2, 0.4]"
-    return prepared(body, initial, PULL, integrator=f'formulation = "{formulation}"').system
+    return prepared(body, initial, PULL, integrator='formulation = "quaternion"').system
 
 
-@pytest.mark.parametrize("formulation", ["quaternion"])
 @pytest.mark.parametrize("axis", [0, 1, 2])
-def test_goryachev_chaplygins_constant_holds(formulation: str, axis: int) -> None:
+def test_goryachev_chaplygins_constant_holds(axis: int) -> None:
     center = np.roll([1.0, 0, 0], axis - 2)
-    system = goryachev(4.0, axis, center, formulation=formulation)
+    system = goryachev(4.0, axis, center)
     assert named(system) == {"goryachev_chaplygin_constant"}
     states = travel(system)
     frame = np.array([center, np.cross(np.eye(3)[axis], center), np.eye(3)[axis]])
@@ -112,7 +100,7 @@ def test_goryachev_chaplygins_constant_holds(formulation: str, axis: int) -> Non
     ours = np.ldexp(hy.cfunc(found.expressions, system.variables)(inside)[0], found.exponents[0])
     np.testing.assert_allclose(ours, values, rtol=0, atol=bound)
     assert float(found.scale) > np.abs(values).max()
-    lifted = goryachev(4.0, axis, center, lift=0.1, formulation=formulation)
+    lifted = goryachev(4.0, axis, center, lift=0.1)
     assert named(lifted) == set()
     states = travel(lifted)
     values = constants(states, frame, 1.0, verticals(lifted, states))["goryachev_chaplygin_constant"]

@@ -10,13 +10,15 @@ from typing import Any
 import de421
 import numpy as np
 import pytest
+from equations import skew
 from jplephem.ephem import Ephemeris
 from kernel_scenes import HEAVY, LANDING, TURNED, moon
 from mpmath import mp
 from scipy.integrate import DOP853
-from support import run_text
+from support import matrices, run_text
 
 import rigidsim
+from rigidsim.scene.parts_of_values import parts_in
 
 EPOCH = 2440423.0  # 1969-07-20T12:00 TDB
 SOURCES = ("earth", "sun", "venus")
@@ -67,45 +69,21 @@ def test_positions_are_those_of_jplephem() -> None:
         assert error.max() < 1e-15, source
 
 
-def exactly_of(dataset: Any, name: str, index: tuple[int, ...]) -> Any:
-    """A value beyond double precision: the sum of its parts."""
-    parts = [part for part in (name, f"{name}_lo", f"{name}_lo2") if part in dataset]
-    return mp.fsum(mp.mpf(float(dataset[part].values[index])) for part in reversed(parts))
-
-
-@pytest.mark.parametrize(("precision", "bound"), [("double", 1e-15), ("quadruple", 1e-32), ("30", 1e-28)])
+@pytest.mark.parametrize(("precision", "bound"), [("double", 1e-15), ("quadruple", 1e-32)])
 def test_positions_are_the_kernels_polynomials(precision: str, bound: float) -> None:
-    times = at_random(6, 20)
     # at an edge both blocks hold, which the fit has made continuous to 1e-15 alone
-    times = [t for t in times if t < 20 * 86400 and (t / 86400 - 1.5) % 4]
+    times = [t for t in at_random(6, 20) if t < 20 * 86400 and (t / 86400 - 1.5) % 4]
     with mp.workdps(50):
-        dataset = run_text(
-            MOON.format(times=times), f"integrator.precision={precision}", "time.end=20 day"
-        ).dataset
-        ratio = mp.mpf(float(KERNEL.EMRAT))
+        changes = f"integrator.precision={precision}", "time.end=20 day"
+        dataset = run_text(MOON.format(times=times), *changes).dataset
+        ratio, parts = mp.mpf(float(KERNEL.EMRAT)), parts_in(dataset, "source_position")
         for row, time in enumerate(times):
             moon, both = polynomial("moon", time), polynomial("earthmoon", time)
             own = both + moon * (ratio / (1 + ratio))
-            wanted = {
-                "earth": -moon,
-                "sun": polynomial("sun", time) - own,
-                "venus": polynomial("venus", time) - own,
-            }
-            for place, source in enumerate(SOURCES):
-                found = [exactly_of(dataset, "source_position", (row, place, i)) for i in range(3)]
-                error = mp.norm(mp.matrix(found) - 1000 * wanted[source]) / (1000 * mp.norm(wanted[source]))
-                assert error < bound, (source, time)
-
-
-def rotation(q: np.ndarray) -> np.ndarray:
-    w, x, y, z = q / np.linalg.norm(q)
-    return np.array(
-        [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-        ]
-    )
+            wanted = [-moon, polynomial("sun", time) - own, polynomial("venus", time) - own]
+            for n, place in enumerate(wanted):
+                found = [mp.fsum(float(dataset[x].values[row, n, i]) for x in parts) for i in range(3)]
+                assert mp.norm(mp.matrix(found) - 1000 * place) < bound * 1000 * mp.norm(place), (n, time)
 
 
 def test_the_motion_is_that_of_the_momentum_under_the_torques_of_bare_positions() -> None:
@@ -127,9 +105,9 @@ def test_the_motion_is_that_of_the_momentum_under_the_torques_of_bare_positions(
             c = matrix.T @ (x / r)
             torque += matrix @ (3 * strength / r**3 * np.cross(c, moments * c))
         rates = (matrix.T @ momentum) / moments
-        return np.concatenate([(matrix @ _cross(rates)).ravel(), torque]) * unit
+        return np.concatenate([(matrix @ skew(rates)).ravel(), torque]) * unit
 
-    y = np.concatenate([rotation(np.array([0.9, 0.1, 0.2, 0.3])).ravel(), np.zeros(3)])
+    y = np.concatenate([matrices([0.9, 0.1, 0.2, 0.3]).ravel(), np.zeros(3)])
     y[9:] = y[:9].reshape(3, 3) @ (moments * [1e-8, -2e-8, 2.6617e-6])
     edges = [0, *np.arange(1.5, 40, 4), 40]  # of the blocks, where the positions have kinks of their rounding
     for begin, end in pairwise(edges):
@@ -138,12 +116,8 @@ def test_the_motion_is_that_of_the_momentum_under_the_torques_of_bare_positions(
         while solver.status == "running":
             solver.step()
         y = solver.y
-    error = y[:9].reshape(3, 3) - rotation(dataset["quaternion"].values[-1])
+    error = y[:9].reshape(3, 3) - matrices(dataset["quaternion"].values[-1])
     assert np.abs(error).max() < 1e-11
-
-
-def _cross(w: np.ndarray) -> np.ndarray:
-    return np.array([[0, -w[2], w[1]], [w[2], 0, -w[0]], [-w[1], w[0], 0]])
 
 
 def test_ecliptic_axes_turn_by_the_obliquity() -> None:
@@ -171,16 +145,13 @@ def test_the_dataset_names_the_kernel_and_its_hash() -> None:
 
 BAD = {
     "kernel": ('ephemeris.kernel="de999"', "no installed package"),
-    "missing": ('ephemeris.kernel="./de440.bsp"', "which isn't there: looked for in"),
     "no epoch": ("time.epoch=", "[time] epoch: missing; [ephemeris] needs the date of time 0"),
     "too early": ('time.epoch="1890-01-01T00:00:00 TDB"', "from 1899-12-04 to 2200-02-01 (TDB)"),
     "too long": ('time.end="400 yr"', "change [time] epoch, start or end, or take a longer kernel"),
     "host": ('body.host="mon"', 'given "mon"; did you mean "moon"'),
     "elsewhere": ('body.host="titan"', "others are in SPK files, which [ephemeris] kernel"),
-    "number": ("body.host=606", 'given "606"; de421 has'),
     "no host": ("body.host=", "name that in [body] host"),
     "itself": ('body.host="earth"', 'given "earth", which is the body itself'),
-    "spectrum": ("output.lyapunov=true", "at the edges of whose blocks states are set"),
     "two places": ("loads[0].position=[1, 0, 0]", "exactly one of orbit, position, ephemeris and source"),
     "axes": ('frame.axes="EME2000"', "the bias of 0.02 arcsec"),
 }
@@ -192,20 +163,3 @@ def test_mistakes_are_refused(name: str) -> None:
     with pytest.raises(rigidsim.ConfigError) as caught:
         run_text(MOON.format(times=[0, 1.0]), setting)
     assert words in str(caught.value)
-
-
-def test_steps_that_end_at_the_edges_of_blocks_leave_a_loose_runs_errors_known() -> None:
-    """Their size is how far they went. Taken for the longest allowed, they would be told in the summary, and
-    what the tolerance cuts off beyond all bounds.
-    """
-    loose, usual = (
-        run_text(MOON.format(times=[0, 57 * 86400.0]), f"integrator.tolerance={tolerance}", estimate=True)
-        for tolerance in ("1e-8", '"auto"')
-    )
-    angle = 2 * np.linalg.norm(
-        loose.dataset["quaternion"].values[-1] - usual.dataset["quaternion"].values[-1]
-    )
-    announced = loose.summary["accuracy"]["estimated_attitude_error"]
-    assert angle / 3 < announced < 3000 * angle
-    assert announced < 1e-4
-    assert loose.summary["cost"]["largest_step"] <= 4 * 86400

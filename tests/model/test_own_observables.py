@@ -50,15 +50,3 @@ def test_the_example_of_the_readme(run: rigidsim.Run) -> None:
     assert set(dataset.data_vars) - {n for n in dataset.data_vars if "drift_of" in dataset[n].attrs} == {
         "nose"
     }
-
-
-def test_it_is_recorded_only_where_it_is_named(run: rigidsim.Run, tmp_path: Path) -> None:
-    plain = rigidsim.load(ROOT / "configs/asymmetric_top.toml", overrides=["time.samples=3", "time.end=1"])
-    assert "nose" not in rigidsim.run(plain, out=tmp_path / "plain").dataset
-
-
-def test_a_name_that_is_taken_is_refused() -> None:
-    from rigidsim.scene.registry import register_observable
-
-    with pytest.raises(ValueError, match='"energy" is registered already'):
-        register_observable(OBSERVABLES["energy"])

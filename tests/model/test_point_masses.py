@@ -5,13 +5,12 @@ six-degree motion about a fixed point; what each coupling keeps.
 from __future__ import annotations
 
 import math
-from pathlib import Path
 
 import heyoka as hy
 import numpy as np
 import pytest
 import xarray
-from support import IMPATIENT, cases, law, run_text, same_bits
+from support import law, run_text
 
 import rigidsim
 from rigidsim import ConfigError
@@ -122,10 +121,6 @@ def test_one_mass_is_keplers_closed_form() -> None:
     rounding = law(EPS, 1000, math.radians(36) / DAY, 40 * DAY)
     apart = np.abs(run.quaternion.values - kepler.quaternion.values).max()
     assert apart < 4 * rounding
-    drawn = run_text(
-        planet("one_way", moon=False).replace("eccentricity = 0.3", "eccentricity = 0.3001")
-    ).dataset
-    assert np.abs(drawn.quaternion.values - kepler.quaternion.values).max() > 100 * rounding
 
 
 # --- six degrees of freedom: a long body about a planet, its shape felt in its path ----------------
@@ -156,70 +151,33 @@ def about_a_fixed_point() -> xarray.Dataset:
     return run_text(DUMBBELL % ("", FLIGHT + load)).dataset
 
 
-@pytest.mark.parametrize("way", cases(["host", "own flight"], ["host"]))
+@pytest.mark.parametrize("way", ["host", "own flight"])
 def test_full_coupling_is_six_degree_central_gravity(way: str, about_a_fixed_point: xarray.Dataset) -> None:
     """The planet is 6e21 times as heavy, so that it stays where it is to all digits."""
     expected = about_a_fixed_point
-
-    def run(coupling: str) -> xarray.Dataset:
-        given = f'coupling = "{coupling}"'
-        if way == "host":
-            masses = ATTRACTOR + SATELLITE + gradient("planet")
-            return run_text(DUMBBELL % (f'host = "satellite"\n{given}', masses)).dataset
+    body, masses = 'host = "satellite"\n', ATTRACTOR + SATELLITE + gradient("planet")
+    if way == "own flight":
         pulled = '[[loads]]\nkind = "central_gravity"\norbit = {body = "planet"}\n'
-        return run_text(DUMBBELL % (given, FLIGHT + ATTRACTOR + pulled)).dataset
-
-    def place(dataset: xarray.Dataset) -> np.ndarray:
-        if way == "host":
-            return dataset.point_mass_position.sel(point_mass="satellite").values
-        return dataset.position.values
-
-    full = run("full")
+        body, masses = "", FLIGHT + ATTRACTOR + pulled
+    full, one_way = (
+        run_text(DUMBBELL % (f'{body}coupling = "{coupling}"', masses)).dataset
+        for coupling in ("full", "one_way")
+    )
+    places = [
+        x.point_mass_position.sel(point_mass="satellite").values if body else x.position.values
+        for x in (full, one_way)
+    ]
     rounding = law(EPS, 200, 1.3e-3, 3 * 3600.0)  # relative to the distance, and as an angle
     amplified = 64  # of the orbit's along-track errors and the tumbling's, over the law of free rotation
-    assert np.abs(place(full) - expected.position.values).max() < amplified * rounding * 9e6
+    apart = [np.abs(place - expected.position.values).max() for place in places]
+    assert apart[0] < amplified * rounding * 9e6
     assert np.abs(full.quaternion.values - expected.quaternion.values).max() < amplified * rounding
     for name in ("energy", "angular_momentum", "linear_momentum"):
         assert float(np.abs(full[f"system_{name}_drift"]).max()) < 8 * EPS * math.sqrt(200) * 3
-    if way == "host":  # and without the forces of its shape it moves elsewhere
-        assert np.abs(place(run("one_way")) - expected.position.values).max() > 1e3
+    if body:  # without the forces of its shape it moves elsewhere
+        assert apart[1] > 1e3
     else:  # a body that flies by itself feels its own shape in either case
-        assert np.abs(place(run("one_way")) - expected.position.values).max() < amplified * rounding * 9e6
-
-
-def test_action_is_reaction_between_equals() -> None:
-    """A planet hardly heavier than the body: all that is kept belongs to both."""
-    light = ATTRACTOR.replace(repr(EARTH), "2e-6")
-    satellite = SATELLITE.replace(str(POSITION), "[1000, 0, 0]").replace(str(VELOCITY), "[0, 4e-5, 1e-5]")
-    text = DUMBBELL % ('host = "satellite"\ncoupling = "full"', light + satellite + gradient("planet"))
-    text = (
-        text.replace("1e13", "1e6")
-        .replace("2e14", "2e7")
-        .replace("2.05e14", "2.05e7")
-        .replace('"3 h"', '"90 day"')
-    )
-    run = run_text(text.replace("[1e-3, 2e-4, 8e-4]", "[1e-7, 2e-7, 8e-7]"))
-    dataset = run.dataset
-    bound = 16 * EPS * math.sqrt(run.summary["cost"]["steps"]) * 3
-    for name in ("energy", "angular_momentum", "linear_momentum"):
-        assert float(np.abs(dataset[f"system_{name}_drift"]).max()) < bound
-    spin = np.linalg.norm(dataset.angular_momentum - dataset.angular_momentum[0], axis=1)
-    scale = dataset.system_angular_momentum_drift.attrs["scale"]
-    assert spin.max() > 1e6 * bound * scale  # what the spin takes from the orbit is far more than is lost
-
-
-@pytest.mark.slow
-def test_a_saved_run_has_labels_and_is_prolonged(tmp_path: Path) -> None:
-    text = planet("full").replace('"36 deg/day"', '"360 deg/day"')
-    shorter = text.replace('end = "40 day"\nsamples = 9', 'end = "20 day"\nsamples = 5')
-    run = run_text(shorter, out=tmp_path)
-    whole = rigidsim.resume(run.folder.path, until="40 day", tuning=IMPATIENT)
-    same_bits(whole.dataset, run_text(text).dataset)
-    with xarray.open_dataset(whole.folder.path / "dataset.h5") as read:
-        moon = read.point_mass_position.sel(point_mass="moon", space_axis="X")
-        assert moon.shape == (9,)
-        assert read.point_mass_position.attrs["units"] == "m"
-    assert rigidsim.verify(whole.folder.path).identical
+        assert apart[1] < amplified * rounding * 9e6
 
 
 REFUSED = {
@@ -228,18 +186,9 @@ REFUSED = {
         (PLANET % ('host = "erth"', BODIES + gradient("sun"))),
         '[body] host: given "erth"; did you mean "earth"?; allowed: sun, earth',
     ),
-    "no such source": (
-        PLANET % ('host = "earth"', BODIES + gradient("moon")),
-        '[[loads]] number 1 orbit.body: given "moon"; allowed: sun, earth',
-    ),
     "mass": (
         planet("full").replace("5.97219e24", "6.5e24"),
         '[body] mass: given 6.5e+24 kg, but the gravitational parameter of its host "earth"',
-    ),
-    "twice": (planet("full").replace('"moon"', '"earth"'), 'two bodies are named "earth"'),
-    "about itself": (
-        planet("full").replace('about = "sun"', 'about = "moon"'),
-        "which goes about this body itself",
     ),
     "pulled host": (
         planet("full").replace("gravity_gradient", "central_gravity"),

@@ -4,15 +4,13 @@ from __future__ import annotations
 
 import math
 
-import heyoka as hy
 import numpy as np
 import pytest
-from equations import EPS, Random, derivative, matrix
+from equations import derivative
 from support import config, run_text
 
 import rigidsim
 from rigidsim import ConfigError, parse
-from rigidsim.model.averaged import resonance
 from rigidsim.solve.problem import InitialValueProblem, prepare
 
 MOMENTS = np.array([0.998, 0.999, 1.0])
@@ -45,82 +43,6 @@ def averaged(*given: object, **more: object) -> InitialValueProblem:
     return prepare(parse(scene(*given, **more)))  # type: ignore[arg-type]
 
 
-def sums(
-    multiple: int, eccentricity: float, frame: np.ndarray, momentum: np.ndarray, orbit: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, float]:
-    """Mean torques over the anomaly, in space and in the body, seen along the frame's axes; and the mean
-    potential: of axes that go round p times uniformly about the momentum.
-
-    Args:
-        frame: a, b, c as columns.
-        momentum: along them.
-        orbit: P and T as columns.
-    """
-    turns = 1 + multiple % 2
-    count = 512 * turns
-    mean = 2 * np.pi * np.arange(count) / 512
-    anomaly = mean.copy()
-    for _ in range(100):
-        anomaly -= (anomaly - eccentricity * np.sin(anomaly) - mean) / (1 - eccentricity * np.cos(anomaly))
-    place = np.array([np.cos(anomaly) - eccentricity, math.sqrt(1 - eccentricity**2) * np.sin(anomaly)]).T
-    about = frame @ momentum / np.linalg.norm(momentum)
-    in_space, in_body, potential = np.zeros(3), np.zeros(3), 0.0
-    for r, m in zip(place @ orbit.T, mean, strict=True):
-        half = multiple * m / 4
-        body = matrix(np.array([math.cos(half), *(math.sin(half) * about)])) @ frame
-        size = np.linalg.norm(r)
-        torque = 3 / size**5 * np.cross(r, body @ (MOMENTS * (body.T @ r)))
-        in_space += torque / count
-        in_body += body.T @ torque / count
-        potential += 1.5 / size**5 * (MOMENTS * (body.T @ r) ** 2).sum() / count
-    return frame.T @ in_space, in_body, potential
-
-
-def turned_orbit(inclination: float, node: float, periapsis: float) -> np.ndarray:
-    """P and T as columns."""
-    found = np.eye(3)
-    for angle, axis in ((node, 2), (inclination, 0), (periapsis, 2)):
-        vector = math.sin(angle / 2) * np.eye(3)[axis]
-        found = found @ matrix(np.array([math.cos(angle / 2), *vector]))
-    return found[:, :2]
-
-
-@pytest.fixture
-def first_order(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Without what the mean leaves out to second order."""
-    monkeypatch.setattr(resonance, "second_order", lambda *given: (0.0,) * 8)
-
-
-@pytest.mark.parametrize(("multiple", "eccentricity"), [(2, 0.05), (2, 0.3), (3, 0.2), (5, 0.5)])
-@pytest.mark.usefixtures("first_order")
-def test_the_rates_are_means_over_the_orbit(multiple: int, eccentricity: float) -> None:
-    """At an obliquity and a wobble of any size, against sums over the anomaly."""
-    random = Random(multiple)
-    angles = "inclination = 0.4, ascending_node = 0.7, periapsis = 1.1, mean_anomaly = 0.3"
-    spin = multiple / 2 + 1e-3
-    q = random.quaternion()
-    system = averaged(spin, eccentricity, quaternion=q.tolist(), orbit=angles).system
-    assert system.states == ["rw", "rx", "ry", "rz", "la", "lb", "excess"]
-    exponents = np.array(system.state_exponents)
-    slow = np.ldexp(np.array([float(x) for x in system.initial]), exponents)
-    slow[4:6] += [0.03, -0.02]
-    found = derivative(system, slow)
-    w, x, y, z = slow[:4]
-    # W from q' = q (0, W) / 2
-    inverse = np.array([[-x, w, z, -y], [-y, -z, w, x], [-z, y, -x, w]])
-    rates = 2 * inverse @ found[:4]
-    momentum = slow[4:] + np.array([0, 0, multiple / 2])
-    orbit = turned_orbit(0.4, 0.7, 1.1)
-    in_space, in_body, _ = sums(multiple, eccentricity, matrix(slow[:4]), momentum, orbit)
-    size = np.linalg.norm(momentum)
-    about, own = momentum / size, momentum / MOMENTS
-    # what turns the body's axes with the momentum, beyond what turns it within them
-    expected = own - multiple / 2 * about + np.cross(about, in_space - in_body) / size
-    # the trapezoidal rule at 512 points has converged to rounding at e = 0.5
-    np.testing.assert_allclose(rates, expected, atol=100 * EPS)
-    np.testing.assert_allclose(found[4:], np.cross(momentum, own) + in_body, atol=100 * EPS)
-
-
 def test_the_second_order_is_the_exact_precession_on_a_circle() -> None:
     """Roll and yaw of a satellite on a circular orbit, s^4 + n^2 (1 + 3 x + x z) s^2 + 4 n^4 x z = 0: the
     root near n is the precession of the pole, which the mean alone makes faster by 3/4 (C - A)/C of it.
@@ -151,26 +73,11 @@ def test_the_second_order_is_the_exact_precession_on_a_circle() -> None:
 def both() -> dict[float, tuple[rigidsim.Run, rigidsim.Run]]:
     """Three librations in longitude and more, near the Moon's resonance and Mercury's."""
     found = {}
-    for spin, eccentricity in ((1.005, 0.05), (1.5, 0.2)):
-        revolutions = 56 if spin < 1.2 else 72
-        end, samples = 2 * math.pi * revolutions, 8 * revolutions + 1
-        found[spin] = (
-            run_text(
-                scene(
-                    spin, eccentricity, end=end, samples=samples, record='"momentum_axis", "resonant_angle"'
-                )
-            ),
-            run_text(
-                scene(
-                    spin,
-                    eccentricity,
-                    level="full",
-                    end=end,
-                    samples=samples,
-                    record='"momentum_axis", "quaternion"',
-                )
-            ),
-        )
+    for spin, eccentricity, revolutions in ((1.005, 0.05, 56), (1.5, 0.2, 72)):
+        time = {"end": 2 * math.pi * revolutions, "samples": 8 * revolutions + 1}
+        slow = scene(spin, eccentricity, record='"momentum_axis", "resonant_angle"', **time)
+        full = scene(spin, eccentricity, level="full", record='"momentum_axis", "quaternion"', **time)
+        found[spin] = (run_text(slow), run_text(full))
     return found
 
 
@@ -211,28 +118,6 @@ def test_the_commensurable_angle_is_that_of_every_rotation(
     mean = apart.reshape(-1, 16, 3).mean(axis=1)
     left_out = eccentricity**2 if spin < 1.2 else eccentricity
     assert np.linalg.norm(mean, axis=1).max() < 3 * flattening * (flattening + left_out) * path.max()
-
-
-@pytest.mark.usefixtures("first_order")
-def test_the_slow_energy_is_kept_on_an_orbit_that_rests() -> None:
-    """m . I^-1 m / 2 - p n L + <U> is the Hamiltonian of the averaged motion where the orbit doesn't move."""
-    system = averaged(1.005, 0.1, orbit='inclination = "20 deg"').system
-    exponents = np.array(system.state_exponents)
-    engine = hy.taylor_adaptive(
-        system.equations, [float(x) for x in system.initial], compact_mode=True, opt_level=0, tol=2.0**-42
-    )
-    energies, potentials = [], []
-    orbit = turned_orbit(math.radians(20), 0.0, 0.0)
-    for time in np.linspace(0.0, math.ldexp(300.0, -system.scaling.time), 9):
-        engine.propagate_until(time)
-        slow = np.ldexp(engine.state, exponents)
-        momentum = slow[4:] + np.array([0.0, 0, 1])
-        _, _, potential = sums(2, 0.1, matrix(slow[:4]), momentum, orbit)
-        free = (momentum**2 / MOMENTS).sum() / 2 - np.linalg.norm(momentum)
-        energies.append(free + potential)
-        potentials.append(potential)
-    assert np.ptp(potentials) > 1e-5
-    assert np.ptp(energies) < 1e-11  # 1024 epsilon along some thirty steps
 
 
 @pytest.mark.parametrize(

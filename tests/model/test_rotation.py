@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import re
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,10 +12,8 @@ from support import cases, config, loaded, run_text
 
 import rigidsim
 from rigidsim import ConfigError
-from rigidsim.solve.assembly import assemble
 from rigidsim.solve.problem import prepare
 
-FAULTS = Path(__file__).parents[1] / "data" / "faults"
 MOMENTS = (1.0, 1.0, 1.5)
 NAMES = (
     "quaternion", "rotation_angle", "rotation_rate", "rotation_period", "andoyer_momenta", "andoyer_angles",
@@ -26,25 +23,21 @@ RECORD = f"record = {list(NAMES)}".replace("'", '"')
 TILTED = 'angular_momentum = ["0.3", "0.4", 2]\neuler_angles = [0.3, 0.35, 0.2]'
 
 
-def symmetric(time: str, integrator: str, runs: Path) -> xr.Dataset:
-    return loaded(run_text(config(f"principal_moments = {[*MOMENTS]}", TILTED, (), time, integrator, RECORD)))
-
-
 @pytest.mark.parametrize(
     "integrator",
     cases(
         ['formulation = "quaternion"', 'formulation = "euler_angles"', 'formulation = "rotation_matrix"',
-         'formulation = "canonical"', 'method = "closed_form"', 'precision = "extended"'],
-        ['formulation = "quaternion"', 'formulation = "euler_angles"', 'method = "closed_form"'],
+         'method = "closed_form"'],
+        ['formulation = "quaternion"', 'method = "closed_form"'],
     ),
 )  # fmt: skip
-@pytest.mark.parametrize("samples", [3, 2001])
 def test_a_free_symmetric_top_has_constant_momenta_and_uniform_angles(
-    samples: int, integrator: str, runs: Path
+    integrator: str,
 ) -> None:
     """l' = L (1/C - 1/A), g' = G/A, h' = 0; polar motion circles at l', and all turns are counted."""
     a, _, c = MOMENTS
-    found = symmetric(f"end = 200\nsamples = {samples}", integrator, runs)
+    body, time = f"principal_moments = {[*MOMENTS]}", "end = 200\nsamples = 3"
+    found = run_text(config(body, TILTED, (), time, integrator, RECORD)).dataset
     time = found["time"].values
     big_l, big_g, big_h = found["andoyer_momenta"].values.T
     momentum = np.array([0.3, 0.4, 2])
@@ -85,10 +78,6 @@ def test_the_rotation_of_an_earth_is_told_without_following_it() -> None:
         np.testing.assert_array_equal(few.dataset[name].values, many.dataset[name].values[::400])
     turns = few.dataset["rotation_angle"].values[-1] / (2 * np.pi)
     assert turns == pytest.approx(400 * 86400 * 7.292115e-5 / (2 * np.pi), abs=0.1)
-    text = config(body, start, load, 'end = "400 day"\nevery = "20 day"')
-    evaluator = assemble(prepare(rigidsim.parse(text))).evaluator
-    assert not evaluator.sparse
-    assert not evaluator.dense
 
 
 def test_retrograde_and_upside_down_bodies_turn_in_the_direct_sense_about_their_momentum() -> None:
@@ -122,27 +111,6 @@ def test_polar_motion_is_absent_where_the_spin_has_left_the_figure_axis() -> Non
     )
 
 
-def test_turns_go_on_where_a_run_is_resumed(runs: Path) -> None:
-    """Told by rates, and counted along the motion: the same bits as in one go."""
-    body, start = "principal_moments = [1, 1.02, 1.04]", 'angular_velocity = ["0.01", 0, 1]'
-    start += '\neuler_angles = [0.2, "23 deg", 0]'
-    load = 'kind = "gravity_gradient"\ngravitational_parameter = 1\norbit = {semi_major_axis = 100}'
-    output = 'record = ["node_longitude", "rotation_angle", "andoyer_angles"]'
-    text = config(body, start, load, "end = 3000\nsamples = 31", "", output)
-    whole = loaded(run_text(text, 'name="whole"', out=runs))
-    part = run_text(text, 'name="part"', "limits.max_steps=1000", out=runs)
-    assert part.status == "stopped: max_steps"
-    resumed = loaded(rigidsim.resume(part.folder.path, overrides=["limits.max_steps=100000"]))
-    for name in ("node_longitude", "rotation_angle", "andoyer_angles"):
-        np.testing.assert_array_equal(resumed[name].values, whole[name].values)
-    assert whole["rotation_angle"].values[-1] > 2900
-    prepared = prepare(rigidsim.parse(text))
-    evaluator = assemble(prepared).evaluator
-    assert evaluator.sparse  # g and l are followed
-    dense = loaded(run_text(text, 'name="dense"', "time.samples=6001", out=runs))
-    np.testing.assert_array_equal(dense["rotation_angle"].values[::200], whole["rotation_angle"].values)
-
-
 def recorded_less_labelled(found: xr.Dataset) -> np.ndarray:
     """Turns by which the rotation angle differs from the sum of Andoyer's angles that its label gives."""
     told = re.match(r"(h \+ g \+ l|g [+-] h [+-] l) of andoyer_angles", found["rotation_angle"].convention)
@@ -152,26 +120,18 @@ def recorded_less_labelled(found: xr.Dataset) -> np.ndarray:
     return np.asarray((found["rotation_angle"].values - labelled) / (2 * np.pi))
 
 
-def test_the_label_of_the_rotation_angle_is_the_sum_that_is_recorded() -> None:
-    found = run_text((FAULTS / "rotation_angle_label.toml").read_text()).dataset
-    assert found["rotation_angle"].convention.startswith("g + h - l of andoyer_angles")
-    off = recorded_less_labelled(found)
-    np.testing.assert_allclose(off, round(off[0]), rtol=0, atol=1e-12)
-
-
-@pytest.mark.slow
 def test_the_label_is_what_is_recorded_in_all_hemispheres() -> None:
     """Starts with the momentum above and below the reference plane and the figure's equator."""
     random = np.random.default_rng(3)
     labels = set()
-    for n in range(50):
+    for n in range(24):
         moments = [*random.uniform(0.9, 1.1, 2).tolist(), 1.6]  # turns about z or opposite to it
         rates = [*random.uniform(-0.4, 0.4, 2).tolist(), float(random.choice([-1.0, 1.0]))]
         q, normal = random.normal(size=4), random.normal(size=3)
         text = config(
             f"principal_moments = {moments}",
             f"angular_velocity = {rates}\nquaternion = {q.tolist()}",
-            time="end = 30\nsamples = 61",
+            time="end = 10\nsamples = 21",
             output='record = ["rotation_angle", "andoyer_angles"]',
             more=f'[frame]\nfigure_axis = "z"\nreference = {normal.tolist()}',
         )

@@ -45,9 +45,8 @@ def spun(torque: str, runs: Path, *, width: str = "1", spin: str = "0.5", precis
 @pytest.mark.parametrize(
     ("form", "precision", "width"),
     [
-        *(("exp(-((t-50)/w)^2)/w", "double", width) for width in ("1e-2", "1e-4")),
-        pytest.param("exp(-((t-50)/w)^2)/w", "extended", "1e-3", marks=pytest.mark.slow),
-        pytest.param("exp(-(t-50)^2/w^2)/w", "double", "1e-4", marks=pytest.mark.slow),
+        ("exp(-((t-50)/w)^2)/w", "double", "1e-4"),
+        ("exp(-((t-50)/w)^2)/w", "extended", "1e-2"),
         ("sigmoid((t-50)/w)*sigmoid((50-t)/w)/w", "double", "1e-4"),
     ],
 )
@@ -75,7 +74,7 @@ def test_a_pulse_gives_its_whole_impulse_and_work(form: str, width: str, precisi
     cases([
         "tanh((t-5)/0.001)", "erf((t-5)/0.001)", "atan((t-5)/0.001)", "sigmoid(100*(sin(t)-0.5))",
         "cos(t)^64", "(2+cos(t))^-64", "exp(-50*cos(t)^2)", "exp(-1000*sin(t/7)^2)",
-        "1/(1+((t-50)/1e-3)^2)^4", "(t/100)^40", "1/cosh(3*(t-50))",
+        "1/(1+((t-50)/1e-3)^2)^4", "(t/100)^40",
     ], ["tanh((t-5)/0.001)", "exp(-1000*sin(t/7)^2)"]),
 )  # fmt: skip
 def test_switches_and_combs(torque: str, runs: Path) -> None:
@@ -95,13 +94,12 @@ def test_switches_and_combs(torque: str, runs: Path) -> None:
     assert gained == pytest.approx(expected, rel=blur + 50 * EPS * math.sqrt(run.summary["cost"]["steps"]))
 
 
-@pytest.mark.parametrize("width", ["1e-1", "1e-4"])
-def test_an_event_on_a_narrow_function_of_time(width: str, runs: Path) -> None:
+def test_an_event_on_a_narrow_function_of_time(runs: Path) -> None:
     """Both crossings of half its height, at t0 -+ w sqrt(ln 2)."""
     event = '[[events]]\nname = "peak"\nexpression = "exp(-((t-50)/w)^2) - 1/2"\n'
-    run = spun("0.001*sin(t)", runs, width=width, more=event)
+    run = spun("0.001*sin(t)", runs, width="1e-4", more=event)
     found = run.dataset["peak_time"].values
-    reach = float(width) * math.sqrt(math.log(2))
+    reach = 1e-4 * math.sqrt(math.log(2))
     assert found == pytest.approx([50 - reach, 50 + reach], abs=20 * 50 * EPS)
 
 

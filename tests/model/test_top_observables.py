@@ -86,22 +86,7 @@ def test_regular_precession_keeps_its_tilt_and_counts_every_turn_of_sparse_sampl
     assert np.abs(height - 0.04 / 2).max() < 1e-12
 
 
-def test_a_fast_top_precesses_slowly(runs: Path) -> None:
-    """mu/(C w3) on average, exactly so at 90 degrees; the cusps of its nutation are 2 A mu/(C w3)^2 deep."""
-    dataset = ready("heavy_top_fast", runs, "time.samples=401")
-    mu, a, c, spin = 0.1 * 9.80665 * 0.04, 2e-4, 1e-4, 1000.0
-    depth = 2 * a * mu / (c * spin) ** 2
-    time = dataset["time"].values
-    slow = mu / (c * spin) * time
-    precession = dataset["precession_angle"].values
-    assert precession[-1] > 1.5
-    assert np.abs(precession - slow).max() < 0.6 * depth + 1e-6 * slow[-1]  # half of it each way
-    tilts = dataset["tilt"].values - np.pi / 2
-    assert tilts.min() > -1e-12
-    assert 0.9 * depth < tilts.max() < 1.001 * depth
-
-
-def test_the_tip_is_the_point_that_is_given(tmp_path: Path) -> None:
+def test_the_tip_is_the_point_that_is_given() -> None:
     """In free flight it goes with the centre of mass; where nothing says which point it is, that is said."""
     start = "angular_velocity = [1, 2, 3]\nposition = [7, 8, 9]\nvelocity = [1, 0, -2]"
     body = "principal_moments = [1, 2, 2.5]\nmass = 2"
@@ -117,11 +102,9 @@ def test_the_tip_is_the_point_that_is_given(tmp_path: Path) -> None:
             assert max(abs(a - b) for a, b in zip(got, expected, strict=True)) < 30 * EPSILON["double"]
     plain = loaded(run_text(config(output="tip = [0, 0, 1]", time="end = 1\nsamples = 2")))
     assert "tip" in plain  # named by its point
-    for output, words in (
-        ('record = ["tip"]', ["[output] record", "tip = [x, y, z]"]),
-        ('tip = [0, 0, 1]\nrecord = ["quaternion"]', ['no "tip"', "name it there, or leave tip out"]),
+    for output, said in (
+        ('record = ["tip"]', r"tip = \[x, y, z\]"),
+        ('tip = [0, 0, 1]\nrecord = ["quaternion"]', "name it there, or leave tip out"),
     ):
-        with pytest.raises(ConfigError) as raised:
-            rigidsim.run(rigidsim.parse(config(output=output)), out=tmp_path)
-        for word in words:
-            assert word in str(raised.value)
+        with pytest.raises(ConfigError, match=said):
+            run_text(config(output=output))
