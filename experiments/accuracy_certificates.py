@@ -5,8 +5,6 @@ The truth is another run of the scene at the same samples: quadruple precision, 
 accuracy or the certificate's own reference needs more; of long scenes with a closed form, that in 70 digits.
 
 Expected: no true error exceeds its certificate, and no certified run misses the accuracy asked for.
-
-Run: python -m experiments.accuracy_certificates [--full] [--out DIR] [--first N --count M] [--seed S]
 """
 
 from __future__ import annotations

@@ -30,7 +30,6 @@ STUDIES = (
     "hyperion",
     "satellite_stability",
     "flip_sphere",
-    "round_off_ensemble",
     "sweep_coverage",
     "apophis_flyby",
     "averaged_motions",

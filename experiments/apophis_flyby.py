@@ -25,8 +25,6 @@ Held against:
   half of the members (of those that shift so far, for the ecliptic), *could* as one in 1000. Scheeres et
   al. 2005 (Icarus 178, 281) foretold as much for any start.
 - Energy and total angular momentum, orbit included, to the round-off law.
-
-Run: python -m experiments.apophis_flyby [--full] [--out DIR] [--config]
 """
 
 from __future__ import annotations

@@ -13,8 +13,6 @@ Held against:
   10 degrees or more. Likely is more than half;
 - the hyperbola: nothing that the Moon and the Sun do in four days should matter beside what isn't known of
   the rotation: a tenth of a degree, and a part in a thousand of the rate, for the median member.
-
-Run: python -m experiments.apophis_real_sky [--full] [--out DIR]
 """
 
 from __future__ import annotations

@@ -196,11 +196,7 @@ def draw(results: Sequence[Result], out: Path) -> Path:
     axes.axvline(1, color="#999999", lw=1, ls=":")
     axes.set_ylim(-0.7, len(shown) - 0.2)
     axes.set_xlim(left=0)
-    tidy(
-        axes,
-        "ratio (median and range over the pairs); black: at most; diamond: with estimates",
-        "",
-    )
+    tidy(axes, "ratio (median and range over the pairs); black: at most; diamond: with estimates", "")
     return save(figure, out, NAME)
 
 

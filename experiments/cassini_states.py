@@ -14,8 +14,6 @@ Held against:
   n/w of the angle, the bend of the figure axis; its path isn't judged, as it librates near its own period;
 - the full model: three times 3/2 (C - A)/C n/w of the angle, the order of what averaging leaves out;
 - the Moon's 1.543 deg (Williams et al. 2014), 1 %; Mercury's 2.04 arcmin (Margot et al. 2012), 4 %.
-
-Run: python -m experiments.cassini_states [--full] [--out DIR]
 """
 
 from __future__ import annotations

@@ -194,7 +194,8 @@ def tidy(axes: Any, xlabel: str, ylabel: str, title: str = "") -> None:
         axes.set_title(title, fontsize=10.5)
     axes.grid(True, color="#dddddd", linewidth=0.6)
     axes.set_axisbelow(True)
-    axes.spines[["top", "right"]].set_visible(False)
+    for side in {"top", "right"} & set(axes.spines):  # which maps of a sphere lack
+        axes.spines[side].set_visible(False)
 
 
 def save(figure: Figure, out: Path, name: str) -> Path:

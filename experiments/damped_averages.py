@@ -13,8 +13,6 @@ Held against:
   their announced errors and their change over that part make of these;
 - the exact solution of the axisymmetric body, to the tolerance over ten e-foldings;
 - the order: errors are in proportion to the torque over momentum times rate, if the same share is lost.
-
-Run: python -m experiments.damped_averages [--full] [--out DIR]      two minutes of CPU with --full
 """
 
 from __future__ import annotations

@@ -12,8 +12,6 @@ Held against:
   digits;
 - Chandler's 427 to 435 days (Chandler 1891; Gross 2007), the period of the real, elastic Earth, which a rigid
   body must NOT give.
-
-Run: python -m experiments.earth_free_nutation [--full] [--out DIR]
 """
 
 from __future__ import annotations

@@ -17,8 +17,6 @@ Held against:
 - every rotation resolved beside it: the announced error over a thousand years (--full; 50 otherwise);
 - a hundredth of the steps for the Sun alone, averaged over the rotation; CPU is told, and not judged: on a
   machine with other work its ratio varies by a third between runs.
-
-Run: python -m experiments.earth_obliquity [--full] [--out DIR]      half a minute of CPU
 """
 
 from __future__ import annotations

@@ -14,8 +14,6 @@ Method: four fits by `rigidsim fit`.
 Held against: the published moments of Toutatis and the residuals of their solution (7.7 deg rms); the truth
 of the simulated book and satellite; DE421's start, beta and gamma, which the ratios of moments are, and what
 is left of its librations. Tolerances are three of the fits' own sigmas.
-
-Run: python -m experiments.fitted_bodies [--full] [--out DIR]
 """
 
 from __future__ import annotations

@@ -14,8 +14,6 @@ Held against: 2K(k)/p in mpmath (50 digits). Tolerance: the round-off law (Brouw
 walk (eps/2) sqrt(steps), doubled as squares, so that their difference has sqrt(2) eps sqrt(steps) L^2;
 three times that over D = L^2 - 2 E I_2 is the relative error of k'^2, and over p the error of the period.
 And a contrast: double precision must NOT find the period at 1e-12.
-
-Run: python -m experiments.flip_period [--full] [--out DIR]
 """
 
 from __future__ import annotations

@@ -12,8 +12,6 @@ Held against:
   hangs on D, which vanishes on the separatrices, so that the bound grows towards them; and eps t of the
   clock.
 - The sign of D tells the axis that is circled: C where it is above zero, A below, B nowhere (Poinsot).
-
-Run: python -m experiments.flip_sphere [--full] [--out DIR]
 """
 
 from __future__ import annotations

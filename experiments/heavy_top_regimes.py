@@ -22,8 +22,6 @@ Held against (Landau & Lifshitz, Mechanics, section 35; Whittaker, section 71):
   sqrt(mu/A - (C w3/2A)^2) to 1e-9 (the fitted stretch starts after 12 e-folds, with exp(-24) = 4e-11 of the
   decaying solution left, and ends below 1e-6 rad, whose square is the next order);
 - the pendulum, T = 4 K(sin(a/2)) sqrt(A/mu), no spin; tolerance: the round-off law over one swing.
-
-Run: python -m experiments.heavy_top_regimes [--full] [--out DIR]
 """
 
 from __future__ import annotations

@@ -23,8 +23,6 @@ Held against:
   (standard error of blocks of 100 revolutions, told with each), and the motion may keep to the shore of an
   island for some hundred revolutions, growing slowly. What tumbles doesn't stay as it was, either: later on
   it spins faster, at 2.5 to 3 n, and the rate over 10,000 revolutions from a tilt of 0.01 rad is 0.090 n.
-
-Run: python -m experiments.hyperion [--full] [--out DIR]
 """
 
 from __future__ import annotations

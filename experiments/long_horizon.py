@@ -109,10 +109,7 @@ def measure(body: str, precision: str, held: bool, horizon: float, starts: int =
         errors[2, start] = angles_between(trial.attitudes, reference.attitudes)[grown]
         cpu[start] = trial.cpu_seconds
     return xarray.Dataset(
-        {
-            "error": (("quantity", "start", "time"), errors),
-            "cpu_seconds": (("start",), cpu),
-        },
+        {"error": (("quantity", "start", "time"), errors), "cpu_seconds": (("start",), cpu)},
         coords={"quantity": list(QUANTITIES), "time": moments[grown]},
         attrs={"body": body, "precision": precision, "held": int(held)},
     )

@@ -13,8 +13,6 @@ Held against (physics: P1 and the first-order nutation, see ``averaged`` and ``n
 - the 18.6-year nutation, 9.2022 arcsec in obliquity and 17.235 in longitude, to 0.5 %, of first order too;
 - the drifts of the invariants, against the bound that the run itself gives for rounding.
 --full goes once round the whole cycle of 25,772 years, some 1e7 rotations, and reports its cost on stderr.
-
-Run: python -m experiments.luni_solar_precession [--full] [--out DIR]
 """
 
 from __future__ import annotations
@@ -107,10 +105,7 @@ def node_terms() -> dict[str, float]:
     _, kp = averaged(MOON)
     i, eps, rate = np.radians(float(MOON["i"])), float(OBLIQUITY) * ARCSEC, 2 * np.pi / (float(NODE) * DAY)
     strength = kp * np.sin(i) * np.cos(i) / rate / ARCSEC
-    return {
-        "obliquity": strength * np.cos(eps),
-        "longitude": strength * np.cos(2 * eps) / np.sin(eps),
-    }
+    return {"obliquity": strength * np.cos(eps), "longitude": strength * np.cos(2 * eps) / np.sin(eps)}
 
 
 def figure_axis(result: Result) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

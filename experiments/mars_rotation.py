@@ -16,8 +16,6 @@ Held against (Konopliv, Park & Folkner 2016, Icarus 274, 253):
 - amplifications by the core: the linearised equations of a mantle and a core, and the usual formula
   1 + F s/(s - s0), which is their limit for slow nutations of a slightly flattened body. The retrograde third
   of a year (229 days) is near the free core nutation, four turns away in 50 years.
-
-Run: python -m experiments.mars_rotation [--full] [--out DIR]
 """
 
 from __future__ import annotations

@@ -20,8 +20,6 @@ Held against:
 - that Jupiter's line may exceed that of 88 days (Peale, Margot & Yseboodt 2009, Icarus 199, 1, abstract);
 - the period of the free libration, 15.847 years for moments by J2 = 6e-5, C22 = 1e-5, C = 0.34 M R^2 (Rambaux
   & Bois 2004, Astron. Astrophys. 413, 381), and n sqrt(3 (B - A)/C_m (7 e/2 - 123 e^3/16 + 489 e^5/128)).
-
-Run: python -m experiments.mercury_librations [--full] [--out DIR]
 """
 
 from __future__ import annotations

@@ -13,8 +13,6 @@ amplitude: 1056.13, 8822.88 and 27257.27 d in DE421 (Rambaux & Williams 2011, Ce
 abstract). These differ by 3e-5, 2e-3 (the real mode in latitude has 0.03 arcsec: it is known worst) and 2e-4,
 which is allowed, and for the wobble 5e-4, since 150 years are two of its cycles. Its ellipse has 8.19 by 3.31
 arcsec.
-
-Run: python -m experiments.moon_free_librations [--full] [--out DIR]
 """
 
 from __future__ import annotations

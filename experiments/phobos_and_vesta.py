@@ -14,8 +14,6 @@ Held against:
   Astron. Astrophys. 556, A151, abstract);
 - the averaged precession, (3/2) n^2/w (C - A)/C cos(obliquity) (1 - e^2)^(-3/2), and the half-yearly nutation
   in obliquity of a circular orbit, (3/4) n/w (C - A)/C sin(obliquity), less 5 e^2/2.
-
-Run: python -m experiments.phobos_and_vesta [--full] [--out DIR]
 """
 
 from __future__ import annotations

@@ -15,8 +15,6 @@ Held against (physics: published numbers):
 - the real Earth (IAU 2000B), from which a rigid one must differ where its fluid core and its yielding count:
   182.6 d and 13.66 d by more than 1.5 %; but 9.3 yr to 1 %;
 - periods against the arguments, to 1e-6, half of the last digit of 6798.38 d (182.6 d: 1e-5, a blend).
-
-Run: python -m experiments.precession_and_nutation [--full] [--out DIR]        (--full: sampled daily)
 """
 
 from __future__ import annotations

@@ -234,10 +234,7 @@ def _torque(draw: Draw, frame: str, components: Sequence[str]) -> None:
     draw.body(draw.moments(), turned=draw.sometimes(0.3))
     draw.start(draw.direction())
     size = draw.mass * draw.length**2 / draw.time**2
-    draw.parameters = [
-        f"k = {size * draw.decades(-4, -1)!r}",
-        f"n = {draw.between(0.1, 2) / draw.time!r}",
-    ]
+    draw.parameters = [f"k = {size * draw.decades(-4, -1)!r}", f"n = {draw.between(0.1, 2) / draw.time!r}"]
     draw.load("torque", f"components = {list(components)}", f'frame = "{frame}"')
 
 

@@ -17,8 +17,6 @@ Held against:
 - that program's cost: at most 1.1 times its CPU, and 2 s for the 50 years, as asked; each run seven times in
   turn, without compiling or estimates (the bare one keeps states at block edges alone);
 - the announced error: below 1e-9 rad, as asked, and at least a third of the difference from 80 bits.
-
-Run: python -m experiments.real_moon [--full] [--out DIR]      --full: costs, and 80 bits for 50 years, not 5
 """
 
 from __future__ import annotations

@@ -9,8 +9,6 @@ the free nutation.
 Held against: five published circular amplitudes of a rigid Earth's figure axis, to 0.5 mas: lines of
 182.62 and 182.63 d, and of 365.22 and 365.26 d, can't be told apart in 50 years, which alone leaves 0.3
 mas.
-
-Run: python -m experiments.rigid_earth [--full] [--out DIR]
 """
 
 from __future__ import annotations

@@ -11,8 +11,6 @@ largest real part r tells the growth exp(r t). Cells with r = 0 must not grow by
 that is near lets a vector grow linearly in time (ln 126 = 4.8), and oscillations have amplitudes (e^2). Cells
 with r T above 14 must. Between them the orbits are too few to tell, and they are counted. For 14 < r T < 25,
 before round-off has driven the motion itself away (e^36 = 1/eps), the growth must be r T to within those 7.
-
-Run: python -m experiments.satellite_stability [--full] [--out DIR]
 """
 
 from __future__ import annotations

@@ -12,8 +12,6 @@ Held against:
   fainter ones the error as a phase over the run, times their share of the largest line, within 1e-13;
 - the satellite: n sqrt(3 (B - A) / C), and s^4 + n^2 (1 + 3 sx + sx sz) s^2 + 4 n^4 sx sz = 0, to 1e-8: of
   the order of the amplitude squared.
-
-Run: python -m experiments.spectral_lines [--full] [--out DIR]
 """
 
 from __future__ import annotations

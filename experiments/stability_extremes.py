@@ -91,10 +91,7 @@ def campaign(count: int, seed: int, tell: Tell) -> list[Verdict]:
 def tabulated(found: dict[Way, list[Verdict]]) -> str:
     """One row per extreme, one column per way; in brackets the largest error that was announced."""
     rows = dict.fromkeys(v.scene.row for verdicts in found.values() for v in verdicts)
-    lines = [
-        f"| extreme | {' | '.join(way.title for way in found)} |",
-        f"| --- |{' --- |' * len(found)}",
-    ]
+    lines = [f"| extreme | {' | '.join(way.title for way in found)} |", f"| --- |{' --- |' * len(found)}"]
     for row in rows:
         cells = [_cell([v for v in verdicts if v.scene.row == row]) for verdicts in found.values()]
         lines.append(f"| {row} | {' | '.join(cells)} |")

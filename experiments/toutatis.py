@@ -12,8 +12,6 @@ Held against:
 - the closed form, period 4K(k)/p and mean precession L/I3 + L (1/I1 - 1/I3) Pi/K, to three times the
   round-off law of attitudes over the angle turned, about 2e-14 (what the windows leave of the periodic
   parts, some exp(-sqrt(4 pi N)) for N = 136 turns or more, is below that).
-
-Run: python -m experiments.toutatis [--full] [--out DIR]
 """
 
 from __future__ import annotations

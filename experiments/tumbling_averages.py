@@ -15,8 +15,6 @@ Held against:
   with D from the mean of l . I l along the free motion, taken from Euler's equations step by step (DOP853),
   without the elliptic integrals of the model; within the part of a turn that the precession makes in one
   orbit, which is the size of what the average adds in second order.
-
-Run: python -m experiments.tumbling_averages [--full] [--out DIR]      some two minutes of CPU with --full
 """
 
 from __future__ import annotations

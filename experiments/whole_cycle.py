@@ -10,8 +10,6 @@ integrated as point masses (``configs/bodies/earth_moon_sun.toml``): every rotat
 Held against: 1e-6 rad (spin-averaged) and 1e-5 rad (orbit-averaged, short-period terms added back), for
 ``obliquity`` and ``node_longitude`` at every sample; and the errors that the averaged runs announce, also
 under the integrated Sun and Moon.
-
-Run: python -m experiments.whole_cycle [--full] [--out DIR]      three minutes of CPU with --full
 """
 
 from __future__ import annotations

@@ -26,11 +26,7 @@ from experiments.real_bodies import nutation
 H = 0.0032737548
 RADIUS = 6378.1366
 C22, S22 = 1.5745e-6, -9.0387e-7
-TESSERALS = {
-    (3, 1): (2.1931e-6, 2.681e-7),
-    (3, 2): (3.0905e-7, -2.1143e-7),
-    (3, 3): (1.0058e-7, 1.9722e-7),
-}
+TESSERALS = {(3, 1): (2.1931e-6, 2.681e-7), (3, 2): (3.0905e-7, -2.1143e-7), (3, 3): (1.0058e-7, 1.9722e-7)}
 """Greenwich longitudes."""
 START = 2442412.5
 SAMPLES = 5

@@ -60,11 +60,7 @@ class Moon:
         # beta = (C - A)/B, gamma = (B - A)/C, J2 = (C - (A + B)/2)/(M R^2).
         beta, gamma, j2 = c["LBET"], c["LGAM"], c["J2M"]
         polar = 2 * (1 + beta) * j2 / (2 * beta - gamma + beta * gamma)
-        self.moments = [
-            polar * (1 - beta * gamma) / (1 + beta),
-            polar * (1 + gamma) / (1 + beta),
-            polar,
-        ]
+        self.moments = [polar * (1 - beta * gamma) / (1 + beta), polar * (1 + gamma) / (1 + beta), polar]
         self.radius = c["AM"]
         self.field = self._field()
         self.core_polar = 0.0 if "core" in self.without else c["IFAC"] * polar

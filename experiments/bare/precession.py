@@ -14,10 +14,7 @@ def turned(axis: int, angle: np.ndarray, vectors: np.ndarray) -> np.ndarray:
     c, s = np.cos(angle), np.sin(angle)
     a, b = (axis + 1) % 3, (axis + 2) % 3
     found = np.array(vectors, dtype=float)
-    found[:, a], found[:, b] = (
-        c * vectors[:, a] + s * vectors[:, b],
-        -s * vectors[:, a] + c * vectors[:, b],
-    )
+    found[:, a], found[:, b] = (c * vectors[:, a] + s * vectors[:, b], -s * vectors[:, a] + c * vectors[:, b])
     return found
 
 

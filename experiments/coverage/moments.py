@@ -119,10 +119,7 @@ SPIKES: dict[str, Shape] = {
         lasts=True,
     ),
     "root": Shape(
-        f"1/sqrt(1 + {_U}^2)^3",
-        2.0,
-        lambda u: u / mpmath.sqrt(1 + u * u),
-        lambda u: mpmath.sqrt(1 + u * u),
+        f"1/sqrt(1 + {_U}^2)^3", 2.0, lambda u: u / mpmath.sqrt(1 + u * u), lambda u: mpmath.sqrt(1 + u * u)
     ),
 }
 _SHAPES = {shape.text: shape for shape in (*SWITCHES.values(), *SPIKES.values())}

@@ -104,10 +104,7 @@ def published(harmonic: int) -> tuple[float, float]:
     """Amplitudes in longitude and obliquity, mas, of all published terms of one harmonic."""
     tilt, longitude = SEASONAL[harmonic]
     turn = complex(math.cos(PHASE), math.sin(PHASE))
-    return (
-        abs(longitude * turn + LONGITUDE.get(harmonic, 0.0)),
-        abs(tilt * turn + TILT.get(harmonic, 0.0)),
-    )
+    return (abs(longitude * turn + LONGITUDE.get(harmonic, 0.0)), abs(tilt * turn + TILT.get(harmonic, 0.0)))
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ import pytest
 from support import config, run_estimated, run_text
 
 import rigidsim
-from experiments.averaging.resonances import TIMES, axes_of, members, sound
+from experiments.averaged_motions import TIMES, axes_of, members, sound
 from rigidsim.cli.screens.words import verdict_line
 
 FAULT = Path(__file__).parents[1] / "data" / "faults" / "resonance_no_error.toml"
@@ -40,7 +40,7 @@ def test_what_is_not_measured_says_why_and_that_nothing_is_known() -> None:
 
 @pytest.mark.slow
 def test_announced_errors_of_librating_bodies_are_true() -> None:
-    """Two of those that ``python -m experiments.averaging.resonances`` counts."""
+    """Two of those that ``python -m experiments.averaged_motions`` counts."""
     found = [axis for _, axes in members(2, seed=11) for axis in axes]
     assert len(found) >= 3
     assert sound(found)

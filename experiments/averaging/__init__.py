@@ -1,1 +1,0 @@
-"""Random bodies and orbits whose averaged motions are held against the full ones."""
