@@ -212,7 +212,7 @@ def picture(turning: list[Axis], resting: list[Axis]) -> Picture:
     for some, color, label in ((turning, BLUE, "rotating bodies"), (resting, ORANGE, "librating bodies")):
         points = np.array([(one.true, one.announced) for one in some])
         curves.append(Curve(*points.T, label, color, "o", 1.5))
-    panel = Panel("Axes of momentum and figure", "true distance from the full motion (rad)", "announced (rad)",
+    panel = Panel("Axes of momentum and figure", "true error, from the full motion (rad)", "announced (rad)",
                   curves, "xy")  # fmt: skip
     title = "Averages of random bodies announce errors that cover the true ones"
     return Picture(title, "a", [panel], (8.4, 6.2))
