@@ -39,6 +39,8 @@ _NO_RATES = 0.15
 """Of the turn in a window: unexplained defects beyond that are no integrator's, whose steps would be a
 radian long, but those of rates that are something else.
 """
+_FAR = np.pi / 3
+"""Turn (rad) from row to row, beyond which the rates' integral misses as much as loose integrations."""
 _SAME = 3.0  # factor within which the rates' first difference is what the attitudes' turning misses
 _AGREE = 10.0  # times the attitude's floor per radian of the motion, that rates may differ by and agree
 
@@ -143,6 +145,8 @@ def by_rates(known: Evidence, windows: WindowDefects) -> tuple[str, str] | None:
     if share <= _MODEL or left <= 2 * noise:
         mean = _rms(np.linalg.norm(windows.acceleration, axis=1))
         return WRONG_MODEL, f"its equations are others, by {mean:.3g} rad/s^2: {told}"
+    if known.turn > _FAR:
+        return UNDECIDED, f"{_rows_apart(known)}: {told}"
     if share >= _INTEGRATOR:
         return INTEGRATION_ERROR, f"its equations are these, loosely integrated: {told}"
     return UNDECIDED, f"both its model and its integration may differ: {told}"
@@ -151,10 +155,7 @@ def by_rates(known: Evidence, windows: WindowDefects) -> tuple[str, str] | None:
 def by_attitudes(known: Evidence, windows: WindowsOfAttitudes | None) -> tuple[str, str]:
     """The verdict by attitudes alone, and why."""
     if windows is None:
-        return UNDECIDED, (
-            f"rows are too far apart to separate a model from an integration: the motion turns by "
-            f"{np.degrees(known.turn):.3g} deg from row to row; write rows at most 60 deg apart"
-        )
+        return UNDECIDED, _rows_apart(known)
     noise = known.attitude_noise + _ROUNDING
     if windows.size <= _ABOVE * noise:
         return UNDECIDED, (
@@ -177,6 +178,14 @@ def by_attitudes(known: Evidence, windows: WindowsOfAttitudes | None) -> tuple[s
     return UNDECIDED, (
         f"its model and its integration can't be told apart: {told} other moments or steady torques leave "
         f"{left:.2g} rad; write angular velocities too (wx wy wz), or more rows"
+    )
+
+
+def _rows_apart(known: Evidence) -> str:
+    turn, most = np.degrees([known.turn, _FAR])
+    return (
+        f"rows are too far apart to separate a model from an integration: the motion turns by {turn:.3g} deg "
+        f"from row to row; write rows at most {most:.0f} deg apart"
     )
 
 
