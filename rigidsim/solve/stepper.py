@@ -174,8 +174,8 @@ class Stepper:
         """Continue from here in a chart, where this is the state."""
         raise NotImplementedError
 
-    def bound_first_step(self) -> None:
-        """Bound the first step after the state at the start was set."""
+    def bound_steps(self) -> None:
+        """Bound the steps by the series at the start, after its state was set."""
 
 
 _SPARSE = 1.5

@@ -55,13 +55,17 @@ class TaylorStepper(Stepper):
         bounds = (longest_step(self._integrator.order, precision.scalar), _LONGEST_FOLLOWED)
         self._bounds = [precision.number(system.scene.context.mpf(bound)) for bound in bounds]
         self._longest = self._bounds[0]
-        self.bound_first_step()
+        self.bound_steps()
         self._tiny = 0
         self._epsilon = float(precision.epsilon)
         self.begun = TaylorStepper.mark(self)
 
-    def bound_first_step(self) -> None:
-        """Bound the first step, from the start, of series with gaps where the engine looks."""
+    def bound_steps(self) -> None:
+        """Bound the steps where series at the start have gaps where the engine looks.
+
+        The first step alone needs that, but all are bounded, which costs steps and no accuracy: calls take
+        many steps with one bound, and members of a batch and resumed sessions must have the same.
+        """
         if self.single_steps:  # which are seen to one by one
             return
         self._meet()

@@ -184,7 +184,7 @@ class Charts(Effect):
         if self.near(stepper.state):  # no change on the way: it begins there
             self._enter_other(stepper)
             self.changes = 0
-            stepper.bound_first_step()
+            stepper.bound_steps()
 
     anywhere = True
 
