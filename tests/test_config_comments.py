@@ -101,18 +101,18 @@ def test_what_a_scene_gives_at_once(name: str) -> None:
         assert phrase in comments
 
 
-def test_what_the_asymmetric_top_runs_through(runs: Path) -> None:
-    text, comments = given("asymmetric_top")
-    run = rigidsim.run(rigidsim.parse(text, overrides=["output.timeline=false"]), out=runs)
+def test_what_the_asymmetric_top_runs_through(ready: Callable[..., rigidsim.SavedRun]) -> None:
+    _, comments = given("asymmetric_top")
+    run = ready("asymmetric_top")
     with run.dataset as dataset:
         rates = np.linalg.norm(dataset.angular_velocity.values, axis=1)
         turned = np.trapezoid(rates, dataset.time.values)
     assert f"by {turned:.0f} rad in {run.summary['cost']['steps']} steps" in comments
 
 
-def test_the_water_molecule_flips(runs: Path) -> None:
-    text, comments = given("water_molecule")
-    run = rigidsim.run(rigidsim.parse(text, overrides=["output.timeline=false"]), out=runs)
+def test_the_water_molecule_flips(ready: Callable[..., rigidsim.SavedRun]) -> None:
+    _, comments = given("water_molecule")
+    run = ready("water_molecule")
     with run.dataset as dataset:
         spin = dataset.angular_velocity.sel(body_axis="z").values
         flips = dataset.time.values[np.flatnonzero(np.diff(np.sign(spin)))]
@@ -131,21 +131,3 @@ def test_how_far_the_satellite_is_braked(runs: Path) -> None:
         )
     assert f"momentum falls to {100 * momentum:.0f} % and the energy to {100 * energy:.0f} %" in comments
     assert f"takes {round(run.summary['cost']['steps'], -3):,} steps" in comments
-
-
-@pytest.mark.slow
-def test_how_far_the_braked_satellite_is_from_the_motion_with_every_rotation(runs: Path) -> None:
-    text, comments = given("detumbling_cubesat")
-    average = rigidsim.run(rigidsim.parse(text, overrides=["output.timeline=false"]), out=runs, force=True)
-    changes = [
-        'model.level="full"',
-        'name="every_rotation"',
-        "output.timeline=false",
-        "output.estimate=false",
-    ]
-    full = rigidsim.run(rigidsim.parse(text, overrides=changes), out=runs)
-    assert f"instead of {full.summary['cost']['steps'] / 1e6:.1f} million" in comments
-    apart = np.linalg.norm(average.dataset.momentum_axis.values - full.dataset.momentum_axis.values, axis=1)
-    assert apart.max() < 6e-6
-    assert "stays within 6e-6 rad of it" in comments
-    assert apart.max() < average.summary["modelling"]["momentum_axis"]

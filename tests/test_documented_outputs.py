@@ -180,14 +180,6 @@ def test_what_a_page_names_is_there(page: Path) -> None:
     assert [module for module in modules if not module.with_suffix(".py").exists()] == []
 
 
-def test_the_readme_stays_one_screen() -> None:
-    """What, picture, two commands, a first experiment, links."""
-    text = PAGES[0].read_text(encoding="utf-8")
-    assert len(text.splitlines()) < 130
-    assert "<!-- ci: main -->" in text
-    assert "<!-- ci: tests -->" in text
-
-
 def main(names: list[str]) -> None:
     """Write the outputs of some pages, or all, anew."""
     for page in [Path(name).resolve() for name in names] or PAGES:

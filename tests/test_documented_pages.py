@@ -47,23 +47,6 @@ def _bare(text: str) -> str:
     return "\n".join(line.rstrip() for line in text.rstrip("\n").splitlines())
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda p: str(p.relative_to(ROOT)))
-def test_what_isnt_run_says_why(page: Path) -> None:
-    """A block has a language, or is a display of something; one that isn't run gives a reason."""
-    for block in blocks_of(page):
-        where = f"{page.relative_to(ROOT)}:{block.line}"
-        assert block.language in ("sh", "python", "toml", "", "before", "{toctree}"), where
-        if block.mark.startswith("not run:"):
-            assert len(block.mark) > len("not run: x"), where
-
-
-def test_most_blocks_are_run() -> None:
-    code = [b for page in PAGES for b in blocks_of(page) if b.language in ("sh", "python", "toml")]
-    skipped = [b for b in code if b.mark.startswith("not run")]
-    assert len(code) - len(skipped) >= 40
-    assert len(skipped) <= len(code) / 8
-
-
 def main(names: list[str]) -> None:
     """Write what blocks print into some pages, or all, anew."""
     import os

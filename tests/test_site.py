@@ -46,25 +46,20 @@ def test_links_lead_to_places_of_the_site(pages: Path) -> None:
     assert "](configs/heavy_top_nutating.toml)" in (pages / "gallery.md").read_text(encoding="utf-8")
 
 
-@pytest.mark.parametrize(
-    ("page", "fault"),
-    [
-        ('<a href="two.html">', []),
-        ('<a href="two.html#there">', []),
-        ('<a href="three.html">', ["one.html: three.html leads nowhere"]),
-        ('<a href="two.html#where">', ["one.html: two.html#where names a place that isn't there"]),
-        ('<a href="https://example.org/x">', []),
-        ('<script src="https://example.org/x.js">', ["one.html: fetches https://example.org/x.js"]),
-        ('<link href="//example.org/x.css">', ["one.html: fetches //example.org/x.css"]),
-        ('<button data-recording="x.rrd">', ["one.html: x.rrd leads nowhere"]),
-        ('<script src="re_viewer.js"></script>', ["one.html: lets the viewer fetch from elsewhere"]),
-    ],
-)
-def test_a_built_site_is_checked_as_a_reader_finds_it(page: str, fault: list[str], tmp_path: Path) -> None:
-    (tmp_path / "one.html").write_text(page)
+def test_a_built_site_is_checked_as_a_reader_finds_it(tmp_path: Path) -> None:
+    right = '<a href="two.html"><a href="two.html#there"><a href="https://example.org/x">'
+    wrong = {
+        '<a href="three.html">': "three.html leads nowhere",
+        '<a href="two.html#where">': "two.html#where names a place that isn't there",
+        '<script src="https://example.org/x.js">': "fetches https://example.org/x.js",
+        '<button data-recording="x.rrd">': "x.rrd leads nowhere",
+        '<script src="re_viewer.js"></script>': "lets the viewer fetch from elsewhere",
+    }
     (tmp_path / "two.html").write_text('<h2 id="there">')
     (tmp_path / "re_viewer.js").write_text("")
-    assert checking.faults(tmp_path) == fault
+    for page, fault in {right: "", **wrong}.items():
+        (tmp_path / "one.html").write_text(page)
+        assert checking.faults(tmp_path) == ([f"one.html: {fault}"] if fault else [])
 
 
 def test_style_sheets_fetch_nothing_from_elsewhere(tmp_path: Path) -> None:
