@@ -6,7 +6,6 @@ import pytest
 pytest.importorskip("de421")
 from experiments import apophis_real_sky as study
 from experiments.common import simulate
-from experiments.measure import matrices
 from experiments.real_bodies import apophis
 
 
@@ -17,11 +16,3 @@ def test_perigee_is_where_the_published_elements_have_it() -> None:
     expected = apophis.equatorial(study.flyby.hyperbola(0.0)[0]) / 1e3
     assert np.linalg.norm(place - expected) < 0.003
     assert np.linalg.norm(place) == pytest.approx(study.HORIZONS, abs=0.1)
-
-
-def test_a_matrix_comes_back_as_a_quaternion() -> None:
-    generator = np.random.default_rng(5)
-    for given in [*generator.standard_normal((4, 4)), np.array([0.0, 1.0, 0.0, 0.0])]:
-        unit = given / np.linalg.norm(given)
-        found = np.array(study.quaternion_of(matrices(unit[None])[0]))
-        assert abs(found @ unit) == pytest.approx(1, abs=1e-12)

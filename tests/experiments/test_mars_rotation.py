@@ -25,22 +25,6 @@ def test_the_free_core_nutation_is_a_mode_of_the_pages_equations() -> None:
     )
 
 
-def test_a_fit_finds_circles_and_rates() -> None:
-    """Poles made of two circles and a precession."""
-    days = np.arange(-4000, 4000, 0.7)
-    m = mars.anomaly(days)
-    tilt = math.radians(25.2)
-    psi = math.radians(82) + mars.MAS * (-7600 * days / 365.25 + 600 * np.sin(m) / math.sin(tilt))
-    obliquity = tilt + mars.MAS * 500 * np.cos(2 * m)
-    (cn, ci), (sn, si) = np.cos([mars.NODE, mars.INCLINATION]), np.sin([mars.NODE, mars.INCLINATION])
-    axes = np.array([[cn, sn, 0], [-sn * ci, cn * ci, si], [sn * si, -cn * si, ci]])
-    poles = np.array([np.sin(obliquity) * np.sin(psi), -np.sin(obliquity) * np.cos(psi), np.cos(obliquity)])
-    found = mars.fit(days, (axes.T @ poles).T, ())
-    assert found.rates == pytest.approx((-7600, 0), abs=1e-6)
-    assert found.amplitudes(1) == pytest.approx((600 / math.sin(tilt), 0), abs=1e-3)
-    assert found.amplitudes(2) == pytest.approx((0, 500), abs=1e-3)
-
-
 def test_a_martian_year_of_the_ready_scene_nutates_by_an_arcsecond() -> None:
     pytest.importorskip("de421")
     from experiments import mars_rotation

@@ -7,23 +7,6 @@ import pytest
 from numpy.polynomial import chebyshev
 from scipy.integrate import solve_ivp
 
-from experiments.real_bodies import mercury
-
-
-def test_a_fit_finds_lines_and_a_free_period() -> None:
-    days = np.arange(-36000, 18000, 9.7)
-    m = mercury.anomaly(days)
-    free = 2 * math.pi * (days - days[0]) / (mercury.YEAR * 15.8)
-    late = 2 * math.pi * days / (mercury.YEAR * 5.663)
-    arcsec = 38 * np.sin(m) - 4 * np.sin(2 * m) + 3 * np.cos(late) + 200 * np.cos(free + 0.3)
-    turned = 6.1385 * np.radians(days) + mercury.ARCSEC * arcsec
-    found = mercury.fit(days, turned, 15.82)
-    assert found.period == pytest.approx(15.8, abs=1e-4)
-    assert found.annual[:3] == pytest.approx([38, -4, 0], abs=1e-3)
-    assert found.forced[5.663] == pytest.approx(3, abs=1e-3)
-    assert found.rate == pytest.approx(6.1385, abs=1e-9)
-    assert abs(found.free) == pytest.approx(200, abs=0.05)
-
 
 def test_the_ready_scene_turns_as_the_planar_equation_says() -> None:
     """a'' = -(3/2) (B - A)/C_m G M/r^3 sin 2(a - f), f the Sun's longitude in the equator of the start.

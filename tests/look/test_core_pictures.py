@@ -32,12 +32,6 @@ def test_its_axis_and_rate_are_drawn_and_nothing_that_holds_for_rigid_bodies(run
     np.testing.assert_allclose(curves[0].get_ydata(), np.degrees(np.arccos(cosine)), rtol=1e-6)
 
 
-def test_equal_rates_are_no_curve_of_rounding() -> None:
-    text = config("principal_moments = [1, 1, 1.5]\ncore = {moment = 0.3}", "angular_velocity = [0, 0, 1]")
-    drawn = figure(run_text(text).dataset, "core")
-    assert len([axes for axes in drawn.axes if axes.get_lines()]) == 1
-
-
 def test_a_timeline_has_an_arrow_for_it(run: rigidsim.Run) -> None:
     picture, _ = build_picture(run.dataset.load())
     arrows = {arrow.name: arrow for arrow in picture.stages[0].arrows}

@@ -181,19 +181,6 @@ def test_nutation_ellipse_has_its_period_and_its_axes() -> None:
     assert axes.get_ylabel() == "Δobliquity [arcsec]"
 
 
-def test_tip_of_a_top_is_seen_from_above_with_its_first_turn() -> None:
-    dataset = heavy_top()
-    page = figures.figure(dataset)
-    axes = next(axes for axes in page.axes if "X" in axes.get_xlabel())
-    assert axes.get_xlabel() == "X [mm]"
-    first = next(line for line in axes.get_lines() if line.get_label() == "first turn")
-    rows = len(first.get_xdata())
-    assert rows == pytest.approx(2001 / 3, abs=2)
-    np.testing.assert_allclose(np.transpose(first.get_data()), dataset["tip"].values[:rows, :2] * 1e3)
-    assert titles(page)[0] == "Tilt against the vertical"
-    assert titles(page)[1] == "Precession: uniform, 1 turns/s"
-
-
 def test_libration_in_time_and_in_planes() -> None:
     dataset = satellite()
     page = figures.figure(dataset, "libration")
@@ -274,16 +261,3 @@ def test_unknown_and_impossible_figures_are_refused_with_those_there_are(symmetr
 
 
 # units and numbers
-
-
-def test_a_flight_is_drawn_in_its_plane(symmetric_top: Build) -> None:
-    dataset = symmetric_top()
-    flat = np.stack([np.cos(dataset["time"]), np.sin(dataset["time"]), np.zeros(1001)], axis=1)
-    moving = figures.figure(dataset.assign(position=(("time", "space_axis"), 7e6 * flat)))
-    axes = next(
-        one for one, title in zip(moving.axes, titles(moving), strict=True) if "Path in its plane" in title
-    )
-    assert axes.get_xlabel() == "X [Mm]"
-    assert "polhode" in figures.available(dataset)
-    rates = titles(figures.figure(dataset[["angular_velocity"]].assign_attrs(dataset.attrs)))
-    assert rates[0] == "Angular velocity, body axes"

@@ -13,7 +13,7 @@ pytest.importorskip("matplotlib")
 pytest.importorskip("rerun")
 
 import rigidsim
-from rigidsim.look import figures, gyrostats
+from rigidsim.look import gyrostats
 from rigidsim.look.gyrostats import Gyrostat
 from rigidsim.look.solids import rotation_matrix
 from rigidsim.look.stages.registry import build_picture
@@ -157,33 +157,6 @@ def test_the_path_of_a_run_keeps_to_the_sphere_and_to_a_level(two: xarray.Datase
     assert gyrostat is not None
     energy = gyrostat.energy(path / gyrostat.size)
     np.testing.assert_allclose(energy, energy[0], rtol=1e-12)
-
-
-def test_the_page_is_about_the_rotors(two: xarray.Dataset, driven: xarray.Dataset) -> None:
-    def titles(dataset: xarray.Dataset) -> list[str]:
-        page = figures.figure(dataset)
-        return [" ".join((axes.get_title("left") or axes.get_title()).split()) for axes in page.axes]
-
-    sphere = "Momentum sphere in body axes: levels of energy"
-    assert titles(two)[:2] == [
-        "Axes of the rotors, from the angular momentum",
-        "Rates of the rotors, relative to the body",
-    ]
-    assert sphere in titles(two)
-    assert [title for title in titles(driven) if "sphere" in title or "Own" in title] == [
-        "Own state heat",
-        "Momentum sphere: levels of energy if motors stopped at the start",
-        "Momentum sphere: levels of energy if motors stopped at the end",
-    ]
-    own = figures.figure(driven, "states").axes[0]
-    assert own.get_ylabel() == "value [J]"
-    np.testing.assert_array_equal(own.get_lines()[0].get_ydata(), driven["heat"].values)
-    (rates,) = [axes for axes in figures.figure(two, "rotors").axes if "Rates" in axes.get_title("left")]
-    assert [line.get_label() for line in rates.get_lines()] == ["free", "kept"]
-    (sphere_axes,) = figures.figure(two, "momentum_sphere").axes
-    drawn = [text.get_text() for text in sphere_axes.get_legend().get_texts()]
-    assert drawn[0].startswith("L = ")
-    assert "stable" in drawn
 
 
 def test_rotors_are_in_the_recording_and_turn_by_their_rates(

@@ -11,10 +11,9 @@ import xarray
 
 import rigidsim
 from rigidsim import RunFolderError
-from rigidsim.look import film
 from rigidsim.look.solids import rotation_matrix
 from rigidsim.look.stages.registry import build_picture
-from rigidsim.look.timeline.drawn import DrawnRun, build_clock, dated
+from rigidsim.look.timeline.drawn import build_clock, dated
 from rigidsim.scene.epochs import parse_epoch
 from rigidsim.store import pictures
 
@@ -66,20 +65,3 @@ def test_odd_pictures_are_refused(
 ) -> None:
     with pytest.raises(RunFolderError, match=said):
         pictures.draw(symmetric_top(), tmp_path / "a.png", **options)  # type: ignore[arg-type]
-
-
-def test_a_picture_is_drawn_at_its_moment_in_the_units_of_the_scene(
-    symmetric_top: Build, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    asked = []
-
-    def render(path: Path, target: Path, **options: object) -> None:
-        asked.append((options["at"], options["size"]))
-        target.write_bytes(b"")
-
-    monkeypatch.setattr(film, "render", render)
-    dataset = symmetric_top(scale=60.0)  # twenty minutes
-    for at in ("5", "300 s", "5 min"):
-        pictures.draw(dataset.assign_attrs(time_unit="min"), tmp_path / "a.png", at=at, part="scene")
-    assert [share for share, _ in asked] == pytest.approx([0.25] * 3)
-    assert DrawnRun.of(dataset, 100).clock.duration

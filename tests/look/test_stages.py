@@ -12,7 +12,6 @@ import xarray
 from scipy.spatial.transform import Rotation
 
 from rigidsim.look.stages.registry import build_picture
-from rigidsim.look.states import sections_of, states_of
 
 Build = Callable[..., xarray.Dataset]
 
@@ -152,26 +151,3 @@ def test_the_ellipsoid_of_energy_touches_the_invariable_plane_at_the_tip(symmetr
     np.testing.assert_allclose(heights, heights[0], rtol=1e-9)
     rim = next(line for line in rolling.lines if line.name == "plane/rim")
     np.testing.assert_allclose(rim.points[:, 2], heights[0], rtol=1e-9)
-
-
-def test_events_have_a_lane_and_a_section(symmetric_top: Build) -> None:
-    dataset = symmetric_top(count=101)
-    times = np.arange(1.0, 13.0)
-    label = {"event": "flip"}
-    dataset["flip_time"] = ("flip", times, {**label, "units": "s"})
-    dataset["flip_angular_velocity"] = (
-        ("flip", "body_axis"),
-        np.stack([np.cos(times), np.sin(times), 0 * times], axis=1),
-        {**label, "units": "1"},
-    )
-    (lane,) = states_of(dataset, 0.0, 20.0)
-    assert lane.values[:3] == ["before flip", "flip 1", "flip 2"]
-    np.testing.assert_array_equal(lane.seconds, np.append(0.0, times))
-    (plane,) = sections_of(dataset)
-    low, high = np.cos(times).min(), np.cos(times).max()
-    assert plane.names[0] == f"x (axes cross at {(low + high) / 2:.4g})"
-    assert plane.points[:, 0].min() == pytest.approx((low - high) / 2)
-    assert not plane.moves
-    assert len(plane.points) == 12
-    stopped = states_of(dataset.assign_attrs(status="max_drift"), 0.0, 20.0)[-1]
-    assert (stopped.values, stopped.seconds.tolist()) == (["running", "max drift"], [0.0, 20.0])

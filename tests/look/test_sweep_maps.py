@@ -77,19 +77,6 @@ def test_directions_are_drawn_on_the_sphere_each_with_its_value() -> None:
     assert pytest.approx(vectors / 3, abs=1e-12) == back.T
 
 
-def test_a_section_is_drawn_in_the_components_that_it_does_not_cut() -> None:
-    """Those of the second one are rounding errors of the section itself."""
-    random = np.random.default_rng(0).normal(size=(5, 7, 3)) * [1, 1e-16, 2]
-    random[3, 4:] = np.nan  # events that didn't happen
-    dataset = members_of(push=np.arange(5.0))
-    dataset["flip_spin"] = (("push", "flip_occurrence", "body_axis"), random, {"units": "rad/s"})
-    dataset = dataset.assign_coords(body_axis=list("xyz"))
-    axes = sweep_figure(dataset, "flip_spin").axes[0]
-    assert [axes.get_xlabel()[-1], axes.get_ylabel()[-1]] == ["x", "z"]
-    shown = np.asarray(axes.collections[0].get_offsets())
-    np.testing.assert_array_equal(np.ma.getdata(shown)[:4], random[0, :4, ::2])
-
-
 def secular(unit: str = "yr") -> xarray.Dataset:
     """A planet's precession and its lines over obliquities, with a constant, a noise line and a swing."""
     tilt = np.deg2rad(np.linspace(10, 30, 5))

@@ -88,21 +88,6 @@ def test_runs_side_by_side_share_a_clock_and_show_how_far_they_are_apart(
     assert (10 ** difference[1::2]).max() < (2 * 0.04) ** 2 / 8
 
 
-def test_runs_side_by_side_have_dates_if_they_count_from_the_same_epoch(
-    symmetric_top: Build, read_back: Read, tmp_path: Path
-) -> None:
-    def dated(epoch: str) -> xarray.Dataset:
-        return symmetric_top(count=11).assign_attrs(epoch=epoch)
-
-    one, other = dated("2000-01-01T12:00:00 TDB"), dated("2000-01-02T12:00:00 TDB")
-    write_comparison([("a", one), ("b", one)], tmp_path / "dated.rrd")
-    write_comparison([("a", one), ("b", other)], tmp_path / "apart.rrd")
-    for name in ("run0", "run1"):
-        found = read_back(tmp_path / "dated.rrd", f"/{name}/scene/body")
-        assert found["date (TDB)"][0].astype("datetime64[ns]") == np.datetime64("2000-01-01T12:00:00", "ns")
-        assert "date (TDB)" not in read_back(tmp_path / "apart.rrd", f"/{name}/scene/body")
-
-
 def _turn_about_z(angle: float) -> np.ndarray:
     """What a quaternion w x y z becomes with a rotation about Z after it."""
     c, s = np.cos(angle / 2), np.sin(angle / 2)

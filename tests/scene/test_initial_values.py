@@ -57,20 +57,6 @@ def test_components(expression: str, says: str, precision: str) -> None:
         assert "column" in text
 
 
-def test_places_and_velocities_of_a_flight() -> None:
-    force = '[[loads]]\nkind = "force"\ncomponents = ["1/x", "log(vy)", "z"]'
-    text = refused(force, "position = [0, 1, 2]\nvelocity = [0, -3, 0]")
-    assert "components[0]" in text
-    assert "components[1]" in text  # all of them at once
-    assert "(vy = -3.0)" in text
-    assert "components[2]" not in text
-
-
-def test_events() -> None:
-    event = '[[events]]\nname = "fine"\nexpression = "wy"\n[[events]]\nname = "lost"\nexpression = "wy/wx"'
-    assert "[[events]] number 2 expression: no finite value at the start" in refused(event)
-
-
 def test_a_value_that_is_lost_later_is_no_matter_of_the_start() -> None:
     load = '[[loads]]\nkind = "torque"\ncomponents = ["1/(t-5)", 0, 0]'
     run = run_text(SCENE.format(initial="", loads=load, precision="double"))
