@@ -152,7 +152,7 @@ BAD = {
     "elsewhere": ('body.host="titan"', "others are in SPK files, which [ephemeris] kernel"),
     "no host": ("body.host=", "name that in [body] host"),
     "itself": ('body.host="earth"', 'given "earth", which is the body itself'),
-    "two places": ("loads[0].position=[1, 0, 0]", "exactly one of orbit, position, ephemeris and source"),
+    "two places": ("loads[0].position=[1, 0, 0]", "given position and source; exactly one of orbit"),
     "axes": ('frame.axes="EME2000"', "the bias of 0.02 arcsec"),
 }
 
