@@ -8,8 +8,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
-from hypothesis import strategies as st
 
 import rigidsim
 from experiments import accuracy_certificates as study
@@ -17,10 +15,7 @@ from experiments import error_coverage, kill_campaign
 from experiments.coverage.judging import Judged
 from experiments.durability.judging import Tally, check_after, check_complete, saved_rows
 from experiments.durability.scenes import same, text_of
-from experiments.extremes import judging
-from experiments.extremes.random_scenes import random_case
 from experiments.random_scenes import random_scene
-from experiments.same_bits import ROOT, Scene, Version, compared
 from experiments.sweep_kill_campaign import WAYS, campaign
 from rigidsim.accuracy.certificate import Certificate, certify
 from rigidsim.store.folder import RunFolder
@@ -73,31 +68,6 @@ def test_a_few_disturbances_of_each_kind_lose_nothing(tmp_path: Path) -> None:
     assert sum(tally.counts[way] for way in WAYS) >= 4
 
 
-# ---- the comparison of two versions of the code, on as little as shows that it can fail
-
-TEXT = (
-    'name = "scene"\n[body]\nprincipal_moments = [1, 2, 2.5]\n[initial]\nangular_velocity = [0.3, 1, 0.5]\n'
-    "[time]\nend = 20\nsamples = 9\n"
-)
-
-
-class Changed(Version):
-    """A version whose middle moment of inertia is off by 4e-16."""
-
-    def run(self, scene: Scene, *args: Any, **options: Any) -> Any:
-        job = {"text": scene.job["text"].replace("[1, 2, 2.5]", "[1, 2.0000000000000004, 2.5]")}
-        return super().run(Scene(scene.kind, scene.name, job), *args, **options)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(("other", "found"), [(Version, ("same", "same")), (Changed, ("differs", ""))])
-def test_one_bit_is_seen(other: type[Version], found: tuple[str, str]) -> None:
-    whole, resumed = compared(
-        Scene("free", "free", {"text": TEXT}), Version(ROOT), other(Path(ROOT)), random.Random(0)
-    )
-    assert (whole.split(":")[0], resumed) == found
-
-
 # ---- the coverage campaign: it goes on where it stopped, and a share of it keeps what estimates promise
 
 
@@ -114,21 +84,6 @@ def test_broken_promises_are_found() -> None:
     assert any("digits said to be gone" in line and "[201]" in line for line in alarmed)
     wide = [judged(1e-12, 1e-9, number=n) for n in range(200)]
     assert any("median announced over true" in line for line in error_coverage.broken_promises(wide))
-
-
-# ---- the study of extremes: random scenes are never wrong in silence, and it sees one that is
-
-
-@pytest.mark.slow
-@settings(max_examples=15, derandomize=True, deadline=None, suppress_health_check=list(HealthCheck))
-@given(data=st.data())
-def test_random_extremes_are_never_wrong_in_silence(data: st.DataObject) -> None:
-    def uniform(low: float, high: float) -> float:
-        return data.draw(st.floats(low, high))
-
-    scene, column, precision, hold = random_case(uniform)
-    verdict = judging.judge(scene, column, precision, hold=hold)
-    assert verdict.kind in ("right", "announced", "refused"), verdict.line
 
 
 # ---- the certificates' study finds what it should, and would find a certificate that lies

@@ -125,9 +125,6 @@ def test_closed_forms_agree_with_quadrature() -> None:
         assert abs(mpmath.quad(azimuth, [0, quarter]) / quarter - heavy.precession) < mpmath.mpf("1e-20")
 
 
-# ---- the benchmark gives a number in every row, and the scripts that runs are held against do the same work
-
-
 # ---- every peer integrates the same motion; costs are read off curves rightly; absence is said, not hidden
 
 SHORT = [(name, 16.0) for name in SCENES]

@@ -175,6 +175,3 @@ def test_dataset_without_samples_is_refused(symmetric_top: Build, tmp_path: Path
     with pytest.raises(ValueError, match="no samples"):
         write_timeline(symmetric_top().isel(time=slice(0, 0)), tmp_path / "t.rrd")
     assert not list(tmp_path.iterdir())
-
-
-# ---- which variables of a recorded run are shown as variables of their own

@@ -51,7 +51,7 @@ def spelled(day: date, seconds: Decimal, of_year: bool = False) -> str:
     return f"{head}T{whole // 3600:02}:{whole % 3600 // 60:02}:{whole % 60 + seconds % 1:012.9f}"
 
 
-@pytest.mark.parametrize("seed", seeds(4, 60))
+@pytest.mark.parametrize("seed", seeds(2, 60))
 def test_utc_before_1972_drifts_as_in_erfa(seed: int) -> None:
     """Fifty moments a seed, a fifth within 10 s of a step: to 1e-9 s, a few units in the last place of the
     doubles that ERFA keeps a date in; and some time later again.

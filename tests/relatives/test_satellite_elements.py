@@ -75,7 +75,7 @@ def as_table(elements, end):
     return "\n".join(lines)
 
 
-@pytest.mark.parametrize("seed", seeds(4, 60))
+@pytest.mark.parametrize("seed", seeds(2, 60))
 def test_the_source_is_opposite_to_the_satellite(seed: int) -> None:
     draw = random.Random(seed)
     elements, table = drawn(draw)

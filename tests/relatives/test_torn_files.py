@@ -34,7 +34,7 @@ def damage(path: Path, draw: random.Random) -> None:
     path.write_bytes(content)
 
 
-@pytest.mark.parametrize("seed", seeds(3, 25))
+@pytest.mark.parametrize("seed", seeds(2, 25))
 def test_the_advice_about_a_damaged_dataset_leads_on(
     seed: int, made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -50,7 +50,7 @@ def component(rng: np.random.Generator) -> tuple[str, float]:
     return f'"{size!r}*pi/3 {unit}"', size * np.pi / 3 * UNITS[unit]
 
 
-@pytest.mark.parametrize("seed", seeds(5, 60))
+@pytest.mark.parametrize("seed", seeds(2, 60))
 def test_random_fields(seed: int) -> None:
     rng = np.random.default_rng(seed)
     fields = [[component(rng) for _ in range(3)] for _ in range(rng.integers(1, 3))]

@@ -141,11 +141,9 @@ REFUSED = {
         f'mode = "zip"\n{RATE} = {{values = [1, 2]}}\naxes."time.end" = {{values = [1]}}',
         "needs axes of one length",
     ),
-    "no way": (f'{RATE} = {{name = "a"}}', "exactly one of linspace"),
     "mixed units": (f'{RATE} = {{linspace = ["1 deg/s", 2, 3]}}', "write both in one unit"),
     "kept what nobody knows": (f'keep = ["finale"]\n{RATE} = {{values = [1]}}', 'did you mean "final"'),
     "the output itself": ('axes."output.record" = {values = [["energy"]]}', "can't be swept"),
-    "unknown key": ('axes."initial.angular_velocty[2]" = {values = [1]}', 'did you mean "angular_velocity"'),
 }
 
 
