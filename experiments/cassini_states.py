@@ -1,19 +1,14 @@
 """Where do the poles of the Moon and Mercury stand: Cassini's states found and followed by an average?
 
-Method: Kepler orbits whose node turns uniformly about the pole of the ecliptic (the Moon) or of the Laplace
-plane (Mercury). The body starts in step with its source, 1:1 and 3:2, where the theory below has the state
-(`orbit_averaged`). The state is the mean place of the pole in the frame that turns with the node (Hann
-window), from which the next run starts, and the full model at last.
+Kepler orbits whose node turns about the ecliptic's pole (the Moon) or the Laplace plane's (Mercury), bodies
+in step 1:1 and 3:2. The state is the mean place of the pole in the frame of the node (Hann window), from
+which the next run starts, and the full model at last.
 
-Held against:
-- the balance L |W| sin I = dU/dt of precession and torque with the potential averaged over the argument of
-  the pericentre (Colombo 1966; Peale 1969, Astronomical Journal 74, 483), solved by bisection;
-- the linear theory of the path about it: the torque of a body that turns uniformly, summed over the anomaly,
-  gives the Jacobian J in the node's frame and harmonics k of the argument (rate w), each of which moves the
-  pole by (i k w - J)^-1 of itself. Tolerances: a tenth of what goes round, and for the Moon (3 e)^2 (C - A)/C
-  n/w of the angle, the bend of the figure axis; its path isn't judged, as it librates near its own period;
-- the full model: three times 3/2 (C - A)/C n/w of the angle, the order of what averaging leaves out;
-- the Moon's 1.543 deg (Williams et al. 2014), 1 %; Mercury's 2.04 arcmin (Margot et al. 2012), 4 %.
+The balance L |W| sin I = dU/dt (Colombo 1966; Peale 1969, Astronomical Journal 74, 483) is solved by
+bisection; the linear theory of the path about it has the Jacobian J of the torque summed over the anomaly,
+and moves the pole by (i k w - J)^-1 of each harmonic. Tolerances: a tenth of what goes round, for the Moon
+also the bend of the figure axis, (3 e)^2 (C - A)/C n/w of the angle; three times 3/2 (C - A)/C n/w for what
+averaging leaves out.
 """
 
 from __future__ import annotations

@@ -1,17 +1,9 @@
 """In how many days does the pole of a rigid Earth go round its figure axis, and is that Chandler's period?
 
-Method: rates alone (three states), double precision. The pole starts 1e-6 rad from the figure axis; its
-azimuth in the body grows linearly; its rate is a least-squares fit over all samples of ten years. Once with
-the measured moments (preset "earth"), once with a homogeneous ellipsoid of the Earth's diameters.
-
-Held against:
-- Euler's closed form, A/(C-A) = 304.456 rotations = 303.62 mean solar days for the dynamical flattening
-  (C-A)/C = 0.00327379492 (Mathews, Herring & Buffett 2002), and (a^2+c^2)/(a^2-c^2) rotations for the
-  ellipsoid; tolerance 1e-9, relative: ten years are 12 turns, so that the round-off law of the rates
-  (eps/2 sqrt(steps), some 1e-14 rad at 75 rad) leaves 1e-12 at worst, and the printed A/(C-A) has nine
-  digits;
-- Chandler's 427 to 435 days (Chandler 1891; Gross 2007), the period of the real, elastic Earth, which a rigid
-  body must NOT give.
+Rates alone, ten years: the azimuth of the pole grows linearly, and its rate is a least-squares fit; with
+the measured moments (preset "earth"), and with a homogeneous ellipsoid of the Earth's diameters. Euler's
+closed form is A/(C-A) rotations, (a^2+c^2)/(a^2-c^2) for the ellipsoid; ten years are 12 turns, so that
+rounding leaves 1e-12 at worst. The real, elastic Earth's 427 to 435 days must NOT come out.
 """
 
 from __future__ import annotations

@@ -1,22 +1,11 @@
 """The Earth over a million years: what does the motion of its orbit do to the obliquity?
 
-Method: the Earth under the Sun and the Moon, averaged over rotation and orbits. Once its orbit is fixed, and
-the Moon's node turns about the fixed ecliptic. Once the orbit moves by a table of elements every 2000 years
-(configs/tables/earth_secular.csv, by our own integration of the planets), and with it the Moon's, whose node
-is averaged over: the Moon then acts as in the ecliptic with 1 - 3/2 sin^2 i of its strength. Obliquity and
-equinox are taken from the momentum's direction and the table's plane, at its rows. The Sun alone is followed
-for a thousand years at two levels, for what they cost.
-
-Held against:
-- for the fixed orbit a mean obliquity that doesn't change, within the announced error;
-- the polynomials of IAU 2006 (Capitaine et al. 2003) for obliquity and general precession, over the next two
-  thousand years: 46.04 arcsec a century and 50.51 arcsec a year on the mean; 1 % and 0.2 %, for a rigid Earth
-  whose precession itself is known from luni_solar_precession to 0.1 %;
-- 23.3 +- 1.3 deg, within which it stays (Laskar, Joutel & Robutel 1993), and a mean period of 41,000 years
-  (Berger 1976, for the past): 2 %, by which one million years differ from another;
-- every rotation resolved beside it: the announced error over a thousand years (--full; 50 otherwise);
-- a hundredth of the steps for the Sun alone, averaged over the rotation; CPU is told, and not judged: on a
-  machine with other work its ratio varies by a third between runs.
+The Earth under Sun and Moon, averaged over rotation and orbits, on a fixed orbit and on one that moves by
+configs/tables/earth_secular.csv (our own integration of the planets), where the Moon acts with 1 - 3/2
+sin^2 i of its strength. Published: IAU 2006 (Capitaine et al. 2003) over the next two thousand years, 1 %
+and 0.2 %; 23.3 +- 1.3 deg (Laskar, Joutel & Robutel 1993); a mean period of 41,000 years (Berger 1976), 2
+%, by which one million years differ from another. The full motion is beside it for a thousand years
+(--full; 50 otherwise).
 """
 
 from __future__ import annotations

@@ -1,19 +1,9 @@
-"""What do fits tell of real bodies: Toutatis, a book with a telephone on it, a satellite, the Moon?
+"""What do fits show of real bodies: Toutatis, a book with a telephone on it, a satellite, the Moon?
 
-Method: four fits by `rigidsim fit`.
-
-- **Toutatis**: attitudes and angular velocities of December 1992 (Takahashi, Busch and Scheeres 2013), from
-  a start some degrees off; two misprints are in the table.
-- **A book**, tossed with a telephone on it: 1.2 s of its gyroscope at 100 Hz, simulated with noise of 0.02
-  rad/s and a bias of each axis, known to 0.1 rad/s. Ratios of moments and biases are estimated.
-- **A satellite** with a wheel of known momentum, on an orbit about the Earth: what attitudes good to 0.1 deg
-  tell of its moments, as they go on for up to two orbits. Without the wheel only ratios can show.
-- **The Moon** (with --full): DE421's own librations over a year, each 4 days, to 1 mas, by the model of
-  configs/kernels/moon_since_1969.toml, whose start and A, B and C were perturbed.
-
-Held against: the published moments of Toutatis and the residuals of their solution (7.7 deg rms); the truth
-of the simulated book and satellite; DE421's start, beta and gamma, which the ratios of moments are, and what
-is left of its librations. Tolerances are three of the fits' own sigmas.
+Toutatis by attitudes and rates of December 1992 (Takahashi, Busch & Scheeres 2013; two misprints are in the
+table); a tossed book by 1.2 s of a simulated gyroscope with noise and biases; a satellite with a wheel by
+attitudes good to 0.1 deg over up to two orbits (without the wheel only ratios of moments show); with --full
+DE421's Moon by a year of its librations, from a perturbed start. Tolerances are three sigmas of the fits.
 """
 
 from __future__ import annotations

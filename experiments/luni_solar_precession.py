@@ -1,18 +1,10 @@
 """Do the Sun and the Moon turn a rigid Earth's axis at the published rates, with every rotation resolved?
 
-Method: the preset "earth" with the gravity gradients of the Sun, the Moon and both on Kepler orbits (the
-Moon's node regresses), quaternions, double precision, space axes = ecliptic. At the start both bodies stand
-on the equinox, where they exert no torque, so that w along the figure axis is the slow solution and the free
-nutation stays small. The longitude (minus the azimuth) and the obliquity of the figure axis are fitted by
-least squares with a straight line and the forced terms: node (from the moving equinox) and half of it, year,
-month and their parts.
-
-Held against (physics: P1 and the first-order nutation, see ``averaged`` and ``node_terms``):
-- P1's shares of 15.949, 34.36 and together 50.307 arcsec/yr, to 1e-3 (Sun) and 0.3 % (P1 is of first order in
-  the torque and takes the node's turn as an average);
-- the 18.6-year nutation, 9.2022 arcsec in obliquity and 17.235 in longitude, to 0.5 %, of first order too;
-- the drifts of the invariants, against the bound that the run itself gives for rounding.
---full goes once round the whole cycle of 25,772 years, some 1e7 rotations, and reports its cost on stderr.
+The preset "earth" under the Sun, the Moon and both on Kepler orbits (the Moon's node regresses). Both stand
+on the equinox at the start, where they exert no torque, so that the free nutation stays small. Longitude
+and obliquity of the figure axis are fitted with a line and the forced terms. P1 and the first-order
+nutation are of first order in the torque, which leaves 0.3 and 0.5 %. --full goes once round the cycle of
+25,772 years.
 """
 
 from __future__ import annotations

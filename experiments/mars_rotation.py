@@ -1,21 +1,11 @@
 """Does a rigid Mars precess and nutate as published, and what does a fluid core make of its nutations?
 
-Method: the ready scene `mars_nutation` (preset `mars_konopliv`; the Sun, the planets and the Moon of JPL's
-DE421) over 50 years around J2000. The figure axis on Mars' mean orbit of J2000: both circles of the first six
-harmonics of the mean anomaly fitted at once, with a parabola and the free nutation. Then again with a core
-whose factor A_c/A_m is 0.07 and whose free nutation takes -240 days.
-
-One number of the preset is fitted: H = (C - A)/C, to the published precession less its geodetic part.
-
-Held against (Konopliv, Park & Folkner 2016, Icarus 274, 253):
-- the precession, -7608.3(2.1) mas/yr, and C/(M R^2) = J2/H beside 0.36367(10) of Baland et al. 2020 (Celest.
-  Mech. Dyn. Astr. 132, 47), who started from the same precession;
-- amplitudes of the nutations to 0.5 mas, after one factor that is common to all: the published series
-  (Reasenberg & King 1979) is of constants that give another precession. The factor tells which, and it is
-  within the error of the first measured one (Folkner et al. 1997, Science 278, 1749: 7576(35));
-- amplifications by the core: the linearised equations of a mantle and a core, and the usual formula
-  1 + F s/(s - s0), which is their limit for slow nutations of a slightly flattened body. The retrograde third
-  of a year (229 days) is near the free core nutation, four turns away in 50 years.
+The ready scene `mars_nutation` over 50 years around J2000, with H = (C - A)/C fitted to the precession; six
+harmonics of the mean anomaly, a parabola and the free nutation are fitted to the figure axis; and again
+with a core of A_c/A_m = 0.07, free in -240 days. The published series (Konopliv, Park & Folkner 2016,
+Icarus 274, 253, from Reasenberg & King 1979) goes with another precession, so that one factor is common to
+all amplitudes. The core's amplifications are those of the linearised equations of mantle and core; 1 + F
+s/(s - s0) is their limit for slow nutations.
 """
 
 from __future__ import annotations

@@ -1,25 +1,14 @@
 """Does Mercury librate as observed and as published, with the Sun where it is?
 
-Method: the ready scene `mercury_libration` (preset `mercury`; a core of 0.569 of the moment that isn't
-dragged along; the Sun of JPL's DE421) over 150 years. The angle of the x axis about the mean pole is fitted
-with six harmonics of the mean anomaly, six long periods, the free libration and a parabola. Then again with a
-core that brings the largest libration to 41 arcsec, and, rigid and set librating freely, with the moments of
-Rambaux & Bois 2004.
+The ready scene `mercury_libration` over 150 years: harmonics of the mean anomaly, six long periods, the
+free libration and a parabola are fitted to the angle about the mean pole. Again with a core that brings the
+largest libration to 41 arcsec, and, rigid and set librating freely, with the moments of Rambaux & Bois 2004
+(Astron. Astrophys. 413, 381), whose free period is n sqrt(3 (B - A)/C_m (7 e/2 - 123 e^3/16 + 489
+e^5/128)).
 
-Held against:
-- the amplitude at 88 days, 38.5(1.6) arcsec (Margot et al. 2012, J. Geophys. Res. 117, E00L09), which the
-  preset's moments must give;
-- its harmonics in the IAU's rotation of Mercury (Archinal et al. 2018, Celest. Mech. Dyn. Astr. 130, 22),
-  scaled to the same first one;
-- the mean rate of the prime meridian, 6.138506839(28) deg/day by the mean orbit (Stark, Oberst & Hussmann
-  2015, Celest. Mech. Dyn. Astr. 123, 263): the rate that is found, and the node's on the Earth's equator, as
-  the IAU's pole moves;
-- amplitudes of the long periods where the first one is 41 arcsec: Jupiter (11.86 and 5.93 years) about 33 %
-  of it, Venus 10 %, Saturn 3 %, the Earth 2 % (Dufey, Noyelles, Rambaux & Lemaitre 2009, Celest. Mech. Dyn.
-  Astr. 101, 141, abstract);
-- that Jupiter's line may exceed that of 88 days (Peale, Margot & Yseboodt 2009, Icarus 199, 1, abstract);
-- the period of the free libration, 15.847 years for moments by J2 = 6e-5, C22 = 1e-5, C = 0.34 M R^2 (Rambaux
-  & Bois 2004, Astron. Astrophys. 413, 381), and n sqrt(3 (B - A)/C_m (7 e/2 - 123 e^3/16 + 489 e^5/128)).
+Published: Margot et al. 2012 (J. Geophys. Res. 117, E00L09); Archinal et al. 2018; Stark, Oberst & Hussmann
+2015 (Celest. Mech. Dyn. Astr. 123, 263), 6.138506839(28) deg/day; Dufey et al. 2009 (Celest. Mech. Dyn.
+Astr. 101, 141); Peale, Margot & Yseboodt 2009 (Icarus 199, 1).
 """
 
 from __future__ import annotations

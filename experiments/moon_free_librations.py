@@ -1,18 +1,12 @@
 """Where do the Moon's free librations lie, of a rigid Moon and of the real one, beside the observed ones?
 
-Method: the ready scene `moon_since_1969` (DE421) from 1900 on for 150 years, twice: from DE421's own
-attitude, and turned a little away from it (100 arcsec about z, 120 about x, and the rates so that the axis of
-rotation moves by half of that in the body). The difference of both motions is free libration alone: whatever
-is forced is the same in both. Its three periods are fitted: in longitude, of the wobble in the body, and of
-the precession in space, which counts from the orbit's node, as published. Four Moons: rigid of degree 2; to
-degree 4 with the Earth's figure; with an elastic body; with a fluid core, too.
+The ready scene `moon_since_1969` from 1900 on for 150 years, twice, from starts that differ by 100 arcsec:
+the difference is free libration alone, whose three periods are fitted. Four Moons: rigid of degree 2; to
+degree 4 with the Earth's figure; elastic; with a fluid core.
 
-Held against: periods that are found in the librations of JPL's ephemerides, where nature gave them some
-amplitude: 1056.13, 8822.88 and 27257.27 d in DE421 (Rambaux & Williams 2011, Celest. Mech. Dyn. Astr. 109,
-85), 1056.16, 8806.9 and 27262.99 d in DE430 (Yang, Li, Ping & Hanada 2017, Res. Astron. Astrophys. 17, 127,
-abstract). These differ by 3e-5, 2e-3 (the real mode in latitude has 0.03 arcsec: it is known worst) and 2e-4,
-which is allowed, and for the wobble 5e-4, since 150 years are two of its cycles. Its ellipse has 8.19 by 3.31
-arcsec.
+Published: periods in DE421 (Rambaux & Williams 2011, Celest. Mech. Dyn. Astr. 109, 85) and DE430 (Yang, Li,
+Ping & Hanada 2017, Res. Astron. Astrophys. 17, 127), which differ by as much as is allowed, and for the
+wobble 5e-4, since 150 years are two of its cycles.
 """
 
 from __future__ import annotations

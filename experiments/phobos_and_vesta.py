@@ -1,19 +1,11 @@
 """Do Phobos and Vesta librate and nutate as published?
 
-Method: the ready scenes `phobos_libration`, 40 days of a synchronous satellite in the plane of its orbit, and
-`vesta_nutation`, 22 years of a fast rotator under the Sun. Of Phobos the harmonics of the mean anomaly and
-the free libration are fitted to the angle turned; of Vesta the harmonics of its mean anomaly, and a
-parabola, to obliquity and node. Vesta's polar moment isn't known: 0.4 M R^2, and again 0.38 and 0.42.
-
-Held against:
-- Phobos' libration once in an orbit: 1.1 deg of a homogeneous body (Rambaux, Castillo-Rogez, Le Maistre &
-  Rosenblatt 2012, Astron. Astrophys. 548, A14, as quoted), 1.143 deg as the IAU has it (Archinal et al. 2018,
-  Celest. Mech. Dyn. Astr. 130, 22; observed), and 2 e/(1 - n^2/s^2) with s the free libration's frequency
-  sqrt(3 G M (B - A)/(C a^3));
-- Vesta's nutation: about 2000 mas in half a year, and 200 mas more with 0.38 than with 0.42 (Rambaux 2013,
-  Astron. Astrophys. 556, A151, abstract);
-- the averaged precession, (3/2) n^2/w (C - A)/C cos(obliquity) (1 - e^2)^(-3/2), and the half-yearly nutation
-  in obliquity of a circular orbit, (3/4) n/w (C - A)/C sin(obliquity), less 5 e^2/2.
+The ready scenes `phobos_libration`, 40 days, and `vesta_nutation`, 22 years, whose polar moment isn't
+known: 0.4 M R^2, and again 0.38 and 0.42. Harmonics of the mean anomaly are fitted to Phobos' angle and to
+Vesta's obliquity and node. Published: Rambaux et al. 2012 (Astron. Astrophys. 548, A14), Archinal et al.
+2018 (Celest. Mech. Dyn. Astr. 130, 22), Rambaux 2013 (Astron. Astrophys. 556, A151). Formulas: 2 e/(1 -
+n^2/s^2) with s = sqrt(3 G M (B - A)/(C a^3)); (3/2) n^2/w (C - A)/C cos(obliquity) (1 - e^2)^(-3/2), and
+the half-yearly (3/4) n/w (C - A)/C sin(obliquity), less 5 e^2/2.
 """
 
 from __future__ import annotations

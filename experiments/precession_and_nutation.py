@@ -1,20 +1,11 @@
 """Which lines has the nutation of a rigid Earth, and does the frequency analysis find the published ones?
 
-Method: the preset "earth" under the gravity gradients of the Sun and the Moon on Kepler orbits for 200 years,
-every rotation resolved, sampled every 4 days; the Moon's node and perigee move as they do (periods 6798.38 d
-from the equinox, 27.212221 d draconic and 27.554550 d anomalistic months). ``rigidsim.analyse`` takes
-obliquity and longitude of the figure axis apart into the secular precession and lines, named by the mean
-longitudes, the node and the perigee. The same run thinned to a sample every 20 days shows the 13.66 days
-beyond Nyquist's frequency; sampled each half synodic month they fall onto the half year, and must not be told
-apart.
-
-Held against (physics: published numbers):
-- the precession of 50.307 arcsec/yr (P1), 0.3 %: what P1 leaves out;
-- rigid Earth: 17.28, 1.277, 0.221 arcsec in longitude (18.6 yr, 182.6 d, 13.66 d; REN-2000 as quoted), 1 %:
-  orbits here are Kepler ellipses; 9.2022 in obliquity, first order, 0.5 %;
-- the real Earth (IAU 2000B), from which a rigid one must differ where its fluid core and its yielding count:
-  182.6 d and 13.66 d by more than 1.5 %; but 9.3 yr to 1 %;
-- periods against the arguments, to 1e-6, half of the last digit of 6798.38 d (182.6 d: 1e-5, a blend).
+The preset "earth" under Sun and Moon on Kepler orbits for 200 years, a sample each 4 days.
+``rigidsim.analyse`` names the lines of obliquity and longitude by the mean longitudes, the node and the
+perigee. Thinned to 20 days the same samples show 13.66 days beyond Nyquist's frequency; sampled each half
+synodic month, these fall onto the half year and must not be told apart. Periods agree to half of the last
+digit of 6798.38 d. The real Earth (IAU 2000B) must differ where its fluid core counts, and not in the slow
+lines.
 """
 
 from __future__ import annotations

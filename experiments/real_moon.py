@@ -1,22 +1,10 @@
 """Does the Moon turn as DE421 says, and what is each effect worth?
 
-Method: the ready scene `moon_since_1969` (JPL's DE421 gives constants, start and positions; nothing is
-fitted) for 50 years, and again with one effect left out at a time. The rotation vector between the computed
-attitude and the package's own librations, in body axes, every 8 days.
-
-Held against:
-- the librations of DE421: at most 1.5 mas in each component, as asked; another program of these equations was
-  within 2.0, with a coarser expansion of the delay;
-- what that program lost with each effect left out (total rms over 50 years), to 20 %: its handling of the
-  delay differs, and its numbers are rounded (the spin's distortion is what it adds to a rigid Moon);
-- the same equations in another formulation, written with heyoka alone (`experiments/bare/moon.py`): 2e-9 rad,
-  0.4 mas, since that has the delay to third order, and here it ends with the second, whose rest is a
-  hundredth of what it adds (80 mas);
-- the same with another package's positions, constants and start (`de423`), given number by number instead of
-  by the preset;
-- that program's cost: at most 1.1 times its CPU, and 2 s for the 50 years, as asked; each run seven times in
-  turn, without compiling or estimates (the bare one keeps states at block edges alone);
-- the announced error: below 1e-9 rad, as asked, and at least a third of the difference from 80 bits.
+The ready scene `moon_since_1969` for 50 years, nothing fitted, and with one effect left out at a time: the
+rotation vector to the package's own librations every 8 days. Another program of these equations was within
+2.0 mas and lost so much with each effect left out, to 20 %. `experiments/bare/moon.py`, with heyoka alone,
+has the delay to third order, a hundredth of the 80 mas that the second adds: 2e-9 rad; again with de423,
+number by number. With --full its CPU is compared, seven times in turn.
 """
 
 from __future__ import annotations

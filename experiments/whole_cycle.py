@@ -1,15 +1,8 @@
 """The Earth's whole precession at three levels of model: how far are they apart, and what does each cost?
 
-Method: ``configs/earth_precession_averaged.toml``, the Earth under the Sun and the Moon, is run with every
-rotation resolved, averaged over the rotation, and averaged over the orbits as well, the latter two with and
-without the short-period terms; 25,760 years with a sample every 28 years (``--full``), or 56 years with one
-every 0.2. Differences from the full motion are taken sample by sample. Besides, with Sun and Moon that are
-integrated as point masses (``configs/bodies/earth_moon_sun.toml``): every rotation and the average over it,
-40 years (4 otherwise).
-
-Held against: 1e-6 rad (spin-averaged) and 1e-5 rad (orbit-averaged, short-period terms added back), for
-``obliquity`` and ``node_longitude`` at every sample; and the errors that the averaged runs announce, also
-under the integrated Sun and Moon.
+``configs/earth_precession_averaged.toml`` with every rotation resolved, averaged over the rotation, and
+over the orbits as well, with and without short-period terms: 25,760 years with --full, 56 otherwise.
+Besides, under a Sun and a Moon that are integrated (``configs/bodies/earth_moon_sun.toml``).
 """
 
 from __future__ import annotations

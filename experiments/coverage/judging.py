@@ -78,7 +78,7 @@ class Judged:
         )
 
 
-class _Kept(SampleReceiver):
+class Kept(SampleReceiver):
     """Keeps all samples, and watches them as a run does."""
 
     def __init__(self, prepared: InitialValueProblem, evaluator: object) -> None:
@@ -86,10 +86,14 @@ class _Kept(SampleReceiver):
         self.statistics = SampleStatistics()
         self.trail = SampleTrail(prepared.precision)
         self.parts: dict[str, list[list[np.ndarray]]] = {}
+        self.times: list[mpmath.mpf] = []  # s
 
     def take(self, block: SampleBlock) -> None:
+        """Keep a block, and watch it."""
         self.trail.take(block)
         recorded = self._evaluator.evaluate(block)  # type: ignore[attr-defined]
+        exact, exponent = self._prepared.precision.exact, self._prepared.clock.exponent
+        self.times += [mpmath.ldexp(exact(t), exponent) for t in block.times]
         for invariant in self._prepared.system.invariants:
             self.statistics.see(invariant.name, recorded[f"{invariant.name}_drift"][0][:, 0])
         factors = self._evaluator.singular_factors(block.states, block.chart)  # type: ignore[attr-defined]
@@ -160,10 +164,10 @@ def _setting(scene: CoverageScene) -> str:
 
 def gone_through(
     prepared: InitialValueProblem, most: int = MOST_STEPS
-) -> tuple[_Kept, Progress, float, Assembly]:
+) -> tuple[Kept, Progress, float, Assembly]:
     """Integrate, unless it takes too many steps: samples, how it ended, seconds of CPU, what did it."""
     parts = assemble(prepared)
-    seen = _Kept(prepared, parts.evaluator)
+    seen = Kept(prepared, parts.evaluator)
     check: Callable[[Progress], Status | None] = lambda p: Status.MAX_STEPS if p.steps > most else None  # noqa: E731
     loop = sampler(prepared, parts, seen, check)
     before = time.process_time()

@@ -12,21 +12,16 @@ from dataclasses import dataclass
 from typing import Any
 
 import mpmath
-import numpy as np
 
 import rigidsim
+from experiments.coverage.judging import Kept, gone_through
 from experiments.extremes.scenes import Extreme
 from rigidsim.accuracy.error_law import round_off_law
 from rigidsim.errors import ConfigError
 from rigidsim.scene.cautions import WarningCode
 from rigidsim.session.diagnostics import Diagnostics
-from rigidsim.session.recorder import SampleStatistics
-from rigidsim.solve.assembly import assemble, sampler
 from rigidsim.solve.closed_form import ClosedForm, NoClosedForm, closed_form_of
-from rigidsim.solve.effects.waypoints import SampleTrail
 from rigidsim.solve.problem import InitialValueProblem, prepare
-from rigidsim.solve.sample_block import SampleBlock
-from rigidsim.solve.sampler import SampleReceiver
 from rigidsim.solve.status import Status
 
 FACTOR = 3.0
@@ -38,6 +33,8 @@ _WALK = 4.0
 _CLOSED = 50.0
 """eps; thirty operations, and numpy's sines are right to 4 ulp."""
 _DIGITS = 50
+MOST_STEPS = 10**9
+"""More than a scene to 1e8 radians takes."""
 
 
 @dataclass(frozen=True)
@@ -71,32 +68,6 @@ class Verdict:
         )
 
 
-class _Samples(SampleReceiver):
-    """Keeps everything in memory, and watches it as a run does."""
-
-    def __init__(self, prepared: InitialValueProblem, evaluator: Any, name: str) -> None:
-        self._prepared, self._evaluator, self._name = prepared, evaluator, name
-        self.statistics = SampleStatistics()
-        self.trail = SampleTrail(prepared.precision)
-        self.times: list[Any] = []
-        self.rows: list[list[Any]] = []
-
-    def take(self, block: SampleBlock) -> None:
-        self.trail.take(block)
-        recorded = self._evaluator.evaluate(block)
-        for invariant in self._prepared.system.invariants:
-            self.statistics.see(invariant.name, recorded[f"{invariant.name}_drift"][0][:, 0])
-        exact, exponent = self._prepared.precision.exact, self._prepared.clock.exponent
-        seconds = [mpmath.ldexp(exact(t), exponent) for t in block.times]
-        factors = self._evaluator.singular_factors(block.states, block.chart)
-        if factors is not None:
-            self.statistics.see_singular(factors, np.array([float(t) for t in seconds]))
-        self.times += seconds
-        with mpmath.workdps(_DIGITS + 20):
-            for row in zip(*recorded[self._name], strict=True):
-                self.rows.append([mpmath.fsum(float(x) for x in parts) for parts in zip(*row, strict=True)])
-
-
 def judge(scene: Extreme, column: str, precision: str, *, hold: bool = False) -> Verdict:
     """Run a scene in one formulation."""
 
@@ -107,11 +78,9 @@ def judge(scene: Extreme, column: str, precision: str, *, hold: bool = False) ->
 
     try:
         prepared = prepare(rigidsim.parse(scene.text(column, precision, hold=hold)))
-        parts = assemble(prepared)
+        samples, progress, *_ = gone_through(prepared, MOST_STEPS)
     except ConfigError as refusal:
         return verdict("refused", str(refusal).replace("\n", " "))
-    samples = _Samples(prepared, parts.evaluator, "angular_velocity" if column == "rates" else "quaternion")
-    progress = sampler(prepared, parts, samples).run()
     if progress.status is not Status.FINISHED:
         return verdict("refused", f"the run ended: {progress.status.value}")
     diagnostics = Diagnostics(prepared, progress, samples.statistics).estimated(samples.trail)
@@ -136,16 +105,17 @@ def judge(scene: Extreme, column: str, precision: str, *, hold: bool = False) ->
     return verdict(kind, "; ".join(c.text for c in found), error, bound, estimate)
 
 
-def _largest_error(scene: Extreme, column: str, prepared: InitialValueProblem, samples: _Samples) -> float:
+def _largest_error(scene: Extreme, column: str, prepared: InitialValueProblem, samples: Kept) -> float:
     form = reference(scene)
+    rows = samples.exact("angular_velocity" if column == "rates" else "quaternion")
     with mpmath.workdps(_DIGITS + 20):
         exact = [form.exactly(time, _DIGITS) for time in samples.times]
         if column != "rates":
-            return float(max(_angle(row, q) for row, (_, q) in zip(samples.rows, exact, strict=True)))
+            return float(max(_angle(row, q) for row, (_, q) in zip(rows, exact, strict=True)))
         inertia = [[mpmath.mpf(x) for x in row] for row in prepared.scene.body.inertia]
         rates = [w for w, _ in exact]
-        momenta = [[[mpmath.fdot(r, w) for r in inertia] for w in part] for part in (samples.rows, rates)]
-        return float(max(_relative(samples.rows, rates), _relative(*momenta)))
+        momenta = [[[mpmath.fdot(r, w) for r in inertia] for w in part] for part in (rows, rates)]
+        return float(max(_relative(rows, rates), _relative(*momenta)))
 
 
 _known: dict[str, ClosedForm] = {}
