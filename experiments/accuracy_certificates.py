@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 import rigidsim
-from experiments.common import BLUE, GREY, ORANGE, Answer, Check, Curve, Panel, Picture, Study
+from experiments.common import Answer, Check, Curve, Panel, Picture, Study
 from experiments.random_scenes import KINDS, RandomScene, random_scene
 from rigidsim.accuracy.comparison import angles_between, parts_of
 from rigidsim.errors import ConfigError
@@ -118,9 +118,9 @@ def picture(outcomes: Sequence[Outcome]) -> Picture:
     ends = np.array([asked.min() / 3, asked.max() * 3])
     return Picture("An accuracy asked for is kept and certified", "a", [
         Panel("true <= certified <= asked for", "attitude error asked for, rad", "attitude error, rad", [
-            Curve(ends, ends, "accuracy asked for", GREY),
-            Curve(asked, certified, "certified", ORANGE, "v", 1),
-            Curve(asked, true, "true", BLUE, "o", 0.8),
+            Curve(ends, ends, "accuracy asked for", "grey"),
+            Curve(asked, certified, "certified", "orange", "v", 1),
+            Curve(asked, true, "true", "blue", "o", 0.8),
         ], "xy", legend="upper left"),
     ], (8, 5.2))  # fmt: skip
 

@@ -38,7 +38,7 @@ from typing import Any
 import numpy as np
 
 import rigidsim
-from experiments.common import BLUE, CONFIGS, GREY, ORANGE, Answer, Check, Curve, Panel, Picture, Study
+from experiments.common import CONFIGS, Answer, Check, Curve, Panel, Picture, Study
 from experiments.measure import matrices
 from experiments.tumbling import Tumbling, excitation_of, polhode, tumbling, tumbling_of
 
@@ -263,15 +263,16 @@ def picture(drawn: Draws, after: Tumbling, poles: np.ndarray, shift: np.ndarray)
         axes.set_xticks([10, 20, 30, 50, 100], ["10", "20", "30", "50", "100"])
         axes.minorticks_off()
 
-    sky = [Curve(_longitude(one), away(one), label, color, ".", 0.7, {"alpha": 0.5, "markeredgewidth": 0})
-           for one, label, color in ((poles, "after", ORANGE), (drawn.poles, "before", BLUE))]  # fmt: skip
+    sky = [Curve(_longitude(one), away(one), label, color, ".", 0.7, {"alpha": 0.5})
+           for one, label, color in ((poles, "after", "orange"),
+                                     (drawn.poles, "before", "blue"))]  # fmt: skip
     plane = [Curve(hours(after.effective[rows]), after.excitation[rows], label, color, ".", 0.6)
-             for rows, label, color in ((after.short, "after, short-axis mode", ORANGE),
-                                        (~after.short, "after, long-axis mode", GREY))]  # fmt: skip
-    plane.append(Curve(hours(drawn.state.effective), drawn.state.excitation, "before", BLUE, ".", 0.6))
+             for rows, label, color in ((after.short, "after, short-axis mode", "orange"),
+                                        (~after.short, "after, long-axis mode", "grey"))]  # fmt: skip
+    plane.append(Curve(hours(drawn.state.effective), drawn.state.excitation, "before", "blue", ".", 0.6))
     stay, limit = (
         100 * after.short.mean(),
-        Curve(10, None, "10°, which Benson et al. 2023 call likely", ORANGE),
+        Curve(10, None, "10°, likely (Benson et al. 2023)", "orange"),
     )
     title = f"After the Earth: {stay:.0f} % still in short-axis mode, poles and periods scattered"
     return Picture(title, "abc", [
@@ -280,7 +281,7 @@ def picture(drawn: Draws, after: Tumbling, poles: np.ndarray, shift: np.ndarray)
         Panel("How fast, and how much it tumbles", "effective period 2π L/2E (h)", "excitation E/E0", plane,
               "x", legend="upper right", more=ticks),
         Panel(f"Median {np.median(shift):.0f}°", "pole shifted by (degrees)", "members", [limit],
-              more=lambda axes: axes.hist(shift, bins=np.arange(0, 61, 1.5), color=BLUE, alpha=0.8)),
+              more=lambda axes: axes.hist(shift, bins=np.arange(0, 61, 1.5), color="grey", alpha=0.8)),
     ], (14, 5.2), {"per_subplot_kw": {"a": {"projection": "polar"}}})  # fmt: skip
 
 

@@ -23,20 +23,7 @@ import numpy as np
 
 import rigidsim
 from experiments import apophis_flyby as flyby
-from experiments.common import (
-    BLUE,
-    CONFIGS,
-    GREY,
-    ORANGE,
-    Answer,
-    Check,
-    Curve,
-    Panel,
-    Picture,
-    Result,
-    Study,
-    simulate,
-)
+from experiments.common import CONFIGS, Answer, Check, Curve, Panel, Picture, Result, Study, simulate
 from experiments.measure import matrices
 from experiments.real_bodies import apophis
 from experiments.tumbling import Tumbling, tumbling_of
@@ -157,15 +144,15 @@ def picture(
     return Picture(title, "abc", [
         Panel("Distance from the Earth (dashed: the Moon's)", "hours from perigee", "1000 km", [
             Curve(hours, np.linalg.norm(scene.values("position"), axis=1) / 1e6),
-            Curve(None, 384.4, "", GREY, "--", 0.8),
+            Curve(None, 384.4, "", "grey", "--", 0.8),
         ], "y"),
         Panel("Angular momentum of the ready scene", "hours from perigee", "change", [
             Curve(hours, angle(poles, np.broadcast_to(poles[0], poles.shape)), "pole, deg"),
-            Curve(hours, 100 * (size / size[0] - 1), "size, %", ORANGE),
+            Curve(hours, 100 * (size / size[0] - 1), "size, %", "orange"),
         ], limits={"xlim": (-12, 12)}, legend="center right"),
         Panel("Members: worth of Moon, Sun and planets (blue)", "pole shifted by, deg", "", [
-            Curve(shift, apart, "pole, deg", BLUE, "o"),
-            Curve(shift, 100 * np.abs(ratio - 1), "change of the rate, %", ORANGE, "o"),
+            Curve(shift, apart, "pole, deg", "blue", "o"),
+            Curve(shift, 100 * np.abs(ratio - 1), "change of the rate, %", "orange", "o"),
         ], "y", legend="center right"),
     ], (14, 4.8))  # fmt: skip
 

@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 
 import rigidsim
-from experiments.common import BLUE, GREY, ORANGE, Answer, Check, Curve, Panel, Picture, Study
+from experiments.common import Answer, Check, Curve, Panel, Picture, Study
 from rigidsim.errors import ConfigError
 from rigidsim.scene.cautions import WarningCode
 from rigidsim.store.summary import Summary
@@ -207,9 +207,9 @@ def picture(turning: list[Axis], resting: list[Axis]) -> Picture:
     """Announced errors against true ones."""
     ran = [*turning, *resting]
     ends = np.array([min(one.true for one in ran) / 3, max(one.announced for one in ran) * 3])
-    curves = [Curve(ends, factor * ends, label, GREY, style, 1) for factor, label, style in (
+    curves = [Curve(ends, factor * ends, label, "grey", style, 1) for factor, label, style in (
         (1, "announced = true", "-"), (10, "ten times the true one", "--"))]  # fmt: skip
-    for some, color, label in ((turning, BLUE, "rotating bodies"), (resting, ORANGE, "librating bodies")):
+    for some, color, label in ((turning, "blue", "rotating bodies"), (resting, "orange", "librating bodies")):
         points = np.array([(one.true, one.announced) for one in some])
         curves.append(Curve(*points.T, label, color, "o", 1.5))
     panel = Panel("Axes of momentum and figure", "true error, from the full motion (rad)", "announced (rad)",

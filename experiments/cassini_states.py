@@ -18,19 +18,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from experiments.common import (
-    BLUE,
-    GREY,
-    ORANGE,
-    Answer,
-    Check,
-    Curve,
-    Panel,
-    Picture,
-    Result,
-    Study,
-    simulate,
-)
+from experiments.common import Answer, Check, Curve, Panel, Picture, Result, Study, simulate
 from rigidsim.scene.arithmetic import context_for, hansen
 from rigidsim.scene.bodies.presets import PRESETS
 
@@ -332,14 +320,14 @@ def picture(shown: list[tuple[Case, Found]]) -> Picture:
     panels = []
     for case, found in shown:
         labels = ("from the balance", "from the state found", "the same by the linear theory")
-        drawn = list(zip(found.paths, (GREY, BLUE, ORANGE), labels, strict=True))
+        drawn = list(zip(found.paths, ("grey", "blue", "orange"), labels, strict=True))
         curves = [Curve(*np.degrees(path - mean(found.paths[1])).T * 3600, label, color, width=0.8)
                   for path, color, label in (drawn if case.name == "mercury" else drawn[:2])]  # fmt: skip
         title = (
             f"{case.name.title()}, state {case.state}: {np.degrees(found.angle):.4f} deg from the node's pole"
         )
         panels.append(Panel(title, "along the node (arcsec)", "across (arcsec)",
-                            [*curves, Curve(0, 0, "", GREY, "+", 3)], equal=True))  # fmt: skip
+                            [*curves, Curve(0, 0, "", "grey", "+", 3)], equal=True))  # fmt: skip
     title = "Cassini's states: the pole in the frame that turns with the orbit's node"
     return Picture(title, "ab", panels, (11.5, 5.6))
 

@@ -26,6 +26,7 @@ from rigidsim.scene.parts_of_values import parts_in
 CONFIGS = Path(__file__).parents[1] / "configs"
 DEFAULT_OUT = Path("runs/experiments")
 BLUE, ORANGE, GREEN, RED, GREY = "#2166ac", "#e08214", "#1b9e77", "#b2182b", "#636363"
+COLORS = {"blue": BLUE, "orange": ORANGE, "green": GREEN, "red": RED, "grey": GREY}
 EPSILON = {"single": 2.0**-23, "double": 2.0**-52, "extended": 2.0**-63, "quadruple": 2.0**-112}
 
 
@@ -211,6 +212,7 @@ class Curve:
     """A line, or dots, in matplotlib's style; without x or y a level from side to side.
 
     Attributes:
+        color: a name in ``COLORS``, or of matplotlib.
         width: of lines, and 4 of them the diameter of markers.
         more: further options of ``Axes.plot``.
     """
@@ -218,14 +220,14 @@ class Curve:
     x: Any
     y: Any
     label: str = ""
-    color: str = BLUE
+    color: str = "blue"
     style: str = "-"
     width: float = 1.2
     more: Mapping[str, Any] = field(default_factory=dict)
 
     def draw(self, axes: Any) -> None:
         """Onto axes."""
-        options = {"color": self.color, "linewidth": self.width, **self.more}
+        options = {"color": COLORS.get(self.color, self.color), "linewidth": self.width, **self.more}
         if self.label:
             options["label"] = self.label
         if self.x is None:

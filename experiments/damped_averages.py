@@ -22,21 +22,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from experiments.common import (
-    BLUE,
-    GREEN,
-    GREY,
-    ORANGE,
-    RED,
-    Answer,
-    Check,
-    Curve,
-    Panel,
-    Picture,
-    Result,
-    Study,
-    simulate,
-)
+from experiments.common import Answer, Check, Curve, Panel, Picture, Result, Study, simulate
 from rigidsim.errors import ConfigError
 
 CONFIG = """
@@ -280,23 +266,23 @@ def picture(
 ) -> Picture:
     """The wobble, the distances, their order, and the random bodies."""
     averaged, full = both["spin_averaged"], both["full"]
-    time, energy, colors = averaged.values("time"), averaged.values("energy"), (BLUE, ORANGE, GREEN)
+    time, energy, colors = averaged.values("time"), averaged.values("energy"), ("blue", "orange", "green")
     pairs = zip(energy, averaged.values("angular_momentum_norm"), strict=True)
     bounds = np.degrees([extremes(scene.moments, e, s) for e, s in pairs])
     away, (sizes, errors) = distances(averaged, full), ordered
-    along, order, beside = [], [], [Curve(None, 1.0, "", RED, width=1)]
+    along, order, beside = [], [], [Curve(None, 1.0, "", "red", width=1)]
     for i, (color, (name, label)) in enumerate(zip(colors, ANNOUNCED.items(), strict=True)):
         along += [Curve(time, np.maximum(away[name], 1e-12), label, color, ".", 0.5),
                   Curve(None, averaged.summary["modelling"][name], "", color, "--", 0.9)]  # fmt: skip
         order.append(Curve(sizes, errors[name], label, color, "o-"))
         beside.append(Curve(np.arange(len(ratios)), ratios[:, i], label, color, "o"))
     line = errors["angular_momentum_norm"][0] / 2 * sizes / sizes[0]
-    order.append(Curve(sizes, line, "first order", GREY, ":", 0.8))
+    order.append(Curve(sizes, line, "first order", "grey", ":", 0.8))
     least = float(min(np.median(x) for x in away.values())) / 30
     return Picture("A damped rotation: its average beside every rotation", "ab;cd", [
         Panel(f"{100 * energy[-1] / energy[0]:.0f} % of the energy left at the end", "time (s)",
-              "wobble (deg)", [Curve(time, np.degrees(wobble(full)), "full", GREY, ".", 0.5),
-               *(Curve(time, bounds[:, i], label, RED)
+              "wobble (deg)", [Curve(time, np.degrees(wobble(full)), "full", "grey", ".", 0.5),
+               *(Curve(time, bounds[:, i], label, "red")
                  for i, label in enumerate(("averaged: extremes", "")))], legend="upper right"),
         Panel("average from full; dashed: announced", "time (s)", "distance (rad, relative)", along, "y",
               limits={"ylim": (least, None)}, legend="lower right"),

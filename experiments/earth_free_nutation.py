@@ -13,20 +13,7 @@ from typing import Any
 import mpmath
 import numpy as np
 
-from experiments.common import (
-    CONFIGS,
-    GREY,
-    ORANGE,
-    RED,
-    Answer,
-    Check,
-    Curve,
-    Panel,
-    Picture,
-    Result,
-    Study,
-    simulate,
-)
+from experiments.common import COLORS, CONFIGS, Answer, Check, Curve, Panel, Picture, Result, Study, simulate
 from experiments.measure import phase_rate
 
 FLATTENING = "0.00327379492"  # (C-A)/C, Mathews, Herring & Buffett 2002
@@ -97,12 +84,15 @@ def picture(result: Result, days: dict[str, float]) -> Picture:
         for number, mark in enumerate(marks):
             axes.annotate(f"day {50 * number}", 0.8 * mark, ha="center", va="center", fontsize=8.5)
 
-    periods = [Curve(n * period, None, label, ORANGE, "--")
+    periods = [Curve(n * period, None, label, "orange", "--")
                for n, label in ((1, f"{period:.2f} d and twice that"), (2, ""))]  # fmt: skip
-    band = lambda axes: axes.axvspan(*CHANDLER, color=RED, alpha=0.25, label="Chandler's period (elastic)")  # noqa: E731
+
+    def band(axes: Any) -> None:
+        axes.axvspan(*CHANDLER, color=COLORS["red"], alpha=0.25, label="Chandler's period (elastic)")
+
     return Picture(f"A rigid Earth nutates in {period:.2f} days, not in Chandler's 427 to 435", "ab", [
         Panel("One turn of the pole, in the body", "pole along x (arcsec)", "pole along y (arcsec)",
-              [Curve(*arcsec[turn].T, width=2), Curve(*marks.T, style="o"), Curve(0, 0, "", GREY, "+", 3)],
+              [Curve(*arcsec[turn].T, width=2), Curve(*marks.T, style="o"), Curve(0, 0, "", "grey", "+", 3)],
               equal=True, more=named),
         Panel("Measured moments, (C - A)/C = 0.00327379492", "time (mean solar days)",
               "pole along x (arcsec)",

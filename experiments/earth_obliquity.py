@@ -14,19 +14,7 @@ import sys
 
 import numpy as np
 
-from experiments.common import (
-    CONFIGS,
-    GREY,
-    ORANGE,
-    Answer,
-    Check,
-    Curve,
-    Panel,
-    Picture,
-    Result,
-    Study,
-    simulate,
-)
+from experiments.common import CONFIGS, Answer, Check, Curve, Panel, Picture, Result, Study, simulate
 
 TABLE = CONFIGS / "tables" / "earth_secular.csv"
 YEAR, ARCSEC = 31557600.0, np.pi / 648000
@@ -223,10 +211,10 @@ def picture(fixed: Result, years: np.ndarray, tilt: np.ndarray) -> Picture:
     return Picture(title, "a;b", [
         Panel("", "", "obliquity (deg)", [
             Curve(years / 1000, tilt, "moving orbit"),
-            Curve(fixed.values("time") / YEAR / 1000, np.degrees(still), "fixed orbit", ORANGE),
+            Curve(fixed.values("time") / YEAR / 1000, np.degrees(still), "fixed orbit", "orange"),
         ], legend="upper center"),
         Panel("", "time from J2000 (kyr)", "orbit's inclination (deg)",
-              [Curve(years / 1000, columns()[: len(years), 2], "", GREY)]),
+              [Curve(years / 1000, columns()[: len(years), 2], "", "grey")]),
     ], (11.5, 5.6))  # fmt: skip
 
 

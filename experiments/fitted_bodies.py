@@ -15,20 +15,7 @@ from typing import Any
 import numpy as np
 
 import rigidsim
-from experiments.common import (
-    BLUE,
-    CONFIGS,
-    GREEN,
-    GREY,
-    ORANGE,
-    RED,
-    Answer,
-    Check,
-    Curve,
-    Panel,
-    Picture,
-    Study,
-)
+from experiments.common import CONFIGS, Answer, Check, Curve, Panel, Picture, Study
 
 BOOK = """
 name = "book"
@@ -115,9 +102,9 @@ def toutatis() -> tuple[list[Check], Panel]:
     rates = np.rad2deg(np.abs(found.dataset["residual_2"].values).max(axis=1)) * 86400
     times = found.dataset["time_2"].values / 86400
     panel = Panel("Toutatis 1992: what is left", "days since 9 November 1992", "deg", [
-        Curve(found.dataset["time_1"] / 86400, residuals, "attitudes", BLUE, "o-"),
-        Curve(times[used], rates[used], "rates, deg/day", ORANGE, "s"),
-        Curve(times[~used], rates[~used], "left out", RED, "x", 2),
+        Curve(found.dataset["time_1"] / 86400, residuals, "attitudes", "blue", "o-"),
+        Curve(times[used], rates[used], "rates, deg/day", "orange", "s"),
+        Curve(times[~used], rates[~used], "left out", "red", "x", 2),
     ], "y")  # fmt: skip
     source = "Takahashi et al. 2013; three scaled sigmas"
     checks = [
@@ -153,7 +140,7 @@ def book(folder: Path) -> tuple[list[Check], Panel]:
     fit += "".join(f'prior."parameters.b{a}" = {{sigma = "0.1 rad/s"}}\n' for a in "xyz")
     found = rigidsim.fit(rigidsim.parse(start + fit + sets))
     curves = []
-    for n, (name, color) in enumerate(zip("xyz", (RED, GREEN, BLUE), strict=True)):
+    for n, (name, color) in enumerate(zip("xyz", ("red", "green", "blue"), strict=True)):
         left = found.dataset[f"residual_{n + 1}"].values[:, 0]
         curves += [Curve(times, seen[:, n], "", color, ".", 0.5),
                    Curve(times, seen[:, n] - left, name, color, width=1)]  # fmt: skip
@@ -190,7 +177,7 @@ def satellite(folder: Path) -> tuple[list[Check], Panel]:
         told[name] = found
         if name == "with a wheel":
             relative = 100 * np.array(sigmas) / [900, 1000, 400]
-            colors = (RED, GREEN, BLUE)
+            colors = ("red", "green", "blue")
             curves = [Curve(spans, relative[:, n], f"moment {'xyz'[n]}", colors[n], "o-") for n in range(3)]
     for key, value in zip(MOMENTS, (900.0, 1000.0, 400.0), strict=True):
         found = told["with a wheel"]
@@ -201,7 +188,7 @@ def satellite(folder: Path) -> tuple[list[Check], Panel]:
     source = "torques of a gravity gradient are as large as the moments"
     checks.append(within("satellite without its wheel: undetermined", len(names), 3, 0, source, "keys"))
     title = "a satellite's moments by attitudes to 0.1 deg (without the wheel only their ratios show)"
-    curves.append(Curve(None, 100, "", GREY, width=0.8))
+    curves.append(Curve(None, 100, "", "grey", width=0.8))
     return checks, Panel(title, "orbits that were observed", "sigma, % of the moment", curves, "y")
 
 
@@ -247,8 +234,8 @@ def moon(folder: Path) -> tuple[list[Check], Panel]:
     found = rigidsim.fit(begun)
     left = found.dataset["residual_1"].values / MAS
     years = days / 365.25
-    curves = [Curve(years, left[:, n], axis, color, width=1)
-              for n, (axis, color) in enumerate(zip("XYZ", (RED, GREEN, BLUE), strict=True))]  # fmt: skip
+    colors = ("red", "green", "blue")
+    curves = [Curve(years, left[:, n], "XYZ"[n], colors[n], width=1) for n in range(3)]
     largest = float(np.linalg.norm(left, axis=1).max())
     checks = [Check("Moon: residual at most", largest, 0.0, 1.0, "mas", "DE421's librations", "absolute")]
     fitted = [found.value(key) for key in MOMENTS[:2]] + [moments[2]]

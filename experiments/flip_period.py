@@ -25,27 +25,13 @@ import mpmath
 import numpy as np
 
 from experiments.closed_forms import FreeTop, free_top
-from experiments.common import (
-    BLUE,
-    EPSILON,
-    GREEN,
-    GREY,
-    ORANGE,
-    Answer,
-    Check,
-    Curve,
-    Panel,
-    Picture,
-    Result,
-    Study,
-    simulate,
-)
+from experiments.common import EPSILON, Answer, Check, Curve, Panel, Picture, Result, Study, simulate
 from experiments.measure import crossings
 
 MOMENTS = (1, 2, 3)
 FLIPS = 3
 PER_UNIT = 50  # samples per 1/p
-COLORS = {"double": ORANGE, "extended": GREEN, "quadruple": BLUE}
+COLORS = {"double": "orange", "extended": "green", "quadruple": "blue"}
 CONFIG = """
 name = "flips"
 [body]
@@ -131,8 +117,10 @@ def picture(found: dict[str, list[tuple[int, float, float, float]]]) -> Picture:
     offsets = np.logspace(-1, -12, 100)
     curve = [float(free_top([mpmath.mpf(m) for m in MOMENTS], [mpmath.mpf(0), 1, mpmath.mpf(d)]).flip)
              for d in offsets]  # fmt: skip
-    periods, errors = [Curve(offsets, curve, "2K(k)/p", GREY)], []
-    for (precision, rows), color, marker in zip(found.items(), (ORANGE, GREEN, BLUE), "s^o", strict=True):
+    periods, errors = [Curve(offsets, curve, "2K(k)/p", "grey")], []
+    for (precision, rows), color, marker in zip(
+        found.items(), ("orange", "green", "blue"), "s^o", strict=True
+    ):
         exponents, values, error, allowed = np.array(rows, dtype=float).T
         periods.append(Curve(10**-exponents, values, precision, color, marker, 1.7))
         errors += [Curve(10**-exponents, np.maximum(error, 1e-36), precision, color, marker, 1.7),

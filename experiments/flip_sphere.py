@@ -24,19 +24,7 @@ import numpy as np
 from matplotlib.colors import LogNorm
 
 import rigidsim
-from experiments.common import (
-    BLUE,
-    CONFIGS,
-    EPSILON,
-    GREY,
-    ORANGE,
-    Answer,
-    Check,
-    Curve,
-    Panel,
-    Picture,
-    Study,
-)
+from experiments.common import CONFIGS, EPSILON, Answer, Check, Curve, Panel, Picture, Study
 
 CONFIG = CONFIGS / "sweeps" / "flip_sphere.toml"
 MOMENTS = (1, 2, 3)
@@ -139,9 +127,9 @@ def picture(
         Panel("Directions of the spin in the body; white: separatrices", "", "", more=sphere),
         Panel("One dot a direction", "distance from the separatrices, |L² − 2EB| / L²",
               "deviation of the flip time (s)", [
-                  Curve(beyond, np.maximum(errors, 1e-17), "run less closed form", BLUE, ".", 0.6),
-                  Curve(beyond[order], allowed[order], "what rounding explains (3 x its law)", ORANGE),
-                  Curve(None, EPSILON["double"], "eps", GREY, ":"),
+                  Curve(beyond, np.maximum(errors, 1e-17), "run less closed form", "blue", ".", 0.6),
+                  Curve(beyond[order], allowed[order], "what rounding explains (3 x its law)", "orange"),
+                  Curve(None, EPSILON["double"], "eps", "grey", ":"),
               ], "xy", legend="upper right"),
     ], (13, 5.6), {"per_subplot_kw": {"a": {"projection": "mollweide"}}})  # fmt: skip
 

@@ -35,11 +35,7 @@ import numpy as np
 
 from experiments.closed_forms import HeavyTop, heavy_top
 from experiments.common import (
-    BLUE,
     CONFIGS,
-    GREEN,
-    ORANGE,
-    RED,
     Answer,
     Check,
     Curve,
@@ -260,7 +256,7 @@ def study(full: bool) -> Answer:
 def picture(paths: dict[str, Result], tilts: dict[str, Result]) -> Picture:
     """Tilts against time: with the closed form's turning angles, and near the sleeping threshold."""
     curves = []
-    for (name, result), color in zip(paths.items(), (BLUE, ORANGE, GREEN), strict=True):
+    for (name, result), color in zip(paths.items(), ("blue", "orange", "green"), strict=True):
         part, top = result.values("time") <= 0.5, closed("30", REGIMES[name])
         curves.append(Curve(result.values("time")[part], np.degrees(tilt(result.values("quaternion")))[part],
                             name, color))  # fmt: skip
@@ -268,7 +264,7 @@ def picture(paths: dict[str, Result], tilts: dict[str, Result]) -> Picture:
     sleeping = [
         Curve(result.values("time")[1:], np.degrees(tilt(result.values("quaternion")))[1:],
               f"{name} the threshold", color)
-        for (name, result), color in zip(tilts.items(), (BLUE, RED), strict=True)
+        for (name, result), color in zip(tilts.items(), ("blue", "red"), strict=True)
     ]  # fmt: skip
     title = "The heavy top keeps to its elliptic integrals: cusps, loops, waves, and sleep"
     return Picture(title, "ab", [

@@ -35,20 +35,7 @@ import heyoka as hy
 import numpy as np
 
 import rigidsim
-from experiments.common import (
-    BLUE,
-    GREEN,
-    GREY,
-    ORANGE,
-    RED,
-    Answer,
-    Check,
-    Curve,
-    Panel,
-    Picture,
-    Study,
-    simulate,
-)
+from experiments.common import Answer, Check, Curve, Panel, Picture, Study, simulate
 from experiments.measure import matrices
 from rigidsim.scene.bodies.presets import PRESETS
 from rigidsim.solve.problem import prepare
@@ -310,7 +297,7 @@ def picture(motion: Motion, shown: dict[str, Resonance], exponents: dict[str, Ex
 
     def named(axes: Any) -> None:
         for name, one in shown.items():
-            color, place = GREEN if STATES[name][2] else RED, (np.degrees(one.theta), one.spin)
+            color, place = "green" if STATES[name][2] else "red", (np.degrees(one.theta), one.spin)
             axes.plot(*place, "o", color=color, markersize=7, clip_on=False, markerfacecolor="none", mew=1.8)
             axes.annotate(name, place, (7, 4), textcoords="offset points", color=color, fontweight="bold")
 
@@ -322,19 +309,21 @@ def picture(motion: Motion, shown: dict[str, Resonance], exponents: dict[str, Ex
         points = axes.scatter(longitude, latitude, c=time, s=2.5, cmap="viridis")
         axes.figure.colorbar(points, ax=axes, label="time (revolutions)")
 
-    sections = [section(np.pi / 2, 1.0, 3000, GREY, 0.22)]
-    sections += [section(t, w, 250, BLUE, 0.28) for t in (0.0, np.pi / 2) for w in np.arange(0.05, 3.0, 0.1)]
+    sections = [section(np.pi / 2, 1.0, 3000, "grey", 0.22)]
+    sections += [
+        section(t, w, 250, "blue", 0.28) for t in (0.0, np.pi / 2) for w in np.arange(0.05, 3.0, 0.1)
+    ]
     result = simulate(CONFIG.format(tilt=TILT, end=80 * np.pi, samples=4001))
     axes = matrices(result.values("quaternion"))
     short, w = axes[:, :, 2], np.einsum("nij,nj->ni", axes, result.values("angular_velocity"))
     time, spin = result.values("time") / (2 * np.pi), w / np.linalg.norm(w, axis=1)[:, None]
-    axes_of = ((short, "shortest axis", BLUE), (spin, "axis of rotation", ORANGE))
+    axes_of = ((short, "shortest axis", "blue"), (spin, "axis of rotation", "orange"))
     away = [
         Curve(time, np.degrees(np.arctan2(np.hypot(*one[:, :2].T), one[:, 2])), label, color, width=1)
         for one, label, color in axes_of
     ]
     rates = []
-    for (name, one), color in zip(exponents.items(), (BLUE, ORANGE), strict=True):
+    for (name, one), color in zip(exponents.items(), ("blue", "orange"), strict=True):
         label = f"{name}: {one.rate:.3f} ± {one.error:.3f} n"
         rates += [Curve(np.arange(1, len(one.running) + 1), one.running, label, color),
                   Curve(None, RATES[name], "", color, "--", 0.9)]  # fmt: skip

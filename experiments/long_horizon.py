@@ -30,7 +30,7 @@ import numpy as np
 import xarray
 
 import rigidsim
-from experiments.common import BLUE, EPSILON, GREY, ORANGE, Answer, Check, Curve, Panel, Picture, Study
+from experiments.common import EPSILON, Answer, Check, Curve, Panel, Picture, Study
 from rigidsim.accuracy.comparison import angles_between
 from rigidsim.accuracy.setting import Setting
 from rigidsim.accuracy.trial import try_setting
@@ -187,7 +187,7 @@ def picture(measured: Sequence[xarray.Dataset]) -> Picture:
 
 def _curves(data: xarray.Dataset, quantity: str) -> list[Curve]:
     precision, held, moments = data.attrs["precision"], bool(data.attrs["held"]), data["time"].values
-    color = {"single": GREY, "double": BLUE, "extended": ORANGE}[precision]
+    color = {"single": "grey", "double": "blue", "extended": "orange"}[precision]
     least = EPSILON[precision] / 16  # zeros are below what the evaluation resolves
     values = np.maximum(data["error"].sel(quantity=quantity).values, least)
     fitted, label = fit(data, quantity), f"{precision}{', held' if held else ''}"

@@ -17,19 +17,7 @@ from typing import Any
 import mpmath
 import numpy as np
 
-from experiments.common import (
-    BLUE,
-    GREEN,
-    ORANGE,
-    Answer,
-    Check,
-    Curve,
-    Panel,
-    Picture,
-    Result,
-    Study,
-    simulate,
-)
+from experiments.common import Answer, Check, Curve, Panel, Picture, Result, Study, simulate
 from experiments.measure import matrices
 
 DAY, YEAR = 86400, 365.25 * 86400  # s; Julian year
@@ -204,20 +192,18 @@ def picture(found: dict[str, Any]) -> Picture:
     across, up = both["residuals"]
     tilt = np.sin(float(OBLIQUITY) * ARCSEC)
     a, b = first["longitude"] * tilt, first["obliquity"]
-    title = (
-        f"Sun and Moon turn the Earth's axis by {both['rate']:.2f} arcsec a year, nodding once in 18.6 years"
-    )
+    title = f"Sun and Moon turn the Earth's axis by {both['rate']:.2f} arcsec a year, nodding in 18.6 years"
     return Picture(title, "ab", [
         Panel("Longitude: a line and the nutation", "time (Julian years)", "precession (arcsec)", [
             Curve(one["t"], one["path"], f"{name}: {one['rate']:.3f} arcsec/yr", color)
-            for name, one, color in (("both", both, BLUE), ("Moon", found["Moon"], ORANGE),
-                                     ("Sun", found["Sun"], GREEN))
+            for name, one, color in (("both", both, "blue"), ("Moon", found["Moon"], "orange"),
+                                     ("Sun", found["Sun"], "green"))
         ]),
         Panel("Nutation over one turn of the node", "longitude times sin(obliquity) (arcsec)",
               "obliquity (arcsec)", [
                   Curve(across * tilt, up, "figure axis, daily, the line removed", width=0.6),
-                  Curve(a * np.sin(turn), b * np.cos(turn), f"first order: {b:.2f} by {a:.2f} arcsec", ORANGE,
-                        "--", 1.6),
+                  Curve(a * np.sin(turn), b * np.cos(turn), f"first order: {b:.2f} by {a:.2f} arcsec",
+                        "orange", "--", 1.6),
               ], equal=True, legend="upper center", limits={"ylim": (-11, 15.5)}),
     ], (11.5, 5.4), {"width_ratios": [1.55, 1]})  # fmt: skip
 

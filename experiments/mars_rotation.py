@@ -14,21 +14,7 @@ import math
 
 import numpy as np
 
-from experiments.common import (
-    BLUE,
-    CONFIGS,
-    GREY,
-    ORANGE,
-    RED,
-    Answer,
-    Check,
-    Curve,
-    Panel,
-    Picture,
-    Result,
-    Study,
-    simulate,
-)
+from experiments.common import CONFIGS, Answer, Check, Curve, Panel, Picture, Result, Study, simulate
 from experiments.real_bodies import mars
 
 SCENE = CONFIGS / "kernels" / "mars_nutation.toml"
@@ -126,7 +112,7 @@ def picture(
     bars = [
         Curve(harmonics, [rigid.amplitudes(k)[which] / over - mars.published(k)[which] for k in harmonics],
               f"{what}, {label}", color, "o", more={"markerfacecolor": "white"} if over == 1 else {})
-        for which, (what, color) in enumerate((("longitude", BLUE), ("obliquity", ORANGE)))
+        for which, (what, color) in enumerate((("longitude", "blue"), ("obliquity", "orange")))
         for over, label in ((1, "as it is"), (scale, f"all over {scale:.4f}"))
     ]  # fmt: skip
     period = np.concatenate([np.linspace(-900, -90, 4000), [np.nan], np.linspace(90, 900, 1000)])
@@ -139,10 +125,10 @@ def picture(
         Panel("Nutation in the first Martian year after J2000", "longitude × sin(obliquity), mas",
               "obliquity, mas", [path], equal=True),
         Panel("Amplitudes less the published ones (grey: 0.5 mas)", "harmonic of the year", "mas",
-              [*bars, *(Curve(None, y, "", GREY, ":") for y in (-0.5, 0.5))], legend="upper right"),
+              [*bars, *(Curve(None, y, "", "grey", ":") for y in (-0.5, 0.5))], legend="upper right"),
         Panel("Amplified by a core of F = 0.07, free in −240 days", "period, days (negative: back)", "", [
-            Curve(period, curve, "linearised equations", GREY, width=1),
-            Curve([2 * math.pi / (k * ANNUAL) for k in shown], runs, "runs", RED, "o"),
+            Curve(period, curve, "linearised equations", "grey", width=1),
+            Curve([2 * math.pi / (k * ANNUAL) for k in shown], runs, "runs", "red", "o"),
         ], limits={"ylim": (-1, 4)}, legend="upper right"),
     ], (14, 5.2))  # fmt: skip
 

@@ -17,20 +17,7 @@ import math
 
 import numpy as np
 
-from experiments.common import (
-    BLUE,
-    CONFIGS,
-    GREY,
-    ORANGE,
-    RED,
-    Answer,
-    Check,
-    Curve,
-    Panel,
-    Picture,
-    Study,
-    simulate,
-)
+from experiments.common import CONFIGS, Answer, Check, Curve, Panel, Picture, Study, simulate
 from experiments.real_bodies import mercury
 
 SCENE = CONFIGS / "kernels" / "mercury_libration.toml"
@@ -108,10 +95,10 @@ def picture(days: np.ndarray, turned: np.ndarray, real: mercury.Libration) -> Pi
     )
     slow, span, years = rest - annual, days[few] - days[0], 2000 + days / mercury.YEAR
     period = np.linspace(10, 20, 2001)
-    resonance = [Curve(period, real.annual[0] * (real.period / period) ** 2, "88 days", GREY, width=1),
-                 Curve(real.period, real.annual[0], "", GREY, "o")]  # fmt: skip
-    for line, color, name in ((11.862, RED, "Jupiter, 11.86 yr"), (5.663, BLUE, "Venus, 5.66 yr"),
-                              (14.73, ORANGE, "Saturn, 14.73 yr")):  # fmt: skip
+    resonance = [Curve(period, real.annual[0] * (real.period / period) ** 2, "88 days", "grey", width=1),
+                 Curve(real.period, real.annual[0], "", "grey", "o")]  # fmt: skip
+    for line, color, name in ((11.862, "red", "Jupiter, 11.86 y"), (5.663, "blue", "Venus, 5.66 y"),
+                              (14.73, "orange", "Saturn, 14.73 y")):  # fmt: skip
         push = abs(real.forced[line] * ((real.period / line) ** 2 - 1))
         amplitude = push / np.maximum(np.abs((period / line) ** 2 - 1), 1e-6)
         resonance += [Curve(period, amplitude, name, color, width=1),
@@ -120,10 +107,11 @@ def picture(days: np.ndarray, turned: np.ndarray, real: mercury.Libration) -> Pi
     return Picture(title, "abc", [
         Panel("Libration in longitude, three years of Mercury", "days", "arcsec", [
             Curve(span, annual[few] + slow[few] - slow[few].mean(), "run"),
-            Curve(span, observed[few], "the IAU's lines", ORANGE, "--", 1),
+            Curve(span, observed[few], "the IAU's lines", "orange", "--", 1),
         ], limits={"ylim": (-48, 62)}, legend="upper right"),
         Panel("150 years: Jupiter's line of 11.86 years", "", "arcsec", [
-            Curve(years, rest, "all", GREY, width=0.2), Curve(years, slow, "without that of 88 days", RED),
+            Curve(years, rest, "all", "grey", width=0.2),
+            Curve(years, slow, "without that of 88 days", "red"),
         ], limits={"ylim": (-100, 135)}, legend="upper right"),
         Panel("Near resonance (dots: the run)", "period of the free libration, yr", "amplitude, arcsec",
               resonance, "y", limits={"ylim": (0.3, 1000)}, legend="upper right"),

@@ -18,21 +18,7 @@ from typing import Any
 import numpy as np
 
 from experiments.bare import moon as bare
-from experiments.common import (
-    BLUE,
-    CONFIGS,
-    GREEN,
-    GREY,
-    ORANGE,
-    RED,
-    Answer,
-    Check,
-    Curve,
-    Panel,
-    Picture,
-    Study,
-    simulate,
-)
+from experiments.common import CONFIGS, Answer, Check, Curve, Panel, Picture, Study, simulate
 from experiments.real_bodies import free_librations as free
 
 SCENE = CONFIGS / "kernels" / "moon_since_1969.toml"
@@ -167,9 +153,9 @@ def picture(found: dict[str, Modes]) -> Picture:
             axes.ticklabel_format(axis="x", useOffset=False)
             axes.locator_params(axis="x", nbins=5)
 
-        colors = (RED, ORANGE, GREEN, BLUE)
+        colors = ("red", "orange", "green", "blue")
         dots = [Curve(one.periods[k], row, "", colors[row], "o", 2) for row, one in enumerate(found.values())]
-        lines = [Curve(DE430[k], None, "in DE430", GREY), Curve(DE421[k], None, "in DE421", GREY, "--")]
+        lines = [Curve(DE430[k], None, "in DE430", "grey"), Curve(DE421[k], None, "in DE421", "grey", "--")]
         limits = {"ylim": (-0.5, len(found) + 0.2)}
         return Panel(title, "days", "", [*dots, *lines], legend="upper right", limits=limits, more=named)
 
@@ -179,7 +165,7 @@ def picture(found: dict[str, Modes]) -> Picture:
         Panel("Wobble, 74.6 years: the axis in the body", "about x, arcsec", "about y, arcsec",
               [Curve(*slow[:, :2].T)], equal=True),
         Panel("Longitude, 2.9 years", "", "about z, arcsec",
-              [Curve(1900.1 + days / 365.25, slow[:, 2], "", ORANGE, width=0.8)]),
+              [Curve(1900.1 + days / 365.25, slow[:, 2], "", "orange", width=0.8)]),
         *(periods(k, title) for k, title in enumerate(titles)),
     ], (14, 7.2))  # fmt: skip
 

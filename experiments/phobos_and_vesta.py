@@ -14,20 +14,7 @@ import math
 
 import numpy as np
 
-from experiments.common import (
-    BLUE,
-    CONFIGS,
-    ORANGE,
-    RED,
-    Answer,
-    Check,
-    Curve,
-    Panel,
-    Picture,
-    Result,
-    Study,
-    simulate,
-)
+from experiments.common import CONFIGS, Answer, Check, Curve, Panel, Picture, Result, Study, simulate
 
 PHOBOS, VESTA = (CONFIGS / "bodies" / f"{name}.toml" for name in ("phobos_libration", "vesta_nutation"))
 DAY, YEAR = 86400.0, 365.25
@@ -114,8 +101,8 @@ def picture(moon: Result, rock: Result, swing: float, nutation: float) -> Pictur
     facing = -np.degrees(moon.values("libration")[:401, 0])  # counted as the rotation, like the other one
     years = rock.values("time") / DAY / YEAR
     nodding = []
-    for name, color, label in (("obliquity", BLUE, "obliquity"),
-                               ("node_longitude", ORANGE, "node less its precession")):  # fmt: skip
+    for name, color, label in (("obliquity", "blue", "obliquity"),
+                               ("node_longitude", "orange", "node less its precession")):  # fmt: skip
         values = rock.dataset[name].sel(axis="figure").values
         rest = values - np.polyval(np.polyfit(years, values, 1), years)
         nodding.append(Curve(years, rest / MAS / 1000, label, color))
@@ -123,7 +110,7 @@ def picture(moon: Result, rock: Result, swing: float, nutation: float) -> Pictur
     return Picture(title, "ab", [
         Panel(f"Phobos: {abs(swing):.2f}° of its own, the rest is optical", "hours", "deg", [
             Curve(days * 24, facing, "long axis from the direction of Mars"),
-            Curve(days * 24, swing * np.sin(ANOMALISTIC * days), "from uniform rotation", RED),
+            Curve(days * 24, swing * np.sin(ANOMALISTIC * days), "from uniform rotation", "red"),
         ], limits={"ylim": (-3.4, 4.6)}, legend="upper right"),
         Panel(f"Vesta: {nutation / 1000:.2f} arcsec in obliquity, twice in 3.6 years", "years", "arcsec",
               nodding, limits={"ylim": (-6.5, 9)}, legend="upper right"),

@@ -17,7 +17,7 @@ import mpmath
 import numpy as np
 
 import rigidsim
-from experiments.common import BLUE, GREY, ORANGE, RED, Answer, Check, Curve, Panel, Picture, Study, simulate
+from experiments.common import COLORS, Answer, Check, Curve, Panel, Picture, Study, simulate
 
 DAY, YEAR = 86400, 365.25 * 86400
 ARCSEC = np.pi / 648000
@@ -221,7 +221,13 @@ def picture(found: Any, thin: Any) -> Picture:
             taken: list[tuple[float, float]] = []
             for line in signal.lines:
                 x, y = float(line.frequency) * turns, float(line.amplitude) / ARCSEC
-                color = RED if line.unfolded else GREY if line.ambiguous or not line.label.text else BLUE
+                color = (
+                    COLORS["red"]
+                    if line.unfolded
+                    else "grey"
+                    if line.ambiguous or not line.label.text
+                    else "blue"
+                )
                 axes.vlines(x, 1e-6, y, color=color, linewidth=1.4)
                 room = all(abs(np.log10(x / a)) > 0.14 or abs(np.log10(y / b)) > 0.9 for a, b in taken)
                 if y > 3e-2 and room:
@@ -233,7 +239,7 @@ def picture(found: Any, thin: Any) -> Picture:
 
         return Panel(title, xlabel, "amplitude (arcsec)", [
             Curve(frequency[1:] * turns, size[1:] / ARCSEC, "", "#9fb6cd", width=0.7),
-            Curve(analysis.nyquist * turns, None, "Nyquist", ORANGE, "--", 1),
+            Curve(analysis.nyquist * turns, None, "Nyquist", "orange", "--", 1),
         ], "xy", limits={"ylim": (1e-6, 3e3), "xlim": (0.02, 220)}, legend="lower left",
             more=lines)  # fmt: skip
 

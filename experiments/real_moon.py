@@ -16,22 +16,7 @@ import numpy as np
 
 from experiments.bare import blocks
 from experiments.bare import moon as bare
-from experiments.common import (
-    BLUE,
-    CONFIGS,
-    GREEN,
-    GREY,
-    ORANGE,
-    RED,
-    Answer,
-    Check,
-    Curve,
-    Panel,
-    Picture,
-    Result,
-    Study,
-    simulate,
-)
+from experiments.common import CONFIGS, Answer, Check, Curve, Panel, Picture, Result, Study, simulate
 
 SCENE = CONFIGS / "kernels" / "moon_since_1969.toml"
 START = 2440400.5
@@ -199,7 +184,7 @@ def picture(whole: Result, rest: np.ndarray, found: Mapping[str, np.ndarray]) ->
         simulate(SCENE, *SPARSE, "time.every=1 day", "time.end=1200 day")
     )
     years = 1969.486 + whole.values("time") / DAY / 365.25
-    colors = ["#67001f", RED, ORANGE, "#bf812d", GREEN, BLUE, "#762a83", "black"]
+    colors = ["#67001f", "red", "orange", "#bf812d", "green", "blue", "#762a83", "black"]
     lines = [(f"without {EFFECTS[name][0]}", vectors)
              for name, vectors in sorted(found.items(), key=lambda item: -rms(item[1]))]  # fmt: skip
     curves = [
@@ -209,9 +194,9 @@ def picture(whole: Result, rest: np.ndarray, found: Mapping[str, np.ndarray]) ->
     title = "The Moon since 1969: nothing fitted, within a milliarcsecond of DE421"
     return Picture(title, "a;b", [
         Panel("The Earth in the Moon's sky: librations in longitude and latitude", "", "deg",
-              [Curve(days, longitude, "longitude"), Curve(days, latitude, "latitude", ORANGE)]),
+              [Curve(days, longitude, "longitude"), Curve(days, latitude, "latitude", "orange")]),
         Panel("Rotation from DE421's librations with one effect left out (rms in the legend)", "year", "mas",
-              [*curves, Curve(None, ALLOWED, "", GREY, "--", 0.8)], "y", limits={"ylim": (1e-2, 4e6)},
+              [*curves, Curve(None, ALLOWED, "", "grey", "--", 0.8)], "y", limits={"ylim": (1e-2, 4e6)},
               legend="upper left"),
     ], (11, 8.5), {"height_ratios": [1, 1.7]})  # fmt: skip
 

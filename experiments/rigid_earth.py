@@ -14,19 +14,7 @@ mas.
 from __future__ import annotations
 
 from experiments.bare import precession
-from experiments.common import (
-    BLUE,
-    CONFIGS,
-    ORANGE,
-    Answer,
-    Check,
-    Curve,
-    Panel,
-    Picture,
-    Result,
-    Study,
-    simulate,
-)
+from experiments.common import CONFIGS, Answer, Check, Curve, Panel, Picture, Result, Study, simulate
 from experiments.real_bodies import nutation
 
 SCENE = CONFIGS / "kernels" / "rigid_earth_nutation.toml"
@@ -79,8 +67,8 @@ def picture(result: Result, fit: nutation.Nutations) -> Picture:
     years = 2000 + (dates - 2451545.0) / 365.25
     # one above the other, by 3 mas: daily samples of both would cover each other
     rest = [Curve(years, part + shift, f"{label}, shifted by {shift:g} mas", color, width=0.3)
-            for part, color, shift, label in ((fit.rest.real, ORANGE, 1.5, "dpsi sin eps"),
-                                              (fit.rest.imag, BLUE, -1.5, "deps"))]  # fmt: skip
+            for part, color, shift, label in ((fit.rest.real, "orange", 1.5, "dpsi sin eps"),
+                                              (fit.rest.imag, "blue", -1.5, "deps"))]  # fmt: skip
     left = f"Left over by {len(fit.circles)} circles above 0.1 mas and a cubic"
     return Picture("A rigid Earth's pole about the mean pole of date, 1975 to 2025", "ab", [
         Panel("Nutation: 18.6 years, with half a year and half a month", "dpsi sin eps, arcsec",

@@ -21,7 +21,7 @@ from typing import Any
 
 import numpy as np
 
-from experiments.common import BLUE, ORANGE, Answer, Check, Curve, Panel, Picture, Study
+from experiments.common import Answer, Check, Curve, Panel, Picture, Study
 from rigidsim.workflows.read import parse
 from rigidsim.workflows.sweeps.sweep import sweep
 
@@ -125,13 +125,13 @@ def picture(values: np.ndarray, grown: np.ndarray, rate: np.ndarray) -> Picture:
 
     line, known = np.array([0, 40]), rate < 40
     allowed = [
-        Curve(line, line + PLAIN * k, "" if k else "r T", ORANGE, ":" if k else "-") for k in (-1, 0, 1)
+        Curve(line, line + PLAIN * k, "" if k else "r T", "orange", ":" if k else "-") for k in (-1, 0, 1)
     ]
     return Picture("", "ab", [
         Panel(f"Growth of a displacement over {ORBITS} orbits; white: DeBra & Delp 1961",
               "k_R = (C - A) / B  (A yaw, B roll, C pitch)", "k_Y = (C - B) / A", more=shown),
         Panel("One dot a satellite; dotted: allowed", "r T of the linear motion", "ln of the largest growth",
-              [Curve(rate[known], grown[known], "", BLUE, ".", 1), *allowed],
+              [Curve(rate[known], grown[known], "", "blue", ".", 1), *allowed],
               limits={"xlim": (-1, 40), "ylim": (0, 42)}),
     ], (10.5, 5.0), {"width_ratios": [1.25, 1]})  # fmt: skip
 

@@ -23,7 +23,7 @@ import mpmath
 import numpy as np
 
 import rigidsim
-from experiments.common import BLUE, GREY, Answer, Check, Curve, Panel, Picture, Study, simulate
+from experiments.common import COLORS, Answer, Check, Curve, Panel, Picture, Study, simulate
 
 PERIODS = 10000
 FEW = 2.618  # samples a period in quadruple precision, where each takes milliseconds: harmonics are folded
@@ -230,7 +230,7 @@ def picture(drawn: list[tuple[Case, Any]]) -> Picture:
         def lines(axes: Any) -> None:
             for line in signal.lines:
                 x, y = float(line.frequency) / unit, float(line.amplitude) / largest
-                axes.vlines(x, 1e-15, y, color=BLUE if line.label.text else GREY, linewidth=1.5)
+                axes.vlines(x, 1e-15, y, color=COLORS["blue"] if line.label.text else "grey", linewidth=1.5)
                 axes.annotate(line.label.text, (x, y), (0, 4), textcoords="offset points", ha="center",
                               fontsize=7.5)  # fmt: skip
 

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from experiments.common import BLUE, GREEN, GREY, ORANGE, RED, Answer, Check, Curve, Panel, Picture, Study
+from experiments.common import Answer, Check, Curve, Panel, Picture, Study
 from experiments.extremes.judging import Verdict, judge
 from experiments.extremes.random_scenes import random_case
 from experiments.extremes.scenes import ANY, Extreme, all_scenes
@@ -118,9 +118,9 @@ def totals(verdicts: Sequence[Verdict]) -> str:
 def picture(verdicts: Sequence[Verdict]) -> Picture:
     """Errors over what the runs said of them: all below the line of a factor three, or announced in words."""
     line = np.array([1e-20, 1e2])
-    curves = [Curve(line, 3 * line, "3 x estimate", GREY),
-              Curve(1e-2, None, "digits gone: warned from here on", BLUE, ":", 0.8)]  # fmt: skip
-    for kind, color in (("right", GREEN), ("announced", ORANGE), ("SILENT", RED)):
+    curves = [Curve(line, 3 * line, "3 x estimate", "grey"),
+              Curve(1e-2, None, "digits gone: warned from here on", "blue", ":", 0.8)]  # fmt: skip
+    for kind, color in (("right", "green"), ("announced", "orange"), ("SILENT", "red")):
         for warned, marker in ((False, "o"), (True, "x")):
             picked = [(min(max(v.estimate, 1e-20), 1e2), max(v.error, 1e-20)) for v in verdicts
                       if v.kind == kind and bool(v.text) == warned and v.estimate is not None]  # fmt: skip

@@ -25,7 +25,7 @@ from dataclasses import dataclass, replace
 import mpmath
 import numpy as np
 
-from experiments.common import BLUE, GREY, ORANGE, Answer, Check, Curve, Panel, Picture, Study
+from experiments.common import Answer, Check, Curve, Panel, Picture, Study
 from experiments.coverage.judging import gone_through
 from experiments.coverage.sweep_kinds import KINDS
 from rigidsim.scene.config import Experiment, parse
@@ -144,10 +144,10 @@ def picture(told: Sequence[tuple[str, Found]]) -> Picture:
         seen = np.maximum(true, _SEEN)
         ends = np.array([min(announced.min(), seen.min()) / 2, 2 * max(announced.max(), seen.max())])
         panels.append(Panel(f"{what} at the end", f"announced error ({unit})", f"true error ({unit})", [
-            Curve(announced[~warned], seen[~warned], "members", BLUE, "."),
-            Curve(announced[warned], seen[warned], "that say no digits are left", GREY, "x"),
-            Curve(ends, ends, "as announced", GREY),
-            Curve(ends, _MOST_RATIO * ends, "three times that", ORANGE),
+            Curve(announced[~warned], seen[~warned], "members", "blue", "."),
+            Curve(announced[warned], seen[warned], "that say no digits are left", "grey", "x"),
+            Curve(ends, ends, "as announced", "grey"),
+            Curve(ends, _MOST_RATIO * ends, "three times that", "orange"),
         ], "xy", legend="upper left"))  # fmt: skip
     title = "True errors of sweeps' members stay below three times the announced ones"
     return Picture(title, "ab"[: len(panels)], panels)

@@ -20,20 +20,7 @@ import mpmath
 import numpy as np
 
 from experiments.closed_forms import free_top
-from experiments.common import (
-    BLUE,
-    GREY,
-    ORANGE,
-    Answer,
-    Check,
-    Curve,
-    Panel,
-    Picture,
-    Result,
-    Study,
-    round_off,
-    simulate,
-)
+from experiments.common import Answer, Check, Curve, Panel, Picture, Result, Study, round_off, simulate
 from experiments.measure import matrices, mean_rate, spectral_rate
 from rigidsim.scene.bodies.presets import PRESETS
 
@@ -105,8 +92,8 @@ def picture(result: Result, rotation: float, precession: float) -> Picture:
     short, w = time <= 30, np.degrees(result.values("angular_velocity")) * DAY
     growth = np.degrees(np.unwrap(azimuth))
     uneven = np.sign(growth[-1]) * (growth - growth[0]) - 360 * time / precession
-    rates = [Curve(time[short], w[short, k], f"w{name}", color)
-             for k, (name, color) in enumerate(zip("xyz", (BLUE, GREY, ORANGE), strict=True))]  # fmt: skip
+    colors = ("blue", "grey", "orange")
+    rates = [Curve(time[short], w[short, k], f"w{'xyz'[k]}", colors[k]) for k in range(3)]
     title = f"Toutatis: {rotation:.3f} days about its long axis, which precesses in {precession:.3f} days"
     return Picture(title, "a;b", [
         Panel(f"Body rates: period 4K/p = {rotation:.3f} days", "", "rate (deg/day)", rates),

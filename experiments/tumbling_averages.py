@@ -25,20 +25,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from experiments.common import (
-    BLUE,
-    GREEN,
-    GREY,
-    ORANGE,
-    Answer,
-    Check,
-    Curve,
-    Panel,
-    Picture,
-    Result,
-    Study,
-    simulate,
-)
+from experiments.common import Answer, Check, Curve, Panel, Picture, Result, Study, simulate
 
 DAY, YEAR, UNIT = 86400.0, 31557600.0, 149597870700.0
 SUN = 1.32712440018e20
@@ -63,7 +50,7 @@ samples = {samples}
 record = {record}
 estimate = {estimate}
 """
-AVERAGES = {"spin_averaged": BLUE, "orbit_averaged": ORANGE}
+AVERAGES = {"spin_averaged": "blue", "orbit_averaged": "orange"}
 
 
 @dataclass(frozen=True)
@@ -268,8 +255,8 @@ def picture(tumbler: dict[str, Result], toutatis: dict[str, Result]) -> Picture:
         )  # fmt: skip
     whole = tumbler["full"]
     energy, momentum = (float(whole.values(name).mean()) for name in ("energy", "angular_momentum_norm"))
-    swings = [Curve(whole.values("time") / TUMBLER.period, np.degrees(wobble(whole)), "", GREY, ".", 0.5)]
-    swings += [Curve(None, np.degrees(bound), "", GREEN)
+    swings = [Curve(whole.values("time") / TUMBLER.period, np.degrees(wobble(whole)), "", "grey", ".", 0.5)]
+    swings += [Curve(None, np.degrees(bound), "", "green")
                for bound in extremes(moments_of(whole), energy, momentum)]  # fmt: skip
     path = Curve(*toutatis["long"].values("momentum_axis")[:, :2].T, width=0.6)
     panels += [

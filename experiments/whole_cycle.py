@@ -12,21 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from experiments.common import (
-    BLUE,
-    CONFIGS,
-    GREEN,
-    GREY,
-    ORANGE,
-    Answer,
-    Check,
-    Curve,
-    Panel,
-    Picture,
-    Result,
-    Study,
-    simulate,
-)
+from experiments.common import CONFIGS, Answer, Check, Curve, Panel, Picture, Result, Study, simulate
 
 CONFIG = CONFIGS / "earth_precession_averaged.toml"
 INTEGRATED = CONFIGS / "bodies" / "earth_moon_sun.toml"
@@ -54,12 +40,12 @@ class Level:
         return self.name + (", short period" if self.short_period else "")
 
 
-FULL = Level("full", False, GREY, None)
+FULL = Level("full", False, "grey", None)
 AVERAGED = (
-    Level("spin_averaged", True, BLUE, 1e-6),
-    Level("spin_averaged", False, GREEN, None),
-    Level("orbit_averaged", True, ORANGE, 1e-5),
-    Level("orbit_averaged", False, GREY, None),
+    Level("spin_averaged", True, "blue", 1e-6),
+    Level("spin_averaged", False, "green", None),
+    Level("orbit_averaged", True, "orange", 1e-5),
+    Level("orbit_averaged", False, "grey", None),
 )
 
 
