@@ -42,20 +42,6 @@ _COLUMNS = (
     "largest drift",
     "of what rounding explains",
 )
-STUDIES = {
-    "earth_free_nutation": ("", "Euler's free nutation of the Earth, and why it isn't Chandler's"),
-    "toutatis": ("", "Toutatis tumbles in 5.41 and 7.35 days: closed form, spectral lines"),
-    "heavy_top_regimes": ("", "heavy tops: nutation, fast and regular precession, sleeping tops"),
-    "luni_solar_precession": ("luni_solar_precession", "25,772 years of the Earth, every rotation resolved"),
-    "precession_and_nutation": ("precession_and_nutation", "lines of the Earth's nutation against IAU 2000B"),
-    "spectral_lines": ("spectral_lines", "lines of free bodies and tops against elliptic integrals"),
-    "hyperion": ("hyperion", "Hyperion's chaos: stability, section, Lyapunov rates"),
-    "long_horizon": ("long_horizon", "how errors grow over 1e7 rad, plain and with held invariants"),
-    "precision_tradeoff": ("precision_tradeoff", "what accuracy costs, five scenes, all settings"),
-    "peer_comparison": ("peer_comparison", "against other integrators"),
-    "accuracy_certificates": ("accuracy_certificates", "whether certified errors are true"),
-}
-"""Studies by name: their figure in experiments/figures, and what they ask."""
 SWEPT_STUDIES = ("apophis_flyby", "flip_sphere", "round_off")
 """Sweeps whose picture is their study's."""
 
@@ -167,15 +153,9 @@ def page(rows: list[list[str]]) -> str:
         )
         drawn_by = "its study" if config.stem in SWEPT_STUDIES else "rigidsim plot"
         parts.append(f"![Figure drawn by {drawn_by}](figures/{config.stem}.png)")
-    parts.append("## Studies")
     parts.append(
-        "Each study answers a question with one command, `python -m experiments.NAME`; see "
-        "[all of them with their tables](../experiments/README.md)."
+        "[Studies](../experiments/README.md) answer questions about such scenes, each with one command."
     )
-    for name, (figure, what) in STUDIES.items():
-        parts.append(f"**`{name}`**: {what}.")
-        if figure:
-            parts.append(f"![{what}](../experiments/figures/{figure}.png)")
     return "\n\n".join(_wrapped(part) for part in parts) + "\n"
 
 
