@@ -36,32 +36,27 @@ def page(path: Path, name: str = "summary") -> str:
     return str(component(path, f"/{name}", "TextDocument:text")[0])
 
 
-def test_attitude_is_the_datasets_to_float32(symmetric_top: Build, read_back: Read, tmp_path: Path) -> None:
-    dataset = symmetric_top()
-    assert write_timeline(dataset, tmp_path / "t.rrd") == 1001
-    rows = read_back(tmp_path / "t.rrd", "/scene/body")
+def test_the_recording_is_the_dataset(symmetric_top: Build, read_back: Read, tmp_path: Path) -> None:
+    dataset, path = symmetric_top(), tmp_path / "t.rrd"
+    assert write_timeline(dataset, path) == 1001
+    rows = read_back(path, "/scene/body")
     wanted = dataset["quaternion"].values[:, [1, 2, 3, 0]]
-    # Half a unit in the last place of float32 numbers below 1.
+    # half a unit in the last place of float32 numbers below 1
     np.testing.assert_allclose(rows["Transform3D:quaternion"], wanted, rtol=0, atol=2.0**-25)
     np.testing.assert_array_equal(rows["step"], np.arange(1001))
-
-
-def test_times_are_exact_nanoseconds(symmetric_top: Build, read_back: Read, tmp_path: Path) -> None:
-    write_timeline(symmetric_top(), tmp_path / "t.rrd")
-    rows = read_back(tmp_path / "t.rrd", "/plots/angular_velocity")
-    np.testing.assert_array_equal(
-        rows["time"].astype("timedelta64[ns]").astype(np.int64), np.arange(1001) * 20_000_000
-    )
-
-
-def test_values_of_plots_are_float64(symmetric_top: Build, read_back: Read, tmp_path: Path) -> None:
-    dataset = symmetric_top()
-    write_timeline(dataset, tmp_path / "t.rrd")
-    rows = read_back(tmp_path / "t.rrd", "/plots/angular_velocity")
-    np.testing.assert_array_equal(rows["Scalars:scalars"], dataset["angular_velocity"].values)
-    drift = read_back(tmp_path / "t.rrd", "/plots/drift/all")["Scalars:scalars"]
+    plot = read_back(path, "/plots/angular_velocity")
+    ticks = plot["time"].astype("timedelta64[ns]").astype(np.int64)
+    np.testing.assert_array_equal(ticks, np.arange(1001) * 20_000_000)  # exact
+    np.testing.assert_array_equal(plot["Scalars:scalars"], dataset["angular_velocity"].values)  # float64
+    drift = read_back(path, "/plots/drift/all")["Scalars:scalars"]
     np.testing.assert_allclose(drift[100:], np.log10(1e-16 * np.arange(100, 1001)), rtol=1e-12)
     assert np.isfinite(drift[0])  # the drift of zero at the start
+    # arrows are in space axes, and longer than the body
+    momentum = read_back(path, "/scene/centre/angular_momentum")["Arrows3D:vectors"]
+    np.testing.assert_allclose(momentum, np.tile([0, 0, 1.6], (1001, 1)), atol=1e-6)
+    velocity = read_back(path, "/scene/centre/angular_velocity")["Arrows3D:vectors"]
+    assert np.linalg.norm(velocity, axis=1).max() == pytest.approx(1.6, rel=1e-6)
+    np.testing.assert_allclose(velocity[:, 2], velocity[0, 2], rtol=1e-6)  # L.w = 2T
 
 
 def test_only_the_rows_shown_are_read_from_a_file(symmetric_top: Build, tmp_path: Path) -> None:
@@ -85,37 +80,17 @@ def test_chunk_borders_lose_and_double_nothing(symmetric_top: Build, read_back: 
     for entity in ("/scene/body", "/plots/angular_velocity"):
         rows = read_back(tmp_path / "t.rrd", entity)
         np.testing.assert_array_equal(rows["step"], np.arange(count))
-    np.testing.assert_array_equal(rows["Scalars:scalars"], dataset["angular_velocity"].values)
+    rates = dataset["angular_velocity"].values
+    np.testing.assert_array_equal(rows["Scalars:scalars"], rates)
     sizes = [len(chunk) for chunk in RrdReader(tmp_path / "t.rrd").stream()]
     assert max(sizes) == CHUNK  # what the viewer reads well
-
-
-def test_trail_joins_each_row_to_the_one_before(
-    symmetric_top: Build, read_back: Read, tmp_path: Path
-) -> None:
-    count = CHUNK + 10
-    dataset = symmetric_top(count=count)
-    write_timeline(dataset, tmp_path / "t.rrd")
-    rows = read_back(tmp_path / "t.rrd", "/poinsot/body/polhode/recent")
-    strips = rows["LineStrips3D:strips"].reshape(count, 2, 3)
+    # a trail joins each row to the one before
+    trail = read_back(tmp_path / "t.rrd", "/poinsot/body/polhode/recent")
+    strips = trail["LineStrips3D:strips"].reshape(count, 2, 3)
     np.testing.assert_array_equal(strips[1:, 0], strips[:-1, 1])
-    rates = dataset["angular_velocity"].values
     # in units of the largest semi-axis of the ellipsoid of energy, sqrt(2 T / A), with A = 1
     factor = 1 / np.sqrt(np.mean(rates**2 @ [1, 1, 2]))
     np.testing.assert_allclose(strips[:, 1], rates * factor, atol=1e-6)
-
-
-def test_arrows_are_in_space_axes_and_longer_than_the_body(
-    symmetric_top: Build, read_back: Read, tmp_path: Path
-) -> None:
-    dataset = symmetric_top()
-    write_timeline(dataset, tmp_path / "t.rrd")
-    momentum = read_back(tmp_path / "t.rrd", "/scene/centre/angular_momentum")["Arrows3D:vectors"]
-    np.testing.assert_allclose(momentum, np.tile([0, 0, 1.6], (1001, 1)), atol=1e-6)
-    velocity = read_back(tmp_path / "t.rrd", "/scene/centre/angular_velocity")["Arrows3D:vectors"]
-    assert np.linalg.norm(velocity, axis=1).max() == pytest.approx(1.6, rel=1e-6)
-    # A symmetric top's angular velocity keeps its angle to L: L.w = 2T.
-    np.testing.assert_allclose(velocity[:, 2], velocity[0, 2], rtol=1e-6)
 
 
 @pytest.mark.parametrize(("scale", "name"), [(1e-13 / 0.02, "time [as]"), (1e14 / 20.0, "time [1e6 s]")])
