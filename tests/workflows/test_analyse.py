@@ -69,9 +69,9 @@ def test_lines_of_a_free_body_are_multiples_of_its_period(tmp_path: Path) -> Non
     assert {line.label.multipliers[0] % 2 for line in analysis["angular_velocity.z"].lines} == {0}
 
 
-@pytest.mark.slow
-def test_digits_of_quadruple_precision_over_a_thousand_periods(tmp_path: Path) -> None:
-    run, exact = tumbling(1000, "quadruple", "4", tmp_path)
+@pytest.mark.campaign
+def test_digits_of_quadruple_precision_over_ten_thousand_periods(tmp_path: Path) -> None:
+    run, exact = tumbling(10000, "quadruple", "4", tmp_path)
     with mpmath.workdps(60):
         analysis = rigidsim.analyse(run, "angular_velocity")
         assert max(wrong(analysis, exact, 1e-3)) < 1e-28
