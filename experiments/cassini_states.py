@@ -25,8 +25,7 @@ from rigidsim.scene.bodies.presets import PRESETS
 DAY, YEAR = 86400.0, 31557600.0
 CONFIG = """
 name = "{name}"
-[body]
-preset = "{name}"
+body.preset = "{name}"
 [initial]
 angular_velocity = [0, 0, "{spin} deg/day"]
 euler_angles = [{node}, {tilt}, {turn}]

@@ -23,12 +23,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from experiments.common import Answer, Check, Curve, Panel, Picture, Result, Study, simulate
+from experiments.tumbling_averages import extremes, wobble
 from rigidsim.errors import ConfigError
 
 CONFIG = """
 name = "damped"
-[body]
-principal_moments = {moments}
+body.principal_moments = {moments}
 [initial]
 angular_velocity = {rates}
 euler_angles = ["30 deg", "40 deg", "10 deg"]
@@ -106,19 +106,6 @@ def distances(averaged: Result, full: Result) -> dict[str, np.ndarray]:
     }
 
 
-def extremes(moments: tuple[float, ...], energy: float, momentum: float) -> np.ndarray:
-    """Least and largest angle between the axis of the largest moment and the momentum in free motion, rad."""
-    a, b, c = moments
-    along = [(2 * energy - momentum**2 / x) / (1 / c - 1 / x) / momentum**2 for x in (a, b)]
-    return np.sort(np.arccos(np.sqrt(np.clip(along, 0.0, 1.0))))
-
-
-def wobble(full: Result) -> np.ndarray:
-    """Angle from the figure axis to the momentum at each sample, rad, at most a right one."""
-    axes = full.values("figure_axis"), full.values("momentum_axis")
-    return np.asarray(np.arccos(np.clip(np.abs((axes[0] * axes[1]).sum(axis=1)), 0.0, 1.0)))
-
-
 def covered(title: str, averaged: Result, full: Result) -> list[Check]:
     """Errors over what is announced."""
     checks = []
@@ -135,11 +122,15 @@ def wobbles(scene: Scene, averaged: Result, full: Result) -> list[Check]:
     """The wobble in the last part of the full motion, and that of the averaged momentum and energy."""
     last = slice(-(SAMPLES // PARTS), None)
     size, energy = (averaged.values(name)[last] for name in ("angular_momentum_norm", "energy"))
-    bounds = np.array([extremes(scene.moments, e, s) for e, s in zip(energy, size, strict=True)])
+    bounds = np.array([extremes(np.array(scene.moments), e, s) for e, s in zip(energy, size, strict=True)])
     announced = [averaged.summary["modelling"][name] for name in ("energy", "angular_momentum_norm")]
-    middle = extremes(scene.moments, energy.mean(), size.mean())
+    middle = extremes(np.array(scene.moments), energy.mean(), size.mean())
     moved = [
-        extremes(scene.moments, energy.mean() * (1 + x * announced[0]), size.mean() * (1 + y * announced[1]))
+        extremes(
+            np.array(scene.moments),
+            energy.mean() * (1 + x * announced[0]),
+            size.mean() * (1 + y * announced[1]),
+        )
         for x in (-1, 1)
         for y in (-1, 1)
     ]
@@ -268,7 +259,7 @@ def picture(
     averaged, full = both["spin_averaged"], both["full"]
     time, energy, colors = averaged.values("time"), averaged.values("energy"), ("blue", "orange", "green")
     pairs = zip(energy, averaged.values("angular_momentum_norm"), strict=True)
-    bounds = np.degrees([extremes(scene.moments, e, s) for e, s in pairs])
+    bounds = np.degrees([extremes(np.array(scene.moments), e, s) for e, s in pairs])
     away, (sizes, errors) = distances(averaged, full), ordered
     along, order, beside = [], [], [Curve(None, 1.0, "", "red", width=1)]
     for i, (color, (name, label)) in enumerate(zip(colors, ANNOUNCED.items(), strict=True)):

@@ -22,8 +22,7 @@ SUN, MOON = "1.32712440018e20", "4.902800e12"
 INCLINATION = np.radians(5.145)
 START = """
 name = "earth"
-[body]
-preset = "earth"
+body.preset = "earth"
 [initial]
 angular_velocity = [0, 0, "7.292115e-5 rad/s"]
 euler_angles = ["180 deg", "84381.406 arcsec", 0]

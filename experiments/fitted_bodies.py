@@ -19,10 +19,8 @@ from experiments.common import CONFIGS, Answer, Check, Curve, Panel, Picture, St
 
 BOOK = """
 name = "book"
-[body]
-principal_moments = [13, 20, 25]
-[initial]
-angular_velocity = [0.6, 9, 0.4]
+body.principal_moments = [13, 20, 25]
+initial.angular_velocity = [0.6, 9, 0.4]
 [parameters]
 bx = "0 rad/s"
 by = "0 rad/s"
@@ -35,8 +33,7 @@ BIAS = np.array([0.05, -0.08, 0.03])  # rad/s
 GYROSCOPE = 0.02  # rad/s, of each sample
 SATELLITE = """
 name = "satellite"
-[body]
-principal_moments = ["900 kg m^2", "1000 kg m^2", "400 kg m^2"]
+body.principal_moments = ["900 kg m^2", "1000 kg m^2", "400 kg m^2"]
 [initial]
 quaternion = [0.5, -0.5, 0.5, -0.5]
 angular_velocity = ["4e-4 rad/s", "-1.3e-3 rad/s", "-3e-4 rad/s"]

@@ -1,19 +1,13 @@
 """How long does a body dwell before it flips about its intermediate axis, ever nearer to the separatrix?
 
-Method: moments 1, 2, 3; w = (0, 1, d): the rate about the middle axis, an offset d from the separatrix. The
-first reversal of w_y is at K/p, and from then on one follows every 2K/p ~ 2 ln(4 / k') / p with k' ~ d: each
-factor of ten in d adds 2 ln(10) / p. Reversals are found between samples (50 per 1/p) by polynomials
-through 24 of them, good to 1e-28: the nearest singularity of the rates is pi/2p away.
+Moments 1, 2, 3; w = (0, 1, d). The rate about the middle axis reverses every 2K/p ~ 2 ln(4 / k') / p with
+k' ~ d. Reversals are found between samples by polynomials through 24 of them, good to 1e-28. The period
+hangs on k'^2 ~ d^2, the small difference L^2 - 2 E I_2, of which double precision leaves nothing at d =
+1e-8: so d <= 1e-4 is run in 80 bits, d <= 1e-6 in quadruple precision, and double must NOT find the period
+at 1e-12.
 
-Why more than double precision: the period hangs on k'^2 ~ d^2, the small difference L^2 - 2 E I_2. Once the
-body has turned at full rate, rounding has changed L^2 and 2E by some eps sqrt(steps), each by its own
-amount. With eps = 2.2e-16 nothing is left of d = 1e-8 and less: the body then flips at intervals that
-rounding draws. So d <= 1e-4 is run in 80 bits, d <= 1e-6 in quadruple precision (eps = 1.9e-34, d^2 = 1e-24).
-
-Held against: 2K(k)/p in mpmath (50 digits). Tolerance: the round-off law (Brouwer 1937). L^2 and 2E each
-walk (eps/2) sqrt(steps), doubled as squares, so that their difference has sqrt(2) eps sqrt(steps) L^2;
-three times that over D = L^2 - 2 E I_2 is the relative error of k'^2, and over p the error of the period.
-And a contrast: double precision must NOT find the period at 1e-12.
+Tolerance: L^2 and 2E each walk (eps/2) sqrt(steps) (Brouwer 1937), doubled as squares; three times sqrt(2)
+eps sqrt(steps) L^2 over L^2 - 2 E I_2 is the relative error of k'^2, and over p that of the period.
 """
 
 from __future__ import annotations
@@ -34,10 +28,8 @@ PER_UNIT = 50  # samples per 1/p
 COLORS = {"double": "orange", "extended": "green", "quadruple": "blue"}
 CONFIG = """
 name = "flips"
-[body]
-principal_moments = [1, 2, 3]
-[initial]
-angular_velocity = [0, 1, "1e-{exponent}"]
+body.principal_moments = [1, 2, 3]
+initial.angular_velocity = [0, 1, "1e-{exponent}"]
 [time]
 end = "{end}"
 samples = {samples}

@@ -35,10 +35,8 @@ LONGEST_MESSAGE = 20_000
 PREPARED_EVERY, PLANNED_EVERY = 20, 1000
 RUN = """
 name = "base"
-[body]
-principal_moments = [1, 2, 2.5]
-[initial]
-angular_velocity = [0.3, 1.0, 0.5]
+body.principal_moments = [1, 2, 2.5]
+initial.angular_velocity = [0.3, 1.0, 0.5]
 [[events]]
 name = "flip"
 expression = "wy"

@@ -1,27 +1,13 @@
 """Does a heavy symmetric top nutate, precess, sleep and swing as its elliptic integrals say?
 
-Method: the top of configs/heavy_top_*.toml (A = 2e-4, C = 1e-4 kg m^2 about the tip, M g l = 0.0392266 J) in
-double precision. Turning points of the tilt are zeros of d(cos theta)/dt, which is exact in the recorded
-quaternion and rates; between samples they, and the tilt there, come from polynomials through the 12 nearest
-samples, with 50 samples or more per nutation: good to (6!)^2/12! (2 pi/50)^12 = 2e-14 of the amplitude.
-Precession is counted from turning point to turning point.
+The top of configs/heavy_top_*.toml in double precision (Landau & Lifshitz, Mechanics, section 35;
+Whittaker, section 71). Turning points of the tilt are zeros of d(cos theta)/dt, between samples by
+polynomials through the 12 nearest: good to (6!)^2/12! (2 pi/50)^12 = 2e-14 of the amplitude.
 
-Held against (Landau & Lifshitz, Mechanics, section 35; Whittaker, section 71):
-- nutation period 2K/p, turning angles and mean precession, of cusps, loops and waves. Tolerance: three times
-  the round-off law of attitudes (Brouwer 1937), as an angle; over the swing's amplitude and the number of
-  nutations for periods, over the angle turned for precession;
-- the fast top at 90 degrees: mu/(C w3) as the mean precession of one released from rest, but for
-  -2 e^2, e = A mu/(C w3)^2 = 7.8e-4, and (C/A) w3 as its nutation but for 3 e^2 (with u = -e y the motion is
-  y'' = 1 - y - 3 e^2 y^2 in units of the nutation; tolerances 3 e^2 and 4 e^2 against the plain formulas);
-  the precession exactly if it starts in regular precession;
-- regular precession at 60 degrees: tilt constant to three times the round-off law;
-- the sleeping threshold w3^2 = 4 A mu/C^2: 0.1 % above it the tilt stays at the linear theory's 2 e/spread
-  for a push e (tolerance 1e-8: the next order is (tilt/0.045)^2 = 1.3e-9, 0.045 = sqrt(2 * 0.001)); 0.1 %
-  below it the top leans over to cos(theta) = u1 of the same cubic (tolerance: three times the round-off law;
-  u1 hangs on the invariants, which an instability doesn't amplify); the growth rate
-  sqrt(mu/A - (C w3/2A)^2) to 1e-9 (the fitted stretch starts after 12 e-folds, with exp(-24) = 4e-11 of the
-  decaying solution left, and ends below 1e-6 rad, whose square is the next order);
-- the pendulum, T = 4 K(sin(a/2)) sqrt(A/mu), no spin; tolerance: the round-off law over one swing.
+Tolerances are three times the round-off law of attitudes (Brouwer 1937), but for: the fast top at 90
+degrees, whose plain formulas lack 2 e^2 (precession) and 3 e^2 (nutation), e = A mu/(C w3)^2 = 7.8e-4; the
+sleeping top 0.1 % above its threshold w3^2 = 4 A mu/C^2, whose linear theory lacks (tilt/0.045)^2 = 1.3e-9;
+and the growth rate, fitted after 12 e-folds (exp(-24) = 4e-11 of the decaying solution) and below 1e-6 rad.
 """
 
 from __future__ import annotations

@@ -1,28 +1,15 @@
 """Does Hyperion tumble chaotically, as Wisdom, Peale & Mignard (1984) foretold?
 
-Method: a homogeneous rigid ellipsoid of their axes, 190 x 145 x 114 km, on their orbit, which is fixed; units
-of C, the mean motion n and the semi-major axis. All equations are those that rigidsim prepares for the
-config below (quaternions, double precision).
-- Spin-orbit states p = k/(2 m): planar orbits, symmetric about the pericentre, that turn k/2 times in m
-  revolutions; found by shooting over m/2 revolutions. Their multipliers are the eigenvalues of the monodromy
-  matrix (variational equations, heyoka's ``var_ode_sys``), in the plane and out of it. And the full motion
-  after a tilt of 0.01 rad is followed over 1000 revolutions.
-- Lyapunov rates in the large chaotic zone, start theta = 90 deg, w = n at pericentre: the tangent space is
-  carried along and orthonormalised (QR) each revolution; in the plane alone, and freely after the tilt.
+A homogeneous ellipsoid of their axes, 190 x 145 x 114 km, on their fixed orbit; all equations are those
+that rigidsim prepares. Spin-orbit states p = k/(2 m), planar and symmetric about the pericentre, are found
+by shooting over m/2 revolutions; multipliers are eigenvalues of the monodromy matrix (heyoka's
+``var_ode_sys``), and the full motion is followed after a tilt of 0.01 rad. Lyapunov rates are from tangent
+spaces orthonormalised each revolution, in the large chaotic zone.
 
-Held against:
-- the paper's verdicts: synchronous and 1/2 states unstable in attitude (the tilt must pass 60 deg), 2, 9/4
-  and 5/2 stable (it must stay below 15 deg; the bounds lie between what either sort does);
-- multipliers: those of the 9/4 and 5/2 states are 1, to 1e-5. NOT that of the 2 state: it is 1.00785, which
-  the paper's verdict doesn't tell. Two frequencies collide in a narrow tongue about these moments (gone with
-  B/C = 0.85 or 0.87); a tilt grows e-fold in 128 revolutions, to 8 deg and no further. To be sure, the
-  multiplier is held against the growth of a tilt of 1e-7 rad in the plain equations, to 2 %;
-- the synchronous out-of-plane multiplier, 1.96608 per revolution, to 1e-3 (re-computed for this project);
-- 0.116 n in the plane (3000 revolutions; 10,000 with --full) and 0.120 n tumbling (2000; with --full the mean
-  of five tilts), to 15 % with --full. The shorter runs get 30 %: there the rate scatters by 5 to 10 %
-  (standard error of blocks of 100 revolutions, told with each), and the motion may keep to the shore of an
-  island for some hundred revolutions, growing slowly. What tumbles doesn't stay as it was, either: later on
-  it spins faster, at 2.5 to 3 n, and the rate over 10,000 revolutions from a tilt of 0.01 rad is 0.090 n.
+The paper's verdicts must come out, but for the 2 state: two frequencies collide in a narrow tongue about
+these moments, its multiplier is 1.00785, and a tilt grows e-fold in 128 revolutions, to 8 deg and no
+further; the plain equations must agree to 2 %. Shorter runs get 30 % for Lyapunov rates: these scatter by 5
+to 10 %, and the motion may keep to the shore of an island for some hundred revolutions.
 """
 
 from __future__ import annotations
@@ -57,8 +44,7 @@ STAYS, LEAVES = 15.0, 60.0  # deg
 PLANE, OUT = [2, 3, 6], [0, 1, 4, 5]  # wz qw qz; wx wy qx qy
 CONFIG = """
 name = "hyperion"
-[body]
-principal_moments = RATIOS   # 190 x 145 x 114 km: 0.59555, 0.85945, 1
+body.principal_moments = RATIOS   # 190 x 145 x 114 km: 0.59555, 0.85945, 1
 [initial]
 angular_velocity = [0, 0, 1]
 euler_angles = ["90 deg", {tilt}, 0]

@@ -1,22 +1,12 @@
 """Is anything lost when a run is killed, the disk fills up or becomes read-only, or its files are damaged?
 
-Question: after SIGKILL at any moment, is the folder readable, is every sample still there whose segment had
-its name before the kill, and is the dataset bit for bit that of a run that nobody disturbed? The same for a
-disk that fills up and for one that becomes read-only; and is every file that was truncated, flipped in a
-bit, exchanged or lost recognised?
-
-Method: each scene is run once undisturbed. Then it is begun in a child process, killed, resumed in another
-child, killed again, ..., and left to finish after one to six kills. A third of the moments are uniform over
-the scene's duration, a third while a temporary file is being written, a third just after a file got its
-name. What was saved is noted from outside before the kill. Segments are written some hundred times as often
-as usual (``FREQUENT``), to have many moments at which something can go wrong. Then: the same on a small
-tmpfs (as root; else under a limit of the files' size), enlarged before each resume; on a tmpfs that is
-remounted read-only (as root only) and writable again before each resume; and files of finished and
-unfinished runs damaged at random places. Last, runs under a kernel that kill themselves where the integrator
-stands at the edge of a block, in three precisions; a look after every step tells, and counts.
-
-Seeded: the same kills are planned, though the machine's timing moves what they hit. Each run is told as it is
-done, and the totals are printed even when time is up or the campaign is interrupted.
+Each scene is run once undisturbed; then it is begun in a child process, killed by SIGKILL (a third at any
+moment, a third while a temporary file is written, a third just after a file got its name), and resumed, one
+to six times. Segments are written some hundred times as often as usual. What was saved is noted from
+outside before the kill: it has to be there afterwards, and the dataset has to be bit for bit the
+undisturbed one. The same on a small tmpfs (without root under a limit of file sizes) that is enlarged
+before each resume, on one that is remounted read-only (as root), with files damaged at random places, and
+in runs under a kernel that kill themselves at the edge of a block.
 
 Run: python -m experiments.kill_campaign [--kills 300] [--full-disks 40] [--read-only 20] [--damages 400]
 [--edges 30] [--seconds 1200] [--seed 1]

@@ -49,8 +49,7 @@ HELD_LAW = 1.0  # of the attitude where the frequencies are held
 BODIES = {
     "free asymmetric body": """
 name = "free"
-[body]
-principal_moments = [1, 2, 3]
+body.principal_moments = [1, 2, 3]
 [initial]
 angular_velocity = [{a}, {b}, {c}]
 euler_angles = [0, 1, 0]

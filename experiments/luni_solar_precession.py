@@ -32,8 +32,7 @@ NUTATION = {"obliquity": 9.2022, "longitude": 17.235}  # arcsec, first order
 CYCLE = (25772.0, 25762.0)  # years: the run, and 360 degrees at 50.307 arcsec/yr
 CONFIG = """
 name = "luni_solar_precession"
-[body]
-preset = "earth"
+body.preset = "earth"
 [initial]
 angular_velocity = [0, 0, "{spin} rad/day"]
 euler_angles = ["180 deg", "84381.406 arcsec", 0]  # the x axis is the vernal equinox

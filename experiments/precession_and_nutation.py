@@ -36,8 +36,7 @@ LABELS = {  # without the sign, which differs between sine and cosine of a decre
 }  # fmt: skip
 CONFIG = """
 name = "precession_and_nutation"
-[body]
-preset = "earth"
+body.preset = "earth"
 [initial]
 angular_velocity = [0, 0, "{spin} rad/day"]
 euler_angles = ["180 deg", "84381.406 arcsec", 0]  # the x axis is the vernal equinox

@@ -30,8 +30,7 @@ PLAIN = 7.0
 """Logarithm of what a motion without exponential growth may make of a vector; see above."""
 CONFIG = """
 name = "satellite_stability"
-[body]
-principal_moments = [1, 2, 2.5]
+body.principal_moments = [1, 2, 2.5]
 [initial]
 quaternion = [1, 0, 0, 0]
 angular_velocity = [0, 0, 1]

@@ -8,10 +8,8 @@ invariants) and one number of its config. A run in double precision records the 
 this number moved, in quadruple precision, give the central difference of fourth order: steps h of 1e-6 leave
 some h^4 = 1e-24, and 1e-13 for the 80 bits in which they are subtracted. They share nothing with the
 variational equations but the way from a config to equations. The largest difference along the run, relative
-to the derivative's largest value there, may be 1e-9. ``--quick`` takes the four motions from one compiled
-system with other coefficients, in a quarter of the time, by larger steps, so that a case beyond 1e-9 is to
-be repeated without it; ``--only N`` repeats a case; the exit code is 1 if
-one is off.
+to the derivative's largest value there, may be 1e-9. ``--only N`` repeats a case;
+the exit code is 1 if one is off.
 """
 
 from __future__ import annotations
@@ -31,10 +29,9 @@ from experiments.sensitivity_scenes import Case, case
 from rigidsim.scene.parts_of_values import parts_in
 from rigidsim.scene.varied_keys import varied_keys
 from rigidsim.workflows.read import parse
-from rigidsim.workflows.sensitivity import Tangents
 
 BOUND = 1e-9
-_MOVED, _MOVED_QUICKLY = Fraction(1, 1 << 20), Fraction(1, 1 << 13)  # of a number's size
+_MOVED = Fraction(1, 1 << 20)  # of a number's size
 _WEIGHTS = {1: 8.0, -1: -8.0, 2: -1.0, -2: 1.0}  # times 1 / 12 h
 
 
@@ -50,14 +47,13 @@ class Found:
         return max(self.errors.values(), default=float("inf"))
 
 
-def checked(one: Case, *, quick: bool = False) -> Found:
-    """The errors of one case; ``quick`` differences share what is compiled, and have 1e-12."""
+def checked(one: Case) -> Found:
+    """The errors of one case."""
     base = parse(one.text, overrides=[f'output.sensitivity=["{one.key}"]', *_QUIET])
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         found = rigidsim.run(base, out=None, progress=False).dataset
-        times = found["time"].to_numpy()
-        differences = _quick_differences(one, times) if quick else _differences(one)
+        differences = _differences(one)
     errors = {}
     for name, difference in differences.items():
         largest = np.abs(difference).max()
@@ -69,30 +65,6 @@ def checked(one: Case, *, quick: bool = False) -> Found:
 
 _QUIET = ["output.timeline=false", "output.estimate=false"]
 _NONE = 1e-12
-
-
-def _quick_differences(one: Case, times: np.ndarray) -> dict[str, np.ndarray]:
-    """As ``_differences``, of motions whose coefficients alone were worked out anew, given in double."""
-    text = parse(one.text, overrides=['integrator.precision="quadruple"', *_QUIET])
-    motion = Tangents(text, [one.key])
-    (value,) = motion.values
-    step = (abs(value) or 1.0) * float(_MOVED_QUICKLY)
-    base, found = motion.at({}, times), {}
-    sides = {n: motion.at({motion.keys[0]: value + n * step}, times) for n in _WEIGHTS}
-    width = 12 * ((value + step) - value)
-
-    def difference(name: str) -> np.ndarray:
-        parts = {n: getattr(side, name) for n, side in sides.items()}
-        if name == "attitude":
-            middle = base.attitude
-            parts = {n: q * np.sign((q * middle).sum(axis=1))[:, None] for n, q in parts.items()}
-        return np.asarray(sum(weight * parts[n] for n, weight in _WEIGHTS.items()) / width)
-
-    found["angular_velocity_sensitivity"] = difference("angular_velocity")
-    found["attitude_sensitivity"] = _turned(base.attitude, difference("attitude"))
-    if base.position is not None:
-        found["position_sensitivity"] = difference("position")
-    return found
 
 
 def _turned(quaternion: np.ndarray, change: np.ndarray) -> np.ndarray:
@@ -186,14 +158,13 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--scenes", type=int, default=200)
     parser.add_argument("--first", type=int, default=0)
     parser.add_argument("--only", type=int)
-    parser.add_argument("--quick", action="store_true")
     chosen = parser.parse_args(arguments)
     numbers = range(chosen.first, chosen.first + chosen.scenes) if chosen.only is None else [chosen.only]
     off, worst = [], 0.0
     for number in numbers:
         one = case(number)
         try:
-            found = checked(one, quick=chosen.quick)
+            found = checked(one)
         except rigidsim.RigidsimError as error:
             print(f"{number:4d} {one.family:10s} {one.key:34s} refused: {error}", flush=True)
             off.append(number)

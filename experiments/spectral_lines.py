@@ -47,8 +47,7 @@ estimate = false
 GRAVITY = '[[loads]]\nkind = "uniform_gravity"\nacceleration = [0, 0, "-9.80665"]\n'
 SATELLITE = """
 name = "satellite"
-[body]
-principal_moments = [9, 10, 4]                 # x along the orbit, y against its normal, z to the Earth
+body.principal_moments = [9, 10, 4]                 # x along the orbit, y against its normal, z to the Earth
 [initial]
 euler_angles = ["90 deg", "90 deg", "180 deg"]
 angular_velocity = [1e-5, "-1.00001", 2e-5]

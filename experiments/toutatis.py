@@ -31,10 +31,8 @@ RECOMPUTED = {"rotation": 5.396, "precession": 7.350}  # days
 DAY = 86400
 CONFIG = """
 name = "toutatis"
-[body]
-principal_moments = [3.09, 3.22, 1]   # ratios; the long axis is z
-[initial]
-angular_velocity = ["20.7 deg/day", "31.3 deg/day", "98.0 deg/day"]
+body.principal_moments = [3.09, 3.22, 1]   # ratios; the long axis is z
+initial.angular_velocity = ["20.7 deg/day", "31.3 deg/day", "98.0 deg/day"]
 [time]
 end = "{days} day"
 every = "0.05 day"

@@ -21,138 +21,79 @@ keep = ["final"]
 tile = 64
 """
 _FREE = """
-[body]
-principal_moments = [1, 2, 2.5]
-[initial]
-angular_velocity = [0.1, 1, 0.05]
-[time]
-end = {end}
-samples = 2
+body.principal_moments = [1, 2, 2.5]
+initial.angular_velocity = [0.1, 1, 0.05]
+time = {{end = {end}, samples = 2}}
 """
 _ORBIT = """
-[body]
-principal_moments = [1, 1.5, 1.8]
-[initial]
-angular_velocity = [0.1, 0.2, 1.1]
-euler_angles = [0.3, 0.1, 0]
+body.principal_moments = [1, 1.5, 1.8]
+initial = {{angular_velocity = [0.1, 0.2, 1.1], euler_angles = [0.3, 0.1, 0]}}
+time = {{end = {end}, samples = 2}}
 [[loads]]
 kind = "gravity_gradient"
 gravitational_parameter = 1
 orbit = {{semi_major_axis = 1, eccentricity = 0.1, inclination = 0.2, mean_anomaly = 0.4}}
-[time]
-end = {end}
-samples = 2
 {more}
 """
 _PLANAR = """
-[body]
-principal_moments = [34021, 49096, 57125]
-[initial]
-euler_angles = [0, 0, 0]
-angular_velocity = [0, 0, 1]
+body.principal_moments = [34021, 49096, 57125]
+initial = {{euler_angles = [0, 0, 0], angular_velocity = [0, 0, 1]}}
+time = {{end = {end}, samples = 2}}
+integrator = {{formulation = "planar", tolerance = {tolerance}}}
 [[loads]]
 kind = "gravity_gradient"
 gravitational_parameter = 1
 orbit = {{semi_major_axis = 1, eccentricity = 0.1}}
-[time]
-end = {end}
-samples = 2
-[integrator]
-formulation = "planar"
-tolerance = {tolerance}
 """
 _TOP = """
-[body]
-principal_moments = [1, {second}, 0.5]
-mass = 1
-center_of_mass = [0, 0, 0.3]
-[initial]
-angular_velocity = [0.1, 0.2, 5]
-euler_angles = [0, 0.5, 0]
+body = {{principal_moments = [1, {second}, 0.5], mass = 1, center_of_mass = [0, 0, 0.3]}}
+initial = {{angular_velocity = [0.1, 0.2, 5], euler_angles = [0, 0.5, 0]}}
+time = {{end = {end}, samples = 2}}
 [[loads]]
 kind = "uniform_gravity"
 acceleration = [0, 0, -9.8]
-[time]
-end = {end}
-samples = 2
 """
 _DRIVEN = """
-[parameters]
-k = 0.1
-n = 1
-[body]
-principal_moments = [1, 2, 2.5]
-[initial]
-angular_velocity = [0.1, 0.2, 1]
+parameters = {{k = 0.1, n = 1}}
+body.principal_moments = [1, 2, 2.5]
+initial.angular_velocity = [0.1, 0.2, 1]
+time = {{end = {end}, samples = 2}}
 [[loads]]
 kind = "torque"
 components = ["k*sin(n*t)", "k*cos(n*t)^2/3", "-k*wz/9"]
 frame = "body"
-[time]
-end = {end}
-samples = 2
 """
 _GYROSTAT = """
-[body]
-principal_moments = [1, 2, 2.5]
-[initial]
-angular_velocity = [0.1, 0.2, 1]
-[[rotors]]
-name = "free"
-axis = [0, 0.6, 0.8]
-moment = 0.1
-rate = 5
-[[rotors]]
-name = "driven"
-axis = [1, 0, 0]
-moment = 0.05
-rate = -8
-torque = "0.02*sin(0.7*t)"
-[time]
-end = {end}
-samples = 2
+body.principal_moments = [1, 2, 2.5]
+initial.angular_velocity = [0.1, 0.2, 1]
+time = {{end = {end}, samples = 2}}
+rotors = [
+  {{name = "free", axis = [0, 0.6, 0.8], moment = 0.1, rate = 5}},
+  {{name = "driven", axis = [1, 0, 0], moment = 0.05, rate = -8, torque = "0.02*sin(0.7*t)"}},
+]
 """
 _LAWS = """
-[parameters]
-k = 0.5
-[body]
-principal_moments = [1, 2, 2.5]
-[initial]
-angular_velocity = [0.1, 0.2, 0.3]
-[[states]]
-name = "slow"
-unit = "rad/s"
-derivative = "(wz - slow)/(3 s)"
-[[states]]
-name = "slosh"
-unit = "rad"
-derivative = "rolling"
-[[states]]
-name = "rolling"
-unit = "rad/s"
-derivative = "-(4 s^-2)*slosh - (0.02 s^-1)*rolling + 0.3*(1 s^-1)*wy"
+parameters.k = 0.5
+body.principal_moments = [1, 2, 2.5]
+initial.angular_velocity = [0.1, 0.2, 0.3]
+time = {{end = {end}, samples = 2}}
+states = [
+{{name = "slow", unit = "rad/s", derivative = "(wz - slow)/(3 s)"}},
+{{name = "slosh", unit = "rad", derivative = "rolling"}},
+{{name = "rolling", unit = "rad/s", derivative = "-(4 s^-2)*slosh - (0.02 s^-1)*rolling + 0.3*(1 s^-1)*wy"}},
+]
 [[loads]]
 kind = "torque"
 components = ["-k*qw*qx", "-k*qw*qy - (0.1 N m)*slosh", "-k*qw*qz - (0.05 N m s)*slow"]
 frame = "body"
-[time]
-end = {end}
-samples = 2
 """
 _FLIGHT = """
-[body]
-principal_moments = [1, 1.6, 2]
-mass = 1
-[initial]
-angular_velocity = [0.01, 0.02, 0.03]
-position = [30, 0, 0]
-velocity = [0, 0.05, 0]
+body = {{principal_moments = [1, 1.6, 2], mass = 1}}
+initial = {{angular_velocity = [0.01, 0.02, 0.03], position = [30, 0, 0], velocity = [0, 0.05, 0]}}
+time = {{end = {end}, samples = 2}}
 [[loads]]
 kind = "central_gravity"
 gravitational_parameter = 1
-[time]
-end = {end}
-samples = 2
 """
 
 
