@@ -10,7 +10,7 @@ the page says that it needs nothing but an empty folder:
 - without a language: nothing, unless ``<!-- prints -->`` stands above it: what the block before it printed.
 
 ``<!-- before: COMMAND -->`` runs where it stands and isn't shown; ``<!-- not run: WHY -->`` above a block
-says why it isn't run; ``<!-- blocks: slow -->`` puts a page into the long stage.
+says why it isn't run; of pages with ``<!-- blocks: slow -->`` the long stage runs some, drawn by the day.
 """
 
 from __future__ import annotations
@@ -76,7 +76,7 @@ def blocks_of(page: Path) -> list[Block]:
 
 
 def is_slow(page: Path) -> bool:
-    """Whether its blocks run in the long stage."""
+    """Whether its blocks run in the long stage, on some days."""
     return "<!-- blocks: slow -->" in page.read_text(encoding="utf-8")
 
 

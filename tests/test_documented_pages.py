@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 from documented_blocks import Story, blocks_of, is_slow, prepare
+from support import cases
 from test_documented_outputs import differences
 
 ROOT = Path(__file__).parents[1]
@@ -16,10 +17,8 @@ _PLAYED = [page for page in PAGES if any(block.run for block in blocks_of(page))
 
 @pytest.mark.parametrize(
     "page",
-    [
-        pytest.param(page, id=str(page.relative_to(ROOT)), marks=[pytest.mark.slow] * is_slow(page))
-        for page in _PLAYED
-    ],
+    cases(_PLAYED, [page for page in _PLAYED if not is_slow(page)], daily=8),
+    ids=[str(page.relative_to(ROOT)) for page in _PLAYED],
 )
 def test_blocks_run_and_print_what_is_shown(
     page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
