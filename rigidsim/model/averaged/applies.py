@@ -67,8 +67,8 @@ def refuse_scene(scene: Scene, loads: Sequence[Load]) -> None:
     elif alone and level == ORBIT_AVERAGED:
         against = f"{alone[0].title} is no gravity gradient, and is averaged over the rotation alone"
         raise refused(level, against, 'choose "spin_averaged"')
-    elif strange := [load.title for load in alone if not reads_rates_alone(load)]:
-        against = f"{strange[0]} is neither the gravity gradient of a source with elements, a place or an "
+    elif others := [load.title for load in alone if not reads_rates_alone(load)]:
+        against = f"{others[0]} is neither the gravity gradient of a source with elements, a place or an "
         against += "ephemeris, nor of one of [[bodies]], nor a function of the rates in body axes"
     elif alone and (found := surfaces_of(scene).found):
         against = f"{found[0].text} ({found[0].where}) has a kink or jump, over which no average is smooth"
