@@ -43,7 +43,7 @@ def test_max_steps_is_never_exceeded_and_always_used_up(scene: str, tmp_path: Pa
     whole = run_text(SCENES[scene])
     total = whole.summary["cost"]["steps"]
     for number, (drive, pacing) in enumerate(DRIVES.items()):
-        most, tuning = total // 2 - number, Tuning(pacing)
+        most, tuning = max(1, (total - 1) // 2 - number), Tuning(pacing)
         guard = f"limits.max_steps={most}"
         run = run_text(SCENES[scene], guard, out=tmp_path / str(number), tuning=tuning)
         sessions = 1
