@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import numpy as np
@@ -136,6 +137,18 @@ def test_damaged_files_and_mistakes_with_them_are_refused(scene: Path) -> None:
         kernel.write_bytes(damage(whole))
         with pytest.raises(rigidsim.ConfigError, match=words):
             rigidsim.run(scene, out=None)
+
+
+def test_reading_a_config_changes_nothing_for_the_next(
+    scene: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Which isn't beside the first, and so doesn't find its kernel."""
+    monkeypatch.chdir(tmp_path)
+    before = dict(os.environ)
+    rigidsim.run(scene, out=None, changes={"time.end": "1 day"})
+    assert dict(os.environ) == before
+    with pytest.raises(rigidsim.ConfigError, match="which isn't there: looked for in"):
+        rigidsim.run(rigidsim.parse(scene.read_text()), out=None)
 
 
 def test_a_swept_source_has_an_axis_of_another_name_than_the_sources(tmp_path: Path) -> None:

@@ -1,8 +1,7 @@
 """Where a kernel's file is: beside the config, or in folders that are named.
 
 A run's folder remembers the places of its files in ``.kernel``, which only says where to look: whether a file
-is the same, its SHA-256 tells. Workers of a sweep, which know no folder of a config, look where their
-parent found it.
+is the same, its SHA-256 tells.
 """
 
 from __future__ import annotations
@@ -18,7 +17,6 @@ EMBEDDED = " (embedded config)"
 """What follows a dataset's path where that stands for the config in it."""
 NOTE = ".kernel"
 """File of a run's folder with the places of its kernels."""
-_FOUND = "RIGIDSIM_KERNELS_FOUND"  # the same of a parent process, for its workers
 
 
 def kernel_of(given: str, source: str) -> Kernel:
@@ -49,31 +47,24 @@ def kernel_of(given: str, source: str) -> Kernel:
 
 
 def find_file(given: str, source: str, what: str) -> Path:
-    """The absolute path of a kernel that is given by its own, and noted for workers; ``what`` it should be.
+    """The absolute path of a kernel that is given by its own; ``what`` it should be.
 
     Raises:
         KernelError: it isn't there.
     """
-    path = _find(given, source, what).absolute()
-    known, folder = os.environ.get(_FOUND, "").split(os.pathsep), str(path.parent)
-    os.environ[_FOUND] = os.pathsep.join([folder, *(x for x in known if x and x != folder)])
-    return path
-
-
-def _find(given: str, source: str, kind: str) -> Path:
     wanted, folders = Path(given).expanduser(), folders_of(source)
     places = [wanted] if wanted.is_absolute() else [folder / wanted for folder in folders]
     try:
         for path in [*places, *(folder / wanted.name for folder in folders)]:
             if path.is_file():
-                return path
+                return path.absolute()
         if any(path.is_dir() for path in places):
-            raise KernelError(f"which is a folder; the path of {kind} is allowed")
+            raise KernelError(f"which is a folder; the path of {what} is allowed")
     except OSError as error:  # names that no file system takes
         raise KernelError(f"which can't be looked for ({error.strerror or error})") from None
     looked = ", ".join(dict.fromkeys(str(path.parent) for path in places))
-    what = f"which isn't there: looked for in {looked}; put it there, or name its folder in the environment "
-    raise KernelError(f"{what}variable {FOLDERS}")
+    why = f"which isn't there: looked for in {looked}; put it there, or name its folder in the environment "
+    raise KernelError(f"{why}variable {FOLDERS}")
 
 
 def _names(folder: Path) -> set[str]:
@@ -98,8 +89,7 @@ def folders_of(source: str) -> list[Path]:
     file = Path(source.removesuffix(EMBEDDED)).absolute()
     named = [Path(x) for x in os.environ.get(FOLDERS, "").split(os.pathsep) if x]
     if not file.is_file():
-        found = [Path(x) for x in os.environ.get(_FOUND, "").split(os.pathsep) if x]
-        return [Path.cwd(), *named, *found]
+        return [Path.cwd(), *named]
     noted = file.parent / NOTE
     lines = noted.read_text(encoding="utf-8").splitlines() if noted.is_file() else []
     beside = [Path(line.strip()).parent for line in lines if line.strip()]

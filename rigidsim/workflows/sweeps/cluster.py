@@ -66,7 +66,9 @@ class Cluster(Way):
             ahead = _AHEAD * max(1, self._threads(client))
             while waiting and len(running) < ahead:
                 tile = waiting.pop()
-                future = client.submit(tile_image, *task(generation, tile, self.data), pure=False, retries=2)
+                future = client.submit(
+                    tile_image, *task(generation, tile, self.source, self.data), pure=False, retries=2
+                )
                 running[future] = tile
             done = _first_done(distributed, client, list(running))
             if done is None:

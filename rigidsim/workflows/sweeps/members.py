@@ -33,27 +33,27 @@ _LINES = 5  # of each signal's spectrum
 
 
 @lru_cache(maxsize=4)
-def sweep_of(config: str) -> Sweep:
-    """The sweep of a config's text, worked out once per process."""
-    return recording(Sweep.of(parse(config, source="the sweep's config")))
+def sweep_of(config: str, source: str = "the sweep's config") -> Sweep:
+    """The sweep of a config's text, worked out once per process; ``source``: where its kernels are found."""
+    return recording(Sweep.of(parse(config, source=source)))
 
 
 @lru_cache(maxsize=4)
-def kernel_of_members(config: str) -> dict[str, Any]:
+def kernel_of_members(config: str, source: str) -> dict[str, Any]:
     """What tells the kernels of a config's members; empty without one."""
-    sweep = sweep_of(config)
+    sweep = sweep_of(config, source)
     if not reads_kernels(sweep.base):
         return {}
     return kernel_attributes(build_scene(sweep.worked_out(first_possible(sweep))))
 
 
-def refuse_other_kernel(config: str, begun: Mapping[str, Any], place: Path) -> None:
+def refuse_other_kernel(sweep: Sweep, begun: Mapping[str, Any], place: Path) -> None:
     """Refuse to go on with members that were begun with another kernel than the one that is found now.
 
     Raises:
         RunFolderError: its bytes differ.
     """
-    refuse_others(begun, kernel_of_members(config), place)
+    refuse_others(begun, kernel_of_members(sweep.experiment.text, sweep.experiment.source), place)
 
 
 def first_possible(sweep: Sweep) -> int:
@@ -97,13 +97,13 @@ def hidden_of(sweep: Sweep) -> tuple[str, ...]:
 
 
 def tile_image(
-    config: str, members: Sequence[int], keep: Sequence[str], apart: bool | None, data: str = ""
+    config: str, source: str, members: Sequence[int], keep: Sequence[str], apart: bool | None, data: str = ""
 ) -> bytes:
     """Run members of a sweep's config and keep items (``items_of``): the sealed file of their tile; ``data``:
     the folder of what members are fitted to.
     """
     began, cpu = time.perf_counter(), time.process_time()
-    sweep = sweep_of(config)
+    sweep = sweep_of(config, source)
     results = run_members(sweep, members, [plain(item) for item in keep], apart, Path(data))
     made = {
         "engines": dict(results.engines),
@@ -114,7 +114,7 @@ def tile_image(
         "finished_at": provenance.now(),
         "cpu_model": provenance.cpu_model(),
         **{f"version_{name}": version for name, version in provenance.versions().items()},
-        **kernel_of_members(config),
+        **kernel_of_members(config, source),
     }
     return Tile(
         sweep.experiment.sha256,
@@ -146,7 +146,7 @@ def run_members(
     hidden = hidden_of(sweep)
     done = Batched([], [], list(range(len(members))), why_alone(sweep, keep))
     if not done.why:
-        done = batches_of(sweep.experiment.text).run(members, keep, apart)
+        done = batches_of(sweep.experiment.text, sweep.experiment.source).run(members, keep, apart)
     for place in done.left:
         member = partial(lambda member: run(sweep.experiment_of(member), out=None), members[place])
         with naming_member(members[place]):
@@ -157,17 +157,17 @@ def run_members(
 
 
 @lru_cache(maxsize=4)
-def batches_of(config: str) -> BatchTiles:
+def batches_of(config: str, source: str) -> BatchTiles:
     """The families of a config's sweep, traced once per process."""
-    sweep = sweep_of(config)
+    sweep = sweep_of(config, source)
     return BatchTiles(sweep, hidden_of(sweep))
 
 
-def get_ready(config: str) -> None:
+def get_ready(config: str, source: str) -> None:
     """Trace and compile in this process what most members of a config's sweep need; nothing is integrated."""
-    sweep = sweep_of(config)
+    sweep = sweep_of(config, source)
     if not why_alone(sweep, sweep.table.keep):
-        batches_of(config).compile()
+        batches_of(config, source).compile()
 
 
 def single_member(experiment: Experiment, member: int) -> Experiment:

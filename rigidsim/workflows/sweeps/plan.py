@@ -74,7 +74,7 @@ def check_sweep(sweep: Sweep, *, every: bool = True, each: Each = map) -> Initia
         if accepted < sweep.count and sweep.count > _ALL:
             problems = _worked_out(sweep, _OF_AN_AXIS)
         if refused and not problems:
-            errors, _ = batches_of(sweep.experiment.text).refused(refused)
+            errors, _ = batches_of(sweep.experiment.text, sweep.experiment.source).refused(refused)
             told = [sweep.blamed(member, errors[member]) for member in refused if member in errors]
             problems = [problem for error in told for problem in error.problems]
         if not problems and accepted < sweep.count <= _ALL and every and not sweep.fits:
@@ -110,13 +110,14 @@ def _shares(sweep: Sweep, each: Each) -> Iterable[Share]:
     if why_alone(sweep, ()) not in ("", "wall_time", "asked"):
         return []
     edges = [*range(0, sweep.count, _AT_ONCE), sweep.count]
-    return each(refused_of, [(sweep.experiment.text, *ends) for ends in itertools.pairwise(edges)])
+    text, source = sweep.experiment.text, sweep.experiment.source
+    return each(refused_of, [(text, source, *ends) for ends in itertools.pairwise(edges)])
 
 
-def refused_of(share: tuple[str, int, int]) -> Share:
-    """Of a share (config, first, stop): members that no run accepts, and how many can be run together."""
-    config, begin, end = share
-    refused, accepted = batches_of(config).refused(range(begin, end), _MOST_TOLD)
+def refused_of(share: tuple[str, str, int, int]) -> Share:
+    """Of a share (config, source, first, stop): members no run accepts, and how many can be run together."""
+    config, source, begin, end = share
+    refused, accepted = batches_of(config, source).refused(range(begin, end), _MOST_TOLD)
     return sorted(refused)[:_MOST_TOLD], accepted
 
 
@@ -194,7 +195,10 @@ def _member_seconds(sweep: Sweep, made: RunPlan) -> float:
     seconds = predicted.integration_seconds + predicted.recording_seconds
     if (fit := sweep.base.config.fit) is not None:
         return fit.starts * _RUNS_OF_A_FIT * seconds + max(predicted.building_seconds, _BUILD_SECONDS)
-    if why_alone(sweep, sweep.table.keep) or batches_of(sweep.experiment.text).apart is not None:
+    if (
+        why_alone(sweep, sweep.table.keep)
+        or batches_of(sweep.experiment.text, sweep.experiment.source).apart is not None
+    ):
         beside = predicted.choosing_seconds + predicted.modelling_seconds
         return seconds + max(predicted.building_seconds, _BUILD_SECONDS) + beside
     each = _ESTIMATED if sweep.base.config.output.estimate else 1.0

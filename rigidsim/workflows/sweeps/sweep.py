@@ -173,10 +173,11 @@ def run_sweep(
             if beside is not None and files:
                 keep_data(files, beside, folder.data)
             way.data = str(folder.data.absolute())
+            way.source = wanted.experiment.source
             for begun in folder.generations() if reads_kernels(wanted.base) else ():
                 for tile in folder.present(begun).nonzero()[0][:1].tolist():
                     made = folder.read(begun, tile).made
-                    refuse_other_kernel(wanted.experiment.text, made, folder.tile(begun, tile))
+                    refuse_other_kernel(wanted, made, folder.tile(begun, tile))
             generation = _generation(wanted, folder, length, exclusive=share is not None)
             interrupted = _run_tiles(folder, generation, way, share, observer)
             all_there = bool(folder.present(generation).all())
@@ -210,7 +211,7 @@ def _refuse_other(wanted: Sweep, folder: SweepFolder) -> None:
     """
     for config in [g.config for g in folder.generations()[-1:]] or folder.finished_config():
         try:
-            same = identity(sweep_of(config)) == identity(wanted)
+            same = identity(sweep_of(config, wanted.experiment.source)) == identity(wanted)
         except ConfigError:  # edited, or of a version that had other keys
             same = False
         if not same:
@@ -241,7 +242,7 @@ def _generation(wanted: Sweep, folder: SweepFolder, length: int | None, *, exclu
     latest = [g for g in generations[-1:] if g.config_sha256 == wanted.experiment.sha256]
     if latest and len(generations) == 1:
         return latest[0]
-    known = [(g, sweep_of(g.config)) for g in generations]
+    known = [(g, sweep_of(g.config, wanted.experiment.source)) for g in generations]
     if latest and not sources_of(wanted, folder, known, to_come=latest[0]).works():
         return latest[0]  # otherwise tiles of an earlier one are gone
     works = sources_of(wanted, folder, known).works()
@@ -255,7 +256,11 @@ def _apart(wanted: Sweep, generations: Sequence[Generation]) -> bool | None:
     """See ``Generation``: as it was found first, so that more members don't change those that are there."""
     if generations:
         return generations[0].apart
-    return None if why_alone(wanted, ()) else batches_of(wanted.experiment.text).apart is not None
+    return (
+        None
+        if why_alone(wanted, ())
+        else batches_of(wanted.experiment.text, wanted.experiment.source).apart is not None
+    )
 
 
 def _run_tiles(
@@ -287,7 +292,9 @@ def _run_tiles(
 def _completed(wanted: Sweep, folder: SweepFolder, wall: float, cpu: float) -> SavedSweep:
     """Write dataset and summary once all tiles are there."""
     generations = folder.generations()
-    sources = sources_of(wanted, folder, [(g, sweep_of(g.config)) for g in generations])
+    sources = sources_of(
+        wanted, folder, [(g, sweep_of(g.config, wanted.experiment.source)) for g in generations]
+    )
     reader = TileReader(folder, generations)
     found = gather(sources, reader)
     summary = summary_of(wanted, sources, reader, found, wall, cpu)

@@ -35,7 +35,7 @@ def verify_sweep(
         raise RunFolderError(f"{saved.place}: is {saved.status}; {RESUME} completes it")
     with saved.dataset as dataset:
         sweep = sweep_of(str(dataset.attrs["config"]))
-        refuse_other_kernel(sweep.experiment.text, saved.outcome.provenance, saved.folder.dataset)
+        refuse_other_kernel(sweep, saved.outcome.provenance, saved.folder.dataset)
         problems = _problems(saved, dataset, sweep)
         chosen = sorted(random.Random(seed).sample(range(sweep.count), min(members, sweep.count)))
         differing: dict[str, None] = {}

@@ -35,20 +35,23 @@ _WATCH_SECONDS = 1.0
 
 
 def task(
-    generation: Generation, tile: int, data: str
-) -> tuple[str, list[int], tuple[str, ...], bool | None, str]:
+    generation: Generation, tile: int, source: str, data: str
+) -> tuple[str, str, list[int], tuple[str, ...], bool | None, str]:
     """Arguments of ``tile_image`` for a tile."""
     work, _ = generation.work_of(tile)
-    return generation.config, generation.members_of(tile).tolist(), work.keep, generation.apart, data
+    members = generation.members_of(tile).tolist()
+    return generation.config, source, members, work.keep, generation.apart, data
 
 
 class Way:
     """Computes tiles; no bit depends on which way is used. This one does in this process, one by one.
 
     Attributes:
+        source: where the config is from, by which its kernels are found.
         data: folder of what members are fitted to, where they are fits.
     """
 
+    source = ""
     data = ""
 
     def ready_for(self, sweep: Sweep) -> AbstractContextManager[object]:
@@ -66,7 +69,7 @@ class Way:
         if no more can be computed.
         """
         for tile in tiles:
-            yield tile, tile_image(*task(generation, tile, self.data))
+            yield tile, tile_image(*task(generation, tile, self.source, self.data))
 
 
 class Workers(Way):
@@ -86,7 +89,7 @@ class Workers(Way):
             try:
                 with suppress(BrokenProcessPool):  # whatever goes wrong is told when tiles need it
                     for _ in range(min(self._count, sweep.count)):
-                        self._pool.submit(get_ready, sweep.experiment.text)
+                        self._pool.submit(get_ready, sweep.experiment.text, sweep.experiment.source)
                 yield
             finally:
                 self._end()
@@ -125,7 +128,9 @@ class Workers(Way):
             while waiting and len(running) < 2 * self._count:  # one task ahead for each worker
                 tile = waiting[-1]  # keeps waiting if the pool broke just now and takes no more
                 running[
-                    pool.submit(leave_tile, self._between / str(tile), *task(generation, tile, self.data))
+                    pool.submit(
+                        leave_tile, self._between / str(tile), *task(generation, tile, self.source, self.data)
+                    )
                 ] = tile
                 waiting.pop()
             done, _ = wait(running, timeout=0.5, return_when=FIRST_COMPLETED)
@@ -194,6 +199,6 @@ def _begin_worker(parent: int, between: Path) -> None:
         while os.getppid() == parent:
             time.sleep(_WATCH_SECONDS)
         shutil.rmtree(between, ignore_errors=True)  # a parent that was killed can't do this itself
-        os._exit(1)
+        os._exit(1)  # by which alone a thread ends the whole process, whatever the others do
 
     threading.Thread(target=watch, name="rigidsim watch", daemon=True).start()
