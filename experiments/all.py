@@ -1,7 +1,7 @@
 """Do all studies pass? Runs each at reduced length (--full: at full length) and prints one table.
 
 Held against: every study's own published numbers and closed forms. A study that breaks down counts as failed.
-A new study is one more name in STUDIES: a module of this folder with ``study(full, out)``.
+A new study is one more name in STUDIES: a module of this folder with ``study(full)`` under ``@Study``.
 
 Run: python -m experiments.all [--full] [--out DIR] [NAME ...]      exit code 1 if anything failed
 """
