@@ -56,8 +56,8 @@ def refuse_scene(scene: Scene, loads: Sequence[Load]) -> None:
         against = "the body has a position and flies"
     elif against:
         pass
-    elif strange := [load.unaveraged for load in having(Unaveraged, loads)]:
-        against, instead = strange[0]
+    elif unfit := [load.unaveraged for load in having(Unaveraged, loads)]:
+        against, instead = unfit[0]
     elif not loads:
         against = "no torque acts, so that the direction of the angular momentum rests"
     elif max(scene.body.principal_moments) == min(scene.body.principal_moments):

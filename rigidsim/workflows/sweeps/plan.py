@@ -33,7 +33,9 @@ _AT_ONCE = 4096
 QUICK = 1_000_000
 """Up to this many members are all checked for a plan; a sweep checks all."""
 Share = tuple[list[int], int]
-Each = Callable[[Callable[[tuple[str, int, int]], Share], list[tuple[str, int, int]]], Iterable[Share]]
+Each = Callable[
+    [Callable[[tuple[str, str, int, int]], Share], list[tuple[str, str, int, int]]], Iterable[Share]
+]
 
 _SECONDS_OF_A_TILE, _LEAST_SECONDS = 5.0, 2.0
 _SHARE_OF_A_TILE = 32
