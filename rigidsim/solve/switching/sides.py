@@ -92,6 +92,7 @@ class Probe:
         field = [right for _, right in system.equations]
         options = {"compact_mode": True, **precision.options}
         read = [*system.surfaces, *system.turning, *system.signed]
+        self._read = len(read)
         spin = [hy.sum([w * w for w in system.mechanics.rates])] if self.unturned else []
         self._values = hy.cfunc([*read, *spin, *named], variables, **options)
         found = [c.expression for c in system.crossings]
@@ -107,7 +108,7 @@ class Probe:
     ) -> tuple[np.ndarray, list[float], list[float]]:
         """Arguments in the run's precision; the plain angles and the plain quaternion if needed."""
         found = self._values(np.array(state), pars=pars, time=time)
-        rest = [float(x) for x in found[self.surfaces : self.surfaces + len(self.unturned)]]
+        rest = [float(x) for x in found[self.surfaces : self._read]]
         return found[: self.surfaces], rest[: self._angles], rest[self._angles :]
 
     def rate(self, state: np.ndarray, time: Scalar, pars: np.ndarray) -> float:
