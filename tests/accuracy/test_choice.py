@@ -212,11 +212,11 @@ class Magnet(LoadModel):
     conservative = True
 
     def torque(self, m: Any) -> Any:
-        field, size = m.matrix[0], m.scene.context.ldexp(m.scene.context.mpf("0.3"), -m.scaling.energy)
+        field, size = m.matrix[0], m.scene.context.mpf("0.3")  # N m
         return [([-size, 0, 0], field[1]), ([0, size, 0], field[0])]
 
     def potential(self, m: Any) -> Any:
-        size = m.scene.context.ldexp(m.scene.context.mpf("0.3"), -m.scaling.energy)
+        size = m.scene.context.mpf("0.3")  # J
         return -m.number(size) * m.matrix[0][2]
 
 
