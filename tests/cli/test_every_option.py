@@ -19,6 +19,7 @@ import rigidsim
 from rigidsim.cli import app as cli
 from rigidsim.cli.app import app
 from rigidsim.look import viewer
+from rigidsim.look.film import vulkan_drivers
 
 # a line of the command's arguments, and the code it ends with
 QUICK = {
@@ -189,6 +190,9 @@ def test_a_quick_line(line: str, made: Path, monkeypatch: pytest.MonkeyPatch) ->
 @pytest.mark.slow
 @pytest.mark.parametrize("line", LONG)
 def test_a_long_line(line: str, made: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    if any(option in line for option in ("--gif", "--mp4", "--png")) and not vulkan_drivers():
+        pytest.skip("no Vulkan driver: apt-get install mesa-vulkan-drivers")
+
     def closed_at_once(path: Path, *, web: bool) -> int:
         return 0
 
