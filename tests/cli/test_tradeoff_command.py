@@ -30,7 +30,7 @@ def test_table_dataset_and_figure(config: Callable[..., str], rigidsim_command: 
 
     again = rigidsim_command("tradeoff", name, "--budget", "25")
     assert again.exit_code == 2
-    assert "there is an earlier measurement; give --force" in again.stderr
+    assert "tradeoff.h5: exists; --force replaces it" in again.stderr
 
     # what it advises can be run
     for row in result["advice"][:2]:
