@@ -1,8 +1,8 @@
 """Outputs that the documentation shows are those of the code.
 
-Above a shown output stands a marker, ``<!-- output: COMMAND -->`` (or ``slow output``, compared by hand;
-``studies output``: the tests of the studies compare it, study by study). A fenced block below it is all that
-the command prints on stdout, a table below it the command's table, row by row.
+Above a shown output stands a marker, ``<!-- output: COMMAND -->`` (or ``slow output``, compared by hand).
+A fenced block below it is all that the command prints on stdout, a table below it the command's table, row by
+row.
 ``python tests/test_documented_outputs.py [FILE...]`` writes them anew: when numbers are meant to move.
 
 They agree in every word, and number by number:
@@ -39,7 +39,7 @@ PAGES = [
     *sorted((ROOT / "experiments").glob("*.md")),
 ]
 _BLOCK = r"(```\n.*?^```$|(?:\|[^\n]*\n)+)"
-_MARKER = re.compile(rf"<!-- (?:(slow|studies) )?output: (.+?) -->\n+{_BLOCK}", re.MULTILINE | re.DOTALL)
+_MARKER = re.compile(rf"<!-- (?:(slow) )?output: (.+?) -->\n+{_BLOCK}", re.MULTILINE | re.DOTALL)
 _NUMBER = re.compile(r"(?<![\w.])[-+]?\d[\d,]*(?:\.\d+)?(?:[eE][-+]?\d+)?(?![\w.]*\w)")
 _TIME = re.compile(r"(?<![\w.])\d[\d.]* (?:ns|us|ms|s|min|h)\b")
 _ROUNDING = 1e-13
