@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from rigidsim.accuracy.braking import forecast_pace
 from rigidsim.accuracy.choice import choose_level, chosen
 from rigidsim.accuracy.error_law import (
     attitude_error,
@@ -28,7 +27,7 @@ from rigidsim.solve.sample_block import SampleBlock
 from rigidsim.store.segments import SegmentLimits
 from rigidsim.store.summary import Span, Start, UnderstoodBody
 from rigidsim.store.summary_parts import SummaryPart
-from rigidsim.workflows.plan_levels import LevelCost, compared_levels, timed_pilot
+from rigidsim.workflows.plan_levels import LevelCost, compared_levels, timed_pilot, torques_change_pace
 from rigidsim.workflows.read import Given, as_experiment
 
 _PILOT_SECONDS = 0.5
@@ -88,7 +87,7 @@ class Predicted(SummaryPart):
     """The forecast cost of a run, and its errors.
 
     Attributes:
-        pace: mean length of the first steps over that of all; None if torques change it unpredictably.
+        pace: 1, or None if torques change the length of steps after the pilot's.
         modelling_seconds: CPU time of the full model beside an averaged one.
         free_bytes: free space on the disk; infinite if unknown.
         attitude_error_rad: None without an attitude, or if the method tells its own errors; ``held``: whether
@@ -208,8 +207,7 @@ def plan(
     pilot = timed_pilot(prepared, corrected, pilot_seconds)
     step = math.ldexp(pilot.step, prepared.system.scaling.time)
     duration = float(prepared.scene.samples.last - prepared.scene.start)
-    pace = forecast_pace(prepared, pilot)
-    steps = max(1.0, duration / step * (pace or 1.0))
+    steps = max(1.0, duration / step)
     samples = prepared.clock.count
     room = storage(prepared, Path(out) / prepared.scene.name)
     seconds_per_sample = _seconds_per_sample(prepared, parts, room.row)
@@ -272,7 +270,7 @@ def plan(
         ),
         predicted=Predicted(
             steps=steps,
-            pace=pace,
+            pace=None if torques_change_pace(prepared, pilot) else 1.0,
             integration_seconds=integrate,
             recording_seconds=record,
             building_seconds=building,

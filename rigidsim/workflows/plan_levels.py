@@ -5,12 +5,13 @@ from collections.abc import Sequence
 from contextlib import suppress
 from typing import Any
 
-from rigidsim.accuracy.braking import forecast_pace
 from rigidsim.accuracy.choice import CHEAPEST_FIRST, LevelChoice
 from rigidsim.accuracy.models.modelling import measure_modelling
 from rigidsim.accuracy.models.side_by_side import Unmeasured
 from rigidsim.accuracy.motion import Pilot, run_pilot
 from rigidsim.errors import ConfigError
+from rigidsim.model.averaged.torques import reads_rates_alone
+from rigidsim.model.capabilities import gradient_source_of
 from rigidsim.model.load import Load
 from rigidsim.scene.choices import FULL
 from rigidsim.scene.config import Experiment
@@ -58,7 +59,7 @@ def compared_levels(
             found.append(LevelCost(**row, why_not="; ".join(problem.what for problem in error.problems)))
             continue
         pilot = timed_pilot(prepared, assemble(prepared).steps(), _PILOT_SECONDS)
-        steps = math.ceil(pilot.whole * (forecast_pace(prepared, pilot) or 1.0))
+        steps = math.ceil(pilot.whole)
         row |= {"steps": float(steps), "cpu_seconds": steps * pilot.seconds_per_step}
         if level == FULL:
             row["error_rad"] = 0.0
@@ -83,3 +84,14 @@ def timed_pilot(prepared: InitialValueProblem, corrected: CorrectedStepper, seco
         chunk=1,
         largest_chunk=_LARGEST_CHUNK,
     )
+
+
+def torques_change_pace(prepared: InitialValueProblem, pilot: Pilot) -> bool:
+    """Whether steps get longer or shorter after the pilot's, since torques that are functions of the rates
+    brake the rotation, or spin it up.
+    """
+    plan, clock = prepared.system.plan, prepared.clock
+    alone = [load for load in plan.loads if gradient_source_of(load) is None]
+    braked = plan.formulation.resolves_rotation and alone and all(map(reads_rates_alone, alone))
+    ahead = pilot.taken * pilot.step < float(clock.at(clock.count - 1)) - float(clock.start)
+    return bool(prepared.has_steps and braked and ahead)

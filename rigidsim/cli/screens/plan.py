@@ -44,7 +44,7 @@ def print_plan(plan: RunPlan) -> None:
     _print_levels(plan.levels, on)
     if plan.accuracy is not None:
         on.line("chosen", f"{plan.accuracy.chosen}: {plan.accuracy.why}")
-    first = "" if predicted.pace == 1 else " at first"
+    first = "" if predicted.pace is not None else " at first"
     on.line(
         "forecast",
         f"{predicted.steps:.3g} steps of about {span_text(pilot.step)}{first} "
@@ -54,9 +54,6 @@ def print_plan(plan: RunPlan) -> None:
     )
     if predicted.pace is None:
         on.line("", "with steps as at the start, which torques change: fewer where they brake the rotation")
-    elif predicted.pace != 1:
-        told = f"{predicted.pace:.2g} times as many a second as at first"
-        on.line("", f"torques change the rotation: steps are {told}, on average")
     for warning in plan.warnings:
         on.line("warning", warning, "bold red")
     error = predicted.attitude_error_rad
