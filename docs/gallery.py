@@ -1,53 +1,40 @@
-"""The gallery: every ready config with its picture, what to look for in it, and its numbers.
+"""Pictures and numbers of the gallery: every ready config is run for them.
 
-``python -m docs.gallery [NAME...]`` runs the configs, draws what ``rigidsim plot`` draws of each (or of those
-named) into docs/figures/gallery, and writes docs/gallery.md. ``--timelines`` draws their timelines instead,
-as ``rigidsim view --png`` does, for which the rerun viewer needs a renderer (a software one will do).
-``--table`` prints the table of numbers alone, which the tests compare with the one on the page.
+``python -m docs.gallery [NAME...]`` runs the configs, draws the figure of ``rigidsim plot`` for all, or for the
+named ones, into docs/figures/gallery, and writes the table of docs/gallery.md. ``--timelines`` draws timelines
+instead, as ``rigidsim view --png`` does; the rerun viewer needs a renderer for it (a software one suffices).
+``--table`` only prints the table, which a test compares with the page. The site adds a section for each config
+(``docs/builder/sections.py``).
 """
 
 from __future__ import annotations
 
 import io
-import re
 import sys
 import tempfile
-import textwrap
-import tomllib
 from pathlib import Path
 from typing import Any
 
 import rigidsim
+from docs.builder.sections import CONFIGS, ROOT
 
-ROOT = Path(__file__).resolve().parents[1]
 PAGE = ROOT / "docs" / "gallery.md"
 PICTURES = ROOT / "docs" / "figures" / "gallery"
-CONFIGS = [
-    config
-    for folder in ("", "bodies", "tables")
-    for config in sorted((ROOT / "configs" / folder).glob("*.toml"))
-]
 _DOTS_PER_INCH = 100
 _COLOURS = 256  # of a picture's palette
 _TIMELINE_WIDTH = 1200
-_WIDTH = 140  # of a line of text
-_JOINED = "\0"
 _COLUMNS = (
     "config",
     "states",
-    "precision",
     "steps",
-    "samples",
     "attitude uncertain by, rad",
     "largest drift",
     "of what rounding explains",
 )
-SWEPT_STUDIES = ("apophis_flyby", "flip_sphere", "round_off")
-"""Sweeps whose picture is their study's."""
 
 
-def numbers(run: rigidsim.Run) -> list[str]:
-    """The row of a run."""
+def numbers(run: rigidsim.Run, config: Path) -> list[str]:
+    """The row of a config's run."""
     summary = run.summary
     drifts = [(row["largest_drift"] or 0.0, row["bound"]) for row in summary["invariants"].values()]
     largest, bound = max(drifts, default=(0.0, 1.0))
@@ -56,11 +43,9 @@ def numbers(run: rigidsim.Run) -> list[str]:
     if (averaged := run.dataset.attrs.get("modelling_error")) is not None:
         uncertain = f"axes {averaged:.1e} (model)"
     return [
-        f"`{summary['name']}`",
+        f"[{config.stem}](../{config.relative_to(ROOT).as_posix()})",
         str(len(summary["states"])),
-        summary["precision"],
         str(summary["cost"]["steps"]),
-        str(summary["samples"]),
         uncertain,
         f"{largest:.1e}",
         f"{largest / bound:.1e}",
@@ -68,18 +53,9 @@ def numbers(run: rigidsim.Run) -> list[str]:
 
 
 def table(rows: list[list[str]]) -> str:
-    """All rows below their columns."""
+    """Column names, and all rows below."""
     lines = [_COLUMNS, ["---"] * len(_COLUMNS), *rows]
     return "\n".join("| " + " | ".join(line) + " |" for line in lines)
-
-
-def described(config: Path) -> tuple[str, str]:
-    """Description of a config, and what to look for, from its own comments."""
-    text = config.read_text(encoding="utf-8")
-    comment = re.match(r"(?:#[^\n]*\n)+", text)
-    words = " ".join((line.lstrip("#").strip() for line in comment[0].splitlines()) if comment else ())
-    look = words.partition("What to look for: ")[2] or words
-    return tomllib.loads(text).get("description", ""), (look[:1].upper() + look[1:]).replace("|", "\\|")
 
 
 def picture(run: rigidsim.Run, name: str) -> None:
@@ -96,7 +72,7 @@ def picture(run: rigidsim.Run, name: str) -> None:
 
 
 def timeline(run: rigidsim.Run, folder: Path, name: str) -> None:
-    """What the viewer shows of a run, small.
+    """The viewer's picture of a run, small.
 
     Args:
         folder: for the picture at its full size.
@@ -121,55 +97,8 @@ def _save(drawn: Any, file: str) -> None:
     image.save(PICTURES / file, optimize=True)
 
 
-def page(rows: list[list[str]]) -> str:
-    """docs/gallery.md."""
-    parts = [
-        "<!-- blocks: slow -->\n# Gallery",
-        "Two commands run and draw any config of `configs/` (`python -m docs.gallery` generates this page):",
-        "```sh\nrigidsim run configs/heavy_top_nutating.toml\nrigidsim plot runs/heavy_top_nutating\n```",
-        "Each config has two pictures: the timeline at one moment (`rigidsim view runs/heavy_top_nutating "
-        "--png timeline.png`), and the figure of `plot`. On the documentation's site a *Play* button below "
-        "some pictures loads the scene into rerun's viewer (14 MB once, and 1 MB for each scene).",
-        "## Numbers",
-        "The table gives the announced error of the attitude at the end, the largest drift of any invariant, "
-        "and this drift relative to the rounding bound (50 tolerance sqrt(steps)). An averaged model has the "
-        "error of its axes. A large error with a tiny drift means that the motion amplifies errors: the body "
-        "flips, or falls.",
-        "<!-- slow output: python -m docs.gallery --table -->\n" + table(rows),
-    ]
-    for config in CONFIGS:
-        description, look = described(config)
-        parts.append(f"## {config.stem}")
-        path = config.relative_to(ROOT).as_posix()
-        parts.append(f"*{description}.* [{config.name}](../{path})")
-        parts.append(look)
-        parts.append(f"![Its timeline](figures/gallery/{config.stem}_timeline.png)")
-        parts.append(f"![Figure drawn by rigidsim plot](figures/gallery/{config.stem}.png)")
-    parts.append("## Sweeps")
-    for config in sorted((ROOT / "configs" / "sweeps").glob("*.toml")):
-        description, _ = described(config)
-        parts.append(
-            f"*{description}.* [{config.name}](../configs/sweeps/{config.name}), by `rigidsim sweep`."
-        )
-        drawn_by = "its study" if config.stem in SWEPT_STUDIES else "rigidsim plot"
-        parts.append(f"![Figure drawn by {drawn_by}](figures/{config.stem}.png)")
-    parts.append(
-        "[Studies](../experiments/README.md) answer questions about such scenes, each with one command."
-    )
-    return "\n\n".join(_wrapped(part) for part in parts) + "\n"
-
-
-def _wrapped(part: str) -> str:
-    """A paragraph in lines as long as those of other pages; anything else as it is."""
-    if part.startswith(("<!--", "#", "```", "![")):
-        return part
-    # a dash or a sum must not begin a line, which would make a list of it
-    kept = re.sub(r" (?=[-+*] )", _JOINED, part)
-    return textwrap.fill(kept, _WIDTH, break_long_words=False, break_on_hyphens=False).replace(_JOINED, " ")
-
-
 def main(given: list[str]) -> None:
-    """Run, draw and write; or print the table alone."""
+    """Run, draw and write; or only print the table."""
     alone, timelines = "--table" in given, "--timelines" in given
     named = {name for name in given if not name.startswith("-")}
     rows = []
@@ -178,7 +107,7 @@ def main(given: list[str]) -> None:
             print(config.stem, file=sys.stderr, flush=True)
             wanted = not named or config.stem in named
             run = rigidsim.run(config, out=folder, changes={"output.timeline": timelines and wanted})
-            rows.append(numbers(run))
+            rows.append(numbers(run, config))
             if timelines and wanted:
                 timeline(run, Path(folder), config.stem)
             elif not alone and wanted:
@@ -186,7 +115,9 @@ def main(given: list[str]) -> None:
     if alone:
         print(table(rows))
     else:
-        PAGE.write_text(page(rows), encoding="utf-8")
+        text = PAGE.read_text(encoding="utf-8")
+        lines = [line for line in text.splitlines() if line.startswith("|")]
+        PAGE.write_text(text.replace("\n".join(lines), table(rows)), encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -14,6 +14,7 @@ from pathlib import Path
 
 import notebooks
 import scenes
+import sections
 
 ROOT = Path(__file__).resolve().parents[2]
 ELSEWHERE = {
@@ -53,7 +54,7 @@ def gather(folder: Path, root: Path = ROOT, *, run: bool = False) -> list[Path]:
         if page.suffix == ".ipynb":
             text = notebooks.as_page(page, target.parent / "pictures" if run else None)
         else:
-            text = page.read_text(encoding="utf-8")
+            text = sections.with_sections(page.read_text(encoding="utf-8"))
         if run and place in scenes.PAGES:
             text = scenes.with_buttons(text)
         target.write_text(_linked(text, page, folder, root, dead), encoding="utf-8")
