@@ -1,10 +1,10 @@
 """Pictures and numbers of the gallery: every ready config is run for them.
 
-``python -m docs.gallery [NAME...]`` runs the configs, draws the figure of ``rigidsim plot`` for all, or for the
-named ones, into docs/figures/gallery, and writes the table of docs/gallery.md. ``--timelines`` draws timelines
-instead, as ``rigidsim view --png`` does; the rerun viewer needs a renderer for it (a software one suffices).
-``--table`` only prints the table, which a test compares with the page. The site adds a section for each config
-(``docs/builder/sections.py``).
+``python -m docs.gallery [NAME...]`` runs the configs, draws the figure of ``rigidsim plot`` for all, or for
+the named ones, into docs/figures/gallery, and writes the table of docs/gallery.md. ``--timelines`` draws
+timelines instead, as ``rigidsim view --png`` does; the rerun viewer needs a renderer for it (a software one
+suffices). ``--table`` only prints the table, which a test compares with the page. The site adds a section for
+each config (``docs/builder/sections.py``).
 """
 
 from __future__ import annotations

@@ -136,7 +136,8 @@ class Published(Mapping[str, Preset]):
         return len(self._names)
 
 
-PRESETS = Published(files("rigidsim.scene.bodies") / "published")
+FOLDER = files("rigidsim.scene.bodies") / "published"
+PRESETS = Published(FOLDER)
 
 _ALIKE = 0.01
 """Relative difference up to which a gravitational parameter is that of a known body: for what is written in
