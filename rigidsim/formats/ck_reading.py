@@ -18,7 +18,7 @@ import numpy as np
 
 from rigidsim.errors import RigidsimError
 from rigidsim.formats.trajectories import Trajectory
-from rigidsim.scene.kernels.kernel import KernelError
+from rigidsim.scene.kernels.reading import KernelError
 from rigidsim.scene.kernels.spice import loaded
 from rigidsim.scene.rotations import quaternion_of
 

@@ -28,7 +28,7 @@ from rigidsim.formats.tables import Table
 from rigidsim.scene.epochs import Epoch
 from rigidsim.scene.frame import EQUATOR
 from rigidsim.scene.kernels.ephemeris import EQUATORIAL
-from rigidsim.scene.kernels.kernel import KernelError
+from rigidsim.scene.kernels.reading import KernelError
 from rigidsim.scene.kernels.spice import loaded, spice
 from rigidsim.scene.parts_of_values import parts_in
 from rigidsim.scene.rotations import product, rotation_matrix

@@ -20,7 +20,7 @@ from rigidsim.scene.bodies.field_files import cut
 from rigidsim.scene.bodies.gravity_field import asked_degree
 from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.fields import NAME_OR_VECTOR
-from rigidsim.scene.kernels.finding import EMBEDDED, folders_of
+from rigidsim.scene.kernels.reading import EMBEDDED, folders_of
 from rigidsim.scene.python_values import assignments_of, inline, toml_text
 from rigidsim.scene.registry import LOAD_KINDS
 from rigidsim.scene.schema import Config, config_model

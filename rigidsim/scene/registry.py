@@ -22,7 +22,7 @@ from rigidsim.scene.expressions.names import Names, origin
 from rigidsim.scene.expressions.tree import Expression
 from rigidsim.scene.fields import ConfigTable, Metre, VariableName, refuse
 from rigidsim.scene.kernels.ephemeris import Ephemeris
-from rigidsim.scene.kernels.kernel import Sight
+from rigidsim.scene.kernels.reading import Sight
 from rigidsim.scene.point_masses import PointMasses
 
 

@@ -28,7 +28,7 @@ from rigidsim.scene.rotors import refuse_odd_rotors, turning_inertia
 from rigidsim.scene.sample_times import SampleTimes, sample_times
 
 if TYPE_CHECKING:
-    from rigidsim.scene.kernels.orientation import Orientation
+    from rigidsim.scene.kernels.spice import Orientation
 
 T = TypeVar("T")
 
@@ -240,7 +240,7 @@ def build_scene(experiment: Experiment, context: Any = None) -> Scene:
 def _orientation(table: schema.Output, *around: Any) -> Orientation | None:
     if table.orientation is None and table.orientation_of is None:
         return None
-    from rigidsim.scene.kernels.orientation import resolve_orientation
+    from rigidsim.scene.kernels.spice import resolve_orientation
 
     return resolve_orientation(table, *around)
 

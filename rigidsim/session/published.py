@@ -11,8 +11,8 @@ import numpy as np
 
 from rigidsim.errors import RunFolderError
 from rigidsim.scene.frame import Figure
-from rigidsim.scene.kernels.kernel import KernelError
-from rigidsim.scene.kernels.orientation import Orientation
+from rigidsim.scene.kernels.reading import KernelError
+from rigidsim.scene.kernels.spice import Orientation
 from rigidsim.scene.rotations import product, quaternion_of, rotation_matrix
 from rigidsim.store.variables import Variable
 

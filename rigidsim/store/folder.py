@@ -13,7 +13,7 @@ from typing import ClassVar
 
 from rigidsim.errors import FORCE, OUT, RESUME, RunFolderError, StoppedWritingError, once_mended
 from rigidsim.look.figure_names import FIGURES
-from rigidsim.scene.kernels.finding import NOTE
+from rigidsim.scene.kernels.reading import NOTE
 from rigidsim.store import atomic, provenance, segments
 from rigidsim.store.outputs import ANALYSIS
 from rigidsim.store.summary import Brief, read_summary

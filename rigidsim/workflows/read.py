@@ -16,7 +16,7 @@ import rigidsim.solve.equilibria  # noqa: F401  (each enters what it defines int
 from rigidsim.errors import ConfigError, Problem, RunFolderError, run_again
 from rigidsim.scene.config import Experiment, Overrides, parse
 from rigidsim.scene.config import load as load_file
-from rigidsim.scene.kernels.finding import EMBEDDED, FOLDERS
+from rigidsim.scene.kernels.reading import EMBEDDED, FOLDERS
 from rigidsim.scene.registry import OBSERVABLES
 from rigidsim.scene.scene import build_scene
 from rigidsim.scene.schema import config_model

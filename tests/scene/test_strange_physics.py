@@ -13,7 +13,6 @@ import de421
 import numpy as np
 import pytest
 from kernel_scenes import moon, satellite, system
-from support import cases
 from test_field_files import text as field_scene
 
 from rigidsim import ConfigError, load, parse
@@ -58,7 +57,7 @@ def figure(j2: float = 1e-3, radius: str = "6378 km", pole: str = "[0, 0, 1]") -
 
 
 REFUSED = {
-    "a module": (moon("os"), "which is a package, but none of an ephemeris"),
+    "a module": (moon("os"), "which is no installed package of an ephemeris"),
     "no kernel": (moon().replace('[ephemeris]\nkernel = "de421"\n', ""), "neither [[bodies]] nor an [ephem"),
     "with the body itself": (moon(sources=("earth_moon_barycenter",)), 'contains that of "moon"'),
     "bodies, a part and the whole": (
@@ -153,17 +152,14 @@ def rewritten(file: str, change: Callable[[bytes], bytes]) -> Callable[[Path], o
 
 DAMAGED = {
     "header": (rewritten("constants.npy", lambda x: x[:20] + b"z" + x[21:]), "constants.npy is damaged"),
-    "ratio of masses": (constant("EMRAT", 8.13), "EMRAT is 8.13, which is 81.3 in all kernels"),
-    "strength": (constant("GMB", 1.8e-9), "G M of earth is"),
-    "span": (constant("jalpha", 2524624.5), "it ends at JD 2524624.5, and begins at 2524624.5"),
-    "metres": (blocks("moon", lambda x: 1000 * x), '"earth" moves at 17.7 to 42.9'),
-    "another's": (blocks("sun", lambda x: np.load(PACKAGE / "jpl-venus.npy")), '"sun" is '),
+    "cut": (rewritten("jpl-moon.npy", lambda x: x[:-8]), "jpl-moon.npy is damaged or truncated"),
+    "span": (constant("jalpha", 2524624.5), "its span is empty"),
+    "torn": (blocks("sun", lambda x: x * (1 + (np.arange(len(x)) == 9))[:, None, None]), "block 10 does"),
 }
 
 
 @pytest.mark.parametrize("name", DAMAGED)
 def test_damaged_packages_are_refused(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A package of which no installer noted anything: its numbers alone tell."""
     damage, words = DAMAGED[name]
     own = f"kernel_{list(DAMAGED).index(name)}"  # an own name: found modules are remembered
     package(tmp_path, own, damage)
@@ -171,34 +167,18 @@ def test_damaged_packages_are_refused(name: str, tmp_path: Path, monkeypatch: py
     with pytest.raises(ConfigError) as caught:
         prepare(parse(moon(own)))
     assert words in str(caught.value)
-    assert f"install {own} again" in str(caught.value) or "take the file anew" in str(caught.value)
+    assert f"install {own} again" in str(caught.value)
 
 
-@pytest.mark.parametrize("command", cases(["check", "run", "plan"], ["check"]))
-def test_one_bit_of_an_installed_package_is_noticed(tmp_path: Path, command: str) -> None:
-    """By what its installer noted, through the command line; and nothing in the package is run."""
-
-    def damage(place: Path) -> None:
-        (place / "__init__.py").write_text("raise SystemExit(3)")
-        if command != "plan":
-            data = bytearray((place / "jpl-moon.npy").read_bytes())
-            data[4_000_000] ^= 1
-            (place / "jpl-moon.npy").write_bytes(data)
-
-    package(tmp_path, "de421", damage)
+def test_no_code_of_a_package_is_run(tmp_path: Path) -> None:
+    package(tmp_path, "de421", lambda place: (place / "__init__.py").write_text("raise SystemExit(3)"))
     (tmp_path / "moon.toml").write_text(moon(time='end = "1 day"'))
     places = [str(tmp_path), str(Path(__file__).parents[2])]
     found = subprocess.run(
-        [sys.executable, "-m", "rigidsim", command, "moon.toml"],
+        [sys.executable, "-m", "rigidsim", "plan", "moon.toml"],
         cwd=tmp_path,
-        env={**os.environ, "PYTHONPATH": os.pathsep.join(places), "COLUMNS": "500"},
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(places)},
         capture_output=True,
         text=True,
     )
-    if command == "plan":
-        assert found.returncode == 0, found.stderr
-        return
-    assert found.returncode == 2
-    words = " ".join(found.stderr.split())
-    assert "jpl-moon.npy is damaged or truncated (its SHA-256 isn't the one that" in words
-    assert not (tmp_path / "runs").exists()
+    assert found.returncode == 0, found.stderr

@@ -12,7 +12,7 @@ from kernels import write_spk
 from support import IMPATIENT
 
 import rigidsim
-from rigidsim.scene.kernels.finding import FOLDERS
+from rigidsim.scene.kernels.reading import FOLDERS
 from rigidsim.session.session import Tuning
 from rigidsim.solve.sampler import Pacing
 

@@ -9,7 +9,7 @@ from rigidsim.errors import ConfigError, Problem
 from rigidsim.model.load_words import length_text, span_words
 from rigidsim.scene.cautions import Caution, WarningCode
 from rigidsim.scene.effect_parts import EffectPart
-from rigidsim.scene.kernels.kernel import Sight
+from rigidsim.scene.kernels.reading import Sight
 from rigidsim.scene.registry import SceneLoad, Surroundings, names_of
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.schema import Config

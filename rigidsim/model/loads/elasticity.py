@@ -44,7 +44,7 @@ from rigidsim.model.two_part import rounded
 from rigidsim.scene.arithmetic import Matrix, Vector, apply, dot, norm, working_epsilon
 from rigidsim.scene.attitude import rotation_matrix
 from rigidsim.scene.cautions import Caution
-from rigidsim.scene.kernels.kernel import Sight
+from rigidsim.scene.kernels.reading import Sight
 from rigidsim.scene.point_masses import GRAVITATIONAL_CONSTANT
 from rigidsim.scene.registry import Surroundings, register_of_body
 from rigidsim.scene.scene import Scene

@@ -28,7 +28,7 @@ from rigidsim.scene.cautions import Caution
 from rigidsim.scene.epochs import J2000, Epoch
 from rigidsim.scene.fields import BodyName, GravitationalParameter, Metre, Triple
 from rigidsim.scene.frame import ECLIPTIC
-from rigidsim.scene.kernels.kernel import Sight
+from rigidsim.scene.kernels.reading import Sight
 from rigidsim.scene.orbit_keys import OrbitFields
 from rigidsim.scene.orbits import KeplerOrbit, attracting_body, resolve_orbit, resolve_tabulated_orbit
 from rigidsim.scene.registry import Surroundings, register_load

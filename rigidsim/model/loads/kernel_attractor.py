@@ -26,7 +26,7 @@ from rigidsim.model.plausibility import about_named_strength, about_start, named
 from rigidsim.model.rotations import Symbolic, length
 from rigidsim.scene.arithmetic import Vector, dot, norm, unit_vectors
 from rigidsim.scene.cautions import Caution, WarningCode
-from rigidsim.scene.kernels.kernel import Sight
+from rigidsim.scene.kernels.reading import Sight
 from rigidsim.scene.registry import Surroundings
 from rigidsim.scene.scene import Scene
 

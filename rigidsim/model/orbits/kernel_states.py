@@ -32,7 +32,7 @@ from rigidsim.model.scaling import Rounder
 from rigidsim.model.state_blocks import StateBlock
 from rigidsim.model.two_part import as_factor, rounded
 from rigidsim.scene.kernels.ephemeris import Ephemeris
-from rigidsim.scene.kernels.kernel import Sight
+from rigidsim.scene.kernels.reading import Sight
 from rigidsim.scene.kernels.series import BlockSeries, chebyshev, exactly
 from rigidsim.scene.scene import Scene
 

@@ -19,7 +19,7 @@ from rigidsim.model.rotations import Symbolic
 from rigidsim.scene.arithmetic import Vector
 from rigidsim.scene.cautions import Caution
 from rigidsim.scene.kernels.ephemeris import Ephemeris
-from rigidsim.scene.kernels.kernel import Sight
+from rigidsim.scene.kernels.reading import Sight
 from rigidsim.scene.registry import Surroundings
 from rigidsim.scene.scene import Scene
 

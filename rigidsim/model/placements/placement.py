@@ -17,7 +17,7 @@ from rigidsim.model.rotations import Symbolic
 from rigidsim.scene.arithmetic import Vector
 from rigidsim.scene.cautions import Caution
 from rigidsim.scene.epochs import Epoch
-from rigidsim.scene.kernels.kernel import Sight
+from rigidsim.scene.kernels.reading import Sight
 from rigidsim.scene.orbit_tables.pieces import TabulatedOrbit
 from rigidsim.scene.orbits import KeplerOrbit
 from rigidsim.scene.registry import LoadFields

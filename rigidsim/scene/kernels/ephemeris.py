@@ -15,8 +15,7 @@ from rigidsim.scene.arithmetic import Vector
 from rigidsim.scene.epochs import J2000, Epoch
 from rigidsim.scene.fields import ConfigTable
 from rigidsim.scene.frame import ECLIPTIC, OBLIQUITY
-from rigidsim.scene.kernels.finding import kernel_of
-from rigidsim.scene.kernels.kernel import DAY, J2000_DATE, Kernel, KernelError, Sight
+from rigidsim.scene.kernels.reading import DAY, J2000_DATE, Kernel, KernelError, Sight, kernel_of
 from rigidsim.scene.kernels.series import exactly
 from rigidsim.scene.validation_messages import nearest, shown
 

@@ -1,7 +1,8 @@
-"""Kernels read through jplephem: packages such as ``de421``, and SPK files.
+"""Kernels: bodies, the series that place them relative to each other, and constants.
 
-In a package the Moon is geocentric and all else barycentric, the Earth with the Moon as their barycentre; in
-an SPK file each segment tells its own centre.
+A package such as ``de421`` has a file of coefficients for each body: the Moon is geocentric there and all
+else barycentric, the Earth with the Moon as their barycentre. In an SPK file, which is made of SPICE's arrays
+of doubles (NAIF, "DAF Required Reading" and "SPK Required Reading"), each segment names its own centre.
 """
 
 from __future__ import annotations
@@ -9,23 +10,29 @@ from __future__ import annotations
 import hashlib
 import importlib
 import importlib.util
+import os
 import re
-from collections.abc import Callable
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
 from fractions import Fraction
-from functools import cached_property, lru_cache
+from functools import lru_cache
 from pathlib import Path
-from types import ModuleType, SimpleNamespace
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 
-from rigidsim.scene.kernels.kernel import DAY, J2000_DATE, Kernel, KernelError
-from rigidsim.scene.kernels.series import BlockSeries, joined
-from rigidsim.scene.kernels.soundness import refuse_constants, refuse_exchanged
+from rigidsim.scene.arithmetic import Vector
+from rigidsim.scene.kernels.series import BlockSeries, exactly, joined
 from rigidsim.scene.validation_messages import nearest
 
-T = TypeVar("T")
-
+J2000_DATE = Fraction(2451545)
+DAY = 86400
+FOLDERS = "RIGIDSIM_KERNELS"
+"""Environment variable with folders in which kernels are looked for by their names."""
+EMBEDDED = " (embedded config)"
+"""What follows a dataset's path where that stands for the config in it."""
+NOTE = ".kernel"
+"""File of a run's folder with the places of its kernels, where they are looked for, too."""
 _EXTRA = "pip install 'rigidsim[ephemeris]'"
 _PACKAGES = ("de405", "de406", "de421", "de422", "de423")
 _STRENGTHS = {
@@ -36,90 +43,137 @@ _CUBIC_KILOMETRE = 10**9  # m^3
 _BARYCENTER = "earth_moon_barycenter"
 _FRAME = 1  # of SPICE: J2000, which DE kernels since DE403 identify with the ICRF
 _TYPES = (2, 3)
-_LARGEST_CACHED = 4
-_RECORD = 1024  # bytes, of SPK files
+_RECORD = 128  # doubles, of SPK files
 _IDENTIFIERS = (b"DAF/SPK", b"NAIF/DAF")  # of SPK files today, and before 1997
+_SUMMARY = np.dtype([("span", "f8", 2), ("whole", "i4", 6)])
 _UNREADABLE = (OSError, ValueError, LookupError, ArithmeticError)
 """What the numbers of a file that isn't what it should be lead to."""
 
 
-def _by_reader(read: Callable[[], T]) -> T:
-    """What jplephem or numpy reads; a ValueError for whatever they find wrong in a file."""
-    try:
-        return read()
-    except (OSError, MemoryError):
-        raise
-    except Exception as error:
-        raise ValueError(_words(error)) from None
+class KernelError(ValueError):
+    """A kernel can't be read, or lacks something; the message goes on from ``given "...",``."""
 
 
-def _jplephem(part: str) -> ModuleType:
-    try:
-        return importlib.import_module(f"jplephem.{part}")
-    except ImportError:
-        what = f"which is read by the package jplephem, which isn't installed: {_EXTRA}"
-        raise KernelError(what) from None
+@dataclass(frozen=True)
+class Sight:
+    """One body of a kernel seen from another: the sum of series, each times an exact factor.
+
+    Attributes:
+        source, host: names of both.
+        links: factors and series.
+    """
+
+    source: str
+    host: str
+    links: tuple[tuple[Fraction, BlockSeries], ...]
+
+    @property
+    def span(self) -> tuple[Fraction, Fraction]:
+        """Times between which it is known, seconds since J2000."""
+        series = [x for _, x in self.links]
+        return max(x.begin for x in series), min(x.end for x in series)
+
+    @property
+    def exponent(self) -> int:
+        """Exponent of a power of two of km of the distance's order."""
+        return max(series.exponent for _, series in self.links)
+
+    def at(self, context: Any, time: Any, order: int = 0) -> Vector:
+        """Vector (mpf, km) at a time (mpf, seconds since J2000), or a derivative of it."""
+        total = [context.zero] * 3
+        for factor, series in self.links:
+            vector, size = series.at(context, time, order), exactly(context, factor)
+            total = [x + size * y for x, y in zip(total, vector, strict=True)]
+        return total
+
+    def sampled(self, times: np.ndarray) -> np.ndarray:
+        """Vectors at times (n,), seconds since J2000, in double precision: (n, 3), km."""
+        found = [float(factor) * series.sampled(times) for factor, series in self.links]
+        return np.sum(found, axis=0)
 
 
-def is_path(given: str) -> bool:
-    """Whether a kernel is given as a file's path rather than a package's name."""
-    return "/" in given or "\\" in given or "." in given
+class Kernel(ABC):
+    """Bodies of one kernel.
 
+    Attributes:
+        name: as in the config, without its place.
+        place: path of its file; None for an installed package.
+    """
 
-# --- packages -----------------------------------------------------------------------------------------------
+    name: str
+    place: Path | None = None
+
+    @property
+    @abstractmethod
+    def bodies(self) -> list[str]:
+        """Names of the bodies, for messages."""
+
+    @abstractmethod
+    def known(self, body: str) -> bool:
+        """Whether it places a body of a name."""
+
+    @abstractmethod
+    def path_of(self, body: str) -> list[tuple[Fraction, BlockSeries]]:
+        """A body's place relative to the solar system's barycentre, as the links of a ``Sight``."""
+
+    @abstractmethod
+    def strength(self, body: str) -> Fraction | None:
+        """Gravitational parameter of a body, m^3/s^2; None if the kernel has none."""
+
+    @property
+    @abstractmethod
+    def digest(self) -> str:
+        """SHA-256 of what was read of it."""
+
+    def sight(self, source: str, host: str) -> Sight:
+        """One body seen from another; ``host`` may be empty, which is the solar system's barycentre."""
+        factors: dict[BlockSeries, Fraction] = {}
+        for sign, path in ((1, self.path_of(source)), (-1, self.path_of(host) if host else [])):
+            for factor, series in path:
+                factors[series] = factors.get(series, Fraction(0)) + sign * factor
+        links = tuple((factor, series) for series, factor in factors.items() if factor != 0)
+        if not links:
+            raise KernelError(f'which has "{source}" where "{host or "the barycentre"}" is')
+        return Sight(source, host, links)
 
 
 class PackagedKernel(Kernel):
-    """A package with one file of coefficients for each body, and a file of constants."""
+    """A package with a file of coefficients for each body, and one of constants; none of its code runs."""
 
     def __init__(self, name: str, folder: Path) -> None:
         self.name, self._folder = name, folder
         self._used: dict[str, BlockSeries] = {}
-        # its files alone count: nothing of the package is run
-        ephem = _jplephem("ephem")
-        module = SimpleNamespace(__name__=name, __file__=str(folder / "__init__.py"))
         try:
-            refuse_exchanged(name, folder / "constants.npy")
-            _by_reader(lambda: np.load(folder / "constants.npy", mmap_mode="r"))  # is as large as it says
-            self._data = _by_reader(lambda: ephem.Ephemeris(module))
-            self.constants = {
-                key: float(value)
-                for key, value in vars(self._data).items()
-                if isinstance(value, float | np.floating)
-            }
-            self._begin, self._end = (Fraction(self.constants[key]) for key in ("jalpha", "jomega"))
-            self._ratio = Fraction(self.constants["EMRAT"])
-            refuse_constants(self.constants, self.strength)
-        except KernelError:
-            raise
+            given = _array(folder / "constants.npy")
+            self._constants = {key.decode("ascii"): float(value) for key, value in given}
+            self._begin, self._end = (Fraction(self._constants[key]) for key in ("jalpha", "jomega"))
+            self._ratio = Fraction(self._constants["EMRAT"])
+            if not self._begin < self._end or self._ratio == -1:
+                raise ValueError("its span is empty")
         except _UNREADABLE as error:
-            raise KernelError(_damaged("constants.npy", error, f"install {name} again")) from None
+            raise _damaged("constants.npy", error, f"install {name} again") from None
 
     @property
     def bodies(self) -> list[str]:
-        found = [x for x in self._data.names if x not in ("librations", "nutations", "earthmoon")]
-        return sorted([*found, "earth", _BARYCENTER])
+        found = {path.stem.removeprefix("jpl-") for path in self._folder.glob("jpl-*.npy")}
+        return sorted({*found, "earth", _BARYCENTER} - {"librations", "nutations", "earthmoon"})
 
     def known(self, body: str) -> bool:
         return body in self.bodies
 
     def _series(self, file: str, target: str, center: str) -> BlockSeries:
-        if target not in self._used:
-            path = self._folder / f"jpl-{file}.npy"
+        if file not in self._used:
+            name = f"jpl-{file}.npy"
             try:
-                given = _by_reader(lambda: np.load(path, mmap_mode="r", allow_pickle=False))
-                span = (self._end - self._begin) * DAY
+                given = _array(self._folder / name)
                 if given.ndim != 3 or given.shape[1] != 3 or given.dtype != np.float64 or 0 in given.shape:
                     raise ValueError(f"an array of {given.dtype} {given.shape}")
                 joined(given)
-                refuse_exchanged(self.name, path)
             except _UNREADABLE as error:
-                remedy = f"install {self.name} again"
-                raise KernelError(_damaged(f"jpl-{file}.npy", error, remedy)) from None
-            begin = (self._begin - J2000_DATE) * DAY
-            plain = given.view(np.ndarray)  # which is quicker to index than a memmap
-            self._used[target] = BlockSeries(target, center, begin, span / len(given), plain)
-        return self._used[target]
+                raise _damaged(name, error, f"install {self.name} again") from None
+            begin, length = (self._begin - J2000_DATE) * DAY, (self._end - self._begin) * DAY / len(given)
+            self._used[file] = BlockSeries(target, center, begin, length, given)
+        return self._used[file]
 
     def path_of(self, body: str) -> list[tuple[Fraction, BlockSeries]]:
         if body not in ("earth", "moon", _BARYCENTER):
@@ -132,37 +186,17 @@ class PackagedKernel(Kernel):
 
     def strength(self, body: str) -> Fraction | None:
         key = _STRENGTHS.get(body, "GMB")
-        if key not in self.constants or "AU" not in self.constants:
+        if key not in self._constants or "AU" not in self._constants:
             return None
-        whole = Fraction(self.constants[key]) * Fraction(self.constants["AU"]) ** 3
+        whole = Fraction(self._constants[key]) * Fraction(self._constants["AU"]) ** 3
         whole = whole * _CUBIC_KILOMETRE / DAY**2
         share = {"earth": self._ratio, "moon": Fraction(1)}.get(body)
         return whole if share is None else whole * share / (1 + self._ratio)
 
     @property
     def digest(self) -> str:
-        files = {"earth_moon": "earthmoon"}
-        used = sorted(f"jpl-{files.get(x, x)}.npy" for x in self._used)
+        used = sorted(f"jpl-{file}.npy" for file in self._used)
         return digest_of([self._folder / name for name in ["constants.npy", *used]])
-
-
-@lru_cache(maxsize=8)
-def _digest_of(paths: tuple[tuple[str, int, int], ...]) -> str:
-    total = hashlib.sha256()
-    for path, _, _ in paths:
-        with Path(path).open("rb") as file:
-            while part := file.read(1 << 20):
-                total.update(part)
-    return total.hexdigest()
-
-
-def digest_of(paths: list[Path]) -> str:
-    """SHA-256 of files one after the other, read once per process as long as they don't change."""
-    known = [(str(path), (found := path.stat()).st_size, found.st_mtime_ns) for path in paths]
-    return _digest_of(tuple(known))
-
-
-# --- SPK files ----------------------------------------------------------------------------------------------
 
 
 class SpkKernel(Kernel):
@@ -170,51 +204,63 @@ class SpkKernel(Kernel):
 
     def __init__(self, path: Path) -> None:
         self.name, self.place = path.name, path
-        spk = _jplephem("spk")
-        file = path.open("rb")
+        with path.open("rb") as file:
+            head = file.read(96)
+        big = head[88:96] == b"BIG-IEEE" or (head[:8] == b"NAIF/DAF" and head[8:12] == b"\0\0\0\2")
+        self._order = ">" if big else "<"
         try:
-            daf = _by_reader(lambda: spk.DAF(file))
-            if daf.locidw not in _IDENTIFIERS:
-                raise ValueError(f"it begins with {daf.locidw.decode('ascii', 'replace')}")
-            most = path.stat().st_size // _RECORD
-            if _by_reader(lambda: any(number > most for number, _ in enumerate(daf.summary_records()))):
-                raise ValueError("its list of segments has no end")
-            self._file = _by_reader(lambda: spk.SPK(daf))
+            if not head.startswith(_IDENTIFIERS):
+                raise ValueError(f"it begins with {head[:8].decode('ascii', 'replace').rstrip()}")
+            self._words = np.memmap(path, f"{self._order}f8", "r", shape=(path.stat().st_size // 8,))
+            summaries = self._summaries(int(np.frombuffer(head, f"{self._order}i4", 1, 76)[0]))
         except _UNREADABLE as error:
-            file.close()
-            what = f"which is no SPK file, or a damaged one ({_words(error)}); "
-            what += "a file .bsp of SPICE is allowed"
-            raise KernelError(what) from None
-        if not self._file.segments:
+            what = f"which is no SPK file, or a damaged one ({_words(error)}); a file .bsp of SPICE is "
+            raise KernelError(f"{what}allowed") from None
+        if not summaries:
             raise KernelError("which has no segments; an SPK file with positions of bodies is allowed")
-        last = max(segment.end_i for segment in self._file.segments)
-        size = path.stat().st_size
-        if 8 * last > size:
-            what = f"which is truncated: it has {size} bytes, and its segments go on to {8 * last}"
-            raise KernelError(f"{what}; copy it again")
-        names = _jplephem("names").target_names
-        self._names = {_word(text): code for code, text in sorted(names.items(), reverse=True)}
+        last = max(whole[5] for _, whole in summaries)
+        if last > len(self._words):
+            what = f"which is truncated: it has {path.stat().st_size} bytes, and its segments go on to "
+            raise KernelError(f"{what}{8 * last}; copy it again")
         self._segments: dict[int, list[Any]] = {}
-        for segment in self._file.segments:
-            self._segments.setdefault(int(segment.target), []).append(segment)
+        for span, whole in summaries:
+            self._segments.setdefault(whole[0], []).append((span, whole))
         self._used: dict[int, BlockSeries] = {}
+        try:
+            names = importlib.import_module("jplephem.names").target_names
+        except ImportError:
+            what = f"whose bodies the package jplephem names, and it isn't installed: {_EXTRA}"
+            raise KernelError(what) from None
+        self._codes = {_word(text): code for code, text in sorted(names.items(), reverse=True)}
+        found = {code: name for name, code in self._codes.items()}
+        found |= {code: found[100 * code + 99] for code in (1, 2, 4, 5, 6, 7, 8, 9)}
+        self._labels = {**found, 3: _BARYCENTER}
+
+    def _summaries(self, record: int) -> list[tuple[list[float], list[int]]]:
+        """Of all segments: begin and end; target, centre, frame, type, first and last word."""
+        found: list[tuple[list[float], list[int]]] = []
+        seen = set[int]()
+        while record:
+            if record in seen:
+                raise ValueError("its list of segments has no end")
+            seen.add(record)
+            words = self._words[_RECORD * (record - 1) : _RECORD * record]
+            following, _, count = (int(x) for x in words[:3])
+            rows = np.frombuffer(words[3 : 3 + 5 * count].tobytes(), _SUMMARY.newbyteorder(self._order))
+            found += zip(rows["span"].tolist(), rows["whole"].tolist(), strict=True)
+            record = following
+        return found
 
     def _candidates(self, body: str) -> list[int]:
         """Codes by which a body may be placed, the best first."""
         if re.fullmatch(r"-?\d{1,9}", body):
             return [int(body)]
-        code = self._names.get("earth_barycenter" if body == _BARYCENTER else body)
+        code = self._codes.get("earth_barycenter" if body == _BARYCENTER else body)
         if code is None:
             return []
         # a planet far from its moons is where its system is
         system = [code // 100] if 100 < code < 1000 and code % 100 == 99 and code != 399 else []
         return [code, *system]
-
-    @cached_property
-    def _labels(self) -> dict[int, str]:
-        found = {code: name for name, code in self._names.items()}
-        found |= {code: found[100 * code + 99] for code in (1, 2, 4, 5, 6, 7, 8, 9)}
-        return {**found, 3: _BARYCENTER}
 
     @property
     def bodies(self) -> list[str]:
@@ -226,68 +272,57 @@ class SpkKernel(Kernel):
     def path_of(self, body: str) -> list[tuple[Fraction, BlockSeries]]:
         code = next(code for code in self._candidates(body) if code in self._segments)
         found: list[tuple[Fraction, BlockSeries]] = []
-        while code != 0:
-            if code not in self._segments or len(found) > len(self._segments):
-                name = self._labels.get(code, str(code))
-                what = (
-                    f'which places "{body}" relative to "{name}", and that relative to nothing; a file with '
-                )
-                raise KernelError(what + "both is allowed")
-            series, center = self._series(code)
-            if series is not None:
+        for _ in self._segments:
+            series, code = self._series(code)
+            if series.coefficients.any():  # else it is where its centre is
                 found.append((Fraction(1), series))
-            code = center
-        return found
+            if code == 0:
+                return found
+            if code not in self._segments:
+                break
+        name = self._labels.get(code, str(code))
+        what = f'which places "{body}" relative to "{name}", and that relative to nothing; a file with '
+        raise KernelError(f"{what}both is allowed")
 
-    def _series(self, code: int) -> tuple[BlockSeries | None, int]:
-        """The series of a target, None if it is where its centre is, and that centre's code."""
-        segments = self._segments[code]
-        center = int(segments[-1].center)
+    def _series(self, code: int) -> tuple[BlockSeries, int]:
+        """The series of a target, of the segments that follow one another, and its centre's code."""
+        center = self._segments[code][-1][1][1]
         if code not in self._used:
-            segments = [x for x in segments if int(x.center) == center]
-            self._used[code] = self._joined(code, center, segments)
-        series = self._used[code]
-        return (None if not series.coefficients.any() else series), center
+            label, other = (self._labels.get(x, f"body_{x}").replace("-", "minus_") for x in (code, center))
+            segments = [x for x in self._segments[code] if x[1][1] == center]
+            read = sorted((self._read(label, *segment) for segment in segments), key=lambda x: x[0])
+            begin, length, given = read[0]
+            blocks = [given]
+            for following, its_length, more in read[1:]:
+                reached = begin + length * sum(map(len, blocks))
+                if its_length != length or more.shape[2] != given.shape[2] or following > reached:
+                    what = f'whose segments of "{label}" have blocks of several kinds, or gaps; a file with '
+                    raise KernelError(what + "one segment of each body is allowed")
+                blocks.append(more[round((reached - following) / length) :])
+            label = f"body_{label}" if label[0].isdigit() else label
+            whole = blocks[0] if len(blocks) == 1 else np.concatenate(blocks)
+            self._used[code] = BlockSeries(label, other, begin, length, whole)
+        return self._used[code], center
 
-    def _joined(self, code: int, center: int, segments: list[Any]) -> BlockSeries:
-        """Segments of one body, which follow one another, as one series."""
-        label, other = (self._labels.get(x, f"body_{x}").replace("-", "minus_") for x in (code, center))
-        read = sorted((self._read(label, segment) for segment in segments), key=lambda x: x[0])
-        begin, length, given = read[0]
-        blocks = [given]
-        for following, its_length, more in read[1:]:
-            reached = begin + length * sum(map(len, blocks))
-            if its_length != length or more.shape[2] != given.shape[2] or following > reached:
-                what = f'whose segments of "{label}" have blocks of several kinds, or gaps; a file with one '
-                raise KernelError(what + "segment of each body is allowed")
-            blocks.append(more[round((reached - following) / length) :])
-        label = f"body_{label}" if label[0].isdigit() else label
-        return BlockSeries(
-            label, other, begin, length, blocks[0] if len(blocks) == 1 else np.concatenate(blocks)
-        )
-
-    def _read(self, label: str, segment: Any) -> tuple[Fraction, Fraction, np.ndarray]:
-        if segment.data_type not in _TYPES:
-            what = (
-                f'whose "{label}" is of SPK type {segment.data_type}; types 2 and 3 (Chebyshev) are allowed: '
-            )
+    def _read(self, label: str, span: list[float], whole: list[int]) -> tuple[Fraction, Fraction, np.ndarray]:
+        """Begin, length and coefficients (blocks, 3, terms) of the blocks of a segment."""
+        _, _, frame, kind, first, last = whole
+        if kind not in _TYPES:
+            what = f'whose "{label}" is of SPK type {kind}; types 2 and 3 (Chebyshev) are allowed: '
             raise KernelError(what + "write it anew as one of them, as SPICE's spkmerge or JPL's Horizons do")
-        if segment.frame != _FRAME:
-            raise KernelError(f'whose "{label}" is in frame {segment.frame} of SPICE; J2000 (1) is allowed')
+        if frame != _FRAME:
+            raise KernelError(f'whose "{label}" is in frame {frame} of SPICE; J2000 (1) is allowed')
         try:
-            words = segment.end_i - 3, segment.end_i
-            begin, length, _, count = _by_reader(lambda: self._file.daf.read_array(*words))
-            coefficients = _by_reader(segment.load_array)[2]
-            covered = segment.start_second, segment.end_second
-            if not (length > 0 and begin <= covered[0] < covered[1] <= begin + count * length):
+            words = self._words[first - 1 : last].view(np.ndarray)
+            begin, length, size, count = words[-4:].tolist()
+            if not (length > 0 and begin <= span[0] < span[1] <= begin + count * length):
                 raise ValueError("its blocks don't cover its span")
-            blocks = np.moveaxis(coefficients[:3], 0, 1)
-            if len(blocks) != count:
-                raise ValueError("blocks are missing")
+            rows = words[: int(count * size)].reshape(int(count), int(size))[:, 2:]
+            blocks = rows.reshape(int(count), 3 * (kind - 1), -1)[:, :3].astype(np.float64, copy=False)
             joined(blocks)
         except _UNREADABLE as error:
-            raise KernelError(_damaged(f'segment of "{label}"', error, "copy it again")) from None
-        return Fraction(float(begin)), Fraction(float(length)), blocks
+            raise _damaged(f'segment of "{label}"', error, "copy it again") from None
+        return Fraction(begin), Fraction(length), blocks
 
     def strength(self, body: str) -> None:
         return None
@@ -306,45 +341,114 @@ def _words(error: Exception) -> str:
     return str(error).split("\n")[0][:120] or type(error).__name__
 
 
-def _damaged(what: str, error: Exception, remedy: str) -> str:
-    return f"whose {what} is damaged or truncated ({_words(error)}); {remedy}"
+def _array(path: Path) -> np.ndarray:
+    """What a file of numpy's holds; ``ValueError`` for whatever numpy finds wrong in it."""
+    try:
+        return np.load(path, mmap_mode="r").view(np.ndarray)  # quicker to index than a memmap
+    except (OSError, MemoryError):
+        raise
+    except Exception as error:  # of its header, which is parsed as Python
+        raise ValueError(_words(error)) from None
 
 
-# --- opening ------------------------------------------------------------------------------------------------
+def _damaged(what: str, error: Exception, remedy: str) -> KernelError:
+    return KernelError(f"whose {what} is damaged or truncated ({_words(error)}); {remedy}")
 
 
-@lru_cache(maxsize=_LARGEST_CACHED)
+def digest_of(paths: list[Path]) -> str:
+    """SHA-256 of files one after the other, read once per process as long as they don't change."""
+    return _digest_of(tuple((str(path), (found := path.stat()).st_size, found.st_mtime_ns) for path in paths))
+
+
+@lru_cache(maxsize=8)
+def _digest_of(paths: tuple[tuple[str, int, int], ...]) -> str:
+    total = hashlib.sha256()
+    for path, _, _ in paths:
+        with Path(path).open("rb") as file:
+            while part := file.read(1 << 20):
+                total.update(part)
+    return total.hexdigest()
+
+
+# --- where they are -----------------------------------------------------------------------------------------
+
+
+def is_path(given: str) -> bool:
+    """Whether a kernel is given as a file's path rather than a package's name."""
+    return "/" in given or "\\" in given or "." in given
+
+
+def kernel_of(given: str, source: str) -> Kernel:
+    """The kernel that a config names: ``source`` is where the config is, if it is a file.
+
+    Raises:
+        KernelError: it isn't there, or can't be read.
+    """
+    if not is_path(given):
+        if (folder := _package(given)) is not None:
+            return PackagedKernel(given, folder)
+        beside = any(os.path.isfile(folder / f"{given}.bsp") for folder in folders_of(source))
+        hint = f'the file beside the config is "./{given}.bsp"' if beside else f"pip install {given}"
+        if not beside and given not in _PACKAGES:
+            hint = f"allowed: {', '.join(_PACKAGES)}"
+        what = f"which is no installed package of an ephemeris{nearest(given, _PACKAGES)}; {hint}, or the "
+        raise KernelError(f'{what}path of an SPK file, with a slash or a suffix: "./de440.bsp"')
+    try:
+        path = find_file(given, source, "an SPK file")
+    except KernelError as error:
+        stem = Path(given).stem
+        hint = "" if _package(stem) is None else f'; the package is named without a suffix: "{stem}"'
+        raise KernelError(f"{error}{hint}") from None
+    try:
+        return _opened(str(path), (found := path.stat()).st_size, found.st_mtime_ns)
+    except OSError as error:
+        raise KernelError(f"which can't be read ({error.strerror or error}): {path}") from None
+
+
+@lru_cache(maxsize=4)
 def _opened(path: str, size: int, changed: int) -> SpkKernel:
+    """The kernel of an SPK file, read once per process as long as it doesn't change."""
     return SpkKernel(Path(path))
 
 
-def open_file(path: Path) -> Kernel:
-    """The kernel of an SPK file, read once per process as long as it doesn't change.
-
-    Raises:
-        KernelError: it is no such file, or damaged.
-    """
-    found = path.stat()
-    return _opened(str(path), found.st_size, found.st_mtime_ns)
-
-
-def open_package(name: str) -> Kernel:
-    """The kernel of an installed package.
-
-    Raises:
-        KernelError: there is none of this name, or it is damaged.
-    """
+def _package(name: str) -> Path | None:
+    """Folder of an installed package of an ephemeris; None if there is none of this name."""
     try:
         spec = importlib.util.find_spec(name)
     except (ImportError, ValueError):
         spec = None
-    if spec is None or spec.origin is None:
-        hint = f"pip install {name}" if name in _PACKAGES else f"allowed: {', '.join(_PACKAGES)}"
-        what = (
-            f"which is no installed package{nearest(name, _PACKAGES)}; {hint}, or the path of an SPK file, "
-        )
-        raise KernelError(what + 'with a slash or a suffix: "./de440.bsp"')
-    folder = Path(spec.origin).parent
-    if not (folder / "constants.npy").exists() or not list(folder.glob("jpl-*.npy")):
-        raise KernelError(f"which is a package, but none of an ephemeris; allowed: {', '.join(_PACKAGES)}")
-    return PackagedKernel(name, folder)
+    folder = Path() if spec is None or spec.origin is None else Path(spec.origin).parent
+    return folder if (folder / "constants.npy").exists() and list(folder.glob("jpl-*.npy")) else None
+
+
+def find_file(given: str, source: str, what: str) -> Path:
+    """The absolute path of a kernel that is given by its own; ``what`` it should be.
+
+    Raises:
+        KernelError: it isn't there.
+    """
+    wanted, folders = Path(given).expanduser(), folders_of(source)
+    places = [wanted] if wanted.is_absolute() else [folder / wanted for folder in folders]
+    try:
+        for path in [*places, *(folder / wanted.name for folder in folders)]:
+            if path.is_file():
+                return path.absolute()
+        if any(path.is_dir() for path in places):
+            raise KernelError(f"which is a folder; the path of {what} is allowed")
+    except OSError as error:  # names that no file system takes
+        raise KernelError(f"which can't be looked for ({error.strerror or error})") from None
+    looked = ", ".join(dict.fromkeys(str(path.parent) for path in places))
+    why = f"which isn't there: looked for in {looked}; put it there, or name its folder in the environment "
+    raise KernelError(f"{why}variable {FOLDERS}")
+
+
+def folders_of(source: str) -> list[Path]:
+    """Folders to look in: the config's, the one that a run's folder notes, and those that are named."""
+    file = Path(source.removesuffix(EMBEDDED)).absolute()
+    named = [Path(x) for x in os.environ.get(FOLDERS, "").split(os.pathsep) if x]
+    if not file.is_file():
+        return [Path.cwd(), *named]
+    noted = file.parent / NOTE
+    lines = noted.read_text(encoding="utf-8").splitlines() if noted.is_file() else []
+    beside = [Path(line.strip()).parent for line in lines if line.strip()]
+    return [file.parent, *named, *beside]

@@ -1,18 +1,44 @@
-"""SPICE's toolkit, through spiceypy: loaded where it is needed, its pool of kernels left as it was found."""
+"""SPICE's toolkit, through spiceypy, and the published orientation of ``[output] orientation``.
+
+The toolkit is loaded where it is needed, its pool of kernels left as it was found.
+
+Text kernels hold right ascension and declination of the pole and the prime meridian as polynomials and sines
+(the IAU's, Archinal et al. 2018, Celest. Mech. Dyn. Astr. 130, 22), binary ones Chebyshev series of angles.
+SPICE itself reads both, in double precision, as which they are published.
+"""
 
 from __future__ import annotations
 
 import importlib
-from collections.abc import Iterator
+import re
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
+from fractions import Fraction
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
-from rigidsim.scene.kernels.kernel import KernelError
+import numpy as np
+
+from rigidsim.errors import ConfigError, Problem
+from rigidsim.scene.epochs import Epoch
+from rigidsim.scene.frame import ECLIPTIC, OBLIQUITY
+from rigidsim.scene.kernels.ephemeris import EQUATORIAL, date_of
+from rigidsim.scene.kernels.reading import KernelError, digest_of, find_file, is_path
+from rigidsim.scene.validation_messages import nearest, shown
 
 _EXTRA = "pip install 'rigidsim[spice]'"
 _LONGEST_PATH = 255  # characters that SPICE's loader takes
+
+_KINDS = {b"KPL/PCK": "text", b"DAF/PCK": "binary"}
+_OTHERS = {
+    b"DAF/SPK": "positions of bodies, which [ephemeris] kernel takes",
+    b"DAF/CK": "attitudes of a craft",
+}
+_KIND = "a PCK of SPICE (.tpc or .bpc)"
+_MOST = 1000  # bodies of a kernel
+_EQUATOR = "J2000"
 
 
 @cache
@@ -57,3 +83,189 @@ def _words(error: Any) -> str:
     """The first sentence of what SPICE says, without line breaks."""
     short, text = str(error.short), " ".join(str(error.long).split())
     return f"{short}: {text.split('. ')[0][:160]}"
+
+
+@dataclass(frozen=True, eq=False)
+class Orientation:
+    """Published axes of a body along time.
+
+    Attributes:
+        place, digest: the kernel's file, and its SHA-256.
+        body: number of NAIF by which SPICE knows the axes: of the body, or of the class of a binary kernel.
+        described: what it is, for readers.
+        ahead: date of the scene's time 0: seconds of TDB since J2000.
+        equator: matrix from SPICE's J2000 to the scene's space axes.
+    """
+
+    place: Path
+    digest: str
+    body: int
+    described: str
+    ahead: Fraction
+    equator: np.ndarray
+
+    @property
+    def name(self) -> str:
+        """The kernel's name."""
+        return self.place.name
+
+    def dates(self, seconds: list[np.ndarray]) -> np.ndarray:
+        """SPICE's times of some times of the scene, which are given in parts."""
+        near = float(self.ahead)
+        total: Any = np.longdouble(near) + np.longdouble(float(self.ahead - Fraction(near)))
+        for part in reversed(seconds):
+            total = total + part
+        return np.atleast_1d(total).astype(np.float64)
+
+    def matrices(self, dates: np.ndarray) -> np.ndarray:
+        """Matrices (rows, 3, 3) from the published body axes to J2000, at SPICE's times.
+
+        Raises:
+            KernelError: the kernel can't be read there.
+        """
+        with loaded(self.place) as toolkit:
+            found = [toolkit.tipbod(_EQUATOR, self.body, date) for date in dates.tolist()]
+        return np.asarray(found).reshape(-1, 3, 3).transpose(0, 2, 1)
+
+
+class Asked(Protocol):
+    """The keys of ``[output]`` that ask for one."""
+
+    orientation: str | None
+    orientation_of: str | None
+
+
+def resolve_orientation(
+    table: Asked,
+    host: str | None,
+    axes: str | None,
+    epoch: Epoch | None,
+    run: tuple[Any, Any],
+    source: str,
+) -> Orientation | None:
+    """The published orientation that a config names; None without one.
+
+    Args:
+        table: ``[output]``.
+        host: ``[body] host``, the body if the table names none.
+        axes, epoch, run: space axes, date of time 0, and start and end of the run (mpf, s).
+        source: where the config is, if it is a file.
+
+    Raises:
+        ConfigError: the kernel can't be read, or hasn't the body or the dates.
+    """
+    given, asked = table.orientation, table.orientation_of
+    if given is None:
+        if asked is not None:
+            what = (
+                f'given "{asked}" without [output] orientation, the kernel that has it; give that, or leave '
+            )
+            raise ConfigError(Problem("[output] orientation_of", what + "this out"))
+        return None
+    if epoch is None:
+        what = 'missing; [output] orientation needs the date of time 0, such as "J2000"'
+        raise ConfigError(Problem("[time] epoch", what))
+    if axes not in (ECLIPTIC, *EQUATORIAL):
+        told = "missing; [output] orientation needs to know" if axes is None else f'given "{axes}", which'
+        more = " what the space axes are" if axes is None else " differs from SPICE's axes by 0.02 arcsec"
+        allowed = ", ".join(f'"{name}"' for name in (*EQUATORIAL, ECLIPTIC))
+        raise ConfigError(Problem("[frame] axes", f"{told}{more}; allowed: {allowed}"))
+    ahead = epoch.since_j2000()
+    begin, end = (float(ahead + Fraction(float(time))) for time in run)
+    try:
+        if not is_path(given):
+            raise KernelError(f"which is no path; the path of {_KIND}, with a slash or a suffix, is allowed")
+        place = find_file(given, source, _KIND)
+        kind = _kind_of(place)
+        digest = digest_of([place])
+        with loaded(place) as toolkit:
+            choose = _in_text if kind == "text" else _in_binary
+            body, described = choose(toolkit, place, asked, host, (begin, end))
+            for date in (begin, end):
+                toolkit.tipbod(_EQUATOR, body, date)
+    except KernelError as error:
+        raise ConfigError(Problem("[output] orientation", f'given "{given}", {error}')) from None
+    return Orientation(place, digest, body, described, ahead, _turn(axes))
+
+
+def _turn(axes: str | None) -> np.ndarray:
+    if axes != ECLIPTIC:
+        return np.eye(3)
+    angle = float(OBLIQUITY)
+    c, s = np.cos(angle), np.sin(angle)
+    return np.array([[1, 0, 0], [0, c, s], [0, -s, c]])
+
+
+def _kind_of(place: Path) -> str:
+    """Whether a kernel is text or binary, by its first word."""
+    try:
+        with place.open("rb") as file:
+            head = file.read(8)
+    except OSError as error:
+        raise KernelError(f"which can't be read ({error.strerror or error}): {place}") from None
+    for word, kind in _KINDS.items():
+        if head.startswith(word):
+            return kind
+    other = next((f": it holds {what}" for word, what in _OTHERS.items() if head.startswith(word)), "")
+    raise KernelError(f"which is no PCK{other or f' (it begins with {head!r})'}; {_KIND} is allowed")
+
+
+def _in_text(
+    toolkit: Any, place: Path, asked: str | None, host: str | None, run: tuple[float, float]
+) -> tuple[int, str]:
+    """The body that is asked for in a text kernel."""
+    text = place.read_text(encoding="ascii", errors="replace")
+    numbers = sorted({int(code) for code in re.findall(r"\bBODY(-?\d+)_POLE_RA\b", text)})
+    names = {code: _name(toolkit, code) for code in numbers[:_MOST]}
+    known = ", ".join(names.values()) or "no pole of any body"
+    wanted = asked if asked is not None else host
+    if wanted is None:
+        raise KernelError(f"and no body is named; give [output] orientation_of: the kernel has {known}")
+    code = _number(toolkit, wanted)
+    if code not in numbers:
+        hint = nearest(wanted, names.values())
+        raise KernelError(f"which has nothing of {shown(wanted)}{hint}; it has {known}")
+    return code, f"pole and prime meridian of {names[code]}"
+
+
+def _in_binary(
+    toolkit: Any, place: Path, asked: str | None, host: str | None, run: tuple[float, float]
+) -> tuple[int, str]:
+    """The axes that are asked for in a binary kernel, where they cover the run."""
+    cell = toolkit.stypes.SPICEINT_CELL(_MOST)
+    toolkit.pckfrm(str(place), cell)
+    codes = sorted(int(code) for code in cell)
+    known = ", ".join(map(str, codes)) or "none"
+    if asked is None and len(codes) != 1:
+        raise KernelError(f"which has several axes; name one by its number in orientation_of: {known}")
+    code = codes[0] if asked is None else _number(toolkit, asked)
+    if code not in codes:
+        what = f"which has no axes {shown(asked)}; a number of those that it has is allowed: {known}"
+        raise KernelError(what)
+    window = toolkit.pckcov(str(place), code)
+    spans = [toolkit.wnfetd(window, i) for i in range(toolkit.wncard(window))]
+    if not any(first <= run[0] and run[1] <= last for first, last in spans):
+        reach = ", ".join(" to ".join(date_of(int(x)) for x in span) for span in spans)
+        when = " to ".join(date_of(int(x)) for x in run)
+        what = f"which goes from {reach} (TDB), but the run from {when}; "
+        raise KernelError(what + "change [time] epoch, start or end, or take a longer kernel")
+    return code, f"axes {code}"
+
+
+def _number(toolkit: Any, name: str) -> int | None:
+    """NAIF's number of a body; None if it has no such name."""
+    if re.fullmatch(r"-?\d{1,9}", name):
+        return int(name)
+    return _found(lambda: int(toolkit.bodn2c(name.replace("_", " "))), toolkit)
+
+
+def _name(toolkit: Any, code: int) -> str:
+    found = _found(lambda: str(toolkit.bodc2n(code)).lower().replace(" ", "_"), toolkit)
+    return str(code) if found is None else found
+
+
+def _found(look: Callable[[], Any], toolkit: Any) -> Any:
+    try:
+        return look()
+    except toolkit.NotFoundError:
+        return None
