@@ -27,6 +27,7 @@ from rigidsim.workflows.read import text_difference
 from rigidsim.workflows.run import run
 
 _ROWS_AT_ONCE = 65536
+_AS_STORED: Any = {"indexed": False, "decoded": False}
 
 
 @dataclass(frozen=True)
@@ -83,6 +84,7 @@ def verify(path: str | Path, *, observer: Observer | None = None) -> Verdict:
     broken = _seal_problems(dataset)
     try:
         experiment = experiment_again(dataset)
+        open_dataset(dataset, **_AS_STORED).close()
     except RigidsimError:
         if not broken:
             raise
@@ -164,8 +166,7 @@ def _compare(saved: Path, again: Path) -> tuple[list[str], Difference | None, in
     """Names of the variables that differ, the earliest difference, and the number of samples."""
     differing: list[str] = []
     earliest: Difference | None = None
-    stored: Any = {"indexed": False, "decoded": False}
-    with open_dataset(saved, **stored) as one, open_dataset(again, **stored) as other:
+    with open_dataset(saved, **_AS_STORED) as one, open_dataset(again, **_AS_STORED) as other:
         names = {str(n) for file in (one, other) for n, v in file.variables.items() if v.dtype.kind == "f"}
         for name in sorted(names):
             known = name in one.variables and name in other.variables

@@ -22,7 +22,7 @@ IGNORED = {
     "resume fits/watched": ("--verbose", "--until 5", "--set limits.max_steps=9", "--workers 2"),
     "run free.toml": ("--member 0",),
     "run free.toml --json": ("--verbose",),
-    "run free.toml --sweep name=[a,b]": ("--verbose", "--member 0"),
+    "run free.toml --sweep body.mass=[1,2]": ("--verbose",),
     "sweep swept.toml --scheduler nowhere:1": ("--workers 1", "--workers 2"),
     "plan free.toml": ("--force", "--write other.toml"),
     "fit watched.toml": ("--member 1",),

@@ -51,10 +51,11 @@ def test_the_advice_about_a_damaged_dataset_leads_on(
         assert result.exit_code == 2, result.output
         command = re.search(r"rigidsim (run \S+ --out ELSEWHERE)", result.stderr)
         assert command, result.stderr
-    assert called(["run", "runs/free/config.toml", "--out", "elsewhere"]).exit_code == 0
+    for config, folder in (("runs/free/config.toml", "elsewhere"), (str(made / "free.toml"), "whole")):
+        assert called(["run", config, "--out", folder]).exit_code == 0
     with (
         xarray.open_dataset("elsewhere/free/dataset.h5", engine="h5netcdf") as again,
-        xarray.open_dataset(made / "runs/free/dataset.h5", engine="h5netcdf") as whole,
+        xarray.open_dataset("whole/free/dataset.h5", engine="h5netcdf") as whole,
     ):
         assert np.array_equal(again["quaternion"], whole["quaternion"])
 
