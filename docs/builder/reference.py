@@ -10,7 +10,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-PAGES = ("config", "commands", "dataset", "bodies", "python", "codes")
+PAGES = ("config", "commands", "dataset", "figures", "bodies", "python", "codes")
 """Names of the pages, each made by the function ``NAME_page``."""
 _FEW = 16  # values that are listed in a cell
 
@@ -256,6 +256,23 @@ def dataset_page() -> str:
                 [[code(name), ", ".join(map(code, labels))] for name, labels in LABELS.items()],
             ),
         ]
+    )
+
+
+# --- figures ------------------------------------------------------------------------------------------------
+
+
+def figures_page() -> str:
+    """Figures of runs, from their registry."""
+    from rigidsim.look.figure_names import FIGURES
+    from rigidsim.look.figures.catalogue import KINDS
+
+    rows = [
+        [code(name), shows, KINDS[name].needs if name in KINDS else ""] for name, shows in FIGURES.items()
+    ]
+    return (
+        "# Names of figures\n\nFor `rigidsim plot RUN --what NAME`. Usage: [figures](../figures.md)."
+        "\n\n" + table(["figure", "shows", "needs"], rows)
     )
 
 

@@ -22,7 +22,7 @@ FIGURES: dict[str, str] = {
     "published": "the rotation from a published orientation to the attitude, over time",
     "attitude": "Euler angles, or the body's z axis in space, and the nutation angle, over time",
     "wobble": "turns of a free symmetric body's wobble in space, and of its spin, over time",
-    "states": "states of one's own ([[states]]) over time",
+    "states": "user-defined states ([[states]]) over time",
     "sensitivity": "derivatives of attitude, rates and position by numbers of the config, over time",
     SPECTRUM: "amplitude spectra of what the scene is about, their lines labelled (analyses the run first)",
     "drift": "drifts of invariants over the band that rounding explains",

@@ -78,20 +78,20 @@ KINDS: dict[str, Kind] = {
     ),
     "polhode": Kind(_TURNS, (), [polhode.polhode, polhode.poinsot]),
     "momentum_sphere": Kind(
-        "angular_velocity, and rates of rotors, recorded, and a momentum whose size stays",
+        "angular_velocity and rates of rotors recorded, and a momentum of constant size",
         (),
         [gyrostat.momentum_sphere, gyrostat.momentum_sphere_at_end],
     ),
     "rotors": Kind("rotors whose rates were recorded", [gyrostat.tilts, gyrostat.rotor_rates]),
-    "herpolhode": Kind("an attitude and a momentum that stays put", (), [polhode.herpolhode]),
+    "herpolhode": Kind("an attitude and a constant momentum", (), [polhode.herpolhode]),
     "path": Kind("position recorded", (), [poles.path]),
     "rates": Kind(_TURNS, [timelines.rates, changing.moments]),
     "core": Kind(
-        "a fluid core whose rate was recorded, and that of the mantle",
+        "rates of a fluid core and of the mantle recorded",
         [changing.core_axis, changing.core_slip],
     ),
     "published": Kind(
-        "a published orientation ([output] orientation) beside the attitude",
+        "a published orientation ([output] orientation) and the attitude",
         [published.angles, published.rotation],
     ),
     "attitude": Kind(_ATTITUDE, [timelines.attitude, timelines.wobble]),
@@ -99,7 +99,7 @@ KINDS: dict[str, Kind] = {
         "a free symmetric body, its attitude, angular_velocity and angular_momentum recorded",
         [poles.wobble_and_spin],
     ),
-    "states": Kind("states of one's own ([[states]]) recorded", changing.OWN_STATES),
+    "states": Kind("user-defined states ([[states]]) recorded", changing.OWN_STATES),
     "sensitivity": Kind(
         "sensitivities ([output] sensitivity)",
         [sensitivity.attitude, sensitivity.rates, sensitivity.position],
