@@ -30,8 +30,9 @@ def test_lines_of_random_samplings(seed: int) -> None:
         slow, unknown = nyquist * rng.uniform(0.05, 0.9, 2)
         fast = nyquist * rng.uniform(1.1, 30)
         seen = [slow, seen_at(fast, spacing), seen_at(unknown, spacing), 0.0, nyquist]
-        if np.diff(np.sort(seen)).min() > 12 * step:
-            break
+        sums = [seen_at(m * slow + n * fast, spacing) for m in range(-6, 7) for n in range(-6, 7)]
+        if np.diff(np.sort(seen)).min() > 12 * step and np.abs(np.subtract(sums, unknown)).min() > step:
+            break  # no line hides another one, and no sum of known frequencies is the unknown one
     time = np.arange(count) * spacing
     sizes, phases = 10 ** rng.uniform(-3, 0, 3), rng.uniform(-3, 3, 3)
     parts = [a * np.cos(w * time + p) for a, w, p in zip(sizes, (slow, fast, unknown), phases, strict=True)]
@@ -76,11 +77,15 @@ def test_the_free_nutation_of_random_planets(seed: int) -> None:
     a, b = 1 - flat - uneven, 1 - flat
     spin = 2 * np.pi / (86400 * rng.uniform(0.5, 1.5))
     wobble = spin * np.sqrt((1 - a) * (1 - b) / (a * b))
-    every = rng.uniform(3, 9)
-    while not 0.1 < seen_at(spin + wobble, 86400 * every) * 86400 * every / np.pi < 0.9:
-        every = rng.uniform(3, 9)
     values = {"tilt": rng.uniform(10, 40), "distance": rng.uniform(0.5, 1.0)}
     values["eccentricity"] = rng.uniform(0, 0.1)
+    orbit = np.sqrt(1.32712440018e20 / (values["distance"] * 1.495978707e11) ** 3)
+    while True:
+        every = rng.uniform(3, 9)
+        seen, nyquist = seen_at(spin + wobble, 86400 * every), np.pi / (86400 * every)
+        forced = [seen_at(j * spin + k * orbit, 86400 * every) for j in (0, 2) for k in range(-6, 12)]
+        if 0.1 * nyquist < seen < 0.9 * nyquist and np.abs(np.subtract(forced, seen)).min() > 0.03 * nyquist:
+            break  # three bins from the lines that the source forces on an uneven body
     text = PLANET.format(a=a, b=b, spin=spin, every=every, end=every * 200, **values)
     analysis = rigidsim.analyse(run_text(text), "obliquity.figure")
     lines = {line.label.text: line for line in analysis.signals[0].lines}
