@@ -16,8 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rigidsim.accuracy.bench.dataset import TOLD, BestSetting, advice, dataset_of
-from rigidsim.accuracy.bench.measure import measure
-from rigidsim.accuracy.bench.plan import DEFAULT
+from rigidsim.accuracy.bench.measure import DEFAULT, measure
 from rigidsim.errors import RigidsimError, RunFolderError
 from rigidsim.scene.choices import FULL
 from rigidsim.scene.config import Experiment

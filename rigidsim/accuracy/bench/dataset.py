@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rigidsim.accuracy.bench.measure import Measurement, RowStatus
-from rigidsim.accuracy.bench.plan import DEFAULT
+from rigidsim.accuracy.bench.measure import DEFAULT, Measurement, RowStatus
 from rigidsim.accuracy.setting import Setting, precision_title, precision_titled
 from rigidsim.scene.choices import METHODS
 

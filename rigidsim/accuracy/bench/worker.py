@@ -1,26 +1,23 @@
 """Settings measured in processes of their own, to which speed, crashes and endless compilations are confined.
 
 Two integrators that are built alike can differ in speed for their whole life, by a factor of up to 2.6, so
-that speeds have to be compared over fresh processes. A process gets its tasks on stdin and answers one after
-the other on stdout; whoever started it stops it when time is up.
+that speeds have to be compared over fresh processes.
 
 Speed is measured per natural step (of a closed form: per sample), in passes over the motion's beginning that
 are repeated until they can be told from noise. Recording costs the same in every setting and isn't counted.
 """
 
 import math
-import os
 import pickle
 import statistics
 import subprocess
 import sys
-import tempfile
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import dataclass, replace
-from multiprocessing.connection import Connection
-from typing import Literal
+from dataclasses import dataclass, field
+from select import select
+from typing import IO, Self
 
 import mpmath
 import numpy as np
@@ -43,15 +40,14 @@ _CLOSED_ROWS = {True: 2000, False: 4}  # of a pass in double, and in mpmath
 
 @dataclass(frozen=True)
 class Task:
-    """What to do with one setting: integrate it over some times (s), which may take ``patience`` CPU seconds,
-    or measure its speed, for so long and over no more than the whole motion's steps.
+    """A setting to be integrated over some times (s), within ``patience`` CPU seconds; with ``speed_steps``
+    its speed to be measured instead, for so long and over no more than so many steps.
     """
 
     setting: Setting
-    kind: Literal["attitudes", "speed"]
     times: tuple[float, ...]
-    patience: float
-    steps: int = 1_000_000
+    patience: float = field(compare=False)
+    speed_steps: int | None = None
 
 
 @dataclass(frozen=True)
@@ -60,26 +56,24 @@ class Answer:
 
     trial: Trial | None = None
     seconds: float = math.nan
-    problem: str | None = None
-    index: int = 0
+    problem: str = ""
 
 
 def _attitudes(experiment: Experiment, task: Task) -> Answer:
-    """Integrate over the task's times."""
     started = time.process_time()
 
     def go_on(_: Progress) -> Status | None:
         return Status.WALL_TIME if time.process_time() - started > task.patience else None
 
     trial = try_setting(experiment, task.setting, [mpmath.mpf(t) for t in task.times], go_on=go_on)
-    problem = None if trial.status is Status.FINISHED else trial.status.message
     if trial.status is Status.WALL_TIME:
-        problem = f"took longer than {task.patience:.3g} s, its part of the budget"
-    return Answer(trial, problem=problem)
+        return Answer(trial, problem=f"took longer than {task.patience:.3g} s, its part of the budget")
+    return Answer(trial, problem="" if trial.status is Status.FINISHED else trial.status.message)
 
 
 def _speed(experiment: Experiment, task: Task) -> Answer:
     """CPU seconds per natural step, or per sample of a closed form: the median of several passes."""
+    most = task.speed_steps or 1
     scene = trial_scene(experiment, task.setting, [mpmath.mpf(t) for t in task.times])
     prepared = prepare_scene(experiment, scene, tolerance=task.setting.tolerance)
     if not prepared.has_steps:
@@ -98,8 +92,8 @@ def _speed(experiment: Experiment, task: Task) -> Answer:
         corrected.back_to(start)
         corrected.skip(count)
 
-    steps(min(task.steps, _LONGEST_WARMING))  # charts are compiled when first needed
-    return Answer(seconds=_per_unit(steps, min(32, task.steps), task.steps, task.patience))
+    steps(min(most, _LONGEST_WARMING))  # charts are compiled when first needed
+    return Answer(seconds=_per_unit(steps, min(32, most), most, task.patience))
 
 
 def _per_unit(one_pass: Callable[[int], None], count: int, most: int, patience: float) -> float:
@@ -119,60 +113,67 @@ def _per_unit(one_pass: Callable[[int], None], count: int, most: int, patience: 
 
 
 def work() -> None:
-    """Do the tasks given on stdin, answering on stdout."""
+    """Do the tasks that come on stdin, answering each on stdout."""
     quieten_engine()
-    text, source, tasks = pickle.load(sys.stdin.buffer)
-    experiment, answers = parse(text, source=source), Connection(sys.stdout.fileno(), readable=False)
-    for task in tasks:
-        measure = _attitudes if task.kind == "attitudes" else _speed
+    given, answers = sys.stdin.buffer, sys.stdout.buffer
+    text, source = pickle.load(given)
+    experiment = parse(text, source=source)
+    while given.peek(1):
+        task: Task = pickle.load(given)
         try:
-            found = measure(experiment, task)
+            found = (_attitudes if task.speed_steps is None else _speed)(experiment, task)
         except ConfigError as error:
             found = Answer(problem="; ".join(map(str, error.problems)))
-        except RigidsimError as error:
-            found = Answer(problem=str(error))
-        except (OverflowError, ZeroDivisionError, ValueError) as error:
-            found = Answer(problem=f"{type(error).__name__}: {error}")
-        answers.send(found)
+        except (RigidsimError, OverflowError, ZeroDivisionError, ValueError) as error:
+            name = "" if isinstance(error, RigidsimError) else f"{type(error).__name__}: "
+            found = Answer(problem=f"{name}{error}")
+        _send(answers, found)
 
 
-def ask(
-    experiment: Experiment, tasks: Sequence[Task], *, deadline: float, first_by: float = 0.0
-) -> Iterator[Answer]:
-    """Answers to tasks as they come, in order, from a fresh process.
+def _send(to: IO[bytes], what: object) -> None:
+    pickle.dump(what, to)
+    to.flush()
 
-    A task on which the process dies is answered with that, and a new process goes on with the rest. At the
-    deadline (``time.monotonic``), that of the first answer at least ``first_by``, the process is stopped, and
-    the tasks that are left have no answer.
-    """
-    command = [sys.executable, "-c", "from rigidsim.accuracy.bench import worker; worker.work()"]
-    pipe = subprocess.PIPE
-    following = 0
-    while following < len(tasks):
-        with (
-            tempfile.TemporaryFile() as errors,
-            subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=errors) as child,
-        ):
-            assert child.stdin is not None
-            assert child.stdout is not None
-            try:
-                with suppress(BrokenPipeError), child.stdin:  # if it is gone, the end of its answers tells
-                    pickle.dump((experiment.text, experiment.source, tasks[following:]), child.stdin)
-                with Connection(os.dup(child.stdout.fileno()), writable=False) as answers:
-                    while following < len(tasks):
-                        until = deadline if following else max(deadline, first_by)
-                        if not answers.poll(max(0.0, until - time.monotonic())):
-                            return
-                        yield replace(answers.recv(), index=following)
-                        following += 1
-            except (EOFError, OSError):  # it ended, perhaps within an answer
-                code = child.wait()
-            finally:
-                child.kill()
-            if following < len(tasks):
-                errors.seek(0)
-                last = errors.read().decode(errors="replace").splitlines()[-1:]
-                words = "".join(f" ({line.strip()})" for line in last)
-                problem = f"the process that measured it ended with code {code}{words}"
-                yield Answer(problem=problem, index=following)
-                following += 1
+
+class Worker:
+    """A fresh process that does one task after the other; a new one follows where it dies."""
+
+    def __init__(self, experiment: Experiment) -> None:
+        self._experiment, self._stopped = experiment, False
+        self._child: subprocess.Popen[bytes] | None = None
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Stop; what another thread waits for then has no answer."""
+        self._stopped = True
+        if self._child is not None:
+            self._child.kill()
+
+    def answer(self, task: Task, until: float) -> Answer | None:
+        """Its answer; None if that isn't there by a time (of ``time.monotonic``), or the worker was stopped.
+        A task on which the process dies is answered with that.
+        """
+        command = [sys.executable, "-c", "from rigidsim.accuracy.bench import worker; worker.work()"]
+        pipe, begun = subprocess.PIPE, self._child
+        child = self._child = begun or subprocess.Popen(command, stdin=pipe, stdout=pipe)
+        assert child.stdin is not None
+        assert child.stdout is not None
+        late = False
+        with suppress(EOFError, OSError, pickle.UnpicklingError):  # it ended, perhaps within an answer
+            if begun is None:
+                _send(child.stdin, (self._experiment.text, self._experiment.source))
+            _send(child.stdin, task)
+            late = not select([child.stdout], [], [], max(0.0, until - time.monotonic()))[0]
+            if not late:
+                found: Answer = pickle.load(child.stdout)
+                return found
+        self._child = None
+        if late:
+            child.kill()
+        with suppress(BrokenPipeError), child:  # closes its pipes, and waits
+            pass
+        if late or self._stopped:
+            return None
+        return Answer(problem=f"the process that measured it ended with code {child.returncode}")
