@@ -103,12 +103,12 @@ class Parametrised:
         self._plan: ModelPlan = plan_model(own, self._loads)
         base, found, moved = self._passes(self.values, self._steps)
         self.plain = System(base.system.plan, number)  # with all that acts once no number is exactly zero
-        self.first = _parameters(self.plain)
+        self.first = parameters_of(self.plain)
         self._varied = [
             i for i, x in enumerate(base.noted) if any(self._differ(m.noted[i], x) for m in moved)
         ]
         self._fixed = {i: x for i, x in enumerate(base.noted) if i not in set(self._varied)}
-        made = self._pass(found, self._as_parameters())
+        made = self._pass(found, self._asparameters_of())
         self.equations, self.outputs = made.equations, made.outputs
         self.recorded = recorded_variables(self.plain.mechanics.observed, self._record)[0]
         self._refuse_hidden(base, found, made)
@@ -205,7 +205,7 @@ class Parametrised:
         outputs = recorded_variables(system.mechanics.observed, self._record)[1]
         return _Pass(system, noted, [hy.expression(x) for x in outputs], equations)
 
-    def _as_parameters(self) -> Callable[[int, Any], Any]:
+    def _asparameters_of(self) -> Callable[[int, Any], Any]:
         places = {i: self.first + n for n, i in enumerate(self._varied)}
         return lambda i, value: hy.par[places[i]] if i in places else self._number(self._fixed.get(i, value))
 
@@ -237,7 +237,7 @@ class Parametrised:
         for sign in (1, -1):
             there = [x + sign * _LOOK * s / (j + 3) for j, (x, s) in enumerate(zip(off, scales, strict=True))]
             try:
-                looked = self._pass(there, self._as_parameters())
+                looked = self._pass(there, self._asparameters_of())
             except ConfigError:
                 continue
             same = len(looked.noted) == len(base.noted) and not any(
@@ -275,7 +275,7 @@ def _of_motion(experiment: Experiment, more: Sequence[str]) -> Experiment:
     return replace(experiment, config=config.model_copy(update=tables))
 
 
-def _parameters(system: System) -> int:
+def parameters_of(system: System) -> int:
     """Number of parameters that a system's equations may use."""
     count = system.parameters
     if system.pieces is not None:

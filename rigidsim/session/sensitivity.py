@@ -13,12 +13,13 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from rigidsim.solve.by_keys import KeyTangents, Rows, turned
 from rigidsim.solve.checkpoint import Arrays, pack, unpack
 from rigidsim.solve.compiled import interruptible
 from rigidsim.solve.problem import InitialValueProblem
 from rigidsim.solve.sample_block import SampleBlock
 from rigidsim.solve.settled import SettledStates
-from rigidsim.solve.variational import LostTangents, Rows, TangentPlace, Variational, turned
+from rigidsim.solve.tangents import LostTangents, Place
 from rigidsim.store.variables import Variable
 
 _SET_AFTER = 8  # steps of the second integrator, after which it is set on the run's state at a sample
@@ -61,7 +62,8 @@ class Sensitivity:
 
     def __init__(self, prepared: InitialValueProblem) -> None:
         self._precision = prepared.precision
-        self._engine = interruptible(lambda: Variational(prepared.parametrised, prepared.precision))
+        self._engine = interruptible(lambda: KeyTangents(prepared.parametrised, prepared.precision))
+        self._tangents = self._engine.tangents
         self._flies = prepared.scene.free_flight
         self._settled = SettledStates.of(prepared.system, self._engine.system, prepared.precision)
         shift = prepared.system.scaling.time - self._engine.system.scaling.time
@@ -70,14 +72,14 @@ class Sensitivity:
         self.go_on: Callable[[], bool] = lambda: True
 
     @property
-    def place(self) -> tuple[TangentPlace, bool]:
+    def place(self) -> tuple[Place, bool]:
         """Where it is, to go back to."""
-        return self._engine.place, self._lost
+        return self._tangents.place, self._lost
 
-    def back_to(self, place: tuple[TangentPlace, bool]) -> None:
+    def back_to(self, place: tuple[Place, bool]) -> None:
         """Return to where it was."""
         self._lost = place[1]
-        self._engine.back_to(place[0])
+        self._tangents.begin(place[0])
 
     def take(self, block: SampleBlock) -> Columns:
         """Columns of the variables for samples that follow those before; NaN once the tangents are lost.
@@ -91,14 +93,14 @@ class Sensitivity:
         try:
             for row in range(len(block) if not self._lost else 0):
                 samples.append(self._engine.sample(times[row], self.go_on))
-                if self._engine.steps >= _SET_AFTER and self._settled is not None:
-                    self._engine.set(times[row], self._settled.at(block, row, samples[-1][0]))
+                if self._tangents.steps >= _SET_AFTER and self._settled is not None:
+                    self._tangents.set(times[row], self._settled.at(block, row, samples[-1][0]))
         except LostTangents:
             self._lost = True
         except KeyboardInterrupt:
             self.back_to(before)
             raise
-        rows = self._engine.rows(times[: len(samples)], samples) if samples else None
+        rows = self._engine.of(times[: len(samples)], samples) if samples else None
         return self._columns(rows, len(block))
 
     def _columns(self, rows: Rows | None, count: int) -> Columns:
@@ -125,7 +127,7 @@ class Sensitivity:
 
     def pack(self) -> Arrays:
         """See ``rigidsim.solve.checkpoint.SavedPart``."""
-        place, precision = self._engine.place, self._precision
+        place, precision = self._tangents.place, self._precision
         arrays = pack(np.array(place.time, dtype=precision.scalar), precision, "tangent_time")
         arrays |= pack(place.state, precision, "tangent_state")
         arrays["tangent_exponents"] = place.exponents
@@ -135,9 +137,9 @@ class Sensitivity:
     def restore(self, arrays: Mapping[str, np.ndarray]) -> None:
         """See ``rigidsim.solve.checkpoint.SavedPart``."""
         time, state = (unpack(arrays, self._precision, name) for name in ("tangent_time", "tangent_state"))
-        here = self._engine.place
+        here = self._tangents.place
         exponents = np.asarray(arrays["tangent_exponents"])
         if time.shape != (2,) or state.shape != here.state.shape or exponents.shape != here.exponents.shape:
             raise ValueError("its tangents belong to other equations")
         steps, lost = (int(n) for n in arrays["tangent_counts"])
-        self.back_to((TangentPlace((time[0], time[1]), state, exponents.astype(np.int64), steps), bool(lost)))
+        self.back_to((Place((time[0], time[1]), state, exponents.astype(np.int64), steps), bool(lost)))

@@ -12,20 +12,19 @@ that drive it without feeling it (the position on an orbit), which stand for an 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields
 
 import heyoka as hy
 import numpy as np
 
-from rigidsim.model.rotations import Symbolic
 from rigidsim.model.system import System
 from rigidsim.model.tangents import moving_names, own_names
-from rigidsim.solve.compiled import TaylorEngine, interruptible
-from rigidsim.solve.switching.turned import Turned
+from rigidsim.solve.compiled import interruptible
+from rigidsim.solve.precision import precision_of
+from rigidsim.solve.tangents import Derivatives, LostTangents, Place, Tangents
 
 _INTERVAL = 16.0  # internal units between orthogonalisations: some dozens of steps, little growth
-_CHUNK, _MOST_CHUNKS = 4096, 256  # steps between two looks at Ctrl-C, and such chunks in an interval
 _MOST_ROWS = 1000  # rows of the convergence that are kept
 
 
@@ -60,11 +59,11 @@ class Convergence:
     """Progress of a spectrum, float64, to be resumed with the same bits; empty at the start."""
 
     number: int = 0
-    state: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    place: np.ndarray = field(default_factory=lambda: np.zeros(0))  # state and tangents
     sums: np.ndarray = field(default_factory=lambda: np.zeros(0))
     times: list[float] = field(default_factory=list)
     exponents: list[np.ndarray] = field(default_factory=list)
-    parameters: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    turns: np.ndarray = field(default_factory=lambda: np.zeros(0))
 
     def arrays(self) -> dict[str, np.ndarray]:
         """The arrays to be saved."""
@@ -75,11 +74,11 @@ class Convergence:
         """The progress saved as arrays; empty arrays may be missing."""
         return cls(
             int(arrays["number"][0]),
-            arrays["state"],
+            arrays["place"],
             arrays["sums"],
             [float(t) for t in arrays.get("times", ())],
             list(arrays.get("exponents", ())),
-            arrays.get("parameters", np.zeros(0)),
+            arrays.get("turns", np.zeros(0)),
         )
 
 
@@ -93,71 +92,36 @@ def lyapunov_spectrum(
     """Integrate the variational equations, while ``go_on`` says so; None if ended early or lost."""
     moving = motion_states(system)
     states, count = len(system.states), len(moving)
-    initial = [float(x) for x in system.initial] + list(np.eye(count).ravel())
-    equations = tangent_equations(system, moving)
-    integrator = interruptible(lambda: hy.taylor_adaptive(equations, initial, time=start, compact_mode=True))
+    tangents = interruptible(
+        lambda: Tangents(Derivatives.of(system), moving, count, precision_of("double"), compact_mode=True)
+    )
     intervals = max(1, math.ceil((end - start) / _INTERVAL))
     stride = max(1, math.ceil(intervals / _MOST_ROWS))
-    if done is None or (done.state.size, done.parameters.size) != (len(initial), len(integrator.pars)):
-        done = Convergence(sums=np.zeros(count))
-    if done.number:
-        integrator.time = start + (end - start) * done.number / intervals
-        integrator.state[:] = done.state
-        integrator.pars[:] = done.parameters
-    follow = _following(system, integrator, done)
+    if done is None or done.place.size != states + count * count:
+        initial = [*map(float, system.initial), *np.eye(count).ravel()]
+        done = Convergence(place=np.array(initial), sums=np.zeros(count))
+    begun = start + (end - start) * done.number / intervals
+    none = np.zeros(count, dtype=np.int64)
+    tangents.begin(Place((begun, 0.0), done.place, none, turns=tuple(done.turns.tolist())))
     for number in range(done.number + 1, intervals + 1):
         time = start + (end - start) * number / intervals
-        for _ in range(_MOST_CHUNKS):
-            outcome = integrator.propagate_until(time, max_steps=_CHUNK, callback=follow)[0]
-            if outcome != hy.taylor_outcome.step_limit or not go_on(done):
-                break
-        tangents = np.array(integrator.state[states:]).reshape(count, count)
-        if outcome != hy.taylor_outcome.time_limit or not np.isfinite(tangents).all():
+        try:
+            state, grown = tangents.to(time, lambda: go_on(done))
+        except (LostTangents, KeyboardInterrupt):
             return None
-        basis, triangle = np.linalg.qr(tangents)
+        basis, triangle = np.linalg.qr(grown.T)
         lengths = np.abs(np.diag(triangle))
         done.sums = done.sums + np.log(np.maximum(lengths, np.finfo(float).tiny))
-        integrator.state[states:] = basis.ravel()
+        tangents.restart(state, basis.T)
         if number % stride == 0 or number == intervals:
             done.times.append(math.ldexp(time - start, system.scaling.time))
             done.exponents.append(np.sort(done.sums)[::-1] / done.times[-1])
-        done.number, done.state = number, np.array(integrator.state)
-        done.parameters = np.array(integrator.pars)
+        done.number, done.place = number, tangents.here.state
+        done.turns = np.array(tangents.here.turns)
         if not go_on(done):
             return None
     names = tuple(system.states[i] for i in moving)
     return LyapunovSpectrum(np.array(done.times), np.array(done.exponents), names)
-
-
-def _following(
-    system: System, integrator: TaylorEngine, done: Convergence
-) -> Callable[[TaylorEngine], bool] | None:
-    """What keeps turns of angles, and the quaternion's sign, continuous after each step; None if the
-    equations read neither.
-    """
-    states, angles, used = len(system.states), len(system.turning), len(integrator.pars)
-    read = [*system.turning, *system.signed]
-    if not read or not used:
-        return None
-    function = hy.cfunc(read, system.variables, compact_mode=True)
-
-    def plain() -> tuple[list[float], list[float]]:
-        found = function(np.array(integrator.state[:states])).tolist()
-        return found[:angles], found[angles:]
-
-    here = plain()
-    turned = Turned.by(*here, done.parameters.tolist()) if done.number else Turned.begun(system, *here)
-
-    def follow(_: TaylorEngine) -> bool:
-        nonlocal turned
-        here = plain()
-        found = turned.parameters(*here)
-        turned = Turned.by(*here, found)
-        integrator.pars[: len(found)] = found[:used]
-        return True
-
-    follow(integrator)
-    return follow
 
 
 def motion_states(system: System) -> list[int]:
@@ -168,19 +132,3 @@ def motion_states(system: System) -> list[int]:
     }
     moving = moving_names(own_names(system.mechanics), reads)
     return [i for i, name in enumerate(system.states) if name in moving]
-
-
-def tangent_equations(system: System, moving: Sequence[int]) -> list[tuple[Symbolic, Symbolic]]:
-    """The system's equations, then those of the derivatives of moving states by their initial values, row by
-    row.
-
-    All other states are integrated without tangent vectors, so that step control sees the same states.
-    """
-    chosen = [system.variables[i] for i in moving]
-    varied = hy.var_ode_sys(system.equations, chosen).sys
-    states, count = len(system.states), len(moving)
-    rows = [varied[states + i * count : states + (i + 1) * count] for i in range(states)]
-    # what drives the motion doesn't depend on it; what feeds on it is read by nothing
-    none = {variable: hy.expression(0.0) for i in range(states) if i not in moving for variable, _ in rows[i]}
-    tangents = [(variable, hy.subs(right, none)) for i in moving for variable, right in rows[i]]
-    return [*varied[:states], *tangents]

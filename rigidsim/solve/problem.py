@@ -92,7 +92,7 @@ class InitialValueProblem:
     @cached_property
     def parametrised(self) -> Parametrised:
         """The system with these keys as parameters; ConfigError if its equations have no derivatives."""
-        from rigidsim.solve.differentiable import parametrised  # which few runs need
+        from rigidsim.solve.by_keys import parametrised  # which few runs need
 
         try:
             return parametrised(self.experiment, self.sensitivity_keys, self.python_loads)
@@ -129,7 +129,7 @@ def prepare(experiment: Experiment, *, loads: Sequence[Load] = ()) -> InitialVal
     prepared = prepare_scene(experiment, build_scene(experiment), loads=loads)
     if prepared.sensitivity_keys:
         from rigidsim.scene.varied_keys import varied_keys
-        from rigidsim.solve.differentiable import refuse_without_derivatives
+        from rigidsim.solve.by_keys import refuse_without_derivatives
 
         try:
             refuse_without_derivatives(prepared.scene, prepared.system, has_steps=prepared.has_steps)

@@ -11,10 +11,10 @@ import numpy as np
 from rigidsim.errors import ConfigError, Problem
 from rigidsim.model.load import Load
 from rigidsim.scene.config import Experiment
+from rigidsim.solve.by_keys import KeyTangents, Rows, parametrised, refuse_without_derivatives, turned
 from rigidsim.solve.compiled import interruptible
-from rigidsim.solve.differentiable import parametrised, refuse_without_derivatives
 from rigidsim.solve.problem import prepare
-from rigidsim.solve.variational import LostTangents, Rows, Variational, turned
+from rigidsim.solve.tangents import LostTangents
 
 _WHERE = "keys"
 _KNOWN = ("quaternion", "angular_velocity", "position", "velocity")
@@ -66,6 +66,8 @@ class Tangents:
 
     Args:
         record: further variables, by the names of ``[output] record``, for ``Sensitivities.extra``.
+        quickly: to derivatives right to some 1e-7, where the motion allows it.
+        where: the part of a config that names the keys, for errors.
 
     Raises:
         ConfigError: see ``sensitivities``.
@@ -78,17 +80,19 @@ class Tangents:
         *,
         record: Sequence[str] = (),
         loads: Sequence[Load] = (),
+        quickly: bool = False,
+        where: str = _WHERE,
     ) -> None:
         prepared = prepare(experiment, loads=loads)
         of = prepared.scene, prepared.system
         try:
-            refuse_without_derivatives(*of, has_steps=prepared.has_steps, where=_WHERE)
-            self._parametrised = parametrised(experiment, keys, loads, _WHERE, record)
+            refuse_without_derivatives(*of, has_steps=prepared.has_steps, where=where)
+            self._parametrised = parametrised(experiment, keys, loads, where, record)
         except ConfigError as error:
             raise error.at(experiment.source) from None
-        self._precision, self._source = prepared.precision, experiment.source
-        self._at = list(self._parametrised.values)
-        self._variational = self._compiled()
+        self._precision, self._source, self._quickly = prepared.precision, experiment.source, quickly
+        self._at, self._sloped = list(self._parametrised.values), True
+        self._tangents = self._compiled()
 
     @property
     def keys(self) -> tuple[str, ...]:
@@ -119,39 +123,46 @@ class Tangents:
         if unknown := [name for name in values if name not in self.keys]:
             what = f'given a value for "{unknown[0]}"; allowed: {", ".join(self.keys)}'
             raise ConfigError(Problem(_WHERE, what), self._source)
-        self._move_to(values)
-        engine, clock = self._variational, np.asarray(times, dtype=np.float64)
-        internal = self._internal(clock)
+        clock = np.asarray(times, dtype=np.float64)
         try:
-            samples = [engine.sample(time) for time in internal]
+            return self._told(clock, self.rows(values, clock))
         except LostTangents as error:
             raise ConfigError(Problem(_WHERE, f"the motion can't be differentiated: {error}")) from None
-        if not samples:
-            raise ConfigError(Problem("times", "given none; at least one is allowed"), self._source)
-        return self._told(clock, engine.rows(internal, samples))
 
-    def _move_to(self, values: Mapping[str, float]) -> None:
+    def rows(self, values: Mapping[str, float], times: np.ndarray, *, slopes: bool = True) -> Rows:
+        """The same as it comes, with or without derivatives: all variables in SI.
+
+        Raises:
+            ConfigError: see ``at``.
+            LostTangents: the motion or derivatives don't stay finite.
+        """
+        self._move_to(values, slopes)
+        internal = self._internal(times)
+        if not len(internal):
+            raise ConfigError(Problem("times", "given none; at least one is allowed"), self._source)
+        return self._tangents.at(internal, slopes=slopes)
+
+    def _move_to(self, values: Mapping[str, float], slopes: bool) -> None:
         """Begin anew with these values, compiled again where the equations have another form."""
         keys, context = self._parametrised.keys, self._parametrised.context
         wanted = [Fraction(values[key.name]) if key.name in values else key.value(context) for key in keys]
-        if wanted == self._at:
-            self._variational.begin()
+        if wanted == self._at and (self._sloped or not slopes):
+            self._tangents.begin()
             return
-        coefficients = self._parametrised.at(wanted)
+        coefficients = self._parametrised.at(wanted, slopes=slopes)
         if coefficients is None:
-            self._parametrised = self._parametrised.made_at(wanted)
-            self._variational = self._compiled()
+            self._parametrised, slopes = self._parametrised.made_at(wanted), True
+            self._tangents = self._compiled()
         else:
-            self._variational.use(coefficients)
-        self._at = wanted
+            self._tangents.use(coefficients)
+        self._at, self._sloped = wanted, slopes
 
-    def _compiled(self) -> Variational:
-        return interruptible(lambda: Variational(self._parametrised, self._precision))
+    def _compiled(self) -> KeyTangents:
+        return interruptible(lambda: KeyTangents(self._parametrised, self._precision, quickly=self._quickly))
 
     def _internal(self, times: np.ndarray) -> np.ndarray:
         """Times in the units of the equations, in the run's precision."""
-        scene, unit = self._variational.system.scene, self._variational.system.scaling.time
-        context = scene.context
+        scene = self._parametrised.plain.scene
         if times.ndim != 1 or not np.isfinite(times).all() or (np.diff(times) < 0).any():
             what = "given others; finite times in ascending order, in a plain sequence, are allowed"
             raise ConfigError(Problem("times", what), self._source)
@@ -160,7 +171,7 @@ class Tangents:
                 f"given {times[0]:g} s, before the start at {float(scene.start):g} s; later times are allowed"
             )
             raise ConfigError(Problem("times", what), self._source)
-        return self._precision.array([context.ldexp(context.mpf(float(t)), -unit) for t in times])
+        return self._precision.of_doubles(np.ldexp(times, -self._parametrised.plain.scaling.time))
 
     def _told(self, times: np.ndarray, rows: Rows) -> Sensitivities:
         quaternion, by = rows.values["quaternion"], rows.slopes

@@ -1,8 +1,8 @@
 """How an averaged motion carries small errors of its direction on: steadily, in proportion to time, or
 exponentially, as near a hyperbolic Cassini state.
 
-Neighbours of the averaged motion, two tangent directions of its direction, are followed over short stretches
-one after the other: each gives the tangent map of its stretch, and their products that between any two times.
+Two tangents of the averaged motion's direction are followed over short stretches one after the other: each
+gives the tangent map of its stretch, and their products that between any two times.
 The average over the orbits serves where there is one, whose steps are few whatever the run's level; it
 carries errors alike, up to terms that averaging leaves out.
 """
@@ -19,18 +19,15 @@ from rigidsim.accuracy.trial import compactly
 from rigidsim.errors import ConfigError
 from rigidsim.model.averaged.average import DIRECTION, Average
 from rigidsim.scene.choices import DEFAULT_METHOD, ORBIT_AVERAGED
+from rigidsim.solve.precision import precision_of
 from rigidsim.solve.problem import InitialValueProblem, prepare_scene
-from rigidsim.solve.shadow.carriers import BatchCarrier, StepperCarrier
-from rigidsim.solve.shadow.ensemble import PERTURBED, EnsembleCarrier
+from rigidsim.solve.tangents import Derivatives, LostTangents, Place, Tangents
 from rigidsim.store.summary_parts import UnmeasuredCode
 
 _PART_OF_TURN = math.pi / 6
 """Largest angle of precession within a stretch, over which the path's direction is nearly the same."""
 _FEWEST, _MOST = 64, 1024  # stretches
-_APART = 2.0**-20
-"""Distance of neighbours, rad: its square is below, and the lanes' tolerance far below, what matters."""
-_STEPS = 1 << 20  # of one call
-_STEPS_OF_SPIN = 10_000  # from which code pays that takes longer to compile
+_TOLERANCE = 1e-9  # far below what matters of an error's growth
 _STANDS = 1e-13  # rad: a path that is shorter has no direction
 
 
@@ -84,24 +81,35 @@ def carrying(
     turned = seconds * average.strength * abs(float(average.motion.excess / average.motion.momentum))
     count = int(min(max(turned / _PART_OF_TURN, _FEWEST), _MOST))
     ahead = min(1.0, _PART_OF_TURN * count / max(turned, 1e-300))  # of a stretch
-    carrier, edges = _carrier(problem), np.linspace(start, end, count + 1)
+    made, double = Derivatives.of(system), precision_of("double")
     places = [system.states.index(name) for name in DIRECTION]
+    moving = made.felt(places)
+    compact = average.over_orbits or system.wide  # few steps
+    tangents = Tangents(made, moving, 2, double, compact_mode=compact, tol=_TOLERANCE)
+    own = [moving.index(place) for place in places]
     state = np.array([float(x) for x in system.initial])
+    tangents.begin(
+        Place((start, 0.0), np.append(state, np.zeros(2 * len(moving))), np.zeros(2, dtype=np.int64))
+    )
     bases, moved = [_basis(state[places], np.zeros(3))], []
-    for begin, until in pairwise(edges):
-        middle = float(begin + ahead * (until - begin))
-        states = np.repeat(state[:, None], PERTURBED + 1, axis=1)
-        pushed = bases[-1]
-        states[places, 1:3] += _APART * pushed.T
-        if not go_on():
-            raise Unmeasured(UnmeasuredCode.INTERRUPTED, "the measurement was interrupted")
-        states = _to(carrier, states, float(begin), middle)
-        bases[-1] = _basis(state[places], states[places, 0] - state[places], pushed[0])
-        states = _to(carrier, states, middle, float(until))
-        state = states[:, 0]
-        apart = (states[places, 1:3] - state[places, None]) / _APART
-        moved.append(apart @ pushed @ bases[-1].T)
-        bases.append(_basis(state[places], np.zeros(3), bases[-1][0]))
+    for begin, until in pairwise(np.linspace(start, end, count + 1)):
+        pushed = np.zeros((2, len(moving)))
+        pushed[:, own] = bases[-1]
+        tangents.restart(state, pushed)
+        before = state
+        try:
+            ahead_of_it, _ = tangents.to(float(begin + ahead * (until - begin)), go_on)
+            state, grown = tangents.to(float(until), go_on)
+        except LostTangents:
+            why = "motions beside the averaged one can't be followed to its end"
+            raise Unmeasured(UnmeasuredCode.AVERAGED_STOPPED, why) from None
+        except KeyboardInterrupt:
+            raise Unmeasured(UnmeasuredCode.INTERRUPTED, "the measurement was interrupted") from None
+        path = _basis(before[places], ahead_of_it[places] - before[places], bases[-1][0])
+        mixed = path @ bases[-1].T  # the basis along the path, in terms of the one that was pushed
+        bases[-1] = path
+        moved.append((mixed @ grown[:, own]).T)
+        bases.append(_basis(state[places], np.zeros(3), path[0]))
     maps = [after @ step for after, step in zip(bases[1:], moved, strict=True)]
     return Carrying(seconds / count, np.array(maps))
 
@@ -128,30 +136,6 @@ def _problem(prepared: InitialValueProblem, average: Average | None) -> InitialV
             if level == own_level:
                 raise
     raise AssertionError
-
-
-def _carrier(problem: InitialValueProblem) -> EnsembleCarrier:
-    system, clock = problem.system, problem.clock
-    if system.stepwise:
-        start, end = float(clock.start), float(clock.at(clock.count - 1))
-        return StepperCarrier(system, start, end, 1)
-    average = system.formulation.average
-    assert average is not None
-    return BatchCarrier(system, 0 if average.over_orbits else _STEPS_OF_SPIN)
-
-
-def _to(carrier: EnsembleCarrier, states: np.ndarray, begin: float, end: float) -> np.ndarray:
-    """States (states, 1 + perturbed) at a later time. Raises ``Unmeasured``."""
-    only, every = np.zeros(1, dtype=int), np.ones((1, states.shape[1]))
-    while begin < end:
-        moved, _, reached = carrier.advance(
-            only, states[:, None], begin * every, end * every, np.array([_STEPS])
-        )
-        if not np.isfinite(moved).all():
-            why = "motions beside the averaged one can't be followed to its end"
-            raise Unmeasured(UnmeasuredCode.AVERAGED_STOPPED, why)
-        states, begin = moved[:, 0], float(reached[0])
-    return states
 
 
 def _basis(direction: np.ndarray, towards: np.ndarray, otherwise: np.ndarray | None = None) -> np.ndarray:

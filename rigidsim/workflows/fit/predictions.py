@@ -16,10 +16,9 @@ from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.row_rotations import conjugated, multiplied, normalised, vector_of
 from rigidsim.scene.sample_times import Time
 from rigidsim.scene.schema import Config
-from rigidsim.solve.differentiable import parametrised, refuse_without_derivatives
+from rigidsim.solve.by_keys import turned
 from rigidsim.solve.problem import prepare
-from rigidsim.solve.tangent_lanes import TangentLanes, fits_lanes
-from rigidsim.solve.variational import LostTangents, turned
+from rigidsim.solve.tangents import LostTangents
 from rigidsim.workflows.fit.keys import FitKeys
 from rigidsim.workflows.fit.observed import QUATERNION, Observed
 from rigidsim.workflows.run import run
@@ -181,20 +180,12 @@ class ByTangents:
         self._sizes = np.array([one.size for one in keys.all])
         integrator = quiet.config.integrator.model_copy(update={"method": DEFAULT_METHOD})
         stepping = replace(quiet, config=quiet.config.model_copy(update={"integrator": integrator}))
-        prepared = prepare(stepping)
-        if prepared.system.wide:
+        if prepare(stepping).system.wide:
             what = "its equations are so many that to differentiate them takes longer than the runs"
             raise ConfigError(Problem("[fit] parameters", what))
-        refuse_without_derivatives(
-            prepared.scene, prepared.system, has_steps=prepared.has_steps, where="[fit] parameters"
+        self._source = Tangents(
+            stepping, self._keys, record=self._names, quickly=True, where="[fit] parameters"
         )
-        made = parametrised(stepping, self._keys, (), "[fit] parameters", self._names)
-        self._source: TangentLanes | Tangents
-        if fits_lanes(made, prepared.precision):
-            self._source, self._made = TangentLanes(made), made
-            self._at, self._sloped = list(made.values), True
-        else:
-            self._source = Tangents(stepping, self._keys, record=self._names)
 
     def at(self, values: Sequence[float], times: np.ndarray, *, slopes: bool = True) -> Prediction:
         """See ``Predictor.at``."""
@@ -208,47 +199,19 @@ class ByTangents:
 
     def _every(self, values: Sequence[float], times: np.ndarray, slopes: bool) -> dict[str, tuple[Any, Any]]:
         """Values and derivatives, (n, keys, components), of all that there is; without derivatives, None."""
+        given = {key: float(value) for key, value in zip(self._keys, values, strict=True)}
         try:
-            if isinstance(self._source, TangentLanes):
-                return self._by_lanes(values, times, slopes)
-            given = {key: float(value) for key, value in zip(self._keys, values, strict=True)}
-            found = self._source.at(given, times)
+            rows = self._source.rows(given, times, slopes=slopes)
         except LostTangents as error:
             raise NotPredicted(f"{error}") from None
         except ConfigError as error:
             raise NotPredicted("; ".join(problem.what for problem in error.problems)) from None
-        every = {
-            "quaternion": (found.attitude, found.d_attitude),
-            "angular_velocity": (found.angular_velocity, found.d_angular_velocity),
-            "position": (found.position, found.d_position),
-            "velocity": (found.velocity, found.d_velocity),
-            **found.extra,
+        found = {
+            name: (x.astype(float), rows.slopes[name].astype(float) if slopes else None)
+            for name, x in rows.values.items()
         }
-        return {name: parts for name, parts in every.items() if parts[0] is not None}
-
-    def _by_lanes(
-        self, values: Sequence[float], times: np.ndarray, slopes: bool
-    ) -> dict[str, tuple[np.ndarray, np.ndarray | None]]:
-        wanted = [Fraction(float(value)) for value in values]
-        if wanted == self._at and (self._sloped or not slopes):
-            return self._rows(times, slopes)
-        self._at, self._sloped = wanted, slopes
-        coefficients = self._made.at(wanted, slopes=slopes)
-        if coefficients is None:  # the equations have another form here
-            self._made, self._sloped = self._made.made_at(wanted), True
-            self._source = TangentLanes(self._made)
-        else:
-            assert isinstance(self._source, TangentLanes)
-            self._source.use(coefficients)
-        return self._rows(times, slopes)
-
-    def _rows(self, times: np.ndarray, slopes: bool) -> dict[str, tuple[np.ndarray, np.ndarray | None]]:
-        assert isinstance(self._source, TangentLanes)
-        rows = self._source.rows(np.ldexp(times, -self._made.plain.scaling.time), slopes=slopes)
-        found = {name: (value, rows.slopes.get(name)) for name, value in rows.values.items()}
-        quaternion = found["quaternion"][0]
-        turning = turned(quaternion, rows.slopes["quaternion"]) if slopes else None
-        return {**found, "quaternion": (normalised(quaternion), turning)}
+        turning = turned(rows.values[QUATERNION], rows.slopes[QUATERNION]).astype(float) if slopes else None
+        return {**found, QUATERNION: (normalised(found[QUATERNION][0]), turning)}
 
     def _predicted(self, every: Mapping[str, tuple[Any, Any]]) -> Prediction:
         made = Prediction({})

@@ -1,0 +1,267 @@
+"""A motion's derivatives by numbers of its config: which motions have them, and what is recorded of them.
+
+One integrator carries the motion with its tangents dy/dp for each key p, apart from a run's own
+(``rigidsim.solve.tangents``). Many keys of a motion in double precision whose equations stay the same from
+the start on may go side by side, one a lane, at a tolerance of 1e-9; the motion itself is then integrated at
+epsilon.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import heyoka as hy
+import numpy as np
+
+from rigidsim.errors import ConfigError, Problem
+from rigidsim.model.load import Load
+from rigidsim.model.parametrised import Coefficients, Parametrised
+from rigidsim.model.system import System
+from rigidsim.scene.choices import FULL
+from rigidsim.scene.config import Experiment
+from rigidsim.scene.scene import Scene
+from rigidsim.scene.varied_keys import varied_keys
+from rigidsim.solve.compiled import compiled_engine, compiled_function, evaluate_rows
+from rigidsim.solve.precision import Precision, Scalar, precision_of
+from rigidsim.solve.tangents import Derivatives, LostTangents, Place, Tangents
+
+WHERE = "[output] sensitivity"
+
+
+def refuse_without_derivatives(scene: Scene, system: System, *, has_steps: bool, where: str = WHERE) -> None:
+    """Refuse a motion for which variational equations end, or don't exist.
+
+    Raises:
+        ConfigError: single precision, an average, a closed form, kinks and jumps, an end by the loads.
+    """
+    integrator, found = scene.config.integrator, system.plan.surfaces.found
+    why = ""
+    if integrator.precision == "single":
+        why = 'derivatives lose their digits in single precision; choose precision = "double" or a higher one'
+    elif scene.config.model.level != FULL:
+        why = f'[model] level = "{scene.config.model.level}" has no attitude to differentiate; choose "full"'
+    elif not has_steps:
+        why = (
+            f'[integrator] method = "{integrator.method}" takes no steps beside which variational equations '
+            'could be integrated; choose "taylor"'
+        )
+    elif found:
+        why = (
+            f"the equations switch at a kink or jump of {found[0].text} ({found[0].where}), where "
+            f"variational equations end; {found[0].remedy}"
+        )
+    elif system.switches:
+        why = (
+            "the equations read full turns of Euler angles or the quaternion's sign, which have jumps; write "
+            "the load with products of quaternion components"
+        )
+    elif len(system.crossings) > len(system.events):
+        why = "the body changes in a way that may end its motion, where variational equations end"
+    elif scene.found_start is not None:
+        why = "the start is an equilibrium that is found, not given; give its attitude and rates instead"
+    if why:
+        raise ConfigError(Problem(where, f"asked for derivatives, but {why}"))
+
+
+def parametrised(
+    experiment: Experiment,
+    keys: Sequence[str],
+    loads: Sequence[Load] = (),
+    where: str = WHERE,
+    record: Sequence[str] = (),
+) -> Parametrised:
+    """The system of an experiment with numbers of its config as parameters.
+
+    Raises:
+        ConfigError: a key that stands for no number, or by which the equations have no derivative.
+    """
+    precision = precision_of(experiment.config.integrator.precision)
+    found = varied_keys(experiment, keys, where)
+    return Parametrised(experiment, found, precision.number, precision.bits, loads, record)
+
+
+# --- what is recorded -------------------------------------------------------------------------------------
+
+_WIDTH = 4
+"""Lanes of a batch: the fastest for a motion with a tangent, even where registers hold eight."""
+_IN_LANES = 1e-9
+"""Tolerance of lanes, which take a third of the time then: derivatives that are right to some 1e-7."""
+_MOST_STATES = 20  # in lanes, beyond which unrolled code takes long to compile
+
+
+@dataclass(frozen=True)
+class Rows:
+    """What is recorded of a motion at some times (n,), in SI: (n, components) of each variable, and its
+    derivatives by the keys, (n, keys, components).
+    """
+
+    values: dict[str, np.ndarray] = field(default_factory=dict)
+    slopes: dict[str, np.ndarray] = field(default_factory=dict)
+
+
+class KeyTangents:
+    """A motion and its derivatives by the keys of a parametrised system.
+
+    Args:
+        quickly: to go in lanes where the motion allows it.
+    """
+
+    def __init__(self, made: Parametrised, precision: Precision, *, quickly: bool = False) -> None:
+        self.made, self.precision, self.system = made, precision, made.plain
+        self.keys, system = len(made.keys), made.plain
+        alone = system.pieces is None and not system.clocked and not system.switches and made.first == 0
+        small = not system.wide and len(system.states) <= _MOST_STATES
+        self._lanes = quickly and precision.name == "double" and alone and small
+        derivatives = Derivatives(system, made.equations, made.outputs, made.first, made.count)
+        slopes = made.coefficients.initial_slopes
+        self._moving = derivatives.felt([i for i, row in enumerate(slopes) if any(x != 0 for x in row)])
+        more: dict[str, Any] = {"width": _WIDTH, "tol": _IN_LANES} if self._lanes else {"compact_mode": True}
+        self.tangents = Tangents(
+            derivatives, self._moving, 1 if self._lanes else self.keys, precision, **more
+        )
+        outputs = range(len(made.equations), len(made.equations) + len(made.outputs))
+        along = dict(zip(self._moving, self.tangents.one[len(system.states) :], strict=True))
+        first = self.tangents.slopes(0).start
+        self._slopes = [derivatives.along(row, along, first) for row in outputs]
+        self._options = dict(precision.options) if self._lanes else dict(precision.options, compact_mode=True)
+        context = system.scene.context
+        self._start = precision.number(context.ldexp(system.scene.start, -system.scaling.time))
+        units = [context.ldexp(context.one, e) for one in made.recorded for e in one.exponents]
+        self._units = precision.array(units)
+        self._moved: tuple[bytes, np.ndarray] | None = None  # the latest motion, and all it depends on
+        self.use(made.coefficients)
+
+    def use(self, found: Coefficients) -> None:
+        """Take coefficients and initial values, to begin anew; without derivatives of these there are none of
+        the motion.
+        """
+        precision, made = self.precision, self.made
+        self._values, self._initial = precision.array(found.values), precision.array(found.initial)
+        keys = len(found.initial_slopes[0])
+        self._coefficient_slopes, self._initial_slopes = (
+            np.array([precision.array(row) for row in rows], dtype=precision.scalar).reshape(len(rows), keys)
+            for rows in (found.slopes, [found.initial_slopes[i] for i in self._moving])
+        )
+        if self._lanes:
+            return
+        tangents, numbers = self.tangents, self.tangents.numbers
+        numbers[made.first : made.first + made.count] = self._values
+        exponents, carried = np.zeros(self.keys, dtype=np.int64), []
+        for j in range(self.keys):
+            numbers[tangents.slopes(j)] = self._coefficient_slopes[:, j]
+            sizes = [*self._initial_slopes[:, j], *self._coefficient_slopes[:, j]]
+            exponents[j] = math.frexp(max((abs(float(x)) for x in sizes), default=0.0))[1]
+            context = self.system.scene.context
+            column = [context.ldexp(found.initial_slopes[i][j], -int(exponents[j])) for i in self._moving]
+            carried.append(precision.array(column))
+        state = np.concatenate([self._initial, *carried])
+        self._first = Place((self._start, precision.of_double(0.0)), state, exponents)
+        self.begin()
+
+    def begin(self) -> None:
+        """Go back to the start."""
+        if not self._lanes:
+            self.tangents.begin(self._first)
+
+    def sample(self, time: Scalar, go_on: Callable[[], bool] = lambda: True) -> tuple[np.ndarray, np.ndarray]:
+        """State with tangents at a time (``Tangents.sample``), and the parameters there."""
+        return self.tangents.sample(time, go_on), self.tangents.numbers.copy()
+
+    def at(self, times: np.ndarray, *, slopes: bool = True) -> Rows:
+        """What is recorded at ascending internal times (n,), n > 0, from the start on.
+
+        Raises:
+            LostTangents: the motion or a tangent doesn't stay finite.
+        """
+        if not self._lanes:
+            return self.of(times, [self.sample(time) for time in times])
+        values = self._evaluated(self.made.outputs, self._motion(times), self._values[:, None], times)
+        along: list[np.ndarray] = []
+        for first in range(0, self.keys if slopes else 0, _WIDTH):
+            along += self._in_lanes(times, [min(first + i, self.keys - 1) for i in range(_WIDTH)])
+        return self._rows(values, along[: self.keys])
+
+    def of(self, times: np.ndarray, samples: Sequence[tuple[np.ndarray, np.ndarray]]) -> Rows:
+        """The same at some samples (``sample``), n > 0 of them."""
+        scalar, tangents = self.precision.scalar, self.tangents
+        states = np.array([state for state, _ in samples], dtype=scalar)
+        numbers = np.array([one for _, one in samples], dtype=scalar).T
+        count, known = len(self.system.states), tangents.slopes(0).start
+        along = []
+        for j in range(self.keys):
+            own = np.concatenate([states[:, :count], states[:, tangents.of(j)]], axis=1)
+            read = np.concatenate([numbers[:known], numbers[tangents.slopes(j)]])
+            along.append(self._evaluated(self._slopes, own, read, times))
+        return self._rows(self._evaluated(self.made.outputs, states[:, :count], numbers, times), along)
+
+    def _rows(self, values: np.ndarray, along: Sequence[np.ndarray]) -> Rows:
+        rows, slopes = Rows(), np.stack(along, axis=1) * self._units if along else None
+        for one in self.made.recorded:
+            part = slice(one.first, one.first + one.count)
+            rows.values[one.name] = (values * self._units)[:, part]
+            if slopes is not None:
+                rows.slopes[one.name] = slopes[:, :, part]
+        return rows
+
+    def _evaluated(
+        self, expressions: Iterable[Any], states: np.ndarray, numbers: np.ndarray, times: np.ndarray
+    ) -> np.ndarray:
+        """Values (n, expressions) of the outputs, or along a tangent, in states (n, ...), with parameters."""
+        variables = self.tangents.one[: states.shape[1]]
+        function = compiled_function(list(expressions), variables, **self._options)
+        given = numbers[: function.nparams] if function.nparams else None
+        if given is not None and given.shape[1] == 1:
+            given = given[:, 0]
+        return evaluate_rows(function, np.ascontiguousarray(states), given, times).T
+
+    # --- in lanes ---------------------------------------------------------------------------------------
+
+    def _motion(self, times: np.ndarray) -> np.ndarray:
+        """States (n, states) by an integrator of the motion alone."""
+        described = b"".join(x.tobytes() for x in (self._initial, self._values, times))
+        if self._moved is not None and self._moved[0] == described:
+            return self._moved[1]
+        equations = list(zip(self.system.variables, self.made.equations, strict=True))
+        engine = compiled_engine(equations, np.zeros(len(equations)), **self._options)
+        engine.time, engine.state[:], engine.pars[:] = (
+            self._start, self._initial, self._values[: len(engine.pars)],
+        )  # fmt: skip
+        grid = times if times[0] == self._start else np.append(self._start, times)
+        outcome, *_, states = engine.propagate_grid(grid)
+        if outcome != hy.taylor_outcome.time_limit or not np.isfinite(states).all():
+            raise LostTangents("the motion is no longer finite")
+        self._moved = described, np.asarray(states[len(grid) - len(times) :])
+        return self._moved[1]
+
+    def _in_lanes(self, times: np.ndarray, keys: list[int]) -> list[np.ndarray]:
+        """Derivatives of the outputs, (n, outputs), by the key of each lane."""
+        every = np.repeat(self._values[:, None], len(keys), axis=1)
+        self.tangents.numbers[:] = numbers = np.concatenate([every, self._coefficient_slopes[:, keys]])
+        initial = np.repeat(self._initial[:, None], len(keys), axis=1)
+        found: list[list[np.ndarray]] = [[] for _ in keys]
+        begin = 0
+        for states in self.tangents.through(
+            float(self._start), initial, self._initial_slopes[:, keys], times
+        ):
+            block = times[begin : begin + len(states)]
+            begin += len(states)
+            for lane, part in enumerate(found):
+                own = states[:, :, lane]
+                part.append(self._evaluated(self._slopes, own, numbers[:, lane : lane + 1], block))
+        return [np.concatenate(part) for part in found]
+
+
+def turned(quaternion: np.ndarray, slopes: np.ndarray) -> np.ndarray:
+    """Rotation vectors, space axes, per unit of each key: 2 dq/dp q*, from q (n, 4), body axes to space, and
+    its derivatives (n, keys, 4); (n, keys, 3).
+    """
+    w, v = quaternion[:, None, :1], quaternion[:, None, 1:]
+    a, b = slopes[:, :, :1], slopes[:, :, 1:]
+    (vx, vy, vz), (bx, by, bz) = (np.moveaxis(x, 2, 0) for x in (v, b))
+    crossed = np.stack([by * vz - bz * vy, bz * vx - bx * vz, bx * vy - by * vx], axis=2)
+    square = w * w + sum(v[:, :, i : i + 1] * v[:, :, i : i + 1] for i in range(3))
+    half = w * b - a * v - crossed
+    return (half + half) / square
