@@ -8,8 +8,8 @@ quaternion's sign continued where equations read them.
 
 Each tangent is carried times a power of two, chosen anew on the way so that step control sees numbers of
 order one whatever the tangent's unit and however it grows: the equations are linear in it, and nothing is
-rounded thereby. In lanes, each of which carries the motion with other tangents, these are carried so small that
-step control doesn't see them: their series have the same radius of convergence as the motion's.
+rounded thereby. In lanes, each of which carries the motion with other tangents, these are so small that step
+control doesn't see them: their series have the same radius of convergence as the motion's.
 """
 
 from __future__ import annotations
