@@ -20,7 +20,6 @@ import numpy as np
 from rigidsim.formats.digits import FEW, written_resolution
 from rigidsim.formats.messages import MessageSegment
 from rigidsim.scene.epochs import Epoch
-from rigidsim.scene.frame import EQUATOR
 from rigidsim.scene.rotations import rotation_matrix
 from rigidsim.scene.row_rotations import (
     SEQUENCES,
@@ -32,6 +31,7 @@ from rigidsim.scene.row_rotations import (
     turned,
     vector_of,
 )
+from rigidsim.scene.space_axes import EQUATOR
 
 _QUATERNION = ("Q1", "Q2", "Q3", "QC")
 _ANGLES = ("ANGLE_1", "ANGLE_2", "ANGLE_3")

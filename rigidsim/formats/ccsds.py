@@ -27,8 +27,8 @@ from rigidsim.formats.digits import decimals
 from rigidsim.formats.registry import Format, Naming, TableSource, named_epoch
 from rigidsim.formats.tables import Table, TableColumn
 from rigidsim.scene.epochs import DIGITS, Epoch
-from rigidsim.scene.frame import ECLIPTIC, EQUATOR, OBLIQUITY, SpaceAxes
 from rigidsim.scene.rotations import product
+from rigidsim.scene.space_axes import ECLIPTIC, EQUATOR, OBLIQUITY, SpaceAxes, obliquity, to_equator
 from rigidsim.scene.validation_messages import nearest, shown
 
 _LONGEST_LINE = 254
@@ -61,9 +61,8 @@ class Labels:
         """A vector in the scene's axes resolved along the message's."""
         if self.turn is None:
             return components
-        (x, y, z), (cosine, sine) = components, self.turn[:2]
         with localcontext(_WIDE):
-            return [x, cosine * y - sine * z, sine * y + cosine * z]
+            return to_equator(components, self.turn[:2])
 
 
 def labels(naming: Naming, attributes: Mapping[str, Any]) -> Labels:
@@ -77,10 +76,8 @@ def labels(naming: Naming, attributes: Mapping[str, Any]) -> Labels:
     words = f"turned about X by the obliquity to {EQUATOR}: {arcsec:.3f} arcsec (IAU 2006)"
     context = mpmath.MPContext()
     context.prec = _BITS
-    angle = OBLIQUITY.at(context)
-    c, s, c_half, s_half = (
-        Decimal(mpmath.nstr(f(x), 45)) for x in (angle, angle / 2) for f in (context.cos, context.sin)
-    )
+    turns = (obliquity(context, part) for part in (1, 2))
+    c, s, c_half, s_half = (Decimal(mpmath.nstr(x, 45)) for turn in turns for x in turn)
     notes = [note, f"its space axes, {axes}, were {words}"]
     return Labels(epoch, EQUATOR, notes, (c, s, c_half, s_half))
 

@@ -15,7 +15,7 @@ from rigidsim.errors import RigidsimError
 from rigidsim.formats.attitude_messages import AttitudeRows, named_axes
 from rigidsim.formats.messages import MessageSegment, read_segments
 from rigidsim.scene.epochs import Epoch
-from rigidsim.scene.frame import EQUATOR, SpaceAxes
+from rigidsim.scene.space_axes import EQUATOR, SpaceAxes
 
 MESSAGE_COLUMNS = {
     "quaternion": ("qw", "qx", "qy", "qz"), "angular_velocity": ("wx", "wy", "wz"),

@@ -13,8 +13,8 @@ from rigidsim.formats.ck_reading import read_rows
 from rigidsim.formats.text_tables import TEXT, as_number, is_date, name_and_unit, open_text
 from rigidsim.formats.trajectories import KINDS, Trajectory, read_trajectory
 from rigidsim.scene.epochs import Epoch, parse_epoch
-from rigidsim.scene.frame import ECLIPTIC, OBLIQUITY
-from rigidsim.scene.rotations import product
+from rigidsim.scene.row_rotations import multiplied
+from rigidsim.scene.space_axes import from_equator
 from rigidsim.scene.validation_messages import nearest
 
 
@@ -143,10 +143,7 @@ def read_attitudes(path: Path, kernels: Sequence[Path], epoch: Epoch, axes: str)
         RigidsimError: SPICE refuses a kernel, or the CK holds no rows.
     """
     found = read_rows(path, kernels, epoch.since_j2000())
-    quaternions = found.quaternions
-    if axes == ECLIPTIC:
-        half = -float(OBLIQUITY) / 2
-        quaternions = np.stack(product([np.cos(half), np.sin(half), 0.0, 0.0], [*quaternions.T]), axis=1)
+    quaternions = multiplied(np.array(from_equator(axes, np)), found.quaternions)
     numbers = {"time": found.times, **{f"quaternion_{x}": quaternions[:, n] for n, x in enumerate("wxyz")}}
     if found.rates is not None:
         numbers |= {f"angular_velocity_{x}": found.rates[:, n] for n, x in enumerate("xyz")}

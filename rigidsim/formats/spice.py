@@ -26,12 +26,11 @@ from rigidsim.formats.ccsds import labels
 from rigidsim.formats.registry import RunMotion, TableSource
 from rigidsim.formats.tables import Table
 from rigidsim.scene.epochs import Epoch
-from rigidsim.scene.frame import EQUATOR
-from rigidsim.scene.kernels.ephemeris import EQUATORIAL
 from rigidsim.scene.kernels.reading import KernelError
 from rigidsim.scene.kernels.spice import loaded, spice
 from rigidsim.scene.parts_of_values import parts_in
 from rigidsim.scene.rotations import product, rotation_matrix
+from rigidsim.scene.space_axes import CELESTIAL, EQUATOR
 
 J2000 = "J2000"
 _WANTED, _ALLOWED = 2e-13, 1e-12
@@ -233,8 +232,8 @@ def run_of(table: Table, source: TableSource) -> SpiceRun:
         raise RigidsimError(what + ("; name it in [output] record" if table.rows else ""))
     assert source.motion is not None
     named = labels(source.naming, source.attributes)
-    if named.frame not in (*EQUATORIAL, EQUATOR):
-        allowed = ", ".join((*EQUATORIAL, EQUATOR))
+    if named.frame not in (*CELESTIAL, EQUATOR):
+        allowed = ", ".join((*CELESTIAL, EQUATOR))
         raise RigidsimError(f"--axes: given {named.frame}, which SPICE doesn't know; allowed: {allowed}")
     ahead = named.epoch.since_j2000()
     begin, end = (ahead + time for time in source.motion.span)

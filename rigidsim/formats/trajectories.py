@@ -20,8 +20,8 @@ from rigidsim.errors import RigidsimError
 from rigidsim.formats.message_columns import MESSAGE_COLUMNS, message_columns
 from rigidsim.formats.text_tables import TEXT, TIMES, is_date, name_and_unit, open_text
 from rigidsim.scene.epochs import Epoch, parse_epoch
-from rigidsim.scene.frame import ECLIPTIC, OBLIQUITY, SpaceAxes
-from rigidsim.scene.row_rotations import multiplied, turned
+from rigidsim.scene.row_rotations import conjugated, multiplied, turned
+from rigidsim.scene.space_axes import ECLIPTIC, SpaceAxes, from_equator
 from rigidsim.store.many_rows import BLOCK, blocks_of, gathered
 
 if TYPE_CHECKING:
@@ -81,8 +81,8 @@ class Trajectory:
         """A message's attitudes and path in other space axes; the same where either are not known."""
         if ECLIPTIC not in (axes, self.axes) or axes == self.axes or not {axes, self.axes} <= KNOWN_AXES:
             return self
-        half = float(OBLIQUITY) / 2 * (-1 if axes == ECLIPTIC else 1)
-        turn, columns = np.array([[np.cos(half), np.sin(half), 0.0, 0.0]]), dict(self.columns)
+        turn, columns = np.array([from_equator(ECLIPTIC, np)]), dict(self.columns)
+        turn = turn if axes == ECLIPTIC else conjugated(turn)
         for variable, names in MESSAGE_COLUMNS.items():
             if variable == "angular_velocity" or not columns.keys() >= set(names):
                 continue

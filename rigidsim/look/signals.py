@@ -15,6 +15,7 @@ import xarray
 
 from rigidsim.look.solids import Array, rotation_matrix
 from rigidsim.look.surroundings import carries_within, frame, gravity
+from rigidsim.scene.space_axes import CELESTIAL, EQUATOR, obliquity, to_equator
 
 _ORBIT_NORM = re.compile(r"orbit_norm_(\d+)")
 _IN_WORDS = {"energy_balance": "energy less work"}
@@ -56,8 +57,6 @@ def is_averaged(attributes: Mapping[str, Any]) -> bool:
 
 
 NEAR_AXIS = 0.35  # largest polar motion (rad) shown as such; beyond it, the body tumbles
-_EQUATORIAL = ("ICRF", "GCRF", "EME2000")  # axes of the Earth's mean equator of J2000
-_OBLIQUITY = np.deg2rad(84381.406 / 3600)  # of the ecliptic to it (IAU 2006)
 _ALIKE_PLANES = 1e-5  # between unit normals of planes that have one name
 _ALIKE = 1e-9  # moments nearer than this are one
 _STEADY = 1e-6  # a momentum that turns by less is fixed
@@ -255,8 +254,8 @@ def reference_axes(dataset: xarray.Dataset) -> tuple[Array, str] | None:
     if asked == "orbit":
         return None
     named = str(dataset.attrs.get("axes", ""))
-    ecliptic = np.array([0.0, -np.sin(_OBLIQUITY), np.cos(_OBLIQUITY)])
-    equatorial = named in _EQUATORIAL
+    ecliptic = np.array(to_equator([0.0, 0.0, 1.0], obliquity(np)))
+    equatorial = named in (*CELESTIAL, EQUATOR)
     normal = ecliptic if asked is None and equatorial and "obliquity" not in dataset else np.eye(3)[2]
     if recorded is not None and asked is not None:
         normal = np.array(recorded["reference_normal"])

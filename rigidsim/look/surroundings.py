@@ -16,9 +16,7 @@ import xarray
 
 from rigidsim.look.solids import Array, Color
 from rigidsim.scene.bodies.presets import KNOWN, KnownBody, known_body
-
-_KEPLER_STEPS = 60  # of Newton's method; from E = M + e sin M it converges for any e < 1
-
+from rigidsim.scene.kepler import combined, eccentric_anomalies, plane_vectors
 
 _COLORS: dict[str, Color] = {
     "Sun": (255, 214, 110),
@@ -110,25 +108,12 @@ def kepler_path(orbit: dict[str, float], seconds: Array) -> Array:
     """
     e, axis = orbit["eccentricity"], orbit["semi_major_axis"]
     mean = np.remainder(orbit["mean_anomaly"] + orbit["mean_motion"] * seconds + np.pi, 2 * np.pi) - np.pi
-    anomaly = mean + e * np.sin(mean)
-    for _ in range(_KEPLER_STEPS):
-        step = (anomaly - e * np.sin(anomaly) - mean) / (1 - e * np.cos(anomaly))
-        anomaly = anomaly - step
-        if not len(step) or np.abs(step).max() < 1e-14:
-            break
-    x, y = axis * (np.cos(anomaly) - e), axis * np.sqrt(1 - e * e) * np.sin(anomaly)
-    turn = orbit["periapsis"] + orbit["periapsis_rate"] * seconds
+    anomaly = eccentric_anomalies(mean, e)
+    periapsis = orbit["periapsis"] + orbit["periapsis_rate"] * seconds
     node = orbit["ascending_node"] + orbit["node_rate"] * seconds
-    u, v = x * np.cos(turn) - y * np.sin(turn), x * np.sin(turn) + y * np.cos(turn)
-    tilt = orbit["inclination"]
-    return np.stack(
-        [
-            u * np.cos(node) - v * np.cos(tilt) * np.sin(node),
-            u * np.sin(node) + v * np.cos(tilt) * np.cos(node),
-            v * np.sin(tilt),
-        ],
-        axis=1,
-    )
+    axes = plane_vectors(*((np.cos(x), np.sin(x)) for x in (orbit["inclination"], node, periapsis)))
+    across = axis * np.sqrt(1 - e * e) * np.sin(anomaly)
+    return np.stack(combined(axes, axis * (np.cos(anomaly) - e), across), axis=1)
 
 
 def orbit_normal(orbit: dict[str, float]) -> Array:

@@ -23,7 +23,8 @@ from rigidsim.model.rotations import Symbolic
 from rigidsim.model.sources import read_in
 from rigidsim.model.two_part import rounded
 from rigidsim.scene.arithmetic import apply
-from rigidsim.scene.earth_axes import STRENGTH, UNLIKE, earth_axes, rotation_rate
+from rigidsim.scene.bodies.presets import EARTH
+from rigidsim.scene.earth_axes import earth_axes, rotation_rate
 from rigidsim.scene.expressions.names import PLACES, NameProvider, Readable, provides
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.schema import Config
@@ -173,7 +174,7 @@ def _check(scene: Scene) -> None:
         )
     source = flown_about(scene.config)
     strength = getattr(source.of(scene), "strength", None) if source is not None else None
-    if strength is not None and abs(strength / STRENGTH - 1) > UNLIKE:
+    if strength is not None and not EARTH.attracts_by(strength):
         what = f"the Earth's air, where {value_text(strength, 'm^3/s^2')} attracts the body, which isn't the "
         raise _fault(scene, f"{given}{what}Earth; give density, altitude and scale_height of its own air")
 

@@ -16,7 +16,7 @@ import heyoka as hy
 from rigidsim.model.kinematics import Kinematics, seconds
 from rigidsim.model.rotations import Symbolic
 from rigidsim.scene.epochs import Epoch
-from rigidsim.scene.frame import ECLIPTIC, OBLIQUITY
+from rigidsim.scene.space_axes import ECLIPTIC, obliquity, to_ecliptic
 
 _CENTURY = 86400 * 36525  # s
 _ARCSEC = 3600 * 180
@@ -58,6 +58,5 @@ def earth_pole(m: Kinematics, epoch: Epoch, axes: str) -> list[Symbolic]:
     equator = [c1 * radial + s1 * across, c1 * across - s1 * radial, c2 - s2 * along]
     if axes != ECLIPTIC:
         return equator
-    c, s = (m.number(f(OBLIQUITY.at(context))) for f in (context.cos, context.sin))
-    x, y, z = equator
-    return [x, c * y + s * z, c * z - s * y]
+    c, s = map(m.number, obliquity(context))
+    return to_ecliptic(equator, (c, s))

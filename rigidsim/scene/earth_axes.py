@@ -16,12 +16,8 @@ from typing import Any
 from rigidsim.scene.arithmetic import Matrix
 from rigidsim.scene.epochs import Epoch
 from rigidsim.scene.exact import ExactNumber
-from rigidsim.scene.frame import ECLIPTIC, OBLIQUITY
+from rigidsim.scene.space_axes import ECLIPTIC, obliquity, to_ecliptic
 
-STRENGTH = 3.986004418e14
-"""G M of the Earth, m^3/s^2."""
-UNLIKE = 0.01
-"""Share by which another G M isn't the Earth's."""
 _J2000 = 2451545  # Julian date
 _CENTURY = 36525  # days
 # arcsec, in powers of centuries since J2000
@@ -64,8 +60,7 @@ def earth_axes(epoch: Epoch, axes: str, context: Any) -> Matrix:
         matrix = _turned(matrix, about, by, context)
     if axes != ECLIPTIC:
         return matrix
-    c, s = (f(OBLIQUITY.at(context)) for f in (context.cos, context.sin))
-    return [[x, c * y + s * z, c * z - s * y] for x, y, z in matrix]
+    return [to_ecliptic(row, obliquity(context)) for row in matrix]
 
 
 def _turned(matrix: Matrix, about: int, angle: Any, context: Any) -> Matrix:

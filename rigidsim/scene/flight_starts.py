@@ -11,9 +11,10 @@ from typing import Any
 
 from rigidsim.errors import ConfigError, Problem
 from rigidsim.scene.arithmetic import Vector, apply, cross
+from rigidsim.scene.bodies.presets import EARTH
 from rigidsim.scene.epochs import Epoch
-from rigidsim.scene.frame import ECLIPTIC, OBLIQUITY
 from rigidsim.scene.schema import Config
+from rigidsim.scene.space_axes import ECLIPTIC, obliquity, to_ecliptic
 from rigidsim.scene.two_line_elements import TwoLineElements
 
 Rotation = tuple[list[list[float]], list[float]]
@@ -22,8 +23,7 @@ ROTATIONS: dict[str, Callable[[Epoch], Rotation]] = {}
 """By name of a frame; the others are GCRF's axes, to 0.02 arcsec."""
 PROPAGATORS: dict[str, Callable[[TwoLineElements, Epoch], tuple[list[float], list[float]]]] = {}
 """SGP4 by its name: to position and velocity in TEME, m and m/s. Both raise ``ValueError``."""
-_EARTH = 3.986004418e14  # m^3/s^2
-_NEAR = 1e-3  # part by which values in use differ, many times over
+_STRENGTH = f"{EARTH.gravitational_parameter:g} m^3/s^2"
 
 
 def flight_start(config: Config, context: Any) -> tuple[Vector, Vector]:
@@ -67,7 +67,7 @@ def flight_start(config: Config, context: Any) -> tuple[Vector, Vector]:
     except ValueError as error:
         raise _fault(key, str(error)) from None
     if config.frame.axes == ECLIPTIC:
-        position, velocity = (_ecliptic(vector, context) for vector in (position, velocity))
+        position, velocity = (to_ecliptic(vector, obliquity(context)) for vector in (position, velocity))
     return position, velocity
 
 
@@ -75,13 +75,6 @@ def _given(config: Config, context: Any) -> tuple[Vector, Vector]:
     table, zero = config.initial, [context.zero] * 3
     position = [x.at(context) for x in table.position] if table.position else zero
     return position, [x.at(context) for x in table.velocity] if table.velocity else list(zero)
-
-
-def _ecliptic(vector: Vector, context: Any) -> Vector:
-    angle = OBLIQUITY.at(context)
-    x, y, z = vector
-    c, s = context.cos(angle), context.sin(angle)
-    return [x, c * y + s * z, c * z - s * y]
 
 
 def _check_geocentric(config: Config, key: str) -> None:
@@ -97,15 +90,15 @@ def _check_geocentric(config: Config, key: str) -> None:
         strength, place = load.gravitational_parameter, load.position  # type: ignore[attr-defined]
         if strength is None:  # of one of [[bodies]]
             what = "counts from the centre of the Earth, but the central_gravity is that of one of [[bodies]]"
-        elif abs(float(strength) / _EARTH - 1) > _NEAR:
+        elif not EARTH.attracts_by(float(strength)):
             what = f"is about the Earth, but the central_gravity has {float(strength):.6g} m^3/s^2"
         elif any(x.sign for x in place):
             what = "counts from the centre of the Earth, but the central_gravity has another position"
         else:
             return
-        raise _fault(key, f"{what}; a gravitational_parameter of {_EARTH:g} m^3/s^2 at the origin is allowed")
+        raise _fault(key, f"{what}; a gravitational_parameter of {_STRENGTH} at the origin is allowed")
     what = "is about the Earth, but nothing attracts the body; add a load of kind central_gravity with "
-    raise _fault(key, f'{what}gravitational_parameter = "{_EARTH:g} m^3/s^2"')
+    raise _fault(key, f'{what}gravitational_parameter = "{_STRENGTH}"')
 
 
 def _fault(key: str, text: str) -> ConfigError:

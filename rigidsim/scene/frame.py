@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from fractions import Fraction
 from typing import Annotated, Any, Literal
 
 from pydantic import Tag
@@ -11,20 +10,11 @@ from pydantic import Tag
 from rigidsim.errors import ConfigError, Problem
 from rigidsim.scene.arithmetic import Vector, cross, dot, negligible, norm
 from rigidsim.scene.bodies.body import RigidBody
-from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.fields import NAME_OR_VECTOR, ConfigTable, Dimensionless, Triple, name_or_vector
+from rigidsim.scene.space_axes import SpaceAxes
 
 ORBIT = "orbit"
 SPACE = "space"
-SpaceAxes = Literal["EME2000", "ICRF", "GCRF", "ecliptic J2000"]
-ECLIPTIC: SpaceAxes = "ecliptic J2000"
-"""Mean ecliptic and equinox of J2000: the axes of the ephemerides."""
-EQUATOR: SpaceAxes = "EME2000"
-"""Mean equator and equinox of J2000: the ecliptic's, turned about their common X axis, the equinox."""
-OBLIQUITY = ExactNumber(Fraction(84381406, 1000 * 3600 * 180), pi_power=1)
-"""Angle (rad) from the equator to the ecliptic of J2000, 84381.406 arcsec: IAU 2006 (resolution B1, the P03
-precession of Capitaine et al. 2003, A&A 412, 567).
-"""
 
 
 class Frame(ConfigTable):

@@ -9,6 +9,7 @@ from typing import Any
 
 from rigidsim.scene.arithmetic import cosine_and_sine, eccentric_anomaly
 from rigidsim.scene.exact import ExactNumber
+from rigidsim.scene.kepler import combined, plane_vectors
 from rigidsim.scene.orbit_keys import PACES, Elements, Orbit
 from rigidsim.scene.orbit_tables.elements import ElementTable, TableError, read_table
 from rigidsim.scene.orbit_tables.pieces import TabulatedOrbit
@@ -62,22 +63,14 @@ class KeplerOrbit:
 
     def place(self, context: Any, time: Any) -> list[Any]:
         """Place of the attracting body at a time, m, space axes."""
-        e, anomaly = self.eccentricity, self.eccentric_anomaly(context, time)
-        x = self.semi_major_axis * (context.cos(anomaly) - e)
-        y = self.semi_major_axis * context.sqrt(1 - e * e) * context.sin(anomaly)
-        z = context.zero
-        turns = (
-            (self.periapsis + self.periapsis_rate * time, 3),
-            (self.inclination, 1),
-            (self.ascending_node + self.node_rate * time, 3),
+        a, e, anomaly = self.semi_major_axis, self.eccentricity, self.eccentric_anomaly(context, time)
+        node, periapsis = (
+            self.ascending_node + self.node_rate * time,
+            self.periapsis + self.periapsis_rate * time,
         )
-        for angle, axis in turns:
-            c, s = cosine_and_sine(context, angle)
-            if axis == 3:
-                x, y = c * x - s * y, s * x + c * y
-            else:
-                y, z = c * y - s * z, s * y + c * z
-        return [x, y, z]
+        turns = (cosine_and_sine(context, angle) for angle in (self.inclination, node, periapsis))
+        across = a * context.sqrt(1 - e * e) * context.sin(anomaly)
+        return combined(plane_vectors(*turns), a * (context.cos(anomaly) - e), across)
 
     @property
     def pericentre(self) -> Any:

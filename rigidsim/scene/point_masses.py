@@ -20,6 +20,7 @@ from rigidsim.scene.fields import (
     Triple,
     VariableName,
 )
+from rigidsim.scene.kepler import combined, plane_vectors
 from rigidsim.scene.validation_messages import nearest, shown
 
 GRAVITATIONAL_CONSTANT = "6.67430e-11"
@@ -300,18 +301,14 @@ def _place(
 
 
 def _of_elements(number: int, orbit: StartingOrbit, strength: Any, context: Any) -> tuple[Vector, Vector]:
-    """Relative position and velocity (Murray & Dermott 1999, sections 2.4 and 2.8)."""
+    """Relative position and velocity."""
     a, e = ellipse_of(orbit, context, lambda key, text: _fault(number, f"orbit.{key}", text))
     anomaly = eccentric_anomaly(context, orbit.mean_anomaly.at(context), e)
     c, s, root = context.cos(anomaly), context.sin(anomaly), context.sqrt(1 - e * e)
-    angles = (orbit.ascending_node, orbit.inclination, orbit.periapsis)
-    (cn, sn), (ci, si), (cw, sw) = ((context.cos(x.at(context)), context.sin(x.at(context))) for x in angles)
-    p = [cn * cw - sn * sw * ci, sn * cw + cn * sw * ci, sw * si]
-    q = [-cn * sw - sn * cw * ci, -sn * sw + cn * cw * ci, cw * si]
+    angles = (x.at(context) for x in (orbit.inclination, orbit.ascending_node, orbit.periapsis))
+    axes = plane_vectors(*((context.cos(x), context.sin(x)) for x in angles))
     speed = context.sqrt(strength / a) / (1 - e * c)
-    place = [a * ((c - e) * x + root * s * y) for x, y in zip(p, q, strict=True)]
-    moving = [speed * (root * c * y - s * x) for x, y in zip(p, q, strict=True)]
-    return place, moving
+    return combined(axes, a * (c - e), a * root * s), combined(axes, -(speed * s), speed * root * c)
 
 
 def ellipse_of(orbit: Any, context: Any, fault: Callable[[str, str], ConfigError]) -> tuple[Any, Any]:

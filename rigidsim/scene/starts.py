@@ -18,11 +18,11 @@ from dataclasses import dataclass
 from typing import Any, Protocol
 
 from rigidsim.errors import ConfigError, Problem
-from rigidsim.scene import attitude
+from rigidsim.scene import attitude, space_axes
 from rigidsim.scene.arithmetic import Vector, apply, dot, negligible, transpose
 from rigidsim.scene.bodies.body import RigidBody, inverse_inertia
 from rigidsim.scene.exact import ExactNumber
-from rigidsim.scene.frame import ECLIPTIC, EQUATOR, OBLIQUITY, Figure
+from rigidsim.scene.frame import Figure
 from rigidsim.scene.registry import SceneLoad
 from rigidsim.scene.schema import Config, Initial
 
@@ -217,9 +217,8 @@ def from_equator(scene: Begun, key: str) -> Vector:
     context = scene.context
     if scene.axes is None:
         what = "counts from the equator of J2000, but what the space axes are isn't known; set [frame] axes "
-        raise refusal(key, f'{what}to "{EQUATOR}" or "{ECLIPTIC}", or give the attitude otherwise')
-    angle = -OBLIQUITY.at(context) / 2 if scene.axes == ECLIPTIC else context.zero
-    return [context.cos(angle), context.sin(angle), context.zero, context.zero]
+        raise refusal(key, f'{what}to "EME2000" or "ecliptic J2000", or give the attitude otherwise')
+    return space_axes.from_equator(scene.axes, context)
 
 
 def _from_pole(scene: Begun) -> InitialRotation:

@@ -27,7 +27,7 @@ from typing import Any
 
 import numpy as np
 
-from rigidsim.model.averaged.spectrum import eccentric_anomalies
+from rigidsim.scene.kepler import eccentric_anomalies
 
 _POINTS = ((0.3, 64), (0.6, 256), (1.0, 8192))
 """Points per turn up to an eccentricity; harmonics beyond are below double precision up to 0.6."""

@@ -12,7 +12,6 @@ from rigidsim.model.averaged.orbit_terms import (
     OrbitPlace,
     TableTerms,
     nutation,
-    plane_vectors,
     second_order,
 )
 from rigidsim.model.averaged.sources import Source
@@ -24,6 +23,7 @@ from rigidsim.model.rotations import Symbolic
 from rigidsim.model.state_blocks import StateBlock
 from rigidsim.model.two_part import as_factor
 from rigidsim.scene.arithmetic import cosine_and_sine, cross, dot
+from rigidsim.scene.kepler import plane_vectors
 from rigidsim.scene.orbit_tables.pieces import TabulatedOrbit
 from rigidsim.scene.orbits import KeplerOrbit
 

@@ -44,6 +44,7 @@ from rigidsim.model.rotations import Symbolic
 from rigidsim.model.scaling import Rounder
 from rigidsim.model.two_part import as_factor, rounded
 from rigidsim.scene.arithmetic import Vector, cross, dot
+from rigidsim.scene.kepler import turned
 from rigidsim.scene.orbit_tables.pieces import AXIS
 from rigidsim.scene.orbits import KeplerOrbit
 
@@ -144,18 +145,6 @@ def nutation(
     return [size * x for x in cross(tensor, s)]
 
 
-def plane_vectors(
-    tilt: tuple[Any, Any], node: tuple[Any, Any], periapsis: tuple[Any, Any]
-) -> tuple[Vector, Vector]:
-    """P and T of an orbit from cosine and sine of its inclination, node and periapsis."""
-    ci, si = tilt
-    cn, sn = node
-    cw, sw = periapsis
-    first = [cn, sn, 0 * cn]
-    second = [-(sn * ci), cn * ci, si]
-    return turned((first, second), (cw, sw))
-
-
 def place_by_elements(
     functions: Any, elements: Mapping[str, Any], anomaly: Any, periapsis: Any
 ) -> OrbitPlace:
@@ -165,13 +154,6 @@ def place_by_elements(
     axes = [1 - 2 * p * p, product, -2 * p * chi], [product, 1 - 2 * q * q, 2 * q * chi]
     turn = functions.cos(periapsis), functions.sin(periapsis)
     return OrbitPlace(functions.cos(anomaly), functions.sin(anomaly), *turned(axes, turn))
-
-
-def turned(axes: tuple[Vector, Vector], turn: tuple[Any, Any]) -> tuple[Vector, Vector]:
-    """Two unit vectors rotated within their plane by an angle given as cosine and sine."""
-    (first, second), (c, s) = axes, turn
-    along = [c * x + s * y for x, y in zip(first, second, strict=True)]
-    return along, [c * y - s * x for x, y in zip(first, second, strict=True)]
 
 
 @dataclass(frozen=True)

@@ -9,12 +9,13 @@ from typing import Any, Self
 
 import numpy as np
 
-from rigidsim.model.averaged.orbit_terms import Ellipse, OrbitPlace, place_by_elements, plane_vectors
+from rigidsim.model.averaged.orbit_terms import Ellipse, OrbitPlace, place_by_elements
 from rigidsim.model.averaged.spectrum import orbit_harmonics
 from rigidsim.model.capabilities import gradient_source_of
 from rigidsim.model.gradient import GradientSource
 from rigidsim.model.load import Load
 from rigidsim.scene.arithmetic import Vector, eccentric_anomaly, norm
+from rigidsim.scene.kepler import plane_vectors
 from rigidsim.scene.orbit_tables.pieces import AXIS
 from rigidsim.scene.scene import Scene
 

@@ -16,6 +16,7 @@ from functools import cached_property
 import numpy as np
 
 from rigidsim.model.averaged.free_motion import FreeMotion
+from rigidsim.scene.kepler import eccentric_anomalies
 
 _POINTS = 256
 _LEAST = 1e-12  # of the largest harmonic
@@ -155,15 +156,6 @@ def orbit_harmonics(eccentricity: float) -> np.ndarray:
     parts = [np.fft.fft(f * fifth) / points for f in (x * x, x * y, x * y, y * y)]
     sizes = np.sqrt(sum(np.abs(p) ** 2 for p in parts))
     return np.asarray(sizes[: points // 2])
-
-
-def eccentric_anomalies(mean: np.ndarray, e: float) -> np.ndarray:
-    """Solutions E of Kepler's equation M = E - e sin E."""
-    anomaly = mean + e * np.sin(mean)
-    for _ in range(60):
-        step = (anomaly - e * np.sin(anomaly) - mean) / (1 - e * np.cos(anomaly))
-        anomaly = anomaly - np.clip(step, -0.5, 0.5)
-    return anomaly
 
 
 def _turned(precession: np.ndarray, nodding: np.ndarray, own: np.ndarray) -> np.ndarray:

@@ -27,12 +27,12 @@ from rigidsim.scene.arithmetic import Vector, norm
 from rigidsim.scene.cautions import Caution
 from rigidsim.scene.epochs import J2000, Epoch
 from rigidsim.scene.fields import BodyName, GravitationalParameter, Metre, Triple
-from rigidsim.scene.frame import ECLIPTIC
 from rigidsim.scene.kernels.reading import Sight
 from rigidsim.scene.orbit_keys import OrbitFields
 from rigidsim.scene.orbits import KeplerOrbit, attracting_body, resolve_orbit, resolve_tabulated_orbit
 from rigidsim.scene.registry import Surroundings, register_load
 from rigidsim.scene.scene import Scene
+from rigidsim.scene.space_axes import ECLIPTIC
 
 _PLACES = ("orbit", "satellite_orbit", "position", "ephemeris", "source")
 """Keys that tell how a source is placed."""

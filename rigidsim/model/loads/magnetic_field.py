@@ -27,8 +27,8 @@ from rigidsim.model.plausibility import about_orbit, implied_strength
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.two_part import rounded
 from rigidsim.scene.arithmetic import Vector, dot, norm
+from rigidsim.scene.bodies.presets import EARTH
 from rigidsim.scene.cautions import Caution
-from rigidsim.scene.earth_axes import STRENGTH, UNLIKE
 from rigidsim.scene.effect_parts import EffectPart
 from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.orbits import KeplerOrbit, resolve_orbit
@@ -195,9 +195,9 @@ class InMagneticField(Load):
         for load in loads_of(scene):
             if not isinstance(load, CentralGravity) or load.position != centre:
                 continue
-            if abs(load.strength / STRENGTH - 1) > UNLIKE:
+            if not EARTH.attracts_by(load.strength):
                 what = f"where {value_text(load.strength, 'm^3/s^2')} attracts the body, which isn't the "
-                what += f"Earth; give source_moment, or the Earth's G M, {STRENGTH:.9e} m^3/s^2"
+                what += f"Earth; give source_moment, or {EARTH.gravitational_parameter:g} m^3/s^2"
                 raise ConfigError(Problem(where, given + what))
         far = norm(scene.context, [x - a for x, a in zip(scene.position or [], centre, strict=True)])
         if self.earth.within(far):

@@ -28,7 +28,7 @@ from rigidsim.model.observables.observable import (
 )
 from rigidsim.model.observables.steadiness import is_planet, steady_directions, steady_meridian
 from rigidsim.model.rotations import Symbolic, apply, unit
-from rigidsim.scene.frame import ECLIPTIC, OBLIQUITY
+from rigidsim.scene.space_axes import ECLIPTIC, obliquity, to_equator
 
 AXIS = ("axis",)
 
@@ -46,12 +46,10 @@ def _on_plane(m: Mechanics) -> list[list[Symbolic]]:
 
 def _on_sky(m: Mechanics, axes: list[list[Symbolic]]) -> list[list[Symbolic]]:
     """Components of axes along equatorial axes: the space axes, unless these are the ecliptic's."""
-    context = m.scene.context
     if m.scene.axes != ECLIPTIC:
         return axes
-    angle = OBLIQUITY.at(context)
-    c, s = m.fixed([context.cos(angle), context.sin(angle)])
-    return [[x, c * y - s * z, s * y + c * z] for x, y, z in axes]
+    c, s = m.fixed(list(obliquity(m.scene.context)))
+    return [to_equator(axis, (c, s)) for axis in axes]
 
 
 def _meridian(m: Mechanics) -> list[Angle]:

@@ -35,6 +35,7 @@ from rigidsim.scene.kernels.ephemeris import Ephemeris
 from rigidsim.scene.kernels.reading import Sight
 from rigidsim.scene.kernels.series import BlockSeries, chebyshev, exactly
 from rigidsim.scene.scene import Scene
+from rigidsim.scene.space_axes import obliquity, to_ecliptic
 
 _AXES = "xyz"
 _RATES = ("", "v", "a", "j")
@@ -110,11 +111,11 @@ class KernelStates:
             size = self._rounded(exactly(self._context, factor), series.exponent - sight.exponent)
             for row, axis in zip(rows, range(3), strict=True):
                 row.append(size * self._component(series, axis, order))
-        x, y, z = (row[0] if len(row) == 1 else hy.sum(row) for row in rows)
+        found = [row[0] if len(row) == 1 else hy.sum(row) for row in rows]
         if not self.ephemeris.ecliptic:
-            return [x, y, z]
-        c, s = (self._rounded(value) for value in self.ephemeris.obliquity(self._context))
-        return [x, c * y + s * z, c * z - s * y]
+            return found
+        c, s = (self._rounded(value) for value in obliquity(self._context))
+        return to_ecliptic(found, (c, s))
 
     def _rounded(self, value: Any, exponent: int = 0) -> Symbolic:
         return as_factor(rounded(self._number(self._context.ldexp(value, exponent))))

@@ -40,6 +40,7 @@ from rigidsim.model.scaling import Rounder
 from rigidsim.model.state_blocks import StateBlock
 from rigidsim.model.two_part import as_factor, rounded
 from rigidsim.scene.arithmetic import bits_in_use, cosine_and_sine
+from rigidsim.scene.kepler import regular_place
 from rigidsim.scene.orbit_tables.pieces import AXIS, LONGITUDE, TabulatedOrbit
 from rigidsim.scene.orbits import KeplerOrbit
 
@@ -247,16 +248,7 @@ def table_states(
     turning = turning / radius
     eccentric = orbit.eccentric_longitude(begin, orbit.starting_longitude(start))
     inverse = 1.0 / radius
-    beta = 1.0 / (1.0 + hy.sqrt(1.0 - k * k - h * h))
-    x = ((1.0 - h * h * beta) * c + h * k * beta * s - k) * inverse
-    y = ((1.0 - k * k * beta) * s + h * k * beta * c - h) * inverse
-    chi = hy.sqrt(1.0 - p * p - q * q)
-    cross = 2.0 * (p * q)
-    direction = [
-        (1.0 - 2.0 * (p * p)) * x + cross * y,
-        cross * x + (1.0 - 2.0 * (q * q)) * y,
-        2.0 * (chi * (q * y - p * x)),
-    ]
+    direction = regular_place(hy, (k, h, q, p), (c, s), inverse)
     block = StateBlock(
         [*found.block.names, f"cos_longitude{tag}", f"sin_longitude{tag}"],
         [*found.block.derivatives, -(turning * s), turning * c],

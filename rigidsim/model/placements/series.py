@@ -24,8 +24,8 @@ from rigidsim.model.rotations import Symbolic
 from rigidsim.scene.arithmetic import Vector
 from rigidsim.scene.epochs import Epoch
 from rigidsim.scene.exact import ExactNumber
-from rigidsim.scene.frame import ECLIPTIC
 from rigidsim.scene.scene import Scene
+from rigidsim.scene.space_axes import ECLIPTIC
 from rigidsim.scene.tracing.numbers import plain
 
 _THRESHOLD = 1e-6

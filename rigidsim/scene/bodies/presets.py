@@ -160,6 +160,10 @@ class KnownBody:
     radius: float
     distance: float
 
+    def attracts_by(self, strength: Any) -> bool:
+        """Whether a gravitational parameter (m^3/s^2) is this body's."""
+        return bool(abs(strength / self.gravitational_parameter - 1) < _ALIKE)
+
     @property
     def called(self) -> str:
         """Its name in a sentence: ``the Sun``, ``Saturn``."""
@@ -186,9 +190,10 @@ KNOWN: tuple[KnownBody, ...] = (
     KnownBody("Uranus", 5.7939512e15, 2.5559e7, 2.870658e12),
     KnownBody("Neptune", 6.8350999e15, 2.4764e7, 4.498396e12),
 )
+EARTH = next(body for body in KNOWN if body.name == "Earth")
 
 
 def known_body(strength: float) -> KnownBody | None:
     """The body with a gravitational parameter (m^3/s^2); None if it is that of no known one."""
     near = min(KNOWN, key=lambda one: abs(one.gravitational_parameter - strength))
-    return near if abs(strength / near.gravitational_parameter - 1) < _ALIKE else None
+    return near if near.attracts_by(strength) else None

@@ -14,13 +14,11 @@ from rigidsim.errors import ConfigError, Problem
 from rigidsim.scene.arithmetic import Vector
 from rigidsim.scene.epochs import J2000, Epoch
 from rigidsim.scene.fields import ConfigTable
-from rigidsim.scene.frame import ECLIPTIC, OBLIQUITY
 from rigidsim.scene.kernels.reading import DAY, J2000_DATE, Kernel, KernelError, Sight, kernel_of
 from rigidsim.scene.kernels.series import exactly
+from rigidsim.scene.space_axes import CELESTIAL, ECLIPTIC, ICRF, obliquity, to_ecliptic
 from rigidsim.scene.validation_messages import nearest, shown
 
-ICRF = "ICRF"
-EQUATORIAL = (ICRF, "GCRF")  # both have the same orientation
 _METRES = 1000
 
 
@@ -113,17 +111,7 @@ class Ephemeris:
 
     def turned(self, context: Any, vector: Vector) -> Vector:
         """A vector of the kernel's axes (mpf) in space axes."""
-        if not self.ecliptic:
-            return vector
-        c, s = self.obliquity(context)
-        x, y, z = vector
-        return [x, c * y + s * z, c * z - s * y]
-
-    @staticmethod
-    def obliquity(context: Any) -> tuple[Any, Any]:
-        """Cosine and sine of the obliquity of J2000 (mpf)."""
-        angle = OBLIQUITY.at(context)
-        return context.cos(angle), context.sin(angle)
+        return to_ecliptic(vector, obliquity(context)) if self.ecliptic else vector
 
 
 def resolve_ephemeris(
@@ -139,7 +127,7 @@ def resolve_ephemeris(
     if epoch is None:
         what = 'missing; [ephemeris] needs the date of time 0, such as "2000-01-01T12:00:00 TDB" or "J2000"'
         raise ConfigError(Problem("[time] epoch", what))
-    if axes not in (None, ECLIPTIC, *EQUATORIAL):
+    if axes not in (None, ECLIPTIC, *CELESTIAL):
         what = (
             f'given "{axes}", which differs from the kernel\'s axes by the bias of 0.02 arcsec of the frame '
         )

@@ -23,9 +23,9 @@ import numpy as np
 
 from rigidsim.errors import ConfigError, Problem
 from rigidsim.scene.epochs import Epoch
-from rigidsim.scene.frame import ECLIPTIC, OBLIQUITY
-from rigidsim.scene.kernels.ephemeris import EQUATORIAL, date_of
+from rigidsim.scene.kernels.ephemeris import date_of
 from rigidsim.scene.kernels.reading import KernelError, digest_of, find_file, is_path
+from rigidsim.scene.space_axes import CELESTIAL, ECLIPTIC, obliquity, to_ecliptic
 from rigidsim.scene.validation_messages import nearest, shown
 
 _EXTRA = "pip install 'rigidsim[spice]'"
@@ -165,10 +165,10 @@ def resolve_orientation(
     if epoch is None:
         what = 'missing; [output] orientation needs the date of time 0, such as "J2000"'
         raise ConfigError(Problem("[time] epoch", what))
-    if axes not in (ECLIPTIC, *EQUATORIAL):
+    if axes not in (ECLIPTIC, *CELESTIAL):
         told = "missing; [output] orientation needs to know" if axes is None else f'given "{axes}", which'
         more = " what the space axes are" if axes is None else " differs from SPICE's axes by 0.02 arcsec"
-        allowed = ", ".join(f'"{name}"' for name in (*EQUATORIAL, ECLIPTIC))
+        allowed = ", ".join(f'"{name}"' for name in (*CELESTIAL, ECLIPTIC))
         raise ConfigError(Problem("[frame] axes", f"{told}{more}; allowed: {allowed}"))
     ahead = epoch.since_j2000()
     begin, end = (float(ahead + Fraction(float(time))) for time in run)
@@ -185,15 +185,8 @@ def resolve_orientation(
                 toolkit.tipbod(_EQUATOR, body, date)
     except KernelError as error:
         raise ConfigError(Problem("[output] orientation", f'given "{given}", {error}')) from None
-    return Orientation(place, digest, body, described, ahead, _turn(axes))
-
-
-def _turn(axes: str | None) -> np.ndarray:
-    if axes != ECLIPTIC:
-        return np.eye(3)
-    angle = float(OBLIQUITY)
-    c, s = np.cos(angle), np.sin(angle)
-    return np.array([[1, 0, 0], [0, c, s], [0, -s, c]])
+    turn = np.eye(3) if axes != ECLIPTIC else np.array(to_ecliptic(np.eye(3), obliquity(np)))
+    return Orientation(place, digest, body, described, ahead, turn)
 
 
 def _kind_of(place: Path) -> str:

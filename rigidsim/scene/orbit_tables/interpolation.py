@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 
+from rigidsim.scene.kepler import eccentric_anomalies, regular_place
 from rigidsim.scene.orbit_tables.elements import TableError
 
 AXIS, LONGITUDE = "axis", "longitude"
@@ -142,21 +143,10 @@ def interpolation_error(
 
 def _places(elements: Mapping[str, np.ndarray], longitude: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Unit vectors (3, n) and distances (n,) of regular elements, in double precision."""
-    k, h, q, p = (elements[name] for name in (*EXCENTRIC, *TILTED))
-    eccentric = longitude + k * np.sin(longitude) - h * np.cos(longitude)
-    for _ in range(60):  # Newton; from e < 1 it converges within a few dozen steps
-        c, s = np.cos(eccentric), np.sin(eccentric)
-        step = (eccentric - k * s + h * c - longitude) / (1 - k * c - h * s)
-        eccentric = eccentric - np.clip(step, -1.0, 1.0)
-    c, s = np.cos(eccentric), np.sin(eccentric)
-    beta = 1 / (1 + np.sqrt(1 - k * k - h * h))
-    r = 1 - k * c - h * s
-    x = ((1 - h * h * beta) * c + h * k * beta * s - k) / r
-    y = ((1 - k * k * beta) * s + h * k * beta * c - h) / r
-    chi = np.sqrt(1 - p * p - q * q)
-    place = [
-        (1 - 2 * p * p) * x + 2 * p * q * y,
-        2 * p * q * x + (1 - 2 * q * q) * y,
-        2 * chi * (q * y - p * x),
-    ]
-    return np.array(place), r * elements[AXIS]
+    regular = tuple(elements[name] for name in (*EXCENTRIC, *TILTED))
+    k, h = regular[:2]
+    periapsis = np.arctan2(h, k)
+    eccentric = eccentric_anomalies(longitude - periapsis, np.hypot(k, h)) + periapsis
+    turn = np.cos(eccentric), np.sin(eccentric)
+    r = 1 - k * turn[0] - h * turn[1]
+    return np.array(regular_place(np, regular, turn, 1 / r)), r * elements[AXIS]

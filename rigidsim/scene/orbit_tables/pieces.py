@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 
 from rigidsim.scene.arithmetic import eccentric_anomaly
+from rigidsim.scene.kepler import regular_place
 from rigidsim.scene.orbit_tables.elements import ElementTable, TableError
 from rigidsim.scene.orbit_tables.interpolation import (
     AXIS,
@@ -168,19 +169,10 @@ class TabulatedOrbit:
     def place(self, time: Any) -> list[Any]:
         """Place of the attracting body at a time, m, space axes."""
         found = self.at(time)
-        k, h, q, p = (found[x] for x in ("k", "h", "q", "p"))
+        regular = tuple(found[x] for x in (*EXCENTRIC, *TILTED))
         longitude = self.eccentric_longitude(found, self.starting_longitude(time))
-        c, s = self.context.cos(longitude), self.context.sin(longitude)
-        beta = 1 / (1 + self.context.sqrt(1 - k * k - h * h))
-        x = (1 - h * h * beta) * c + h * k * beta * s - k
-        y = (1 - k * k * beta) * s + h * k * beta * c - h
-        chi = self.context.sqrt(1 - p * p - q * q)
-        direction = [
-            (1 - 2 * p * p) * x + 2 * p * q * y,
-            2 * p * q * x + (1 - 2 * q * q) * y,
-            2 * chi * (q * y - p * x),
-        ]
-        return [found[AXIS] * x for x in direction]
+        turn = self.context.cos(longitude), self.context.sin(longitude)
+        return [found[AXIS] * x for x in regular_place(self.context, regular, turn)]
 
     def starting_longitude(self, time: Any) -> Any:
         """The mean longitude at a time; without a column from that at time zero and the mean motion now."""

@@ -18,9 +18,9 @@ from rigidsim.formats.observations import Observations, read_attitudes, read_obs
 from rigidsim.scene.config import Experiment
 from rigidsim.scene.exact import parse_number, parse_quantity
 from rigidsim.scene.fit_table import FitDataTable
-from rigidsim.scene.frame import ECLIPTIC, EQUATOR, SpaceAxes
 from rigidsim.scene.row_rotations import SEQUENCES, normalised, of_euler
 from rigidsim.scene.scene import Scene
+from rigidsim.scene.space_axes import ECLIPTIC, EQUATOR, SpaceAxes
 from rigidsim.scene.units import UnitError, conversion
 from rigidsim.workflows.fit.observed import EULER_ANGLES, QUATERNION, Observed
 
