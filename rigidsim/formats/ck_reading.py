@@ -18,9 +18,12 @@ import numpy as np
 
 from rigidsim.errors import RigidsimError
 from rigidsim.formats.trajectories import Trajectory
+from rigidsim.scene.epochs import Epoch
 from rigidsim.scene.kernels.reading import KernelError
 from rigidsim.scene.kernels.spice import loaded
 from rigidsim.scene.rotations import quaternion_of
+from rigidsim.scene.row_rotations import multiplied
+from rigidsim.scene.space_axes import from_equator
 
 SUFFIX = ".bc"
 _TURN = 0.1  # rad from row to row
@@ -45,31 +48,18 @@ def read_ck(path: Path, kernels: Sequence[Path], ahead: Fraction, begin: float, 
         return _rows(toolkit, path, number, ahead, (begin, end))
 
 
-@dataclass(frozen=True)
-class KernelRows:
-    """The rows of a CK at its own times, in the order of time.
-
-    Attributes:
-        times: (rows,), s of the experiment.
-        quaternions: (rows, 4), w x y z, from body axes to J2000.
-        rates: (rows, 3), angular velocity in body axes, rad/s, nan where there is none; None without any.
-    """
-
-    times: np.ndarray
-    quaternions: np.ndarray
-    rates: np.ndarray | None
-
-
-def read_rows(path: Path, kernels: Sequence[Path], ahead: Fraction) -> KernelRows:
-    """Attitude and, if it is there, angular velocity of the only object of a CK at the times of its rows.
+def read_rows(path: Path, kernels: Sequence[Path], epoch: Epoch, axes: str | None) -> Trajectory:
+    """Attitude and, if it is there, angular velocity of the only object of a CK at the times of its rows,
+    with columns named as in exported tables; rates are nan where a segment has none.
 
     Args:
         kernels: the clock (SCLK), where that needs it leap seconds (LSK), and what else its frame needs (FK).
-        ahead: date of time 0, s of TDB since J2000.
+        epoch: date of time 0. axes: the space axes of the attitudes here.
 
     Raises:
         RigidsimError: SPICE refuses a kernel, or a segment has no rows (types 4 and 6).
     """
+    ahead = epoch.since_j2000()
     with _opened(path, kernels, "as kernels = [...] beside file") as (toolkit, number):
         clock = toolkit.ckmeta(number, "SCLK")
         ticks, rated = _own_ticks(toolkit, path)
@@ -79,12 +69,16 @@ def read_rows(path: Path, kernels: Sequence[Path], ahead: Fraction) -> KernelRow
             turning = [toolkit.ckgpav(number, tick, 0.0, "J2000")[1] for tick in ticks[rated]]
         except toolkit.NotFoundError:
             raise RigidsimError(f"{path}: SPICE finds no attitude at the time of one of its rows") from None
-        rates = np.full((len(ticks), 3), np.nan)
-        if turning:
-            rates[rated] = np.einsum("nij,nj->ni", matrices[rated], np.array(turning))
-        times = np.array([float(Fraction(date) - ahead) for date in dates])
     # SPICE's matrices go from the reference to the body
-    return KernelRows(times, quaternion_of(matrices.transpose(0, 2, 1)), rates if rated.any() else None)
+    attitudes = multiplied(np.array(from_equator(axes, np)), quaternion_of(matrices.transpose(0, 2, 1)))
+    columns = {"time": np.array([float(Fraction(date) - ahead) for date in dates])}
+    columns |= {f"quaternion_{x}": attitudes[:, n] for n, x in enumerate("wxyz")}
+    if turning:
+        rates = np.full((len(ticks), 3), np.nan)
+        rates[rated] = np.einsum("nij,nj->ni", matrices[rated], np.array(turning))
+        columns |= {f"angular_velocity_{x}": rates[:, n] for n, x in enumerate("xyz")}
+    units = {"time": "s"} | {name: "rad/s" for name in columns if name.startswith("angular")}
+    return Trajectory(columns, str(path), units)
 
 
 @contextmanager

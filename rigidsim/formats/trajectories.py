@@ -1,4 +1,4 @@
-"""Trajectories that other tools wrote, as named columns of doubles: CSV, Parquet, netCDF and AEM or OEM.
+"""What other tools wrote, as named columns of doubles: text, Parquet, netCDF and CCSDS messages.
 
 Nothing is known here of what the columns mean, nor is anything left out, sorted or filled in. Files are read
 by blocks of rows, so that memory doesn't grow with them.
@@ -11,6 +11,7 @@ import itertools
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_args
 
@@ -18,10 +19,11 @@ import numpy as np
 
 from rigidsim.errors import RigidsimError
 from rigidsim.formats.message_columns import MESSAGE_COLUMNS, message_columns
-from rigidsim.formats.text_tables import TEXT, TIMES, is_date, name_and_unit, open_text
 from rigidsim.scene.epochs import Epoch, parse_epoch
 from rigidsim.scene.row_rotations import conjugated, multiplied, turned
 from rigidsim.scene.space_axes import ECLIPTIC, SpaceAxes, from_equator
+from rigidsim.scene.text_tables import TableError, TextTable, holds_times, is_date, name_and_unit, open_table
+from rigidsim.scene.validation_messages import nearest
 from rigidsim.store.many_rows import BLOCK, blocks_of, gathered
 
 if TYPE_CHECKING:
@@ -33,6 +35,8 @@ KINDS = (
 )
 KNOWN_AXES = frozenset(get_args(SpaceAxes))
 """Space axes whose turns to each other are known."""
+TEXT = {".csv", ".txt", ".dat", ".tsv"}
+"""Endings of the names of text files."""
 _XARRAY = {".nc", ".nc4", ".cdf", ".h5", ".hdf5", ".zarr"}
 _MOST_COLUMNS = 500
 _BUFFER = 2**20  # bytes of a Parquet file's column that are read at once
@@ -56,6 +60,7 @@ class Trajectory:
         left_out: names of columns that hold no real numbers.
         notes: what a user should know of how the file was read.
         lines: numbers of the rows' lines, where these don't follow each other.
+        text: the text that the columns are from; cells that are no numbers are read there again.
     """
 
     columns: Mapping[str, np.ndarray]
@@ -71,11 +76,93 @@ class Trajectory:
     left_out: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
     lines: np.ndarray | None = None
+    text: TextTable | None = None
 
     def row(self, index: int) -> str:
         """A row as the file counts it."""
         number = self.first + int(index) if self.lines is None else int(self.lines[index])
         return f"{self.counted} {number}"
+
+    @property
+    def names(self) -> list[str]:
+        """Names of all columns, also of those that hold no numbers."""
+        return list(self.columns) if self.text is None else self.text.names
+
+    def named(self, name: str) -> str:
+        """The column of this name, with its unit or without.
+
+        Raises:
+            RigidsimError: there is none, or there are several.
+        """
+        if name in self.names:
+            return name
+        same = [one for one in self.names if name_and_unit(one)[0] == name]
+        if len(same) == 1:
+            return same[0]
+        near = f"; give one of {', '.join(same)}" if same else nearest(name, self.names)
+        raise RigidsimError(
+            f'{self.source}: has no column "{name}"{near}; its columns are {", ".join(self.names)[:400]}'
+        )
+
+    def has(self, name: str) -> bool:
+        """Whether there is a column of this name, with its unit or without."""
+        return any(name in (one, name_and_unit(one)[0]) for one in self.names)
+
+    def unit(self, name: str) -> str | None:
+        """The unit of a column, as far as the file or the column's name says it."""
+        return self.units.get(self.named(name))
+
+    def column(self, name: str) -> np.ndarray:
+        """Numbers of a column, (rows,) float64.
+
+        Raises:
+            RigidsimError: there is no such column, or a row holds no finite number.
+        """
+        name = self.named(name)
+        found = self.columns.get(name)
+        if found is None:  # of words
+            assert self.text is not None
+            found = np.full(sum(1 for _ in self.text.rows()), np.nan)
+        bad = np.flatnonzero(~np.isfinite(found))
+        if len(bad):
+            cells = [] if self.text is None else itertools.islice(self.text.column(name), bad[0], bad[0] + 1)
+            given = "".join(f' ("{cell[:40]}")' for _, cell in cells)
+            raise RigidsimError(
+                f"{self.source}: {self.row(bad[0])}: {name} is no finite number{given}, as in "
+                f"{len(bad):,} of {len(found):,} rows; remove these rows, or write their values"
+            )
+        return found
+
+    def dates(self, name: str, scale: str) -> list[Epoch] | None:
+        """Dates of a message, or of a column in a time scale; None if it holds numbers.
+
+        Raises:
+            RigidsimError: there is no such column, or a row holds no date.
+        """
+        if self.epochs:
+            return list(self.epochs)
+        name = self.named(name)
+        if self.text is None or not any(is_date(cell) for _, cell in self.text.column(name)):
+            return None
+        found = []
+        for number, cell in self.text.column(name):
+            try:
+                found.append(parse_epoch(cell, scale))
+            except ValueError as error:
+                raise RigidsimError(f"{self.source}: line {number}: {error}") from None
+        return found
+
+    def dated(self) -> Trajectory:
+        """With the dates of a column of times, read as UTC; the same if times are numbers."""
+        timed = list(filter(holds_times, self.names))
+        if self.text is None or any(name in self.columns for name in timed):
+            return self
+        for name in timed:
+            if (dates := self.dates(name, "UTC")) is not None:
+                left_out = tuple(one for one in self.left_out if one != name)
+                notes = ("dates were read as UTC",)
+                return replace(self, epochs=tuple(dates), left_out=left_out, notes=notes)
+        return self
 
     def in_axes(self, axes: str | None) -> Trajectory:
         """A message's attitudes and path in other space axes; the same where either are not known."""
@@ -100,7 +187,7 @@ def is_trajectory(path: Path) -> bool:
     return suffix in {*TEXT, ".parquet", ".pq", ".aem", ".oem", ".xml"}
 
 
-def read_trajectory(path: Path) -> Trajectory:
+def read_columns(path: Path) -> Trajectory:
     """Read a file by the kind that its name and its first line say.
 
     Raises:
@@ -124,9 +211,16 @@ def read_trajectory(path: Path) -> Trajectory:
                 return Trajectory(source=str(path), **message_columns(path, found[1]))
             if suffix in TEXT:
                 return _of_text(path)
+    except TableError as error:
+        raise RigidsimError(f"{path}: {error}") from None
     except (OSError, UnicodeDecodeError) as error:
         raise _unreadable(path, error) from None
     raise RigidsimError(f"{path}: of no known kind; allowed: {KINDS}, or the folder of a run")
+
+
+def read_trajectory(path: Path) -> Trajectory:
+    """The same, with dates where a text has them in place of times."""
+    return read_columns(path).dated()
 
 
 def _unreadable(path: Path, error: Exception) -> RigidsimError:
@@ -243,13 +337,8 @@ def _of_parquet(path: Path) -> Trajectory:
 
 
 def _of_text(path: Path) -> Trajectory:
-    table = open_text(path)
-    names = table.names
-    worded: set[int] = set()  # columns with a cell that is no number
-    numbered: set[int] = set()  # columns with a number
+    table = open_table(partial(_lines, path))
     lines: list[int] = []
-    timed = {n for n, name in enumerate(names) if name_and_unit(name)[0].lower() in TIMES}
-    dates: dict[int, list[tuple[int, str]]] = {}
 
     def blocks() -> Iterator[np.ndarray]:
         rows = table.rows()
@@ -259,43 +348,23 @@ def _of_text(path: Path) -> Trajectory:
                 yield np.array([[float(cell) for cell in cells] for _, cells in block])
             except ValueError:
                 yield np.array([list(map(table.number, cells)) for _, cells in block])
-                for number, cells in block:
-                    for n in timed:
-                        if is_date(cells[n]) or n in dates:
-                            dates.setdefault(n, []).append((number, cells[n]))
 
-    def seen() -> Iterator[np.ndarray]:
-        for block in blocks():
-            finite = np.isfinite(block)
-            worded.update(np.flatnonzero(~finite.all(axis=0)).tolist())
-            numbered.update(np.flatnonzero(finite.any(axis=0)).tolist())
-            yield block
-
-    found = _columns(names, seen())
-    kept = [n for n in range(len(names)) if n in numbered or n not in worded]
-    epochs: tuple[Epoch, ...] = ()
-    notes: tuple[str, ...] = ()
-    if dates and not timed.intersection(kept):
-        place = min(dates)
-        epochs, notes = _dates(path, dates[place]), ("dates were read as UTC",)
-        worded.discard(place)
-    left_out = tuple(names[n] for n in range(len(names)) if n not in kept and n in worded)
+    found = _columns(table.names, blocks())
+    if not lines:
+        raise TableError("no rows; a line of names and rows of values are needed")
+    kept = {name: values for name, values in found.items() if _any_number(values)}
+    left_out = tuple(name for name in found if name not in kept)
+    in_turn = lines[-1] - lines[0] == len(lines) - 1
     return Trajectory(
-        {names[n]: found[names[n]] for n in kept}, str(path), counted="line", first=lines[0] if lines else 0,
-        epochs=epochs, left_out=left_out, notes=notes, lines=_irregular(lines),
+        kept, str(path), table.units, "line", lines[0], left_out=left_out,
+        lines=None if in_turn else np.array(lines), text=table,
     )  # fmt: skip
 
 
-def _dates(path: Path, cells: Iterable[tuple[int, str]]) -> tuple[Epoch, ...]:
-    found = []
-    for number, cell in cells:
-        try:
-            found.append(parse_epoch(cell, "UTC"))
-        except ValueError as error:
-            raise RigidsimError(f"{path}: line {number}: {error}") from None
-    return tuple(found)
+def _lines(path: Path) -> Iterator[str]:
+    with path.open(encoding="utf-8-sig") as file:
+        yield from file
 
 
-def _irregular(lines: list[int]) -> np.ndarray | None:
-    """Numbers of the rows' lines; None where each row is in the line after the row before."""
-    return None if not lines or lines[-1] - lines[0] == len(lines) - 1 else np.array(lines)
+def _any_number(values: np.ndarray) -> bool:
+    return any(np.isfinite(values[rows]).any() for rows in blocks_of(len(values)))

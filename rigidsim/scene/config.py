@@ -311,8 +311,8 @@ def _text(
         raise ConfigError(Problem(where, what + "the config")) from None
     except ValueError as error:
         text_error = where != _TIMES or isinstance(error, UnicodeDecodeError)
-        told = f"is not UTF-8 text; save it as {kind}" if text_error else error
-        raise ConfigError(Problem(where, f'given "{name}", which {told}')) from None
+        told = f", which is not UTF-8 text; save it as {kind}" if text_error else f": {error}"
+        raise ConfigError(Problem(where, f'given "{name}"{told}')) from None
     text = text.replace("\r\n", "\n").replace("\r", "\n")
     if "'''" in text or any((ord(c) < 32 and c not in "\n\t") or ord(c) == 127 for c in text):
         what = f'given "{name}", which holds characters that no table has; save it as plain {kind}'
@@ -321,9 +321,13 @@ def _text(
 
 
 def _times_of(file: TextIO) -> str:
-    from rigidsim.scene.listed_times import time_column  # which few configs need
+    from rigidsim.scene.text_tables import time_column  # which few configs need
 
-    return time_column(file)
+    def again() -> TextIO:
+        file.seek(0)
+        return file
+
+    return time_column(again)
 
 
 def _refuse_size(where: str, name: str, size: int) -> None:

@@ -11,10 +11,11 @@ from rigidsim.scene.arithmetic import cosine_and_sine, eccentric_anomaly
 from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.kepler import combined, plane_vectors
 from rigidsim.scene.orbit_keys import PACES, Elements, Orbit
-from rigidsim.scene.orbit_tables.elements import ElementTable, TableError, read_table
+from rigidsim.scene.orbit_tables.elements import ElementTable, read_table
 from rigidsim.scene.orbit_tables.pieces import TabulatedOrbit
 from rigidsim.scene.point_masses import ellipse_of
 from rigidsim.scene.registry import Surroundings
+from rigidsim.scene.text_tables import TableError
 from rigidsim.scene.tracing.arithmetic import TracedExact
 from rigidsim.scene.tracing.numbers import Traced, Untraceable
 from rigidsim.scene.validation_messages import nearest

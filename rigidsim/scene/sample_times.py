@@ -123,7 +123,7 @@ def _listed(table: Time, context: Any, texts: Mapping[str, str]) -> list[Fractio
     assert given is not None
     if not isinstance(given, str):
         return [time.fraction(context) for time in given]
-    from rigidsim.scene.listed_times import times_in  # which few configs need
+    from rigidsim.scene.text_tables import times_in  # which few configs need
 
     if given not in texts:
         what = "but this config was given as text, without files beside it; put the table's text into "
@@ -131,7 +131,7 @@ def _listed(table: Time, context: Any, texts: Mapping[str, str]) -> list[Fractio
     try:
         return times_in(texts[given], context, table.epoch)
     except ValueError as error:
-        raise _fail("times", f'given "{given}", which {error}') from None
+        raise _fail("times", f'given "{given}": {error}') from None
 
 
 def sample_times(table: Time, context: Any, texts: Mapping[str, str]) -> tuple[Any, Any, SampleTimes]:

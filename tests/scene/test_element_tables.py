@@ -55,7 +55,7 @@ BAD = {
     "no time": ("eccentricity\n1", "has no column time"),
     "unknown": ("time, eccentricty\n", 'line 1: given the column "eccentricty"; did you mean "ecc'),
     "both": ("time, mean_anomaly, mean_longitude\n", "has both mean_anomaly and mean_longitude"),
-    "cells": ("time, eccentricity\n0, 0.1\n1, 0.1, 3", "line 3: has 3 cells; the header names 2 columns"),
+    "cells": ("time, eccentricity\n0, 0.1\n1, 0.1, 3", "line 3 has 3 values, where the line of names has 2"),
     "no number": ("time, eccentricity\n0, nan", 'line 2: given "nan" as eccentricity; a decimal number'),
     "few": ("time, periapsis\n0, 3\n1, 3", "has 2 rows; 8 or more are needed"),
     "back": (

@@ -18,6 +18,7 @@ principal_moments = [1, 2, 3]
 angular_velocity = [0.1, 0.2, 0.3]
 [time]
 times = "theirs.csv"
+epoch = "2024-03-01T00:00:00 UTC"
 """
 
 
@@ -32,6 +33,8 @@ def read(folder: Path, table: str) -> rigidsim.Experiment:
     [
         ("# a run\nqw,t [min],wx\n1,0,0\n1,0.1,0\n1,2e-1,0\n", [0, 6, 12]),
         ("time_day\twx\n0\t1\n0.00001\t1\n", [0, Fraction("0.864")]),
+        ("dt;t [min]\n0,5;0\n0,5;0,1\n", [0, 6]),
+        ("t,q\n2024-03-01T00:00:00 UTC,1\n2024-03-01 00:00:01.5 UTC,1\n", [0, Fraction("1.5")]),
         ("0 1\n0.1 1\n0.30000000000000000001 1\n", [0, Fraction("0.1"), Fraction("0.30000000000000000001")]),
     ],
 )  # fmt: skip
@@ -48,7 +51,7 @@ def test_times_are_those_that_are_written(tmp_path: Path, table: str, times: lis
     [
         ("qw,qx\n1,0\n", "names no column t or time"),
         ("t,wx\n0,1\n0,2\n", "times must increase"),
-        ("wx,t\n0,1\n2\n", "no time in line 3"),
+        ("wx,t\n0,1\n2\n", "line 3 has 1 values, where the line of names has 2"),
     ],
 )
 def test_tables_that_hold_no_times_are_refused(tmp_path: Path, table: str, told: str) -> None:

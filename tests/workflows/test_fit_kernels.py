@@ -107,6 +107,15 @@ def some(count: int) -> tuple[np.ndarray, Rotation, np.ndarray]:
     return ticks, Rotation.random(count, rng=numbers), numbers.standard_normal((count, 3))
 
 
+def rows_of(here: Path) -> tuple[np.ndarray, np.ndarray, np.ndarray | None]:
+    """Times, quaternions and rates, if there are any, of a CK."""
+    found = read_rows(here / "seen.bc", [here / "clock.tsc"], parse_epoch(EPOCH), "EME2000").columns
+    quaternions = np.stack([found[f"quaternion_{x}"] for x in "wxyz"], axis=1)
+    rated = "angular_velocity_x" in found
+    rates = np.stack([found[f"angular_velocity_{x}"] for x in "xyz"], axis=1) if rated else None
+    return found["time"], quaternions, rates
+
+
 @pytest.mark.parametrize(
     ("kind", "rated", "count"),
     [(1, True, 100), (1, False, 20), (2, True, 101), (3, True, 250), (3, False, 100), (5, True, 101)],
@@ -115,15 +124,15 @@ def test_rows_are_those_that_were_written(kind: int, rated: bool, count: int, he
     """Of whatever type and length: a directory follows after each hundred times."""
     ticks, attitude, rates = some(count)
     write(here / "seen.bc", kind, ticks, attitude, rates if rated else None)
-    found = read_rows(here / "seen.bc", [here / "clock.tsc"], AHEAD)
-    np.testing.assert_allclose(found.times, ticks * TICK, atol=2e-7)  # doubles of seconds since J2000
-    again = Rotation.from_quat(found.quaternions[:, [1, 2, 3, 0]])
+    times, quaternions, read = rows_of(here)
+    np.testing.assert_allclose(times, ticks * TICK, atol=2e-7)  # doubles of seconds since J2000
+    again = Rotation.from_quat(quaternions[:, [1, 2, 3, 0]])
     assert (again.inv() * attitude).magnitude().max() < 1e-14
     if not rated and kind in (1, 3, 5):
-        assert found.rates is None
+        assert read is None
     elif rated:
-        assert found.rates is not None
-        np.testing.assert_allclose(found.rates, attitude.inv().apply(rates), atol=1e-13)
+        assert read is not None
+        np.testing.assert_allclose(read, attitude.inv().apply(rates), atol=1e-13)
 
 
 def test_of_segments_that_overlap_the_last_one_counts(here: Path) -> None:
@@ -134,13 +143,13 @@ def test_of_segments_that_overlap_the_last_one_counts(here: Path) -> None:
     _, other, _ = some(12)
     write(here / "seen.bc", 3, within, other, None)
     write(here / "seen.bc", 1, ticks[[2, 5]], other[:2], None)
-    found = read_rows(here / "seen.bc", [here / "clock.tsc"], AHEAD)
+    times, quaternions, read = rows_of(here)
     hidden = [11, 12, 13, 31, 32, 33]
     wanted = np.concatenate([np.delete(ticks, hidden), within])
-    np.testing.assert_allclose(found.times, np.sort(wanted) * TICK, atol=2e-7)
-    assert found.rates is not None
-    assert np.isnan(found.rates).any(axis=1).sum() == len(within) + 2
-    turned = Rotation.from_quat(found.quaternions[[2, 5]][:, [1, 2, 3, 0]])
+    np.testing.assert_allclose(times, np.sort(wanted) * TICK, atol=2e-7)
+    assert read is not None
+    assert np.isnan(read).any(axis=1).sum() == len(within) + 2
+    turned = Rotation.from_quat(quaternions[[2, 5]][:, [1, 2, 3, 0]])
     assert (turned.inv() * other[:2]).magnitude().max() < 1e-14
 
 

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from rigidsim.scene.kepler import eccentric_anomalies, regular_place
-from rigidsim.scene.orbit_tables.elements import TableError
+from rigidsim.scene.text_tables import TableError
 
 AXIS, LONGITUDE = "axis", "longitude"
 EXCENTRIC, TILTED = ("k", "h"), ("q", "p")

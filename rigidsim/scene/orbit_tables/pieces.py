@@ -21,7 +21,7 @@ import numpy as np
 
 from rigidsim.scene.arithmetic import eccentric_anomaly
 from rigidsim.scene.kepler import regular_place
-from rigidsim.scene.orbit_tables.elements import ElementTable, TableError
+from rigidsim.scene.orbit_tables.elements import ElementTable
 from rigidsim.scene.orbit_tables.interpolation import (
     AXIS,
     EXCENTRIC,
@@ -31,6 +31,7 @@ from rigidsim.scene.orbit_tables.interpolation import (
     InterpolationError,
     interpolation_error,
 )
+from rigidsim.scene.text_tables import TableError
 
 _DOUBTFUL_TURN = 0.25  # of a turn, by which the mean longitude may be off what Kepler's law expects
 _LARGEST_TILT = 0.9999  # of sin(i/2): 178.4 deg

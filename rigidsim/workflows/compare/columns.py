@@ -11,10 +11,10 @@ import numpy as np
 
 from rigidsim.errors import RigidsimError
 from rigidsim.formats.digits import FEW, written_resolution
-from rigidsim.formats.text_tables import TIMES, name_and_unit
 from rigidsim.formats.trajectories import Trajectory
 from rigidsim.scene.epochs import Epoch
 from rigidsim.scene.exact import parse_number
+from rigidsim.scene.text_tables import TIMES, name_and_unit
 from rigidsim.store.many_rows import blocks_of, gathered, picked
 from rigidsim.workflows.compare.row_checks import refuse_rows, refuse_values
 

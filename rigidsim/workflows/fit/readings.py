@@ -14,13 +14,13 @@ import numpy as np
 from rigidsim.errors import ConfigError, Problem, RigidsimError
 from rigidsim.formats import ck_reading
 from rigidsim.formats.message_columns import MESSAGE_COLUMNS
-from rigidsim.formats.observations import Observations, read_attitudes, read_observations
+from rigidsim.formats.trajectories import Trajectory, read_columns
 from rigidsim.scene.config import Experiment
 from rigidsim.scene.exact import parse_number, parse_quantity
 from rigidsim.scene.fit_table import FitDataTable
 from rigidsim.scene.row_rotations import SEQUENCES, normalised, of_euler
 from rigidsim.scene.scene import Scene
-from rigidsim.scene.space_axes import ECLIPTIC, EQUATOR, SpaceAxes
+from rigidsim.scene.space_axes import SpaceAxes
 from rigidsim.scene.units import UnitError, conversion
 from rigidsim.workflows.fit.observed import EULER_ANGLES, QUATERNION, Observed
 
@@ -102,13 +102,14 @@ def read_readings(
     if files.of_kernels:
         found = _attitudes(number, table, quantity, scene, files)
     else:
-        found = read_observations(files.file, scene.axes)
+        saved = files.file / "dataset.h5"  # where the file is the folder of a run
+        found = read_columns(saved if saved.is_file() else files.file).in_axes(scene.axes)
     return _ReadTable(number, table, quantity, scene, found, files.file).made()
 
 
 def _attitudes(
     number: int, table: FitDataTable, quantity: Observed, scene: Scene, files: DataFiles
-) -> Observations:
+) -> Trajectory:
     """The rows of a CK, which holds dates, and attitudes relative to J2000."""
     problem = ""
     if scene.epoch is None:
@@ -123,8 +124,7 @@ def _attitudes(
     if problem:
         raise ConfigError(Problem(f"[[fit.data]] number {number} file", problem))
     assert scene.epoch is not None
-    axes = ECLIPTIC if scene.axes == ECLIPTIC else EQUATOR
-    return read_attitudes(files.file, files.kernels, scene.epoch, axes)
+    return ck_reading.read_rows(files.file, files.kernels, scene.epoch, scene.axes)
 
 
 class _ReadTable:
@@ -136,7 +136,7 @@ class _ReadTable:
         table: FitDataTable,
         quantity: Observed,
         scene: Scene,
-        found: Observations,
+        found: Trajectory,
         path: Path,
     ) -> None:
         self.number, self.table, self.quantity, self.scene = number, table, quantity, scene
@@ -149,7 +149,7 @@ class _ReadTable:
         sigmas = self._sigmas(len(times))
         kept = self._within(times)
         order = kept[np.argsort(times[kept], kind="stable")]
-        rows = [self.found.rows[n] for n in order]
+        rows = [self.found.row(n) for n in order]
         times, values, sigmas = times[order], values[order], sigmas[order]
         self._refuse_huge(values, sigmas, rows)
         self._refuse_repeated(times, values, rows)
@@ -211,7 +211,7 @@ class _ReadTable:
             bad = np.flatnonzero(np.abs(norms - 1) > _NORM)
             if len(bad):
                 raise RigidsimError(
-                    f"{self.found.source}: {self.found.rows[bad[0]]}: a quaternion of norm "
+                    f"{self.found.source}: {self.found.row(bad[0])}: a quaternion of norm "
                     f"{norms[bad[0]]:.6g}; norms within 0.01 of 1 are allowed: mend or remove these rows"
                 )
             return normalised(values)
@@ -251,7 +251,7 @@ class _ReadTable:
             if (wrong := ~_usable(column)).any():
                 at = int(np.flatnonzero(wrong)[0])
                 raise RigidsimError(
-                    f"{self.found.source}: {self.found.rows[at]}: {given} is {column[at] / factor:g}; "
+                    f"{self.found.source}: {self.found.row(at)}: {given} is {column[at] / factor:g}; "
                     + _SIGMAS
                 )
             return np.repeat(column[:, None], width, axis=1)
@@ -276,7 +276,7 @@ class _ReadTable:
             first = int(np.flatnonzero(~inside)[0])
             self.told.append(
                 f"{self.table.file}: {int((~inside).sum())} of {len(times)} rows lie outside the run "
-                f"({begin:.6g} to {end:.6g} s) and were left out, first {self.found.rows[first]}"
+                f"({begin:.6g} to {end:.6g} s) and were left out, first {self.found.row(first)}"
             )
         return np.flatnonzero(inside)
 
