@@ -59,7 +59,8 @@ class TextTable:
         for number, line in enumerate(self.lines(), 1):
             if number <= self.head or not (text := line.partition("#")[0].strip()):
                 continue
-            cells = _cells(text, self.separator)
+            alone = count == 1 and not self.separator  # so that blanks belong to the cell, as in a date
+            cells = [text] if alone else _cells(text, self.separator)
             if len(cells) == count + 1 and not cells[-1]:  # a separator ends the line
                 cells.pop()
             if len(cells) != count:
