@@ -16,15 +16,13 @@ import numpy as np
 from rigidsim.formats.registry import Format, TableSource
 from rigidsim.formats.spice import (
     J2000,
+    Attempt,
     Errors,
     SpiceRun,
-    errors_of,
+    fit_and_read_back,
     frame_text,
-    refused,
     run_of,
-    scratch,
     write_text,
-    written,
 )  # fmt: skip
 from rigidsim.formats.tables import Table
 from rigidsim.scene.kernels.spice import spice
@@ -35,7 +33,6 @@ _WINDOW = _DEGREE + 1  # rows that a polynomial goes through
 _CLOSER = 16  # rows of the segments at the ends for each of the others
 _SUBTYPE = 3
 _TURNED = 0.4  # rad from row to row, from which the spacing is found
-_MOST_HALVINGS = 6
 _MOST_CHECKED = 10_000
 _TO_BODY = np.array([1.0, -1.0, -1.0, -1.0])  # SPICE's matrices go from the reference to the body
 _FASTEST = 1 << 40  # ticks of a second
@@ -85,93 +82,59 @@ def _write_clock(run: SpiceRun, path: Path) -> None:
 def write_ck(table: Table, path: Path, source: TableSource) -> None:
     """Write attitude and angular velocity of one run."""
     run = run_of(table, source)
-    length, errors = run.last - run.first, Errors(np.inf, np.inf, 0)
-    step = min(run.steps(_TURNED / max(run.largest_rate, 1e-300)), _power_below(length // (4 * _WINDOW)))
-    with scratch() as folder:
-        clock, trial = folder / "clock", folder / "trial"
-        _write_clock(run, clock)
-        for _ in range(_MOST_HALVINGS):
-            close = step // _CLOSER
-            if close < 2:
-                break
-            main = run.first + step * np.arange(length // step + 1)
-            ends = close * np.arange(_WINDOW * _CLOSER + 1)
-            pieces = [main, run.first + ends, run.last - ends[::-1]]
-            halves = [(piece[:-1] + piece[1:]) // 2 for piece in pieces]
-            between = np.concatenate([_thinned(halves[0]), *halves[1:]])
-            counts = np.unique(np.concatenate([*pieces, between]))
-            found = run.at(counts)
-            trial.unlink(missing_ok=True)
-            _write_rows(run, trial, pieces, counts, found)
-            checked = np.searchsorted(counts, np.unique(between))
-            truth = found[0][checked], found[1][checked]
-            before, errors = errors, errors_of(run, counts[checked], truth, [clock, trial], _reader(run))
-            if errors.small(run.floor) or not errors.better(before):
-                break
-            step //= 2
-        if not errors.allowed(run.floor):
-            raise refused(_why_not(run, errors))
-        rows = f"{len(main)} rows, every {float(step * run.spacing):.6g} s"
-        written(path, lambda made: _copied(trial, made, run, rows, errors))
+    length, ident = run.last - run.first, -run.number
+    widest = 1 << max((length // (4 * _WINDOW)).bit_length() - 1, 0)
 
-
-def _copied(trial: Path, made: Path, run: SpiceRun, rows: str, errors: Errors) -> list[str]:
-    made.write_bytes(trial.read_bytes())
-    ident = -run.number
-    what = [
-        f"CK {ident}, frame {run.name} relative to J2000, by the clock {ident} of the text kernel beside it",
-        f"type 5, subtype 3: quaternion and angular velocity, degree {_DEGREE}; {rows}",
-    ]
-    return run.comments(what, errors)
-
-
-def _why_not(run: SpiceRun, errors: Errors) -> str:
-    if not errors.count:
-        what = "no rows are close enough: SPICE's times are doubles of seconds since J2000, here "
-        return f"{what}{float(run.spacing):.1g} s apart, in which the body turns by {run.turned_by:.2g} rad"
-    return f"the motion has kinks or jumps, about which polynomials are {errors.attitude:.1e} rad from it"
-
-
-def _power_below(count: int) -> int:
-    return 1 << max(count.bit_length() - 1, 0)
-
-
-def _thinned(counts: np.ndarray) -> np.ndarray:
-    if len(counts) <= _MOST_CHECKED:
-        return counts
-    return counts[np.linspace(0, len(counts) - 1, _MOST_CHECKED).astype(int)]
-
-
-def _write_rows(
-    run: SpiceRun,
-    path: Path,
-    pieces: list[np.ndarray],
-    counts: np.ndarray,
-    found: tuple[np.ndarray, np.ndarray],
-) -> None:
-    toolkit = spice()
-    handle = toolkit.ckopn(str(path), "rigidsim", 0)
-    try:
-        for piece in pieces:
-            rows = np.searchsorted(counts, piece)
-            packets = np.concatenate([found[0][rows] * _TO_BODY, found[1][rows]], axis=1)
-            ticks = _ticks(run, piece)
-            toolkit.ckw05(
-                handle, _SUBTYPE, _DEGREE, ticks[0], ticks[-1], -run.number, J2000, True,
-                run.source.title[:40], ticks, packets, float(run.spacing), 1, ticks[:1],
-            )  # fmt: skip
-    finally:
-        toolkit.ckcls(handle)
-
-
-def _reader(run: SpiceRun) -> Any:
-    ident = -run.number
+    def attempt(step: int, made: Path) -> Attempt | None:
+        close = step // _CLOSER
+        if close < 2:
+            return None
+        main = run.first + step * np.arange(length // step + 1)
+        ends = close * np.arange(_WINDOW * _CLOSER + 1)
+        pieces = [main, run.first + ends, run.last - ends[::-1]]
+        halves = [(piece[:-1] + piece[1:]) // 2 for piece in pieces]
+        some = np.unique(np.linspace(0, len(halves[0]) - 1, min(len(halves[0]), _MOST_CHECKED)).astype(int))
+        between = np.unique(np.concatenate([halves[0][some], *halves[1:]]))
+        counts = np.unique(np.concatenate([*pieces, between]))
+        quaternions, rates = run.at(counts)
+        packets = np.concatenate([quaternions * _TO_BODY, rates], axis=1)
+        _write_rows(run, made, pieces, [packets[np.searchsorted(counts, piece)] for piece in pieces])
+        rows = np.searchsorted(counts, between)
+        told = [
+            f"CK {ident}, frame {run.name} relative to J2000, by the clock {ident} of the text kernel beside "
+            "it",
+            f"type 5, subtype 3: quaternion and angular velocity, degree {_DEGREE}; {len(main)} rows, every "
+            f"{float(step * run.spacing):.6g} s",
+        ]
+        return Attempt(told, between, (quaternions[rows], rates[rows]))
 
     def read(toolkit: Any, date: float) -> tuple[np.ndarray, np.ndarray]:
         matrix, rate, _ = toolkit.ckgpav(ident, toolkit.sce2c(ident, date), 0.0, J2000)
         return quaternion_of(matrix.T[None])[0], rate
 
-    return read
+    def why_not(errors: Errors) -> str:
+        if errors.count:
+            what = "the motion has kinks or jumps, about which polynomials are "
+            return f"{what}{errors.attitude:.1e} rad from it"
+        what = "no rows are close enough: SPICE's times are doubles of seconds since J2000, here "
+        return f"{what}{float(run.spacing):.1g} s apart, in which the body turns by {run.turned_by:.2g} rad"
+
+    step = min(run.steps(_TURNED / max(run.largest_rate, 1e-300)), widest)
+    fit_and_read_back(run, path, step, attempt, read, why_not, beside=lambda clock: _write_clock(run, clock))
+
+
+def _write_rows(run: SpiceRun, path: Path, pieces: list[np.ndarray], packets: list[np.ndarray]) -> None:
+    toolkit = spice()
+    handle = toolkit.ckopn(str(path), "rigidsim", 0)
+    try:
+        for piece, rows in zip(pieces, packets, strict=True):
+            ticks = _ticks(run, piece)
+            toolkit.ckw05(
+                handle, _SUBTYPE, _DEGREE, ticks[0], ticks[-1], -run.number, J2000, True,
+                run.source.title[:40], ticks, rows, float(run.spacing), 1, ticks[:1],
+            )  # fmt: skip
+    finally:
+        toolkit.ckcls(handle)
 
 
 CK = Format(write_ck, suffix=".bc", beside={".tsc": write_clock}, between=True)

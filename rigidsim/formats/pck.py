@@ -17,15 +17,14 @@ import numpy as np
 from rigidsim.formats.registry import Format, TableSource
 from rigidsim.formats.spice import (
     J2000,
+    Attempt,
     Errors,
     SpiceRun,
-    errors_of,
+    fit_and_read_back,
     frame_text,
     refused,
     run_of,
-    scratch,
     write_text,
-    written,
 )  # fmt: skip
 from rigidsim.formats.tables import Table
 from rigidsim.scene.kernels.spice import spice
@@ -36,7 +35,6 @@ _TERMS = _DEGREE + 1
 _TURNED = 6.0  # rad within an interval, from which its length is found
 _FRAMES = (J2000, "ECLIPJ2000", "GALACTIC")
 _ENOUGH, _LEAST = 0.3, 0.02  # sine of the angle from the pole
-_MOST_HALVINGS = 6
 _MOST_CHECKED = 400  # intervals
 _NOISE = 5e-16  # rad, of coefficients
 _NODES = np.cos(np.pi * (np.arange(_TERMS)[::-1] + 0.5) / _TERMS)
@@ -57,39 +55,34 @@ def write_frame(table: Table, path: Path, source: TableSource) -> None:
 def write_pck(table: Table, path: Path, source: TableSource) -> None:
     """Write the orientation of one run."""
     run = run_of(table, source)
-    length, errors = run.last - run.first, Errors(np.inf, np.inf, 0)
-    step = min(run.steps(_TURNED / max(run.largest_rate, 1e-300)), 1 << (length.bit_length() - 1))
-    with scratch() as folder:
-        trial = folder / "trial"
-        for _ in range(_MOST_HALVINGS):
-            if step < 4 * _TERMS:
-                break
-            begins = [run.first + step * np.arange(length // step)]
-            if begins[0][-1] + step != run.last:
-                begins.append(np.array([run.last - step]))
-            frame, series, checks, truth = _fitted(run, begins, step)
-            trial.unlink(missing_ok=True)
-            _write_series(run, trial, frame, begins, series, step)
-            before, errors = errors, errors_of(run, checks, truth, [trial], _reader(run))
-            if errors.small(run.floor) or not errors.better(before):
-                break
-            step //= 2
-        if not errors.allowed(run.floor):
-            known = f" ({errors.attitude:.1e} rad, {errors.rate:.1e} in its rate)" if errors.count else ""
-            why = f"no Chebyshev series of its angles keep 1e-12{known}: it has kinks, its z axis "
-            why += "comes near a frame's pole, or it turns too fast for SPICE's times"
-            raise refused(f"{why}; try --format ck")
-        count = sum(map(len, begins))
+    length, number = run.last - run.first, run.class_number
+
+    def attempt(step: int, made: Path) -> Attempt | None:
+        if step < 4 * _TERMS:
+            return None
+        begins = [run.first + step * np.arange(length // step)]
+        if begins[0][-1] + step != run.last:
+            begins.append(np.array([run.last - step]))
+        frame, series, checks, truth = _fitted(run, begins, step)
+        _write_series(run, made, frame, begins, series, step)
         told = [
-            f"PCK class {run.class_number}, frame {run.name} of the text kernel beside, relative to {frame}",
-            f"type 2, degree {_DEGREE}; {count} intervals of {float(step * run.spacing):.6g} s",
+            f"PCK class {number}, frame {run.name} of the text kernel beside, relative to {frame}",
+            f"type 2, degree {_DEGREE}; {sum(map(len, begins))} intervals of "
+            f"{float(step * run.spacing):.6g} s",
         ]
+        return Attempt(told, checks, truth)
 
-        def finished(made: Path) -> list[str]:
-            made.write_bytes(trial.read_bytes())
-            return run.comments(told, errors)
+    def read(toolkit: Any, date: float) -> tuple[np.ndarray, np.ndarray]:
+        matrix, rate = toolkit.xf2rav(toolkit.tisbod(J2000, number, date))
+        return quaternion_of(np.asarray(matrix).T[None])[0], rate
 
-        written(path, finished)
+    def why_not(errors: Errors) -> str:
+        known = f" ({errors.attitude:.1e} rad, {errors.rate:.1e} in its rate)" if errors.count else ""
+        why = f"no Chebyshev series of its angles keep 1e-12{known}: it has kinks, its z axis "
+        return f"{why}comes near a frame's pole, or it turns too fast for SPICE's times; try --format ck"
+
+    step = min(run.steps(_TURNED / max(run.largest_rate, 1e-300)), 1 << (length.bit_length() - 1))
+    fit_and_read_back(run, path, step, attempt, read, why_not)
 
 
 def _fitted(
@@ -160,16 +153,6 @@ def _write_series(
             )  # fmt: skip
     finally:
         toolkit.pckcls(handle)
-
-
-def _reader(run: SpiceRun) -> Any:
-    number = run.class_number
-
-    def read(toolkit: Any, date: float) -> tuple[np.ndarray, np.ndarray]:
-        matrix, rate = toolkit.xf2rav(toolkit.tisbod(J2000, number, date))
-        return quaternion_of(np.asarray(matrix).T[None])[0], rate
-
-    return read
 
 
 PCK = Format(write_pck, suffix=".bpc", beside={".tf": write_frame}, between=True)

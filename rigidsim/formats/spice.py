@@ -1,4 +1,4 @@
-"""What kernels of SPICE share that are written of a run: dates, numbers and names, and their comments.
+"""What kernels of SPICE share that are written of a run: dates, numbers and names, and how close they are.
 
 SPICE's times are doubles of seconds of TDB since J2000. What is written begins and ends at such, and is laid
 out on multiples of their spacing, so that its times are exact, and the run is evaluated at just these.
@@ -43,6 +43,7 @@ _PUBLIC, _MANY = 1_400_000, 600_000  # numbers of frames that NAIF leaves to its
 _CHECKED = 64  # recorded samples that the run is compared at when it is integrated again
 _SAME = 1e-11  # rad
 _MOST_TIMES = 4_000_000
+_MOST_HALVINGS = 6
 
 
 def refused(what: str) -> RigidsimError:
@@ -287,8 +288,74 @@ def _body_of(source: TableSource) -> int:
         raise RigidsimError(what) from None
 
 
+@dataclass(frozen=True)
+class Attempt:
+    """A kernel that was written.
+
+    Attributes:
+        told: lines on what it holds.
+        checked: times between those that it is made of, as counts.
+        truth: quaternions and angular velocities of the run there, as of ``SpiceRun.at``.
+    """
+
+    told: list[str]
+    checked: np.ndarray
+    truth: tuple[np.ndarray, np.ndarray]
+
+
+def fit_and_read_back(
+    run: SpiceRun,
+    path: Path,
+    step: int,
+    attempt: Callable[[int, Path], Attempt | None],
+    read: Callable[[Any, float], tuple[np.ndarray, np.ndarray]],
+    why_not: Callable[[Errors], str],
+    beside: Callable[[Path], None] | None = None,
+) -> None:
+    """Write a kernel as closely spaced as the run needs it: what SPICE reads of it is compared with the run.
+
+    Args:
+        step: the widest spacing, halved until the kernel is close enough or gets no closer.
+        attempt: writes a kernel of a spacing; None where SPICE's times are too coarse for it.
+        read: quaternion and angular velocity in J2000 at one of SPICE's times, by its toolkit.
+        why_not: why no kernel is close enough.
+        beside: writes the text kernel that it is read with.
+
+    Raises:
+        RigidsimError: no kernel is close enough, or SPICE can't write it.
+    """
+    errors, made = Errors(math.inf, math.inf, 0), None
+    with _scratch() as folder:
+        trial, others = folder / "kernel", [folder / "beside"] if beside else []
+        if beside:
+            beside(others[0])
+        for _ in range(_MOST_HALVINGS):
+            trial.unlink(missing_ok=True)
+            if (following := attempt(step, trial)) is None:
+                break
+            made, before = following, errors
+            with loaded(*others, trial) as toolkit:
+                found = [read(toolkit, date) for date in run.date(made.checked).tolist()]
+            quaternions, rates = (np.array(values) for values in zip(*found, strict=True))
+            slow = np.linalg.norm(rates - made.truth[1], axis=1).max() / max(run.largest_rate, 1e-300)
+            away = angles_between(quaternions, made.truth[0]).max()
+            errors = Errors(float(away), float(slow), len(found))
+            if errors.small(run.floor) or not errors.better(before):
+                break
+            step //= 2
+        if made is None or not errors.allowed(run.floor):
+            raise refused(why_not(errors))
+        toolkit = spice()
+        handle = toolkit.dafopw(str(trial))
+        try:
+            toolkit.dafac(handle, run.comments(made.told, errors))
+        finally:
+            toolkit.dafcls(handle)
+        copyfile(trial, path)
+
+
 @contextmanager
-def scratch() -> Iterator[Path]:
+def _scratch() -> Iterator[Path]:
     """A folder with a short path, as SPICE needs it; its errors are told as ours."""
     try:
         with tempfile.TemporaryDirectory(prefix="rigidsim-spice-") as folder:
@@ -301,32 +368,6 @@ def scratch() -> Iterator[Path]:
                 raise RigidsimError(f"SPICE can't write the kernel: {said}") from None
     except OSError as error:
         raise RigidsimError(f"the temporary folder: {error.strerror or error}; set TMPDIR") from None
-
-
-def written(path: Path, make: Callable[[Path], list[str]]) -> None:
-    """Let SPICE write a kernel, put comments into it, and bring it to its place."""
-    with scratch() as folder:
-        made = folder / "kernel"
-        comments, toolkit = make(made), spice()
-        handle = toolkit.dafopw(str(made))
-        try:
-            toolkit.dafac(handle, comments)
-        finally:
-            toolkit.dafcls(handle)
-        copyfile(made, path)
-
-
-def errors_of(
-    run: SpiceRun, counts: np.ndarray, truth: tuple[np.ndarray, np.ndarray], kernels: Sequence[Path],
-    read: Callable[[Any, float], tuple[np.ndarray, np.ndarray]],
-) -> Errors:  # fmt: skip
-    """How far a kernel is from the run at some times: ``read`` gives quaternion and rate in J2000."""
-    with loaded(*kernels) as toolkit:
-        found = [read(toolkit, date) for date in run.date(counts).tolist()]
-    quaternions, rates = (np.array([row[i] for row in found]) for i in (0, 1))
-    away = angles_between(quaternions, truth[0]).max(initial=0.0)
-    slow = np.linalg.norm(rates - truth[1], axis=1).max(initial=0.0)
-    return Errors(float(away), float(slow / max(run.largest_rate, 1e-300)), len(counts))
 
 
 def frame_text(run: SpiceRun, number: int, kind: int, more: Sequence[tuple[str, str]] = ()) -> str:
