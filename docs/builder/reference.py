@@ -1,4 +1,4 @@
-"""The reference, from the code itself: config keys, commands, the dataset, bodies, Python, statuses."""
+"""The reference, from the code itself: config keys, commands, the dataset, figures, Python, statuses."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-PAGES = ("config", "commands", "dataset", "figures", "bodies", "python", "codes")
+PAGES = ("config", "commands", "dataset", "figures", "python", "codes")
 """Names of the pages, each made by the function ``NAME_page``."""
 _FEW = 16  # values that are listed in a cell
 
@@ -274,24 +274,6 @@ def figures_page() -> str:
         "# Names of figures\n\nFor `rigidsim plot RUN --what NAME`. Usage: [figures](../figures.md)."
         "\n\n" + table(["figure", "shows", "needs"], rows)
     )
-
-
-# --- published bodies ---------------------------------------------------------------------------------------
-
-
-def bodies_page() -> str:
-    """The file of each preset, which holds the sources of its values."""
-    from rigidsim.scene.bodies.presets import FOLDER, PRESETS
-
-    parts = [
-        "# Values of published bodies\n\nThe files from which presets are read, in SI units unless a unit is "
-        "written: `ratios` are I_x, I_y, I_z over the largest moment. `largest_moment` is in kg m^2, or "
-        "C/(M R^2) where a `radius` R is given. Remarks and uncertainties: [published bodies](../presets.md)."
-    ]
-    for name in PRESETS:
-        text = FOLDER.joinpath(f"{name}.toml").read_text(encoding="utf-8")
-        parts.append(f"## {name}\n\n```toml\n{text.strip()}\n```")
-    return "\n\n".join(parts)
 
 
 # --- Python -------------------------------------------------------------------------------------------------

@@ -1,4 +1,4 @@
-"""Sections of the gallery, made from the comments of the ready configs when the site is built."""
+"""Sections of the gallery and of published bodies, made from their TOML files when the site is built."""
 
 from __future__ import annotations
 
@@ -12,15 +12,23 @@ CONFIGS = [
     for folder in ("", "bodies", "tables")
     for config in sorted((ROOT / "configs" / folder).glob("*.toml"))
 ]
-MARKER = "<!-- a section for each scene -->"
+BODIES = sorted((ROOT / "rigidsim" / "scene" / "bodies" / "published").glob("*.toml"))
 _STUDIED = ("apophis_flyby", "flip_sphere", "round_off")  # sweeps with a picture by their study
 
 
 def with_sections(text: str) -> str:
-    """The gallery's page with a section for each config, in place of the marker."""
-    parts = [f"## {config.stem}\n\n{_scene(config)}" for config in CONFIGS]
-    swept = sorted((ROOT / "configs" / "sweeps").glob("*.toml"))
-    return text.replace(MARKER, "\n\n".join([*parts, "## Sweeps", *map(_sweep, swept)]))
+    """A page with a section for each scene or body, in place of its marker."""
+    scenes = [f"## {config.stem}\n\n{_scene(config)}" for config in CONFIGS]
+    scenes += ["## Sweeps", *map(_sweep, sorted((ROOT / "configs" / "sweeps").glob("*.toml")))]
+    bodies = [f"## {body.stem}\n\n{_body(body)}" for body in BODIES]
+    text = text.replace("<!-- a section for each scene -->", "\n\n".join(scenes))
+    return text.replace("<!-- a section for each body -->", "\n\n".join(bodies))
+
+
+def _body(body: Path) -> str:
+    """Remarks on a published body, from the comment at the head of its file, and its values."""
+    values = body.read_text(encoding="utf-8").partition("\n\n")[2].strip()
+    return f"{_comment(body)}\n\n```toml\n{values}\n```"
 
 
 def _scene(config: Path) -> str:

@@ -1,5 +1,4 @@
-"""Published bodies: a file each in ``published/``, with the source of every value; ``docs/presets.md`` gives
-details and uncertainties.
+"""Published bodies: a file each in ``published/``, with remarks and the source of every value.
 
 The Sun, the planets and the Moon are recognised by their gravitational parameters as well.
 """
