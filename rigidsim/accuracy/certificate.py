@@ -134,7 +134,7 @@ class _Compared:
             return None
         difference = angles_between([part[places] for part in self._parts], better.attitudes)
         self.largest = float(difference.max())
-        self.own = self._own_error(reference, times, better.attitudes)
+        self.own = self._own_error(reference, times)
         # recorded values can't be compared more closely than a quaternion's last bit
         floor = 2.0 ** (2 - self.setting.bits)
         error = safety * self.largest + self.own + floor
@@ -147,9 +147,7 @@ class _Compared:
             place += floor * max(float(np.abs(part).max()) for part in better.places)
         return Certificate(min(error, math.pi), float(difference[-1]), reference.how, len(rows), place)
 
-    def _own_error(
-        self, reference: Reference, times: Sequence[mpmath.mpf], attitudes: list[np.ndarray]
-    ) -> float:
+    def _own_error(self, reference: Reference, times: Sequence[mpmath.mpf]) -> float:
         """Bound of a reference's own error, rad. A pilot may not have seen how strongly the motion amplifies
         errors; differences have, as the largest one from another setting's solution.
         """
@@ -167,9 +165,8 @@ class _Compared:
         for probe in (Setting("double"), Setting("extended")):
             if own.level > _MUCH_BETTER * probe.level:
                 break
-            other = self._trials.whole(probe, times)
-            found = math.inf if other is None else float(angles_between(other.attitudes, attitudes).max())
-            if found < _INCOMPARABLE:
+            errors = self._trials.compare(probe, own, times)
+            if errors is not None and (found := float(errors.max())) < _INCOMPARABLE:
                 return min(estimate, max(found, probe.level) * level / probe.level)
         return min(estimate, motion.error(level))
 

@@ -8,11 +8,11 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 
-from rigidsim.accuracy.comparison import angles_between, spread_times
+from rigidsim.accuracy.comparison import spread_times
 from rigidsim.accuracy.motion import PILOT_STEPS, motion_of
 from rigidsim.accuracy.reference import exact_beyond, stepped_reference
 from rigidsim.accuracy.setting import Setting, epsilon
-from rigidsim.accuracy.trial import Told, Trial, Trials
+from rigidsim.accuracy.trial import Told, Trials
 from rigidsim.model.load import Load
 from rigidsim.scene.config import Experiment
 from rigidsim.scene.readable import span_text
@@ -62,7 +62,6 @@ class Forecasts:
         self.part = min(1.0, PILOT_STEPS / self.motion.steps)
         self._times = spread_times(experiment, _TIMES, self.part)
         self._measured: dict[Setting, float] = {}
-        self._references: dict[Setting, Trial | None] = {}
 
     def error(self, setting: Setting) -> float:
         """Forecast error at the run's end, rad; measures what it needs."""
@@ -101,10 +100,9 @@ class Forecasts:
             if floor <= self._accuracy:
                 times = spread_times(self._experiment, _CLOSED_TIMES)
                 better = exact_beyond(setting.precision, setting.method).setting
-                one, other = (self._trials.whole(s, times) for s in (setting, better))
-                if one is not None and other is not None:
-                    found = float(angles_between(one.attitudes, other.attitudes).max())
-                    self._measured[setting] = max(found, floor)
+                errors = self._trials.compare(setting, better, times)
+                if errors is not None:
+                    self._measured[setting] = max(float(errors.max()), floor)
         return self._measured[setting]
 
     def _obvious(self, setting: Setting) -> bool:
@@ -138,10 +136,9 @@ class Forecasts:
 
     def _try(self, setting: Setting) -> float:
         """Error at the run's end, from that over the part tried."""
-        reference, trial = self._reference(setting), self._trials.whole(setting, self._times)
-        if trial is None or reference is None:
+        errors = self._trials.compare(setting, self._reference(setting), self._times)
+        if errors is None:
             return math.inf
-        errors = angles_between(trial.attitudes, reference.attitudes)
         late = float(errors.max())
         if late > _SATURATED:  # no longer small: only the law tells how large it would be
             return max(late, self.motion.error(setting.level))
@@ -150,13 +147,10 @@ class Forecasts:
             return late
         return _at_end(float(errors[: len(errors) // 4].max()), late, self.part, setting)
 
-    def _reference(self, setting: Setting) -> Trial | None:
-        """The trial against which a setting's trial is compared: in double precision if rounding is
+    def _reference(self, setting: Setting) -> Setting:
+        """The setting against whose trial another's is compared: in double precision if rounding is
         negligible.
         """
         precision = "double" if self._obvious(setting) else "extended"
         steps = self.motion.steps * self.part
-        best = stepped_reference(precision, self.motion, steps, setting.formulation)
-        if best not in self._references:
-            self._references[best] = self._trials.whole(best, self._times)
-        return self._references[best]
+        return stepped_reference(precision, self.motion, steps, setting.formulation)

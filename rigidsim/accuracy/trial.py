@@ -2,11 +2,13 @@
 
 import time
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 
 import mpmath
 import numpy as np
 
+from rigidsim.accuracy.comparison import angles_between
 from rigidsim.accuracy.setting import Setting
 from rigidsim.errors import ConfigError
 from rigidsim.model.load import Load
@@ -77,22 +79,15 @@ def trial_scene(
     accuracy of that is asked for; ``repeating`` holds invariants as the experiment does. Raises
     ``ConfigError``.
     """
-    config = experiment.config
-    integrator = config.integrator.model_copy(
-        update={
-            "precision": setting.precision,
-            "tolerance": "auto",
-            "formulation": setting.formulation,
-            "hold_invariants": config.integrator.hold_invariants if repeating else setting.hold_invariants,
-            "method": setting.method,
-            "accuracy": None,
-            "accuracy_axis": None,
-            "accuracy_position": None,
-        }
+    given = experiment.config.integrator
+    changed = experiment.config.as_motion(
+        ["quaternion"] + ["position"] * (given.accuracy_position is not None),
+        precision=setting.precision,
+        tolerance="auto",
+        formulation=setting.formulation,
+        hold_invariants=given.hold_invariants if repeating else setting.hold_invariants,
+        method=setting.method,
     )
-    record = ["quaternion"] + (["position"] if config.integrator.accuracy_position is not None else [])
-    output = config.output.model_copy(update={"record": record, "lyapunov": False, "timeline": False})
-    changed = config.model_copy(update={"integrator": integrator, "output": output, "events": []})
     scene = build_scene(replace(experiment, config=changed))
     if times is None:
         return scene
@@ -153,25 +148,36 @@ def try_setting(
     )
 
 
-@dataclass(frozen=True)
+@dataclass
 class Trials:
-    """Trials of one motion, in compact code."""
+    """Trials of one motion, in compact code, each made once."""
 
     experiment: Experiment
     loads: Sequence[Load] = ()
     told: Told | None = None
+    _made: dict[tuple[Setting, tuple[mpmath.mpf, ...]], Trial | None] = field(default_factory=dict)
 
     def whole(self, setting: Setting, times: Sequence[mpmath.mpf]) -> Trial | None:
         """A trial that reached the last of the times (s, mpf); None if the scene can't be integrated with the
         setting (a chart, a load, no closed form), or not so far.
         """
-        try:
-            trial = try_setting(
-                self.experiment, setting, times, loads=self.loads, compact=True, told=self.told
-            )
-        except ConfigError:
-            return None
-        return trial if trial.status is Status.FINISHED and trial.rows == len(times) else None
+        key = setting, tuple(times)
+        if key not in self._made:
+            made = None
+            with suppress(ConfigError):
+                made = try_setting(
+                    self.experiment, setting, times, loads=self.loads, compact=True, told=self.told
+                )
+            done = made is not None and made.status is Status.FINISHED and made.rows == len(times)
+            self._made[key] = made if done else None
+        return self._made[key]
+
+    def compare(self, setting: Setting, reference: Setting, times: Sequence[mpmath.mpf]) -> np.ndarray | None:
+        """Attitude differences (times,), rad, between a setting's trial and its reference's; None if one of
+        them is impossible.
+        """
+        one, other = self.whole(setting, times), self.whole(reference, times)
+        return None if one is None or other is None else angles_between(one.attitudes, other.attitudes)
 
 
 def _telling(check: Check, told: Told, title: str, start: float, last: float) -> Check:

@@ -258,21 +258,7 @@ def _of_motion(experiment: Experiment, more: Sequence[str]) -> Experiment:
     record += ["rotor_rate"] if config.rotors else []
     record += ["core_angular_velocity"] if config.body.core is not None else []
     record += [name for name in more if name not in record]
-    output = config.output.model_copy(
-        update={
-            "record": record,
-            "lyapunov": False,
-            "sensitivity": None,
-            "orientation": None,
-            "orientation_of": None,
-            "tip": None,
-        }
-    )
-    integrator = config.integrator.model_copy(
-        update={"formulation": "quaternion", "hold_invariants": False, "method": "taylor"}
-    )
-    tables = {"output": output, "integrator": integrator, "events": []}
-    return replace(experiment, config=config.model_copy(update=tables))
+    return replace(experiment, config=config.as_motion(record))
 
 
 def parameters_of(system: System) -> int:

@@ -107,6 +107,10 @@ class Scene:
             return None
         return [self.body.mass * x for x in self.body.center_of_mass]
 
+    def as_motion(self, **keys: Any) -> Scene:
+        """The scene of the same motion alone (see ``Config.as_motion``)."""
+        return replace(self, config=self.config.as_motion(**keys), events=())
+
     def formulas(self) -> list[tuple[str, Expression]]:
         """All expressions, with their places in the config."""
         events = enumerate(self.events, start=1)

@@ -7,8 +7,9 @@ axis without inertia, ...) is checked where the scene is built.
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from functools import lru_cache
-from typing import Annotated, Any, Literal, Union
+from typing import Annotated, Any, Literal, Self, Union
 
 from pydantic import (
     Field,
@@ -22,7 +23,7 @@ from pydantic import (
 )
 
 from rigidsim.scene.bodies.table import Body
-from rigidsim.scene.choices import REDUCED
+from rigidsim.scene.choices import DEFAULT_METHOD, REDUCED
 from rigidsim.scene.expressions.names import BODY_NAMES
 from rigidsim.scene.expressions.tree import RESERVED
 from rigidsim.scene.fields import (
@@ -289,6 +290,21 @@ class Config(ConfigTable):
         if (start.tle or start.frame) and self.frame.axes is None and self.ephemeris is None:
             changes["frame"] = self.frame.model_copy(update={"axes": "GCRF"})
         return self.model_copy(update=changes) if changes else self
+
+    def as_motion(self, record: Sequence[str] = ("quaternion",), **integrator: Any) -> Self:
+        """The config of the same motion alone, without what is only watched or judged: a quaternion in steps,
+        without projections, unless the keys of ``[integrator]`` given here say otherwise.
+        """
+        watched = ("sensitivity", "orientation", "orientation_of", "tip")
+        output = {"record": list(record), "timeline": False, "lyapunov": False, **dict.fromkeys(watched)}
+        plain = {"formulation": "quaternion", "method": DEFAULT_METHOD, "hold_invariants": False}
+        judged = dict.fromkeys(("accuracy", "accuracy_axis", "accuracy_position"))
+        tables = {
+            "integrator": self.integrator.model_copy(update=plain | judged | integrator),
+            "output": self.output.model_copy(update=output),
+            "events": [],
+        }
+        return self.model_copy(update=tables)
 
     @field_validator("loads", "events", "bodies", "rotors", "states")
     @classmethod

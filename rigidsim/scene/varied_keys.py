@@ -96,7 +96,7 @@ def scene_of(
     vector = [context.zero] * 3
     for key, value in zip(keys, values, strict=True):
         for place in key.places:
-            config = _replaced(config, place, value)
+            config = replaced(config, place, replace(value_at(config, place), rational=value, pi_power=0))
         if not key.places:
             vector[key.component] = context.mpf(value.numerator) / context.mpf(value.denominator)
     scene = build_scene(replace(experiment, config=config), context)
@@ -129,7 +129,7 @@ def _numbers_of(experiment: Experiment, key: str, where: str) -> list[VariedKey]
     if steps[0] not in _TABLES:
         raise ValueError(f"is no number of the motion; keys of {', '.join(_TABLES)} are allowed")
     unit, _ = unit_and_length(key, parse_toml(experiment.text, experiment.source))
-    value = _at(experiment.config, steps)
+    value = value_at(experiment.config, steps)
     named = {steps: value} if isinstance(value, ExactNumber) else dict(_entries(value, steps))
     if value is None or not named:
         what = "isn't given in the config" if value is None else "has no number there"
@@ -160,7 +160,7 @@ def _of_attitude(experiment: Experiment, steps: Steps) -> list[VariedKey]:
     ]
 
 
-def _at(value: Any, steps: Steps) -> Any:
+def value_at(value: Any, steps: Sequence[str | int]) -> Any:
     """What stands at a place; None for nothing."""
     for step in steps:
         if isinstance(step, int):
@@ -189,7 +189,7 @@ def _places(place: Steps) -> tuple[Steps, ...]:
 def _largest_beside(config: Any, place: Steps) -> ExactNumber:
     """The largest number in the array that a place is in; 1 without one."""
     depth = next((n for n, step in enumerate(place) if isinstance(step, int) and n > 1), len(place))
-    beside = [x for _, x in _entries(_at(config, place[:depth]), place[:depth]) if x.sign]
+    beside = [x for _, x in _entries(value_at(config, place[:depth]), place[:depth]) if x.sign]
     return max(beside, key=lambda x: abs(float(x)), default=ExactNumber(Fraction(1)))
 
 
@@ -205,14 +205,14 @@ def _name(steps: Steps) -> str:
     return text
 
 
-def _replaced(value: Any, steps: Steps, number: Fraction) -> Any:
-    """A copy of a table with another number in one place."""
+def replaced(value: Any, steps: Sequence[str | int], number: ExactNumber) -> Any:
+    """A copy of a table with another number in one place, where one stands."""
     if not steps:
-        return replace(value, rational=number, pi_power=0)
+        return number
     first, *rest = steps
     if isinstance(value, Mapping):
-        return {**value, first: _replaced(value[first], tuple(rest), number)}
+        return {**value, first: replaced(value[first], rest, number)}
     if isinstance(first, int):
-        changed = [*value[:first], _replaced(value[first], tuple(rest), number), *value[first + 1 :]]
+        changed = [*value[:first], replaced(value[first], rest, number), *value[first + 1 :]]
         return tuple(changed) if isinstance(value, tuple) else changed
-    return value.model_copy(update={first: _replaced(getattr(value, first), tuple(rest), number)})
+    return value.model_copy(update={first: replaced(getattr(value, first), rest, number)})

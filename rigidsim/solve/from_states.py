@@ -20,10 +20,9 @@ from rigidsim.model.outputs import drift_outputs
 from rigidsim.model.state_blocks import BODY
 from rigidsim.model.step_limiter import PACE
 from rigidsim.model.system import System
-from rigidsim.scene.choices import DEFAULT_METHOD
 from rigidsim.scene.scene import Scene
 from rigidsim.solve.compiled import compiled_engine, compiled_function, evaluate_rows
-from rigidsim.solve.precision import precision_of
+from rigidsim.solve.precision import Precision, precision_of
 from rigidsim.store.many_rows import blocks_of, gathered, picked
 
 _STEPS = 100_000
@@ -33,52 +32,69 @@ class NotFromStates(Exception):
     """Why a scene can't be started from attitude and rates alone."""
 
 
-class FromStates:
-    """A scene's motion from states of one's own; times in s, attitudes w x y z, rates in rad/s, body axes."""
+class AnyStart:
+    """A scene's equations in rates and quaternion, which may begin at any attitude and rates."""
 
-    def __init__(self, scene: Scene) -> None:
-        config = scene.config
-        integrator = {"formulation": "quaternion", "method": DEFAULT_METHOD, "hold_invariants": False}
-        tables = {
-            "integrator": config.integrator.model_copy(update=integrator),
-            "output": config.output.model_copy(update={"record": ["quaternion"], "lyapunov": False}),
-            "events": [],
-        }
-        if config.model.level != "full":
-            raise NotFromStates(f"the config's model is {config.model.level}, an average without an attitude")
-        scene = replace(scene, config=config.model_copy(update=tables), events=())
-        precision = precision_of("double")
-        self._precision = precision
-        self._system = System(replace(plan_model(scene), formulation=Quaternion()), precision.number)
-        if self._system.stepwise or self._system.clocked:
-            raise NotFromStates("its equations change along the motion (tables, kernels or switches)")
-        if self._system.mechanics.slip is not None:
-            raise NotFromStates("its body is distorted, so that rates alone don't tell its momentum")
+    def __init__(self, scene: Scene, precision: Precision, *, compact: bool = False) -> None:
+        self.precision = precision
+        self._system = System(
+            replace(plan_model(scene.as_motion()), formulation=Quaternion()), precision.number
+        )
+        self._options = dict(precision.options, compact_mode=compact or self._system.wide)
         names = self._system.states
         self._places = [names.index(name) for name in (*BODY.quaternion, *BODY.rates)]
-        flight = BODY.velocity
-        self.flies = all(name in names for name in (*BODY.position, *flight))
-        self._flight = [names.index(name) for name in (*BODY.position, *flight)] if self.flies else []
+        flight = (*BODY.position, *BODY.velocity)
+        self.flies = all(name in names for name in flight)
+        self._flight = [names.index(name) for name in flight] if self.flies else []
         orbits = [self._system.mechanics.orbit_block(tag).names for tag in self._system.plan.orbit_tags]
         known = {WORK, PACE, *(name for block in orbits for name in block)}
         taken = {names[place] for place in (*self._places, *self._flight)}
         self.others = [name for name in names if name not in known | taken]
+        """Names of states beside its own and the orbits': of rotors, and those of users."""
         self.whole = not set(names) - taken
+
+    @property
+    def plain(self) -> bool:
+        """Whether nothing happens between steps."""
+        return not self._system.stepwise and not self._system.clocked
+
+    @cached_property
+    def _engine(self) -> Any:
+        initial = self.precision.array(self._system.initial)
+        return compiled_engine(self._system.equations, initial, time=self._start, **self._options)
+
+    @cached_property
+    def _derivatives(self) -> Any:
+        expressions = [right for _, right in self._system.equations]
+        return compiled_function(expressions, self._system.variables, **self._options)
+
+    @property
+    def _exact_start(self) -> Any:
+        """Internal units, mpf."""
+        scene = self._system.scene
+        return scene.context.ldexp(scene.start, -self._system.scaling.time)
+
+    @property
+    def _start(self) -> Any:
+        return self.precision.number(self._exact_start)
+
+
+class FromStates(AnyStart):
+    """A scene's motion from given states; times in s, attitudes w x y z, rates in rad/s, body axes."""
+
+    def __init__(self, scene: Scene) -> None:
+        if scene.config.model.level != "full":
+            what = f"the config's model is {scene.config.model.level}, an average without an attitude"
+            raise NotFromStates(what)
+        super().__init__(scene, precision_of("double"))
+        if not self.plain:
+            raise NotFromStates("its equations change along the motion (tables, kernels or switches)")
+        if self._system.mechanics.slip is not None:
+            raise NotFromStates("its body is distorted, so that rates alone don't tell its momentum")
 
     @cached_property
     def _scales(self) -> np.ndarray:
         return np.ldexp(1.0, np.array(self._system.state_exponents))
-
-    @cached_property
-    def _engine(self) -> Any:
-        options = dict(self._precision.options, compact_mode=self._system.wide)
-        initial = self._precision.array(self._system.initial)
-        return compiled_engine(self._system.equations, initial, time=self._start, **options)
-
-    @property
-    def _start(self) -> float:
-        scene = self._system.scene
-        return float(scene.context.ldexp(scene.start, -self._system.scaling.time))
 
     def _internal(self, times: np.ndarray) -> np.ndarray:
         return np.ldexp(times, -self._system.scaling.time)
@@ -87,7 +103,7 @@ class FromStates:
         """The scene's own states (rows, states), internal units, at ascending times (s)."""
         engine = self._engine
         engine.time = self._start
-        engine.state[:] = self._precision.array(self._system.initial)
+        engine.state[:] = self.precision.array(self._system.initial)
         first = self._internal(times[:1])
         if first[0] != self._start:
             self._advanced(first)
@@ -132,11 +148,6 @@ class FromStates:
             found[n] = engine.state
         return found
 
-    @cached_property
-    def _derivatives(self) -> Any:
-        options = dict(self._precision.options, compact_mode=self._system.wide)
-        return compiled_function([x for _, x in self._system.equations], self._system.variables, **options)
-
     def slopes(self, states: np.ndarray, times: np.ndarray, added: np.ndarray | None = None) -> np.ndarray:
         """Derivatives (rows, states) by time (s) of states in internal units.
 
@@ -175,11 +186,10 @@ class FromStates:
         if not invariants:
             return {}
         components = [x for invariant in invariants for x in invariant.expressions]
-        options = dict(self._precision.options, compact_mode=self._system.wide)
-        value = compiled_function(components, self._system.variables, **options)
+        value = compiled_function(components, self._system.variables, **self._options)
         begun = evaluate_rows(value, states[slice(1)], times=self._internal(times[:1]))[:, 0]
-        expressions = drift_outputs(invariants, self._system.scene.context, self._precision.number)
-        function = compiled_function(expressions, self._system.variables, **options)
+        expressions = drift_outputs(invariants, self._system.scene.context, self.precision.number)
+        function = compiled_function(expressions, self._system.variables, **self._options)
         found = gathered(
             evaluate_rows(function, states[rows], begun, self._internal(times[rows])).T
             for rows in blocks_of(len(times))

@@ -19,6 +19,7 @@ from rigidsim.scene.scene import Scene, build_scene
 from rigidsim.scene.toml_text import key_steps
 from rigidsim.scene.tracing.arithmetic import TracingContext, swept_number
 from rigidsim.scene.tracing.numbers import Graph, Traced, Untraceable
+from rigidsim.scene.varied_keys import replaced, value_at
 from rigidsim.solve.precision import precision_of
 from rigidsim.solve.problem import InitialValueProblem, prepare
 
@@ -103,7 +104,10 @@ def trace(
     graph = Graph(context_for(representative.config.integrator.precision))
     config = representative.config
     for column, (key, number) in enumerate(zip(keys, numbers, strict=True)):
-        config = _replaced(config, key_steps(key, "axes"), swept_number(graph, column, number))
+        steps = key_steps(key, "axes")
+        if not isinstance(value_at(config, steps), ExactNumber):
+            raise Untraceable(f"what is swept, {key}, is no number")
+        config = replaced(config, steps, swept_number(graph, column, number))
     context = TracingContext(graph)
     scene: Scene = build_scene(replace(representative, config=config), context)
     check_start(scene)
@@ -112,19 +116,3 @@ def trace(
     for part in ("equations", "outputs", "invariants", "crossings", "rate_bound", "initial"):
         getattr(system, part)
     return TracedSystem(prepared, system, parameters, graph)
-
-
-def _replaced(value: Any, steps: Sequence[str | int], number: ExactNumber) -> Any:
-    """A copy of a table with another number in one place."""
-    if not steps:
-        if not isinstance(value, ExactNumber):
-            raise Untraceable("what is swept is no number")
-        return number
-    first, *rest = steps
-    if isinstance(value, dict) and first in value:
-        return {**value, first: _replaced(value[first], rest, number)}
-    if isinstance(value, list) and isinstance(first, int) and first < len(value):
-        return [*value[:first], _replaced(value[first], rest, number), *value[first + 1 :]]
-    if hasattr(value, "model_copy") and isinstance(first, str) and hasattr(value, first):
-        return value.model_copy(update={first: _replaced(getattr(value, first), rest, number)})
-    raise Untraceable(f"no {first} in what is swept")

@@ -7,27 +7,19 @@ scene has it. Numbers go in and out as mpf.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import chain
 from typing import Any
 
 import heyoka as hy
 import numpy as np
 
-from rigidsim.model.formulations.quaternion import Quaternion
-from rigidsim.model.model_plan import plan_model
-from rigidsim.model.observables.mechanical import WORK
-from rigidsim.model.state_blocks import BODY
-from rigidsim.model.step_limiter import PACE
-from rigidsim.model.system import System
 from rigidsim.scene import attitude
 from rigidsim.scene.arithmetic import Matrix, Vector, multiply, norm, working_bits
-from rigidsim.scene.choices import DEFAULT_METHOD
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.starts import InitialRotation
-from rigidsim.solve.compiled import compiled_engine, compiled_function
+from rigidsim.solve.from_states import AnyStart
 from rigidsim.solve.precision import Precision, precision_of
 from rigidsim.store.summary import FoundStart
 
@@ -77,40 +69,17 @@ def widths(scene: Scene) -> list[Precision]:
     return found
 
 
-class PoseMotion:
+class PoseMotion(AnyStart):
     """The motion of a scene in one arithmetic; what else is in it, such as rotors, begins beside a pose."""
 
     def __init__(self, scene: Scene, precision: Precision, pose: Pose | None = None) -> None:
-        config = scene.config
-        integrator = {"formulation": "quaternion", "method": DEFAULT_METHOD, "hold_invariants": False}
-        tables = {
-            "integrator": config.integrator.model_copy(update=integrator),
-            "output": config.output.model_copy(update={"record": ["quaternion"], "lyapunov": False}),
-            "model": config.model.model_copy(update={"level": "full", "short_period": False}),
-            "events": [],
-        }
-        scene = replace(scene, config=config.model_copy(update=tables), events=())
+        model = scene.config.model.model_copy(update={"level": "full", "short_period": False})
+        scene = replace(scene, config=scene.config.model_copy(update={"model": model}))
         if pose is not None:
             quaternion = attitude.quaternion_from_matrix(scene.context, pose.matrix)
             scene = replace(scene, quaternion=quaternion, angular_velocity=pose.rates)
-        self.context, self.precision = scene.context, precision
-        self._system = System(replace(plan_model(scene), formulation=Quaternion()), precision.number)
-
-    @property
-    def others(self) -> list[str]:
-        """Names of states beside those of the rotation that its equations read: of rotors and one's own."""
-        orbits = [self._system.mechanics.orbit_block(orbit).names for orbit in self._system.plan.orbit_tags]
-        known = {*BODY.rates, *BODY.quaternion, WORK, PACE, *chain.from_iterable(orbits)}
-        return [name for name in self._system.states if name not in known]
-
-    @property
-    def plain(self) -> bool:
-        """Whether nothing happens between steps."""
-        return not self._system.stepwise and not self._system.clocked
-
-    @cached_property
-    def _places(self) -> list[int]:
-        return [self._system.states.index(name) for name in (*BODY.quaternion, *BODY.rates)]
+        super().__init__(scene, precision, compact=True)
+        self.context = scene.context
 
     @cached_property
     def _exponents(self) -> list[int]:
@@ -127,43 +96,25 @@ class PoseMotion:
     def _exact(self, values: Iterable[Any]) -> Vector:
         return [self.context.make_mpf(self.precision.exact(x)._mpf_) for x in values]
 
-    @property
-    def _start(self) -> Any:
-        return self.context.ldexp(self._system.scene.start, -self._system.scaling.time)
-
-    @cached_property
-    def _slopes(self) -> Callable[..., Any]:
-        system = self._system
-        expressions = [right for _, right in system.equations]
-        return compiled_function(expressions, system.variables, compact_mode=True, **self.precision.options)
-
     def acceleration(self, pose: Pose) -> tuple[Vector, dict[str, Any]]:
         """Derivatives at the start: of the rates (body axes, rad/s^2), and by name of other states, in
         internal units.
         """
         time, names = self._system.scaling.time, self._system.states
-        options = {}
-        if getattr(self._slopes, "is_time_dependent", False):
-            options["time"] = self.precision.number(self._start)
-        slopes = self._exact(np.asarray(self._slopes(self._state(pose), **options)))
+        options = {"time": self._start} if self._derivatives.is_time_dependent else {}
+        slopes = self._exact(np.asarray(self._derivatives(self._state(pose), **options)))
         rates = [
             self.context.ldexp(slopes[place], e - time)
             for place, e in zip(self._places[4:], self._exponents, strict=True)
         ]
         return rates, {name: slopes[names.index(name)] for name in self.others}
 
-    @cached_property
-    def _engine(self) -> Any:
-        options = dict(self.precision.options, time=self.precision.number(self._start))
-        initial = self.precision.array(self._system.initial)
-        return compiled_engine(self._system.equations, initial, compact_mode=True, **options)
-
     def after(self, pose: Pose, seconds: Any) -> Pose:
         """The pose so many seconds (mpf) after the start. Raises ``Lost``."""
         engine, context = self._engine, self.context
-        engine.time = self.precision.number(self._start)
+        engine.time = self._start
         engine.state[:] = self._state(pose)
-        until = self._start + context.ldexp(seconds, -self._system.scaling.time)
+        until = self._exact_start + context.ldexp(seconds, -self._system.scaling.time)
         outcome, *_ = engine.propagate_until(self.precision.number(until), max_steps=_STEPS)
         if outcome != hy.taylor_outcome.time_limit:
             raise Lost
