@@ -17,6 +17,7 @@ from rigidsim.look.timeline.blueprint import build_comparison
 from rigidsim.look.timeline.drawn import Clock, DrawnRun, build_clock, dated
 from rigidsim.look.timeline.writing import chunks, recording_to
 from rigidsim.scene.readable import epoch_of
+from rigidsim.scene.row_rotations import angles_between
 
 MOST = 6  # largest number of runs shown side by side
 ROWS = 20_000  # largest number of rows shown of each run
@@ -126,7 +127,7 @@ def attitude_differences(named: Sequence[tuple[str, xarray.Dataset]]) -> Plot | 
         if quaternion is None:
             continue
         theirs = _at(times, np.asarray(table["time"].values, dtype=np.float64), quaternion)
-        angle = angle_between(base, theirs)
+        angle = angles_between(base, theirs)
         if not np.isfinite(angle).any():
             continue
         label = f"{legible(name)} from {legible(first_name)}"
@@ -134,15 +135,6 @@ def attitude_differences(named: Sequence[tuple[str, xarray.Dataset]]) -> Plot | 
         series.append(Series(f"difference {number + 1}", [label], [COLORS[number + 1]], curve))
     title = "Angle between the attitudes [rad], log10"
     return Plot("difference", title, "drift", series) if series else None
-
-
-def angle_between(one: Array, other: Array) -> Array:
-    """Angle (rows,), rad, of the rotation from one attitude to another, (rows, 4) unit quaternions each.
-
-    From the chord, so that small angles keep their digits: an arc cosine would lose those below 1e-8.
-    """
-    chord = np.minimum(np.linalg.norm(one - other, axis=1), np.linalg.norm(one + other, axis=1))
-    return np.asarray(4 * np.arcsin(np.clip(chord / 2, 0.0, 1.0)))
 
 
 def _at(times: Array, theirs: Array, quaternion: Array) -> Array:
