@@ -21,15 +21,18 @@ exactly where it began is left alone: what is zero for good stays zero.
 """
 
 from collections.abc import Sequence
+from functools import reduce
 from typing import Any
 
 import heyoka as hy
+import mpmath
 import numpy as np
 
 from rigidsim.model.projected_invariants import projected_invariants
+from rigidsim.model.rotations import Symbolic
+from rigidsim.model.scaling import Rounder
 from rigidsim.model.system import System
 from rigidsim.solve.compiled import CompiledFunction, compiled_function
-from rigidsim.solve.correction import correction, damping_between, freedoms_of, lacking_rates
 from rigidsim.solve.precision import Precision, Scalar, precision_of
 
 LATE = 8192
@@ -154,22 +157,20 @@ class Projection:
         row[2:] = np.concatenate(self._low.parts(state))
 
     def begin(self, state: np.ndarray, time: Scalar) -> None:
-        """Correct for the first time: the residuals' integral so far is taken over the noted states."""
-        chart, integrals = self._chart, self._sums[: len(self.names)]
+        """Correct for the first time, with the residuals' integral over the noted states."""
+        chart = self._chart
         self.use(0)
-        self._then[:] = first = self.residuals(self._low.array(self._system.initial))
+        self._then[:] = self.residuals(self._low.array(self._system.initial))
         for now, there, *values in self._notes.tolist():
-            if not now > self._times[0]:  # none was taken
-                continue
-            self.use(int(there))
-            self.load()
-            found = self._residuals_of(self._summed(list(np.array(values).reshape(self._parts, -1))))
-            integrals += 0.5 * (now - self._times[0]) * (found + self._then)
-            self._then[:], self._times[0] = found, now
+            if now > self._times[0]:  # else none was taken
+                self.use(int(there))
+                parts = np.array(values).reshape(self._parts, -1)
+                noted = _sum([self._low.of_doubles(part) for part in parts])
+                self.project(noted.copy(), now)
+                self._then[:] = self.residuals(noted)  # of a state that stayed as it was
         self.use(chart)
-        drifted = self._then - first
+        self._times[1] = 0.0
         self.project(state, time)
-        self._sums[len(self.names) :] += drifted
         self._times[1] = 0.0  # what follows comes at intervals shorter than the one from the last note
         self._times[3] = 1.0
 
@@ -223,11 +224,7 @@ class Projection:
     def residuals(self, state: np.ndarray) -> np.ndarray:
         """(value - initial) / scale of each projected scalar, float64, evaluated one precision higher."""
         self.load()
-        return self._residuals_of(self._widened(state))
-
-    def _residuals_of(self, state: np.ndarray) -> np.ndarray:
-        """Residuals of a state given in the higher precision."""
-        return np.asarray(self._residuals(state)).astype(np.float64)
+        return np.asarray(self._residuals(self._widened(state))).astype(np.float64)
 
     @property
     def corrections(self) -> np.ndarray:
@@ -238,15 +235,7 @@ class Projection:
 
     def _widened(self, state: np.ndarray) -> np.ndarray:
         """A state in the higher precision, exactly."""
-        return self._summed(self._low.parts(state))
-
-    def _summed(self, values: Sequence[np.ndarray]) -> np.ndarray:
-        """The sum of float64 parts, smallest first."""
-        parts = [self._high.of_doubles(part) for part in values]
-        total = parts[-1]
-        for part in parts[-2::-1]:
-            total = total + part
-        return total
+        return _sum([self._high.of_doubles(part) for part in self._low.parts(state)])
 
     @property
     def _options(self) -> dict[str, Any]:
@@ -263,7 +252,7 @@ class Projection:
         lacking = []
         if self.late:
             as_integrated = self._system.rounded(lambda value: high.number(low.exact(low.number(value))))
-            lacking = lacking_rates(wide, self._in_use(as_integrated))
+            lacking = coefficient_rounding_terms(wide, self._in_use(as_integrated))
         context = wide.scene.context
         damping = high.number(damping_between(low.bits, high.bits, context))
         freedoms = freedoms_of(wide, high.number)
@@ -278,3 +267,126 @@ class Projection:
         found = system if self._chart == 0 else system.partner
         assert found is not None
         return found
+
+
+def _sum(parts: Sequence[np.ndarray]) -> np.ndarray:
+    """The sum of parts, the smallest first."""
+    return reduce(lambda total, part: total + part, reversed(parts))
+
+
+# --- the correction as expressions --------------------------------------------------------------------------
+
+
+def correction(
+    states: Sequence[Symbolic],
+    freedoms: Sequence[Symbolic],
+    residuals: Sequence[Symbolic],
+    lacking: Sequence[Symbolic],
+    damping: Scalar,
+) -> tuple[list[Symbolic], list[Symbolic]]:
+    """What a correction is worked out from, and what comes of it.
+
+    Residuals are (value - initial) / scale of each projected scalar; what is lacking of each state's
+    derivative (``coefficient_rounding_terms``) may be empty. The inputs: states, the time since the latest
+    correction, one over the interval that the next is expected within, and of each scalar its residual's
+    integral until then, what was put back, and the residual that was left. The outputs: what to take off
+    the states, the integrals, what was put back, and the square of the size of the part that puts invariants
+    back.
+    """
+    m, x = len(residuals), list(states)
+    elapsed, pace = hy.make_vars("elapsed", "pace_of_corrections")
+    integrals, put_back, then = (
+        [hy.make_vars(f"{name}_{j}") for j in range(m)] for name in ("integral", "put_back", "then")
+    )
+    new_integrals = [
+        s + 0.5 * (elapsed * (a + b)) for s, a, b in zip(integrals, residuals, then, strict=True)
+    ]
+    new_put_back = [c + (a - b) for c, a, b in zip(put_back, residuals, then, strict=True)]
+    tensors = hy.diff_tensors(residuals, x, diff_order=1)
+    gradients = [
+        [tensors[(j, *(int(k == i) for k in range(len(x))))] for i in range(len(x))] for j in range(m)
+    ]
+    wanted = [r + pace * s for r, s in zip(residuals, new_integrals, strict=True)]
+    if lacking:  # along the invariants' level sets: what it would change of them is taken off at once
+        across = [hy.sum([g * f for g, f in zip(row, lacking, strict=True)]) for row in gradients]
+        wanted = [r + elapsed * a for r, a in zip(wanted, across, strict=True)]
+    change = least_correction(
+        [[free * g for free, g in zip(freedoms, row, strict=True)] for row in gradients], wanted, damping
+    )
+    size = hy.sum([c * c for c in change])
+    change = [free * c for free, c in zip(freedoms, change, strict=True)]
+    if lacking:
+        change = [hy.sum([c, -(elapsed * f)]) for c, f in zip(change, lacking, strict=True)]
+    return [*x, elapsed, pace, *integrals, *put_back, *then], [*change, *new_integrals, *new_put_back, size]
+
+
+def freedoms_of(system: System, number: Rounder) -> list[Symbolic]:
+    """How far a correction of order one moves each state: as far as 1 rad for an angle in a larger unit, in
+    which the same change would look smaller than one of the spin. Not at all where the state stands exactly
+    where it began: it has no drift to be put back, and a rate or a direction that is exactly zero for good
+    would leave it, to grow about an unstable axis.
+    """
+    units = [0] * len(system.states)
+    for i in system.angle_states:
+        units[i] = system.angle_unit
+    return [
+        hy.select(hy.eq(x, hy.expression(number(start))), hy.expression(0.0), hy.expression(2.0**-unit))
+        for x, start, unit in zip(system.variables, system.initial, units, strict=True)
+    ]
+
+
+def coefficient_rounding_terms(exact: System, integrated: System) -> list[Symbolic]:
+    """What integrated equations lack of each derivative, since their coefficients are rounded; empty where
+    they have parameters, which change along the motion: orbits by tables, which are rounded themselves. Both
+    have the digits of the higher precision, ``integrated`` those of the integration in it.
+    """
+    pairs = zip(exact.equations, integrated.equations, strict=True)
+    if hy.get_params([right for _, right in exact.equations]):
+        return []
+    return [right - rounded for (_, right), (_, rounded) in pairs]
+
+
+def damping_between(low: int, high: int, context: mpmath.MPContext) -> mpmath.mpf:
+    """Square of the sine between gradients below which a direction is left to itself.
+
+    Residuals are known to some eps_high, so that the correction in a direction of singular value s is
+    known to eps_high / s; damped by d it errs by at most eps_high / (2 sqrt d), which is to stay below
+    an eighth of eps. The Gram matrix must stay positive after its own rounding.
+    """
+    two = context.mpf(2)
+    return max(two ** (2 * (2 + low - high)), two ** (9 - high))
+
+
+def least_correction(
+    gradients: list[list[Symbolic]], wanted: list[Symbolic], damping: Scalar
+) -> list[Symbolic]:
+    """Least change of the state that removes residuals, J^T (J J^T + damping)^-1 r, with J of order one."""
+    m = len(wanted)
+    pairs = [[zip(gradients[a], gradients[b], strict=True) for b in range(m)] for a in range(m)]
+    gram = [[hy.sum([x * y for x, y in pair]) for pair in row] for row in pairs]
+    for a in range(m):
+        gram[a][a] = gram[a][a] + damping
+    weights = solve_positive(gram, wanted)
+    states = range(len(gradients[0]))
+    return [hy.sum([gradients[j][i] * weights[j] for j in range(m)]) for i in states]
+
+
+def solve_positive(matrix: list[list[Symbolic]], right: list[Symbolic]) -> list[Symbolic]:
+    """Solution of a symmetric positive system of expressions, by its L D L^T decomposition."""
+    size = len(right)
+    lower: list[list[Any]] = [[None] * size for _ in range(size)]
+    pivots: list[Any] = []
+    for j in range(size):
+        known = [-(lower[j][k] * (lower[j][k] * pivots[k])) for k in range(j)]
+        pivots.append(hy.sum([matrix[j][j], *known]))
+        for i in range(j + 1, size):
+            known = [-(lower[i][k] * (lower[j][k] * pivots[k])) for k in range(j)]
+            lower[i][j] = hy.sum([matrix[i][j], *known]) / pivots[j]
+    solution: list[Any] = []
+    for i in range(size):
+        solution.append(hy.sum([right[i]] + [-(lower[i][k] * solution[k]) for k in range(i)]))
+    solution = [y / d for y, d in zip(solution, pivots, strict=True)]
+    for i in reversed(range(size)):
+        known = [-(lower[k][i] * solution[k]) for k in range(i + 1, size)]
+        solution[i] = hy.sum([solution[i], *known])
+    return solution

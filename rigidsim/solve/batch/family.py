@@ -19,8 +19,7 @@ from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.sweeps.sweep import Sweep
 from rigidsim.scene.toml_text import key_steps
 from rigidsim.scene.tracing.numbers import Traced, Untraceable
-from rigidsim.solve.batch.replay import Replay, SharedReals, real_of
-from rigidsim.solve.batch.tracing import TRACED_TABLES, TracedSystem, trace
+from rigidsim.solve.batch.tracing import TRACED_TABLES, Replay, SharedReals, TracedSystem, real_of, trace
 from rigidsim.solve.effects.effect import registered_effects
 from rigidsim.solve.precision import precision_of
 from rigidsim.solve.problem import prepare

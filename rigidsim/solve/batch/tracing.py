@@ -1,11 +1,22 @@
-"""Tracing a system with its swept numbers as parameters, once for all members that share its equations."""
+"""Tracing a system with its swept numbers as parameters, once for all members that share its equations; and
+their numbers, evaluated for many members at once, in the scene's own arithmetic.
 
+heyoka's arrays of multiprecision numbers (MPFR) round sums, products, quotients and roots as mpmath does, so
+that each member's numbers are those of its own build in every bit. Other functions are mpmath's own, once for
+each of the values that they are taken of.
+"""
+
+from __future__ import annotations
+
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import heyoka as hy
+import numpy as np
+from mpmath.libmp import from_man_exp
 
 from rigidsim.model.heyoka_expressions import TANGENT
 from rigidsim.model.model_plan import plan_model
@@ -18,7 +29,7 @@ from rigidsim.scene.initial_values import check_start
 from rigidsim.scene.scene import Scene, build_scene
 from rigidsim.scene.toml_text import key_steps
 from rigidsim.scene.tracing.arithmetic import TracingContext, swept_number
-from rigidsim.scene.tracing.numbers import Graph, Traced, Untraceable
+from rigidsim.scene.tracing.numbers import BINARY, Graph, Guard, Traced, Untraceable
 from rigidsim.scene.varied_keys import replaced, value_at
 from rigidsim.solve.precision import precision_of
 from rigidsim.solve.problem import InitialValueProblem, prepare
@@ -26,6 +37,12 @@ from rigidsim.solve.problem import InitialValueProblem, prepare
 TRACED_TABLES = ("body", "initial", "loads", "rotors", "parameters")
 """Config tables whose numbers may become parameters."""
 _PARAMETER = "swept_"
+_CONTEXT = context_for("double")
+_BITS = _CONTEXT.prec
+_FAILURES = (ZeroDivisionError, ValueError, OverflowError, TypeError)
+"""Errors of mpmath for numbers outside the range of an operation (of complex numbers none is the larger); the
+member's own build reports them.
+"""
 
 
 @dataclass
@@ -116,3 +133,170 @@ def trace(
     for part in ("equations", "outputs", "invariants", "crossings", "rate_bound", "initial"):
         getattr(system, part)
     return TracedSystem(prepared, system, parameters, graph)
+
+
+# --- numbers of members -------------------------------------------------------------------------------------
+
+Reals = Any  # an array of hy.real, or one hy.real
+
+
+class SharedReals(NamedTuple):
+    """Numbers of members: the values that there are, and which each member has; None where all have one."""
+
+    values: Any
+    shared: np.ndarray | None = None
+
+    def of_each(self, count: int) -> np.ndarray:
+        """The numbers of so many members."""
+        each = self.values if self.shared is None else self.values[self.shared]
+        return np.broadcast_to(each, count)
+
+
+def real_of(number: ExactNumber) -> hy.real:
+    """An exact number, rounded as ``ExactNumber.at`` does."""
+    if number.pi_power:
+        return _real(number.at(_CONTEXT))
+    return hy.real(number.rational.numerator, _BITS) / hy.real(number.rational.denominator, _BITS)
+
+
+def _real(value: Any) -> hy.real:
+    """The same number as an mpf; nan if it isn't a real number, or is far outside a double's range."""
+    if not hasattr(value, "_mpf_"):  # complex
+        return hy.real(math.nan, _BITS)
+    sign, mantissa, exponent, _ = value._mpf_
+    if not mantissa and exponent:  # mpmath's codes of infinities and nan
+        return hy.real(math.nan, _BITS)
+    whole = hy.real(int(-mantissa if sign else mantissa), _BITS)
+    return whole * hy.real(math.ldexp(1.0, exponent), _BITS)
+
+
+def _mpf(value: hy.real) -> Any:
+    """The same number as an mpf; ValueError or OverflowError far outside a double's range."""
+    places = _BITS - math.frexp(float(value))[1]
+    whole = int(value * hy.real(math.ldexp(1.0, places), _BITS))
+    return _CONTEXT.make_mpf(from_man_exp(whole, -places))
+
+
+def _reals(values: np.ndarray) -> Reals:
+    return values.astype(hy.real) * hy.real(1.0, _BITS)  # an array of doubles has their precision alone
+
+
+class Replay:
+    """A graph's numbers for some members; nan where an operation has no result.
+
+    Each operation is done once for the values that there are: in a product of axes members share most. The
+    columns of one axis share their index.
+    """
+
+    def __init__(self, graph: Graph, columns: Sequence[SharedReals], count: int) -> None:
+        self._graph, self._columns, self._count = graph, columns, count
+        self._found: dict[Any, SharedReals] = {}
+        self._each = np.arange(count)
+
+    def agreeing(self, guards: Sequence[Guard]) -> np.ndarray:
+        """Mask of the members that make all decisions as the representative does, (members,)."""
+        found = np.ones(self._count, dtype=bool)
+        for guard in guards:
+            found &= self._once(guard, self._agreeing, guard).of_each(self._count)
+            if not found.any():
+                break
+        return found
+
+    def doubles(self, node: int) -> np.ndarray:
+        """A number rounded once, (members,); nan if it is outside a double's range."""
+        return self._once(("double", node), self._rounded, node).of_each(self._count)
+
+    def number(self, node: int) -> SharedReals:
+        """A number of the graph."""
+        return self._once(node, self._worked_out, *self._graph.nodes[node])
+
+    def _once(self, key: Any, work: Callable[..., SharedReals], *given: Any) -> SharedReals:
+        if key not in self._found:
+            with np.errstate(all="ignore"):
+                self._found[key] = work(*given)
+        return self._found[key]
+
+    def _agreeing(self, guard: Guard) -> SharedReals:
+        (left, right), index = self._together(guard.left, guard.right)
+        decided = left < right if guard.kind == "<" else left == right
+        return SharedReals((decided == guard.outcome) & np.isfinite(left) & np.isfinite(right), index)
+
+    def _rounded(self, node: int) -> SharedReals:
+        values, index = self.number(node)
+        exact = np.atleast_1d(values)
+        found = exact.astype(np.float64) + 0.0  # zero without a sign
+        found[(np.abs(found) < np.finfo(float).tiny) & (exact != hy.real(0.0, _BITS))] = np.nan
+        found[np.isinf(found)] = np.nan
+        return SharedReals(found, index)
+
+    def _together(self, *nodes: int) -> tuple[list[Reals], np.ndarray | None]:
+        """Values of nodes by a common index."""
+        found = [self.number(node) for node in nodes]
+        indices = {id(index): index for _, index in found if index is not None}
+        if len(indices) <= 1:
+            return [values for values, _ in found], next(iter(indices.values()), None)
+        return [values if index is None else values[index] for values, index in found], self._each
+
+    def _worked_out(self, operation: str, arguments: tuple[Any, ...]) -> SharedReals:
+        if operation == "constant":
+            return SharedReals(_real(arguments[0]))
+        if operation == "column":
+            return self._columns[arguments[0]]
+        if operation == "power":
+            base, power = arguments
+            if power == 2:
+                return self._worked_out("multiply", (base, base))
+            return self._one_by_one(lambda x: x**power, base)
+        if operation == "call":
+            function, *nodes = arguments
+            return self._one_by_one(lambda *values: function(_CONTEXT, *values), *nodes)
+        known = BINARY.get(operation) or _OF_ARRAYS.get(operation)
+        if known is None:
+            return self._one_by_one(getattr(_CONTEXT, operation), *arguments)
+        values, index = self._together(*arguments)
+        found = known(*values)
+        if operation == "divide":
+            found[np.broadcast_to(values[1] == hy.real(0.0, _BITS), found.shape)] = hy.real(math.nan, _BITS)
+        return SharedReals(found, index)
+
+    def _one_by_one(self, function: Callable[..., Any], *nodes: int) -> SharedReals:
+        """A function that arrays lack, once for each of the values that there are."""
+        values, index = self._together(*nodes)
+        codes: np.ndarray = np.zeros(1, dtype=np.int64)
+        for numbers in values:
+            distinct, code = np.unique(numbers, return_inverse=True)
+            codes = codes * len(distinct) + code
+        _, first, places = np.unique(codes, return_index=True, return_inverse=True)
+        found = []
+        for given in zip(*(np.broadcast_to(x, codes.shape)[first] for x in values), strict=True):
+            try:
+                found.append(_real(function(*map(_mpf, given))))
+            except _FAILURES:
+                found.append(hy.real(math.nan, _BITS))
+        return SharedReals(np.array(found)[places], index)
+
+
+def _exponent(value: Reals) -> Reals:
+    """The smallest e with abs(value) < 2**e."""
+    size = np.abs(value)
+    doubles = size.astype(np.float64)
+    exponents = np.frexp(doubles)[1]
+    # a number just below a power of two is rounded to it
+    exponents -= size < _reals(np.ldexp(1.0, exponents - 1))
+    return _reals(np.where((doubles > 0) & np.isfinite(doubles), exponents, np.nan))
+
+
+def _power_of_two(exponent: Reals) -> Reals:
+    doubles = exponent.astype(np.float64)
+    return _reals(np.where(np.isfinite(doubles), np.ldexp(1.0, doubles.astype(np.int64)), np.nan))
+
+
+_OF_ARRAYS: dict[str, Callable[..., Reals]] = {
+    "maximum": np.maximum,
+    "minimum": np.minimum,
+    "negative": lambda x: -x,
+    "absolute": np.abs,
+    "sqrt": np.sqrt,
+    "exponent": _exponent,
+    "power_of_two": _power_of_two,
+}

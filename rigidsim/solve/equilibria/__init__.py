@@ -1,3 +1,47 @@
-"""Starts in an equilibrium, found by the scene's own equations: relative equilibria and Cassini states."""
+"""Starts in an equilibrium, found by the scene's own equations, each once in a process for one config and
+precision: relative equilibria and Cassini states. Importing this enters them into ``rigidsim.scene.starts``.
+"""
 
-from rigidsim.solve.equilibria import finding  # noqa: F401  (it enters them into rigidsim.scene.starts)
+from __future__ import annotations
+
+from collections import OrderedDict
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
+from rigidsim.scene.scene import Scene
+from rigidsim.scene.starts import ATTITUDES, EQUILIBRIA, InitialRotation, StartForm, register_start
+from rigidsim.scene.tracing.arithmetic import TracingContext
+from rigidsim.scene.tracing.numbers import Untraceable
+from rigidsim.solve.equilibria.cassini import cassini_state
+from rigidsim.solve.equilibria.relative import relative_equilibrium
+
+_KEPT = 64
+_BESIDE = ("name", "description", "integrator", "model", "output", "limits", "sweep", "events")
+"""Tables on which no equilibrium depends; the precision is the context's."""
+_known: OrderedDict[Any, InitialRotation] = OrderedDict()
+
+
+def _once(find: Callable[[Scene], InitialRotation], scene: Scene) -> InitialRotation:
+    if isinstance(scene.context, TracingContext):
+        raise Untraceable("an equilibrium that is found")
+    tables = {name: table for name, table in scene.config if name not in _BESIDE}
+    key = scene.context.prec, repr(tables)
+    if key not in _known:
+        _known[key] = find(scene)
+        while len(_known) > _KEPT:
+            _known.popitem(last=False)
+    found, own = _known[key], scene.context.make_mpf
+    quaternion, rates = (
+        [own(x._mpf_) for x in vector] for vector in (found.quaternion, found.angular_velocity or ())
+    )
+    return InitialRotation(quaternion, rates, found=found.found)
+
+
+def _enter(name: str, find: Callable[[Scene], InitialRotation], allowed: tuple[str, ...]) -> None:
+    register_start(EQUILIBRIA, StartForm("equilibrium", partial(_once, find), allowed=allowed), name)
+
+
+_enter("relative", relative_equilibrium, (*ATTITUDES, "prime_meridian", "node_longitude"))
+for _number in (1, 2, 3, 4):
+    _enter(f"cassini_{_number}", partial(cassini_state, number=_number), ("spin_period",))
