@@ -24,7 +24,7 @@ from rigidsim.accuracy.comparison import (
 from rigidsim.accuracy.motion import KnownMotion, motion_of
 from rigidsim.accuracy.reference import Reference, ReferenceKind, references, scatter_of
 from rigidsim.accuracy.setting import Setting, setting_of
-from rigidsim.accuracy.trial import Told, Trials, try_setting
+from rigidsim.accuracy.trial import TrialProgress, Trials, try_setting
 from rigidsim.model.load import Load
 from rigidsim.scene.config import Experiment
 
@@ -75,7 +75,7 @@ def certify(
     accuracy_position: float | None = None,
     loads: Sequence[Load] = (),
     known: KnownMotion | None = None,
-    told: Told | None = None,
+    told: TrialProgress | None = None,
 ) -> Certificate | None:
     """Compare a finished run with an independent solution, as good as the accuracies asked for need (rad; m,
     None if the path need not be compared); None if the run recorded too little to be compared.

@@ -27,7 +27,7 @@ from rigidsim.accuracy.setting import (
     setting_of,
     wanted,
 )
-from rigidsim.accuracy.trial import Told
+from rigidsim.accuracy.trial import TrialProgress
 from rigidsim.errors import ConfigError, Problem
 from rigidsim.model.load import Load
 from rigidsim.scene.choices import (
@@ -48,7 +48,7 @@ _DIGITS: dict[str | int, range] = {"single": range(4, 8), "double": range(4, 16)
 _LADDER: tuple[str | int, ...] = ("double", "extended", "quadruple", 50, 75, 100, 150, 200, LARGEST_DIGITS)
 
 
-_SAFETY, _HOPE, _HOPE_LONG, _PROGRESS = 3.0, 0.6, 3.0, 0.2
+_SAFETY, _OPTIMISTIC, _OPTIMISTIC_LONG, _PROGRESS = 3.0, 0.6, 3.0, 0.2
 """Ratio of the accuracy to the largest acceptable forecast; ratios of forecast to accuracy up to which a
 setting is tried if the next precision costs ten times as much, of a short run, and of a long one, which
 mostly does better than its beginning forecasts; ratio to a failed setting's forecast that the next one must
@@ -65,7 +65,6 @@ class Choice:
 
     setting: Setting
     forecast: float
-    steps: int
     why: str
     known: KnownMotion
 
@@ -75,7 +74,7 @@ def chosen(
     *,
     loads: Sequence[Load] = (),
     beyond: Setting | None = None,
-    told: Told | None = None,
+    told: TrialProgress | None = None,
 ) -> tuple[Experiment, Choice | None]:
     """The experiment with the settings that its ``accuracy`` asks for written into its text, so that it means
     the same run again, and the choice: beyond one that was run and missed the accuracy only more costly ones
@@ -101,7 +100,7 @@ def choose(
     *,
     loads: Sequence[Load] = (),
     beyond: Setting | None = None,
-    told: Told | None = None,
+    told: TrialProgress | None = None,
     key: str = "accuracy",
 ) -> Choice:
     """The cheapest setting whose forecast keeps an attitude accuracy (rad, at the end), within what the
@@ -115,14 +114,14 @@ def choose(
 
     candidates = sorted(_candidates(experiment, motion), key=counted)
     most = accuracy / _SAFETY
-    hope = accuracy * (_HOPE_LONG if forecasts.part < 1 else _HOPE)
+    optimistic_limit = accuracy * (_OPTIMISTIC_LONG if forecasts.part < 1 else _OPTIMISTIC)
     if beyond is not None:
-        hope = 0.0
+        optimistic_limit = 0.0
         most = min(most, _PROGRESS * forecasts.error(beyond))
         spent = counted(beyond)
         candidates = [s for s in candidates if counted(s) > spent]
     while True:
-        choice = _first(forecasts, candidates, most, hope)
+        choice = _first(forecasts, candidates, most, optimistic_limit)
         if choice is None:
             reached = min(candidates, key=forecasts.error, default=None)
             raise ConfigError(Problem(f"[integrator] {key}", _unreachable(forecasts, reached, accuracy)))
@@ -130,20 +129,21 @@ def choose(
             return choice  # it was tried, or is too dear to be
 
 
-def _first(forecasts: Forecasts, candidates: list[Setting], most: float, hope: float) -> Choice | None:
-    """The first candidate whose forecast is within ``most``, or within ``hope`` if only another precision
-    would do better; None if there is none.
+def _first(
+    forecasts: Forecasts, candidates: list[Setting], most: float, optimistic_limit: float
+) -> Choice | None:
+    """The first candidate whose forecast is within ``most``, or within ``optimistic_limit`` if only another
+    precision would do better; None if there is none.
     """
     motion = forecasts.motion
-    steps = int(motion.steps)
     for n, setting in enumerate(candidates):
         error = forecasts.error(setting)
         if error <= most:
-            return Choice(setting, error, steps, forecasts.why(setting), motion)
+            return Choice(setting, error, forecasts.why(setting), motion)
         dearer = all(s.precision != setting.precision for s in candidates[n + 1 :] if s.has_steps)
-        if dearer and setting.has_steps and error <= hope:
+        if dearer and setting.has_steps and error <= optimistic_limit:
             why = f"{forecasts.why(setting)}; the next precision costs ten times as much"
-            return Choice(setting, error, steps, why, motion)
+            return Choice(setting, error, why, motion)
     return None
 
 

@@ -12,7 +12,7 @@ from rigidsim.accuracy.comparison import spread_times
 from rigidsim.accuracy.motion import PILOT_STEPS, motion_of
 from rigidsim.accuracy.reference import exact_beyond, stepped_reference
 from rigidsim.accuracy.setting import Setting, epsilon
-from rigidsim.accuracy.trial import Told, Trials
+from rigidsim.accuracy.trial import TrialProgress, Trials
 from rigidsim.model.load import Load
 from rigidsim.scene.config import Experiment
 from rigidsim.scene.readable import span_text
@@ -52,7 +52,7 @@ class Forecasts:
         experiment: Experiment,
         accuracy: float,
         loads: Sequence[Load] = (),
-        told: Told | None = None,
+        told: TrialProgress | None = None,
     ) -> None:
         """Examine a motion's beginning."""
         self._experiment, self._accuracy = experiment, accuracy

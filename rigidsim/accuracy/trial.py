@@ -25,7 +25,7 @@ from rigidsim.solve.status import Status
 
 _TOLD_EVERY = 0.05  # seconds
 
-Told = Callable[[str, float], None]
+TrialProgress = Callable[[str, float], None]
 """Receives a setting's title and the progress of its trial (0 to 1), some tens of times per second."""
 
 
@@ -102,7 +102,7 @@ def try_setting(
     *,
     loads: Sequence[Load] = (),
     go_on: Check | None = None,
-    told: Told | None = None,
+    told: TrialProgress | None = None,
     compact: bool = False,
     repeating: bool = False,
 ) -> Trial:
@@ -154,7 +154,7 @@ class Trials:
 
     experiment: Experiment
     loads: Sequence[Load] = ()
-    told: Told | None = None
+    told: TrialProgress | None = None
     _made: dict[tuple[Setting, tuple[mpmath.mpf, ...]], Trial | None] = field(default_factory=dict)
 
     def whole(self, setting: Setting, times: Sequence[mpmath.mpf]) -> Trial | None:
@@ -180,7 +180,7 @@ class Trials:
         return None if one is None or other is None else angles_between(one.attitudes, other.attitudes)
 
 
-def _telling(check: Check, told: Told, title: str, start: float, last: float) -> Check:
+def _telling(check: Check, told: TrialProgress, title: str, start: float, last: float) -> Check:
     """A check between chunks that also reports the progress of a trial."""
     latest = time.monotonic()
 

@@ -155,9 +155,9 @@ _CURES = {
 
 def _one_by_one(code: str) -> str:
     """Why members were run one by one, and the cure where there is one."""
-    from rigidsim.solve.batch.family import Alone
+    from rigidsim.solve.batch.family import NotBatchable
 
-    known = {one.name.lower(): one.value for one in Alone}
+    known = {one.name.lower(): one.value for one in NotBatchable}
     cure = _CURES.get(code, "")
     said = [words for words in (known.get(code, ""), cure) if words]
     return "one by one, several times as slow as in batches: " + ("; ".join(said) or code)

@@ -28,7 +28,7 @@ _HELD = 1 << 16  # values of axes that are held, each worked out once for all me
 _AT_ONCE = 2048  # members whose numbers are worked out together
 
 
-class Alone(Enum):
+class NotBatchable(Enum):
     """Why a member can't run in a batch and is run by itself; the value is shown to users."""
 
     PRECISION = "batches compute in double precision only"
@@ -55,51 +55,51 @@ class Alone(Enum):
     RANGE = "a coefficient is outside the range of double precision"
 
 
-def batchable(experiment: Experiment, keys: Sequence[str]) -> Alone | None:
+def batchable(experiment: Experiment, keys: Sequence[str]) -> NotBatchable | None:
     """Why members can't run in a batch, as far as experiment and swept keys tell; None if they can."""
     config = experiment.config
     integrator = config.integrator
     asked = integrator.accuracy, integrator.accuracy_axis, integrator.accuracy_position
     reasons = {
-        Alone.ACCURACY: any(accuracy is not None for accuracy in asked),
-        Alone.PRECISION: integrator.precision != "double",
-        Alone.ARITHMETIC: not hasattr(hy, "real"),
-        Alone.CLOSED_FORM: not integrator.has_steps,
-        Alone.METHOD: integrator.method != DEFAULT_METHOD,
-        Alone.HELD: integrator.hold_invariants is True,
-        Alone.CHART: not variables_named(integrator.formulation).regular,
-        Alone.AVERAGED: config.model.level != FULL,
-        Alone.ORIENTATION: config.output.orientation is not None,
-        Alone.LYAPUNOV: config.output.lyapunov,
-        Alone.KEY: any(key_steps(key, "axes")[0] not in TRACED_TABLES for key in keys),
+        NotBatchable.ACCURACY: any(accuracy is not None for accuracy in asked),
+        NotBatchable.PRECISION: integrator.precision != "double",
+        NotBatchable.ARITHMETIC: not hasattr(hy, "real"),
+        NotBatchable.CLOSED_FORM: not integrator.has_steps,
+        NotBatchable.METHOD: integrator.method != DEFAULT_METHOD,
+        NotBatchable.HELD: integrator.hold_invariants is True,
+        NotBatchable.CHART: not variables_named(integrator.formulation).regular,
+        NotBatchable.AVERAGED: config.model.level != FULL,
+        NotBatchable.ORIENTATION: config.output.orientation is not None,
+        NotBatchable.LYAPUNOV: config.output.lyapunov,
+        NotBatchable.KEY: any(key_steps(key, "axes")[0] not in TRACED_TABLES for key in keys),
     }
     return next((reason for reason, holds in reasons.items() if holds), None)
 
 
-def _reason_of_system(traced: TracedSystem) -> Alone | None:
+def _reason_of_system(traced: TracedSystem) -> NotBatchable | None:
     system = traced.system
     if registered_effects(system, precision_of("double")):
-        return Alone.EFFECT
+        return NotBatchable.EFFECT
     if system.switches:
-        return Alone.SWITCHING
+        return NotBatchable.SWITCHING
     if len(system.crossings) > len(system.events):
-        return Alone.MOVED_MASS
+        return NotBatchable.MOVED_MASS
     if system.pieces is not None:
-        return Alone.TABLE
+        return NotBatchable.TABLE
     if system.clocked:
-        return Alone.MOMENT
+        return NotBatchable.MOMENT
     if traced.prepared.system.in_two_parts:
-        return Alone.NUTATION
+        return NotBatchable.NUTATION
     if system.scene.bodies is not None:
-        return Alone.BODIES
+        return NotBatchable.BODIES
     # angles in so large a unit are never wrapped here: what follows from them is joined
     unwrapped = bool(system.angle_states and system.angle_unit)
     if system.partner is not None or (system.angle_states and not unwrapped):
-        return Alone.CHART
+        return NotBatchable.CHART
     joined = {r.continuity for r in system.recorded} - (
         {"", "wrapped", "parity"} if unwrapped else {"", "nearest"}
     )
-    return Alone.ANGLES if joined else None
+    return NotBatchable.ANGLES if joined else None
 
 
 class AxisNumbers:
@@ -220,7 +220,7 @@ class Sorted:
     """Members sorted into families."""
 
     groups: list[tuple[Family, Numbers]] = field(default_factory=list)
-    alone: dict[int, Alone] = field(default_factory=dict)  # those that run by themselves
+    alone: dict[int, NotBatchable] = field(default_factory=dict)  # those that run by themselves
     refused: dict[int, ConfigError] = field(default_factory=dict)  # those that no run accepts
 
 
@@ -258,7 +258,7 @@ class Families:
                 if self._most_refused is not None and len(result.refused) >= self._most_refused:
                     return
                 waiting = waiting[1:]
-            elif isinstance(made, Alone):
+            elif isinstance(made, NotBatchable):
                 result.alone[first] = made
                 waiting = waiting[1:]
                 if self._most_untraced is not None and len(result.alone) >= self._most_untraced:
@@ -276,7 +276,7 @@ class Families:
         except ConfigError as error:
             raise Untraceable(str(error)) from error
 
-    def _traced(self, member: int) -> Family | ConfigError | Alone:
+    def _traced(self, member: int) -> Family | ConfigError | NotBatchable:
         experiment = self._members.experiment(member)
         reason = batchable(experiment, self._members.keys)
         if reason is not None:
@@ -286,7 +286,7 @@ class Families:
         except ConfigError as error:
             return error
         except Untraceable:
-            return Alone.UNTRACEABLE
+            return NotBatchable.UNTRACEABLE
         return _reason_of_system(traced) or Family(traced, int(self._members.kinds[member]))
 
     def _taken(self, family: Family, waiting: np.ndarray, result: Sorted) -> np.ndarray:
@@ -303,7 +303,7 @@ class Families:
         numbers = Numbers.of(family.traced, taken, replay, agree)
         within = np.isfinite(numbers.initial).all(axis=0) & np.isfinite(numbers.parameters).all(axis=0)
         if not within.all():
-            result.alone |= dict.fromkeys(taken[~within].tolist(), Alone.RANGE)
+            result.alone |= dict.fromkeys(taken[~within].tolist(), NotBatchable.RANGE)
             numbers = Numbers.of(family.traced, taken[within], replay, agree[within])
         if len(numbers.members):
             result.groups.append((family, numbers))

@@ -26,7 +26,15 @@ from rigidsim.session.members import (
     warning_bits,
     warnings_variable,
 )
-from rigidsim.solve.batch.family import Alone, AxisNumbers, Families, Family, Members, Sorted, batchable
+from rigidsim.solve.batch.family import (
+    AxisNumbers,
+    Families,
+    Family,
+    Members,
+    NotBatchable,
+    Sorted,
+    batchable,
+)
 from rigidsim.solve.batch.run import BatchBlock, BatchRun
 from rigidsim.solve.problem import prepare
 from rigidsim.solve.status import Status
@@ -98,7 +106,7 @@ class BatchTiles:
         self._runs: dict[int, _FamilyRun] = {}
 
     @cached_property
-    def apart(self) -> Alone | None:
+    def apart(self) -> NotBatchable | None:
         """Why all members run one by one, if too few could share a batch; None if they don't.
 
         It is judged by the config alone: who runs in a batch must not depend on which members a process has
@@ -106,12 +114,12 @@ class BatchTiles:
         """
         kinds, looked_at = self._kinds()
         if kinds > _MOST_KINDS and kinds * _LEAST_MEMBERS > looked_at:
-            return Alone.FAMILIES
+            return NotBatchable.FAMILIES
         _, found = self._sample
         if found.alone and not found.groups:
             return found.alone[min(found.alone)]
         many = self._sweep.count > _LOOKED_AT and 2 * len(found.groups) > _LOOKED_AT
-        return Alone.FAMILIES if many else None
+        return NotBatchable.FAMILIES if many else None
 
     def _kinds(self) -> tuple[int, int]:
         """Number of kinds (see ``Members``) among some members, and the number of these."""
@@ -153,7 +161,7 @@ class BatchTiles:
     def run(self, members: Sequence[int], keep: Sequence[str], apart: bool | None = None) -> Batched:
         """Run all members that can be run together; none if they were found to run ``apart`` before."""
         if apart or (apart is None and self.apart is not None):
-            why = self.apart or Alone.FAMILIES
+            why = self.apart or NotBatchable.FAMILIES
             return Batched([], [], list(range(len(members))), why.name.lower())
         found = self._sorted(members)
         done = Batched([], [], sorted(found.alone), "")
