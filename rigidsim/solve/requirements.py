@@ -95,17 +95,28 @@ class SecondNumber:
 
 
 def after_each_step(
-    requirement: Requirement | None, watcher: Callable[[TaylorEngine], bool] | None = None
+    requirement: Requirement | None, *watchers: Callable[[TaylorEngine], bool] | None
 ) -> Callable[[TaylorEngine], bool] | None:
-    """What to call after each of many steps: the watcher, and before it what the next step needs."""
+    """What to call after each of many steps: the watchers, and before them what the next step needs."""
+    calls = [watcher for watcher in watchers if watcher is not None]
     if requirement is None or not requirement.each:
-        return watcher
+        if len(calls) < 2:
+            return calls[0] if calls else None
+        return lambda integrator: _all(integrator, calls)
 
     def after(integrator: TaylorEngine) -> bool:
         requirement.meet(integrator)
-        return watcher is None or watcher(integrator)
+        return _all(integrator, calls)
 
     return after
+
+
+def _all(integrator: TaylorEngine, calls: list[Callable[[TaylorEngine], bool]]) -> bool:
+    """Whether all want to go on; all are called in any case."""
+    going = True
+    for call in calls:
+        going = call(integrator) and going
+    return going
 
 
 def propagation(system: System) -> Callable[[Any, Any, int], Any]:

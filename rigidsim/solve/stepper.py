@@ -36,6 +36,35 @@ class Watcher(Protocol):
         """Called after each step; False ends the call that took it."""
 
 
+class SamplesWithin:
+    """Takes samples at given times, (n,) ascending, from the dense output of steps as they are taken."""
+
+    def __init__(self, times: np.ndarray) -> None:
+        self._times = list(times)
+        self.states: list[np.ndarray] = []
+
+    def __call__(self, engine: TaylorEngine) -> bool:
+        """Take the samples within the step just taken; False once all are taken."""
+        times, states, now = self._times, self.states, engine.time
+        while len(states) < len(times) and times[len(states)] <= now:
+            states.append(np.array(engine.update_d_output(times[len(states)])))  # heyoka reuses its buffer
+        return len(states) < len(times)
+
+    @property
+    def count(self) -> int:
+        """Number of samples taken."""
+        return len(self.states)
+
+    @property
+    def complete(self) -> bool:
+        """Whether all are taken."""
+        return len(self.states) == len(self._times)
+
+    def back_to(self, count: int) -> None:
+        """Forget all but the first."""
+        del self.states[count:]
+
+
 @dataclass(frozen=True)
 class OwnErrors:
     """A solver's own estimate of a run's largest errors until its end.
@@ -224,3 +253,15 @@ def bound_of_sparse_series(coefficients: np.ndarray) -> float:
     if min(radius(order), radius(order - 1)) <= _SPARSE * expected:
         return math.inf
     return shortest * math.exp(-2 - 0.7 / (order - 1))  # as heyoka's own (Jorba & Zou 2005)
+
+
+def may_be_sparse(coefficients: np.ndarray) -> np.ndarray:
+    """Which of many steps, by their coefficients (n, states, order + 1), may have such a bound."""
+    with np.errstate(all="ignore"):
+        sizes = np.abs(coefficients.astype(np.float64)).max(axis=1)
+        order = sizes.shape[1] - 1
+        terms = np.arange(order // 2 + 1, order + 1)
+        entire = np.array([math.lgamma(term + 1) / term for term in terms])
+        radii = (np.log(np.maximum(sizes[:, :1], 1.0)) - np.log(sizes[:, terms])) / terms
+        expected = (radii + (entire[-1] - entire))[:, :-2].min(axis=1)
+        return ~(radii[:, -2:].min(axis=1) <= math.log(_SPARSE) + expected - 1e-6)

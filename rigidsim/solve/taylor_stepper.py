@@ -17,7 +17,7 @@ from rigidsim.solve.compiled import TaylorEngine, compiled_engine, interruptible
 from rigidsim.solve.events import EventLog, engine_events
 from rigidsim.solve.precision import Precision, Scalar
 from rigidsim.solve.requirements import after_each_step, requirement_of
-from rigidsim.solve.stepper import Mark, Stepper, bound_of_sparse_series, longest_step
+from rigidsim.solve.stepper import Mark, SamplesWithin, Stepper, bound_of_sparse_series, longest_step
 
 _ARRIVED = hy.taylor_outcome.time_limit
 _LOST = hy.taylor_outcome.err_nf_state
@@ -124,11 +124,11 @@ class TaylorStepper(Stepper):
             return self.until
         return _earlier(self._requirement.end_after(self.time), self.until)
 
-    def _watched(self) -> Callable[[TaylorEngine], bool] | None:
+    def _watched(self, samples: SamplesWithin | None = None) -> Callable[[TaylorEngine], bool] | None:
         """What to call after each of the steps that begin now."""
         if self.watcher is not None:
             self.watcher.begin(self._integrator.time)
-        return after_each_step(self._requirement, self.watcher)
+        return after_each_step(self._requirement, self.watcher, samples)
 
     @property
     def integrator(self) -> TaylorEngine:
@@ -244,6 +244,10 @@ class TaylorStepper(Stepper):
     def dense(self, time: Scalar) -> np.ndarray:
         return np.array(self._integrator.update_d_output(time))  # heyoka reuses its buffer
 
+    def take(self, count: int, samples: SamplesWithin | None = None) -> bool:
+        """As ``skip``, with the samples within the steps."""
+        return self._propagate(self._meet(), count, samples, write_tc=True)[0]
+
     def skip(self, count: int) -> bool:
         """Take at most ``count`` steps, fewer if the watcher ends the call; False if the state is lost."""
         return self._propagate(self._meet(), count, write_tc=self.watcher is not None)[0]
@@ -271,14 +275,16 @@ class TaylorStepper(Stepper):
         """As ``skip``, with dense output: a function from times (n,) to states (n, states)."""
         return self._propagate(self._meet(), count, c_output=True, write_tc=self.watcher is not None)
 
-    def _propagate(self, until: Scalar | None, count: int, **options: bool) -> tuple[bool, Any]:
+    def _propagate(
+        self, until: Scalar | None, count: int, samples: SamplesWithin | None = None, **options: bool
+    ) -> tuple[bool, Any]:
         """Take at most ``count`` steps, none beyond a time: whether all went well, and continuous output."""
         before = self._integrator.dtime
         outcome, smallest, largest, taken, output, _ = self._integrator.propagate_until(
             self._far if until is None else until,
             max_steps=count,
             max_delta_t=self._longest,
-            callback=self._watched(),
+            callback=self._watched(samples),
             **options,
         )
         return self._account(before, outcome, smallest, largest, taken), output

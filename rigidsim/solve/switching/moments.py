@@ -9,6 +9,8 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any
 
+import numpy as np
+
 from rigidsim.model.system import System
 from rigidsim.model.two_part import exactly, in_two_numbers
 from rigidsim.scene.expressions.piecewise import on_sides
@@ -35,7 +37,7 @@ class Moments:
         expression = system.plan.surfaces.found[place].expression
         self._system, self._precision, self._expression, self._place = system, precision, expression, place
         self._context, self._epsilon = system.scene.context, float(precision.epsilon)
-        self.of_time = names_used(expression) == {"t"}
+        self.of_time = of_time(system, place)
         known = system.clocked and self.of_time
         self.at_known_time = known and as_line(expression, self._context) is not None
         exponent = -system.scaling.time
@@ -43,6 +45,11 @@ class Moments:
         self._middles = sorted(self._context.ldexp(line.zero, exponent) for line in lines)
         self._from = [precision.number(middle) for middle in self._middles]
         self._zeros: dict[tuple[int, ...], tuple[Expression, Any]] = {}
+
+    @property
+    def may_hide(self) -> bool:
+        """Whether ``hidden`` may find anything."""
+        return bool(self._from)
 
     def rounded_from(self, time: Scalar) -> float:
         """The span of time (internal units) to which the argument's rounding is relative: from the farthest
@@ -54,6 +61,12 @@ class Moments:
         if self.at_known_time:
             return rounding
         return max(abs(float(time - moment)) for moment in self._from) + rounding
+
+    def all_rounded_from(self, times: np.ndarray) -> np.ndarray:
+        """The same of times (n,), float64."""
+        if not self.at_known_time and not self._from:
+            return np.abs(times.astype(np.float64))
+        return np.array([self.rounded_from(time) for time in times])
 
     def near(self, time: Scalar, modes: Sequence[int]) -> tuple[Scalar, Scalar] | None:
         """The moment in two numbers next to one in one; None if the state matters or none is there."""
@@ -110,6 +123,11 @@ class Moments:
             zero = None if line is None else self._context.ldexp(line.zero, -self._system.scaling.time)
             self._zeros[sides] = found, zero
         return self._zeros[sides]
+
+
+def of_time(system: System, place: int) -> bool:
+    """Whether the argument of a surface depends on time alone."""
+    return names_used(system.plan.surfaces.found[place].expression) == {"t"}
 
 
 def moments_of(system: System, precision: Precision) -> list[Moments]:

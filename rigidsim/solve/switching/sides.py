@@ -6,6 +6,8 @@ slides along (``rigidsim.solve.switching.sliding``). On several surfaces at once
 crossing and sliding is tried, and the one that agrees with its own field is taken.
 """
 
+from __future__ import annotations
+
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -31,6 +33,11 @@ _MOST_KEPT = 4  # looks: from both sides, at a boundary and within the step befo
 _ROUNDINGS = 32.0  # units of rounding of an argument's terms, below which it is zero
 PARALLEL = 1e-9  # relative difference of fields that count as equal
 _RATE_ROUNDINGS = 1024.0  # the same for its rate, whose terms are products of derivatives
+
+_LEAST = 2.0**-20
+"""The same where the state is zero: a rate that is zero but for a rounding turns back after its square."""
+_CLOSE = 2.0**10 * _ROUNDINGS  # roundings from which on an argument is far from zero
+_CLEAR = 2.0**-40  # relative size of a rate from which on double precision tells its sign
 
 
 @dataclass(frozen=True)
@@ -66,6 +73,37 @@ class Look:
         return in_order((by_time * times)[None], by_state * largest[:, None])
 
 
+@dataclass(frozen=True)
+class Looks:
+    """The same at many states, float64: (surfaces, n), gradients (surfaces, states, n), field (states, n)."""
+
+    u: np.ndarray
+    by_time: np.ndarray
+    gradients: np.ndarray
+    field: np.ndarray
+    spans: np.ndarray
+    epsilon: float
+
+    def noises(self, states: np.ndarray) -> np.ndarray:
+        """Sizes (surfaces, n) up to which arguments are zero but for rounding of states (n, states)."""
+        sizes = np.einsum("jin,in->jn", np.abs(self.gradients), np.abs(states.T.astype(np.float64)))
+        return _ROUNDINGS * self.epsilon * (np.abs(self.by_time) * self.spans + sizes)
+
+    def widest_noises(self, before: np.ndarray, states: np.ndarray) -> np.ndarray:
+        """The largest that any decision works with, of states (n, states) before and after each step."""
+        begun, ended = (np.abs(given.astype(np.float64)) for given in (before, states))
+        largest = np.maximum(np.maximum(begun, ended), np.abs(self.field.T))
+        swings = np.sqrt((self.gradients**2).sum(axis=1)) * ended.max(axis=1)
+        return np.maximum(self.noises(largest), _ROUNDINGS * self.epsilon * swings)
+
+    def rates(self, surfaces: np.ndarray, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Rate of one argument in each of some rows, and the size below which it counts as zero."""
+        terms = self.gradients[surfaces, :, rows] * self.field[:, rows].T
+        by_time = self.by_time[surfaces, rows]
+        noise = max(_RATE_ROUNDINGS * self.epsilon, _CLEAR)
+        return terms.sum(axis=1) + by_time, noise * (np.abs(terms).sum(axis=1) + np.abs(by_time))
+
+
 def in_order(first: np.ndarray, terms: np.ndarray) -> Any:
     """Sum along the first axis, term after term: what decides must not depend on how numpy groups terms."""
     return np.concatenate([first, terms]).cumsum(axis=0)[-1]
@@ -82,13 +120,17 @@ class Probe:
         self.parameters = system.parameters
         self.clocked = system.clocked
         self.moments = moments_of(system, precision)
+        self.hides = any(moments.may_hide for moments in self.moments)
         named = [hy.par[self.parameters - 1], hy.time]  # functions without them take no such argument
         variables = system.variables
-        by_time, gradients = [], []
+        by_time, gradients, changes = [], [], []
         for u in system.surfaces:
             explicit, by_state = slopes(u)
             by_time += explicit or [hy.expression(0.0)]
             gradients += [by_state.get(name, hy.expression(0.0)) for name in system.states]
+            terms = [slope * hy.make_vars(name) for name, slope in by_state.items()]
+            terms += [slope * hy.time for slope in explicit]
+            changes.append(hy.sqrt(hy.sum([term * term for term in terms])))
         field = [right for _, right in system.equations]
         options = {"compact_mode": True, **precision.options}
         read = [*system.surfaces, *system.turning, *system.signed]
@@ -99,6 +141,7 @@ class Probe:
         sizes = [[g * g for g in slopes(expression)[1].values()] for expression in found]
         lengths = [hy.sqrt(hy.sum(squares)) if squares else hy.expression(0.0) for squares in sizes]
         self._crossings = hy.cfunc([*found, *lengths, *named], variables, **options)
+        self._beside = hy.cfunc([*system.surfaces, *changes, *named], variables, **options)
         outputs = [*system.surfaces, *by_time, *gradients, *field, *named]
         self._everything = hy.cfunc(outputs, variables, **options)
         self._latest: dict[tuple[bytes, ...], Look] = {}
@@ -120,6 +163,38 @@ class Probe:
         found = [float(x) for x in self._crossings(np.array(state), pars=pars, time=time)[:-2]]
         noise, half = _RATE_ROUNDINGS * self._epsilon, len(found) // 2
         return [(value, noise * size) for value, size in zip(found[:half], found[half:], strict=True)]
+
+    def beside(self, state: np.ndarray, time: Scalar, pars: np.ndarray, j: int) -> float:
+        """A size well above an argument's rounding, which is added to its event beside its zero."""
+        found = self._beside(state, pars=pars, time=time)
+        noise = max(_ROUNDINGS * float(found[self.surfaces + j]), _LEAST)
+        return 2 * abs(float(found[j])) + self._epsilon * noise
+
+    def asks(self, states: np.ndarray, times: np.ndarray, pars: np.ndarray, sides: np.ndarray) -> np.ndarray:
+        """At which of many states (n,) an argument isn't well on its side (n, surfaces)."""
+        found = _by_columns(self._beside, states, times, pars)
+        u, sizes = found[: self.surfaces], found[self.surfaces : 2 * self.surfaces]
+        return np.asarray((sides.T * u <= _CLOSE * self._epsilon * (sizes + 1.0)).any(axis=0))
+
+    def looks(self, states: np.ndarray, times: np.ndarray, pars: np.ndarray) -> Looks:
+        """Surfaces and fields at many states (n, states), times (n,) and parameters (n, parameters)."""
+        found = _by_columns(self._everything, states, times, pars)
+        s, n, count = self.surfaces, self._states, len(times)
+        spans = np.array([moments.all_rounded_from(times) for moments in self.moments])
+        return Looks(
+            found[:s],
+            found[s : 2 * s],
+            found[2 * s : 2 * s + s * n].reshape(s, n, count),
+            found[-2 - n : -2],
+            spans.reshape(s, count),
+            self._epsilon,
+        )
+
+    def crosses_too(self, states: np.ndarray, times: np.ndarray, pars: np.ndarray) -> np.ndarray:
+        """At which of many states an event's expression is zero but for rounding (n,)."""
+        found = np.abs(_by_columns(self._crossings, states, times, pars)[:-2])
+        half = len(found) // 2
+        return np.asarray((found[:half] <= _RATE_ROUNDINGS * self._epsilon * found[half:]).any(axis=0))
 
     def look(self, state: np.ndarray, time: Scalar, pars: np.ndarray) -> Look:
         """Surfaces and field at a state; those of the latest states are kept, since a step that ends on a
@@ -159,6 +234,12 @@ class Probe:
     def rate_noise(self, look: Look, j: int) -> float:
         """Size below which an argument's rate counts as zero because of rounding."""
         return _RATE_ROUNDINGS * self._epsilon * look.rate_size(j)
+
+
+def _by_columns(function: Any, states: np.ndarray, times: np.ndarray, pars: np.ndarray) -> np.ndarray:
+    """Values (outputs, n), float64, of a compiled function at many states."""
+    found = function(np.ascontiguousarray(states.T), pars=np.ascontiguousarray(pars.T), time=times)
+    return np.asarray(found.astype(np.float64))
 
 
 @dataclass(frozen=True)

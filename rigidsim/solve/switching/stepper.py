@@ -1,32 +1,59 @@
 """Steps that end on switching surfaces: no step passes over a kink or a jump.
 
-The engine finds where a step's own polynomials take an argument through zero. A step that leaves its side is
-taken again up to there, and the next one begins on the other side, or goes along the surface. A root counts
-only where it leads away from the side that the motion is on: the zero at which a step begins doesn't, so
-that no cooldown is needed and a checkpoint holds all there is. All steps are single ones.
+The engine itself ends a step where the argument of a surface vanishes. The event's callback sets the new
+side, a parameter of the equations, and the engine goes on: many steps in one call. After the call all
+boundaries are looked at together. The first step that isn't plain, as where both sides push onto a surface,
+surfaces meet, or a side is wrong because a zero was missed, is taken back with all that follow, and taken by
+itself: the fields of all sides decide how the motion goes on from its end. Whether a step is plain depends on
+that step alone, and a plain one by itself has the same bits; so these don't depend on how many steps are
+taken at once.
+
+The engine would find the zero at which a step begins again and again, in place of those that follow. So where
+an argument is zero but for rounding, its event watches the sum with a parameter, a rounding on the side that
+the motion is on. Then no cooldown is needed, and a boundary holds all that later steps depend on.
+
+Surfaces that depend on time alone end no step by themselves: their roots are noted, and worked out from the
+expressions as written (``rigidsim.solve.switching.moments``). The turns of angles and the sign of the
+quaternion, where an expression depends on them, are parameters of the equations, continued from step to step;
+along surfaces the motion has equations of its own, compiled when they are first needed. Both take single
+steps.
 """
 
 from __future__ import annotations
 
+import copy
 import math
-from collections.abc import Collection
+from bisect import bisect_left
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import replace
+from typing import Any, NamedTuple
 
 import heyoka as hy
 import numpy as np
 
 from rigidsim.model.system import System
-from rigidsim.solve.events import EventLog
+from rigidsim.solve.compiled import TaylorEngine, interruptible
+from rigidsim.solve.events import BESIDE, EventLog, engine_events, of_order_one
 from rigidsim.solve.precision import Precision, Scalar
-from rigidsim.solve.stepper import Stepper, bound_of_sparse_series
-from rigidsim.solve.switching.engines import Root
-from rigidsim.solve.switching.moments import between
-from rigidsim.solve.switching.roots import SurfaceRoots
-from rigidsim.solve.switching.sides import HELD, SLIDES, Continuation, Fields, Look, crossings
-from rigidsim.solve.switching.sliding import MOST_AT_ONCE
-from rigidsim.solve.switching.turned import MOST
+from rigidsim.solve.requirements import SetAtKnots
+from rigidsim.solve.stepper import Mark, SamplesWithin, bound_of_sparse_series, may_be_sparse
+from rigidsim.solve.switching.moments import between, later, of_time
+from rigidsim.solve.switching.sides import (
+    HELD,
+    SLIDES,
+    Continuation,
+    Fields,
+    Look,
+    Probe,
+    crossings,
+)
+from rigidsim.solve.switching.sliding import MOST_AT_ONCE, Meeting, sliding
+from rigidsim.solve.switching.turned import MOST, Turned
 from rigidsim.solve.taylor_stepper import TaylorStepper
 
 _ATTEMPTS = 32  # attempts at one step
+_MOST_CALLS = 1000  # that take steps on to a given time
+_FIRST_AHEAD, _MOST_AHEAD = 16, 1024  # steps that are looked at together: some MB of series
 _MOST_SWITCHES = 256
 """Switches at intervals shorter than ``_SHORTEST`` that count as an accumulation, or as swings kept up by
 rounding, whose period is the square root of its size.
@@ -36,66 +63,534 @@ _ROUNDINGS = 2.0**15  # in the square of an interval
 _MOST_LEFT_OUT = 8.0  # roundings of the state, by a moment in two numbers
 _NOT_RESOLVED = "choose a higher precision, or count time from an epoch shortly before"
 _WIDTH = 2.0**8  # roundings of a time between two findings of the same crossing
+_NEAR = 2.0**-12  # of a step: within it Newton's method improves a root
+_BISECTIONS = 4  # bisections of a step per bit of the precision
+
+Root = tuple[Any, int, int]
+"""Time, number of a surface, and the side to which it leads."""
 
 
-class SwitchingStepper(SurfaceRoots):
+class _Passed(NamedTuple):
+    """A boundary that was passed among many, with what its step may have to be taken back for.
+
+    Attributes:
+        crossed: number of the surface on which the step ended, from 1; 0 for none.
+        switches: count of the latest switches, and since when.
+        series: Taylor coefficients of the step if it began on a surface, (states, order + 1).
+        samples: number of samples taken up to here.
+    """
+
+    time: tuple[Scalar, Scalar]
+    state: np.ndarray
+    pars: np.ndarray
+    crossed: int
+    switches: tuple[int, float]
+    events: int
+    samples: int
+    size: float
+    series: np.ndarray | None
+
+
+class SwitchingStepper(TaylorStepper):
     """Stepper of a system with surfaces, or with angles whose turns matter; it begins where motion leads."""
 
-    # --- steps ----------------------------------------------------------------------------------------------
+    version = 2
+    single_steps = True
 
-    def step(self) -> bool:
-        """Take one step, not past a surface; False if lost, or if it can't go on (``failure`` says why)."""
-        return self._step(self._longest)
+    def __init__(
+        self,
+        system: System,
+        precision: Precision,
+        tolerance: Scalar | None,
+        start: Scalar,
+        log: EventLog | None = None,
+    ) -> None:
+        self._roots: list[Root] = []  # noted within the latest step
+        self._cut: tuple[int, int] | None = None  # surface on which the engine ended it, and the new side
+        self._passed: list[_Passed] | None = None  # boundaries, while many steps are taken
+        self._samples: SamplesWithin | None = None
+        self._halted = self._fresh = False
+        self._offset: list[int] = []  # parameters that are added to events
+        self._ahead = _FIRST_AHEAD
+        self._probes: dict[int, Probe] = {}
+        self._engines: dict[tuple[int, tuple[int, ...], tuple[int, ...]], TaylorEngine] = {}
+        self._chart = 0
+        surfaces = system.plan.surfaces
+        self._modes = [1] * len(surfaces.found)
+        self._crossed, self._count, self._since = 0, 0, 0.0
+        self._count_of_pars = system.parameters  # without what is added to events
+        self._piece: np.ndarray | None = None  # parameters of the piece in which the latest step was
+        self._off, self._minus, self._plus = _scalars(precision, [0.0, -1.0, 1.0])
+        super().__init__(system, precision, tolerance, start, log)
+        # in the partner chart, where a run may begin, angles are plain already
+        self._turned = Turned.begun(system, *self._plain(self.state, self.time))
+        self._dense = self._integrator
+        self._unsettled = ""
+        self._begin()
+        self.begun = self.mark()
 
-    def skip(self, count: int) -> bool:
-        return Stepper.skip(self, count)  # step by step
+    # --- memory ---------------------------------------------------------------------------------------------
 
-    def to(self, time: float) -> bool:
-        for _ in range(100_000):
-            high, low = self._integrator.dtime
-            left = (time - high) - low
-            if left <= abs(time) * self._epsilon:
-                return True
-            if not self._step(min(left, self._longest)):
-                break
-        return False
+    @property
+    def _along(self) -> tuple[int, ...]:
+        return tuple(j for j, mode in enumerate(self._modes) if mode == SLIDES)
 
-    def dense(self, time: Scalar) -> np.ndarray:
-        return np.array(self._dense.update_d_output(time))
+    @property
+    def _held(self) -> dict[int, tuple[int, int]]:
+        """For surfaces kept to at rest: the surface whose side each has (1) or the opposite (-1)."""
+        return {
+            j: (abs(mode) - HELD, 1 if mode > 0 else -1)
+            for j, mode in enumerate(self._modes)
+            if abs(mode) >= HELD
+        }
+
+    @property
+    def _probe(self) -> Probe:
+        if self._chart not in self._probes:
+            system = self._system_of(self._chart)
+            self._probes[self._chart] = interruptible(lambda: Probe(system, self.precision))
+        return self._probes[self._chart]
+
+    def mark(self) -> Mark:
+        mark = super().mark()
+        sides = (
+            *map(float, self._modes),
+            *self._turned.angles,
+            *self._turned.quaternion,
+            float(self._crossed),
+            float(self._count),
+            self._since,
+        )
+        return replace(mark, memory=(mark.memory, sides))
+
+    def back_to(self, mark: Mark) -> None:
+        tiny, sides = mark.memory
+        s, a = len(self._modes), len(self._turned.angles)
+        self._modes = [int(x) for x in sides[:s]]
+        self._turned = Turned(list(sides[s : s + a]), list(sides[s + a : -3]))
+        crossed, count, self._since = sides[-3:]
+        self._crossed, self._count = int(crossed), int(count)
+        self.failure = ""
+        self._enter()
+        self._piece = None
+        super().back_to(replace(mark, memory=tiny))
+
+    def pack(self, memory: Any) -> dict[str, np.ndarray]:
+        tiny, sides = memory
+        return super().pack(tiny) | {"rhythm_switching": np.array(sides)}
+
+    def unpack(self, arrays: Mapping[str, np.ndarray]) -> Any:
+        _, known = self.begun.memory
+        sides = np.asarray(arrays.get("rhythm_switching", np.zeros(0)), dtype=np.float64)
+        if sides.shape != (len(known),):
+            raise ValueError(f"the checkpoint remembers {sides.shape} numbers of switching surfaces")
+        return super().unpack(arrays), tuple(sides.tolist())
+
+    def use(self, chart: int) -> None:
+        self._chart = chart
+        self._enter()
+        self._longest = self._bounds[chart]
 
     def settle(self) -> None:
         """Must be called after the state was set from outside: takes the sides on which it lies."""
-        self._roots.clear()
         # the state lies beside surfaces that it kept to
         self._modes = [mode if abs(mode) == 1 else 1 for mode in self._modes]
         self._agree()
         self._enter()
 
-    def _step(self, longest: Scalar) -> bool:
+    # --- engines --------------------------------------------------------------------------------------------
+
+    def _enter(self) -> None:
+        """Continue with the equations of this chart along the current surfaces."""
+        key = self._chart, self._along, tuple(self._modes[j] for j in self._held)
+        if key not in self._engines:
+            system, along, held = self._system_of(self._chart), self._along, self._held
+            interruptible(lambda: self._compiled(system, along, held))
+        entered = self._engines[key]
+        if entered is not self._integrator:
+            entered.dtime = self._integrator.dtime
+            entered.state[:] = self._integrator.state
+            self._integrator = entered
+
+    def _compiled(
+        self, system: System, along: tuple[int, ...] = (), held: Mapping[int, tuple[int, int]] | None = None
+    ) -> TaylorEngine:
+        held, kind = held or {}, self.precision.scalar
+        options = dict(self.precision.options)
+        equations = system.equations
+        shifted = [u + hy.par[system.parameters + j] for j, u in enumerate(system.surfaces)]
+        ends, noted = [], []
+        for j, u in enumerate(of_order_one(system, shifted, system.surfaces)):
+            if j in along or j in held:
+                continue
+            if of_time(system, j):
+                noted.append(hy.nt_event(u, self._noting(j), fp_type=kind))
+            else:
+                ends.append(self._event(u, j))
+        if along:
+            found = sliding(system, along, held)
+            equations = found.equations
+            for j, side in zip(along, found.sides, strict=True):
+                ends.append(self._event(side - 1.0, j, 1, hy.event_direction.positive))
+                ends.append(self._event(side + 1.0, j, -1, hy.event_direction.negative))
+        if self.has_events:
+            offsets = system.parameters + len(system.surfaces)
+            noted += engine_events(system, self.precision, self.log, offsets=offsets)
+        if self._tolerance is not None:
+            options["tol"] = self._tolerance
+        integrator = hy.taylor_adaptive(
+            equations,
+            self.precision.array(system.initial),
+            time=self._start,
+            t_events=ends,
+            nt_events=noted,
+            compact_mode=self.precision.compact or system.wide or len(along) > 1,
+            **options,
+        )
+        self._engines[(self._chart, along, tuple(self._modes[j] for j in held))] = integrator
+        return integrator
+
+    def _event(
+        self, u: hy.expression, j: int, end: int = 0, way: hy.event_direction = hy.event_direction.any
+    ) -> hy.t_event:
+        """The event that ends steps on a surface, or the motion along it."""
+
+        def called(engine: TaylorEngine, sign: int) -> bool:
+            self._cut = j, end or sign
+            if self._passed is None:
+                return False
+            self._halted = self._halted or not self._crosses(engine, *self._cut)
+            return not self._halted
+
+        return hy.t_event(
+            u, callback=called, direction=way, cooldown=self._off, fp_type=self.precision.scalar
+        )
+
+    def _noting(self, j: int) -> Callable[[TaylorEngine, Scalar, int], None]:
+        def called(_: TaylorEngine, time: Scalar, way: int) -> None:
+            self._roots.append((time, j, way))
+
+        return called
+
+    # --- parameters -----------------------------------------------------------------------------------------
+
+    def _pars(
+        self, turns: list[float], over: dict[int, int] | None = None, low: Scalar | None = None
+    ) -> np.ndarray:
+        """Parameters of the equations; turns of angles, and the sign of the quaternion, are given."""
+        modes = self._modes if over is None else [over.get(j, mode) for j, mode in enumerate(self._modes)]
+        sides = [-1.0 if mode < 0 else 1.0 for mode in modes]
+        numbers = [*sides, *turns]
+        if (pieces := self.system.pieces) is not None:
+            if self._piece is None:  # of those that meet at a boundary, the one that ends there
+                self._piece = self._piece_of(bisect_left(pieces.knots, self.time))
+            numbers += [0.0] * (self.system.first_of_pieces - len(numbers))
+            return np.concatenate([_scalars(self.precision, numbers), self._piece])
+        pars = _scalars(self.precision, numbers)
+        if not self._probe.clocked:
+            return pars
+        return np.concatenate([pars, np.array([self._off if low is None else low], dtype=pars.dtype)])
+
+    def _piece_of(self, number: int) -> np.ndarray:
+        assert self.system.pieces is not None
+        return self.system.pieces.parameters(number)
+
+    def _meet(self) -> Scalar | None:
+        """Continue with the piece of the equations that begins here, if one does."""
+        if isinstance(self._requirement, SetAtKnots):
+            self._piece = self._piece_of(self._requirement.enter(self._integrator))
+        return self.end
+
+    @property
+    def _low(self) -> Scalar:
+        """Second number of the time."""
+        return self._integrator.dtime[1]
+
+    def _parameters(self, over: dict[int, int] | None = None) -> np.ndarray:
+        """Parameters at this boundary; turns and sign continue from the latest step."""
+        return self._pars(self._joined(self.state, self.time), over, self._low)
+
+    def _look(self, state: np.ndarray, time: Scalar, low: Scalar | None = None) -> Look:
+        """Look at the surfaces in a state of the latest step, at a time in one number or two."""
+        return self._probe.look(state, time, self._pars(self._joined(state, time), low=low))
+
+    def _values(self, state: np.ndarray, time: Scalar, low: Scalar | None = None) -> np.ndarray:
+        """Arguments of the surfaces in a state of the latest step, likewise."""
+        return self._probe.values(state, time, self._pars(self._joined(state, time), low=low))[0]
+
+    def _plain(self, state: np.ndarray, time: Scalar) -> tuple[list[float], list[float]]:
+        """Angles within one turn, and the quaternion without its sign, that expressions read."""
+        return self._probe.values(state, time, self._pars(self._probe.unturned))[1:]
+
+    def _joined(self, state: np.ndarray, time: Scalar) -> list[float]:
+        """Turns and sign, continued from the latest step on to a state."""
+        return self._turned.parameters(*self._plain(state, time)) if self._probe.unturned else []
+
+    def _follow(self) -> None:
+        """Continue angles and quaternion to the end of the step just taken."""
+        if self._probe.unturned:
+            self._turned = self._turned.followed(*self._plain(self.state, self.time))
+
+    def _set(self) -> None:
+        """Set the parameters of the equations, and what is added to events, at this boundary.
+
+        An event of the config that lies there, and was found on the way to it, watches the zero of its sum
+        with next to nothing.
+        """
+        engine, pars = self._integrator, self._parameters()
+        look = self._probe.look(self.state, self.time, pars)
+        # what a unit of time makes of the state tells its size
+        noises = self._probe.noises(look, [self.state, look.field])
+        moved = [0.0] * len(self._modes)
+        for j, (u, noise, mode) in enumerate(zip(look.u, noises, self._modes, strict=True)):
+            of_time = self._probe.moments[j].of_time
+            near = abs(float(u)) <= noise or (j + 1 == self._crossed and not of_time)
+            if near and abs(mode) < HELD:
+                moved[j] = mode * (noise if of_time else self._probe.beside(self.state, self.time, pars, j))
+        if self.has_events:
+            moved += [self._beside(*found) for found in self._probe.crossings(self.state, self.time, pars)]
+        everything = np.concatenate([pars, _scalars(self.precision, moved)])
+        engine.pars[:] = everything[: len(engine.pars)]  # along a surface the last ones have no meaning
+        self._offset = [self.system.parameters + i for i, number in enumerate(moved) if number]
+
+    def _beside(self, value: float, noise: float) -> float:
+        """Offset to add to an event's expression."""
+        if self._along and abs(value) <= noise:  # it is zero all along the surface and crosses nothing
+            return 2 * noise
+        return 2.0 ** (-self.precision.bits - BESIDE) if self._crossed and value == 0 else 0.0
+
+    # --- many steps -----------------------------------------------------------------------------------------
+
+    def take(self, count: int, samples: SamplesWithin | None = None) -> bool:
+        """See ``TaylorStepper``."""
+        last, smallest, largest, going = self.steps + count, math.inf, 0.0, True
+        while going and self.steps < last:
+            before, alone = self.steps, True
+            if not self._single:
+                alone = self._together(min(last - before, self._ahead), samples)
+                if self.steps > before:
+                    smallest, largest = min(smallest, self.smallest), max(largest, self.largest)
+                going = samples is None or not samples.complete
+            if alone and going and self.steps < last:
+                if not self._one():
+                    return False
+                smallest, largest = min(smallest, self.smallest), max(largest, self.largest)
+                going = samples is None or samples(self._dense)
+            stuck = self.steps == before or self.collapsed or self.unresolved
+            if stuck or self.ended or self.time == self.until:
+                break
+        self.smallest, self.largest = smallest, largest
+        return True
+
+    @property
+    def _single(self) -> bool:
+        """Whether steps have to be taken one by one here."""
+        if self._unsettled or self._probe.unturned or self.watcher is not None:
+            return True
+        return any(abs(mode) != 1 for mode in self._modes)
+
+    def _together(self, most: int, samples: SamplesWithin | None) -> bool:
+        """Take several plain steps; returns whether the one that follows has to be taken by itself."""
+        until = self._meet()
+        self._set()
+        self._quieten()
+        self._roots.clear()
+        engine, begun, known = self._integrator, self.mark(), 0 if samples is None else samples.count
+        self._passed, self._samples, self._cut, self._halted = [], samples, None, False
+        self._fresh = bool(self._crossed) or not self.steps
+        try:
+            outcome, *_ = engine.propagate_until(
+                self._far if until is None else until,
+                max_steps=most,
+                max_delta_t=self._longest,
+                callback=self._pass,
+                write_tc=True,
+            )
+        finally:
+            passed, self._passed, self._samples = self._passed, None, None
+        kept, alone = self._holding(begun, passed)
+        alone = alone or (kept == len(passed) and (self._halted or outcome == hy.taylor_outcome.err_nf_state))
+        self._ahead = min(2 * self._ahead, _MOST_AHEAD) if kept == len(passed) else max(kept, 1)
+        if alone or kept < len(passed):
+            self._back_among(begun, known, passed[:kept], samples)
+        if kept:
+            sizes = [one.size for one in passed[:kept]]
+            self.smallest, self.largest = min(sizes), max(sizes)
+            self._crossed, self._dense = passed[kept - 1].crossed, engine
+            self.steps = begun.steps + kept
+            self._judge(begun.time[0], kept)
+        return alone
+
+    def _back_among(
+        self, begun: Mark, known: int, passed: list[_Passed], samples: SamplesWithin | None
+    ) -> None:
+        """Go back to the last of the boundaries passed, or to where they began."""
+        self.back_to(begun)
+        if passed:
+            last = passed[-1]
+            begun = replace(begun, time=last.time, state=last.state, events=last.events)
+            self._modes = [1 if side > 0 else -1 for side in last.pars[: len(self._modes)]]
+            self._count, self._since = last.switches
+            TaylorStepper.back_to(self, replace(begun, memory=begun.memory[0]))
+            known = last.samples
+        if samples is not None:
+            samples.back_to(known)
+
+    def _crosses(self, engine: TaylorEngine, j: int, side: int) -> bool:
+        """Go on beyond a surface on which a step ended among many; False if that has to be looked into."""
+        if side != -self._modes[j] or not self._counts(float(engine.time)):
+            return False
+        self._modes[j], first, pars = side, self._count_of_pars, engine.pars
+        pars[j] = self._plus if side > 0 else self._minus
+        beside = self._probe.beside(engine.state, engine.time, pars[:first], j)
+        pars[first + j] = self.precision.of_double(side * beside)
+        self.log.quiet_until = engine.time + self._width(engine.time)
+        return True
+
+    def _pass(self, engine: TaylorEngine) -> bool:
+        """Note a boundary among many."""
+        self._halted = self._halted or bool(self._roots)
+        if self._halted:
+            return False
+        first, crossed = self._count_of_pars, 0 if self._cut is None else self._cut[0] + 1
+        offset = [first + crossed - 1] if crossed else []
+        for place in self._offset:
+            if place not in offset:
+                engine.pars[place] = self._off
+        time = engine.dtime
+        if self._probe.clocked and self.system.pieces is None:
+            engine.pars[first - 1] = time[1]
+        samples = self._samples
+        going = samples is None or samples(engine)
+        assert self._passed is not None
+        self._passed.append(
+            _Passed(
+                time,
+                np.array(engine.state),
+                np.array(engine.pars[:first]),
+                crossed,
+                (self._count, self._since),
+                len(self.log.found),
+                0 if samples is None else samples.count,
+                abs(float(engine.last_h)),
+                np.array(engine.tc) if self._fresh else None,
+            )
+        )
+        if not crossed:
+            self.log.quiet_until = None
+        self._offset, self._cut, self._fresh = offset, None, bool(crossed)
+        return going
+
+    def _holding(self, begun: Mark, passed: list[_Passed]) -> tuple[int, bool]:
+        """How many of the boundaries hold, and whether the step after these has to be taken by itself.
+
+        After a boundary where something other than the surface crossed is zero but for rounding, the
+        parameters have to be set anew.
+        """
+        if not passed:
+            return 0, False
+        states = np.array([begun.state, *(one.state for one in passed)])
+        times = np.array([one.time[0] for one in passed])
+        pars = np.array([one.pars for one in passed])
+        crossed = np.array([one.crossed - 1 for one in passed])
+        sides = np.where(pars[:, : len(self._modes)] > 0, 1.0, -1.0)
+        bad, near = np.zeros((2, len(passed)), dtype=bool)
+        rows = np.flatnonzero((crossed >= 0) | self._probe.asks(states[1:], times, pars, sides))
+        if len(rows):
+            there = states[:-1][rows], states[1:][rows], times[rows], pars[rows]
+            bad[rows], near[rows] = self._wrong_or_near(*there, sides[rows].T, crossed[rows])
+        rows = np.flatnonzero(crossed >= 0)
+        if len(rows):
+            here = states[1:][rows], times[rows], pars[rows]
+            bad[rows] |= near[rows] | ~self._crossing(*here, crossed[rows])
+        series = [(row, one.series) for row, one in enumerate(passed) if one.series is not None]
+        maybe = may_be_sparse(np.array([found for _, found in series])) if series else np.zeros(0)
+        for k in np.flatnonzero(maybe):
+            row, found = series[k]
+            bad[row] |= bound_of_sparse_series(found) < passed[row].size
+        if self._probe.hides:
+            begins = [begun.time[0], *times[:-1]]
+            for row, (begin, end) in enumerate(zip(begins, times, strict=True)):
+                bad[row] |= bool(self._hidden(begin, end, [int(side) for side in sides[row]]))
+        first = int(np.argmax(bad)) if bad.any() else len(passed)
+        again = int(np.argmax(near)) + 1 if near.any() else len(passed)
+        return min(first, again), first < again and first < len(passed)
+
+    def _wrong_or_near(
+        self,
+        before: np.ndarray,
+        states: np.ndarray,
+        times: np.ndarray,
+        pars: np.ndarray,
+        sides: np.ndarray,
+        crossed: np.ndarray,
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """At which of many boundaries a surface other than the one crossed is on the wrong side, or near."""
+        looks = self._probe.looks(states, times, pars)
+        others = np.arange(len(looks.u))[:, None] != crossed
+        wrong = sides * looks.u < -looks.noises(states)
+        near = np.abs(looks.u) <= looks.widest_noises(before, states)
+        return (wrong & others).any(axis=0), (near & others).any(axis=0)
+
+    def _crossing(
+        self, states: np.ndarray, times: np.ndarray, pars: np.ndarray, crossed: np.ndarray
+    ) -> np.ndarray:
+        """At which of many boundaries the fields of both sides lead across the surface, and no event is."""
+        rows = np.arange(len(crossed))
+        side, flipped = np.where(pars[rows, crossed] > 0, 1.0, -1.0), pars.copy()
+        flipped[rows, crossed] = -flipped[rows, crossed]
+        looks = [self._probe.looks(states, times, given) for given in (pars, flipped)]
+        (here, noise), (there, other) = (look.rates(crossed, rows) for look in looks)
+        found = np.minimum(side * here, side * there) > np.maximum(noise, other)
+        return found & ~self._probe.crosses_too(states, times, pars) if self.has_events else found
+
+    # --- one step -------------------------------------------------------------------------------------------
+
+    def step(self) -> bool:
+        """Take one step, not past a surface; False if lost, or if it can't go on (``failure`` says why)."""
+        return self._one()
+
+    def skip(self, count: int) -> bool:
+        return self.take(count)
+
+    def to(self, time: float) -> bool:
+        known = self.until
+        try:
+            self.until = time if known is None else min(time, known)
+            for _ in range(_MOST_CALLS):
+                if time - self.time <= abs(time) * self._epsilon:
+                    return True
+                if not self.take(_MOST_AHEAD):
+                    break
+        finally:
+            self.until = known
+        return False
+
+    def dense(self, time: Scalar) -> np.ndarray:
+        return np.array(self._dense.update_d_output(time))
+
+    def _one(self) -> bool:
+        """Take a step by itself, and decide how the motion goes on from its end."""
         if self._unsettled:
             self.failure = self._unsettled
             return False
-        longest = min(longest, self._begin_piece())
+        until = self._meet()
         self._watched()
         self._quieten()
         log, events = self.log, len(self.log.found)
         for _ in range(_ATTEMPTS):
-            begun = self._integrator
-            self._set(begun)
-            time, before = begun.dtime, np.array(begun.state)
-            self._roots.clear()
-            outcome, size = begun.step(longest, write_tc=True)
-            bound = bound_of_sparse_series(begun.tc) if self._fresh or not self.steps else np.inf
-            bound = min(bound, self._bound_of_turn(before, time[0], size))
-            if bound < abs(float(size)):
-                log.back_to(events)
-                self._roots.clear()
-                begun.dtime = time
-                begun.state[:] = before
-                outcome, size = begun.step(self.precision.of_double(bound), write_tc=True)
-            if outcome == hy.taylor_outcome.err_nf_state:
+            engine = self._integrator
+            self._set()
+            time, before = engine.dtime, np.array(engine.state)
+            finite = self._natural(until, self._longest)
+            bound = bound_of_sparse_series(engine.tc) if self._crossed or not self.steps else np.inf
+            bound = min(bound, self._bound_of_turn(before, time[0]))
+            if bound < abs(float(engine.last_h)):
+                self._return(time, before, events)
+                finite = self._natural(until, self.precision.of_double(bound))
+            if not finite:
                 return False
-            natural = abs(float(size))
+            size = engine.last_h
             root = self._first_root(time, before)
             if root is None:
                 break
@@ -104,30 +599,61 @@ class SwitchingStepper(SurfaceRoots):
             left = between(time, moment)
             if left > 0:
                 size = self._again(root, time, before, left, moment if known else None)
+                self._cut = root[1:]
                 break
             # the step begins on the surface and leaves its side at once
-            log.back_to(events)
-            begun.dtime = time
-            begun.state[:] = before
-            if not self._arrive(root, [before], self._fresh):
+            self._return(time, before, events)
+            if not self._arrive(*root[1:], [before], bool(self._crossed)):
                 return False
         else:
             assert root is not None
             return self._fail(root[1], "it turns back to it again and again")
-        self._dense = begun
-        self.smallest, self.largest = abs(float(size)), natural
+        cut, again = self._cut, bool(self._crossed)
+        if cut is not None and self.has_events:
+            self._note_events(before, time[0], events)
+        self._dense = engine
+        self.smallest = self.largest = abs(float(size))
         self.steps += 1
         self._judge(time[0], 1)
-        self.ended = self.watcher is not None and not self.watcher(begun)
+        self.ended = self.watcher is not None and not self.watcher(engine)
         self._follow()
-        again, self._fresh = self._fresh, False
-        if root is not None and not self._arrive(root, [before, np.array(self.state)], again):
+        self._crossed = 0
+        if cut is not None and not self._arrive(*cut, [before, np.array(self.state)], again):
             return False
         if self._along:
             self._keep_to_surfaces()
         return True
 
-    def _bound_of_turn(self, before: np.ndarray, time: Scalar, size: Scalar) -> float:
+    def _note_events(self, before: np.ndarray, begun: Scalar, known: int) -> None:
+        """Note events that lie on the surface where the step ended, before the engine found them."""
+        found, width = self.log.found[known:], self._width(self.time)
+        noted = {event.index for event in found if event.time >= self.time - width}
+        pars = self._parameters()
+        earlier, here = (
+            self._probe.crossings(*place, pars) for place in ((before, begun), (self.state, self.time))
+        )
+        for i, ((value, _), (now, noise)) in enumerate(zip(earlier, here, strict=True)):
+            direction = self.system.crossings[i].direction
+            if i not in noted and abs(now) <= noise < abs(value) and direction * value <= 0:
+                self.log.note(i, self.time, self.state)
+
+    def _natural(self, until: Scalar | None, longest: Scalar) -> bool:
+        """Take a natural step, which may end on a surface, from where the parameters are set."""
+        engine = self._integrator
+        self._roots.clear()
+        self._cut = None
+        if until is None:
+            outcome, _ = engine.step(longest, write_tc=True)
+        else:
+            outcome, *_ = engine.propagate_until(until, max_steps=1, max_delta_t=longest, write_tc=True)
+        return bool(outcome != hy.taylor_outcome.err_nf_state)
+
+    def _return(self, time: tuple[Scalar, Scalar], state: np.ndarray, events: int) -> None:
+        self.log.back_to(events)
+        self._integrator.dtime = time
+        self._integrator.state[:] = state
+
+    def _bound_of_turn(self, before: np.ndarray, time: Scalar) -> float:
         """Bound of a step just taken within which turns can be continued: series of many terms go far."""
         if not self._probe.unturned:
             return math.inf
@@ -143,7 +669,111 @@ class SwitchingStepper(SurfaceRoots):
     def _quieten(self) -> None:
         """Suppress events at the surface where the latest step ended, which found them."""
         time = self.time
-        self.log.quiet_until = time + self._width(time) if self._fresh else None
+        self.log.quiet_until = time + self._width(time) if self._crossed else None
+
+    # --- roots that the engine doesn't stop at -----------------------------------------------------------
+
+    def moment(self, root: Root) -> tuple[tuple[Scalar, Scalar], bool]:
+        """Time of a root in two numbers, and whether it is known from the surface's expression."""
+        known = self._probe.moments[root[1]].near(root[0], self._modes)
+        return known or (root[0], root[0] * 0), known is not None
+
+    def _first_root(self, begun: tuple[Scalar, Scalar], before: np.ndarray) -> Root | None:
+        """The first root where the step just taken leaves its side, from where it begun; None if none is."""
+        engine = self._integrator
+        end, after = engine.time, np.array(engine.state)
+        states = [before, after]
+        hidden = self._hidden(begun[0], end, self._modes)
+        # those of known moments may differ by less than one number tells
+        roots = sorted([*self._roots, *hidden], key=lambda root: self.moment(root)[0])
+        for n, (time, j, side) in enumerate(roots):
+            if self._modes[j] == SLIDES or roots[n] in hidden:
+                return roots[n]
+            if side != -self._modes[j]:
+                continue
+            following = next((t for t, i, _ in roots[n + 1 :] if i == j), end)
+            middle = time + (following - time) / 2
+            look = self._look(engine.update_d_output(middle), middle)
+            if float(look.u[j]) * side > self._probe.noise(look, j, states):
+                return roots[n]
+        values = self._values(after, end, self._low)
+        for j, mode in enumerate(self._modes):
+            if abs(mode) >= HELD or mode * float(values[j]) >= 0 or (self._cut and self._cut[0] == j):
+                continue
+            look = self._look(after, end, self._low)
+            if -mode * float(look.u[j]) <= self._probe.noise(look, j, states):
+                continue
+            inside = self._seen(j, begun, before)
+            if inside is None:
+                return begun[0], j, -mode
+            return self._bisected(j, inside, end), j, -mode
+        return None
+
+    def _hidden(self, begin: Scalar, end: Scalar, modes: Sequence[int]) -> list[Root]:
+        """Roots within a step that its polynomials may have missed."""
+        middles = [moments.hidden(begin, end, modes) for moments in self._probe.moments]
+        return [(middle, j, -modes[j]) for j, middle in enumerate(middles) if middle is not None]
+
+    def _again(
+        self,
+        root: Root,
+        time: tuple[Scalar, Scalar],
+        before: np.ndarray,
+        size: Scalar,
+        moment: tuple[Scalar, Scalar] | None,
+    ) -> Scalar:
+        """Repeat the step up to a root, to its last digits, or to its known moment; returns the step's size.
+
+        Args:
+            size: of the step to the root as the engine found it, within the step just taken.
+        """
+        engine = self._integrator
+        if moment is None and root[1] not in self._along:  # by that step's own polynomials
+            high, low = later(time, size)
+            look = self._look(np.array(engine.update_d_output(high)), high, low)
+            rate = look.rate(root[1])
+            correction = look.u[root[1]] / rate if rate != 0 else rate
+            if 0 < abs(float(correction)) < _NEAR * float(size):
+                size = size - correction
+        muted, self.log.muted = self.log.muted, True
+        try:
+            engine.dtime = time
+            engine.state[:] = before
+            engine.step(size, write_tc=True)
+            if moment is not None:
+                engine.dtime = moment
+        finally:
+            self.log.muted = muted
+        return size
+
+    def _seen(self, j: int, begun: tuple[Scalar, Scalar], before: np.ndarray) -> Scalar | None:
+        """A time within the latest step at which an argument has the sign of its side, or None."""
+        begin, end, mode = begun[0], self._integrator.time, self._modes[j]
+        look = self._look(before, *begun)
+        known = self._probe.noise(look, j, [before])
+        beside = mode * float(look.u[j]) > known  # of the surface, as the step began
+        some = self.precision.bits // 2
+        for power in range(1, _BISECTIONS * self.precision.bits):
+            then = begin + (end - begin) * self.precision.of_double(2.0**-power)
+            value = mode * float(self._values(self._integrator.update_d_output(then), then)[j])
+            if value > 0:
+                return then
+            if power >= some and (beside or abs(value) <= known):  # nearer than that it is on the surface
+                break
+        return begin if beside else None
+
+    def _bisected(self, j: int, begin: Scalar, end: Scalar) -> Scalar:
+        """A root that the engine missed, by bisection."""
+        for _ in range(_BISECTIONS * self.precision.bits):
+            middle = begin + (end - begin) / 2
+            if not begin < middle < end:
+                break
+            value = self._values(self._integrator.update_d_output(middle), middle)[j]
+            if self._modes[j] * float(value) > 0:
+                begin = middle
+            else:
+                end = middle
+        return end
 
     # --- surfaces -------------------------------------------------------------------------------------------
 
@@ -159,6 +789,30 @@ class SwitchingStepper(SurfaceRoots):
             else:
                 self._take(choice)
 
+    def _at_rest(self, on: list[int], look: Look) -> Continuation | None:
+        """How to continue if swings about two surfaces have decayed to rounding; None otherwise."""
+        resting = np.abs(look.u.astype(np.float64)) <= self._probe.swing_noises(look, self.state)
+        small = [i for i, mode in enumerate(self._modes) if i in on or abs(mode) >= HELD or resting[i]]
+        if len(small) < 2:
+            return None
+
+        def at(sides: Mapping[int, int], state: np.ndarray, time: Scalar) -> Look:
+            return self._probe.look(state, time, self._parameters(dict(sides)))
+
+        meeting = Meeting(at, self._probe, np.array(self.state), self.time, self._epsilon)
+        kept = {j: self._modes[j] for j in (*self._along, *self._held)}
+        return meeting.rest(sorted({*small, *kept}), kept)
+
+    def _keep_to_surfaces(self) -> None:
+        """Remove the rounding that moved the state off the surfaces along which it slides."""
+        state = self._integrator.state
+        look = self._look(state, self.time, self._low)
+        for j in (*self._along, *self._held):
+            gradient = look.gradients[j]
+            square = sum((g * g for g in gradient), gradient[0] * 0)
+            if square != 0:
+                state[:] = state - (look.u[j] / square) * gradient
+
     def _lying_on(self, look: Look, states: list[np.ndarray]) -> list[int]:
         """Surfaces whose arguments are zero but for rounding of these states."""
         near = np.abs(look.u.astype(np.float64)) <= self._probe.noises(look, states)
@@ -169,15 +823,17 @@ class SwitchingStepper(SurfaceRoots):
         """Time (internal units) within which ``_MOST_SWITCHES`` count as an accumulation."""
         return _MOST_SWITCHES * min(_SHORTEST, (_ROUNDINGS * self._epsilon) ** 0.5)
 
-    def _arrive(self, root: Root, states: list[np.ndarray], again: bool) -> bool:
-        """Continue from a surface (``again``: as the step began); False if that is impossible."""
-        _, j, side = root
-        self._fresh = True
-        now = float(self.time)
+    def _counts(self, now: float) -> bool:
+        """Count a switch; False if they accumulate."""
         if now - self._since > self._window:
             self._since, self._count = now, 0
         self._count += 1
-        if self._count > _MOST_SWITCHES:
+        return self._count <= _MOST_SWITCHES
+
+    def _arrive(self, j: int, side: int, states: list[np.ndarray], again: bool) -> bool:
+        """Continue from a surface (``again``: as the step began); False if that is impossible."""
+        self._crossed = j + 1
+        if not self._counts(float(self.time)):
             return self._fail(j, f"its sides changed more than {_MOST_SWITCHES} times in almost no time")
         if self._modes[j] == SLIDES:
             self._modes[j] = side
@@ -296,31 +952,37 @@ class SwitchingStepper(SurfaceRoots):
         return Continuation(modes)
 
     def _moved(self, j: int) -> int:
-        """The side of a surface to which a trial step leads (it is taken back); 0 for none."""
-        engine = self._integrator
-        time, before = engine.dtime, np.array(engine.state)
-        self._set(engine)
+        """The side of a surface to which a trial step leads, by a copy of the engine; 0 for none."""
+        engine, before = self._integrator, np.array(self.state)
         muted, self.log.muted = self.log.muted, True
-        engine.step(self._longest if self._requirement is None else self._within_piece(), write_tc=True)
-        end, after = engine.time, np.array(engine.state)
-        found = 0
-        for part in (1 / 16, 1 / 2, 1.0):
-            then = time[0] + self.precision.of_double(part) * (end - time[0])
-            look = self._look(engine.update_d_output(then), then)
-            if abs(float(look.u[j])) > self._probe.noise(look, j, [before, after]):
-                found = 1 if look.u[j] > 0 else -1
-                break
-        self.log.muted = muted
-        self._roots.clear()
-        engine.dtime = time
-        engine.state[:] = before
-        return found
+        self._integrator = trial = copy.deepcopy(engine)
+        try:
+            self._set()
+            begin = trial.time
+            self._natural(self._meet(), self._longest)
+            found = self._cut[1] if self._cut is not None and self._cut[0] == j else 0
+            for part in (1 / 16, 1 / 2, 1.0):
+                then = begin + self.precision.of_double(part) * (trial.time - begin)
+                look = self._look(np.array(trial.update_d_output(then)), then)
+                if abs(float(look.u[j])) > self._probe.noise(look, j, [before, np.array(trial.state)]):
+                    return 1 if look.u[j] > 0 else -1
+            return found
+        finally:
+            self._integrator, self.log.muted = engine, muted
+            self._roots.clear()
 
     def _fail(self, j: int, why: str, what_to_do: str = "") -> bool:
         surface = self.system.plan.surfaces.found[j]
         what_to_do = what_to_do or surface.remedy
         self.failure = f'at the kink or jump of "{surface.text}" ({surface.where}) {why}; {what_to_do}'
         return False
+
+
+def _scalars(precision: Precision, numbers: list[float]) -> np.ndarray:
+    """Numbers of a precision."""
+    if issubclass(precision.scalar, float | np.floating):
+        return np.array(numbers, dtype=precision.scalar) + 0
+    return np.array([precision.of_double(x) for x in numbers], dtype=precision.scalar)
 
 
 def stepper_of(

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import time
 
+import numpy as np
+
 from rigidsim.model.system import System
 from rigidsim.scene.choices import DEFAULT_METHOD, METHODS
 from rigidsim.solve.corrected_stepper import CorrectedStepper, StepBoundary
@@ -15,8 +17,13 @@ from rigidsim.solve.solvers.algorithm import Algorithm, solves
 from rigidsim.solve.solvers.solver import Solver
 from rigidsim.solve.solvers.stepwise import Reach, StepwiseSolver
 from rigidsim.solve.solvers.taylor.ways import SampleWay, WayFinder
+from rigidsim.solve.stepper import SamplesWithin
 from rigidsim.solve.switching.stepper import stepper_of
 from rigidsim.solve.taylor_stepper import TaylorStepper
+
+_NEAR = 4.0  # longest steps before the last sample, from which on single ones are taken
+_SPARE = 0.9  # of the steps to the last sample, if as long as the longest recent one, that are taken at once
+_MOST_SAMPLES = 1024  # asked for at once
 
 
 class TaylorSolver(StepwiseSolver):
@@ -41,7 +48,7 @@ class TaylorSolver(StepwiseSolver):
             SampleWay.SKIP: self._skip,
             SampleWay.GRID: self._grid,
             SampleWay.BLOCK: self._block,
-            SampleWay.STEP: self._step,
+            SampleWay.STEP: self._take,
         }[way]
         finite = take(self.allowed(count, most), boundary)
         self.ways.measured(way, self.stepper.steps - before, time.perf_counter() - started)
@@ -73,7 +80,7 @@ class TaylorSolver(StepwiseSolver):
                 horizon = float(self.stepper.time) + 2 * part * longest
                 times = self.buffer.until(self.stepper.precision.scalar(horizon), most)
                 if len(times) == most:  # they lie closer than those by which this way was chosen
-                    return self._step(part, boundary)
+                    return self._take(part, boundary)
                 finite, states = self.stepper.grid(times, part)
                 if not finite or self.stepper.unresolved:
                     return self.lost(boundary, part)
@@ -101,9 +108,31 @@ class TaylorSolver(StepwiseSolver):
         self.reached(Reach(boundary, output))
         return True
 
-    def _step(self, count: int, boundary: StepBoundary) -> bool:
-        """Take single steps, until the next sample is worth a skip."""
-        return self.step_by_step(count, boundary, self.ways.numbers.skip_from)
+    def _take(self, count: int, boundary: StepBoundary) -> bool:
+        """Take steps up to corrections, and the samples within them; the last ones of the run singly."""
+        stepper, buffer = self.stepper, self.buffer
+        while count > 0:
+            left = (float(self._last) - float(stepper.time)) / max(self.ways.longest, 1e-300)
+            if left < _NEAR:
+                return self.step_by_step(count, boundary)
+            part = min(count, self.corrected.left, int(_SPARE * left))
+            times = buffer.until(self._last, min(buffer.room, _MOST_SAMPLES))
+            samples = SamplesWithin(times)
+            if not stepper.take(part, samples) or stepper.unresolved:
+                return self.lost(boundary, part)
+            self.note_steps()
+            states, stop = samples.states, stepper.log.stop
+            if stop is not None:
+                states = states[: int((times[: len(states)] <= stop).sum())]
+            if states:
+                self.take(times[: len(states)], np.array(states), boundary)
+            self.reached(Reach(boundary, self._dense))
+            if self._reach is not None or stop is not None or self.corrected.collapsed:
+                break
+            if buffer.full or buffer.complete:
+                break
+            count, boundary = count - part, self.corrected.boundary()
+        return True
 
 
 @solves(METHODS[DEFAULT_METHOD])
