@@ -19,7 +19,7 @@ from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.sweeps.sweep import Sweep
 from rigidsim.scene.toml_text import key_steps
 from rigidsim.scene.tracing.numbers import Traced, Untraceable
-from rigidsim.solve.batch.tracing import TRACED_TABLES, Replay, SharedReals, TracedSystem, real_of, trace
+from rigidsim.solve.batch.tracing import TRACED_TABLES, Reals, Replay, TracedSystem, real_of, trace
 from rigidsim.solve.effects.effect import registered_effects
 from rigidsim.solve.precision import precision_of
 from rigidsim.solve.problem import prepare
@@ -118,11 +118,11 @@ class AxisNumbers:
     def _reals_of(self, place: int, index: int) -> list[hy.real]:
         return [real_of(number) for number in self.sweep.axes[place].exact(index)]
 
-    def columns(self, place: int, which: np.ndarray) -> list[SharedReals]:
+    def columns(self, place: int, which: np.ndarray) -> list[Reals]:
         """The numbers that members have, a column for each key, from the index of each one's value."""
         needed, index = np.unique(which, return_inverse=True)
         columns = zip(*(self._reals(place, i) for i in needed.tolist()), strict=True)
-        return [SharedReals(np.array(column), index) for column in columns]
+        return [np.array(column)[index] for column in columns]
 
     def codes(self, place: int, which: np.ndarray) -> np.ndarray:
         """Codes below the axis's length, equal for members whose axis values have the same text."""
@@ -165,12 +165,9 @@ class Members:
         """A member's exact numbers for ``keys``, SI."""
         return [x for place, which in self._traced for x in self.sweep.axes[place].exact(int(which[member]))]
 
-    def columns(self, members: np.ndarray) -> list[SharedReals]:
+    def columns(self, members: np.ndarray) -> list[Reals]:
         """The numbers of some members for each key (see ``AxisNumbers``)."""
-        found: list[SharedReals] = []
-        for place, which in self._traced:
-            found += self._axes.columns(place, which[members])
-        return found
+        return [x for place, which in self._traced for x in self._axes.columns(place, which[members])]
 
 
 @dataclass
@@ -296,7 +293,7 @@ class Families:
             return waiting
         graph = family.traced.graph
         replay = Replay(graph, self._members.columns(candidates), len(candidates))
-        agree = np.flatnonzero(replay.agreeing(list(graph.guards)))
+        agree = np.flatnonzero(replay.agreeing())
         taken = candidates[agree]
         if not len(taken):
             return waiting

@@ -12,7 +12,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any
 
 import heyoka as hy
 import numpy as np
@@ -29,7 +29,7 @@ from rigidsim.scene.initial_values import check_start
 from rigidsim.scene.scene import Scene, build_scene
 from rigidsim.scene.toml_text import key_steps
 from rigidsim.scene.tracing.arithmetic import TracingContext, swept_number
-from rigidsim.scene.tracing.numbers import BINARY, Graph, Guard, Traced, Untraceable
+from rigidsim.scene.tracing.numbers import BINARY, Graph, Traced, Untraceable
 from rigidsim.scene.varied_keys import replaced, value_at
 from rigidsim.solve.precision import precision_of
 from rigidsim.solve.problem import InitialValueProblem, prepare
@@ -140,18 +140,6 @@ def trace(
 Reals = Any  # an array of hy.real, or one hy.real
 
 
-class SharedReals(NamedTuple):
-    """Numbers of members: the values that there are, and which each member has; None where all have one."""
-
-    values: Any
-    shared: np.ndarray | None = None
-
-    def of_each(self, count: int) -> np.ndarray:
-        """The numbers of so many members."""
-        each = self.values if self.shared is None else self.values[self.shared]
-        return np.broadcast_to(each, count)
-
-
 def real_of(number: ExactNumber) -> hy.real:
     """An exact number, rounded as ``ExactNumber.at`` does."""
     if number.pi_power:
@@ -182,98 +170,74 @@ def _reals(values: np.ndarray) -> Reals:
 
 
 class Replay:
-    """A graph's numbers for some members; nan where an operation has no result.
-
-    Each operation is done once for the values that there are: in a product of axes members share most. The
-    columns of one axis share their index.
+    """A graph's numbers for so many members, from a column for each key; nan where an operation has no
+    result.
     """
 
-    def __init__(self, graph: Graph, columns: Sequence[SharedReals], count: int) -> None:
+    def __init__(self, graph: Graph, columns: Sequence[Reals], count: int) -> None:
         self._graph, self._columns, self._count = graph, columns, count
-        self._found: dict[Any, SharedReals] = {}
-        self._each = np.arange(count)
+        self._found: dict[int, Reals] = {}
 
-    def agreeing(self, guards: Sequence[Guard]) -> np.ndarray:
+    def agreeing(self) -> np.ndarray:
         """Mask of the members that make all decisions as the representative does, (members,)."""
         found = np.ones(self._count, dtype=bool)
-        for guard in guards:
-            found &= self._once(guard, self._agreeing, guard).of_each(self._count)
+        for guard in self._graph.guards:
+            left, right = self._number(guard.left), self._number(guard.right)
+            decided = left < right if guard.kind == "<" else left == right
+            found &= (decided == guard.outcome) & np.isfinite(left) & np.isfinite(right)
             if not found.any():
                 break
         return found
 
     def doubles(self, node: int) -> np.ndarray:
         """A number rounded once, (members,); nan if it is outside a double's range."""
-        return self._once(("double", node), self._rounded, node).of_each(self._count)
-
-    def number(self, node: int) -> SharedReals:
-        """A number of the graph."""
-        return self._once(node, self._worked_out, *self._graph.nodes[node])
-
-    def _once(self, key: Any, work: Callable[..., SharedReals], *given: Any) -> SharedReals:
-        if key not in self._found:
-            with np.errstate(all="ignore"):
-                self._found[key] = work(*given)
-        return self._found[key]
-
-    def _agreeing(self, guard: Guard) -> SharedReals:
-        (left, right), index = self._together(guard.left, guard.right)
-        decided = left < right if guard.kind == "<" else left == right
-        return SharedReals((decided == guard.outcome) & np.isfinite(left) & np.isfinite(right), index)
-
-    def _rounded(self, node: int) -> SharedReals:
-        values, index = self.number(node)
-        exact = np.atleast_1d(values)
+        exact = np.broadcast_to(self._number(node), self._count)
         found = exact.astype(np.float64) + 0.0  # zero without a sign
         found[(np.abs(found) < np.finfo(float).tiny) & (exact != hy.real(0.0, _BITS))] = np.nan
         found[np.isinf(found)] = np.nan
-        return SharedReals(found, index)
+        return found
 
-    def _together(self, *nodes: int) -> tuple[list[Reals], np.ndarray | None]:
-        """Values of nodes by a common index."""
-        found = [self.number(node) for node in nodes]
-        indices = {id(index): index for _, index in found if index is not None}
-        if len(indices) <= 1:
-            return [values for values, _ in found], next(iter(indices.values()), None)
-        return [values if index is None else values[index] for values, index in found], self._each
+    def _number(self, node: int) -> Reals:
+        if node not in self._found:
+            with np.errstate(all="ignore"):
+                self._found[node] = self._worked_out(*self._graph.nodes[node])
+        return self._found[node]
 
-    def _worked_out(self, operation: str, arguments: tuple[Any, ...]) -> SharedReals:
+    def _worked_out(self, operation: str, arguments: tuple[Any, ...]) -> Reals:
         if operation == "constant":
-            return SharedReals(_real(arguments[0]))
+            return _real(arguments[0])
         if operation == "column":
             return self._columns[arguments[0]]
         if operation == "power":
-            base, power = arguments
-            if power == 2:
-                return self._worked_out("multiply", (base, base))
-            return self._one_by_one(lambda x: x**power, base)
+            base, power = self._number(arguments[0]), arguments[1]
+            return base * base if power == 2 else _one_by_one(lambda x: x**power, base)
         if operation == "call":
-            function, *nodes = arguments
-            return self._one_by_one(lambda *values: function(_CONTEXT, *values), *nodes)
+            function, *arguments = arguments
+            return _one_by_one(lambda *x: function(_CONTEXT, *x), *map(self._number, arguments))
+        values = [self._number(argument) for argument in arguments]
         known = BINARY.get(operation) or _OF_ARRAYS.get(operation)
         if known is None:
-            return self._one_by_one(getattr(_CONTEXT, operation), *arguments)
-        values, index = self._together(*arguments)
+            return _one_by_one(getattr(_CONTEXT, operation), *values)
         found = known(*values)
         if operation == "divide":
             found[np.broadcast_to(values[1] == hy.real(0.0, _BITS), found.shape)] = hy.real(math.nan, _BITS)
-        return SharedReals(found, index)
+        return found
 
-    def _one_by_one(self, function: Callable[..., Any], *nodes: int) -> SharedReals:
-        """A function that arrays lack, once for each of the values that there are."""
-        values, index = self._together(*nodes)
-        codes: np.ndarray = np.zeros(1, dtype=np.int64)
-        for numbers in values:
-            distinct, code = np.unique(numbers, return_inverse=True)
-            codes = codes * len(distinct) + code
-        _, first, places = np.unique(codes, return_index=True, return_inverse=True)
-        found = []
-        for given in zip(*(np.broadcast_to(x, codes.shape)[first] for x in values), strict=True):
-            try:
-                found.append(_real(function(*map(_mpf, given))))
-            except _FAILURES:
-                found.append(hy.real(math.nan, _BITS))
-        return SharedReals(np.array(found)[places], index)
+
+def _one_by_one(function: Callable[..., Any], *values: Reals) -> Reals:
+    """A function that arrays lack, once for each of the values that there are."""
+    codes: np.ndarray = np.zeros(1, dtype=np.int64)
+    for numbers in values:
+        distinct, code = np.unique(numbers, return_inverse=True)
+        codes = codes * len(distinct) + code
+    _, first, places = np.unique(codes, return_index=True, return_inverse=True)
+    found = []
+    for given in zip(*(np.broadcast_to(x, codes.shape)[first] for x in values), strict=True):
+        try:
+            found.append(_real(function(*map(_mpf, given))))
+        except _FAILURES:
+            found.append(hy.real(math.nan, _BITS))
+    return np.array(found)[places]
 
 
 def _exponent(value: Reals) -> Reals:
