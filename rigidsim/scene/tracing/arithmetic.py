@@ -2,7 +2,8 @@
 numbers as written in a config, and in expressions.
 """
 
-from collections.abc import Iterable, Sequence
+import operator
+from collections.abc import Callable, Iterable, Sequence
 from fractions import Fraction
 from functools import reduce
 from typing import Any
@@ -164,7 +165,16 @@ def _number(number: ExactNumber, graph: Graph) -> Any:
     return number.traced if isinstance(number, TracedExact) else number.at(graph.context)
 
 
-def exactly(operator: str, numbers: Sequence[ExactNumber]) -> ExactNumber | None:
+_OPERATORS: dict[str, Callable[[Any, Any], Any]] = {
+    "negative": lambda x, _: -x,
+    "sum": operator.add,
+    "product": operator.mul,
+    "quotient": operator.truediv,
+    "power": operator.pow,
+}
+
+
+def exactly(name: str, numbers: Sequence[ExactNumber]) -> ExactNumber | None:
     """Result of an operation on numbers of which some are swept; None if it isn't a rational times a power of
     pi.
     """
@@ -172,20 +182,19 @@ def exactly(operator: str, numbers: Sequence[ExactNumber]) -> ExactNumber | None
     a, b = numbers[0], numbers[-1]
     x, y = _number(a, graph), _number(b, graph)
     p, q = (n.exact.rational if isinstance(n, TracedExact) else n.rational for n in (a, b))
-    turns, made = a.pi_power, x
-    if operator == "negative":
-        p, made = -p, -x
-    elif operator == "sum" and a.pi_power == b.pi_power:
-        p, made = p + q, x + y
-    elif operator == "product":
-        p, turns, made = p * q, turns + b.pi_power, x * y
-    elif operator == "quotient" and y != 0:
-        p, turns, made = p / q, turns - b.pi_power, x / y
-    elif operator == "power" and isinstance(a, TracedExact) and not isinstance(b, TracedExact):
-        if q.denominator != 1 or b.pi_power or abs(q) > 64 or (q < 0 and x == 0):
+    if name == "power":
+        whole = not isinstance(b, TracedExact) and q.denominator == 1 and not b.pi_power and abs(q) <= 64
+        if not whole or (q < 0 and x == 0):
             return None
-        p, turns, made = p ** int(q), turns * int(q), x ** int(q)
-    else:
+    elif (name == "sum" and a.pi_power != b.pi_power) or (name == "quotient" and y == 0):
         return None
-    found = ExactNumber(p, turns)
+    turns = {
+        "product": a.pi_power + b.pi_power,
+        "quotient": a.pi_power - b.pi_power,
+        "power": a.pi_power * int(q),
+    }
+    combined = _OPERATORS.get(name)
+    if combined is None:
+        return None
+    made, found = combined(x, y), ExactNumber(combined(p, q), turns.get(name, a.pi_power))
     return TracedExact(made, found) if isinstance(made, Traced) else found

@@ -178,6 +178,7 @@ class Replay:
         self._graph, self._columns, self._count = graph, columns, count
         self._found: dict[int, Reals] = {}
 
+    @np.errstate(all="ignore")
     def agreeing(self) -> np.ndarray:
         """Mask of the members that make all decisions as the representative does, (members,)."""
         found = np.ones(self._count, dtype=bool)
@@ -189,6 +190,7 @@ class Replay:
                 break
         return found
 
+    @np.errstate(all="ignore")
     def doubles(self, node: int) -> np.ndarray:
         """A number rounded once, (members,); nan if it is outside a double's range."""
         exact = np.broadcast_to(self._number(node), self._count)
@@ -199,8 +201,7 @@ class Replay:
 
     def _number(self, node: int) -> Reals:
         if node not in self._found:
-            with np.errstate(all="ignore"):
-                self._found[node] = self._worked_out(*self._graph.nodes[node])
+            self._found[node] = self._worked_out(*self._graph.nodes[node])
         return self._found[node]
 
     def _worked_out(self, operation: str, arguments: tuple[Any, ...]) -> Reals:
