@@ -262,24 +262,6 @@ class Damping(Protocol):
 
 
 @runtime_checkable
-class Narrow(Protocol):
-    """Arguments around whose zeros it changes abruptly, such as (t - t0) / width of a pulse or a switch.
-
-    They are dimensionless expressions of ``seconds(m)`` and the states. Steps chosen by the motion alone
-    would pass over such a zero; with them they shorten on the way there.
-    """
-
-    def narrow(self, m: Kinematics) -> list[Symbolic]: ...
-
-
-@runtime_checkable
-class Rooted(Protocol):
-    """Radicands in it that may touch zero, where no step may pass over the kink."""
-
-    def roots(self, m: Kinematics) -> list[Symbolic]: ...
-
-
-@runtime_checkable
 class Lengthy(Protocol):
     """``wide`` is True for expressions too long to be unrolled (series of thousands of terms)."""
 

@@ -26,10 +26,18 @@ from rigidsim.model.kinematics import Kinematics
 from rigidsim.model.rotations import Symbolic, euler_from_matrix
 from rigidsim.model.scaling import Rounder
 from rigidsim.model.two_part import TwoPartTime, rounded
-from rigidsim.scene.expressions import tree as expressions
-from rigidsim.scene.expressions.tree import Expression, LineInTime, Name, Node, line_of
+from rigidsim.scene.expressions.tree import (
+    Constant,
+    Expression,
+    LineInTime,
+    Name,
+    Operation,
+    fold,
+    line_of,
+    operate,
+)
 
-_NO_SIDES: Mapping[Node, Any] = {}
+_NO_SIDES: Mapping[Expression, Any] = {}
 _LINEAR = ("sum", "negative", "product", "quotient")
 
 
@@ -38,7 +46,7 @@ def to_heyoka(
     variables: Mapping[str, Any],
     number: Rounder,
     context: Any,
-    sides: Mapping[Node, Any] = _NO_SIDES,
+    sides: Mapping[Expression, Any] = _NO_SIDES,
 ) -> Any:
     """Convert an expression to heyoka's variables; constant parts are worked out in ``context``.
 
@@ -54,7 +62,7 @@ def to_heyoka(
 
     clock = variables.get("t")
 
-    def literal(node: Node, value: Any) -> Any:
+    def literal(node: Expression, value: Any) -> Any:
         """A constant (mpf) or a line in time as an expression; an expression is returned unchanged."""
         if isinstance(value, hy.expression):
             return value
@@ -65,16 +73,18 @@ def to_heyoka(
             return hy.expression(rounded(number(value)))
         except OverflowError:
             what = f"a constant that the working precision can't hold ({context.nstr(value, 6)}: write 0, "
-            raise expression.error(f"{what}another unit, or another precision)", node) from None
+            raise node.error(f"{what}another unit, or another precision) in {node.quoted}") from None
 
-    def combine(node: Node, operands: list[Any]) -> Any:
+    def of_constant(node: Constant) -> Any:
+        return node.value.at(context)
+
+    def of_name(node: Name) -> Any:
+        if node.name == "t" and isinstance(clock, TwoPartTime):
+            return LineInTime(context.one, context.zero)
+        return hy.time if node.name == "t" and "t" not in variables else variables[node.name]
+
+    def of_operation(node: Operation, operands: list[Any]) -> Any:
         """An mpf as long as all operands are constant, a line in time, or an expression."""
-        if isinstance(node, expressions.Constant):
-            return node.value.at(context)
-        if isinstance(node, Name):
-            if node.name == "t" and isinstance(clock, TwoPartTime):
-                return LineInTime(context.one, context.zero)
-            return hy.time if node.name == "t" and "t" not in variables else variables[node.name]
         if any(isinstance(operand, LineInTime) for operand in operands):
             operands = _with_lines(node, operands)
             if len(operands) == 1 and node.operator in _LINEAR:
@@ -84,12 +94,12 @@ def to_heyoka(
                 return 2.0 * hy.sigmoid(literal(node, twice)) - 1.0
             operands = [literal(node, x) if isinstance(x, LineInTime) else x for x in operands]
         if not any(isinstance(operand, hy.expression) for operand in operands):
-            return expressions.operate(expression, node, operands, context)
+            return operate(node, operands, context)
         if node.operator == "sign":
             side = sides.get(node.operands[0])
             return hy.select(hy.gte(operands[0], 0.0), 1.0, -1.0) if side is None else side
         if node.operator == "quotient" and not isinstance(operands[1], hy.expression):
-            inverse = expressions.operate(expression, node, [context.one, operands[1]], context)
+            inverse = operate(node, [context.one, operands[1]], context)
             return operands[0] * literal(node, inverse)
         if node.operator == "power":
             exponent = operands[1]
@@ -102,10 +112,10 @@ def to_heyoka(
         own: dict[str, Any] = {"negative": operator.neg, "quotient": operator.truediv}
         return (own.get(named) or getattr(hy, named))(*operands)
 
-    return literal(expression.root, expressions.fold(expression, combine))
+    return literal(expression, fold(expression, of_constant, of_name, of_operation))
 
 
-def _in_range(node: expressions.Operation, operands: list[Any], number: Rounder) -> list[Any]:
+def _in_range(node: Operation, operands: list[Any], number: Rounder) -> list[Any]:
     """Operands with the numbers among them joined into one, if heyoka would leave the range on its way."""
     plain = [x for x in operands if not isinstance(x, hy.expression)]
     join = {"sum": operator.add, "product": operator.mul}.get(node.operator)
@@ -120,7 +130,7 @@ def _in_range(node: expressions.Operation, operands: list[Any], number: Rounder)
     return operands
 
 
-def _with_lines(node: expressions.Operation, operands: list[Any]) -> list[Any]:
+def _with_lines(node: Operation, operands: list[Any]) -> list[Any]:
     """Operands with the lines and numbers among them joined into one, if the operation leaves them a line."""
     plain = [x for x in operands if not isinstance(x, hy.expression)]
     if node.operator not in _LINEAR or (len(plain) < len(operands) and node.operator != "sum"):

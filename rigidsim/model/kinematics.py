@@ -23,7 +23,7 @@ from rigidsim.model.two_part import as_factor
 from rigidsim.scene.arithmetic import Vector, dot, negligible
 from rigidsim.scene.epochs import Epoch
 from rigidsim.scene.exact import ExactNumber
-from rigidsim.scene.expressions.tree import Node
+from rigidsim.scene.expressions.tree import Expression
 from rigidsim.scene.orbit_tables.pieces import TabulatedOrbit
 from rigidsim.scene.orbits import KeplerOrbit
 from rigidsim.scene.scene import Scene
@@ -60,7 +60,7 @@ class Kinematics:
     """Long vectors that several expressions share, by what they are."""
 
     @cached_property
-    def sides(self) -> Mapping[Node, Symbolic]:
+    def sides(self) -> Mapping[Expression, Symbolic]:
         """For the sign of each surface's argument, the parameter that tells the side the motion is on."""
         places = self.surfaces.places
         return {node: hy.par[index] if sign > 0 else -hy.par[index] for node, (index, sign) in places.items()}

@@ -14,6 +14,7 @@ import numpy as np
 
 from rigidsim.errors import ConfigError, Problem
 from rigidsim.model.kinematics import Kinematics
+from rigidsim.model.names import written
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.si import speaks_si
 from rigidsim.model.state_blocks import StateBlock
@@ -21,6 +22,7 @@ from rigidsim.scene.arithmetic import Vector
 from rigidsim.scene.cautions import Caution
 from rigidsim.scene.registry import SceneLoad
 from rigidsim.scene.scene import Scene
+from rigidsim.scene.transitions import narrow_parts, root_parts
 from rigidsim.scene.validation_messages import shown
 
 Term = tuple[Vector, Symbolic]
@@ -75,6 +77,18 @@ class Load(SceneLoad):
         ``conservative``, and of the canonical formulation's Hamiltonian in any case.
         """
         return None
+
+    def narrow(self, m: Kinematics) -> list[Symbolic]:
+        """Arguments around whose zeros it changes abruptly, such as (t - t0) / width of a pulse or a switch.
+
+        They are dimensionless expressions of ``seconds(m)`` and the states. Steps chosen by the motion alone
+        would pass over such a zero; with them they shorten on the way there.
+        """
+        return written(m, narrow_parts(*(formula for _, formula in self.formulas())))
+
+    def roots(self, m: Kinematics) -> list[Symbolic]:
+        """Radicands in it that may touch zero, where no step may pass over the kink."""
+        return written(m, root_parts(*(formula for _, formula in self.formulas())))
 
     def told(self, scene: Scene) -> str:
         """What it is in a reader's terms, in one sentence for ``check``, ``plan`` and ``info``: sizes at the

@@ -19,7 +19,7 @@ from itertools import pairwise, product
 import heyoka as hy
 import numpy as np
 
-from rigidsim.model.capabilities import Narrow, having, orbit_of, table_of
+from rigidsim.model.capabilities import having, orbit_of, table_of
 from rigidsim.model.carriers import Carrier
 from rigidsim.model.formulations.formulation import Requirements
 from rigidsim.model.formulations.quaternion import quaternion_states
@@ -71,7 +71,7 @@ def estimate_drive(scene: Scene, loads: Sequence[Load], requirements: Requiremen
     inner = [term for carrier in carriers for term in carrier.exerted_torque(m)]
     force = [term for load in loads for term in force_terms(load, m)] if m.velocity is not None else []
     names, start = start_of(m, loads)
-    narrow = [u for load in having(Narrow, loads) for u in load.narrow(m)]
+    narrow = [u for load in loads for u in load.narrow(m)]
     in_time = (s.expression for s in surfaces_of(scene).found if names_used(s.expression) == {"t"})
     narrow += [to_heyoka(u, state_names(m, ("t",)), m.number, m.scene.context) for u in in_time]
     samples = _Samples(m, names, start, narrow)

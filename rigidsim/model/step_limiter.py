@@ -22,7 +22,6 @@ from collections.abc import Mapping
 
 import heyoka as hy
 
-from rigidsim.model.capabilities import Narrow, Rooted
 from rigidsim.model.euler_poles import components_of_factor, starts_in_pole
 from rigidsim.model.heyoka_expressions import to_heyoka
 from rigidsim.model.mechanics import Mechanics
@@ -41,7 +40,7 @@ _CLOCK = "t_of_pace"  # stands in for the time, by which heyoka doesn't differen
 def pace_block(m: Mechanics, before: StateBlock) -> list[StateBlock]:
     """The state that keeps steps from passing over a pulse or a switch in ``before``; none without."""
     watched = _arguments(m)
-    rooted = [(load.title, v) for load in m.loads if isinstance(load, Rooted) for v in load.roots(m)]
+    rooted = [(load.title, v) for load in m.loads for v in load.roots(m)]
     rooted += radicands(m)
     if not (watched or rooted):
         return []
@@ -56,7 +55,7 @@ def pace_block(m: Mechanics, before: StateBlock) -> list[StateBlock]:
 
 def _arguments(m: Mechanics) -> list[tuple[str, Symbolic]]:
     """(description, argument) of what is narrow in loads and events; dimensionless."""
-    found = [(load.title, u) for load in m.loads if isinstance(load, Narrow) for u in load.narrow(m)]
+    found = [(load.title, u) for load in m.loads for u in load.narrow(m)]
     found += narrow_arguments(m)
     angles = frozenset(EULER_NAMES)
     for event in m.scene.events:

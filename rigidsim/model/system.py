@@ -14,7 +14,7 @@ from rigidsim.model.capabilities import Ending, Ranged, having
 from rigidsim.model.formulations.formulation import Formulation, ModelPlan
 from rigidsim.model.heyoka_expressions import carries_sign, plain_angles, to_heyoka
 from rigidsim.model.mechanics import Mechanics
-from rigidsim.model.names import above_zero, state_names
+from rigidsim.model.names import above_zero, state_names, written
 from rigidsim.model.orbits.pieces import Pieces, PieceSeries
 from rigidsim.model.orbits.prescribed import TablePieces
 from rigidsim.model.outputs import Invariant, Recorded, drift_outputs, find_invariants, recorded_variables
@@ -22,7 +22,7 @@ from rigidsim.model.rotations import Symbolic
 from rigidsim.model.scaling import Rounder
 from rigidsim.model.state_blocks import StateBlock, joined
 from rigidsim.scene.expressions.names import EULER_NAMES
-from rigidsim.scene.expressions.tree import names_used, never_below_zero
+from rigidsim.scene.expressions.tree import bounds
 
 _LARGEST_EXPONENT = 1000  # of a recorded variable in SI: float64 ends at 2^1024, and sizes are known roughly
 _DIRECTIONS = {"any": 0, "up": 1, "down": -1}
@@ -234,7 +234,7 @@ class System:
         endings += [
             (f"{where} is negative", above_zero(m, expression), False)
             for where, expression in self.scene.never_negative()
-            if not never_below_zero(expression.root)
+            if bounds(expression)[0] < 0
         ]
         endings += [(*one, True) for load in having(Ranged, m.loads) for one in load.range_ends(m)]
         down = _DIRECTIONS["down"]
@@ -266,10 +266,7 @@ class System:
     @cached_property
     def surfaces(self) -> list[Symbolic]:
         """Arguments that vanish on switching surfaces; the parameter of the same number is the side, +-1."""
-        m, found = self.mechanics, [surface.expression for surface in self.plan.surfaces.found]
-        return [
-            to_heyoka(x, state_names(m, names_used(x)), m.number, m.scene.context, m.sides) for x in found
-        ]
+        return written(self.mechanics, (surface.expression for surface in self.plan.surfaces.found))
 
     @cached_property
     def turning(self) -> list[Symbolic]:

@@ -11,8 +11,6 @@ from rigidsim.scene.expressions.names import EULER_NAMES, PROVIDERS
 from rigidsim.scene.expressions.tree import (
     Expression,
     ExpressionError,
-    Node,
-    Operation,
     evaluate,
     names_used,
 )
@@ -46,7 +44,7 @@ def _check_branch(scene: Scene) -> list[Problem]:
     """Refuse expressions that read Euler angles if the start is given by the other of an attitude's two
     triples: they use the one whose middle angle is in its range, as found in every formulation.
     """
-    read = frozenset().union(*(names_used(e) for _, e in scene.formulas())) & set(EULER_NAMES)
+    read = names_used(*(expression for _, expression in scene.formulas())) & set(EULER_NAMES)
     if scene.euler_angles is None or not read:
         return []
     sequence, middle, pi = scene.config.integrator.euler_sequence, scene.euler_angles[1], scene.context.pi
@@ -110,8 +108,8 @@ def _check_span(where: str, expression: Expression, scene: Scene) -> list[Proble
     no later time that is tried; the last time at which it has one is found by bisection.
     """
     problems, context = [], scene.context
-    for node in _functions_of_time(expression):
-        part, span = Expression(expression.text, node), scene.end - scene.start
+    for part in _functions_of_time(expression):
+        span = scene.end - scene.start
         tried = [_refusal(part, scene.start + span * n / _TIMES, context) for n in range(_TIMES + 1)]
         if tried[0] is not None or None in tried[1:]:
             continue
@@ -134,14 +132,14 @@ def _refusal(expression: Expression, time: Any, context: Any) -> ExpressionError
     return None
 
 
-def _functions_of_time(expression: Expression) -> list[Node]:
+def _functions_of_time(expression: Expression) -> list[Expression]:
     """The largest parts of an expression that depend on time and on nothing else."""
-    found, waiting = [], [expression.root]
+    found, waiting = [], [expression]
     while waiting:
         node = waiting.pop()
-        names = names_used(Expression(expression.text, node))
+        names = names_used(node)
         if names == {"t"}:
             found.append(node)
-        elif names and isinstance(node, Operation):
+        elif names:
             waiting += node.operands
     return found

@@ -16,11 +16,10 @@ from rigidsim.scene.expressions.piecewise import on_sides
 from rigidsim.scene.expressions.tree import (
     Expression,
     ExpressionError,
-    Node,
-    Operation,
     evaluate,
     names_used,
     nodes,
+    operations,
     readables,
 )
 from rigidsim.scene.scene import Scene
@@ -60,7 +59,7 @@ class Surfaces:
     """
 
     found: tuple[Surface, ...] = ()
-    places: Mapping[Node, tuple[int, int]] = field(default_factory=dict)
+    places: Mapping[Expression, tuple[int, int]] = field(default_factory=dict)
     turning: tuple[str, ...] = ()
     signed: bool = False
 
@@ -73,29 +72,26 @@ class Surfaces:
 def surfaces_of(scene: Scene) -> Surfaces:
     """Find the surfaces in the loads and events of a scene."""
     expressions = scene.formulas()
-    arguments: dict[Node, Surface] = {}
+    arguments: dict[Expression, Surface] = {}
     for where, expression in expressions:
-        for node in nodes(expression):
-            if isinstance(node, Operation) and node.operator == "sign":
-                argument = Expression(expression.text, node.operands[0])
-                if names_used(argument):
-                    text = expression.text[slice(*node.span)]
-                    arguments.setdefault(argument.root, Surface(argument, text, where))
-    read = {readable.name: readable for _, expression in expressions for readable in readables(expression)}
+        for node in operations(expression):
+            if node.operator == "sign" and names_used(node.operands[0]):
+                arguments.setdefault(node.operands[0], Surface(node.operands[0], node.text, where))
+    read = {readable.name: readable for readable in readables(*(expression for _, expression in expressions))}
     if not arguments and not any("attitude" in readable.states for readable in read.values()):
         return Surfaces()
     states = random_states(scene)
     context = scene.context
     found: list[Surface] = []
-    places: dict[Node, tuple[int, int]] = {}
+    places: dict[Expression, tuple[int, int]] = {}
     first: dict[int, tuple[int, int]] = {}  # of each kind: its place
     kinds = _kinds(arguments, states, context)
-    for node, surface in arguments.items():
-        kind, sign = kinds[node]
+    for argument, surface in arguments.items():
+        kind, sign = kinds[argument]
         if kind not in first:
             first[kind] = len(found), sign
             found.append(surface)
-        places[node] = first[kind][0], sign * first[kind][1]
+        places[argument] = first[kind][0], sign * first[kind][1]
     parts = [*(expression for _, expression in expressions), *(s.expression for s in found)]
     turn = 2 * context.pi
     turning = tuple(
@@ -143,20 +139,20 @@ def changes(
 
 
 def _kinds(
-    arguments: Mapping[Node, Surface], states: Sequence[Mapping[str, Any]], context: Any
-) -> dict[Node, tuple[int, int]]:
+    arguments: Mapping[Expression, Surface], states: Sequence[Mapping[str, Any]], context: Any
+) -> dict[Expression, tuple[int, int]]:
     """The kind of each argument, a number that those in a constant ratio share, and the ratio's sign.
 
     They are compared in all digits of the scene, and a sign within them has both values at random, wherever
     its own surface lies: ``max(t - 5, 0) - 1`` and ``max(t - 8, 0) - 1`` are equal before 5.
     """
-    found: dict[Node, tuple[int, int]] = {}
+    found: dict[Expression, tuple[int, int]] = {}
     known: list[list[Any]] = []
     generator = random.Random(1)
     drawn = [[generator.choice((1, -1)) for _ in arguments] for _ in states]
     agreement = negligible(context)
 
-    def inner_first(item: tuple[Node, Surface]) -> int:
+    def inner_first(item: tuple[Expression, Surface]) -> int:
         return sum(1 for _ in nodes(item[1].expression))
 
     with context.workprec(context.prec + GUARD_BITS):

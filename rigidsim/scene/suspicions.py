@@ -74,7 +74,7 @@ def _constant_arguments(expression: Expression) -> list[tuple[str, ExactNumber]]
             (argument,) = node.operands
             value = argument.value if isinstance(argument, Constant) else None
             whole = value is not None and not value.pi_power and value.rational.denominator == 1
-            literal = expression.text[slice(*argument.span)].lstrip("+- ").replace(".", "").isdigit()
+            literal = argument.text.lstrip("+- ").replace(".", "").isdigit()
             if value is not None and whole and literal and abs(value.rational) > _TURN:
                 found.append((node.operator, value))
     return found
@@ -102,7 +102,7 @@ def unreachable_events(events: Sequence[Event]) -> list[Problem]:
     """Events that compare the middle Euler angle with what it never is: meant in degrees?"""
     found = []
     for number, event in enumerate(events):
-        root = event.expression.root
+        root = event.expression
         parts = root.operands if isinstance(root, Operation) and root.operator == "sum" else ()
         constants = [float(part.value) for part in parts if isinstance(part, Constant)]
         names = [part.name for part in parts if isinstance(part, Name)]

@@ -13,25 +13,21 @@ worked out from such a time, gives another impulse than the one that was written
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping
-from fractions import Fraction
 from typing import Any
 
-from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.expressions.tree import (
     Constant,
     Expression,
     ExpressionError,
     LineInTime,
-    Node,
-    Operation,
+    bounds,
+    constant,
     evaluate,
-    fold,
     lines_in,
     names_used,
-    operation,
     operations,
+    placed,
+    rational_value,
 )
 from rigidsim.scene.scene import Scene
 
@@ -44,115 +40,55 @@ _LATE = 64
 """Ratio of a time to the width of what happens then from which a rounded time counts: below it the error, a
 part in 2^46 of the impulse in double precision, is no more than that of some steps.
 """
-_BOUNDED: Mapping[str, float] = {
-    "sin": 1, "cos": 1, "sign": 1, "tanh": 1, "erf": 1, "sigmoid": 1,
-    "atan": 2, "asin": 2, "acos": 4, "atan2": 4,
-}  # fmt: skip
 
 
-def narrow_parts(expression: Expression) -> list[Expression]:
+def narrow_parts(*expressions: Expression) -> list[Expression]:
     """Arguments of flat functions, denominators, bases of negative or high powers, if they leave ``WIDE``."""
-    found: dict[Node, None] = {}
-    for node in operations(expression):
-        part: Node | None = None
+    found: dict[Expression, None] = {}
+    for node in (node for expression in expressions for node in operations(expression)):
+        part: Expression | None = None
         if node.operator in _FLAT:
             part = node.operands[0]
         elif node.operator == "quotient":
             part = node.operands[1]
         elif node.operator == "power":
             base, power = node.operands
-            exponent = abs(_bound(Expression(expression.text, power), signed=True))
-            if exponent > _STEEP_POWER and isinstance(power, Constant):  # flat to a part in n of the base
-                part = operation("product", (power, base), base.span)
+            low, high = bounds(power, always=False)
+            if max(-low, high) > _STEEP_POWER and isinstance(power, Constant):
+                part = placed(power * base, base.place)  # flat to a part in n of the base
             elif not isinstance(power, Constant) or power.value.sign < 0:
                 part = base
-        if part is not None and _bound(Expression(expression.text, part)) > WIDE:
-            found[part] = None
-    return [Expression(expression.text, part) for part in found if not _constant(part)]
+        if part is not None and not isinstance(part, Constant):
+            low, high = bounds(part, always=False)
+            if max(-low, high) > WIDE:
+                found[part] = None
+    return list(found)
 
 
-def root_parts(expression: Expression) -> list[Expression]:
+def root_parts(*expressions: Expression) -> list[Expression]:
     """Radicands that may touch zero, where the root has a kink; not those that are positive by their form."""
-    found: dict[Node, None] = {}
-    for node in operations(expression):
-        part: Node | None = None
+    found: dict[Expression, None] = {}
+    for node in (node for expression in expressions for node in operations(expression)):
+        part: Expression | None = None
         if node.operator == "sqrt":
             part = node.operands[0]
         elif node.operator == "power":
             base, power = node.operands
-            whole = isinstance(power, Constant) and not power.value.pi_power
-            if not (whole and power.value.rational.denominator == 1):  # type: ignore[union-attr]
-                part = base
+            exponent = rational_value(power)
+            part = base if exponent is None or exponent.denominator != 1 else None
         elif node.operator in ("asin", "acos"):
             (x,) = node.operands
-            two, one = (Constant(ExactNumber(Fraction(n)), x.span) for n in (2, 1))
-            square = operation("power", (x, two), x.span)
-            part = operation("sum", (one, operation("negative", (square,), x.span)), x.span)
-        if part is not None and not _least(Expression(expression.text, part)) > 0:
+            part = placed(1 - x ** constant(2), x.place)
+        if part is not None and not isinstance(part, Constant) and not bounds(part)[0] > 0:
             found[part] = None
-    return [Expression(expression.text, part) for part in found if not _constant(part)]
-
-
-def _least(expression: Expression) -> float:
-    """Lower bound of the value; -infinity if there is none."""
-
-    def combine(node: Node, operands: list[Any]) -> float:
-        if isinstance(node, Constant):
-            return float(node.value)
-        if not isinstance(node, Operation):
-            return -math.inf if node.of.turns else -node.of.bound
-        if node.operator == "sum":
-            return float(sum(operands))
-        if node.operator in ("exp", "sqrt", "sigmoid"):
-            return 0.0
-        if node.operator in ("product", "quotient") and min(operands) >= 0:
-            return 0.0 if node.operator == "quotient" or 0 in operands else math.prod(operands)
-        if node.operator == "power" and isinstance(node.operands[1], Constant):
-            exponent = node.operands[1].value
-            even = not exponent.pi_power and exponent.rational % 2 == 0
-            return 0.0 if even or operands[0] >= 0 else -math.inf
-        return -_BOUNDED.get(node.operator, math.inf)
-
-    return float(fold(expression, combine))
-
-
-def _constant(node: Node) -> bool:
-    return isinstance(node, Constant)
-
-
-def _bound(expression: Expression, *, signed: bool = False) -> float:
-    """Upper bound of the absolute value, or of the value itself if ``signed``; infinite if there is none."""
-
-    def combine(node: Node, operands: list[Any]) -> float:
-        if isinstance(node, Constant):
-            value = float(node.value)
-            return value if signed else abs(value)
-        if not isinstance(node, Operation):
-            return node.of.bound
-        if node.operator in _BOUNDED:
-            return _BOUNDED[node.operator]
-        if node.operator == "sum":
-            return float(sum(operands))
-        if node.operator == "negative":
-            return float(-operands[0] if signed else operands[0])
-        if node.operator == "product":
-            return 0.0 if 0 in operands else math.prod(operands)
-        if node.operator == "power" and isinstance(node.operands[1], Constant):
-            exponent = float(node.operands[1].value)
-            return operands[0] ** exponent if exponent > 0 and operands[0] < 1e4 else math.inf
-        return math.inf
-
-    return float(fold(expression, combine))
+    return list(found)
 
 
 def happens_at_a_moment(scene: Scene) -> bool:
     """Whether a load or a state switches at a time, or changes late and within a short while."""
-    for _, expression in scene.acting_formulas():
-        if any(_within(line, scene) for line in _of_switches(expression, scene.context)):
-            return True
-        if any(_late(part, scene) for part in narrow_parts(expression)):
-            return True
-    return False
+    acting = [expression for _, expression in scene.acting_formulas()]
+    switching = (_within(line, scene) for x in acting for line in _of_switches(x, scene.context))
+    return any(switching) or any(_late(part, scene) for part in narrow_parts(*acting))
 
 
 def acts_at_moments_alone(scene: Scene) -> bool:
@@ -173,7 +109,7 @@ def _of_switches(expression: Expression, context: Any) -> list[LineInTime]:
     found = []
     for node in operations(expression):
         if node.operator == "sign":
-            found += lines_in(Expression(expression.text, node.operands[0]), context)
+            found += lines_in(node.operands[0], context)
     return [line for line in found if line.offset != 0]
 
 

@@ -5,7 +5,6 @@ from typing import Any
 
 import numpy as np
 
-from rigidsim.model.capabilities import Rooted, having
 from rigidsim.scene.expressions.tree import (
     Expression,
     ExpressionError,
@@ -77,7 +76,7 @@ def closing_words(prepared: InitialValueProblem, progress: Progress, parts: Asse
             return text + reason
         m = prepared.system.mechanics
         states = any(root_parts(state.derivative) for state in prepared.scene.states)
-        if states or any(load.roots(m) for load in having(Rooted, m.loads)):
+        if states or any(load.roots(m) for load in m.loads):
             text += (
                 "; a root of zero has no series: if one vanished there, such as a norm, write "
                 "abs(u) for the component u that moves, or add a small number under the root"
@@ -133,10 +132,9 @@ def _why_it_broke(prepared: InitialValueProblem, time: float) -> str:
 
 def _parts(scene: Scene) -> Iterator[tuple[str, Expression]]:
     for where, expression in scene.acting_formulas():
-        kinks = (node.operands[0] for node in operations(expression) if node.operator == "sign")
-        for part in (*narrow_parts(expression), *(Expression(expression.text, u) for u in kinks)):
-            if names_used(part) == {"t"}:
-                yield where, Expression(expression.text[slice(*part.root.span)], part.root)
+        kinks = [node.operands[0] for node in operations(expression) if node.operator == "sign"]
+        parts = (*narrow_parts(expression), *kinks)
+        yield from ((where, part) for part in parts if names_used(part) == {"t"})
 
 
 def _width(part: Expression, moment: Any, context: Any) -> Any | None:
@@ -157,14 +155,12 @@ def _width(part: Expression, moment: Any, context: Any) -> Any | None:
 
 def _beyond(expression: Expression, time: float, most: int, context: Any) -> str:
     """The text of a part that depends on time alone and has a value of at least 2^most."""
-    for node in operations(expression):
-        text = expression.text[slice(*node.span)]
-        part = Expression(expression.text, node)
+    for part in operations(expression):
         if names_used(part) == {"t"}:
             try:
                 value = evaluate(part, {"t": context.mpf(time)}, context)
             except ExpressionError:
-                return text
+                return part.text
             if context.mag(value) > most:
-                return text
+                return part.text
     return ""

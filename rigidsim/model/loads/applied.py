@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, ClassVar, Literal
 
 from pydantic import Field
 
-from rigidsim.model.heyoka_expressions import to_heyoka
 from rigidsim.model.kinematics import Kinematics
 from rigidsim.model.load import Load, Term
 from rigidsim.model.load_words import span_words, value_text
-from rigidsim.model.names import state_names
+from rigidsim.model.names import written
 from rigidsim.model.rotations import Symbolic, apply, transpose
 from rigidsim.scene.arithmetic import Vector, cross, diagonal, norm, parallel
 from rigidsim.scene.arithmetic import apply as apply_numbers
@@ -31,7 +30,6 @@ from rigidsim.scene.fields import Formula, Metre, Triple
 from rigidsim.scene.initial_values import start_values
 from rigidsim.scene.registry import LoadFields, Surroundings, register_load
 from rigidsim.scene.scene import Scene
-from rigidsim.scene.transitions import narrow_parts, root_parts
 
 _LONGEST = 60  # characters of an expression that are shown
 
@@ -106,13 +104,13 @@ class Applied(Load):
     @property
     def names(self) -> frozenset[str]:
         """Names that the expressions use."""
-        return frozenset().union(*(names_used(c) for c in self.components))
+        return names_used(*self.components)
 
     @property
     def reads(self) -> frozenset[str]:  # type: ignore[override]
         turns = self.title == "torque" or any(x != 0 for x in self.arm)
         crosses = (turns and self.frame == "space") or (self.pushes and self.frame == "body")
-        found = frozenset().union(*(states_read(c) for c in self.components))
+        found = states_read(*self.components)
         return found | ({"attitude"} if crosses else set()) | ({"flight"} if self.pushes else set())
 
     @property
@@ -149,12 +147,12 @@ class Applied(Load):
         return said
 
     def _in_body(self, m: Kinematics) -> list[Symbolic]:
-        found = self._heyoka(m, self.components)
+        found = written(m, self.components)
         return apply(transpose(m.matrix), found) if self.frame == "space" else found
 
     def linear_potential(self, scene: Scene) -> tuple[Vector, Vector] | None:
         """Arm and force, if the force is constant in space; None otherwise."""
-        found = [x.root.value for x in self.components if isinstance(x.root, Constant)]
+        found = [x.value for x in self.components if isinstance(x, Constant)]
         if self.title != "force" or self.frame != "space" or len(found) < 3:
             return None
         return self.arm, [value.at(scene.context) for value in found]
@@ -169,27 +167,13 @@ class Applied(Load):
         turns = (lambda n: n != 0) if self.title == "torque" else (lambda n: abs(n) != 1)
         return any(a and turns(n) for a, n in zip(acting, axis, strict=True))
 
-    def narrow(self, m: Kinematics) -> list[Symbolic]:
-        return self._parts(m, narrow_parts)
-
-    def roots(self, m: Kinematics) -> list[Symbolic]:
-        return self._parts(m, root_parts)
-
-    def _parts(self, m: Kinematics, of: Callable[[Expression], Iterable[Expression]]) -> list[Symbolic]:
-        parts = {part.root: part for c in self.components for part in of(c)}
-        return self._heyoka(m, parts.values())
-
-    def _heyoka(self, m: Kinematics, expressions: Iterable[Expression]) -> list[Symbolic]:
-        variables = state_names(m, self.names)
-        return [to_heyoka(x, variables, m.number, m.scene.context, m.sides) for x in expressions]
-
 
 def _brief(text: str) -> str:
     return text if len(text) <= _LONGEST else text[: _LONGEST - 3] + "..."
 
 
 def _vanishes(component: Expression) -> bool:
-    return isinstance(component.root, Constant) and component.root.value.sign == 0
+    return isinstance(component, Constant) and component.value.sign == 0
 
 
 @register_load
@@ -234,7 +218,7 @@ class Force(Applied):
         if m.velocity is None:
             return []
         context = m.scene.context
-        found = self._heyoka(m, self.components)
+        found = written(m, self.components)
         if self.frame == "body":
             found = apply(m.matrix, found)
         size = context.ldexp(1 / m.carried(m.scene.body.mass), m.scaling.time - m.scaling.speed)

@@ -23,7 +23,6 @@ from rigidsim.scene.initial_values import start_values
 from rigidsim.scene.readable import number_text
 from rigidsim.scene.registry import Surroundings, register_load
 from rigidsim.scene.scene import Scene
-from rigidsim.scene.transitions import narrow_parts, root_parts
 
 
 @register_load
@@ -109,7 +108,7 @@ class SteeredDipole(MagneticDipole):
 
     @property
     def reads(self) -> frozenset[str]:  # type: ignore[override]
-        return super().reads.union(*map(states_read, self.law))
+        return super().reads | states_read(*self.law)
 
     def formulas(self) -> Iterator[tuple[str, Expression]]:
         for i, component in enumerate(self.law):
@@ -128,12 +127,6 @@ class SteeredDipole(MagneticDipole):
     def keeps_plane(self, scene: Scene, axis: Vector, normal: Vector) -> bool:
         return False
 
-    def narrow(self, m: Kinematics) -> list[Symbolic]:
-        return written(m, (part for component in self.law for part in narrow_parts(component)))
-
-    def roots(self, m: Kinematics) -> list[Symbolic]:
-        return written(m, (part for component in self.law for part in root_parts(component)))
-
     def amplitude(self, scene: Scene) -> Any | None:
         return None
 
@@ -146,17 +139,17 @@ class SteeredDipole(MagneticDipole):
 
 def _text(component: Expression) -> str:
     """A component as written; a number has no text of its own."""
-    if isinstance(component.root, Constant) and not component.text:
-        return number_text(float(component.root.value), 6)
+    if isinstance(component, Constant) and not component.text:
+        return number_text(float(component.value), 6)
     return component.text
 
 
 def _law(given: list[Any], around: Surroundings) -> tuple[Expression, ...]:
     """Components of a moment, of which some are expressions."""
-    found = []
+    found: list[Expression] = []
     for i, x in enumerate(given):
         if isinstance(x, ExactNumber):
-            found.append(Expression("", Constant(x, (0, 0))))
+            found.append(Constant(x))
             continue
         try:
             found.append(parse_expression(x, around.names, parameters=around.parameters, unit="A m^2"))

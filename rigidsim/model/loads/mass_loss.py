@@ -17,19 +17,17 @@ mass distribution changes: nothing here changes them.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Literal
 
 from pydantic import Field
 
 from rigidsim.errors import ConfigError, Problem
-from rigidsim.model.heyoka_expressions import to_heyoka
 from rigidsim.model.kinematics import Kinematics
 from rigidsim.model.load import Load, Term
 from rigidsim.model.load_words import value_text
-from rigidsim.model.names import state_names
-from rigidsim.model.rotations import Symbolic
+from rigidsim.model.names import written
 from rigidsim.scene.arithmetic import Matrix, Vector, norm
 from rigidsim.scene.exact import ZERO
 from rigidsim.scene.expressions.parser import parse_expression
@@ -38,7 +36,6 @@ from rigidsim.scene.expressions.tree import (
     Expression,
     ExpressionError,
     evaluate,
-    names_used,
     states_read,
 )
 from rigidsim.scene.fields import Formula, Metre, Triple
@@ -46,7 +43,6 @@ from rigidsim.scene.initial_values import start_values
 from rigidsim.scene.registry import LoadFields, Surroundings, register_load
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.tracing.numbers import plain
-from rigidsim.scene.transitions import narrow_parts, root_parts
 
 
 class MassLossFields(LoadFields):
@@ -118,8 +114,7 @@ class MassLoss(Load):
         return ConfigError(Problem(f"[[loads]] number {self.number + 1} mass_loss", what))
 
     def acts(self) -> bool:
-        root = self.rate.root
-        vanishes = isinstance(root, Constant) and root.value.sign == 0
+        vanishes = isinstance(self.rate, Constant) and self.rate.value.sign == 0
         return not vanishes and any(x != 0 for row in self.geometry for x in row)
 
     @property
@@ -129,20 +124,6 @@ class MassLoss(Load):
     def formulas(self) -> Iterator[tuple[str, Expression]]:
         yield f"[[loads]] number {self.number + 1} rate", self.rate
 
-    def narrow(self, m: Kinematics) -> list[Symbolic]:
-        return self._parts(m, narrow_parts)
-
-    def roots(self, m: Kinematics) -> list[Symbolic]:
-        return self._parts(m, root_parts)
-
-    def _parts(self, m: Kinematics, of: Callable[[Expression], Iterable[Expression]]) -> list[Symbolic]:
-        parts = {part.root: part for part in of(self.rate)}
-        return [self._heyoka(m, part) for part in parts.values()]
-
-    def _heyoka(self, m: Kinematics, expression: Expression) -> Symbolic:
-        variables = state_names(m, names_used(expression))
-        return to_heyoka(expression, variables, m.number, m.scene.context, m.sides)
-
     def torque(self, m: Kinematics) -> list[Term]:
         """Refused beside a weight, whose torque is that of a constant mass."""
         context, scaling = m.scene.context, m.scaling
@@ -151,7 +132,7 @@ class MassLoss(Load):
                 "given beside uniform_gravity on a body that is held off its centre of mass, whose weight is "
             )
             raise self._fault(what + "that of a constant mass; hold it at its centre of mass")
-        rate, terms = self._heyoka(m, self.rate), []
+        (rate,), terms = written(m, [self.rate]), []
         for column, (state, unit) in enumerate(zip(m.rate_states, m.numbers.rate_units, strict=True)):
             size = context.ldexp(unit, -scaling.time - scaling.energy)
             vector = [-size * row[column] for row in self.geometry]

@@ -13,17 +13,16 @@ their motion relative to the body isn't counted. In a field, potential energy ch
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
 import heyoka as hy
 
-from rigidsim.model.heyoka_expressions import to_heyoka
 from rigidsim.model.inertia import MassDistribution, absent
 from rigidsim.model.kinematics import Kinematics
 from rigidsim.model.load import Load, Term, loads_of
-from rigidsim.model.names import state_names
+from rigidsim.model.names import written
 from rigidsim.model.own_states import driven, own_blocks
 from rigidsim.model.rotations import Symbolic
 from rigidsim.scene.arithmetic import Vector
@@ -35,7 +34,6 @@ from rigidsim.scene.registry import Surroundings, register_of_body
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.schema import Config
 from rigidsim.scene.tracing.numbers import plain
-from rigidsim.scene.transitions import narrow_parts, root_parts
 
 _CLOCK = "t_of_moments"
 _ELEMENTS = ("moment_x", "moment_y", "moment_z")
@@ -86,25 +84,11 @@ class MovedMass(Load):
 
     @property
     def reads(self) -> frozenset[str]:  # type: ignore[override]
-        return frozenset().union(*(states_read(x) for _, x in self.formulae))
+        return states_read(*(x for _, x in self.formulae))
 
     def formulas(self) -> Iterator[tuple[str, Expression]]:
         for axis, expression in self.formulae:
             yield f"{WHERE}[{axis}]", expression
-
-    def narrow(self, m: Kinematics) -> list[Symbolic]:
-        return self._parts(m, narrow_parts)
-
-    def roots(self, m: Kinematics) -> list[Symbolic]:
-        return self._parts(m, root_parts)
-
-    def _parts(self, m: Kinematics, of: Callable[[Expression], Iterable[Expression]]) -> list[Symbolic]:
-        parts = {part.root: part for _, x in self.formulae for part in of(x)}
-        return [self._heyoka(m, part) for part in parts.values()]
-
-    def _heyoka(self, m: Kinematics, expression: Expression) -> Symbolic:
-        variables = state_names(m, names_used(expression))
-        return to_heyoka(expression, variables, m.number, m.scene.context, m.sides)
 
     # --- the tensor -----------------------------------------------------------------------------------------
 
@@ -121,7 +105,7 @@ class MovedMass(Load):
         changes: list[Any] = []
         for given in self.moments:
             if isinstance(given, Expression):
-                moments.append(unit * self._heyoka(m, given))
+                moments.append(unit * written(m, [given])[0])
                 changes.append(_along_motion(moments[-1], slopes))
             else:
                 moments.append(hy.expression(m.number(context.ldexp(given, -m.scaling.inertia))))

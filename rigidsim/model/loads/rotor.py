@@ -18,30 +18,28 @@ J s a . (w - w0): what stays then is w . I w / 2 of the body with that rotor loc
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import heyoka as hy
 
-from rigidsim.model.heyoka_expressions import to_heyoka
 from rigidsim.model.kinematics import Kinematics
 from rigidsim.model.load import Load, Term
 from rigidsim.model.load_words import axis_text, value_text
-from rigidsim.model.names import in_si, state_names
+from rigidsim.model.names import in_si, written
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.scaling import exponent
 from rigidsim.model.state_blocks import StateBlock
 from rigidsim.scene.arithmetic import Vector, apply, dot, norm
 from rigidsim.scene.expressions.names import NameProvider, Readable, provides
 from rigidsim.scene.expressions.parser import parse_expression
-from rigidsim.scene.expressions.tree import Expression, ExpressionError, names_used, states_read
+from rigidsim.scene.expressions.tree import Expression, ExpressionError, states_read
 from rigidsim.scene.registry import Surroundings, register_table
 from rigidsim.scene.rotors import Bearing, RotorTable
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.schema import Config
 from rigidsim.scene.tracing.numbers import plain
-from rigidsim.scene.transitions import narrow_parts, root_parts
 
 
 @register_table("rotors")
@@ -108,20 +106,6 @@ class Rotor(Load):
         if self.motor is not None:
             yield f"[[rotors]] number {self.number + 1} torque", self.motor
 
-    def narrow(self, m: Kinematics) -> list[Symbolic]:
-        return self._parts(m, narrow_parts)
-
-    def roots(self, m: Kinematics) -> list[Symbolic]:
-        return self._parts(m, root_parts)
-
-    def _parts(self, m: Kinematics, of: Callable[[Expression], Iterable[Expression]]) -> list[Symbolic]:
-        parts = {} if self.motor is None else {part.root: part for part in of(self.motor)}
-        return [self._heyoka(m, part) for part in parts.values()]
-
-    def _heyoka(self, m: Kinematics, expression: Expression) -> Symbolic:
-        variables = state_names(m, names_used(expression))
-        return to_heyoka(expression, variables, m.number, m.scene.context, m.sides)
-
     # --- its momentum ---------------------------------------------------------------------------------------
 
     def starting_momentum(self, scene: Scene) -> Any:
@@ -151,7 +135,7 @@ class Rotor(Load):
         context, unit = m.scene.context, self._unit(m)
         factor = m.number(context.ldexp(context.one, m.scaling.time - unit))
         start = context.ldexp(self.starting_momentum(m.scene), -unit)
-        slope = factor * self._heyoka(m, self.motor)
+        slope = factor * written(m, [self.motor])[0]
         why = f"momentum of {self.title} about its axis, which its motor changes"
         return StateBlock([self._state], [slope], [start], exponents=[unit], why=why)
 
@@ -200,14 +184,14 @@ class Rotor(Load):
         if self.motor is None:
             return []
         size = m.scene.context.ldexp(m.scene.context.one, -m.scaling.energy)
-        return [([-size * x for x in self.axis], self._heyoka(m, self.motor))]
+        return [([-size * x for x in self.axis], written(m, [self.motor])[0])]
 
     def supplied_power(self, m: Kinematics) -> Symbolic | None:
         """What the motor does on the body, -torque a . w."""
         if self.motor is None:
             return None
         size = m.number(m.scene.context.ldexp(m.scene.context.one, -m.scaling.energy))
-        return -(size * (self._heyoka(m, self.motor) * self._about_axis(m)))
+        return -(size * (written(m, [self.motor])[0] * self._about_axis(m)))
 
     def carried_at_start(self, scene: Scene) -> tuple[Vector, Any]:
         momentum = self.starting_momentum(scene)

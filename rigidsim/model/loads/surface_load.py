@@ -7,7 +7,7 @@ or the stream, are surfaces on which steps end, and the states that they take ar
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -26,7 +26,6 @@ from rigidsim.scene.expressions.tree import Expression, ExpressionError, evaluat
 from rigidsim.scene.initial_values import start_values
 from rigidsim.scene.registry import Surroundings
 from rigidsim.scene.scene import Scene
-from rigidsim.scene.transitions import narrow_parts, root_parts
 
 
 @dataclass(frozen=True)
@@ -56,27 +55,24 @@ class SurfaceLoad(Load):
     @property
     def expressions(self) -> tuple[Expression, ...]:
         """All different ones, factors first."""
-        found = {x.root: x for x in (*self.factors, *(push.expression for push in self.pushes))}
-        return tuple(found.values())
+        return tuple(dict.fromkeys((*self.factors, *(push.expression for push in self.pushes))))
 
     def formulas(self) -> Iterator[tuple[str, Expression]]:
         where = f"[[loads]] number {self.number + 1} {self.title}"
-        plates = {push.expression.root: push.plate for push in reversed(self.pushes) if push.plate}
+        plates = {push.expression: push.plate for push in reversed(self.pushes) if push.plate}
         for expression in self.expressions:
-            plate = plates.get(expression.root)
+            plate = plates.get(expression)
             yield (f"[body] {plate}, under {where}" if plate else where), expression
 
     @property
     def reads(self) -> frozenset[str]:  # type: ignore[override]
-        found = frozenset({"attitude"}).union(*map(states_read, self.expressions))
-        return found | ({"flight"} if self.flies else set())
+        return states_read(*self.expressions) | {"attitude"} | ({"flight"} if self.flies else set())
 
     def _acting(self, m: Kinematics) -> list[tuple[Push, Symbolic]]:
         """The pushes with their expressions times the factors."""
         factors = written(m, self.factors)
         found = dict(zip(self.expressions, written(m, self.expressions), strict=True))
-        by_root = {expression.root: value for expression, value in found.items()}
-        return [(push, hy.prod([*factors, by_root[push.expression.root]])) for push in self.pushes]
+        return [(push, hy.prod([*factors, found[push.expression]])) for push in self.pushes]
 
     def torque(self, m: Kinematics) -> list[Term]:
         """Torque place x force."""
@@ -102,15 +98,6 @@ class SurfaceLoad(Load):
             parts = [m.number(p.along[i] / largest) * value for p, value in acting if p.along[i] != 0]
             sums.append(hy.sum(parts) if parts else hy.expression(0.0))
         return list(zip(diagonal([size * largest] * 3), apply(m.matrix, sums), strict=True))
-
-    def narrow(self, m: Kinematics) -> list[Symbolic]:
-        return self._parts(m, narrow_parts)
-
-    def roots(self, m: Kinematics) -> list[Symbolic]:
-        return self._parts(m, root_parts)
-
-    def _parts(self, m: Kinematics, of: Callable[[Expression], Iterable[Expression]]) -> list[Symbolic]:
-        return written(m, {part.root: part for x in self.expressions for part in of(x)}.values())
 
     def _at_start(self, scene: Scene) -> tuple[Vector, Vector]:
         """Body axes, N and N m (mpf)."""

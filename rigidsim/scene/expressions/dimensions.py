@@ -15,16 +15,12 @@ from fractions import Fraction
 
 from rigidsim.scene import units
 from rigidsim.scene.exact import ExactNumber, Quantity
-from rigidsim.scene.expressions.names import Readable
+from rigidsim.scene.expressions.tree import Constant, Expression, ExpressionError, Name, Operation
 
 _WORD_OF_UNIT = re.compile(
     r"[ \t]*(?P<join>[*/]?)[ \t]*(?P<name>[A-Za-z][A-Za-z0-9_]*)"
     r"(?P<power>[ \t]*(?:\^|\*\*)[ \t]*-?[0-9]+(?![\d.]))?"
 )
-
-
-class DimensionError(ValueError):
-    """Values of different dimensions where one is needed; the text says which."""
 
 
 @dataclass(frozen=True)
@@ -36,15 +32,15 @@ class Measure:
     powers: units.Powers | None
     written: bool = False
 
-    def times(self, other: Measure, power: int = 1) -> Measure:
-        """Dimension of the product with a power (1 or -1) of another value."""
+    def times(self, other: Measure, power: Fraction | int = 1) -> Measure:
+        """Dimension of the product with a power of another value."""
         written = self.written or other.written
         if self.powers is None or other.powers is None:
             return Measure(None, written)
         found = dict(self.powers)
         for base, exponent in other.powers:
             found[base] = found.get(base, Fraction(0)) + power * exponent
-        return Measure(_sorted(found), written)
+        return Measure(tuple(sorted((base, n) for base, n in found.items() if n)), written)
 
     def power(self, exponent: ExactNumber | None) -> Measure:
         """Dimension of a power; for an exponent that isn't rational, only that of a number stays known."""
@@ -52,16 +48,7 @@ class Measure:
             return self
         if exponent is None or exponent.pi_power:
             return Measure(None, self.written)
-        return Measure(_sorted({base: p * exponent.rational for base, p in self.powers}), self.written)
-
-    def with_other(self, other: Measure) -> Measure:
-        """Dimension of a sum or comparison; ``DimensionError`` if they differ and either has a unit."""
-        written = self.written or other.written
-        if self.powers is None or other.powers is None or self.powers == other.powers:
-            return Measure(other.powers if self.powers is None else self.powers, written)
-        if written:
-            raise DimensionError(f"{self} and {other} can't be added or compared")
-        return Measure(None)
+        return Measure((), self.written).times(self, exponent.rational)
 
     def __str__(self) -> str:
         if self.powers is None:
@@ -69,55 +56,75 @@ class Measure:
         return f'a value in "{units.unit_text(self.powers)}"' if self.powers else "a number or an angle"
 
 
-NUMBER = Measure(())
-ANY = Measure(None)
+NUMBER, ANY = Measure(()), Measure(None)
 
 
-def of_name(readable: Readable) -> Measure:
+def of_constant(node: Constant) -> Measure:
+    """Dimension of a number: that of its unit, if it has one."""
+    unit = node.value.unit if isinstance(node.value, Quantity) else None
+    return ANY if unit is None else Measure(units.powers(unit), written=True)
+
+
+def of_name(node: Name) -> Measure:
     """Dimension of what a name stands for."""
-    if readable.unit is None:
+    unit = node.of.unit
+    return ANY if unit is None else Measure(units.powers(unit)) if unit else NUMBER
+
+
+def of_operation(node: Operation, operands: Sequence[Measure], last: Expression | None) -> Measure:
+    """Dimension of an operation as it is written.
+
+    Args:
+        last: its last operand with constants folded.
+
+    Raises:
+        ExpressionError: values of different dimensions where one is needed.
+    """
+    if not operands:
         return ANY
-    if not readable.unit:
-        return NUMBER
-    return Measure(units.powers(readable.unit))
-
-
-def of_number(number: ExactNumber) -> Measure:
-    """Dimension of a constant: that of its unit, if it has one."""
-    return of_unit(number.unit) if isinstance(number, Quantity) else ANY
-
-
-def of_unit(unit: str) -> Measure:
-    """Dimension of a value with this unit written after it."""
-    return Measure(units.powers(unit), written=True)
-
-
-def of_function(name: str, arguments: Sequence[Measure]) -> Measure:
-    """Dimension of a function's value; ``DimensionError`` if it can't have such arguments."""
-    common = arguments[0]
-    for other in arguments[1:]:
-        common = common.with_other(other)
-    if name in ("abs", "min", "max"):
-        return common
+    name, first, *others = node.operator, *operands
+    if name in ("product", "quotient"):
+        return first.times(others[0], 1 if name == "product" else -1)
+    if name in ("negative", "abs"):
+        return first
+    if name == "power":
+        if others[0].powers and others[0].written:
+            raise node.operands[1].error("an exponent is a number, without a unit")
+        return first.power(last.value if isinstance(last, Constant) else None)
     if name == "sqrt":
-        return common.power(ExactNumber(Fraction(1, 2)))
+        return first.power(ExactNumber(Fraction(1, 2)))
+    common = first
+    for other, operand in zip(others, node.operands[1:], strict=True):
+        common = _common(common, other, operand if name == "sum" else node)
+    if name in ("sum", "min", "max"):
+        return common
     if common.powers and common.written and name not in ("sign", "step", "pulse", "atan2"):
-        raise DimensionError(
+        raise node.error(
             f'"{name}" takes a number or an angle, given {common}; divide by '
             f'"(1 {units.unit_text(common.powers)})" if that is meant'
         )
-    return Measure((), any(argument.written for argument in arguments))
+    return Measure((), any(operand.written for operand in operands))
 
 
-def check_unit(measure: Measure, needed: str, *, read_too: bool = False) -> None:
-    """Check that a value can have the required dimension; ``DimensionError`` otherwise.
+def check_unit(found: Measure, needed: str, *, read_too: bool = False) -> None:
+    """Check that a value can have the required dimension; ``ExpressionError`` otherwise.
 
     Args:
         read_too: also if its dimension is only that of what it reads.
     """
-    known = measure.written or (read_too and bool(measure.powers))
-    if known and measure.powers is not None and measure.powers != units.powers(needed):
-        raise DimensionError(f'the expression is {measure}, where "{needed}" is needed')
+    known = found.written or (read_too and bool(found.powers))
+    if known and found.powers is not None and found.powers != units.powers(needed):
+        raise ExpressionError(f'the expression is {found}, where "{needed}" is needed')
+
+
+def _common(a: Measure, b: Measure, where: Expression) -> Measure:
+    """Dimension of a sum or comparison; refused if they differ and either has a unit."""
+    written = a.written or b.written
+    if a.powers is None or b.powers is None or a.powers == b.powers:
+        return Measure(b.powers if a.powers is None else a.powers, written)
+    if written:
+        raise where.error(f"{a} and {b} can't be added or compared")
+    return Measure(None)
 
 
 def end_of_unit(text: str, position: int, names: Collection[str], parameters: Collection[str]) -> int:
@@ -129,7 +136,7 @@ def end_of_unit(text: str, position: int, names: Collection[str], parameters: Co
             otherwise, as ``m`` in "9.81 m/s^2" and in "0.1 N m", since products have their sign.
 
     Raises:
-        DimensionError: the text is ambiguous, like "5 N*m" if m is a parameter.
+        ValueError: the text is ambiguous, like "5 N*m" if m is a parameter.
     """
     end, certain = position, False
     while (match := _WORD_OF_UNIT.match(text, end)) is not None:
@@ -138,13 +145,9 @@ def end_of_unit(text: str, position: int, names: Collection[str], parameters: Co
         if called or name in names or (join and end == position) or not units.is_unit(name):
             break
         if join and name in parameters:
-            raise DimensionError(
+            raise ValueError(
                 f'"{name}" is a name of this scene, and a unit as well; write the unit without "{join}", or '
                 "parentheses around the number with its unit"
             )
         end, certain = match.end(), certain or name not in parameters
     return end if certain else position
-
-
-def _sorted(powers: dict[str, Fraction]) -> units.Powers:
-    return tuple(sorted((base, power) for base, power in powers.items() if power))

@@ -16,39 +16,39 @@ from __future__ import annotations
 
 import re
 import unicodedata
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import replace
 from fractions import Fraction
-from typing import Any, NoReturn
+from typing import NoReturn
 
 from rigidsim.scene import units
 from rigidsim.scene.arithmetic import context_for
-from rigidsim.scene.exact import ExactNumber, parse_number, with_unit
+from rigidsim.scene.exact import ExactNumber, Quantity, parse_number, with_unit
 from rigidsim.scene.expressions import dimensions
-from rigidsim.scene.expressions.dimensions import ANY, DimensionError, Measure, end_of_unit
+from rigidsim.scene.expressions.dimensions import Measure, check_unit, end_of_unit
 from rigidsim.scene.expressions.names import BODY_NAMES, Readable
-from rigidsim.scene.expressions.piecewise import power, written_out
+from rigidsim.scene.expressions.piecewise import written_out
 from rigidsim.scene.expressions.tree import (
     FUNCTIONS,
-    LARGEST_POWER,
-    ONE,
     PIECEWISE,
     RESERVED,
     Constant,
     Expression,
     ExpressionError,
     Name,
-    Node,
     Operation,
+    Place,
     constant_value,
-    operation,
-    placed_at,
+    fold,
+    nodes,
+    placed,
 )
 from rigidsim.scene.validation_messages import nearest
 
 LONGEST_TEXT = 2000
 DEEPEST_NESTING = 64
 MOST_NODES = 5000
+LARGEST_POWER = 64
 _FUNCTIONS = {**FUNCTIONS, **PIECEWISE}
 _INSTEAD = {"ln": "; write log(...)", "pow": "; write x^2", "sgn": "; write sign(...)"}
 _INSTEAD |= {"heaviside": "; write step(...)", "mod": "; write wrap(...), which takes off full turns"}
@@ -56,7 +56,7 @@ _JUMPS = ("sign", "step", "pulse")
 _USAGE = {"atan2": "y, x", "min": "a, b", "max": "a, b", "pulse": "x, begin, end"}
 _BINDS = {"+": 1, "-": 1, "*": 2, "/": 2, "^": 4, "**": 4}
 _SIGN_BINDS = 3
-_OPERATORS = {"+": "sum", "-": "sum", "*": "product", "/": "quotient"}
+_OPERATORS = {"+": "sum", "-": "sum", "*": "product", "/": "quotient", "^": "power", "**": "power"}
 _COMPARISON = (
     "an expression is one value, without comparisons; an event takes the difference of both sides, and "
     "step(t - 10), pulse(t, 10, 12), sign, min and max switch"
@@ -74,15 +74,6 @@ _TOKEN = re.compile(
 )
 _PARENTHESES = 'a number with a unit stands in parentheses beside "/" and "^"'
 _CHECKING = context_for("quadruple")
-
-
-@dataclass(frozen=True)
-class _Parsed:
-    """A parsed expression; ``bare`` is a number with a unit without parentheses around it."""
-
-    node: Node
-    measure: Measure = ANY
-    bare: bool = False
 
 
 def parse_expression(
@@ -118,15 +109,46 @@ def parse_expression(
     text = " ".join(text.split()) if "\n" in text else text  # columns are those of one line
     if not text.strip(" \t"):
         raise ExpressionError("an empty expression; write a number or a formula such as k*sin(t)^2")
-    whole = _Parser(text, names, parameters, jumps).all()
-    expression = Expression(text, whole.node)
-    constant_value(expression, _CHECKING)
-    try:
-        if unit is not None:
-            dimensions.check_unit(whole.measure, unit, read_too=read_too)
-    except DimensionError as error:
-        raise ExpressionError(str(error)) from None
-    return expression
+    read = _Parser(text, names, parameters, jumps).all()
+    found, measure = fold(read, _constant, _named, _operated)
+    constant_value(found, _CHECKING)
+    if unit is not None:
+        check_unit(measure, unit, read_too=read_too)
+    return replace(found, place=Place(text, 0, len(text)))  # type: ignore[type-var]
+
+
+# --- what is read, in smooth functions and signs, its constants folded, with its dimension ------------------
+
+_Meant = tuple[Expression, Measure]
+
+
+def _constant(node: Constant) -> _Meant:
+    return replace(node, value=node.value.alone), dimensions.of_constant(node)
+
+
+def _named(node: Name) -> _Meant:
+    meant: Expression = node
+    if node.of.formula:
+        meant = placed(parse_expression(node.of.formula, node.of.parts), node.place, anew=True)
+    return meant, dimensions.of_name(node)
+
+
+def _operated(node: Operation, meant: list[_Meant]) -> _Meant:
+    operands = [operand for operand, _ in meant]
+    last = operands[-1] if operands else node
+    if node.operator == "quotient" and constant_value(last, _CHECKING) == 0:
+        raise last.error(f"division by the zero in {last.quoted}")
+    measure = dimensions.of_operation(node, [measure for _, measure in meant], last)
+    if node.operator == "power":
+        value = constant_value(last, _CHECKING)
+        if value is None:
+            raise last.error("an exponent must be constant; write exp(y*log(x)) for x^y")
+        if abs(value) > LARGEST_POWER:
+            raise last.error(f"the exponent {last.quoted} is beyond 64; -64 to 64 are allowed")
+    found = placed(written_out(node.operator, *operands), node.place)
+    if sum(1 for _ in nodes(found)) > MOST_NODES:
+        raise node.error("too many piecewise functions within one another; write fewer")
+    return found, measure
 
 
 class _Parser:
@@ -141,6 +163,7 @@ class _Parser:
         self.known = [*names, *self.constants, "e"]
         self.depth = self.start = self.end = 0
         self.kind = self.token = ""
+        self.enclosed: Expression | None = None  # what stands in the last parentheses
         self.advance()
 
     def fail(self, what: str, position: int | None = None) -> NoReturn:
@@ -170,20 +193,13 @@ class _Parser:
         hint = _HINTS.get(rest[0], "allowed: numbers, names, functions and + - * / ^ ( ) ,")
         self.fail(f"unknown character {shown}; {_COMPARISON if rest.startswith('==') else hint}")
 
-    def constant(self, node: Node) -> Any:
-        return constant_value(Expression(self.text, node), _CHECKING)
+    def node(self, operator: str, start: int, *operands: Expression) -> Operation:
+        return Operation(operator, operands, Place(self.text, start, self.end))
 
     def at(self, *signs: str) -> bool:
         return self.kind == "sign" and self.token in signs
 
-    def measured(self, position: int, of: Callable[[], Any]) -> Any:
-        """Result of a dimension check; an error is given its place in the text."""
-        try:
-            return of()
-        except DimensionError as error:
-            self.fail(str(error), position)
-
-    def deeper(self, weakest: int) -> _Parsed:
+    def deeper(self, weakest: int) -> Expression:
         """Parse an expression one level down."""
         self.depth += 1
         if self.depth > DEEPEST_NESTING:
@@ -192,7 +208,7 @@ class _Parser:
         self.depth -= 1
         return node
 
-    def all(self) -> _Parsed:
+    def all(self) -> Expression:
         root = self.binary(0)
         if self.at(")"):
             self.fail('a ")" without its "("; leave it out')
@@ -211,59 +227,39 @@ class _Parser:
             return f"; a unit stands behind a number, as in 2 {name}"
         return f'; no unit is called "{name}"'
 
-    def binary(self, weakest: int) -> _Parsed:
+    def binary(self, weakest: int) -> Expression:
         """Parse operands joined by operators that bind more strongly than ``weakest``."""
         start = self.start
         if self.at("+", "-"):
             sign, left = self.advance(), self.deeper(_SIGN_BINDS)
-            if sign == "-":
-                node = operation("negative", (left.node,), (start, self.end))
-                left = _Parsed(node, left.measure, left.bare)
+            left = self.node("negative", start, left) if sign == "-" else left
         else:
             left = self.primary()
         while self.at(*_BINDS) and _BINDS[self.token] > weakest:
-            sign, at = self.token, self.start
-            self.advance()
-            if sign in ("^", "**"):
-                if left.bare:
-                    self.fail(f"{_PARENTHESES}: (2 s)^3", at)
-                exponent = self.exponent()
-                value = exponent.value if isinstance(exponent, Constant) else None
-                node = self.bounded(power(left.node, exponent, (start, self.end)), start)
-                left = _Parsed(node, left.measure.power(value))
-                continue
-            right, first = self.binary(_BINDS[sign]), left
-            node, span = right.node, (start, self.end)
-            if sign in ("+", "-"):
-                node = operation("negative", (node,), node.span) if sign == "-" else node
-                measure = self.measured(at, lambda a=first, b=right: a.measure.with_other(b.measure))  # type: ignore
-            else:
-                measure = first.measure.times(right.measure, -1 if sign == "/" else 1)
-            if sign == "/" and right.bare:
+            at, sign = self.start, self.advance()
+            power = _OPERATORS[sign] == "power"
+            if power and self.is_bare(left):
+                self.fail(f"{_PARENTHESES}: (2 s)^3", at)
+            right = self.deeper(_SIGN_BINDS) if power else self.binary(_BINDS[sign])
+            if sign == "/" and self.is_bare(right):
                 self.fail(f"{_PARENTHESES}: 1/(2 s) or (1/2)*(1 s)", at)
-            if sign == "/" and self.constant(node) == 0:
-                raise Expression(self.text, node).error("division by the zero", node)
-            left = _Parsed(operation(_OPERATORS[sign], (left.node, node), span), measure)
+            if sign == "-":
+                right = Operation("negative", (right,), right.place)
+            left = self.node(_OPERATORS[sign], start, left, right)
         return left
 
-    def exponent(self) -> Node:
-        start, exponent = self.start, self.deeper(_SIGN_BINDS)
-        if exponent.bare or (exponent.measure.powers and exponent.measure.written):
-            self.fail(f"{_PARENTHESES}, and an exponent has none: (2 s)^3", start)
-        value = self.constant(exponent.node)
-        if value is None:
-            self.fail("an exponent must be constant; write exp(y*log(x)) for x^y", start)
-        if abs(value) > LARGEST_POWER:
-            self.fail(
-                f'the exponent "{self.text[start : self.end]}" is beyond 64; -64 to 64 are allowed', start
-            )
-        return exponent.node
+    def is_bare(self, node: Expression) -> bool:
+        """Whether it is a number with a unit without parentheses around it."""
+        while isinstance(node, Operation) and node.operator == "negative":
+            node = node.operands[0]
+        number = isinstance(node, Constant) and node is not self.enclosed and isinstance(node.value, Quantity)
+        return number and node.text[0] in "0123456789."
 
-    def primary(self) -> _Parsed:
+    def primary(self) -> Expression:
         start = self.start
         if self.at("("):
-            inside = self.arguments()[0]
-            return _Parsed(inside.node, inside.measure)
+            (self.enclosed,) = self.arguments()
+            return self.enclosed
         if self.kind == "number":
             return self.quantity(start)
         if self.kind != "name":
@@ -271,42 +267,38 @@ class _Parser:
         name = self.advance()
         if name in _FUNCTIONS or self.at("("):
             return self.call(name, start)
-        span = (start, self.end)
+        place = Place(self.text, start, self.end)
         if name in self.names:
             readable = self.names[name]
             if readable.jumps and not self.jumps:
                 self.fail(f'"{name}" jumps, and a jump crosses zero nowhere; {readable.jumps}', start)
-            written = readable.formula and placed_at(parse_expression(readable.formula, readable.parts), span)
-            return _Parsed(written or Name(readable.name, span, readable), dimensions.of_name(readable))
+            return Name(readable.name, readable, place)
         if (number := self.constants.get(name)) is not None:
-            return _Parsed(Constant(number.alone, span), dimensions.of_number(number))
+            return Constant(number, place)
         if name == "e":
-            return _Parsed(Operation("exp", (Constant(ONE, span),), span))
+            return self.node("e", start)
         near = nearest(name, self.known) or nearest(name.lower(), self.known)
         near = self.about_units(name) if units.is_unit(name) else near
         allowed = "; ".join([", ".join(self.known), *getattr(self.names, "elsewhere", ())])
         self.fail(f'unknown name "{name}"{near}; allowed: {allowed}', start)
 
-    def quantity(self, start: int) -> _Parsed:
+    def quantity(self, start: int) -> Expression:
         """Parse a number and the unit after it."""
+        token = self.advance()
         try:
-            value = parse_number(self.token, "1")
-        except ValueError as error:
-            self.fail(str(error))
-        self.advance()
-        end = self.measured(start, lambda: end_of_unit(self.text, self.end, BODY_NAMES, self.others))
-        unit = self.text[self.start : end]
-        if self.kind != "name" or not unit:
-            return _Parsed(Constant(value, (start, self.end)))
-        try:
-            number = with_unit(value, unit, self.text[start : self.start + len(unit)])
+            value = parse_number(token, "1")
+            end = end_of_unit(self.text, self.end, BODY_NAMES, self.others)
+            unit = self.text[self.start : end] if self.kind == "name" else ""
+            if unit:
+                value = with_unit(value, unit, self.text[start:end])
         except ValueError as error:
             self.fail(str(error), start)
-        self.token, self.kind = unit, "unit"
-        self.advance()
-        return _Parsed(Constant(number.alone, (start, self.end)), dimensions.of_unit(unit), bare=True)
+        if unit:
+            self.token, self.kind = unit, "unit"
+            self.advance()
+        return Constant(value, Place(self.text, start, self.end))
 
-    def call(self, name: str, start: int) -> _Parsed:
+    def call(self, name: str, start: int) -> Expression:
         if name in self.known:
             self.fail(f'"{name}" is no function; a product has its *, as in {name}*(...)', start)
         if name not in _FUNCTIONS:
@@ -318,22 +310,9 @@ class _Parser:
         if not self.at("("):
             self.fail(f'the function "{name}" has its arguments in parentheses; {usage}', start)
         arguments = self.arguments(_FUNCTIONS[name], f'"{name}" takes {_FUNCTIONS[name]}; {usage}')
-        measure = self.measured(start, lambda: dimensions.of_function(name, [x.measure for x in arguments]))
-        nodes = [argument.node for argument in arguments]
-        return _Parsed(self.bounded(written_out(name, nodes, (start, self.end)), start), measure)
+        return self.node(name, start, *arguments)
 
-    def bounded(self, node: Node, start: int) -> Node:
-        """The node, unless it is too large: piecewise functions repeat their arguments."""
-        waiting, count = [node], 0
-        while waiting:
-            inner = waiting.pop()
-            waiting += inner.operands if isinstance(inner, Operation) else ()
-            count += 1
-            if count > MOST_NODES:
-                self.fail("too many piecewise functions within one another; write fewer", start)
-        return node
-
-    def arguments(self, count: int = 1, usage: str = "one value stands in parentheses") -> list[_Parsed]:
+    def arguments(self, count: int = 1, usage: str = "one value stands in parentheses") -> list[Expression]:
         """Parse the arguments in parentheses."""
         opened = self.start
         self.advance()

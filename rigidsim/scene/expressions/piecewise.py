@@ -1,96 +1,128 @@
 """Functions with kinks and jumps, rewritten in smooth functions and signs.
 
-Every kink or jump lies where an argument u passes zero, and ``sign(u)`` is all that is piecewise about it:
-
-    abs(u) = sign(u) u                     step(u) = (1 + sign(u)) / 2
-    max(a, b) = step(a - b) a + step(b - a) b                pulse(x, a, b) = step(x - a) step(b - x)
-    wrap(x) = 2 atan2(c sin(x/2), c cos(x/2)), c = sign(cos(x/2)): x less full turns, in (-pi, pi]
-    atan2(y, x) = s (pi/2 - atan2(x, s y)), s = sign(y)
-
-On either side of u = 0 a sign is a constant, so that both sides are smooth: see ``rigidsim.scene.surfaces``.
+Every kink or jump lies where an argument u passes zero, and ``sign(u)`` is all that is piecewise about it. On
+either side of u = 0 a sign is a constant, so that both sides are smooth: see ``rigidsim.scene.surfaces``.
 What hides a kink is written out likewise: an even root of an even power is one of abs, and the inverse of a
 sine or cosine of x is a triangle wave.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from fractions import Fraction
-from functools import reduce
+from functools import partial, reduce
+from operator import mul
 
 from rigidsim.scene.exact import ExactNumber
-from rigidsim.scene.expressions.tree import Constant, Expression, Node, Operation, fold, operation
+from rigidsim.scene.expressions.tree import (
+    Constant,
+    Expression,
+    Operation,
+    constant,
+    fold,
+    operation,
+    placed,
+    rational_value,
+)
 
-Span = tuple[int, int]
+_HALF = Fraction(1, 2)
+_QUARTER = constant(ExactNumber(_HALF, 1))
+"""A quarter of a turn, rad."""
 
 
-def written_out(name: str, operands: Sequence[Node], span: Span) -> Node:
-    """A function of the grammar rewritten in smooth functions and signs; smooth ones are unchanged."""
-    write = _WAYS.get(name)
-    found = None if write is None else write(operands, span)
-    return Operation(name, tuple(operands), span) if found is None else found
+def written_out(operator: str, *operands: Expression) -> Expression:
+    """An operation or function of the grammar in smooth functions and signs."""
+    return _WAYS.get(operator, partial(operation, operator))(*operands)
 
 
-def power(base: Node, exponent: Node, span: Span) -> Node:
-    """``base^exponent``; even roots of even powers are taken of the absolute value."""
-    whole = isinstance(exponent, Constant) and exponent.value.pi_power == 0
-    if not whole or isinstance(base, Constant) or exponent.value.rational.denominator % 2:  # type: ignore
-        return operation("power", (base, exponent), span)
-    rest: Fraction = exponent.value.rational  # type: ignore[union-attr]
-    root = None
-    while rest.denominator % 2 == 0 and (inner := _square_root(base if root is None else root)) is not None:
+def sign(u: Expression) -> Expression:  # noqa: D103
+    return Operation("sign", (u,))
+
+
+def _step(u: Expression) -> Expression:
+    return _HALF * (1 + sign(u))
+
+
+def _abs(u: Expression) -> Expression:
+    return sign(u) * u
+
+
+def _max(a: Expression, b: Expression) -> Expression:
+    over = _step(a - b)
+    return over * a + (1 - over) * b
+
+
+def _min(a: Expression, b: Expression) -> Expression:
+    over = _step(a - b)
+    return (1 - over) * a + over * b
+
+
+def _pulse(x: Expression, begin: Expression, end: Expression) -> Expression:
+    return _step(x - begin) * _step(end - x)
+
+
+def _wrap(x: Expression) -> Expression:
+    """x less full turns, in (-pi, pi]: twice the angle of its half, turned to a positive cosine."""
+    cosine, sine = (operation(name, _HALF * x) for name in ("cos", "sin"))
+    side = sign(cosine)
+    return 2 * operation("atan2", side * sine, side * cosine)
+
+
+def _atan2(y: Expression, x: Expression) -> Expression:
+    """From the quarter turn, which it passes smoothly, on either side of y = 0."""
+    if isinstance(y, Constant):
+        return operation("atan2", y, x)
+    return sign(y) * (_QUARTER - operation("atan2", x, sign(y) * y))
+
+
+def _inverse(name: str, u: Expression) -> Expression:
+    """asin or acos: of a sine or cosine a triangle wave."""
+    if not isinstance(u, Operation) or u.operator not in ("sin", "cos"):
+        return operation(name, u)
+    (x,) = u.operands
+    wave = _abs(_wrap(x - _QUARTER if u.operator == "sin" else x))
+    return _QUARTER - wave if name == "asin" else wave
+
+
+def _sqrt(u: Expression) -> Expression:
+    found = _power(u, constant(_HALF))
+    same = isinstance(found, Operation) and found.operator == "power" and found.operands[0] == u
+    return operation("sqrt", u) if same or isinstance(found, Constant) else found
+
+
+def _power(base: Expression, exponent: Expression) -> Expression:
+    """Even roots of even powers are taken of the absolute value."""
+    rest = rational_value(exponent)
+    if rest is None or isinstance(base, Constant):
+        return base**exponent
+    root = base
+    while rest.denominator % 2 == 0 and (inner := _square_root(root)) is not None:
         root, rest = inner, 2 * rest
-    if root is None:
-        return operation("power", (base, exponent), span)
+    if root is base:
+        return base**exponent
     if (rest.numerator % 2 or rest.denominator != 1) and _square_root(root) is None:
-        root = _abs([root], span)
-    return root if rest == 1 else operation("power", (root, Constant(ExactNumber(rest), exponent.span)), span)
+        root = _abs(root)
+    return root if rest == 1 else root ** constant(rest)
 
 
-def on_sides(
-    expression: Expression, places: Mapping[Node, tuple[int, int]], sides: Sequence[int]
-) -> Expression:
-    """An expression with every sign in it replaced by its value: of the argument's surface, whose index and
-    ratio ``places`` gives; a sign stays where ``sides`` has neither 1 nor -1.
-    """
-
-    def combine(node: Node, operands: list[Node]) -> Node:
-        if not isinstance(node, Operation):
-            return node
-        if node.operator == "sign" and node.operands[0] in places:
-            index, ratio = places[node.operands[0]]
-            if abs(sides[index]) == 1:
-                return _number(ratio * sides[index], node.span)
-        if len(operands) > 2:  # a chain, made two by two
-            return reduce(lambda a, b: operation(node.operator, (a, b), node.span), operands)
-        return operation(node.operator, tuple(operands), node.span)
-
-    return Expression(expression.text, fold(expression, combine))
-
-
-def _square_root(node: Node) -> Node | None:
-    """The node whose square this one is by its form, up to sign; None if it isn't a square."""
+def _square_root(node: Expression) -> Expression | None:
+    """That whose square this is by its form, up to sign; None if it isn't a square."""
     if isinstance(node, Constant):
-        return Operation("sqrt", (node,), node.span) if node.value.sign >= 0 else None
+        return operation("sqrt", node) if node.value.sign >= 0 else None
     if not isinstance(node, Operation):
         return None
     if node.operator == "power":
         base, exponent = node.operands
-        if not isinstance(exponent, Constant) or exponent.value.pi_power:
+        rational = rational_value(exponent)
+        if rational is None or rational % 2 != 0:
             return None
-        half = exponent.value.rational / 2
-        if half.denominator != 1:
-            return None
-        return base if half == 1 else operation(
-            "power", (base, Constant(ExactNumber(half), exponent.span)), node.span
-        )  # fmt: skip
+        return base if rational == 2 else base ** (rational / 2)
     if node.operator == "quotient":
-        parts = [_square_root(part) for part in node.operands]
-        return None if None in parts else Operation("quotient", tuple(parts), node.span)  # type: ignore[arg-type]
+        above, below = map(_square_root, node.operands)
+        return None if above is None or below is None else Operation("quotient", (above, below))
     if node.operator != "product":
         return None
-    roots: list[Node] = []
-    waiting = list(node.operands)
+    roots, waiting = [], list(node.operands)
     while waiting:
         factor = waiting.pop(0)
         root = _square_root(factor)
@@ -100,101 +132,32 @@ def _square_root(node: Node) -> Node | None:
             waiting.remove(factor)
             root = factor
         roots.append(root)
-    result = roots[0]
-    for root in roots[1:]:
-        result = operation("product", (result, root), node.span)
-    return result
+    return reduce(mul, roots)
 
 
-def _number(value: int | Fraction, span: Span) -> Constant:
-    return Constant(ExactNumber(Fraction(value)), span)
-
-
-def _negative(node: Node, span: Span) -> Node:
-    return operation("negative", (node,), span)
-
-
-def _sign(u: Node, span: Span) -> Node:
-    return Operation("sign", (u,), span)
-
-
-def _step(u: Node, span: Span) -> Node:
-    both = operation("sum", (_number(1, span), _sign(u, span)), span)
-    return operation("product", (_number(Fraction(1, 2), span), both), span)
-
-
-def _less(a: Node, b: Node, span: Span) -> Node:
-    """The difference a - b."""
-    return operation("sum", (a, _negative(b, b.span)), span)
-
-
-def _abs(operands: Sequence[Node], span: Span) -> Node:
-    return operation("product", (_sign(operands[0], span), operands[0]), span)
-
-
-def _largest(operands: Sequence[Node], span: Span, *, least: bool = False) -> Node:
-    a, b = operands
-    over = _step(_less(a, b, span), span)
-    under = operation("sum", (_number(1, span), _negative(over, span)), span)
-    if least:
-        over, under = under, over
-    return operation(
-        "sum", (operation("product", (over, a), span), operation("product", (under, b), span)), span
-    )
-
-
-def _pulse(operands: Sequence[Node], span: Span) -> Node:
-    x, begin, end = operands
-    return operation("product", (_step(_less(x, begin, span), span), _step(_less(end, x, span), span)), span)
-
-
-def _wrap(operands: Sequence[Node], span: Span) -> Node:
-    half = operation("product", (_number(Fraction(1, 2), span), operands[0]), span)
-    cosine, sine = Operation("cos", (half,), span), Operation("sin", (half,), span)
-    side = _sign(cosine, span)
-    signed = [operation("product", (side, part), span) for part in (sine, cosine)]
-    return operation("product", (_number(2, span), Operation("atan2", tuple(signed), span)), span)
-
-
-def _atan2(operands: Sequence[Node], span: Span) -> Node | None:
-    y, x = operands
-    if isinstance(y, Constant):
-        return None
-    side = _sign(y, span)
-    turned = Operation("atan2", (x, operation("product", (side, y), span)), span)
-    quarter = Constant(ExactNumber(Fraction(1, 2), 1), span)
-    return operation("product", (side, _less(quarter, turned, span)), span)
-
-
-def _inverse(operands: Sequence[Node], span: Span, *, sine: bool) -> Node | None:
-    """asin or acos of a sine or cosine: a triangle wave; None for any other argument."""
-    (inner,) = operands
-    if not isinstance(inner, Operation) or inner.operator not in ("sin", "cos"):
-        return None
-    (x,) = inner.operands
-    quarter = Constant(ExactNumber(Fraction(1, 2), 1), span)
-    if inner.operator == "sin":
-        x = _less(x, quarter, span)
-    found = _abs([_wrap([x], span)], span)
-    return _less(quarter, found, span) if sine else found
-
-
-_WAYS = {
-    "abs": _abs,
-    "sign": lambda operands, span: _sign(operands[0], span),
-    "step": lambda operands, span: _step(operands[0], span),
-    "max": _largest,
-    "min": lambda operands, span: _largest(operands, span, least=True),
-    "pulse": _pulse,
-    "wrap": _wrap,
-    "atan2": _atan2,
-    "asin": lambda operands, span: _inverse(operands, span, sine=True),
-    "acos": lambda operands, span: _inverse(operands, span, sine=False),
-    "sqrt": lambda operands, span: _root(operands[0], span),
+_WAYS: Mapping[str, Callable[..., Expression]] = {
+    **{"abs": _abs, "sign": sign, "step": _step, "max": _max, "min": _min, "pulse": _pulse, "wrap": _wrap},
+    **{"atan2": _atan2, "asin": partial(_inverse, "asin"), "acos": partial(_inverse, "acos")},
+    **{"sqrt": _sqrt, "power": _power, "e": lambda: operation("exp", constant(1))},
 }
 
 
-def _root(node: Node, span: Span) -> Node | None:
-    found = power(node, _number(Fraction(1, 2), span), span)
-    same = isinstance(found, Operation) and found.operator == "power" and found.operands[0] == node
-    return None if same or isinstance(found, Constant) else found
+def on_sides(
+    expression: Expression, places: Mapping[Expression, tuple[int, int]], sides: Sequence[int]
+) -> Expression:
+    """An expression with every sign in it replaced by its value: of the argument's surface, whose index and
+    ratio ``places`` gives; a sign stays where ``sides`` has neither 1 nor -1.
+    """
+
+    def of_operation(node: Operation, operands: list[Expression]) -> Expression:
+        if node.operator == "sign" and node.operands[0] in places:
+            index, ratio = places[node.operands[0]]
+            if abs(sides[index]) == 1:
+                return placed(constant(ratio * sides[index]), node.place)
+        if len(operands) > 2:  # a chain, made two by two
+            found = reduce(lambda a, b: operation(node.operator, a, b), operands)
+        else:
+            found = operation(node.operator, *operands)
+        return placed(found, node.place)
+
+    return fold(expression, lambda node: node, lambda node: node, of_operation)

@@ -1,7 +1,9 @@
-"""Expression trees of time, the state and parameters, and their values.
+"""Expressions of time, the state and parameters: an algebra with exact constants, and their values.
 
-Numbers and parameters stay exact in sums, products, quotients and whole powers. Straight lines in time, such
-as (t - 5000.1)/0.01, are found with exact constants.
+Expressions are added, multiplied and so on as numbers are: ``sign(u)*u``. Numbers and parameters stay exact
+in sums, products, quotients and whole powers. Whoever wants something of an expression folds it: its value
+(``evaluate``), its bounds, its dimension, equations for heyoka, or the straight lines in time within it, such
+as (t - 5000.1)/0.01, which are found with exact constants.
 """
 
 from __future__ import annotations
@@ -10,15 +12,17 @@ import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
-from typing import Any
+from functools import reduce
+from typing import Any, TypeVar
 
 from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.expressions.names import Readable
 
+T = TypeVar("T")
+
 # Past any value that means something, and still quick to take the sine of: 5000 decimal digits fit.
 _LARGEST_BITS = 20_000
 _LARGEST_EXPONENTIAL = 13_862  # its exp is just below 2**_LARGEST_BITS
-LARGEST_POWER = 64
 
 _ONE_ARGUMENT = "sin cos tan asin acos atan sinh cosh tanh exp log sqrt erf sigmoid"
 FUNCTIONS = {**dict.fromkeys(_ONE_ARGUMENT.split(), 1), "atan2": 2}
@@ -27,7 +31,6 @@ PIECEWISE = {"abs": 1, "sign": 1, "min": 2, "max": 2, "step": 1, "pulse": 3, "wr
 """Functions with kinks and jumps; ``rigidsim.scene.expressions.piecewise`` rewrites them."""
 RESERVED = frozenset({*FUNCTIONS, *PIECEWISE, "pi", "e"})
 """Names that no parameter may have."""
-ONE = ExactNumber(Fraction(1))
 
 
 class ExpressionError(ValueError):
@@ -44,49 +47,115 @@ class ExpressionError(ValueError):
 
 
 @dataclass(frozen=True)
-class Constant:
-    """A number, exact; ``span`` is its place in the text, as for every node."""
+class Place:
+    """Where something is written: from ``start`` to ``end`` of a text."""
 
-    value: ExactNumber
-    span: tuple[int, int] = field(compare=False)
+    source: str
+    start: int
+    end: int
+
+
+class Expression:
+    """A constant, a name or an operation; equal ones are written at any place."""
+
+    place: Place | None
+    operands: tuple[Expression, ...] = ()
+
+    @property
+    def text(self) -> str:
+        """As it is written; empty if it isn't."""
+        return "" if self.place is None else self.place.source[self.place.start : self.place.end]
+
+    def error(self, what: str) -> ExpressionError:
+        """An error about it, which shows its place."""
+        return ExpressionError(what, *(() if self.place is None else (self.place.source, self.place.start)))
+
+    @property
+    def quoted(self) -> str:
+        """Its text for a message."""
+        return f'"{self.text if len(self.text) <= 60 else self.text[:57] + "..."}"'
+
+    def __neg__(self) -> Expression:
+        return operation("negative", self)
+
+    def __add__(self, other: Operand) -> Expression:
+        return operation("sum", self, constant(other))
+
+    def __radd__(self, other: Operand) -> Expression:
+        return operation("sum", constant(other), self)
+
+    def __sub__(self, other: Operand) -> Expression:
+        return self + -constant(other)
+
+    def __rsub__(self, other: Operand) -> Expression:
+        return constant(other) + -self
+
+    def __mul__(self, other: Operand) -> Expression:
+        return operation("product", self, constant(other))
+
+    def __rmul__(self, other: Operand) -> Expression:
+        return operation("product", constant(other), self)
+
+    def __truediv__(self, other: Operand) -> Expression:
+        return operation("quotient", self, constant(other))
+
+    def __pow__(self, other: Operand) -> Expression:
+        return operation("power", self, constant(other))
 
 
 @dataclass(frozen=True)
-class Name:
+class Constant(Expression):
+    """A number, exact."""
+
+    value: ExactNumber
+    place: Place | None = field(default=None, compare=False)
+
+
+@dataclass(frozen=True)
+class Name(Expression):
     """Time, a component of the state, or another value of the scene; ``of`` says what is known of it."""
 
     name: str
-    span: tuple[int, int] = field(compare=False)
     of: Readable = field(compare=False)
+    place: Place | None = field(default=None, compare=False)
 
 
 @dataclass(frozen=True)
-class Operation:
+class Operation(Expression):
     """Sum or product (of two or more operands), quotient, power, negative, a smooth function or ``sign``."""
 
     operator: str
-    operands: tuple[Node, ...]
-    span: tuple[int, int] = field(compare=False)
+    operands: tuple[Expression, ...]
+    place: Place | None = field(default=None, compare=False)
 
 
-Node = Constant | Name | Operation
+Operand = Expression | ExactNumber | Fraction | int
 
 
-@dataclass(frozen=True)
-class Expression:
-    """An expression as written and as parsed."""
-
-    text: str
-    root: Node
-
-    def error(self, what: str, node: Node) -> ExpressionError:
-        """An error about a part of the expression, whose place it shows."""
-        part = self.text[slice(*node.span)]
-        part = part if len(part) <= 60 else part[:57] + "..."
-        return ExpressionError(f'{what} in "{part}"', self.text, node.span[0])
+def constant(value: Operand) -> Expression:
+    """A number as an expression; an expression itself."""
+    if isinstance(value, Expression):
+        return value
+    return Constant(value if isinstance(value, ExactNumber) else ExactNumber(Fraction(value)))
 
 
-def _exact(operator: str, numbers: list[ExactNumber]) -> ExactNumber | None:
+def rational_value(expression: Expression) -> Fraction | None:
+    """The value of a rational constant; None for anything else."""
+    number = expression.value if isinstance(expression, Constant) else None
+    return None if number is None or number.pi_power else number.rational
+
+
+def placed(expression: Expression, place: Place | None, *, anew: bool = False) -> Expression:
+    """The expression with a place for all parts that have none; ``anew``: for all parts."""
+    if expression.place is not None and not anew:
+        return expression
+    if isinstance(expression, Operation):
+        operands = tuple(placed(operand, place, anew=anew) for operand in expression.operands)
+        return Operation(expression.operator, operands, place)
+    return replace(expression, place=place)  # type: ignore[type-var]
+
+
+def _exact(operator: str, numbers: Sequence[ExactNumber]) -> ExactNumber | None:
     """The exact result; None if it isn't a rational times a power of pi, or is too long."""
     if any(number.swept for number in numbers):
         from rigidsim.scene.tracing.arithmetic import exactly
@@ -114,53 +183,69 @@ def _bits(x: Fraction) -> int:
     return max(x.numerator.bit_length(), x.denominator.bit_length())
 
 
-def operation(operator: str, operands: tuple[Node, ...], span: tuple[int, int]) -> Node:
+def operation(operator: str, *operands: Expression) -> Expression:
     """The operation, or its exact value as a number; chains become one sum, or one product after a number."""
     numbers = [operand.value for operand in operands if isinstance(operand, Constant)]
     exact = _exact(operator, numbers) if len(numbers) == len(operands) else None
     if exact is not None:
-        return Constant(exact, span)
+        return Constant(exact)
     first, last = operands[0], operands[-1]
-    inverse = _exact("quotient", [ONE, last.value]) if isinstance(last, Constant) else None
-    if operator == "quotient" and inverse is not None:
-        return operation("product", (Constant(inverse, last.span), first), span)
+    if operator == "quotient" and isinstance(last, Constant):
+        inverse = _exact(operator, [ExactNumber(Fraction(1)), last.value])
+        if inverse is not None:
+            return operation("product", Constant(inverse), first)
     if operator == "product" and isinstance(last, Constant):
         first, last = last, first
     if operator == "product" and isinstance(first, Constant):
         head, *tail = _chain(operator, last)
         front = _exact(operator, [first.value, head.value]) if isinstance(head, Constant) else None
-        operands = (first, head, *tail) if front is None else (Constant(front, span), *tail)
+        operands = (first, head, *tail) if front is None else (Constant(front), *tail)
     elif operator in ("sum", "product"):
         operands = (*_chain(operator, first), last)
-    return Operation(operator, operands, span)
+    return Operation(operator, operands)
 
 
-def _chain(operator: str, node: Node) -> tuple[Node, ...]:
+def _chain(operator: str, node: Expression) -> tuple[Expression, ...]:
     return node.operands if isinstance(node, Operation) and node.operator == operator else (node,)
 
 
-def fold(expression: Expression, combine: Callable[[Node, list[Any]], Any]) -> Any:
-    """Fold the tree without recursion: ``combine(node, results of its operands)`` from leaves to root."""
-    results: list[Any] = []
-    waiting: list[tuple[Node, bool]] = [(expression.root, False)]
+# --- folding ------------------------------------------------------------------------------------------------
+
+
+def fold(
+    expression: Expression,
+    of_constant: Callable[[Constant], T],
+    of_name: Callable[[Name], T],
+    of_operation: Callable[[Operation, list[T]], T],
+) -> T:
+    """Fold an expression from its leaves to its root, without recursion.
+
+    Args:
+        of_operation: of an operation and the results for its operands.
+    """
+    results: list[T] = []
+    waiting: list[tuple[Expression, bool]] = [(expression, False)]
     while waiting:
         node, ready = waiting.pop()
-        operands = node.operands if isinstance(node, Operation) else ()
-        if operands and not ready:
-            waiting.append((node, True))
-            waiting += [(operand, False) for operand in reversed(operands)]
+        if isinstance(node, Constant):
+            results.append(of_constant(node))
+        elif isinstance(node, Name):
+            results.append(of_name(node))
+        elif isinstance(node, Operation) and ready:
+            first = len(results) - len(node.operands)
+            results[first:] = [of_operation(node, results[first:])]
         else:
-            first = len(results) - len(operands)
-            results[first:] = [combine(node, results[first:])]
+            waiting.append((node, True))
+            waiting += [(operand, False) for operand in reversed(node.operands)]
     return results[0]
 
 
-def nodes(expression: Expression) -> Iterator[Node]:
-    """Every node, outer ones before inner ones."""
-    waiting = [expression.root]
+def nodes(expression: Expression) -> Iterator[Expression]:
+    """Every part of an expression, outer ones before inner ones."""
+    waiting = [expression]
     while waiting:
         node = waiting.pop()
-        waiting += node.operands if isinstance(node, Operation) else ()
+        waiting += node.operands
         yield node
 
 
@@ -169,31 +254,39 @@ def operations(expression: Expression) -> Iterator[Operation]:
     return (node for node in nodes(expression) if isinstance(node, Operation))
 
 
-def placed_at(expression: Expression, span: tuple[int, int]) -> Node:
-    """The tree of an expression, all of which stands at one place of another text."""
-
-    def combine(node: Node, operands: list[Any]) -> Node:
-        if isinstance(node, Operation):
-            return Operation(node.operator, tuple(operands), span)
-        return replace(node, span=span)
-
-    found: Node = fold(expression, combine)
-    return found
+def readables(*expressions: Expression) -> list[Readable]:
+    """What the names in expressions stand for, each once."""
+    each = (node for expression in expressions for node in nodes(expression) if isinstance(node, Name))
+    return list({node.name: node.of for node in each}.values())
 
 
-def names_used(expression: Expression) -> frozenset[str]:
-    """Names of time and the state that the expression reads; parameters are already numbers."""
-    return frozenset(node.name for node in nodes(expression) if isinstance(node, Name))
+def names_used(*expressions: Expression) -> frozenset[str]:
+    """Names of time and the state that expressions read; parameters are already numbers."""
+    return frozenset(readable.name for readable in readables(*expressions))
 
 
-def readables(expression: Expression) -> list[Readable]:
-    """What the names in the expression stand for, each once, in the order of its text."""
-    return list({node.name: node.of for node in nodes(expression) if isinstance(node, Name)}.values())
+def states_read(*expressions: Expression) -> frozenset[str]:
+    """States without which expressions have no value, see ``Readable.states``."""
+    return frozenset().union(*(readable.states for readable in readables(*expressions)))
 
 
-def states_read(expression: Expression) -> frozenset[str]:
-    """States without which the expression has no value, see ``Readable.states``."""
-    return frozenset().union(*(readable.states for readable in readables(expression)))
+# --- values -------------------------------------------------------------------------------------------------
+
+
+def evaluate(expression: Expression, values: Mapping[str, Any], context: Any) -> Any:
+    """The value (mpf) for values of the names; ``ExpressionError`` names a part without a finite one.
+
+    None where the value of a name that it takes is None.
+    """
+
+    def named(node: Name) -> Any:
+        value = values[node.name]
+        return None if value is None else context.convert(value)
+
+    def operated(node: Operation, operands: list[Any]) -> Any:
+        return None if None in operands else operate(node, operands, context)
+
+    return fold(expression, lambda node: node.value.at(context), named, operated)
 
 
 def constant_value(expression: Expression, context: Any) -> Any:
@@ -201,44 +294,12 @@ def constant_value(expression: Expression, context: Any) -> Any:
     return evaluate(expression, dict.fromkeys(names_used(expression)), context)
 
 
-def never_below_zero(node: Node) -> bool:
-    """Whether its form shows that a number isn't negative: sums, products and quotients of what isn't, even
-    powers, and functions without negative values.
-    """
-    if isinstance(node, Constant):
-        return node.value.sign >= 0
-    if isinstance(node, Name):
-        return False
-    if node.operator == "power":
-        base, exponent = node.operands
-        value = exponent.value if isinstance(exponent, Constant) else None
-        even = value is not None and not value.swept and not value.pi_power and value.rational % 2 == 0
-        return even or never_below_zero(base)
-    if node.operator in ("sum", "product", "quotient"):
-        return all(map(never_below_zero, node.operands))
-    return node.operator in ("exp", "cosh", "sqrt", "sigmoid")
-
-
-def evaluate(expression: Expression, values: Mapping[str, Any], context: Any) -> Any:
-    """The value (mpf) for values of the names; ``ExpressionError`` names a part without a finite one."""
-
-    def combine(node: Node, operands: list[Any]) -> Any:
-        if isinstance(node, Constant):
-            return node.value.at(context)
-        if isinstance(node, Name):
-            value = values[node.name]
-            return None if value is None else context.convert(value)
-        return None if None in operands else operate(expression, node, operands, context)
-
-    return fold(expression, combine)
-
-
-def operate(expression: Expression, node: Operation, operands: list[Any], context: Any) -> Any:
+def operate(node: Operation, operands: Sequence[Any], context: Any) -> Any:
     """Apply one operation to mpf operands; ``ExpressionError`` if it isn't finite, or exceeds 2**20000."""
     operator, first, last = node.operator, operands[0], operands[-1]
     refused, why = _REFUSED.get(operator, (None, ""))
     if refused and refused(first, last):
-        raise expression.error(why, node)
+        raise node.error(f"{why} in {node.quoted}")
     if operator == "sigmoid":
         small = context.exp(-abs(first))
         value = (1 if first >= 0 else small) / (1 + small)
@@ -247,11 +308,11 @@ def operate(expression: Expression, node: Operation, operands: list[Any], contex
     else:
         value = getattr(context, operator)(*operands)
     if value and context.mag(value) > _LARGEST_BITS:
-        raise expression.error(_TOO_LARGE, node)
+        raise node.error(f"{_TOO_LARGE} in {node.quoted}")
     return value
 
 
-_ARITHMETIC: dict[str, Callable[[list[Any]], Any]] = {
+_ARITHMETIC: dict[str, Callable[[Sequence[Any]], Any]] = {
     "sum": lambda a: sum(a[1:], a[0]),
     "product": math.prod,
     "negative": lambda a: -a[0],
@@ -277,6 +338,82 @@ _REFUSED: dict[str, tuple[Callable[[Any, Any], bool], str]] = {
 """Conditions under which an operation on its first and last operand has no real, finite value."""
 
 
+# --- bounds -------------------------------------------------------------------------------------------------
+
+Interval = tuple[float, float]
+_INF = math.inf
+_RANGES: Mapping[str, Interval] = {
+    **dict.fromkeys(("sin", "cos", "sign", "tanh", "erf"), (-1.0, 1.0)),
+    **{"sigmoid": (0.0, 1.0), "exp": (0.0, _INF), "sqrt": (0.0, _INF), "cosh": (1.0, _INF)},
+    **{"atan": (-2.0, 2.0), "asin": (-2.0, 2.0), "acos": (0.0, 4.0), "atan2": (-4.0, 4.0)},
+}
+"""Of functions whose values don't go everywhere."""
+
+
+def bounds(expression: Expression, *, always: bool = True) -> Interval:
+    """Bounds of the value, in interval arithmetic.
+
+    Args:
+        always: over any number of turns of angles, and for all members of a sweep; otherwise within one turn,
+            and for the representative member.
+    """
+
+    def of_constant(node: Constant) -> Interval:
+        if always and node.value.swept:
+            return (0.0, _INF) if node.value.sign >= 0 else (-_INF, 0.0)
+        return (float(node.value), float(node.value))
+
+    def of_name(node: Name) -> Interval:
+        most = _INF if always and node.of.turns else node.of.bound
+        return -most, most
+
+    def of_operation(node: Operation, operands: list[Interval]) -> Interval:
+        (low, high), last = operands[0], operands[-1]
+        if node.operator == "sum":
+            return sum(x for x, _ in operands), sum(x for _, x in operands)
+        if node.operator == "negative":
+            return -high, -low
+        if node.operator == "product":
+            return reduce(_product, operands)
+        if node.operator == "quotient" and last[0] >= 0:
+            return _product((low, high), (_raised(last[1], -1), _raised(last[0], -1)))
+        if node.operator == "power":
+            return _power((low, high), node.operands[1])
+        return _RANGES.get(node.operator, (-_INF, _INF))
+
+    return fold(expression, of_constant, of_name, of_operation)
+
+
+def _product(a: Interval, b: Interval) -> Interval:
+    ends = [x * y if x and y else 0.0 for x in a for y in b]
+    return min(ends), max(ends)
+
+
+def _power(base: Interval, exponent: Expression) -> Interval:
+    """Of a power that is real: its base isn't negative, unless the exponent is whole."""
+    value = exponent.value if isinstance(exponent, Constant) else None
+    if value is None or value.swept or value.pi_power or value.rational.denominator != 1:
+        base = max(base[0], 0.0), max(base[1], 0.0)
+    elif value.rational % 2 == 0:
+        low, high = sorted(map(abs, base))
+        base = (low if base[0] * base[1] > 0 else 0.0), high
+    if value is None or (base[0] < 0 and value.sign < 0):
+        return 0.0 if base[0] >= 0 else -_INF, _INF
+    return _raised(base[value.sign < 0], float(value)), _raised(base[value.sign >= 0], float(value))
+
+
+def _raised(x: float, exponent: float) -> float:
+    try:
+        return x**exponent
+    except ZeroDivisionError:
+        return _INF
+    except OverflowError:
+        return math.copysign(_INF, x)
+
+
+# --- straight lines in time ---------------------------------------------------------------------------------
+
+
 @dataclass(frozen=True)
 class LineInTime:
     """``slope * t + offset`` (mpf, t in s); the slope isn't zero."""
@@ -294,19 +431,17 @@ def line_of(operator: str, operands: Sequence[Any]) -> Any | None:
     """An operation on lines and numbers (mpf): a line, a number, or None if it is neither."""
     lines = [x for x in operands if isinstance(x, LineInTime)]
     numbers = [x for x in operands if not isinstance(x, LineInTime)]
+    first, last = operands[0], operands[-1]
     if operator == "sum":
         slope = sum((x.slope for x in lines[1:]), lines[0].slope)
-        offset = sum((x.offset for x in lines[1:]), lines[0].offset)
-        offset = sum(numbers, offset)
+        offset = sum(numbers, sum((x.offset for x in lines[1:]), lines[0].offset))
         return LineInTime(slope, offset) if slope != 0 else offset
-    first = operands[0]
     if operator == "negative":
         return LineInTime(-first.slope, -first.offset)
-    if operator == "quotient" and not isinstance(operands[1], LineInTime) and operands[1] != 0:
-        return LineInTime(first.slope / operands[1], first.offset / operands[1])
+    if operator == "quotient" and not isinstance(last, LineInTime) and last != 0:
+        return LineInTime(first.slope / last, first.offset / last)
     if operator == "product" and len(lines) == 1:
-        factor = math.prod(numbers)
-        line = lines[0]
+        factor, line = math.prod(numbers), lines[0]
         return LineInTime(factor * line.slope, factor * line.offset) if factor != 0 else factor
     return None
 
@@ -327,20 +462,15 @@ def as_line(expression: Expression, context: Any) -> LineInTime | None:
 def _folded(expression: Expression, context: Any, found: list[LineInTime]) -> Any:
     """A number, a line, or None for anything else, whose lines are added to those found."""
 
-    def combine(node: Node, operands: list[Any]) -> Any:
-        if isinstance(node, Constant):
-            return node.value.at(context)
-        if isinstance(node, Name):
-            return LineInTime(context.one, context.zero) if node.name == "t" else None
-        assert isinstance(node, Operation)
+    def of_operation(node: Operation, operands: list[Any]) -> Any:
         lines = [x for x in operands if isinstance(x, LineInTime)]
+        whole = None
         if None not in operands:
-            whole = (
-                line_of(node.operator, operands) if lines else operate(expression, node, operands, context)
-            )
-            if whole is not None:
-                return whole
-        found.extend(lines)
-        return None
+            whole = line_of(node.operator, operands) if lines else operate(node, operands, context)
+        if whole is None:
+            found.extend(lines)
+        return whole
 
-    return fold(expression, combine)
+    time = LineInTime(context.one, context.zero)
+    at = lambda node: node.value.at(context)  # noqa: E731
+    return fold(expression, at, lambda node: time if node.name == "t" else None, of_operation)
