@@ -29,7 +29,7 @@ import rigidsim
 from rigidsim.formats import FORMATS
 from rigidsim.formats.registry import Naming, format_named
 from rigidsim.scene.choices import FORMULATIONS
-from rigidsim.scene.registry import BESIDE, LOAD_KINDS, OF_BODY, TABLES
+from rigidsim.scene.registry import LOADS
 from rigidsim.scene.starts import ATTITUDES, RATES
 
 BOX = "[[body.surfaces]]\nsize = [1, 0.8, 0.6]\nposition = [0.1, 0, 0.2]\nspecular = 0.1\ndiffuse = 0.2\n"
@@ -152,10 +152,10 @@ def _made(code: str, scene: str, precision: str, how: str, estimate: bool) -> ri
 
 def test_the_scenes_have_every_entry_of_the_registries() -> None:
     texts = [rigidsim.parse(text).to_dict() for text in SCENES.values()]
-    assert {load["kind"] for text in texts for load in text.get("loads", [])} == set(LOAD_KINDS)
-    assert {key for text in texts for load in text.get("loads", []) for key in load} >= set(BESIDE)
-    assert {key for text in texts for key in text["body"]} >= set(OF_BODY)
-    assert {key for text in texts for key in text} >= set(TABLES)
+    assert {load["kind"] for text in texts for load in text.get("loads", [])} == set(LOADS["kind"])
+    assert {key for text in texts for load in text.get("loads", []) for key in load} >= set(LOADS["beside"])
+    assert {key for text in texts for key in text["body"]} >= set(LOADS["body"])
+    assert {key for text in texts for key in text} >= set(LOADS["table"])
     assert {key for text in texts for key in text["initial"]} >= {*ATTITUDES, *RATES}
     assert {how for _, _, how in CASES} == FORMULATED
 

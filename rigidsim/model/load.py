@@ -84,11 +84,11 @@ class Load(SceneLoad):
         They are dimensionless expressions of ``seconds(m)`` and the states. Steps chosen by the motion alone
         would pass over such a zero; with them they shorten on the way there.
         """
-        return written(m, narrow_parts(*(formula for _, formula in self.formulas())))
+        return written(m, narrow_parts(*self.formulas()))
 
     def roots(self, m: Kinematics) -> list[Symbolic]:
         """Radicands in it that may touch zero, where no step may pass over the kink."""
-        return written(m, root_parts(*(formula for _, formula in self.formulas())))
+        return written(m, root_parts(*self.formulas()))
 
     def told(self, scene: Scene) -> str:
         """What it is in a reader's terms, in one sentence for ``check``, ``plan`` and ``info``: sizes at the

@@ -11,7 +11,7 @@ from rigidsim.model.kinematics import Kinematics
 from rigidsim.model.sources import free_flight, in_body_axes, read_in
 from rigidsim.scene.arithmetic import norm
 from rigidsim.scene.expressions.names import PLACES, NameProvider, Readable, provides
-from rigidsim.scene.registry import LOAD_KINDS
+from rigidsim.scene.registry import LOADS
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.schema import Config
 
@@ -28,7 +28,7 @@ class FieldNames(NameProvider):
         """See ``NameProvider``."""
         flies, states, found = free_flight(config), {"attitude", PLACES}, False
         for fields in config.loads:
-            if issubclass(LOAD_KINDS[fields.kind], Magnetic):  # type: ignore[attr-defined]
+            if issubclass(LOADS["kind"][fields.kind], Magnetic):  # type: ignore[attr-defined]
                 found, states = True, states | (fields.placed_by(free_flight=flies) or set())
         return (Readable(name, "T", frozenset(states)) for name in FIELD_NAMES if found)
 

@@ -207,10 +207,10 @@ def _read_by(readers: list[str], them: str = "it") -> str:
 def _names_that_take(scene: Scene, need: str) -> str:
     """The names in expressions that stand for what takes these states, and where they are read."""
     found: dict[str, set[str]] = {}
-    for where, expression in scene.formulas():
+    for expression in scene.formulas():
         names = {readable.name for readable in readables(expression) if need in readable.states}
         if names:
-            found.setdefault(where.rsplit(" ", 1)[0], set()).update(names)
+            found.setdefault(expression.where.rsplit(" ", 1)[0], set()).update(names)
     told = [f"{', '.join(sorted(names))} in {place}" for place, names in found.items()]
     return f" ({'; '.join(told)})" if told else ""
 

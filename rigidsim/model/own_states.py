@@ -102,7 +102,7 @@ def refuse_odd_states(scene: Scene) -> None:
                 "changes with the sign of the quaternion, while q and -q are the same attitude; use products "
             )
             raise ConfigError(
-                Problem(state.where, what + "such as qw*qx, or say where it jumps: sign(qw)*qx")
+                Problem(state.derivative.where, what + "such as qw*qx, or say where it jumps: sign(qw)*qx")
             )
 
 

@@ -81,7 +81,7 @@ def free_flight(config: Config) -> bool:
 
 def read_in(scene: Scene) -> frozenset[str]:
     """Names that any of a scene's expressions reads."""
-    return names_used(*(expression for _, expression in scene.formulas()))
+    return names_used(*scene.formulas())
 
 
 def in_body_axes(scene: Scene, space: Vector) -> Vector:

@@ -232,8 +232,8 @@ class System:
             found.append(Crossing(event.name, expression, _DIRECTIONS[event.direction], event.stop))
         endings = [(*one, False) for load in having(Ending, m.loads) for one in load.endings(m)]
         endings += [
-            (f"{where} is negative", above_zero(m, expression), False)
-            for where, expression in self.scene.never_negative()
+            (f"{expression.where} is negative", above_zero(m, expression), False)
+            for expression in self.scene.never_negative()
             if bounds(expression)[0] < 0
         ]
         endings += [(*one, True) for load in having(Ranged, m.loads) for one in load.range_ends(m)]

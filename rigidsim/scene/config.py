@@ -22,7 +22,7 @@ from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.fields import NAME_OR_VECTOR
 from rigidsim.scene.kernels.reading import EMBEDDED, folders_of
 from rigidsim.scene.python_values import assignments_of, inline, toml_text
-from rigidsim.scene.registry import LOAD_KINDS
+from rigidsim.scene.registry import LOADS
 from rigidsim.scene.schema import Config, config_model
 from rigidsim.scene.toml_text import FLAG, apply_overrides, long_integers, parse_toml, written
 
@@ -210,7 +210,7 @@ def validated(table: dict[str, Any], source: str) -> Config:
         config = model.model_validate(table, context=table)
     except ValidationError as error:
         named = {problem.where for problem in problems}
-        found = messages.config_error(model, error, {*NAME_OR_VECTOR, *LOAD_KINDS}).problems
+        found = messages.config_error(model, error, {*NAME_OR_VECTOR, *LOADS["kind"]}).problems
         problems += [problem for problem in found if problem.where not in named]
     if problems:
         raise ConfigError(problems, source)

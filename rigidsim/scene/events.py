@@ -2,15 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from rigidsim.errors import ConfigError, Problem
-from rigidsim.scene.exact import ExactNumber
-from rigidsim.scene.expressions.names import Names
-from rigidsim.scene.expressions.parser import parse_expression
-from rigidsim.scene.expressions.tree import Expression, ExpressionError, names_used, states_read
-from rigidsim.scene.schema import EventTable
+from rigidsim.scene.expressions.tree import Expression, names_used, states_read
+from rigidsim.scene.registry import Setting
 
 
 @dataclass(frozen=True)
@@ -33,20 +28,14 @@ class Event:
         return states_read(self.expression)
 
 
-def resolve_events(
-    tables: Sequence[EventTable], parameters: Mapping[str, ExactNumber], names: Names
-) -> tuple[Event, ...]:
+def resolve_events(setting: Setting) -> tuple[Event, ...]:
     """Read the expressions of ``[[events]]``."""
     found = []
-    for number, table in enumerate(tables):
-        where = f"[[events]] number {number + 1} expression"
-        try:
-            expression = parse_expression(table.expression, names, parameters=parameters, jumps=False)
-        except ExpressionError as error:
-            raise ConfigError(Problem(where, str(error))) from None
+    for number, table in enumerate(setting.config.events):
+        here = setting.at("events", number)
+        expression = here.expression("expression", table.expression, jumps=False)
         if not names_used(expression):
-            raise ConfigError(
-                Problem(where, f'given "{table.expression}", which never changes; use {", ".join(names)}')
-            )
+            what = f'given "{table.expression}", which never changes; use {", ".join(setting.names)}'
+            raise here.fault("expression", what)
         found.append(Event(table.name, expression, table.direction, table.action == "stop"))
     return tuple(found)

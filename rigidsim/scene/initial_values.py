@@ -32,9 +32,9 @@ def check_start(scene: Scene) -> None:
     """Evaluate the components of loads and the events at the start, and what depends on time alone later."""
     values = start_values(scene)
     problems = _check_branch(scene) or _check_singular(scene, values)
-    for where, expression in scene.formulas():
-        problems += _check(where, expression, values, scene.context)
-        problems += _check_span(where, expression, scene)
+    for expression in scene.formulas():
+        problems += _check(expression, values, scene.context)
+        problems += _check_span(expression, scene)
     problems = problems or _check_signs(scene, values)
     if problems:
         raise ConfigError(problems)
@@ -44,7 +44,7 @@ def _check_branch(scene: Scene) -> list[Problem]:
     """Refuse expressions that read Euler angles if the start is given by the other of an attitude's two
     triples: they use the one whose middle angle is in its range, as found in every formulation.
     """
-    read = names_used(*(expression for _, expression in scene.formulas())) & set(EULER_NAMES)
+    read = names_used(*scene.formulas()) & set(EULER_NAMES)
     if scene.euler_angles is None or not read:
         return []
     sequence, middle, pi = scene.config.integrator.euler_sequence, scene.euler_angles[1], scene.context.pi
@@ -63,8 +63,7 @@ def _check_branch(scene: Scene) -> list[Problem]:
 
 def _check_singular(scene: Scene, values: dict[str, Any]) -> list[Problem]:
     """Refuse loads that read Euler angles where these are singular at the start and have no derivatives."""
-    formulas = scene.acting_formulas()
-    reading = [(where, names_used(e) & set(EULER_NAMES)) for where, e in formulas]
+    reading = [(x.where, names_used(x) & set(EULER_NAMES)) for x in scene.acting_formulas()]
     if not any(names for _, names in reading):
         return []
     context, sequence = scene.context, scene.config.integrator.euler_sequence
@@ -80,30 +79,33 @@ def _check_singular(scene: Scene, values: dict[str, Any]) -> list[Problem]:
     return [Problem(where, f"reads {', '.join(sorted(names))}, {why}") for where, names in reading if names]
 
 
-def _check(where: str, expression: Expression, values: dict[str, Any], context: Any) -> list[Problem]:
+def _check(expression: Expression, values: dict[str, Any], context: Any) -> list[Problem]:
     try:
         evaluate(expression, values, context)
     except ExpressionError as error:
         names = [name for name in values if name in names_used(expression)]
         given = ", ".join(f"{name} = {context.nstr(values[name], 8)}" for name in names)
         return [
-            Problem(where, f"no finite value at the start ({given}); start elsewhere or rewrite it: {error}")
+            Problem(
+                expression.where,
+                f"no finite value at the start ({given}); start elsewhere or rewrite it: {error}",
+            )
         ]
     return []
 
 
 def _check_signs(scene: Scene, values: dict[str, Any]) -> list[Problem]:
     """Refuse what is below zero at the start and can't be."""
-    found = [(at, x, evaluate(x, values, scene.context)) for at, x in scene.never_negative()]
+    found = [(x, evaluate(x, values, scene.context)) for x in scene.never_negative()]
     what = 'given "{}", which is {} at the start; at least 0 is allowed'
     return [
-        Problem(at, what.format(x.text, scene.context.nstr(value, 6)))
-        for at, x, value in found
+        Problem(x.where, what.format(x.text, scene.context.nstr(value, 6)))
+        for x, value in found
         if value is not None and value < 0
     ]
 
 
-def _check_span(where: str, expression: Expression, scene: Scene) -> list[Problem]:
+def _check_span(expression: Expression, scene: Scene) -> list[Problem]:
     """Refuse a function of time alone, such as sqrt(-t) or log(2 - t), that has a value at the start and at
     no later time that is tried; the last time at which it has one is found by bisection.
     """
@@ -119,7 +121,7 @@ def _check_span(where: str, expression: Expression, scene: Scene) -> list[Proble
             last, beyond = (middle, beyond) if _refusal(part, middle, context) is None else (last, middle)
         what = f"no finite value after t = {context.nstr(last, 8)} s, while the run goes on to "
         what += f"{context.nstr(scene.end, 8)} s; rewrite it, or end the run before: {tried[1]}"
-        problems.append(Problem(where, what))
+        problems.append(Problem(expression.where, what))
     return problems
 
 

@@ -13,13 +13,7 @@ from rigidsim.scene.arithmetic import Vector
 from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.expressions.names import Names, names_of
 from rigidsim.scene.expressions.parser import parse_expression
-from rigidsim.scene.expressions.tree import (
-    Expression,
-    ExpressionError,
-    constant_value,
-    evaluate,
-    names_used,
-)
+from rigidsim.scene.expressions.tree import Constant, Expression, ExpressionError, evaluate, names_used
 from rigidsim.scene.schema import Config
 
 WHERE = "[body] principal_moments"
@@ -34,8 +28,8 @@ def least_part(precision: str | int) -> float:
     return _LEAST_SINGLE if precision == "single" else LEAST
 
 
-def formulas_of(config: Config, names: Names | None = None) -> list[Expression | ExactNumber]:
-    """The three moments as numbers, or parsed where the config has expressions; empty if none is one.
+def formulas_of(config: Config, names: Names | None = None) -> list[Expression]:
+    """The three moments, parsed where the config has expressions; empty if none is one.
 
     Raises:
         ConfigError: an expression that can't be read, jumps, or reads what moments can't.
@@ -45,14 +39,14 @@ def formulas_of(config: Config, names: Names | None = None) -> list[Expression |
         return []
     names = names_of(config) if names is None else names
     allowed = {"t", *(state.name for state in config.states)}
-    found: list[Expression | ExactNumber] = []
+    found: list[Expression] = []
     for axis, text in enumerate(given):
         if isinstance(text, ExactNumber):
-            found.append(text)
+            found.append(Constant(text))
             continue
         where = f"{WHERE}[{axis}]"
         try:
-            formula = parse_expression(text, names, parameters=config.parameters, unit="kg m^2")
+            formula = parse_expression(text, names, parameters=config.parameters, unit="kg m^2", where=where)
         except ExpressionError as error:
             said = f'given "{text}", which is neither a number nor an expression that can be read: {error}'
             raise ConfigError(Problem(where, said)) from None
@@ -72,18 +66,14 @@ def moments_at_start(config: Config, context: Any, start: Any) -> Vector | None:
     Raises:
         ConfigError: as ``formulas_of``, or one has no finite value there, or is too small to vary.
     """
-    found = formulas_of(config)
-    if not found:
-        return None
     values = {"t": start, **{state.name: state.initial.at(context) for state in config.states}}
     moments = []
-    for axis, formula in enumerate(found):
+    for axis, formula in enumerate(found := formulas_of(config)):
         try:
-            given = isinstance(formula, ExactNumber)
-            moments.append(formula.at(context) if given else evaluate(formula, values, context))  # type: ignore
+            moments.append(evaluate(formula, values, context))
         except ExpressionError as error:
             raise ConfigError(Problem(f"{WHERE}[{axis}]", f"no finite value at the start: {error}")) from None
-    if any(varies(formula, context) for formula in found):
+    if names_used(*found):
         least = least_part(config.integrator.precision)
         small = next((i for i in range(3) if 0 <= moments[i] <= least * sum(moments)), None)
         if small is not None:
@@ -91,9 +81,4 @@ def moments_at_start(config: Config, context: Any, start: Any) -> Vector | None:
             raise ConfigError(
                 Problem(f"{WHERE}[{small}]", what + f"each has to be more than {least:.1g} of their sum")
             )
-    return moments
-
-
-def varies(formula: Expression | ExactNumber, context: Any) -> bool:
-    """Whether a moment is no constant."""
-    return not isinstance(formula, ExactNumber) and constant_value(formula, context) is None
+    return moments or None

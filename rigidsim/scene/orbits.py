@@ -14,7 +14,7 @@ from rigidsim.scene.orbit_keys import PACES, Elements, Orbit
 from rigidsim.scene.orbit_tables.elements import ElementTable, read_table
 from rigidsim.scene.orbit_tables.pieces import TabulatedOrbit
 from rigidsim.scene.point_masses import ellipse_of
-from rigidsim.scene.registry import Surroundings
+from rigidsim.scene.registry import Setting
 from rigidsim.scene.text_tables import TableError
 from rigidsim.scene.tracing.arithmetic import TracedExact
 from rigidsim.scene.tracing.numbers import Traced, Untraceable
@@ -84,7 +84,7 @@ class KeplerOrbit:
         return abs(self.mean_motion) * context.sqrt(1 - e * e) / (1 - e) ** 2
 
 
-def attracting_body(orbit: Orbit, around: Surroundings) -> int:
+def attracting_body(orbit: Orbit, around: Setting) -> int:
     """Index of the point mass that an orbit names."""
     more = sorted(orbit.model_fields_set - {"body"})
     if more:
@@ -101,7 +101,7 @@ def attracting_body(orbit: Orbit, around: Surroundings) -> int:
     return found
 
 
-def pace_of(table: Elements, around: Surroundings) -> tuple[str, ExactNumber] | None:
+def pace_of(table: Elements, around: Setting) -> tuple[str, ExactNumber] | None:
     """The key that replaces the mean motion of Kepler's third law, and its value; None if none is given."""
     given = [(key, getattr(table, key)) for key in PACES if getattr(table, key) is not None]
     for key, value in given:
@@ -120,7 +120,7 @@ def rate_of(pace: tuple[str, ExactNumber], context: Any) -> Any:
     return value.at(context) if key == "longitude_rate" else 2 * context.pi / value.at(context)
 
 
-def mean_motion(table: Elements, strength: Any | None, around: Surroundings) -> Any:
+def mean_motion(table: Elements, strength: Any | None, around: Setting) -> Any:
     """Rate of the mean anomaly (mpf, rad/s): that of the pace that was given, or of Kepler's third law if the
     gravitational parameter ``strength`` is known. Mean longitude is ascending node + periapsis + mean
     anomaly.
@@ -142,7 +142,7 @@ def mean_motion(table: Elements, strength: Any | None, around: Surroundings) -> 
     return motion
 
 
-def resolve_orbit(table: Elements, strength: Any | None, around: Surroundings) -> KeplerOrbit:
+def resolve_orbit(table: Elements, strength: Any | None, around: Setting) -> KeplerOrbit:
     """Elements of the attracting body as seen from the body: as given, or the body's own with the periapsis
     half a turn back. ``strength`` is the gravitational parameter (mpf, m^3/s^2), if known.
     """
@@ -215,7 +215,7 @@ def tabulated_orbit(
 _NO_CONSTANTS = ("table", "node_rate", "periapsis_rate")
 
 
-def resolve_tabulated_orbit(fields: Elements, strength: Any | None, around: Surroundings) -> TabulatedOrbit:
+def resolve_tabulated_orbit(fields: Elements, strength: Any | None, around: Setting) -> TabulatedOrbit:
     """Work out a table's orbit; ``strength`` is the gravitational parameter of Kepler's law, if known."""
     name = fields.table
     assert name is not None
@@ -229,8 +229,8 @@ def resolve_tabulated_orbit(fields: Elements, strength: Any | None, around: Surr
             what = "given beside table, whose columns say what moves; remove it"
             raise around.fault(f"{fields.key}.{rate}", what)
     pace_of(fields, around)
-    if name not in around.tables:
-        known = ", ".join(around.tables) or "none"
+    if name not in around.config.texts:
+        known = ", ".join(around.config.texts) or "none"
         what = f'given "{name}", but this config was given as text, without files beside it; put the '
         what += f'CSV into [tables."{name}"] text (there now: {known})'
         raise around.fault(f"{fields.key}.table", what)
@@ -238,13 +238,14 @@ def resolve_tabulated_orbit(fields: Elements, strength: Any | None, around: Surr
     constants = tuple((key, value.alone) for key, value in given if value is not None)
     try:
         orbit = tabulated_orbit(
-            name, around.tables[name], around.context.prec, constants, parts, fields.opposite
+            name, around.config.texts[name], around.context.prec, constants, parts, fields.opposite
         )
     except TableError as error:
         raise around.fault(f"{fields.key}.table", f'given "{name}": {error}') from None
     times = orbit.table.times
-    if around.span is not None and not (times[0] <= around.span[0] and around.span[1] <= times[-1]):
-        first, last, start, end = (around.context.nstr(t, 8) for t in (times[0], times[-1], *around.span))
+    if not (times[0] <= around.start and around.end <= times[-1]):
+        ends = times[0], times[-1], around.start, around.end
+        first, last, start, end = (around.context.nstr(t, 8) for t in ends)
         what = (
             f'given "{name}", which reaches from t = {first} s to {last} s, but the run goes from {start} s '
         )

@@ -5,19 +5,18 @@ They are carried by need: recorded, or read by a load, an event or another of th
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 from pydantic import Field, StrictStr, field_validator
 
-from rigidsim.errors import ConfigError, Problem
 from rigidsim.scene import units
-from rigidsim.scene.exact import ZERO, ExactNumber, Quantity
-from rigidsim.scene.expressions.names import BODY_NAMES, Names
-from rigidsim.scene.expressions.parser import parse_expression
-from rigidsim.scene.expressions.tree import RESERVED, Expression, ExpressionError, states_read
+from rigidsim.scene.exact import ZERO, Quantity
+from rigidsim.scene.expressions.names import BODY_NAMES
+from rigidsim.scene.expressions.tree import RESERVED, Expression, states_read
 from rigidsim.scene.fields import AnyQuantity, ConfigTable, Formula, VariableName, refuse
+from rigidsim.scene.registry import Setting
 from rigidsim.scene.units import UnitError
 from rigidsim.scene.validation_messages import shown
 
@@ -72,7 +71,6 @@ class OwnState:
     unit: str | None  # SI; "1" for a number, None if it isn't known
     initial: Any  # mpf
     derivative: Expression  # SI
-    where: str  # its derivative's place in the config
     why: str = ""
 
     @property
@@ -82,26 +80,23 @@ class OwnState:
         return f'state {self.name}: from {start}, changes by "{self.derivative.text}"'
 
 
-def resolve_states(
-    tables: Sequence[OwnStateTable], parameters: Mapping[str, ExactNumber], names: Names, context: Any
-) -> list[OwnState]:
+def resolve_states(setting: Setting) -> list[OwnState]:
     """All states of the config, their derivatives parsed.
 
     Raises:
         ConfigError: an expression that can't be read, or another dimension than the unit's.
     """
     found = []
-    for number, table in enumerate(tables, start=1):
-        where = f"[[states]] number {number} derivative"
-        _check_initial(table, number)
+    for number, table in enumerate(setting.config.states):
+        here, start = setting.at("states", number), table.initial
+        if isinstance(start, Quantity) and table.unit is not None:
+            try:
+                units.conversion(start.unit, table.unit)
+            except UnitError as error:
+                raise here.fault("initial", f"given a value in {start.unit}; {error}") from None
         rate = None if table.unit is None else "s^-1" if table.unit == "1" else f"{table.unit}/s"
-        try:
-            derivative = parse_expression(
-                table.derivative, names, parameters=parameters, unit=rate, read_too=True
-            )
-        except ExpressionError as error:
-            raise ConfigError(Problem(where, str(error))) from None
-        found.append(OwnState(table.name, table.unit, table.initial.at(context), derivative, where))
+        derivative = here.expression("derivative", table.derivative, rate, read_too=True)
+        found.append(OwnState(table.name, table.unit, start.at(setting.context), derivative))
     return found
 
 
@@ -114,37 +109,14 @@ def carried_states(
         readers: who reads, for ``plan``, and what.
         record: names of what is recorded; None for all that the scene has.
     """
-    known = {state.name: state for state in states}
-    why: dict[str, list[str]] = {name: ["recorded"] for name in known if record is None or name in record}
-    waiting = [(who, name) for who, expression in readers for name in sorted(states_read(expression))]
-    waiting += [(f"state {name}", read) for name in why for read in _others(known[name])]
-    while waiting:
-        who, name = waiting.pop(0)
-        if name not in known:
-            continue
-        if name not in why:
-            waiting += [(f"state {name}", read) for read in _others(known[name])]
-        reasons = why.setdefault(name, [])
-        if (reason := f"{who} reads it") not in reasons:
-            reasons.append(reason)
-    return tuple(
-        OwnState(x.name, x.unit, x.initial, x.derivative, x.where, "; ".join(why[x.name]))
-        for x in states
-        if x.name in why
-    )
-
-
-def _others(state: OwnState) -> list[str]:
-    return sorted(states_read(state.derivative) - {state.name})
-
-
-def _check_initial(table: OwnStateTable, number: int) -> None:
-    """Refuse an initial value with a unit of another dimension, or an angle for a number."""
-    given = table.initial
-    if not isinstance(given, Quantity) or table.unit is None:
-        return
-    try:
-        units.conversion(given.unit, table.unit)
-    except UnitError as error:
-        what = f"given a value in {given.unit}; {error}"
-        raise ConfigError(Problem(f"[[states]] number {number} initial", what)) from None
+    slopes = {state.name: state.derivative for state in states}
+    why: dict[str, dict[str, None]] = {x: {"recorded": None} for x in slopes if record is None or x in record}
+    waiting = [*readers, *((f"state {name}", slopes[name]) for name in why)]
+    for who, expression in waiting:
+        for name in sorted(states_read(expression) & set(slopes)):
+            if who == f"state {name}":
+                continue
+            if name not in why:
+                waiting.append((f"state {name}", slopes[name]))
+            why.setdefault(name, {})[f"{who} reads it"] = None
+    return tuple(replace(x, why="; ".join(why[x.name])) for x in states if x.name in why)

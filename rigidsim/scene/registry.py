@@ -1,14 +1,15 @@
-"""Registries of what a config can name beyond the schema: kinds of loads, and observables.
+"""Loads as a scene knows them, what their keys are worked out against, and the registries.
 
-Both are empty here. The files of ``rigidsim.model`` that define a load or an observable register it, so
-that a config, a schema or a message never needs a second list of names.
+These are empty here: files of ``rigidsim.model`` that define a load or an observable register it, so that a
+config, a schema or a message never needs a second list of names.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from typing import Any, ClassVar, Protocol
+from collections.abc import Collection, Iterator, Mapping
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any, ClassVar
 
 from pydantic import Field, field_validator
 
@@ -19,8 +20,10 @@ from rigidsim.scene.effect_parts import EffectPart
 from rigidsim.scene.epochs import Epoch
 from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.expressions.names import Names, origin
-from rigidsim.scene.expressions.tree import Expression
+from rigidsim.scene.expressions.parser import parse_expression
+from rigidsim.scene.expressions.tree import Expression, ExpressionError
 from rigidsim.scene.fields import ConfigTable, Metre, VariableName, refuse
+from rigidsim.scene.frame import Figure
 from rigidsim.scene.kernels.ephemeris import Ephemeris
 from rigidsim.scene.kernels.reading import Sight
 from rigidsim.scene.point_masses import PointMasses
@@ -59,43 +62,41 @@ class SourceFields(LoadFields):
         return value
 
 
-@dataclass(frozen=True)
-class Surroundings:
-    """What the keys of a load are worked out against.
+@dataclass(frozen=True, kw_only=True)
+class Setting:
+    """What is known of a scene before its loads, events and states: these are worked out against it.
 
     Attributes:
-        number: place of the load in the config, counted from 0.
-        context: the scene's arithmetic.
-        parameters: named constants for expressions.
-        center_of_mass: from the body's reference point to its centre of mass, body axes, m (mpf).
-        free_flight: whether the body has a position.
-        axes: what the space axes are, if the config says so.
-        epoch: date of the scene's time 0, if the config says so.
-        tables: texts of the tables that belong to the config, by name.
-        span: start and end of the run, s (mpf).
-        bodies: point masses besides the body.
+        config: the whole config, validated.
+        context: the scene's arithmetic, in which numbers are mpf, in SI units.
+        body: the rigid body at the start.
+        start, end: of the run, s.
+        axes, epoch: what the space axes and time 0 are, if the config says so or a load implies it.
+        position, velocity: those of the centre of mass, space axes; None unless the body moves freely.
         names: what expressions may read.
-        table: array of tables that it stands in.
-        body: the rigid body.
+        bodies: point masses besides the body; None if there are none.
         ephemeris: where bodies of a kernel are; None without one.
         host: the body of the kernel that this one is; empty for none.
+        figure: the body's figure axis, see ``[frame] figure_axis``.
+        table, number: the array of tables, and the place in it counted from 0, of what is being worked out.
     """
 
-    number: int
+    config: Any
     context: Any
-    parameters: Mapping[str, ExactNumber]
-    center_of_mass: Vector
-    free_flight: bool
-    axes: str | None = None
-    epoch: Epoch | None = None
-    tables: Mapping[str, str] = field(default_factory=dict)
-    span: tuple[Any, Any] | None = None
-    bodies: PointMasses | None = None
-    names: Names = field(default_factory=Names)
+    body: RigidBody
+    start: Any
+    end: Any
+    axes: str | None
+    epoch: Epoch | None
+    position: Vector | None
+    velocity: Vector | None
+    names: Names
+    bodies: PointMasses | None
+    ephemeris: Ephemeris | None
+    host: str
+    figure: Figure
     table: str = "loads"
-    body: RigidBody | None = None
-    ephemeris: Ephemeris | None = None
-    host: str = ""
+    number: int = 0
 
     @property
     def carried_bodies(self) -> PointMasses:
@@ -103,9 +104,30 @@ class Surroundings:
         assert self.bodies is not None
         return self.bodies
 
+    @property
+    def free_flight(self) -> bool:
+        """Whether the body moves with six degrees of freedom."""
+        return self.position is not None
+
+    def at(self, table: str, number: int) -> Setting:
+        """The same for what stands at a place of an array of tables."""
+        return replace(self, table=table, number=number)
+
+    def where(self, key: str) -> str:
+        """The place of a key of what is being worked out, for messages."""
+        return f"[[{self.table}]] number {self.number + 1} {key}".rstrip()
+
     def fault(self, key: str, text: str) -> ConfigError:
-        """The error that names a key of this load."""
-        return ConfigError(Problem(f"[[{self.table}]] number {self.number + 1} {key}".rstrip(), text))
+        """The error that names a key of what is being worked out."""
+        return ConfigError(Problem(self.where(key), text))
+
+    def expression(self, key: str, text: str, unit: str | None = None, **options: Any) -> Expression:
+        """The expression of a key, see ``parse_expression``; an error in it names the key."""
+        options = {"parameters": self.config.parameters, "unit": unit, "where": self.where(key), **options}
+        try:
+            return parse_expression(text, self.names, **options)
+        except ExpressionError as error:
+            raise self.fault(key, str(error)) from None
 
 
 class SceneLoad:
@@ -142,14 +164,28 @@ class SceneLoad:
     nothing: ClassVar[Mapping[str, Any]] = {}
 
     @classmethod
-    def resolve(cls, fields: Any, around: Surroundings) -> SceneLoad:
+    def resolve(cls, fields: Any, around: Setting) -> SceneLoad:
         """The load that the keys describe, every number worked out.
 
         Args:
-            fields: an instance of ``Fields``.
+            fields: an instance of ``Fields``; the whole config for a load that a key of ``[body]`` brings.
 
         Raises:
             ConfigError: a contradiction or a value out of range.
+        """
+        raise NotImplementedError
+
+    @classmethod
+    def beside_of(cls, load: SceneLoad, fields: Any, around: Setting) -> SceneLoad | None:
+        """The load that a key of another load brings beside it, on the same source; None where the key's
+        value brings none.
+
+        Args:
+            load: the one that has the key, resolved.
+            fields: its keys.
+
+        Raises:
+            ConfigError: the key contradicts something else.
         """
         raise NotImplementedError
 
@@ -201,57 +237,24 @@ class SceneLoad:
         """
         return None
 
-    def formulas(self) -> Iterator[tuple[str, Expression]]:
-        """Its expressions with their places in the config, to be tried at the start."""
-        yield from ()
+    def formulas(self) -> list[Expression]:
+        """Its expressions, to be tried at the start: those that are attributes, alone or in tuples."""
+        values = (x if isinstance(x, tuple) else (x,) for x in vars(self).values())
+        return [x for each in values for x in each if isinstance(x, Expression)]
 
-    def never_negative(self) -> Iterator[tuple[str, Expression]]:
-        """Expressions for what no body or medium has below zero, with their places in the config."""
-        yield from ()
-
-
-class Companion(Protocol):
-    """A class of loads that a key of another load brings beside it, on the same source."""
-
-    @classmethod
-    def beside_of(cls, load: SceneLoad, fields: Any, around: Surroundings) -> SceneLoad | None:
-        """The load that acts beside another one; None where the key's value brings none.
-
-        Args:
-            load: the one that has the key, resolved.
-            fields: its keys.
-
-        Raises:
-            ConfigError: the key contradicts something else.
-        """
-
-    @staticmethod
-    def effect_parts(fields: Any) -> Iterator[EffectPart]:
-        """As of ``SceneLoad``; ``fields`` are those of the load that has the key."""
+    def never_negative(self) -> list[Expression]:
+        """Expressions for what no body or medium has below zero."""
+        return []
 
 
-class Named(Protocol):
-    """An observable as far as a config needs to know it."""
-
-    @property
-    def name(self) -> str:
-        """Name by which a config asks for the observable."""
-
-
-LOAD_KINDS: dict[str, type[SceneLoad]] = {}
-"""Kinds of ``[[loads]]`` by name."""
-
-TABLES: dict[str, type[SceneLoad]] = {}
-"""Loads with an array of tables of their own, by its name in the config: ``[[rotors]]``."""
-
-OF_BODY: dict[str, type[SceneLoad]] = {}
-"""Loads that keys of ``[body]`` bring, by the key: ``resolve`` is given the whole config."""
-
-BESIDE: dict[str, Any] = {}
-"""Loads that a key of a load brings beside it (``Companion``), by the key."""
+LOADS: dict[str, dict[str, Any]] = {"kind": {}, "table": {}, "body": {}, "beside": {}}
+"""Classes of loads by where their keys stand, and by name there: kinds of ``[[loads]]``, arrays of tables of
+their own such as ``[[rotors]]``, keys of ``[body]``, and keys of loads that bring another beside these
+(``beside_of``).
+"""
 
 OBSERVABLES: dict[str, Any] = {}
-"""What can be recorded, by name, in the order in which a dataset holds it (``Named``)."""
+"""What can be recorded, by name, in the order in which a dataset holds it."""
 
 
 def register_class(known: dict[str, Any], name: str, kind: type, what: str) -> None:
@@ -272,60 +275,24 @@ def register_class(known: dict[str, Any], name: str, kind: type, what: str) -> N
     known[name] = kind
 
 
-def register_load(kind: type[SceneLoad]) -> type[SceneLoad]:
-    """Register a kind of load, so that ``[[loads]] kind = "..."`` finds it (usable as a class decorator).
+def register_load(kind: Any = None, **place: str) -> Any:
+    """Register a class of loads (also as a class decorator), by default as a kind of ``[[loads]]``.
+
+    Args:
+        place: ``table``, ``body`` or ``beside`` with a name, see ``LOADS``.
 
     Raises:
-        ValueError: the kind has no ``Fields``, or its name is taken.
+        ValueError: a kind of ``[[loads]]`` has no ``Fields``, or the name is taken (see ``register_class``).
     """
-    if kind.Fields is None:
-        raise ValueError(f"{kind.__name__} has no Fields; a load of a config declares its keys there")
-    annotation = kind.Fields.model_fields["kind"].annotation
-    (name,) = annotation.__args__  # type: ignore[union-attr]
-    register_class(LOAD_KINDS, name, kind, "a load of kind")
+    if kind is None:
+        return partial(register_load, **place)
+    if not place:
+        if kind.Fields is None:
+            raise ValueError(f"{kind.__name__} has no Fields; a load of a config declares its keys there")
+        place = dict(zip(("kind",), kind.Fields.model_fields["kind"].annotation.__args__, strict=True))
+    ((where, name),) = place.items()
+    register_class(LOADS[where], name, kind, f"a load of {where}")
     return kind
-
-
-def register_table(name: str) -> Callable[[type[SceneLoad]], type[SceneLoad]]:
-    """Register loads whose keys are an array of tables of their own in the config (a class decorator)."""
-
-    def register(kind: type[SceneLoad]) -> type[SceneLoad]:
-        register_class(TABLES, name, kind, "a load with the tables")
-        return kind
-
-    return register
-
-
-def register_of_body(key: str) -> Callable[[type[SceneLoad]], type[SceneLoad]]:
-    """Register a load that a key of ``[body]`` brings (a class decorator)."""
-
-    def register(kind: type[SceneLoad]) -> type[SceneLoad]:
-        register_class(OF_BODY, key, kind, "a load by the key of [body]")
-        return kind
-
-    return register
-
-
-def register_beside(key: str) -> Callable[[Any], Any]:
-    """Register loads that a key of other loads brings beside these (a class decorator)."""
-
-    def register(kind: Any) -> Any:
-        register_class(BESIDE, key, kind, "a load beside others by the key")
-        return kind
-
-    return register
-
-
-def companions(
-    loads: Sequence[SceneLoad], tables: Sequence[LoadFields], around: Surroundings
-) -> list[SceneLoad]:
-    """What the keys of loads bring beside them."""
-    found = []
-    for number, (load, fields) in enumerate(zip(loads, tables, strict=True)):
-        for key, kind in BESIDE.items():
-            if getattr(fields, key, None) is not None:
-                found.append(kind.beside_of(load, fields, replace(around, number=number)))
-    return [load for load in found if load is not None]
 
 
 def names_of(fields: Any) -> list[str]:
@@ -338,7 +305,7 @@ def names_of(fields: Any) -> list[str]:
     return [name for name in given if name]
 
 
-def register_observable(observable: Named) -> None:
+def register_observable(observable: Any) -> None:
     """Register an observable, so that ``[output] record`` finds it; ``ValueError`` if its name is taken."""
     if observable.name in OBSERVABLES:
         raise ValueError(f'an observable named "{observable.name}" is registered already')

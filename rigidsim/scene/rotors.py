@@ -8,7 +8,7 @@ from typing import Any
 from pydantic import Field, StrictBool
 
 from rigidsim.errors import ConfigError, Problem
-from rigidsim.scene.arithmetic import Matrix, Vector, apply, cross, diagonal, dot, eigen
+from rigidsim.scene.arithmetic import Matrix, Vector, cross, diagonal, dot, eigen
 from rigidsim.scene.bodies.body import RigidBody
 from rigidsim.scene.exact import ZERO
 from rigidsim.scene.fields import ConfigTable, Dimensionless, Formula, Moment, Rate, Triple, VariableName
@@ -92,40 +92,3 @@ def _inverse(context: Any, m: Matrix) -> Matrix:
     rows = [cross(m[1], m[2]), cross(m[2], m[0]), cross(m[0], m[1])]
     determinant = dot(m[0], rows[0])
     return [[x / determinant for x in row] for row in rows]
-
-
-def refuse_odd_rotors(rotors: Sequence[RotorTable], body: RigidBody, context: Any) -> None:
-    """Refuse rotors that the body can't have.
-
-    Raises:
-        ConfigError: an axis of no direction, a moment that is out of range.
-    """
-    problems = []
-    for number, rotor in enumerate(rotors, start=1):
-        where = f"[[rotors]] number {number}"
-        axis = [x.at(context) for x in rotor.axis]
-        if all(x == 0 for x in axis):
-            problems.append(Problem(f"{where} axis", "given [0, 0, 0]; a direction is needed"))
-            continue
-        moment = rotor.moment.at(context)
-        if moment < 0 or (moment == 0 and not rotor.fixed):
-            allowed = "zero or more is allowed" if rotor.fixed else "a positive moment is allowed"
-            problems.append(Problem(f"{where} moment", f"given {float(plain(moment)):g}; {allowed}"))
-        if rotor.fixed and rotor.torque is not None:
-            what = "given beside fixed = true, which keeps the rate by whatever torque that takes; remove one"
-            problems.append(Problem(f"{where} torque", what))
-        own = dot(axis, apply(body.inertia, axis)) / dot(axis, axis)
-        if moment > own:
-            what = (
-                f"given {context.nstr(moment, 8)} kg m^2, more than the body's own about this axis, "
-                f"{context.nstr(own, 8)} kg m^2, which includes the rotor as if it were locked; make it "
-                "smaller, or add the rotor's tensor to that of [body]"
-            )
-            problems.append(Problem(f"{where} moment", what))
-    if rotors and min(body.principal_moments) == 0:
-        what = (
-            "given in a body without a moment about one of its axes, which a rotor can't turn; remove them, "
-        )
-        problems.append(Problem("[[rotors]]", what + "or give the body all three moments"))
-    if problems:
-        raise ConfigError(problems)

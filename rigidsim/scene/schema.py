@@ -53,7 +53,7 @@ from rigidsim.scene.integrator_table import Integrator
 from rigidsim.scene.kernels.ephemeris import EphemerisTable
 from rigidsim.scene.own_states import OwnStateTable
 from rigidsim.scene.point_masses import PointMassBody
-from rigidsim.scene.registry import LOAD_KINDS, OBSERVABLES, LoadFields
+from rigidsim.scene.registry import LOADS, OBSERVABLES, LoadFields
 from rigidsim.scene.rotors import RotorTable
 from rigidsim.scene.sample_times import Time
 from rigidsim.scene.sweep_table import SweepTable
@@ -281,6 +281,11 @@ class Config(ConfigTable):
     )
     """texts of tables that loads refer to; the text of files beside the config is copied here"""
 
+    @property
+    def texts(self) -> dict[str, str]:
+        """Texts of tables by name."""
+        return {name: table.text for name, table in self.tables.items()}
+
     @model_validator(mode="after")
     def _dated(self) -> Config:
         """Date and axes that two-line elements, or a frame, imply where the config says nothing of them."""
@@ -330,9 +335,9 @@ class Config(ConfigTable):
 
 def config_model() -> type[Config]:
     """The schema with every kind of load; ``RuntimeError`` if ``rigidsim.model.loads`` registered none."""
-    if not LOAD_KINDS:
+    if not LOADS["kind"]:
         raise RuntimeError("no kinds of loads are registered; import rigidsim.model.loads first")
-    kinds = [LOAD_KINDS[name].Fields for name in sorted(LOAD_KINDS)]
+    kinds = [LOADS["kind"][name].Fields for name in sorted(LOADS["kind"])]
     return _with_loads(tuple(fields for fields in kinds if fields is not None))
 
 

@@ -13,37 +13,17 @@ these are a + 90 deg, 90 deg - d and W for the pole's right ascension a and decl
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 from rigidsim.errors import ConfigError, Problem
 from rigidsim.scene import attitude, space_axes
 from rigidsim.scene.arithmetic import Vector, apply, dot, negligible, transpose
 from rigidsim.scene.bodies.body import RigidBody, inverse_inertia
 from rigidsim.scene.exact import ExactNumber
-from rigidsim.scene.frame import Figure
-from rigidsim.scene.registry import SceneLoad
-from rigidsim.scene.schema import Config, Initial
-
-
-class Begun(Protocol):
-    """A scene of which all but the start is known."""
-
-    @property
-    def config(self) -> Config: ...  # noqa: D102
-    @property
-    def context(self) -> Any: ...  # noqa: D102
-    @property
-    def body(self) -> RigidBody: ...  # noqa: D102
-    @property
-    def loads(self) -> Sequence[SceneLoad]: ...  # noqa: D102
-    @property
-    def figure(self) -> Figure: ...  # noqa: D102
-    @property
-    def axes(self) -> str | None: ...  # noqa: D102
-    @property
-    def quaternion(self) -> Vector: ...  # noqa: D102
+from rigidsim.scene.registry import Setting
+from rigidsim.scene.schema import Initial
 
 
 @dataclass(frozen=True)
@@ -157,26 +137,25 @@ def _either(ways: dict[str, StartForm]) -> str:
     return ", ".join(way.described for way in ways.values())
 
 
-def start_of(scene: Any, with_start: Callable[[Any, InitialRotation], Any]) -> InitialRotation:
-    """Work out the start of a scene.
+def attitude_of(scene: Setting) -> InitialRotation:
+    """The attitude at the start of a scene; by default the body axes are along the space axes."""
+    way = _chosen(scene.config.initial, ATTITUDES, "")
+    return way.resolve(scene) if way else InitialRotation([scene.context.one] + [scene.context.zero] * 3)
 
-    Args:
-        scene: the scene with any start.
-        with_start: puts a start into it.
-    """
-    table, context = scene.config.initial, scene.context
-    way, rates = _chosen(table, ATTITUDES, ""), _chosen(table, RATES, "")
-    start = way.resolve(scene) if way else InitialRotation([context.one] + [context.zero] * 3)
+
+def rotation_of(scene: Any) -> InitialRotation:
+    """Attitude and rates at the start of a scene that has an attitude."""
+    table = scene.config.initial
     if table.equilibrium is not None:
-        start = EQUILIBRIA[table.equilibrium].resolve(with_start(scene, start))
-        key, velocity = "equilibrium", start.angular_velocity
+        key, start = "equilibrium", EQUILIBRIA[table.equilibrium].resolve(scene)
     else:
+        rates = _chosen(table, RATES, "")
         assert rates is not None
-        key, velocity = rates.key, rates.resolve(with_start(scene, start))
-    if along_massless(scene.body, velocity):
+        key, start = rates.key, InitialRotation(scene.quaternion, rates.resolve(scene), scene.euler_angles)
+    if along_massless(scene.body, start.angular_velocity):
         what = "has a spin about the axis that has no moment of inertia, where a spin means nothing; "
         raise refusal(key, what + "make that component zero")
-    return InitialRotation(start.quaternion, velocity, start.euler_angles, start.found)
+    return start
 
 
 def along_massless(body: RigidBody, vector: Vector) -> bool:
@@ -190,7 +169,7 @@ def along_massless(body: RigidBody, vector: Vector) -> bool:
 # --- attitudes ----------------------------------------------------------------------------------------------
 
 
-def _as_written(scene: Begun) -> InitialRotation:
+def _as_written(scene: Setting) -> InitialRotation:
     sequence = scene.config.integrator.euler_sequence
     given = attitude.given_attitude(scene.context, scene.config.initial, sequence, refusal)
     assert given is not None
@@ -201,7 +180,7 @@ def _check_written(table: Initial, context: Any) -> None:
     attitude.given_attitude(context, table, "zxz", refusal)
 
 
-def upright(scene: Begun, node: Any, tilt: Any, turn: Any) -> Vector:
+def upright(scene: Setting, node: Any, tilt: Any, turn: Any) -> Vector:
     """Quaternion of R3(node) R1(tilt) R3(turn) F^T, body axes to those of the plane (radians)."""
     context, figure = scene.context, scene.figure
     turned = attitude.quaternion_from_euler(context, [node, tilt, turn], "zxz")
@@ -210,7 +189,7 @@ def upright(scene: Begun, node: Any, tilt: Any, turn: Any) -> Vector:
     return attitude.unit_quaternion(context, attitude.product(turned, [w, -x, -y, -z]))
 
 
-def from_equator(scene: Begun, key: str) -> Vector:
+def from_equator(scene: Setting, key: str) -> Vector:
     """Quaternion that takes axes of the equator and equinox of J2000 to the scene's space axes; refused,
     naming a key, where these are unknown.
     """
@@ -221,7 +200,7 @@ def from_equator(scene: Begun, key: str) -> Vector:
     return space_axes.from_equator(scene.axes, context)
 
 
-def _from_pole(scene: Begun) -> InitialRotation:
+def _from_pole(scene: Setting) -> InitialRotation:
     table, context = scene.config.initial, scene.context
     assert table.pole is not None
     to_space = from_equator(scene, "pole")
@@ -234,7 +213,7 @@ def _from_pole(scene: Begun) -> InitialRotation:
     return InitialRotation(attitude.product(to_space, plain))
 
 
-def meridian(scene: Begun) -> Any:
+def meridian(scene: Setting) -> Any:
     """The angle ``prime_meridian``, by default 0."""
     given: ExactNumber | None = scene.config.initial.prime_meridian
     return scene.context.zero if given is None else given.at(scene.context)
@@ -243,13 +222,13 @@ def meridian(scene: Begun) -> Any:
 # --- rates --------------------------------------------------------------------------------------------------
 
 
-def _given_rates(scene: Begun) -> Vector:
+def _given_rates(scene: Setting) -> Vector:
     table = scene.config.initial
     assert table.angular_velocity is not None
     return [x.at(scene.context) for x in table.angular_velocity]
 
 
-def _from_momentum(scene: Begun) -> Vector:
+def _from_momentum(scene: Any) -> Vector:
     table = scene.config.initial
     assert table.angular_momentum is not None
     to_body = transpose(attitude.rotation_matrix(scene.quaternion))
@@ -263,7 +242,7 @@ def _from_momentum(scene: Begun) -> Vector:
     return apply(inverse_inertia(scene.context, scene.body), momentum)
 
 
-def spin_rate(scene: Begun) -> Any:
+def spin_rate(scene: Setting) -> Any:
     """Rate (mpf, rad/s) about the figure axis that ``spin_period`` means."""
     period = scene.config.initial.spin_period
     assert period is not None
@@ -276,7 +255,7 @@ def _check_period(table: Initial, context: Any) -> None:
         raise refusal("spin_period", "given 0 s; any other time is allowed, a negative one for retrograde")
 
 
-def _from_period(scene: Begun) -> Vector:
+def _from_period(scene: Setting) -> Vector:
     rate = spin_rate(scene)
     return [rate * x for x in scene.figure.pole]
 

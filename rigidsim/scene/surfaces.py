@@ -38,7 +38,11 @@ class Surface:
 
     expression: Expression
     text: str
-    where: str
+
+    @property
+    def where(self) -> str:
+        """Its key in the config."""
+        return self.expression.where
 
     @property
     def remedy(self) -> str:
@@ -73,11 +77,11 @@ def surfaces_of(scene: Scene) -> Surfaces:
     """Find the surfaces in the loads and events of a scene."""
     expressions = scene.formulas()
     arguments: dict[Expression, Surface] = {}
-    for where, expression in expressions:
+    for expression in expressions:
         for node in operations(expression):
             if node.operator == "sign" and names_used(node.operands[0]):
-                arguments.setdefault(node.operands[0], Surface(node.operands[0], node.text, where))
-    read = {readable.name: readable for readable in readables(*(expression for _, expression in expressions))}
+                arguments.setdefault(node.operands[0], Surface(node.operands[0], node.text))
+    read = {readable.name: readable for readable in readables(*expressions)}
     if not arguments and not any("attitude" in readable.states for readable in read.values()):
         return Surfaces()
     states = random_states(scene)
@@ -92,7 +96,7 @@ def surfaces_of(scene: Scene) -> Surfaces:
             first[kind] = len(found), sign
             found.append(surface)
         places[argument] = first[kind][0], sign * first[kind][1]
-    parts = [*(expression for _, expression in expressions), *(s.expression for s in found)]
+    parts = [*expressions, *(s.expression for s in found)]
     turn = 2 * context.pi
     turning = tuple(
         name

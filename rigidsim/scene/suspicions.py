@@ -53,12 +53,12 @@ def suspicious_angles(config: Config) -> list[Problem]:
 def suspicious_expressions(scene: Scene) -> list[Problem]:
     """Sines, cosines and tangents of whole numbers beyond a full turn: of degrees?"""
     found = []
-    for where, expression in scene.formulas():
+    for expression in scene.formulas():
         for name, value in _constant_arguments(expression):
             number, degrees = f"{float(value):.6g}", f"{math.degrees(float(value)):.6g}"
             found.append(
                 Problem(
-                    where,
+                    expression.where,
                     f"given {name}({number}), whose argument is taken as radians: {degrees} deg; write "
                     f"{name}({number} deg) if degrees are meant, {name}({number} rad) if not",
                 )

@@ -86,19 +86,17 @@ def root_parts(*expressions: Expression) -> list[Expression]:
 
 def happens_at_a_moment(scene: Scene) -> bool:
     """Whether a load or a state switches at a time, or changes late and within a short while."""
-    acting = [expression for _, expression in scene.acting_formulas()]
+    acting = scene.acting_formulas()
     switching = (_within(line, scene) for x in acting for line in _of_switches(x, scene.context))
     return any(switching) or any(_late(part, scene) for part in narrow_parts(*acting))
 
 
 def acts_at_moments_alone(scene: Scene) -> bool:
     """Whether loads depend on time by distances from moments alone, which no rounding of time disturbs."""
-    each = [list(load.formulas()) for load in scene.loads]
-    each += [
-        [(state.where, state.derivative)] for state in scene.states if "t" in names_used(state.derivative)
-    ]
+    each = [load.formulas() for load in scene.loads]
+    each += [[state.derivative] for state in scene.states if "t" in names_used(state.derivative)]
     for formulas in each:
-        lines = [line for _, expression in formulas for line in lines_in(expression, scene.context)]
+        lines = [line for expression in formulas for line in lines_in(expression, scene.context)]
         if not formulas or any(line.offset == 0 for line in lines):
             return False
     return True

@@ -1,6 +1,5 @@
 """How a run ended, in words: which event ended it, or where and why it broke down."""
 
-from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -103,15 +102,16 @@ def _why_it_broke(prepared: InitialValueProblem, time: float) -> str:
     """Why a run broke down after a time (s), with what to do; empty if the loads show no reason."""
     scene, precision = prepared.scene, prepared.precision
     context, spacing = scene.context, float(precision.epsilon)
-    for where, part in _parts(scene):
+    for part in _parts(scene):
         for line in lines_in(part, context):
             moment, width = line.zero, _width(part, line.zero, context)
             if width is None:
                 continue
             near = width < _NARROW * spacing * abs(moment)
             if near and scene.start < moment < scene.end and moment > time - _NARROW * spacing * abs(time):
+                when = time_words(scene).moment(float(moment))
                 return (
-                    f'; "{part.text}" ({where}) changes at {time_words(scene).moment(float(moment))} within '
+                    f'; "{part.text}" ({part.where}) changes at {when} within '
                     f"{float(width):.2g} s, and {precision.name} precision tells times there to "
                     f"{spacing * abs(float(moment)):.2g} s: choose a higher precision, a wider change, or "
                     "count time from an epoch shortly before"
@@ -119,22 +119,21 @@ def _why_it_broke(prepared: InitialValueProblem, time: float) -> str:
     if not issubclass(precision.scalar, float | np.floating):
         return ""
     most = np.finfo(precision.scalar).maxexp
-    for where, expression in scene.acting_formulas():
+    for expression in scene.acting_formulas():
         large = _beyond(expression, time, most, context)
         if large:
             return (
-                f'; "{large}" ({where}) exceeds the range of {precision.name} precision there '
+                f'; "{large}" ({expression.where}) exceeds the range of {precision.name} precision there '
                 f"(2^{most}): write it with functions that stay small, such as 1 - tanh(u)^2 in place of "
                 "1/cosh(u)^2, or choose a higher precision"
             )
     return ""
 
 
-def _parts(scene: Scene) -> Iterator[tuple[str, Expression]]:
-    for where, expression in scene.acting_formulas():
-        kinks = [node.operands[0] for node in operations(expression) if node.operator == "sign"]
-        parts = (*narrow_parts(expression), *kinks)
-        yield from ((where, part) for part in parts if names_used(part) == {"t"})
+def _parts(scene: Scene) -> list[Expression]:
+    formulas = scene.acting_formulas()
+    kinks = [node.operands[0] for x in formulas for node in operations(x) if node.operator == "sign"]
+    return [part for part in (*narrow_parts(*formulas), *kinks) if names_used(part) == {"t"}]
 
 
 def _width(part: Expression, moment: Any, context: Any) -> Any | None:

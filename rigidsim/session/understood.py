@@ -8,7 +8,7 @@ from rigidsim.scene import attitude
 from rigidsim.scene.arithmetic import Vector, working_bits
 from rigidsim.scene.cautions import Caution, WarningCode
 from rigidsim.scene.readable import TimeWords
-from rigidsim.scene.registry import OF_BODY
+from rigidsim.scene.registry import LOADS
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.schema import Config
 from rigidsim.scene.suspicions import (
@@ -100,7 +100,7 @@ def cautions_of(scene: Scene) -> list[Caution]:
                 one.gravitational_parameter, one.name, f"[[bodies]] number {number}"
             )
     for load in loads_of(scene):
-        if isinstance(load, tuple(OF_BODY.values())):
+        if isinstance(load, tuple(LOADS["body"].values())):
             found += load.cautions(scene.config.body, "[body]", scene)
     if scene.gravity is not None and not scene.free_flight and scene.torque_arm is None:
         found.append(

@@ -54,11 +54,11 @@ def refuse_roots_of_zero(system: System, precision: Precision) -> None:
 
 def _roots_of_zero(scene: Scene) -> list[Problem]:
     """Expressions with a root that vanishes at the start."""
-    formulas = [(where, x, parts) for where, x in scene.formulas() if (parts := root_parts(x))]
+    formulas = [(x, parts) for x in scene.formulas() if (parts := root_parts(x))]
     if not formulas:
         return []
     values, context, problems = start_values(scene), scene.context, []
-    for where, expression, parts in formulas:
+    for expression, parts in formulas:
         lost = [part for part in parts if evaluate(part, values, context) == 0]
         if lost:
             read = sorted(set().union(*map(names_used, lost)))
@@ -69,7 +69,7 @@ def _roots_of_zero(scene: Scene) -> list[Problem]:
                 "elsewhere, write abs(u) for the norm of a single component u, or add a small number under "
                 "the root"
             )
-            problems.append(Problem(where, what))
+            problems.append(Problem(expression.where, what))
     return problems
 
 

@@ -204,7 +204,7 @@ def _out_of_range(scene: Scene, error: OverflowError | ExpressionError) -> list[
     """What to say of numbers that the precision can't hold, by their keys where these are known."""
     config = scene.config
     if isinstance(error, ExpressionError):
-        where = (place for place, expression in scene.formulas() if expression.text == error.of)
+        where = (x.where for x in scene.formulas() if x.text == error.of)
         return [Problem(next(where, "config"), str(error))]
     single = config.integrator.precision == "single"
     largest = 10 ** (30 if single else 250)

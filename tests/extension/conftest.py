@@ -13,10 +13,10 @@ from rigidsim.scene.expressions import names
 @pytest.fixture(autouse=True)
 def registries(request: pytest.FixtureRequest) -> Iterator[None]:
     providers = list(names.PROVIDERS)
-    kept = {id(known): dict(known) for known in (registry.LOAD_KINDS, registry.OBSERVABLES)}
+    kept = {id(known): dict(known) for known in (registry.LOADS["kind"], registry.OBSERVABLES)}
     getattr(request.module, "register", lambda: None)()
     yield
     names.PROVIDERS[:] = providers
-    for known in (registry.LOAD_KINDS, registry.OBSERVABLES):
+    for known in (registry.LOADS["kind"], registry.OBSERVABLES):
         known.clear()
         known.update(kept[id(known)])

@@ -19,7 +19,7 @@ import rigidsim
 from rigidsim import ConfigError
 from rigidsim.model.loads import InSI, Load, Term
 from rigidsim.scene.fields import Moment, Rate
-from rigidsim.scene.registry import LoadFields, Surroundings, register_load
+from rigidsim.scene.registry import LoadFields, Setting, register_load
 from rigidsim.solve.problem import prepare
 
 
@@ -43,7 +43,7 @@ class TorsionWire(Load):
         self.stiffness = stiffness
 
     @classmethod
-    def resolve(cls, fields: SpringFields, around: Surroundings) -> TorsionWire:
+    def resolve(cls, fields: SpringFields, around: Setting) -> TorsionWire:
         if fields.inertia.sign <= 0:
             raise around.fault("inertia", f"given {float(fields.inertia):g}; a positive number is allowed")
         return cls(fields.inertia.at(around.context) * fields.frequency.at(around.context) ** 2)

@@ -56,7 +56,7 @@ def test_what_becomes_negative_ends_the_run(seed: int) -> None:
         run = run_text(scene(kind, law, 3 * T))
         fine = run_text(scene(kind, staying, 3 * T))
     assert run.status == "stopped: impossible body"
-    key = {"drag": "number 2 drag density", "mass_loss": "number 1 mass_loss rate"}[kind]
+    key = {"drag": "number 2 density", "mass_loss": "number 1 rate"}[kind]
     assert f"[[loads]] {key} is negative" in run.summary["message"]
     assert run.summary["time_reached"] == pytest.approx(end, rel=1e-9)
     assert fine.status == "finished"

@@ -10,7 +10,7 @@ import pytest
 from support import config, seeds
 
 import rigidsim
-from rigidsim.scene.registry import LOAD_KINDS
+from rigidsim.scene.registry import LOADS
 from rigidsim.scene.scope import NAMED_OTHERWISE
 from rigidsim.workflows.ready_scenes import ready_scenes
 
@@ -58,10 +58,10 @@ def test_a_load_is_found_by_other_names(seed: int) -> None:
 
 
 def test_what_answers_name_is_there() -> None:
-    kinds, said = "|".join(LOAD_KINDS), " ".join(NAMED_OTHERWISE)
+    kinds, said = "|".join(LOADS["kind"]), " ".join(NAMED_OTHERWISE)
     assert all((ROOT / page).is_file() for page in re.findall(r"docs/[\w/]+\.md", said))
     assert set(re.findall(r"rigidsim new (\w+)", said)) <= set(ready_scenes())
     assert len(set(re.findall(kinds, said))) >= 8
     names = [name for every in NAMED_OTHERWISE.values() for name in every]
     assert len(names) == len(set(names)) > 100
-    assert not set(names) & set(LOAD_KINDS)
+    assert not set(names) & set(LOADS["kind"])

@@ -18,7 +18,7 @@ import rigidsim
 from rigidsim.model.kinematics import Kinematics
 from rigidsim.model.load import Load, Term
 from rigidsim.model.observables import Observable, only_when_named
-from rigidsim.scene.registry import LOAD_KINDS, OBSERVABLES, LoadFields, register_load, register_observable
+from rigidsim.scene.registry import LOADS, OBSERVABLES, LoadFields, register_load, register_observable
 
 ERRORS = [
     TypeError, AttributeError, KeyError, IndexError, ZeroDivisionError, FloatingPointError, RuntimeError,
@@ -99,7 +99,7 @@ def _registered() -> Iterator[None]:
     with unoptimised_code():
         yield
     Raising.error = None
-    del LOAD_KINDS["raising"], OBSERVABLES["raising"]
+    del LOADS["kind"]["raising"], OBSERVABLES["raising"]
 
 
 def ways(folder: Path, seed: int) -> dict[str, Callable[[], Any]]:

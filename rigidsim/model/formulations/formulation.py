@@ -73,7 +73,7 @@ class ModelPlan:
     @property
     def wide(self) -> bool:
         """Whether the equations are too long to be compiled unrolled."""
-        read = readables(*(expression for _, expression in self.scene.formulas()))
+        read = readables(*self.scene.formulas())
         return self.formulation.wide or any(map(is_wide, self.loads)) or any(x.long for x in read)
 
 

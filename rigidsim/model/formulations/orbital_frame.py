@@ -94,7 +94,7 @@ def _rides_along(load: Load) -> bool:
 
 def _reads_places(scene: Scene) -> bool:
     """Whether an expression takes the orbit as it is in space."""
-    return PLACES in states_read(*(expression for _, expression in scene.formulas()))
+    return PLACES in states_read(*scene.formulas())
 
 
 def _in_space(

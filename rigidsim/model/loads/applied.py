@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, ClassVar, Literal
 
@@ -17,18 +16,16 @@ from rigidsim.scene.arithmetic import Vector, cross, diagonal, norm, parallel
 from rigidsim.scene.arithmetic import apply as apply_numbers
 from rigidsim.scene.arithmetic import transpose as transposed
 from rigidsim.scene.attitude import rotation_matrix
-from rigidsim.scene.expressions.parser import parse_expression
 from rigidsim.scene.expressions.tree import (
     Constant,
     Expression,
-    ExpressionError,
     evaluate,
     names_used,
     states_read,
 )
 from rigidsim.scene.fields import Formula, Metre, Triple
 from rigidsim.scene.initial_values import start_values
-from rigidsim.scene.registry import LoadFields, Surroundings, register_load
+from rigidsim.scene.registry import LoadFields, Setting, register_load
 from rigidsim.scene.scene import Scene
 
 _LONGEST = 60  # characters of an expression that are shown
@@ -77,29 +74,18 @@ class Applied(Load):
     frame: str  # axes of the components, "body" or "space"
     arm: Vector  # from the reference point to the force's point, body axes, m (mpf)
     pushes: bool  # whether it accelerates the centre of mass
-    number: int  # place in the config, for messages
 
     @classmethod
-    def resolve(cls, fields: Any, around: Surroundings) -> Applied:
-        names, given = around.names, around.parameters
-        components = []
-        for i, text in enumerate(fields.components):
-            try:
-                components.append(parse_expression(text, names, parameters=given, unit=cls.unit))
-            except ExpressionError as error:
-                raise around.fault(f"components[{i}]", str(error)) from None
+    def resolve(cls, fields: Any, around: Setting) -> Applied:
+        texts = enumerate(fields.components)
+        first, second, third = (around.expression(f"components[{i}]", text, cls.unit) for i, text in texts)
         point = getattr(fields, "point", None)
-        arm = around.center_of_mass if point is None else [x.at(around.context) for x in point]
-        first, second, third = components
+        arm = around.body.center_of_mass if point is None else [x.at(around.context) for x in point]
         pushes = cls.title == "force" and around.free_flight
-        return cls((first, second, third), fields.frame, arm, pushes, around.number)
+        return cls((first, second, third), fields.frame, arm, pushes)
 
     def acts(self) -> bool:
         return not all(_vanishes(component) for component in self.components)
-
-    def formulas(self) -> Iterator[tuple[str, Expression]]:
-        for i, component in enumerate(self.components):
-            yield f"[[loads]] number {self.number + 1} components[{i}]", component
 
     @property
     def names(self) -> frozenset[str]:

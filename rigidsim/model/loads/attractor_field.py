@@ -26,12 +26,12 @@ from rigidsim.model.rotations import Symbolic
 from rigidsim.model.turning_harmonics import Outward, TurningHarmonics, frame_of
 from rigidsim.scene.arithmetic import Vector, unit_vectors
 from rigidsim.scene.effect_parts import EffectPart
-from rigidsim.scene.registry import Surroundings, register_beside
+from rigidsim.scene.registry import Setting, register_load
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.tracing.numbers import plain
 
 
-@register_beside("gravity_field")
+@register_load(beside="gravity_field")
 @dataclass(frozen=True)
 class AttractorField(Load):
     """Force of the harmonics of a point at rest.
@@ -55,8 +55,8 @@ class AttractorField(Load):
     wide = True
 
     @classmethod
-    def beside_of(cls, load: Any, fields: CentralGravityFields, around: Surroundings) -> Load:
-        """See ``Companion``."""
+    def beside_of(cls, load: Any, fields: CentralGravityFields, around: Setting) -> Load:
+        """See ``SceneLoad``."""
         given, context = fields.gravity_field, around.context
         assert given is not None
         if not isinstance(load, CentralGravity):

@@ -11,7 +11,7 @@ from pydantic import Field, StrictStr, field_validator, model_validator
 from rigidsim.scene.bodies.gravity_field import MOST, Harmonic
 from rigidsim.scene.exact import ZERO, ExactNumber
 from rigidsim.scene.fields import Angle, ConfigTable, Dimensionless, Metre, Rate, Triple, refuse
-from rigidsim.scene.registry import Surroundings
+from rigidsim.scene.registry import Setting
 from rigidsim.scene.validation_messages import shown
 
 _KEY = re.compile(r"(0|[1-9]\d{0,3}),(0|[1-9]\d{0,3})")
@@ -79,7 +79,7 @@ def _refuse_key(key: str, table: str) -> None:
         raise refuse(f'given "{key}" in S, which has no order 0; zonal coefficients are in C')
 
 
-def coefficients_of(table: AttractorFieldTable, around: Surroundings) -> dict[Harmonic, Any]:
+def coefficients_of(table: AttractorFieldTable, around: Setting) -> dict[Harmonic, Any]:
     """Coefficients (mpf), unnormalized, without zeros; refused where no mass has them."""
     context, found = around.context, {}
     for name, given in (("C", table.C), ("S", table.S)):

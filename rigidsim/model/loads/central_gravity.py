@@ -38,7 +38,7 @@ from rigidsim.scene.fields import BodyName, GravitationalParameter, Metre, Rate,
 from rigidsim.scene.orbit_keys import Orbit
 from rigidsim.scene.orbits import attracting_body
 from rigidsim.scene.point_masses import closest, kepler_reach
-from rigidsim.scene.registry import Surroundings, register_load
+from rigidsim.scene.registry import Setting, register_load
 from rigidsim.scene.scene import Scene
 
 _ROUNDED = 0.999  # of the distance for which estimates are made, and the pericentre but for rounding
@@ -98,7 +98,7 @@ class CentralGravity(PointAttraction):
     conservative = True
 
     @classmethod
-    def resolve(cls, fields: CentralGravityFields, around: Surroundings) -> Load:
+    def resolve(cls, fields: CentralGravityFields, around: Setting) -> Load:
         if fields.orbit is not None:
             if fields.orbit.body is None:
                 raise around.fault("orbit", "given without body; the name of one of [[bodies]] is allowed")

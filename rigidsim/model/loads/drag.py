@@ -23,11 +23,10 @@ from rigidsim.scene.bodies.outside import Plate
 from rigidsim.scene.bodies.presets import known_body
 from rigidsim.scene.cautions import Caution
 from rigidsim.scene.exact import ExactNumber
-from rigidsim.scene.expressions.parser import parse_expression
-from rigidsim.scene.expressions.tree import Expression, ExpressionError
+from rigidsim.scene.expressions.tree import Expression
 from rigidsim.scene.fields import Dimensionless, Metre, NumberOrFormula
 from rigidsim.scene.initial_values import start_values
-from rigidsim.scene.registry import LoadFields, Surroundings, register_load
+from rigidsim.scene.registry import LoadFields, Setting, register_load
 from rigidsim.scene.scene import Scene
 
 Density = Annotated[Any, NumberOrFormula("kg/m^3")]
@@ -74,22 +73,22 @@ class Drag(SurfaceLoad):
     described = "drag"
 
     @classmethod
-    def resolve(cls, fields: DragFields, around: Surroundings) -> Drag:
+    def resolve(cls, fields: DragFields, around: Setting) -> Drag:
         if not around.free_flight or RELATIVE_NAMES[0] not in around.names:
             what = "given without a velocity relative to the air; it takes [initial] position and velocity, "
             raise around.fault("", what + "and a central_gravity (atmosphere_rate there turns the air)")
-        pushes = Pushes(around, RELATIVE_NAMES)
+        pushes = Pushes(around, cls.title, RELATIVE_NAMES)
         half, factors, law = around.context.one / 2, [], None
         _refuse_indices(fields, around)
         if fields.density == NRLMSISE:
-            factors.append(parse_expression(AIR_DENSITY, around.names))
+            factors.append(pushes.parsed(AIR_DENSITY))
         elif isinstance(fields.density, ExactNumber):
             if fields.density.sign < 0:
                 what = f"given {float(fields.density):g}; zero or more is allowed"
                 raise around.fault("density", what)
             half = half * fields.density.at(around.context)
         else:
-            law = _law(fields.density, around)
+            law = around.expression("density", fields.density, "kg/m^3")
             factors.append(law)
         factors += _falling(fields, around)
         for number, surface in pushes.surfaces():
@@ -99,11 +98,10 @@ class Drag(SurfaceLoad):
             else:
                 pushes.along_vector(surface, size, speed=True)
         kind = DragInThermosphere if fields.density == NRLMSISE else cls
-        return kind(pushes.acting(), tuple(factors), around.free_flight, around.number, law)
+        return kind(pushes.acting(), tuple(factors), around.free_flight, law)
 
-    def never_negative(self) -> Iterator[tuple[str, Expression]]:
-        if self.law is not None:
-            yield f"[[loads]] number {self.number + 1} drag density", self.law
+    def never_negative(self) -> list[Expression]:
+        return [] if self.law is None else [self.law]
 
     def cautions(self, fields: DragFields, where: str, scene: Scene) -> Iterator[Caution]:
         attractors = (x for x in scene.config.loads if getattr(x, "kind", "") == "central_gravity")
@@ -127,7 +125,7 @@ class DragInThermosphere(Drag):
         return "drag in NRLMSISE-00"
 
 
-def _refuse_indices(fields: DragFields, around: Surroundings) -> None:
+def _refuse_indices(fields: DragFields, around: Setting) -> None:
     """Require the indices of the Sun and the field with the model alone, within what they have been."""
     for key in INDICES:
         value, most = getattr(fields, key), 400
@@ -140,14 +138,7 @@ def _refuse_indices(fields: DragFields, around: Surroundings) -> None:
             raise around.fault(key, f"given {float(value):g}; {least} to {most} is allowed")
 
 
-def _law(text: str, around: Surroundings) -> Expression:
-    try:
-        return parse_expression(text, around.names, parameters=around.parameters, unit="kg/m^3")
-    except ExpressionError as error:
-        raise around.fault("density", str(error)) from None
-
-
-def _falling(fields: DragFields, around: Surroundings) -> list[Expression]:
+def _falling(fields: DragFields, around: Setting) -> list[Expression]:
     """The factor by which the density falls with the altitude, if it does."""
     if (fields.scale_height is None) != (fields.altitude is None):
         missing = "scale_height" if fields.scale_height is None else "altitude"
@@ -164,4 +155,4 @@ def _falling(fields: DragFields, around: Surroundings) -> list[Expression]:
         what = "given without a surface to count from; give the central_gravity a radius"
         raise around.fault("altitude", what)
     given = {"base": fields.altitude.alone, "scale_height": fields.scale_height.alone}
-    return [parse_expression("exp((base - altitude)/scale_height)", around.names, parameters=given)]
+    return [around.expression("drag", "exp((base - altitude)/scale_height)", parameters=given)]

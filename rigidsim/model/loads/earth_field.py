@@ -22,7 +22,7 @@ from rigidsim.scene.earth_axes import earth_axes, rotation_rate
 from rigidsim.scene.epochs import Epoch
 from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.geomagnetic_field import MOST, RADIUS, igrf
-from rigidsim.scene.registry import Surroundings
+from rigidsim.scene.registry import Setting
 from rigidsim.scene.tracing.numbers import plain
 
 _LEAST = 0.99
@@ -44,7 +44,7 @@ class EarthField:
     epoch: Epoch
 
     @classmethod
-    def of(cls, fields: MagneticFieldFields, around: Surroundings) -> EarthField:
+    def of(cls, fields: MagneticFieldFields, around: Setting) -> EarthField:
         """The field that the keys ask for; refused where date and axes aren't known."""
         axes = around.axes or (around.ephemeris.axes if around.ephemeris is not None else None)
         epoch, context = around.epoch, around.context
@@ -60,7 +60,7 @@ class EarthField:
         assert axes is not None
         try:
             given = igrf(epoch, fields.field_degree or MOST)
-            for second in around.span or ():
+            for second in (around.start, around.end):
                 igrf(epoch.uniform().after(Decimal(round(plain(second)))), 1)
             frame = earth_axes(epoch, axes, context)
         except ValueError as error:

@@ -26,7 +26,7 @@ from rigidsim.scene.arithmetic import (
 from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.fields import InUnit, Metre, Triple
 from rigidsim.scene.readable import number_text
-from rigidsim.scene.registry import Surroundings, register_load
+from rigidsim.scene.registry import Setting, register_load
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.tracing.numbers import plain
 
@@ -70,7 +70,7 @@ class EddyCurrents(InMagneticField):
     unaveraged = "the torque of eddy currents has no average", "leave it out, use viscous_torque"
 
     @classmethod
-    def resolve(cls, fields: EddyCurrentsFields, around: Surroundings) -> EddyCurrents:
+    def resolve(cls, fields: EddyCurrentsFields, around: Setting) -> EddyCurrents:
         if fields.magnetic_tensor is not None:
             moments = _of_tensor(fields.magnetic_tensor, fields, around)
         else:
@@ -137,7 +137,7 @@ class EddyCurrents(InMagneticField):
         return f"{told}: damps a spin across the field by 1/e in {span} or more"
 
 
-def _of_tensor(given: list[ExactNumber], fields: EddyCurrentsFields, around: Surroundings) -> Vector:
+def _of_tensor(given: list[ExactNumber], fields: EddyCurrentsFields, around: Setting) -> Vector:
     for key in ("conductivity", "radius", "thickness"):
         if getattr(fields, key) is not None:
             raise around.fault(key, "given beside magnetic_tensor, which says it; remove one of them")
@@ -147,7 +147,7 @@ def _of_tensor(given: list[ExactNumber], fields: EddyCurrentsFields, around: Sur
     return numbers(given, around)
 
 
-def _of_sphere(fields: EddyCurrentsFields, around: Surroundings) -> Vector:
+def _of_sphere(fields: EddyCurrentsFields, around: Setting) -> Vector:
     for key in ("conductivity", "radius"):
         value = getattr(fields, key)
         if value is None:

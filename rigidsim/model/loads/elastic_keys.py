@@ -10,7 +10,7 @@ from rigidsim.model.load_words import length_text, span_words
 from rigidsim.scene.cautions import Caution, WarningCode
 from rigidsim.scene.effect_parts import EffectPart
 from rigidsim.scene.kernels.reading import Sight
-from rigidsim.scene.registry import SceneLoad, Surroundings, names_of
+from rigidsim.scene.registry import SceneLoad, Setting, names_of
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.schema import Config
 from rigidsim.scene.tracing.numbers import plain
@@ -39,7 +39,7 @@ Sights = tuple[tuple[Sight, int], ...]
 
 
 def elastic_values(
-    config: Config, around: Surroundings
+    config: Config, around: Setting
 ) -> tuple[Any, Any, Any, Any | None, tuple[int, ...], Sights, bool]:
     """Love number, radius, delay, mean rate (mpf, SI), places in ``[[loads]]`` of what raises tides, what
     that takes of a kernel, and whether the spin distorts, too.

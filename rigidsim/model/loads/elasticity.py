@@ -46,7 +46,7 @@ from rigidsim.scene.attitude import rotation_matrix
 from rigidsim.scene.cautions import Caution
 from rigidsim.scene.kernels.reading import Sight
 from rigidsim.scene.point_masses import GRAVITATIONAL_CONSTANT
-from rigidsim.scene.registry import Surroundings, register_of_body
+from rigidsim.scene.registry import Setting, register_load
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.schema import Config
 from rigidsim.scene.tracing.numbers import plain
@@ -55,7 +55,7 @@ T = TypeVar("T")
 _MOST = 0.1  # of a moment, up to which a linear response makes sense
 
 
-@register_of_body("elasticity")
+@register_load(body="elasticity")
 @dataclass(frozen=True)
 class Elasticity(ElasticEffects, Load):
     """The distortion; numbers are mpf, SI."""
@@ -79,7 +79,7 @@ class Elasticity(ElasticEffects, Load):
         return config.body.elasticity is not None
 
     @classmethod
-    def resolve(cls, fields: Config, around: Surroundings) -> Elasticity:
+    def resolve(cls, fields: Config, around: Setting) -> Elasticity:
         return cls(*elastic_values(fields, around))
 
     @cached_property

@@ -26,7 +26,7 @@ from rigidsim.model.loads.source_figure import FigureAttraction, FigureFields
 from rigidsim.model.rotations import Symbolic, apply
 from rigidsim.scene.arithmetic import Vector, norm, unit_vectors
 from rigidsim.scene.effect_parts import EffectPart
-from rigidsim.scene.registry import Surroundings, register_beside
+from rigidsim.scene.registry import Setting, register_load
 from rigidsim.scene.scene import Scene
 
 
@@ -102,18 +102,18 @@ def refuse_inside(
         raise ConfigError(Problem(f"[[loads]] number {number} {key}.radius", what))
 
 
-@register_beside("figure")
+@register_load(beside="figure")
 class Figures:
     """What ``figure`` brings: a torque along an orbit, with a force in flight."""
 
     @staticmethod
     def effect_parts(fields: FigureFields) -> Iterator[EffectPart]:
-        """See ``Companion``."""
+        """See ``SceneLoad``."""
         return FigureAttraction.effect_parts(fields)
 
     @classmethod
-    def beside_of(cls, load: Any, fields: FigureFields, around: Surroundings) -> Load:
-        """See ``Companion``."""
+    def beside_of(cls, load: Any, fields: FigureFields, around: Setting) -> Load:
+        """See ``SceneLoad``."""
         if isinstance(load, CentralGravity):
             return FigureInFlight.beside_of(load, fields, around)
         if load.title == CentralGravity.title:

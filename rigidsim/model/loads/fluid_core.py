@@ -35,7 +35,7 @@ from rigidsim.scene.bodies.body import RigidBody
 from rigidsim.scene.cautions import Caution, WarningCode
 from rigidsim.scene.effect_parts import EffectPart
 from rigidsim.scene.frame import unique_axis
-from rigidsim.scene.registry import Surroundings, register_of_body
+from rigidsim.scene.registry import Setting, register_load
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.schema import Config
 from rigidsim.scene.tracing.numbers import plain
@@ -46,7 +46,7 @@ _MOST_DAMPED = 1e12  # times within a run that friction may take the core to the
 _STIFF = 100.0  # by which friction may be faster than the rotation before it is told
 
 
-@register_of_body("core")
+@register_load(body="core")
 @dataclass(frozen=True)
 class FluidCore(Load):
     """The core; numbers are mpf.
@@ -82,7 +82,7 @@ class FluidCore(Load):
             yield EffectPart(key, f"{key} of the fluid core", {key: 0}, missing=missing)
 
     @classmethod
-    def resolve(cls, fields: Config, around: Surroundings) -> FluidCore:
+    def resolve(cls, fields: Config, around: Setting) -> FluidCore:
         context, body, table = around.context, around.body, fields.body.core
         assert table is not None
         assert body is not None
@@ -296,10 +296,9 @@ def _refuse_odd_mantle(core: FluidCore, body: RigidBody, context: Any) -> None:
     raise ConfigError(Problem("[body] core", what))
 
 
-def _refuse_stiff(core: FluidCore, friction: Any, around: Surroundings) -> None:
+def _refuse_stiff(core: FluidCore, friction: Any, around: Setting) -> None:
     """Refuse a friction whose steps no run ends with."""
-    assert around.span is not None
-    begin, end = around.span
+    begin, end = around.start, around.end
     damping = core.friction / (core.polar * (1 - core.flattening))
     if damping * (end - begin) > _MOST_DAMPED:
         time = value_text(1 / plain(damping), "s")

@@ -43,7 +43,7 @@ from rigidsim.scene.effect_parts import EffectPart, degree_parts
 from rigidsim.scene.orbit_tables.pieces import TabulatedOrbit
 from rigidsim.scene.orbits import KeplerOrbit
 from rigidsim.scene.point_masses import PointMasses
-from rigidsim.scene.registry import SceneLoad, SourceFields, Surroundings, register_beside
+from rigidsim.scene.registry import SceneLoad, Setting, SourceFields, register_load
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.tracing.numbers import plain
 
@@ -268,11 +268,10 @@ class FieldAttraction(Load):
         return degree_parts(fields.degree, LEAST)
 
     @classmethod
-    def beside_of(cls, load: Any, fields: AttractingFields, around: Surroundings) -> Load | None:
-        """See ``Companion``."""
+    def beside_of(cls, load: Any, fields: AttractingFields, around: Setting) -> Load | None:
+        """See ``SceneLoad``."""
         degree = fields.degree
         assert degree is not None
-        assert around.body is not None
         field = around.body.gravity
         if degree < LEAST:
             return None
@@ -289,7 +288,7 @@ class FieldAttraction(Load):
         return kind(load, field, degree, strength, around.number + 1)
 
 
-register_beside("degree")(FieldAttraction)
+register_load(FieldAttraction, beside="degree")
 
 
 class _Flown(FieldAttraction):
@@ -320,7 +319,7 @@ class _Moving(FieldAttraction):
         return self.beside.answered(self.acceleration(m), m) if self.beside.masses.full else []
 
 
-def _refuse_within(load: GradientSource, field: GravityField, around: Surroundings) -> None:
+def _refuse_within(load: GradientSource, field: GravityField, around: Setting) -> None:
     near = load.placement.nearest(around.context)
     if near < field.radius:
         far, radius = (length_text(float(plain(x))) for x in (near, field.radius))

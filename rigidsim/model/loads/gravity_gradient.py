@@ -30,7 +30,7 @@ from rigidsim.scene.fields import BodyName, GravitationalParameter, Metre, Tripl
 from rigidsim.scene.kernels.reading import Sight
 from rigidsim.scene.orbit_keys import OrbitFields
 from rigidsim.scene.orbits import KeplerOrbit, attracting_body, resolve_orbit, resolve_tabulated_orbit
-from rigidsim.scene.registry import Surroundings, register_load
+from rigidsim.scene.registry import Setting, register_load
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.space_axes import ECLIPTIC
 
@@ -76,7 +76,7 @@ class GravityGradient(GradientSource, Load):
     has_source = True
 
     @classmethod
-    def resolve(cls, fields: GravityGradientFields, around: Surroundings) -> Load:
+    def resolve(cls, fields: GravityGradientFields, around: Setting) -> Load:
         if fields.orbit is not None and fields.orbit.body is not None:
             for key in ("gravitational_parameter", *_PLACES[1:]):
                 if getattr(fields, key) is not None:

@@ -27,7 +27,7 @@ from rigidsim.model.rotations import Symbolic, length
 from rigidsim.scene.arithmetic import Vector, dot, norm, unit_vectors
 from rigidsim.scene.cautions import Caution, WarningCode
 from rigidsim.scene.kernels.reading import Sight
-from rigidsim.scene.registry import Surroundings
+from rigidsim.scene.registry import Setting
 from rigidsim.scene.scene import Scene
 
 
@@ -43,7 +43,7 @@ class KernelAttractor(PointAttraction):
     wide = True
 
     @classmethod
-    def of(cls, source: str, strength: Any, around: Surroundings) -> KernelAttractor:
+    def of(cls, source: str, strength: Any, around: Setting) -> KernelAttractor:
         """The body of this name, seen from the host or from the barycentre."""
         ephemeris = kernel_body(source, around)
         return cls(strength, PlacedByKernel(ephemeris, ephemeris.sight(source, around.host)))

@@ -17,11 +17,10 @@ from rigidsim.model.names import written
 from rigidsim.model.rotations import Symbolic
 from rigidsim.scene.arithmetic import Vector, across, cross, diagonal, norm, unit_vectors
 from rigidsim.scene.exact import ExactNumber
-from rigidsim.scene.expressions.parser import parse_expression
-from rigidsim.scene.expressions.tree import Constant, Expression, ExpressionError, evaluate, states_read
+from rigidsim.scene.expressions.tree import Constant, Expression, evaluate, states_read
 from rigidsim.scene.initial_values import start_values
 from rigidsim.scene.readable import number_text
-from rigidsim.scene.registry import Surroundings, register_load
+from rigidsim.scene.registry import Setting, register_load
 from rigidsim.scene.scene import Scene
 
 
@@ -36,11 +35,11 @@ class MagneticDipole(InMagneticField):
     described = "a magnetic dipole"
 
     @classmethod
-    def resolve(cls, fields: MagneticDipoleFields, around: Surroundings) -> MagneticDipole:
+    def resolve(cls, fields: MagneticDipoleFields, around: Setting) -> MagneticDipole:
         found = cls.field_of(fields, around)
         if any(isinstance(x, str) for x in fields.moment):
-            moment, law = [around.context.zero] * 3, _law(fields.moment, around)
-            return SteeredDipole(moment=moment, law=law, number=around.number, **found)
+            moment, law = [around.context.zero] * 3, tuple(_law(fields.moment, around))
+            return SteeredDipole(moment=moment, law=law, **found)
         return cls(moment=numbers(fields.moment, around), **found)
 
     def acts(self) -> bool:
@@ -96,7 +95,6 @@ class SteeredDipole(MagneticDipole):
     """A moment given by expressions, as by a law of magnetorquers."""
 
     law: tuple[Expression, ...] = ()  # its components, A m^2, body axes
-    number: int = 0  # place in the config, for messages
     described = "a magnetic dipole given by expressions"
     conservative = False
 
@@ -109,10 +107,6 @@ class SteeredDipole(MagneticDipole):
     @property
     def reads(self) -> frozenset[str]:  # type: ignore[override]
         return super().reads | states_read(*self.law)
-
-    def formulas(self) -> Iterator[tuple[str, Expression]]:
-        for i, component in enumerate(self.law):
-            yield f"[[loads]] number {self.number + 1} moment[{i}]", component
 
     def torque(self, m: Kinematics) -> list[Term]:
         size = m.scene.context.ldexp(self._size(m.scene), -m.scaling.energy)
@@ -144,15 +138,7 @@ def _text(component: Expression) -> str:
     return component.text
 
 
-def _law(given: list[Any], around: Surroundings) -> tuple[Expression, ...]:
+def _law(given: list[Any], around: Setting) -> Iterator[Expression]:
     """Components of a moment, of which some are expressions."""
-    found: list[Expression] = []
     for i, x in enumerate(given):
-        if isinstance(x, ExactNumber):
-            found.append(Constant(x))
-            continue
-        try:
-            found.append(parse_expression(x, around.names, parameters=around.parameters, unit="A m^2"))
-        except ExpressionError as error:
-            raise around.fault(f"moment[{i}]", str(error)) from None
-    return tuple(found)
+        yield Constant(x) if isinstance(x, ExactNumber) else around.expression(f"moment[{i}]", x, "A m^2")

@@ -32,7 +32,7 @@ from rigidsim.scene.cautions import Caution
 from rigidsim.scene.effect_parts import EffectPart
 from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.orbits import KeplerOrbit, resolve_orbit
-from rigidsim.scene.registry import Surroundings
+from rigidsim.scene.registry import Setting
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.tracing.numbers import plain
 
@@ -55,7 +55,7 @@ class InMagneticField(Load):
     earth: EarthField | None = None  # whose field it is; the source is then its dipole at time 0
 
     @classmethod
-    def field_of(cls, fields: MagneticFieldFields, around: Surroundings) -> dict[str, Any]:
+    def field_of(cls, fields: MagneticFieldFields, around: Setting) -> dict[str, Any]:
         """What the keys say of the field, worked out: source, orbit, place and name."""
         flies = around.free_flight and fields.of_place
         refuse_contradictions(fields, around)

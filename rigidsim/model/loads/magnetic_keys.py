@@ -21,7 +21,7 @@ from rigidsim.scene.fields import (
 )
 from rigidsim.scene.geomagnetic_field import MOST
 from rigidsim.scene.orbit_keys import OrbitFields
-from rigidsim.scene.registry import Surroundings
+from rigidsim.scene.registry import Setting
 
 MagneticMoment = Annotated[ExactNumber, InUnit("A m^2")]
 MomentOrLaw = Annotated[Any, NumberOrFormula("A m^2")]
@@ -92,12 +92,12 @@ class MagneticDipoleFields(MagneticFieldFields):
     )
 
 
-def numbers(values: list[ExactNumber], around: Surroundings) -> Vector:
+def numbers(values: list[ExactNumber], around: Setting) -> Vector:
     """Values of a key as mpf."""
     return [x.at(around.context) for x in values]
 
 
-def refuse_contradictions(fields: MagneticFieldFields, around: Surroundings) -> None:
+def refuse_contradictions(fields: MagneticFieldFields, around: Setting) -> None:
     """Require one field: uniform, of a dipole along an orbit, or in flight of a dipole where the body is."""
     host = around.bodies is not None and around.bodies.host is not None
     if fields.elements is not None and (around.free_flight or host):

@@ -17,7 +17,6 @@ mass distribution changes: nothing here changes them.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Literal
 
@@ -30,17 +29,15 @@ from rigidsim.model.load_words import value_text
 from rigidsim.model.names import written
 from rigidsim.scene.arithmetic import Matrix, Vector, norm
 from rigidsim.scene.exact import ZERO
-from rigidsim.scene.expressions.parser import parse_expression
 from rigidsim.scene.expressions.tree import (
     Constant,
     Expression,
-    ExpressionError,
     evaluate,
     states_read,
 )
 from rigidsim.scene.fields import Formula, Metre, Triple
 from rigidsim.scene.initial_values import start_values
-from rigidsim.scene.registry import LoadFields, Surroundings, register_load
+from rigidsim.scene.registry import LoadFields, Setting, register_load
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.tracing.numbers import plain
 
@@ -79,17 +76,14 @@ class MassLoss(Load):
     described = "mass that leaves"
 
     @classmethod
-    def resolve(cls, fields: MassLossFields, around: Surroundings) -> MassLoss:
+    def resolve(cls, fields: MassLossFields, around: Setting) -> MassLoss:
         context = around.context
-        try:
-            rate = parse_expression(fields.rate, around.names, parameters=around.parameters, unit="kg/s")
-        except ExpressionError as error:
-            raise around.fault("rate", str(error)) from None
+        rate = around.expression("rate", fields.rate, "kg/s")
         if fields.exit_radius.sign < 0:
             what = f"given {float(fields.exit_radius):g} m; a radius of at least 0 is allowed"
             raise around.fault("exit_radius", what)
         point = [x.at(context) for x in fields.exit_point]
-        arm = [x - c for x, c in zip(point, around.center_of_mass, strict=True)]
+        arm = [x - c for x, c in zip(point, around.body.center_of_mass, strict=True)]
         radius, length = fields.exit_radius.at(context), norm(context, arm)
         if radius != 0 and length == 0:
             what = "given the centre of mass, from which the axis of a round exit points to its middle; "
@@ -121,9 +115,6 @@ class MassLoss(Load):
     def reads(self) -> frozenset[str]:  # type: ignore[override]
         return states_read(self.rate)
 
-    def formulas(self) -> Iterator[tuple[str, Expression]]:
-        yield f"[[loads]] number {self.number + 1} rate", self.rate
-
     def torque(self, m: Kinematics) -> list[Term]:
         """Refused beside a weight, whose torque is that of a constant mass."""
         context, scaling = m.scene.context, m.scaling
@@ -140,8 +131,8 @@ class MassLoss(Load):
                 terms.append((vector, rate * state))
         return terms
 
-    def never_negative(self) -> Iterator[tuple[str, Expression]]:
-        yield f"[[loads]] number {self.number + 1} mass_loss rate", self.rate
+    def never_negative(self) -> list[Expression]:
+        return [self.rate]
 
     def told(self, scene: Scene) -> str:
         rate = evaluate(self.rate, start_values(scene), scene.context)

@@ -13,7 +13,6 @@ their motion relative to the body isn't counted. In a field, potential energy ch
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -29,8 +28,8 @@ from rigidsim.scene.arithmetic import Vector
 from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.expressions.tree import Expression, ExpressionError, evaluate, names_used, states_read
 from rigidsim.scene.initial_values import start_values
-from rigidsim.scene.moving_moments import WHERE, formulas_of, least_part, varies
-from rigidsim.scene.registry import Surroundings, register_of_body
+from rigidsim.scene.moving_moments import formulas_of, least_part
+from rigidsim.scene.registry import Setting, register_load
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.schema import Config
 from rigidsim.scene.tracing.numbers import plain
@@ -45,7 +44,7 @@ _MOST = 1e9  # ratio of moments past which no size is estimated
 _LITTLE = 1e-6
 
 
-@register_of_body("principal_moments")
+@register_load(body="principal_moments")
 @dataclass(frozen=True)
 class MovedMass(Load):
     """The mass that moves; ``moments`` are numbers (mpf) or expressions, kg m^2."""
@@ -63,15 +62,9 @@ class MovedMass(Load):
         return not all(isinstance(x, ExactNumber) for x in given)
 
     @classmethod
-    def resolve(cls, fields: Config, around: Surroundings) -> MovedMass:
-        context = around.context
-        found: list[Any] = []
-        for given in formulas_of(fields, around.names):
-            if isinstance(given, ExactNumber):
-                found.append(given.at(context))
-            else:
-                found.append(given if varies(given, context) else evaluate(given, {}, context))
-        return cls(tuple(found))
+    def resolve(cls, fields: Config, around: Setting) -> MovedMass:
+        given = formulas_of(fields, around.names)
+        return cls(tuple(x if names_used(x) else evaluate(x, {}, around.context) for x in given))
 
     @property
     def formulae(self) -> list[tuple[int, Expression]]:
@@ -85,10 +78,6 @@ class MovedMass(Load):
     @property
     def reads(self) -> frozenset[str]:  # type: ignore[override]
         return states_read(*(x for _, x in self.formulae))
-
-    def formulas(self) -> Iterator[tuple[str, Expression]]:
-        for axis, expression in self.formulae:
-            yield f"{WHERE}[{axis}]", expression
 
     # --- the tensor -----------------------------------------------------------------------------------------
 

@@ -30,7 +30,7 @@ from rigidsim.scene.arithmetic import Vector, cross, norm, unit_vectors
 from rigidsim.scene.cautions import Caution
 from rigidsim.scene.kernels.series import exactly
 from rigidsim.scene.point_masses import GRAVITATIONAL_CONSTANT, PointMasses, closest
-from rigidsim.scene.registry import Surroundings
+from rigidsim.scene.registry import Setting
 from rigidsim.scene.scene import Scene
 
 
@@ -107,7 +107,7 @@ class PointAttraction(Load):
         return m.number(sum(m.numbers.inertia[i][i] for i in range(3)))
 
 
-def positive_strength(given: Any, around: Surroundings) -> Any:
+def positive_strength(given: Any, around: Setting) -> Any:
     """A gravitational parameter, m^3/s^2 (mpf); refused if it is missing or isn't positive."""
     if given is None:
         raise around.fault("gravitational_parameter", "missing; it is needed")
@@ -116,7 +116,7 @@ def positive_strength(given: Any, around: Surroundings) -> Any:
     return given.at(around.context)
 
 
-def kernel_strength(given: Any, source: str, around: Surroundings) -> Any:
+def kernel_strength(given: Any, source: str, around: Setting) -> Any:
     """The gravitational parameter (mpf, m^3/s^2) of a body of the kernel: as given, or the kernel's own."""
     ephemeris = kernel_body(source, around)
     if given is not None:

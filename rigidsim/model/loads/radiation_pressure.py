@@ -24,7 +24,7 @@ from rigidsim.scene.bodies.outside import OuterSurface, Plate
 from rigidsim.scene.effect_parts import EffectPart
 from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.fields import InUnit, VariableName
-from rigidsim.scene.registry import LoadFields, Surroundings, register_load
+from rigidsim.scene.registry import LoadFields, Setting, register_load
 
 SPEED_OF_LIGHT = 299792458  # m/s, exact
 _AU = 149597870700  # m, exact (IAU 2012)
@@ -67,7 +67,7 @@ class RadiationPressure(SurfaceLoad):
         yield EffectPart("shadow", "shadow on that light", {"shadow": False}, missing=missing)
 
     @classmethod
-    def resolve(cls, fields: RadiationPressureFields, around: Surroundings) -> RadiationPressure:
+    def resolve(cls, fields: RadiationPressureFields, around: Setting) -> RadiationPressure:
         if fields.irradiance.sign < 0:
             what = f"given {float(fields.irradiance):g}; zero or more is allowed"
             raise around.fault("irradiance", what)
@@ -79,14 +79,14 @@ class RadiationPressure(SurfaceLoad):
                 f'given "{name}", which is no source; {have}. A load such as a gravity_gradient on an orbit '
             )
             raise around.fault("light", f'{what}with name = "{name}" says where it is')
-        pushes = Pushes(around, [f"u{axis}_{name}" for axis in "xyz"])
+        pushes = Pushes(around, cls.title, [f"u{axis}_{name}" for axis in "xyz"])
         pressure = fields.irradiance.at(around.context) / SPEED_OF_LIGHT
         for number, surface in pushes.surfaces():
             _push(pushes, number, surface, pressure)
         factors = [pushes.parsed(f"({_AU}/r_{name})^2")]
         if fields.shadow and f"shadow_{name}" in around.names:
             factors.append(pushes.parsed(f"shadow_{name}"))
-        return cls(pushes.acting(), tuple(factors), around.free_flight, around.number, name)
+        return cls(pushes.acting(), tuple(factors), around.free_flight, name)
 
     def _words(self) -> str:
         return f"radiation pressure of {self.light}"

@@ -18,7 +18,7 @@ J s a . (w - w0): what stays then is w . I w / 2 of the body with that rotor loc
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -33,16 +33,15 @@ from rigidsim.model.scaling import exponent
 from rigidsim.model.state_blocks import StateBlock
 from rigidsim.scene.arithmetic import Vector, apply, dot, norm
 from rigidsim.scene.expressions.names import NameProvider, Readable, provides
-from rigidsim.scene.expressions.parser import parse_expression
-from rigidsim.scene.expressions.tree import Expression, ExpressionError, states_read
-from rigidsim.scene.registry import Surroundings, register_table
+from rigidsim.scene.expressions.tree import Expression, states_read
+from rigidsim.scene.registry import Setting, register_load
 from rigidsim.scene.rotors import Bearing, RotorTable
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.schema import Config
 from rigidsim.scene.tracing.numbers import plain
 
 
-@register_table("rotors")
+@register_load(table="rotors")
 @dataclass(frozen=True)
 class Rotor(Load):
     """A rotor: unit axis (body axes), moment (kg m^2), rate relative to the body at the start (rad/s); mpf.
@@ -58,25 +57,38 @@ class Rotor(Load):
     rate: Any
     motor: Expression | None
     fixed: bool
-    number: int  # place in the config, for messages
 
     stands_in = "rotors"
     conservative = True  # all that isn't is told by ``supplied_power``
 
     @classmethod
-    def resolve(cls, fields: RotorTable, around: Surroundings) -> Rotor:
-        context, motor = around.context, None
-        if fields.torque is not None:
-            given = around.parameters
-            try:
-                motor = parse_expression(fields.torque, around.names, parameters=given, unit="N m")
-            except ExpressionError as error:
-                raise around.fault("torque", str(error)) from None
-        axis = [x.at(context) for x in fields.axis]
+    def resolve(cls, fields: RotorTable, around: Setting) -> Rotor:
+        context, body = around.context, around.body
+        axis, moment = [x.at(context) for x in fields.axis], fields.moment.at(context)
+        if min(body.principal_moments) == 0:
+            what = "given in a body without a moment about one of its axes, which a rotor can't turn; remove "
+            raise around.fault("", what + "the rotor, or give the body all three moments")
+        if all(x == 0 for x in axis):
+            raise around.fault("axis", "given [0, 0, 0]; a direction is needed")
+        if moment < 0 or (moment == 0 and not fields.fixed):
+            allowed = "zero or more is allowed" if fields.fixed else "a positive moment is allowed"
+            raise around.fault("moment", f"given {float(plain(moment)):g}; {allowed}")
+        if fields.fixed and fields.torque is not None:
+            what = "given beside fixed = true, which keeps the rate by whatever torque that takes; remove one"
+            raise around.fault("torque", what)
+        own = dot(axis, apply(body.inertia, axis)) / dot(axis, axis)
+        if moment > own:
+            what = (
+                f"given {context.nstr(moment, 8)} kg m^2, more than the body's own about this axis, "
+                f"{context.nstr(own, 8)} kg m^2, which includes the rotor as if it were locked; make it "
+                "smaller, or add the rotor's tensor to that of [body]"
+            )
+            raise around.fault("moment", what)
+        motor = None if fields.torque is None else around.expression("torque", fields.torque, "N m")
         size = norm(context, axis)
         axis = [x / size if x != 0 else context.zero for x in axis]
-        numbers = fields.moment.at(context), fields.rate.at(context)
-        return cls(fields.name, axis, *numbers, motor, fields.fixed, around.number)
+        numbers = moment, fields.rate.at(context)
+        return cls(fields.name, axis, *numbers, motor, fields.fixed)
 
     @property
     def title(self) -> str:  # type: ignore[override]
@@ -101,10 +113,6 @@ class Rotor(Load):
     @property
     def reads(self) -> frozenset[str]:  # type: ignore[override]
         return frozenset() if self.motor is None else states_read(self.motor)
-
-    def formulas(self) -> Iterator[tuple[str, Expression]]:
-        if self.motor is not None:
-            yield f"[[rotors]] number {self.number + 1} torque", self.motor
 
     # --- its momentum ---------------------------------------------------------------------------------------
 

@@ -42,7 +42,7 @@ from rigidsim.scene.fields import (
 from rigidsim.scene.orbit_tables.pieces import TabulatedOrbit
 from rigidsim.scene.orbits import KeplerOrbit
 from rigidsim.scene.readable import number_text
-from rigidsim.scene.registry import Surroundings
+from rigidsim.scene.registry import Setting
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.tracing.numbers import plain
 
@@ -254,8 +254,8 @@ class FigureAttraction(Load):
         yield EffectPart("figure", "oblateness of the source itself", {"figure": None}, missing=missing)
 
     @classmethod
-    def beside_of(cls, load: Any, fields: FigureFields, around: Surroundings) -> Load:
-        """See ``Companion``."""
+    def beside_of(cls, load: Any, fields: FigureFields, around: Setting) -> Load:
+        """See ``SceneLoad``."""
         given, context = fields.figure, around.context
         assert given is not None
         radius = given.radius.at(context)
@@ -285,14 +285,14 @@ class FigureAttraction(Load):
         return replace(made, pole=[x / size for x in pole])
 
 
-def _refuse_other_pole(source: str | None, around: Surroundings) -> None:
+def _refuse_other_pole(source: str | None, around: Setting) -> None:
     """Refuse the Earth's pole for another body, and beyond the centuries that its polynomials are for."""
     if source not in (None, "earth", "399", "earth_moon_barycenter"):
         what = f'given "{EARTH}", the Earth\'s pole, for the source "{source}"; give its own as a vector'
         raise around.fault("figure.pole", what)
-    if around.span is not None and around.epoch is not None:
+    if around.epoch is not None:
         ahead = float(around.epoch.since_j2000())
-        far = max(abs(float(plain(t)) + ahead) for t in around.span) / _CENTURY
+        far = max(abs(float(plain(t)) + ahead) for t in (around.start, around.end)) / _CENTURY
         if far > _MOST_CENTURIES:
             what = (
                 f'given "{EARTH}" for a run that goes {far:.3g} centuries from J2000; its precession holds '

@@ -7,7 +7,7 @@ or the stream, are surfaces on which steps end, and the states that they take ar
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -21,23 +21,19 @@ from rigidsim.model.rotations import Symbolic, apply
 from rigidsim.scene.arithmetic import Vector, cross, diagonal, norm, unit_vectors
 from rigidsim.scene.bodies.outside import OuterSurface, Plate
 from rigidsim.scene.exact import ExactNumber
-from rigidsim.scene.expressions.parser import parse_expression
-from rigidsim.scene.expressions.tree import Expression, ExpressionError, evaluate, states_read
+from rigidsim.scene.expressions.tree import Expression, evaluate, states_read
 from rigidsim.scene.initial_values import start_values
-from rigidsim.scene.registry import Surroundings
+from rigidsim.scene.registry import Setting
 from rigidsim.scene.scene import Scene
 
 
 @dataclass(frozen=True)
 class Push:
-    """A force ``along`` (mpf, body axes) times an expression, at a ``place`` (m, body axes); ``plate``: its
-    key in ``[body]``, empty for spheres.
-    """
+    """A force ``along`` (mpf, body axes) times an expression, at a ``place`` (m, body axes)."""
 
     along: Vector
     expression: Expression
     place: Vector
-    plate: str = ""
 
 
 @dataclass(frozen=True)
@@ -47,7 +43,6 @@ class SurfaceLoad(Load):
     pushes: tuple[Push, ...]
     factors: tuple[Expression, ...]
     flies: bool  # whether it accelerates the centre of mass
-    number: int  # place in the config, for messages
 
     def acts(self) -> bool:
         return bool(self.pushes)
@@ -57,12 +52,8 @@ class SurfaceLoad(Load):
         """All different ones, factors first."""
         return tuple(dict.fromkeys((*self.factors, *(push.expression for push in self.pushes))))
 
-    def formulas(self) -> Iterator[tuple[str, Expression]]:
-        where = f"[[loads]] number {self.number + 1} {self.title}"
-        plates = {push.expression: push.plate for push in reversed(self.pushes) if push.plate}
-        for expression in self.expressions:
-            plate = plates.get(expression)
-            yield (f"[body] {plate}, under {where}" if plate else where), expression
+    def formulas(self) -> list[Expression]:
+        return list(self.expressions)
 
     @property
     def reads(self) -> frozenset[str]:  # type: ignore[override]
@@ -130,14 +121,15 @@ class Pushes:
     """What makes the pushes of a load on the surfaces of a body.
 
     Args:
+        title: of the load.
         vector: names of the components of the vector that surfaces are met from, body axes.
 
     Attributes:
         found: the pushes so far; those of a vanishing size are left out.
     """
 
-    def __init__(self, around: Surroundings, vector: Sequence[str]) -> None:
-        self.around = around
+    def __init__(self, around: Setting, title: str, vector: Sequence[str]) -> None:
+        self.around, self._title = around, title
         self.found: list[Push] = []
         self._vector = tuple(vector)
         self._flies = around.free_flight
@@ -150,7 +142,7 @@ class Pushes:
     def surfaces(self) -> Iterator[tuple[int, OuterSurface]]:
         """Those of the body, counted from 1; refused if there are none."""
         body = self.around.body
-        if body is None or not body.surfaces:
+        if not body.surfaces:
             what = "given for a body without surfaces; give [[body.surfaces]], such as normal and area of a "
             raise self.around.fault("", what + "plate, size of a box, or radius of a sphere")
         yield from enumerate(body.surfaces, start=1)
@@ -175,8 +167,9 @@ class Pushes:
         facing, given = self._facing(surface, number)
         length = norm(context, [x.at(context) for x in surface.normal]) ** power
         factors = [f"max({facing}, 0)", *([f"({facing})"] * (power - 1)), *([text] if text else [])]
-        expression = self.parsed("*".join(factors), given)
-        self.found.append(Push([x / length for x in along], expression, surface.position, surface.place))
+        where = f"[body] {surface.place}, under {self.around.where(self._title)}"
+        expression = self.parsed("*".join(factors), parameters=given, where=where)
+        self.found.append(Push([x / length for x in along], expression, surface.position))
 
     def _facing(self, plate: Plate, number: int) -> tuple[str, dict[str, ExactNumber]]:
         """The vector's component along the normal as written, in text, and what stands for numbers there."""
@@ -191,9 +184,6 @@ class Pushes:
         text = " + ".join(terms)
         return (f"{sign}({text})" if sign or len(terms) > 1 else text), given
 
-    def parsed(self, text: str, given: Mapping[str, ExactNumber] | None = None) -> Expression:
-        """The expression of a text, with numbers for some of its names."""
-        try:
-            return parse_expression(text, self.around.names, parameters=given)
-        except ExpressionError as error:
-            raise self.around.fault("", str(error)) from None
+    def parsed(self, text: str, **options: Any) -> Expression:
+        """The expression of a text, in which no parameters of the config stand."""
+        return self.around.expression(self._title, text, **{"parameters": None, **options})

@@ -19,7 +19,7 @@ from rigidsim.scene.arithmetic import Vector, across, cross, norm, unit_vectors
 from rigidsim.scene.cautions import Caution, WarningCode
 from rigidsim.scene.exact import ExactNumber, parse_number
 from rigidsim.scene.fields import Acceleration, Triple
-from rigidsim.scene.registry import LoadFields, Surroundings, register_load
+from rigidsim.scene.registry import LoadFields, Setting, register_load
 from rigidsim.scene.scene import Scene
 
 STANDARD_GRAVITY = 9.80665  # m/s^2
@@ -57,7 +57,7 @@ class UniformGravity(Load):
     conservative = True
 
     @classmethod
-    def resolve(cls, fields: UniformGravityFields, around: Surroundings) -> UniformGravity:
+    def resolve(cls, fields: UniformGravityFields, around: Setting) -> UniformGravity:
         return cls([a.at(around.context) for a in fields.acceleration])
 
     @classmethod

@@ -13,7 +13,7 @@ from rigidsim.model.load_words import span_words
 from rigidsim.scene.arithmetic import Vector, cross, negligible, norm
 from rigidsim.scene.fields import Damping, Triple
 from rigidsim.scene.readable import number_text
-from rigidsim.scene.registry import LoadFields, Surroundings, register_load
+from rigidsim.scene.registry import LoadFields, Setting, register_load
 from rigidsim.scene.scene import Scene
 
 
@@ -38,7 +38,7 @@ class ViscousTorque(Load):
     described = "a viscous torque"
 
     @classmethod
-    def resolve(cls, fields: ViscousTorqueFields, around: Surroundings) -> ViscousTorque:
+    def resolve(cls, fields: ViscousTorqueFields, around: Setting) -> ViscousTorque:
         for i, coefficient in enumerate(fields.coefficients):
             if coefficient.sign < 0:
                 given = f"given {float(coefficient):g}; zero or more is allowed"

@@ -20,7 +20,7 @@ from rigidsim.scene.arithmetic import Vector
 from rigidsim.scene.cautions import Caution
 from rigidsim.scene.kernels.ephemeris import Ephemeris
 from rigidsim.scene.kernels.reading import Sight
-from rigidsim.scene.registry import Surroundings
+from rigidsim.scene.registry import Setting
 from rigidsim.scene.scene import Scene
 
 _LUNISOLAR = frozenset({"sun", "earth", "moon", "earth_moon_barycenter"})
@@ -44,7 +44,7 @@ class PlacedByKernel(Placement):
     without_plane = "positions of a kernel name none"
 
     @classmethod
-    def of(cls, source: str, around: Surroundings) -> PlacedByKernel:
+    def of(cls, source: str, around: Setting) -> PlacedByKernel:
         """The body that the key ``source`` of a load names."""
         ephemeris = kernel_body(source, around)
         if not around.host:
@@ -196,7 +196,7 @@ def refuse_same_sources(loads: Iterable[Any], host: str | None) -> None:
             raise ConfigError(Problem(where, what))
 
 
-def kernel_body(source: str, around: Surroundings) -> Ephemeris:
+def kernel_body(source: str, around: Setting) -> Ephemeris:
     """The ephemeris that has a body which a load names; refused if none has."""
     if around.ephemeris is None:
         what = f'given "{source}", but there is no [ephemeris]; add one with a kernel'
@@ -205,7 +205,7 @@ def kernel_body(source: str, around: Surroundings) -> Ephemeris:
     return around.ephemeris
 
 
-def refuse_series(around: Surroundings) -> None:
+def refuse_series(around: Setting) -> None:
     """Refuse analytic series beside a kernel whose axes they don't share."""
     if around.ephemeris is not None and around.axes is None:
         what = 'given beside [ephemeris], whose axes are ICRF unless [frame] axes = "ecliptic J2000"; set '

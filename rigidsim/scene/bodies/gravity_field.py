@@ -14,14 +14,13 @@ import math
 import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from fractions import Fraction
 from typing import Any
 
 from pydantic import Field, StrictInt, StrictStr, field_validator, model_validator
 
 from rigidsim.errors import ConfigError, Problem
 from rigidsim.scene.bodies.field_files import FieldFileError, read_field
-from rigidsim.scene.exact import ExactNumber
+from rigidsim.scene.exact import ExactNumber, rounded
 from rigidsim.scene.fields import ConfigTable, Dimensionless, Metre, refuse
 from rigidsim.scene.point_masses import GRAVITATIONAL_CONSTANT
 from rigidsim.scene.tracing.numbers import plain
@@ -185,18 +184,17 @@ def _of_file(name: str, body: Any, context: Any, texts: Mapping[str, str], degre
     except FieldFileError as error:
         raise fault(f"{given}which {_sentence(error)}", " file") from None
 
-    def number(value: Fraction) -> Any:
-        return context.mpf(value.numerator) / value.denominator
-
-    radius, mass = number(read.radius), number(read.strength) / context.mpf(GRAVITATIONAL_CONSTANT)
+    radius = rounded(read.radius, context)
+    mass = rounded(read.strength, context) / context.mpf(GRAVITATIONAL_CONSTANT)
     if abs(mass - body.mass) > _SAME_MASS * body.mass:
         there, here = (context.nstr(x, 6) for x in (mass, body.mass))
         what = f"{given}whose G M makes the mass {there} kg, but [body] has {here} kg; "
         raise fault(what + "is it the field of another body?", " file")
     found: dict[Harmonic, Any] = {}
     for (n, m), row in read.rows.items():
-        factor = context.sqrt(number(read.squared_factor(n, m)))
-        found |= {(n, m, sine): factor * number(x) for sine, x in zip((False, True), row, strict=True)}
+        factor = context.sqrt(rounded(read.squared_factor(n, m), context))
+        for sine, x in zip((False, True), row, strict=True):
+            found[n, m, sine] = factor * rounded(x, context)
     _refuse_other_tensor(given, found, radius, body, context)
     _refuse_impossible(found, context, given, " file")
     beyond = {key: c for key, c in found.items() if key[0] >= LEAST}

@@ -59,14 +59,14 @@ def reference_point(table: body_table.Body, source: str, center: Vector, context
             raise refusal(
                 "reference", f"given {shown(table.reference)}; allowed here: {allowed}, or a point [x, y, z]"
             )
-        assert shape is not None
-        dimensions = {}
-        for key in shape.dimensions:
-            value = getattr(table, key)
-            values = value if isinstance(value, list) else [value]
-            dimensions[key] = [v.at(context) for v in values]
-        return landmarks[table.reference](context, dimensions)
+        lengths = {key: [x.at(context) for x in _lengths(table, key)] for key in shape.dimensions}  # type: ignore
+        return landmarks[table.reference](context, lengths)
     return [x.at(context) for x in table.reference]
+
+
+def _lengths(table: body_table.Solid, key: str) -> list[Any]:
+    value = getattr(table, key)
+    return value if isinstance(value, list) else [value]
 
 
 def parallel_axis(inertia: Matrix, mass: Any, arm: Vector) -> Matrix:
@@ -91,9 +91,8 @@ def _solid(
     refuse_dimensions(table, tuple(shape.dimensions), f"that a {name} doesn't have", place)
     dimensions = {}
     for key, count in shape.dimensions.items():
-        value = getattr(table, key)
-        values = value if isinstance(value, list) else [value]
-        if value is None:
+        values = _lengths(table, key)
+        if values == [None]:
             lengths = "a positive length" if count == 1 else f"{count} positive lengths"
             raise refusal(f"{place}{key}", f"missing; a {name} needs it: {lengths}")
         if len(values) != count:

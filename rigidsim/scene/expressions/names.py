@@ -105,21 +105,10 @@ class NameProvider:
         raise NotImplementedError
 
 
-@dataclass(frozen=True)
-class Names(Mapping[str, Readable]):
-    """The names that expressions of a scene may read."""
+class Names(dict[str, Readable]):
+    """The names that expressions of a scene may read; ``elsewhere``: what would bring others."""
 
-    known: Mapping[str, Readable] = field(default_factory=dict)
-    elsewhere: tuple[str, ...] = ()  # what would bring others
-
-    def __getitem__(self, name: str) -> Readable:
-        return self.known[name]
-
-    def __iter__(self) -> Any:
-        return iter(self.known)
-
-    def __len__(self) -> int:
-        return len(self.known)
+    elsewhere: tuple[str, ...] = ()
 
 
 PROVIDERS: list[NameProvider] = []
@@ -144,7 +133,7 @@ def names_of(config: Any) -> Names:
     Raises:
         ConfigError: two things of one name.
     """
-    known: dict[str, Readable] = {}
+    known = Names()
     bringing: dict[str, str] = {}
     elsewhere = []
     for provider in PROVIDERS:
@@ -157,7 +146,8 @@ def names_of(config: Any) -> Names:
         if name in config.parameters:
             what = f'given the name "{name}", which expressions of this scene use already; rename it'
             raise ConfigError(Problem(f"[parameters] {name}", what))
-    return Names(known, tuple(filter(None, elsewhere)))
+    known.elsewhere = tuple(filter(None, elsewhere))
+    return known
 
 
 def _taken(config: Any, name: str, brings: tuple[str, str]) -> Problem:

@@ -84,6 +84,7 @@ def parse_expression(
     jumps: bool = True,
     unit: str | None = None,
     read_too: bool = False,
+    where: str = "",
 ) -> Expression:
     """Parse an expression.
 
@@ -94,6 +95,7 @@ def parse_expression(
         jumps: whether piecewise constant functions are allowed.
         unit: SI unit of the value; None for any.
         read_too: whether it is checked where no unit is written, too: against the units of what is read.
+        where: the key of the config at which it stands, for messages about its parts.
 
     Raises:
         ExpressionError: with what was given, what is allowed, and a caret under the place. Constant parts
@@ -109,12 +111,12 @@ def parse_expression(
     text = " ".join(text.split()) if "\n" in text else text  # columns are those of one line
     if not text.strip(" \t"):
         raise ExpressionError("an empty expression; write a number or a formula such as k*sin(t)^2")
-    read = _Parser(text, names, parameters, jumps).all()
+    read = _Parser(text, names, parameters, jumps, where).all()
     found, measure = fold(read, _constant, _named, _operated)
     constant_value(found, _CHECKING)
     if unit is not None:
         check_unit(measure, unit, read_too=read_too)
-    return replace(found, place=Place(text, 0, len(text)))  # type: ignore[type-var]
+    return replace(found, place=Place(text, 0, len(text), where))  # type: ignore[type-var]
 
 
 # --- what is read, in smooth functions and signs, its constants folded, with its dimension ------------------
@@ -155,9 +157,14 @@ class _Parser:
     """Recursive descent with one token of lookahead: its ``kind``, ``token`` (text) and ``start``."""
 
     def __init__(
-        self, text: str, names: Mapping[str, Readable], parameters: Mapping[str, ExactNumber], jumps: bool
+        self,
+        text: str,
+        names: Mapping[str, Readable],
+        parameters: Mapping[str, ExactNumber],
+        jumps: bool,
+        where: str,
     ) -> None:
-        self.text, self.names, self.parameters, self.jumps = text, names, parameters, jumps
+        self.text, self.names, self.parameters, self.jumps, self.where = text, names, parameters, jumps, where
         self.constants = {**parameters, "pi": ExactNumber(Fraction(1), 1)}
         self.others = {*parameters, *names} - set(BODY_NAMES)
         self.known = [*names, *self.constants, "e"]
@@ -194,7 +201,11 @@ class _Parser:
         self.fail(f"unknown character {shown}; {_COMPARISON if rest.startswith('==') else hint}")
 
     def node(self, operator: str, start: int, *operands: Expression) -> Operation:
-        return Operation(operator, operands, Place(self.text, start, self.end))
+        return Operation(operator, operands, self.place(start))
+
+    def place(self, start: int) -> Place:
+        """The place of what was read last."""
+        return Place(self.text, start, self.end, self.where)
 
     def at(self, *signs: str) -> bool:
         return self.kind == "sign" and self.token in signs
@@ -267,7 +278,7 @@ class _Parser:
         name = self.advance()
         if name in _FUNCTIONS or self.at("("):
             return self.call(name, start)
-        place = Place(self.text, start, self.end)
+        place = self.place(start)
         if name in self.names:
             readable = self.names[name]
             if readable.jumps and not self.jumps:
@@ -296,7 +307,7 @@ class _Parser:
         if unit:
             self.token, self.kind = unit, "unit"
             self.advance()
-        return Constant(value, Place(self.text, start, self.end))
+        return Constant(value, self.place(start))
 
     def call(self, name: str, start: int) -> Expression:
         if name in self.known:

@@ -48,11 +48,12 @@ class ExpressionError(ValueError):
 
 @dataclass(frozen=True)
 class Place:
-    """Where something is written: from ``start`` to ``end`` of a text."""
+    """Where something is written: from ``start`` to ``end`` of a text, at ``where`` of the config."""
 
     source: str
     start: int
     end: int
+    where: str = ""
 
 
 class Expression:
@@ -65,6 +66,11 @@ class Expression:
     def text(self) -> str:
         """As it is written; empty if it isn't."""
         return "" if self.place is None else self.place.source[self.place.start : self.place.end]
+
+    @property
+    def where(self) -> str:
+        """The key of the config at which it stands, for messages."""
+        return "" if self.place is None else self.place.where
 
     def error(self, what: str) -> ExpressionError:
         """An error about it, which shows its place."""

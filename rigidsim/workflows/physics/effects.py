@@ -13,7 +13,7 @@ from typing import Any
 from rigidsim.scene.config import Experiment
 from rigidsim.scene.effect_parts import EffectPart
 from rigidsim.scene.python_values import assignments_of
-from rigidsim.scene.registry import BESIDE, LOAD_KINDS, OF_BODY, TABLES, names_of
+from rigidsim.scene.registry import LOADS, names_of
 from rigidsim.scene.schema import Config
 
 _TITLES = {"loads": "", "rotors": "rotor ", "bodies": "attraction by the point mass "}
@@ -70,12 +70,12 @@ def missing_from(config: Config) -> list[tuple[str, str]]:
 def _all(config: Config) -> Iterator[PhysicalEffect]:
     codes = load_codes(config)
     for n, (code, fields) in enumerate(zip(codes, config.loads, strict=True)):
-        parts = [*LOAD_KINDS[fields.kind].effect_parts(fields)]  # type: ignore[attr-defined]
-        for key, kind in BESIDE.items():
+        parts = [*LOADS["kind"][fields.kind].effect_parts(fields)]  # type: ignore[attr-defined]
+        for key, kind in LOADS["beside"].items():
             parts += kind.effect_parts(fields) if key in type(fields).model_fields else []
         yield from _parts(code, f"loads[{n}]", parts)
         yield PhysicalEffect(code, fields.kind.replace("_", " "), gone=("loads", n))  # type: ignore[attr-defined]
-    for key, load in OF_BODY.items():
+    for key, load in LOADS["body"].items():
         if not load.brought_by(config) or _is_nothing(config, key, load.nothing):
             yield PhysicalEffect(key, load.described, missing=f"the config gives none ([body] {key})")
             continue
@@ -86,13 +86,13 @@ def _all(config: Config) -> Iterator[PhysicalEffect]:
             yield PhysicalEffect(key, load.described, {f"body.{x}": value for x, value in given.items()})
         else:
             yield PhysicalEffect(key, load.described, missing="no single key leaves it out")
-    for array in ("bodies", *TABLES):
+    for array in ("bodies", *LOADS["table"]):
         for n, table in enumerate(getattr(config, array)):
             words = f"{_TITLES.get(array, '')}{table.name}"
             yield PhysicalEffect(f"{array[:-1]}-{table.name}", words, gone=(array, n))
-        if array in TABLES and not getattr(config, array):
+        if array in LOADS["table"] and not getattr(config, array):
             yield PhysicalEffect(array, array, missing=f"the config has no [[{array}]]")
-    if {fields.kind for fields in config.loads} < set(LOAD_KINDS):  # type: ignore[attr-defined]
+    if {fields.kind for fields in config.loads} < set(LOADS["kind"]):  # type: ignore[attr-defined]
         yield PhysicalEffect("others", "loads of other kinds", missing="none is given")
 
 
@@ -127,7 +127,7 @@ def settings_without(experiment: Experiment, codes: Sequence[str]) -> list[str]:
     values = {key: value for effect in left_out for key, value in effect.values.items()}
     gone = sorted(effect.gone for effect in left_out if effect.gone)
     names = {name for array, n in gone if array == "loads" for name in names_of(config.loads[n])}
-    for key, kind in OF_BODY.items():
+    for key, kind in LOADS["body"].items():
         if kind.brought_by(config) and key not in codes:
             values = {f"body.{key}.{x}": y for x, y in kind.without_loads(config, names).items()} | values
     found = assignments_of(values)
