@@ -376,7 +376,8 @@ def bounds(expression: Expression, *, always: bool = True) -> Interval:
     def of_operation(node: Operation, operands: list[Interval]) -> Interval:
         (low, high), last = operands[0], operands[-1]
         if node.operator == "sum":
-            return sum(x for x, _ in operands), sum(x for _, x in operands)
+            lows, highs = zip(*operands, strict=True)
+            return -_INF if -_INF in lows else sum(lows), _INF if _INF in highs else sum(highs)
         if node.operator == "negative":
             return -high, -low
         if node.operator == "product":
