@@ -315,11 +315,10 @@ def _flown_about(load: Load) -> bool:
 
 
 def _oddness(load: Load, quaternion: np.ndarray, here: float, there: float) -> Problem:
-    number = getattr(load, "number", None)
-    where = "loads" if number is None else f"[[{load.stands_in}]] number {number + 1}"
+    odd = (x.where for x in load.formulas() if any(readable.changes_sign for readable in readables(x)))
     shown = ", ".join(f"{x:.3g}" for x in quaternion)
     return Problem(
-        where,
+        next(odd, "loads"),
         f"{load.described} depends on the sign of the quaternion: at q = [{shown}] a part of it is "
         f"{here:.3g} (in internal units), at -q, which is the same attitude, {there:.3g}; use products such "
         "as qw*qx, or say where it jumps: sign(qw)*qx",

@@ -136,7 +136,6 @@ class SceneLoad:
     Attributes:
         Fields: its keys in a config; None for a load that only Python gives.
         described: description with an article, for sentences.
-        stands_in: array of tables of the config that it stands in.
         uniform_field: acceleration (mpf, m/s^2, space axes) of a field that is the same everywhere; such
             loads add up to the scene's gravity. None for all others.
         axes: what the space axes are in its own equations; None if these hold in any axes.
@@ -153,7 +152,6 @@ class SceneLoad:
 
     Fields: ClassVar[type[LoadFields] | None] = None
     described: str = "a load"
-    stands_in: ClassVar[str] = "loads"
     uniform_field: Vector | None = None
     axes: str | None = None
     epoch: Epoch | None = None

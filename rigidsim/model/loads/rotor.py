@@ -58,7 +58,6 @@ class Rotor(Load):
     motor: Expression | None
     fixed: bool
 
-    stands_in = "rotors"
     conservative = True  # all that isn't is told by ``supplied_power``
 
     @classmethod
