@@ -8,8 +8,9 @@ member's number and the values that identify it. A vector becomes a column per c
 """
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cache
 from itertools import product
 from typing import Any
 
@@ -87,8 +88,9 @@ class Table:
 
     Attributes:
         members: dimensions of a sweep's members; empty for a run.
-        reasons: why members failed, by member.
+        values: of a long table, the columns without which a row is left out.
         block_numbers: numbers held in memory at once.
+        made: variables of columns that the dataset doesn't have, or has otherwise.
     """
 
     dim: str
@@ -97,8 +99,8 @@ class Table:
     bits: int = 53
     members: tuple[str, ...] = ()
     values: tuple[TableColumn, ...] = ()
-    reasons: dict[int, str] = field(default_factory=dict)
     block_numbers: int = BLOCK_NUMBERS
+    made: Mapping[str, xarray.Variable] = field(default_factory=dict)
 
     @property
     def _long(self) -> bool:
@@ -139,55 +141,36 @@ class Table:
             width = each if len(flat) > 1 else min(each, max(1, self.block_numbers // numbers))
             for low in range(0, each, width):
                 here = {dim: slice(i, i + n) for dim, i, n in zip(outer, first, shape, strict=True)}
-                steps = range(low, min(low + width, each))
                 if self._long:
-                    here[self.dim] = slice(steps.start, steps.stop)
-                yield self._block(wanted, _Block(self.dataset.isel(here), flat, steps))
+                    here[self.dim] = slice(low, min(low + width, each))
+                yield self._block(wanted, here)
 
-    def _block(self, wanted: Sequence[TableColumn], block: "_Block") -> list[list[np.ndarray]]:
+    def _block(self, wanted: Sequence[TableColumn], here: Mapping[str, slice]) -> list[list[np.ndarray]]:
         """Parts of some columns; rows of a long table without any number are left out."""
-        if not self._long:
-            return [self._parts(column, block) for column in wanted]
-        numbers = [self._parts(column, block)[0] for column in self.values]
-        kept = np.any([~np.isnan(values) for values in numbers], axis=0)
-        return [[part[kept] for part in self._parts(column, block)] for column in wanted]
-
-    def _parts(self, column: TableColumn, block: "_Block") -> list[np.ndarray]:
-        """The parts of one column, (rows of the block,) each."""
-        if self.members and column.name == MEMBER:
-            return [np.repeat(np.arange(block.members.start, block.members.stop), len(block.steps))]
-        if self.members and column.name == REASON:
-            return [np.array([self.reasons.get(member, "") for member in block.members], dtype=object)]
-        if self._long and column.name == self.dim and self.dim not in self.dataset.variables:
-            return [np.tile(np.arange(block.steps.start, block.steps.stop), len(block.members))]
         dims = (*self._outer, self.dim) if self._long else tuple(self._outer)
-        key: Any = (slice(None), *column.index)
-        parts = [block.rows(name, dims)[key] for name in column.parts]
-        for number in range(1, len(parts)):  # members of fewer bits than others have no residuals: nan
-            empty = np.isnan(parts[number]) & ~np.isnan(parts[0])
-            parts[number] = np.where(empty, 0.0, parts[number])
-        unit = column.angle_unit
-        return parts if unit is None else converted(parts, unit, column.bits(self.bits))
+        block = self.dataset.isel(here)
+        sizes = {dim: block.sizes[dim] for dim in dims}
 
+        @cache
+        def rows(name: str) -> np.ndarray:
+            """A variable with a row for each point of the dimensions, repeated along those that it lacks."""
+            made = self.made.get(name)
+            variable = block[name].variable if made is None else made.isel(here, missing_dims="ignore")
+            own = {str(dim): size for dim, size in variable.sizes.items() if dim not in sizes}
+            wide = variable.set_dims(sizes | own).transpose(*sizes, *own)
+            return np.asarray(wide.values.reshape(-1, *own.values()))
 
-class _Block:
-    """Members, with some of their samples, that are read together."""
+        def parts(column: TableColumn) -> list[np.ndarray]:
+            found = [rows(name)[(slice(None), *column.index)] for name in column.parts]
+            # members of fewer bits than others have no residuals: nan
+            found[1:] = [np.where(np.isnan(x) & ~np.isnan(found[0]), 0.0, x) for x in found[1:]]
+            unit = column.angle_unit
+            return found if unit is None else converted(found, unit, column.bits(self.bits))
 
-    def __init__(self, dataset: xarray.Dataset, members: range, steps: range) -> None:
-        self.members, self.steps = members, steps
-        self._dataset = dataset
-        self._read: dict[str, np.ndarray] = {}
-
-    def rows(self, name: str, dims: Sequence[str]) -> np.ndarray:
-        """A variable with one row for each point of some dimensions, (rows, *components), repeated along
-        those that it lacks.
-        """
-        if name not in self._read:
-            variable = self._dataset[name].variable
-            own = {str(dim): size for dim, size in variable.sizes.items() if dim not in dims}
-            wide = variable.set_dims({dim: self._dataset.sizes[dim] for dim in dims} | own)
-            self._read[name] = wide.transpose(*dims, *own).values.reshape(-1, *own.values())
-        return self._read[name]
+        if not self._long:
+            return [parts(column) for column in wanted]
+        kept = np.any([~np.isnan(parts(column)[0]) for column in self.values], axis=0)
+        return [[part[kept] for part in parts(column)] for column in wanted]
 
 
 def tables_of(
@@ -213,30 +196,32 @@ def _tables_of_members(
     members = tuple(map(str, dataset["status"].dims))
     axes = [str(name) for name, variable in dataset.variables.items() if "swept_key" in variable.attrs]
     axes.sort(key=lambda name: next((i for i, dim in enumerate(members) if name in (dim, f"{dim}_value")), 0))
-    labels = [c for name in axes for c in _columns_of(dataset, name, angle_unit, members)]
-    kept: dict[str, list[TableColumn]] = {MEMBER: []}
+    kept: dict[str, list[str]] = {MEMBER: []}
     names = [str(name) for name, found in dataset.data_vars.items() if set(members) <= set(found.dims)]
     names.sort(key=lambda name: (_FIRST.index(name) if name in _FIRST else len(_FIRST), name))
     for name in names:
         dim = next((str(dim) for dim in dataset[name].dims if _is_long(str(dim), members)), MEMBER)
-        rows = (*members, dim)
-        kept.setdefault(dim, []).extend(_columns_of(dataset, name, angle_unit, rows))
-    reasons: dict[int, str] = {}
+        kept.setdefault(dim, []).append(name)
+    numbered = np.arange(dataset["status"].size).reshape(dataset["status"].shape)
+    made = {MEMBER: _made(members, numbered, "number of the member, the last axis fastest")}
+    for dim in kept.keys() - {MEMBER} - set(map(str, dataset.variables)):
+        made[dim] = _made((dim,), np.arange(dataset.sizes[dim]), "which of the member's, counted from 0")
     if "failed" in dataset.dims:
-        numbers, texts = dataset["failed_member"].values, dataset[REASON].values
-        reasons = {int(member): str(text) for member, text in zip(numbers, texts, strict=True)}
+        reasons = np.full(numbered.size, "", dtype=object)
+        reasons[dataset["failed_member"].values] = dataset[REASON].values
+        made[REASON] = _made(members, reasons.reshape(numbered.shape), "why a member didn't end well")
+        kept[MEMBER].append(REASON)
+    whole = dataset.assign(made)
+
+    def columns(names: Sequence[str], dim: str) -> tuple[TableColumn, ...]:
+        rows = (*members, dim)
+        return tuple(c for name in names for c in _columns_of(whole, name, angle_unit, rows))
+
     found = []
-    for dim, values in kept.items():
-        columns = [_made(MEMBER, "i", "number of the member, the last axis fastest"), *labels]
-        if dim != MEMBER:
-            told = _columns_of(dataset, dim, None, (dim,)) if dim in dataset.variables else []
-            columns += told or [_made(dim, "i", "which of the member's, counted from 0")]
-        columns += values
-        if dim == MEMBER and reasons:
-            columns.append(_made(REASON, "U", "why a member didn't end well"))
-        found.append(
-            Table(dim, tuple(columns), dataset, bits, members, tuple(values), reasons, block_numbers)
-        )
+    for dim, names in kept.items():
+        every = columns([MEMBER, *axes, *([] if dim == MEMBER else [dim]), *names], dim)
+        values = columns(names, dim)
+        found.append(Table(dim, every, dataset, bits, members, values, block_numbers, made))
     return found
 
 
@@ -245,9 +230,9 @@ def _is_long(dim: str, members: Sequence[str]) -> bool:
     return dim not in members and (dim in _LONG or dim.endswith("_occurrence"))
 
 
-def _made(name: str, kind: str, long_name: str) -> TableColumn:
-    """A column that isn't a variable of the dataset."""
-    return TableColumn(name, "", (), (name,), {"units": "1", "long_name": long_name}, kind)
+def _made(dims: Sequence[str], values: np.ndarray, long_name: str) -> xarray.Variable:
+    """A column that the dataset doesn't have."""
+    return xarray.Variable(dims, values, {"units": "1", "long_name": long_name})
 
 
 def _columns_of(

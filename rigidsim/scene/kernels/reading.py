@@ -17,7 +17,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -207,7 +207,7 @@ class SpkKernel(Kernel):
         with path.open("rb") as file:
             head = file.read(96)
         big = head[88:96] == b"BIG-IEEE" or (head[:8] == b"NAIF/DAF" and head[8:12] == b"\0\0\0\2")
-        self._order = ">" if big else "<"
+        self._order: Literal["<", ">"] = ">" if big else "<"
         try:
             if not head.startswith(_IDENTIFIERS):
                 raise ValueError(f"it begins with {head[:8].decode('ascii', 'replace').rstrip()}")

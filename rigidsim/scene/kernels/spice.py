@@ -185,7 +185,7 @@ def resolve_orientation(
                 toolkit.tipbod(_EQUATOR, body, date)
     except KernelError as error:
         raise ConfigError(Problem("[output] orientation", f'given "{given}", {error}')) from None
-    turn = np.eye(3) if axes != ECLIPTIC else np.array(to_ecliptic(np.eye(3), obliquity(np)))
+    turn = np.eye(3) if axes != ECLIPTIC else np.array(to_ecliptic(list(np.eye(3)), obliquity(np)))
     return Orientation(place, digest, body, described, ahead, turn)
 
 
