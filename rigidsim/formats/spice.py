@@ -30,6 +30,7 @@ from rigidsim.scene.kernels.reading import KernelError
 from rigidsim.scene.kernels.spice import loaded, spice
 from rigidsim.scene.parts_of_values import parts_in
 from rigidsim.scene.rotations import product, rotation_matrix
+from rigidsim.scene.row_rotations import angles_between, normalised
 from rigidsim.scene.space_axes import CELESTIAL, EQUATOR
 
 J2000 = "J2000"
@@ -168,7 +169,7 @@ class SpiceRun:
 
     def _compare(self, known: Sequence[Fraction], again: np.ndarray) -> None:
         saved = self.table.dataset["quaternion"].isel(time=self._rows).values
-        away = angles_between(saved, again).max(initial=0.0)
+        away = angles_between(normalised(saved), normalised(again)).max(initial=0.0)
         announced = self.source.attributes.get("attitude_error") or 0.0
         if not away <= max(_SAME, 10 * float(announced)):
             what = f"integrated again, the run is {away:.2g} rad from its own samples: it was made by other "
@@ -206,13 +207,6 @@ class SpiceRun:
 def _lines(text: str) -> list[str]:
     plain = "".join(c if " " <= c <= "~" else "?" for c in text)
     return wrap(plain, _LINE, subsequent_indent="   ")
-
-
-def angles_between(one: np.ndarray, other: np.ndarray) -> np.ndarray:
-    """Angles (rows,) between attitudes as quaternions (rows, 4) of any sign and norm, rad."""
-    p, q = (x / np.linalg.norm(x, axis=1)[:, None] for x in (one, other))
-    chord = np.minimum(np.linalg.norm(p - q, axis=1), np.linalg.norm(p + q, axis=1))
-    return np.asarray(4 * np.arcsin(np.minimum(chord / 2, 1.0)))
 
 
 def time_of(table: Table, row: int) -> Fraction:

@@ -11,7 +11,7 @@ from rigidsim.scene.arithmetic import cosine_and_sine, eccentric_anomaly
 from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.kepler import combined, plane_vectors
 from rigidsim.scene.orbit_keys import PACES, Elements, Orbit
-from rigidsim.scene.orbit_tables.elements import ElementTable, read_table
+from rigidsim.scene.orbit_tables.elements import read_table
 from rigidsim.scene.orbit_tables.pieces import TabulatedOrbit
 from rigidsim.scene.point_masses import ellipse_of
 from rigidsim.scene.registry import Setting
@@ -206,8 +206,7 @@ def tabulated_orbit(
         motion = lambda axis: context.sqrt(mass / axis**3)  # noqa: E731
     columns = {key: value.at(context) for key, value in given.items()}
     made_of = (name, text, bits, constants, strength, opposite)
-    listed = ElementTable(list(table.times), {k: list(v) for k, v in table.columns.items()}, context)
-    orbit = TabulatedOrbit(made_of, name, listed, columns, motion, opposite=opposite)
+    orbit = TabulatedOrbit(made_of, name, table, columns, motion, opposite=opposite)
     _ = orbit.error
     return orbit
 

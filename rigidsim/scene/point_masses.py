@@ -2,8 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from fractions import Fraction
-from typing import Any, Protocol
+from typing import Any
 
 from pydantic import Field, StrictBool, StrictStr
 
@@ -21,6 +20,7 @@ from rigidsim.scene.fields import (
     VariableName,
 )
 from rigidsim.scene.kepler import combined, plane_vectors
+from rigidsim.scene.kernels.ephemeris import Ephemeris
 from rigidsim.scene.validation_messages import nearest, shown
 
 GRAVITATIONAL_CONSTANT = "6.67430e-11"
@@ -71,23 +71,6 @@ class PointMassBody(ConfigTable):
         None, examples=[{"about": "sun", "semi_major_axis": "1 au", "eccentricity": 0.0167}]
     )
     """osculating elements at the start, instead of position and velocity"""
-
-
-class PlacesBodies(Protocol):
-    """Where bodies are at the start: ``rigidsim.scene.kernels.ephemeris.Ephemeris``."""
-
-    @property
-    def name(self) -> str:
-        """What messages call it."""
-
-    def check_body(self, body: str, fault: Callable[[str], ConfigError]) -> None:
-        """Refuse a body that it doesn't place."""
-
-    def strength(self, body: str) -> Fraction | None:
-        """Gravitational parameter, m^3/s^2."""
-
-    def start_of(self, body: str, context: Any) -> tuple[Vector, Vector]:
-        """Place and velocity at the start, m and m/s (mpf), space axes, from the barycentre."""
 
 
 @dataclass(frozen=True)
@@ -168,7 +151,7 @@ def resolve_point_masses(
     context: Any,
     *,
     free_flight: bool,
-    ephemeris: PlacesBodies | None = None,
+    ephemeris: Ephemeris | None = None,
 ) -> PointMasses | None:
     """Initial states of ``[[bodies]]``; None without any. ``mass`` (kg) is the rigid body's."""
     if not tables:
@@ -221,7 +204,7 @@ def _refuse_overlap(tables: Sequence[PointMassBody]) -> None:
             raise _fault(placed["earth_moon_barycenter"], "name", what)
 
 
-def _strength(number: int, table: PointMassBody, context: Any, ephemeris: PlacesBodies | None) -> Any:
+def _strength(number: int, table: PointMassBody, context: Any, ephemeris: Ephemeris | None) -> Any:
     if table.gravitational_parameter is not None:
         return table.gravitational_parameter.at(context)
     found = None
@@ -236,7 +219,7 @@ def _strength(number: int, table: PointMassBody, context: Any, ephemeris: Places
 
 
 def _of_kernel(
-    number: int, table: PointMassBody, context: Any, ephemeris: PlacesBodies | None
+    number: int, table: PointMassBody, context: Any, ephemeris: Ephemeris | None
 ) -> tuple[Vector, Vector]:
     """Where the kernel has a body at the start, and its velocity, from the barycentre."""
     for key in ("position", "velocity", "orbit"):

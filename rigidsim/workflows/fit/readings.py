@@ -13,7 +13,7 @@ import numpy as np
 
 from rigidsim.errors import ConfigError, Problem, RigidsimError
 from rigidsim.formats import ck_reading
-from rigidsim.formats.message_columns import MESSAGE_COLUMNS
+from rigidsim.formats.attitude_messages import MESSAGE_COLUMNS
 from rigidsim.formats.trajectories import Trajectory, read_columns
 from rigidsim.scene.config import Experiment
 from rigidsim.scene.exact import parse_number, parse_quantity
