@@ -1,5 +1,5 @@
-"""What the rows of a CCSDS message mean: attitudes from body to space axes and rates along body axes in an AEM,
-the path in SI in an OEM.
+"""What the rows of CCSDS messages mean: attitudes from body to space axes and rates along body axes (AEM), the
+path in SI (OEM).
 
 Conventions of annex F of 504.0-B-2. The quaternion from frame A to frame B turns the axes of A into those of
 B, so that it turns a vector's coordinates in B into those in A; Euler angles from A to B are intrinsic turns;
