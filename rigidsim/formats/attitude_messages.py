@@ -1,4 +1,4 @@
-"""What the rows of CCSDS messages mean: attitudes from body to space axes and rates along body axes (AEM), the
+"""What rows of CCSDS messages mean: attitudes from body to space axes and rates along body axes (AEM), the
 path in SI (OEM).
 
 Conventions of annex F of 504.0-B-2. The quaternion from frame A to frame B turns the axes of A into those of
