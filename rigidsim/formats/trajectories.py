@@ -142,7 +142,9 @@ class Trajectory:
         if self.epochs:
             return list(self.epochs)
         name = self.named(name)
-        if self.text is None or not any(is_date(cell) for _, cell in self.text.column(name)):
+        if self.text is None or name in self.columns:
+            return None
+        if not any(is_date(cell) for _, cell in self.text.column(name)):
             return None
         found = []
         for number, cell in self.text.column(name):
