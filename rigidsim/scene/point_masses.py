@@ -210,9 +210,9 @@ def _strength(number: int, table: PointMassBody, context: Any, ephemeris: Epheme
     found = None
     if table.ephemeris and ephemeris is not None:
         ephemeris.check_body(table.name, lambda what: _fault(number, "name", what))
-        found = ephemeris.strength(table.name)
+        found = ephemeris.kernel.strength(table.name)
     if found is None and table.ephemeris and ephemeris is not None:
-        raise _fault(number, "gravitational_parameter", f"missing; {ephemeris.name} has none: give it")
+        raise _fault(number, "gravitational_parameter", f"missing; {ephemeris.kernel.name} has none: give it")
     if found is None and not table.ephemeris:
         raise _fault(number, "gravitational_parameter", "missing; it is needed")
     return context.one if found is None else ExactNumber(found).at(context)

@@ -35,7 +35,7 @@ from rigidsim.scene.kernels.ephemeris import Ephemeris
 from rigidsim.scene.kernels.reading import Sight
 from rigidsim.scene.kernels.series import BlockSeries, chebyshev, exactly
 from rigidsim.scene.scene import Scene
-from rigidsim.scene.space_axes import obliquity, to_ecliptic
+from rigidsim.scene.space_axes import ECLIPTIC, obliquity, to_ecliptic
 
 _AXES = "xyz"
 _RATES = ("", "v", "a", "j")
@@ -112,7 +112,7 @@ class KernelStates:
             for row, axis in zip(rows, range(3), strict=True):
                 row.append(size * self._component(series, axis, order))
         found = [row[0] if len(row) == 1 else hy.sum(row) for row in rows]
-        if not self.ephemeris.ecliptic:
+        if self.ephemeris.axes != ECLIPTIC:
             return found
         c, s = (self._rounded(value) for value in obliquity(self._context))
         return to_ecliptic(found, (c, s))

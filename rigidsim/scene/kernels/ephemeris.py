@@ -51,11 +51,6 @@ class Ephemeris:
     run: tuple[Any, Any]
     used: list[Sight] = field(default_factory=list)
 
-    @property
-    def ecliptic(self) -> bool:
-        """Whether the space axes are the ecliptic's, rather than the kernel's own."""
-        return self.axes == ECLIPTIC
-
     def refused(self, what: str) -> ConfigError:
         """The error of the kernel's key."""
         return ConfigError(Problem("[ephemeris] kernel", f'given "{self.given}", {what}'))
@@ -90,15 +85,6 @@ class Ephemeris:
         self.used.append(found)
         return found
 
-    @property
-    def name(self) -> str:
-        """The kernel's name."""
-        return self.kernel.name
-
-    def strength(self, body: str) -> Fraction | None:
-        """Gravitational parameter of a body, m^3/s^2; None if the kernel has none."""
-        return self.kernel.strength(body)
-
     def start_of(self, body: str, context: Any) -> tuple[Vector, Vector]:
         """Place and velocity of a body at the start, m and m/s (mpf), space axes, from the barycentre."""
         sight = self.sight(body, "")
@@ -106,12 +92,8 @@ class Ephemeris:
 
     def place(self, context: Any, sight: Sight, time: Any, order: int = 0) -> Vector:
         """Vector (mpf, m, space axes) of a sight at a time of the scene (mpf, s), or a derivative of it."""
-        found = sight.at(context, time + exactly(context, self.ahead), order)
-        return self.turned(context, [_METRES * x for x in found])
-
-    def turned(self, context: Any, vector: Vector) -> Vector:
-        """A vector of the kernel's axes (mpf) in space axes."""
-        return to_ecliptic(vector, obliquity(context)) if self.ecliptic else vector
+        found = [_METRES * x for x in sight.at(context, time + exactly(context, self.ahead), order)]
+        return to_ecliptic(found, obliquity(context)) if self.axes == ECLIPTIC else found
 
 
 def resolve_ephemeris(
