@@ -104,10 +104,7 @@ def _is_double(time: Fraction) -> bool:
 
 def _doubles(times: Sequence[Fraction]) -> np.ndarray:
     """The doubles nearest to times, those beyond all doubles infinite."""
-    try:
-        return np.array([time.numerator / time.denominator for time in times])
-    except OverflowError:
-        return np.array([_double(time) for time in times])
+    return np.array(list(map(_double, times)))
 
 
 def _double(time: Fraction) -> float:
