@@ -7,8 +7,6 @@ accuracy or the certificate's own reference needs more; of long scenes with a cl
 Expected: no true error exceeds its certificate, and no certified run misses the accuracy asked for.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass

@@ -6,8 +6,6 @@ A new study is one more name in STUDIES: a module of this folder with ``study(fu
 Run: python -m experiments.all [--full] [--out DIR] [NAME ...]      exit code 1 if anything failed
 """
 
-from __future__ import annotations
-
 import argparse
 import importlib
 import sys
@@ -24,16 +22,12 @@ STUDIES = (
     "toutatis",
     "heavy_top_regimes",
     "flip_period",
-    "luni_solar_precession",
     "precession_and_nutation",
     "spectral_lines",
     "hyperion",
-    "satellite_stability",
-    "flip_sphere",
     "sweep_coverage",
     "apophis_flyby",
     "averaged_motions",
-    "whole_cycle",
     "cassini_states",
     "tumbling_averages",
     "damped_averages",
@@ -43,7 +37,6 @@ STUDIES = (
     "mars_rotation",
     "mercury_librations",
     "phobos_and_vesta",
-    "moon_free_librations",
     "apophis_real_sky",
     "fitted_bodies",
 )

@@ -27,8 +27,6 @@ Held against:
 - Energy and total angular momentum, orbit included, to the round-off law.
 """
 
-from __future__ import annotations
-
 import re
 import sys
 import tempfile
@@ -270,10 +268,7 @@ def picture(drawn: Draws, after: Tumbling, poles: np.ndarray, shift: np.ndarray)
              for rows, label, color in ((after.short, "after, short-axis mode", "orange"),
                                         (~after.short, "after, long-axis mode", "grey"))]  # fmt: skip
     plane.append(Curve(hours(drawn.state.effective), drawn.state.excitation, "before", "blue", ".", 0.6))
-    stay, limit = (
-        100 * after.short.mean(),
-        Curve(10, None, "10°, likely (Benson et al. 2023)", "orange"),
-    )
+    stay, limit = (100 * after.short.mean(), Curve(10, None, "10°, likely (Benson et al. 2023)", "orange"))
     title = f"After the Earth: {stay:.0f} % still in short-axis mode, poles and periods scattered"
     return Picture(title, "abc", [
         Panel("Pole, in degrees from the ecliptic's south pole", "", "", sky, legend="lower left",

@@ -15,8 +15,6 @@ Held against:
   the rotation: a tenth of a degree, and a part in a thousand of the rate, for the median member.
 """
 
-from __future__ import annotations
-
 import tempfile
 
 import numpy as np

@@ -9,8 +9,6 @@ one in half of them; of librating ones the true error is at most three times the
 most ten times in all that don't warn.
 """
 
-from __future__ import annotations
-
 import math
 import sys
 from collections.abc import Callable, Iterator

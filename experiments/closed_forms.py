@@ -6,8 +6,6 @@ are rigidsim's (``rigidsim.solve.closed_form``); here are
 the numbers that studies hold against published ones.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any

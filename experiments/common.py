@@ -4,8 +4,6 @@ A study is a module whose text asks a question and whose ``study(full)``, under 
 and a picture; its command writes ``out/NAME.png`` and ends with exit code 1 if a check fails.
 """
 
-from __future__ import annotations
-
 import argparse
 import inspect
 import math

@@ -15,8 +15,6 @@ Held against:
 - the order: errors are in proportion to the torque over momentum times rate, if the same share is lost.
 """
 
-from __future__ import annotations
-
 import sys
 from dataclasses import dataclass
 

@@ -6,8 +6,6 @@ closed form is A/(C-A) rotations, (a^2+c^2)/(a^2-c^2) for the ellipsoid; ten yea
 rounding leaves 1e-12 at worst. The real, elastic Earth's 427 to 435 days must NOT come out.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import mpmath

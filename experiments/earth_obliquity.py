@@ -8,8 +8,6 @@ and 0.2 %; 23.3 +- 1.3 deg (Laskar, Joutel & Robutel 1993); a mean period of 41,
 (--full; 50 otherwise).
 """
 
-from __future__ import annotations
-
 import sys
 
 import numpy as np

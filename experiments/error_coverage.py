@@ -11,8 +11,6 @@ code, isn't repeated, so that a campaign can be stopped and gone on with. ``--on
 Exit code 1 if a promise was broken.
 """
 
-from __future__ import annotations
-
 import argparse
 import hashlib
 import json

@@ -15,8 +15,6 @@ SciPy's motions, to 1e-6.
 Run: python -m experiments.fit_campaign [--scenes N] [--undetermined N] [--seed N]      Exit: 1 if one fails
 """
 
-from __future__ import annotations
-
 import argparse
 import random
 import sys

@@ -6,8 +6,6 @@ attitudes good to 0.1 deg over up to two orbits (without the wheel only ratios o
 DE421's Moon by a year of its librations, from a perturbed start. Tolerances are three sigmas of the fits.
 """
 
-from __future__ import annotations
-
 import tempfile
 from pathlib import Path
 from typing import Any

@@ -10,8 +10,6 @@ Tolerance: L^2 and 2E each walk (eps/2) sqrt(steps) (Brouwer 1937), doubled as s
 eps sqrt(steps) L^2 over L^2 - 2 E I_2 is the relative error of k'^2, and over p that of the period.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -8,8 +8,6 @@ defect; its case is kept in ``--keep`` and the exit code is 1. Cases run in a ch
 when it dies, one at a time; a case is named by the seed and its number, and ``--only N`` repeats one.
 """
 
-from __future__ import annotations
-
 import argparse
 import contextlib
 import io

@@ -3,8 +3,6 @@
 Everything is a function of a ``random.Random``, so that a number names a case and a case can be repeated.
 """
 
-from __future__ import annotations
-
 import datetime
 import random
 import tomllib

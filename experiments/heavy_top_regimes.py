@@ -10,8 +10,6 @@ sleeping top 0.1 % above its threshold w3^2 = 4 A mu/C^2, whose linear theory la
 and the growth rate, fitted after 12 e-folds (exp(-24) = 4e-11 of the decaying solution) and below 1e-6 rad.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import Any

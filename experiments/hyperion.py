@@ -12,8 +12,6 @@ further; the plain equations must agree to 2 %. Shorter runs get 30 % for Lyapun
 to 10 %, and the motion may keep to the shore of an island for some hundred revolutions.
 """
 
-from __future__ import annotations
-
 import sys
 from dataclasses import dataclass
 from typing import Any

@@ -12,8 +12,6 @@ Run: python -m experiments.kill_campaign [--kills 300] [--full-disks 40] [--read
 [--edges 30] [--seconds 1200] [--seed 1]
 """
 
-from __future__ import annotations
-
 import argparse
 import random
 import signal

@@ -18,8 +18,6 @@ Run: python -m experiments.long_horizon [--full] [--out DIR]
 Reduced: single to 1e4, double to 1e5 rad, extended to 1e4; --full: 1e5, 1e7 and 1e6 (an hour and a half).
 """
 
-from __future__ import annotations
-
 import math
 import sys
 from collections.abc import Sequence

@@ -8,8 +8,6 @@ all amplitudes. The core's amplifications are those of the linearised equations 
 s/(s - s0) is their limit for slow nutations.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

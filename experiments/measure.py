@@ -1,7 +1,5 @@
 """Measuring: rates of angles and lines of spectra, crossings between samples, attitudes as matrices."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

@@ -11,8 +11,6 @@ Published: Margot et al. 2012 (J. Geophys. Res. 117, E00L09); Archinal et al. 20
 Astr. 101, 141); Peale, Margot & Yseboodt 2009 (Icarus 199, 1).
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

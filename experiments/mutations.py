@@ -8,8 +8,6 @@ What is committed is tried, in copies made by git. A mistake that no test catche
 Run: python -m experiments.mutations [--count N] [--seed S] [--seconds T] [--long] [--against REF]
 """
 
-from __future__ import annotations
-
 import argparse
 import ast
 import io

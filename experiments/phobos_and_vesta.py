@@ -8,8 +8,6 @@ n^2/s^2) with s = sqrt(3 G M (B - A)/(C a^3)); (3/2) n^2/w (C - A)/C cos(obliqui
 the half-yearly (3/4) n/w (C - A)/C sin(obliquity), less 5 e^2/2.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -8,8 +8,6 @@ digit of 6798.38 d. The real Earth (IAU 2000B) must differ where its fluid core 
 lines.
 """
 
-from __future__ import annotations
-
 import sys
 from typing import Any
 

@@ -4,8 +4,6 @@ The same seed and number always give the same scene. Motions are drawn with rate
 time, mass and length over many decades are put on afterwards.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass

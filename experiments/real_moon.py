@@ -7,8 +7,6 @@ has the delay to third order, a hundredth of the 80 mas that the second adds: 2e
 number by number. With --full its CPU is compared, seven times in turn.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

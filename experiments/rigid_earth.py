@@ -11,8 +11,6 @@ Held against: five published circular amplitudes of a rigid Earth's figure axis,
 mas.
 """
 
-from __future__ import annotations
-
 from experiments.bare import precession
 from experiments.common import CONFIGS, Answer, Check, Curve, Panel, Picture, Result, Study, simulate
 from experiments.real_bodies import nutation

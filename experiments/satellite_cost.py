@@ -15,8 +15,6 @@ estimates.
 Run: python -m experiments.satellite_cost [--turns 5] [--hours 24]      exit code 1 if the motions differ
 """
 
-from __future__ import annotations
-
 import argparse
 import sys
 from collections.abc import Sequence

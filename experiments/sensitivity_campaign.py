@@ -12,8 +12,6 @@ to the derivative's largest value there, may be 1e-9. ``--only N`` repeats a cas
 the exit code is 1 if one is off.
 """
 
-from __future__ import annotations
-
 import argparse
 import sys
 import warnings

@@ -1,7 +1,5 @@
 """Random scenes of many kinds, each with a number of its config, for the campaign of sensitivities."""
 
-from __future__ import annotations
-
 import random
 from dataclasses import dataclass
 

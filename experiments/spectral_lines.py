@@ -14,8 +14,6 @@ Held against:
   the order of the amplitude squared.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

@@ -15,8 +15,6 @@ at most twenty times the true one in the median. Among fewer than a hundred memb
 Run: python -m experiments.sweep_coverage [--members 60] [--seed 1] [--only KIND ...] [--out DIR]
 """
 
-from __future__ import annotations
-
 import math
 import time
 from collections.abc import Sequence

@@ -13,8 +13,6 @@ outside after the kill; those have to be the same files, unchanged, at the end.
 Run: python -m experiments.sweep_kill_campaign [--kills 100] [--seconds 1800] [--seed 1]
 """
 
-from __future__ import annotations
-
 import argparse
 import os
 import random

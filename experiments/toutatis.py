@@ -14,8 +14,6 @@ Held against:
   parts, some exp(-sqrt(4 pi N)) for N = 136 turns or more, is below that).
 """
 
-from __future__ import annotations
-
 import mpmath
 import numpy as np
 

@@ -7,8 +7,6 @@ Good to about 1e-13 away from the separatrix, which is what studies of measured 
 ``closed_forms`` are for comparisons with runs.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -17,8 +17,6 @@ Held against:
   orbit, which is the size of what the average adds in second order.
 """
 
-from __future__ import annotations
-
 import sys
 from dataclasses import dataclass
 

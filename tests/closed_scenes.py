@@ -1,7 +1,5 @@
 """What the tests of the closed forms share: scenes, random bodies and starts, integrations as a measure."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import mpmath

@@ -13,8 +13,6 @@ the page says that it needs nothing but an empty folder:
 says why it isn't run; of pages with ``<!-- blocks: slow -->`` the long stage runs some, drawn by the day.
 """
 
-from __future__ import annotations
-
 import contextlib
 import io
 import re

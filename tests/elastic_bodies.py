@@ -1,107 +1,12 @@
-"""Motions of elastic bodies by equations of their own.
-
-Without delay, in 113 bits: Euler's equations for the true rates with dI/dt along the motion,
-
-    (I + k/3 (w^2 + w w^T/3)) w' = N - w x I w - T' w,
-
-where T is the tidal part and k the strength, and Newton's for the source. With a delay, in doubles: momentum
-in space and rotation matrix, the distortion taken at t - tau by going back along the undistorted motion.
+"""Motions of elastic bodies by equations of their own: momentum in space and rotation matrix, the distortion
+taken at t - tau by going back along the undistorted motion.
 """
-
-from __future__ import annotations
 
 from collections.abc import Sequence
 from typing import Any
 
-import heyoka as hy
 import numpy as np
-from gyrostats import BITS, exact
 from scipy.integrate import solve_ivp
-
-GRAVITATIONAL_CONSTANT = "6.67430e-11"
-
-
-def strength(love: str, radius: str) -> Any:
-    """k R^5 / G."""
-    size = exact(radius)
-    return exact(love) * size * size * size * size * size / exact(GRAVITATIONAL_CONSTANT)
-
-
-def _cross(a: Sequence[Any], b: Sequence[Any]) -> list[Any]:
-    return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-
-
-def _dot(a: Sequence[Any], b: Sequence[Any]) -> Any:
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-
-
-def _det(columns: Sequence[Sequence[Any]]) -> Any:
-    return _dot(columns[0], _cross(columns[1], columns[2]))
-
-
-def followed(
-    moments: Sequence[Any],
-    elastic: Any,
-    mean_rate: Any,
-    attraction: Any,
-    start: Sequence[Sequence[Any]],
-    rates: Sequence[Any],
-    times: Any,
-    *,
-    spins: bool = True,
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Rates, matrices and angular momenta (space axes) at times, 80-bit numbers, without delay.
-
-    Args:
-        start: place and velocity of the source; the body starts unturned.
-        spins: whether its own spin distorts the body, too.
-    """
-    w = list(hy.make_vars("w0", "w1", "w2"))
-    r = [list(hy.make_vars(*(f"r{i}{j}" for j in range(3)))) for i in range(3)]
-    x, v = (list(hy.make_vars(*(f"{n}{i}" for i in range(3)))) for n in "xv")
-    third, mu = exact(1) / exact(3), exact(attraction)
-    columns = [list(column) for column in zip(*r, strict=True)]
-    seen = [_dot(column, x) for column in columns]
-    turning = _cross(seen, w)
-    moved = [_dot(column, v) + y for column, y in zip(columns, turning, strict=True)]
-    squared = _dot(x, x)
-    cube = 1.0 / (squared * hy.sqrt(squared))
-    fifth = cube / squared
-    slope = -5.0 * _dot(x, v) / squared * fifth
-    size, rate, bulge = elastic * mu, exact(mean_rate), elastic * third if spins else exact(0)
-    tensor, change, whole = ([[None] * 3 for _ in range(3)] for _ in range(3))
-    own = [exact(m) for m in moments]
-    for i in range(3):
-        for j in range(3):
-            same = 1.0 if i == j else 0.0
-            tide = seen[i] * seen[j] * fifth - (third * cube if same else 0.0)
-            spin = w[i] * w[j] - (third * _dot(w, w) if same else 0.0)
-            known = rate * rate * ((third if same else exact(0)) - exact(float(i == j == 2)))
-            tensor[i][j] = own[i] * same - size * tide + bulge * (spin + known)
-            grown = third * (-3.0 * _dot(x, v) / squared * cube) if same else 0.0
-            change[i][j] = -size * (
-                slope * seen[i] * seen[j] + fifth * (seen[i] * moved[j] + moved[i] * seen[j]) - grown
-            )
-            whole[i][j] = tensor[i][j] + bulge * ((_dot(w, w) if same else 0.0) + third * (w[i] * w[j]))
-    momentum = [_dot(row, w) for row in tensor]
-    torque = [3.0 * mu * fifth * y for y in _cross(seen, [_dot(row, seen) for row in tensor])]
-    right = [n + y - _dot(c, w) for n, y, c in zip(torque, _cross(momentum, w), change, strict=True)]
-    volume = _det(whole)
-    turned = [_det([right if j == i else whole[j] for j in range(3)]) / volume for i in range(3)]
-    system = list(zip(w, turned, strict=True))
-    turns = ((0, 1, 2), (1, 2, 0), (2, 0, 1))
-    system += [(row[i], row[j] * w[k] - row[k] * w[j]) for row in r for i, j, k in turns]
-    system += list(zip(x, v, strict=True)) + [(a, -mu * b * cube) for a, b in zip(v, x, strict=True)]
-    initial = [exact(y) for y in rates] + [exact(float(i == j)) for i in range(3) for j in range(3)]
-    initial += [exact(y) for part in start for y in part]
-    grid = np.array([exact(t) for t in times])
-    engine = hy.taylor_adaptive(system, initial, time=grid[0], fp_type=hy.real, prec=BITS, compact_mode=True)
-    found = engine.propagate_grid(grid)[-1]
-    spun = [_dot(row, momentum) for row in r]
-    read = hy.cfunc(spun, [y for y, _ in system], fp_type=hy.real, prec=BITS, compact_mode=True)
-    narrow = np.vectorize(lambda y: np.longdouble(str(y)), otypes=[np.longdouble])
-    momenta = narrow(read(np.ascontiguousarray(found.T))).T
-    return narrow(found[:, :3]), narrow(found[:, 3:12]).reshape(-1, 3, 3), momenta
 
 
 class Delayed:

@@ -1,7 +1,5 @@
 """The symbolic equations of a scene, evaluated in SI, and mechanics in numpy to hold them against."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import heyoka as hy
@@ -44,17 +42,31 @@ def internal(system: Any, state: np.ndarray) -> np.ndarray:
     return np.ldexp(state, -np.array(system.state_exponents))
 
 
+_COMPILED: list[tuple[str, Any, Any]] = []  # of the last systems, which most calls ask for again
+
+
+def _compiled(kind: str, system: Any, expressions: list[Any]) -> Any:
+    for known, of, function in _COMPILED:
+        if known == kind and of is system:
+            return function
+    _COMPILED.append((kind, system, hy.cfunc(expressions, system.variables)))
+    del _COMPILED[:-6]
+    return _COMPILED[-1][2]
+
+
 def derivative(system: Any, state: np.ndarray, time: float = 0.0) -> np.ndarray:
     """Time derivative of the states, SI, at a state in SI and a time in seconds."""
-    rhs = hy.cfunc([rhs for _, rhs in system.equations], system.variables)
-    rates = rhs(internal(system, state), time=float(np.ldexp(time, -system.scaling.time)))
-    return np.ldexp(rates, np.array(system.state_exponents) - system.scaling.time)
+    rhs = _compiled("derivative", system, [rhs for _, rhs in system.equations])
+    inside, options = internal(system, state), {"time": float(np.ldexp(time, -system.scaling.time))}
+    if system.surfaces:  # a parameter for each says on which side the state is
+        options["pars"] = np.sign(_compiled("surfaces", system, system.surfaces)(inside))
+    return np.ldexp(rhs(inside, **options), np.array(system.state_exponents) - system.scaling.time)
 
 
 def observed(system: Any, state: np.ndarray) -> dict[str, np.ndarray]:
     """All recorded variables, SI, at a state in SI."""
     count = sum(r.count for r in system.recorded)
-    values = hy.cfunc(system.outputs[:count], system.variables)(internal(system, state))
+    values = _compiled("observed", system, system.outputs[:count])(internal(system, state))
     return {r.name: np.ldexp(values[r.first : r.first + r.count], r.exponents) for r in system.recorded}
 
 

@@ -1,7 +1,5 @@
 """Gravity fields in other words: Legendre functions as explicit sums, and bodies of point masses."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Scenes under a kernel, for tests: a Moon, a satellite, and the solar system as point masses."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 KEPT = ("0.999369252102309314", "0.999596982633729229", 1)

@@ -1,7 +1,5 @@
 """Small SPK files for tests, written from the coefficients of a package."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import de421

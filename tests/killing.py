@@ -1,7 +1,5 @@
 """Runs in a process of their own that is killed once some samples are saved, as nothing else is as sudden."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 import time

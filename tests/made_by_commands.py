@@ -1,7 +1,5 @@
 """A run, a sweep and a fit, made by commands, for the tests of what other commands do with them."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -1,7 +1,5 @@
 """SPK files written by hand: SPICE's arrays of doubles, with segments of types 2 and 3, little-endian."""
 
-from __future__ import annotations
-
 import struct
 from collections.abc import Mapping
 from pathlib import Path

@@ -1,7 +1,5 @@
 """What several tests share: running texts, exact values of datasets, angles between attitudes, bounds."""
 
-from __future__ import annotations
-
 import fcntl
 import hashlib
 import math
@@ -225,24 +223,6 @@ def assert_announced(announced: Sequence[float], true: Sequence[float], at_most:
     assert len(ratios) >= 5
     assert ratios.min() >= 1 / 3
     assert np.median(ratios) <= at_most
-
-
-def assert_announced_from(text: str, starts: Sequence[str], exact: str, at_most: float = 10) -> None:
-    """The same of the attitudes of a config from several starts, each against more digits."""
-    announced, true = [], []
-    for start in starts:
-        run = run_text(text, start, estimate=True)
-        truth = loaded(run_text(text, start, f'integrator.precision="{exact}"'))["quaternion"].values
-        announced.append(run.summary["accuracy"]["estimated_attitude_error"])
-        true.append(angle_between(loaded(run)["quaternion"].values, truth).max())
-    assert_announced(announced, true, at_most)
-
-
-STARTS = [
-    f"initial.angular_velocity={w}"
-    for w in ([0.3, 1.0, 0.5], [1.0, 0.2, 0.4], [0.2, 0.3, 1.1], [-0.6, 0.7, 0.5], [0.5, -0.9, 0.4])
-]
-"""Five starts of a body."""
 
 
 def config(

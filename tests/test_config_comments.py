@@ -1,12 +1,9 @@
 """Numbers in the comments of configs/ are those of the scenes below them."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from pathlib import Path
 
-import numpy as np
 import pytest
 from support import CONFIGS
 
@@ -101,26 +98,7 @@ def test_what_a_scene_gives_at_once(name: str) -> None:
         assert phrase in comments
 
 
-def test_what_the_asymmetric_top_runs_through(ready: Callable[..., rigidsim.SavedRun]) -> None:
-    _, comments = given("asymmetric_top")
-    run = ready("asymmetric_top")
-    with run.dataset as dataset:
-        rates = np.linalg.norm(dataset.angular_velocity.values, axis=1)
-        turned = np.trapezoid(rates, dataset.time.values)
-    assert f"by {turned:.0f} rad in {run.summary['cost']['steps']} steps" in comments
-
-
-def test_the_water_molecule_flips(ready: Callable[..., rigidsim.SavedRun]) -> None:
-    _, comments = given("water_molecule")
-    run = ready("water_molecule")
-    with run.dataset as dataset:
-        spin = dataset.angular_velocity.sel(body_axis="z").values
-        flips = dataset.time.values[np.flatnonzero(np.diff(np.sign(spin)))]
-        last = float(dataset.time[-1])
-    assert f"every {np.diff(flips).mean() * 1e12:.2f} ps" in comments
-    assert f"steps of {10 ** round(math.log10(last / run.summary['cost']['steps'])):.0e} s" in comments
-
-
+@pytest.mark.slow
 def test_how_far_the_satellite_is_braked(runs: Path) -> None:
     text, comments = given("detumbling_cubesat")
     changes = ["output.timeline=false", "output.estimate=false"]

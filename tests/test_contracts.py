@@ -4,8 +4,6 @@ A scene with all of them runs, resumes bit for bit, has the members of its sweep
 are true, in each precision. What a load does is compared with closed forms and other integrators elsewhere.
 """
 
-from __future__ import annotations
-
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -13,17 +11,7 @@ from typing import Any
 import heyoka as hy
 import numpy as np
 import pytest
-from support import (
-    EPSILON,
-    angle_between,
-    assert_announced,
-    cases,
-    config,
-    loaded,
-    run_text,
-    same_bits,
-    wide,
-)
+from support import EPSILON, angle_between, assert_announced, cases, config, loaded, run_text, same_bits, wide
 
 import rigidsim
 from rigidsim.formats import FORMATS
@@ -166,7 +154,7 @@ def test_a_run_that_was_stopped_twice_has_the_same_bits(case: tuple[str, str, st
     assert whole.status == "finished"
     assert [code for code in whole.summary["warning_codes"] if code != "attitude_uncertain"] == []
     steps = whole.summary["cost"]["steps"]
-    guard = f"limits.max_steps={max(1, steps // 3 - 1)}"
+    guard = f"limits.max_steps={max(1, (steps - 1) // 2)}"
     run = run_text(SCENES[case[0]], *settings(*case[1:]), guard, out=tmp_path)
     sessions = 1
     while run.status == "stopped: max_steps":
@@ -176,10 +164,9 @@ def test_a_run_that_was_stopped_twice_has_the_same_bits(case: tuple[str, str, st
     assert sessions >= 3
     assert run.summary["cost"]["sessions"] == sessions
     same_bits(run, whole)
-    assert rigidsim.verify(tmp_path / "scene").identical
 
 
-@pytest.mark.parametrize("scene", cases(MAIN, ["spinner"]))
+@pytest.mark.parametrize("scene", cases(MAIN, ["top"]))
 def test_members_of_a_sweep_are_single_runs(scene: str, tmp_path: Path) -> None:
     axes = "".join(f"axes.'{key}' = {{values = {values}}}\n" for key, values in VARIED[scene].items())
     swept = SCENES[scene] + f'[sweep]\nmode = "zip"\nkeep = ["final"]\n{axes}'
@@ -192,7 +179,7 @@ def test_members_of_a_sweep_are_single_runs(scene: str, tmp_path: Path) -> None:
             np.testing.assert_allclose(found, alone[name].values, rtol=0, atol=1e-13)
 
 
-@pytest.mark.parametrize("precision", cases(EXACT, ["double"]))
+@pytest.mark.parametrize("precision", cases(EXACT, []))
 def test_announced_errors_are_true(precision: str) -> None:
     announced, true = [], []
     for scene in MAIN:

@@ -18,8 +18,6 @@ They agree in every word, and number by number:
   no two CPUs share): each row holds them to what is expected and allowed, and its verdict is compared.
 """
 
-from __future__ import annotations
-
 import math
 import os
 import re

@@ -1,7 +1,5 @@
 """Every block of code on the documentation's pages runs, and prints what is shown."""
 
-from __future__ import annotations
-
 import sys
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """docs/house.md lists the rooms; tests and studies patch nothing private."""
 
-from __future__ import annotations
-
 import ast
 import re
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The documentation's notebooks are kept without outputs; `python docs/build.py` runs them."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """The version is the same wherever it is written, and the recipe for conda asks for what pip is asked for."""
 
-from __future__ import annotations
-
 import re
 import tomllib
 from pathlib import Path
@@ -60,11 +58,3 @@ def test_the_recipe_asks_for_the_same_packages_and_versions(recipe: dict[str, An
     assert here == {IN_CONDA.get(name, name): bounds for name, bounds in asked.items()}
     (backend,) = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["build-system"]["requires"]
     assert requirement(backend) in [requirement(text) for text in recipe["requirements"]["host"]]
-
-
-def test_the_recipe_builds_this_clone_and_installs_its_command(recipe: dict[str, Any]) -> None:
-    """From the files beside it: nothing is fetched from elsewhere."""
-    assert (ROOT / "docs" / "conda" / recipe["source"]["path"]).resolve() == ROOT.resolve()
-    ((name, target),) = PROJECT["scripts"].items()
-    assert recipe["build"]["python"]["entry_points"] == [f"{name} = {target}"]
-    assert "://" not in (ROOT / "docs" / "conda" / "recipe.yaml").read_text("utf-8")

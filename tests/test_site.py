@@ -1,9 +1,5 @@
 """The documentation's site: pages gathered with their links, the reference made from the code."""
 
-from __future__ import annotations
-
-import gzip
-import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -16,7 +12,6 @@ sys.path.insert(0, str(ROOT / "docs" / "builder"))
 
 import checking  # noqa: E402
 import reference  # noqa: E402
-import scenes  # noqa: E402
 import sections  # noqa: E402
 import staging  # noqa: E402
 
@@ -61,36 +56,6 @@ def test_a_built_site_is_checked_as_a_reader_finds_it(tmp_path: Path) -> None:
     for page, fault in {right: "", **wrong}.items():
         (tmp_path / "one.html").write_text(page)
         assert checking.faults(tmp_path) == ([f"one.html: {fault}"] if fault else [])
-
-
-def test_style_sheets_fetch_nothing_from_elsewhere(tmp_path: Path) -> None:
-    (tmp_path / "fine.css").write_text(
-        "a { background: url(data:image/png;base64,x) } b { src: url(c.woff) }"
-    )
-    assert checking.faults(tmp_path) == []
-    (tmp_path / "far.css").write_text("@font-face { src: url('https://example.org/x.woff') }")
-    assert checking.faults(tmp_path) == ["far.css: fetches https://example.org/x.woff"]
-
-
-def test_scenes_that_play_have_a_button_below_their_timeline(pages: Path) -> None:
-    text = scenes.with_buttons((pages / "gallery.md").read_text(encoding="utf-8"))
-    assert text.count("<button") == len(scenes.PLAYED) >= 5
-    for name in scenes.PLAYED:
-        section = text.split(f"\n## {name}\n")[1].split("\n## ")[0]
-        assert f'data-recording="scenes/{name}.rrd"' in section
-
-
-@pytest.mark.slow
-def test_the_site_serves_recordings_and_viewer_itself(tmp_path: Path) -> None:
-    """The viewer comes from the installed rerun-sdk, and its page lets it fetch from the site alone."""
-    viewer = tmp_path / "_static" / "viewer"
-    shutil.copytree(ROOT / "docs" / "builder" / "_static", tmp_path / "_static")
-    scenes.record(tmp_path, ("tossed_plate",))
-    scenes.put_viewer(viewer)
-    assert 1e5 < (tmp_path / "scenes" / "tossed_plate.rrd").stat().st_size < 2e6
-    assert gzip.decompress((viewer / "re_viewer_wasm.bin").read_bytes()).startswith(b"\0asm")
-    assert b"wasm_bindgen" in (viewer / "re_viewer.js").read_bytes()
-    assert checking.faults(tmp_path) == []
 
 
 def test_the_reference_has_every_key_command_and_variable(pages: Path) -> None:

@@ -1,7 +1,5 @@
 """What is packed is whole: wheel and sdist run outside the clone, with ready scenes, presets and types."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

@@ -5,8 +5,6 @@ four days (exactly: the same polynomial in another variable), and differences of
 polynomials. Kilometres, days, axes of the ICRF.
 """
 
-from __future__ import annotations
-
 import importlib
 from pathlib import Path
 

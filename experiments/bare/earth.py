@@ -8,8 +8,6 @@ A)/C of the rigid-Earth series and the package's J2. Rates in body axes and a qu
 days, blocks as in ``moon``.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import math

@@ -8,8 +8,6 @@ equations of point masses (Einstein, Infeld & Hoffmann, to 1/c^2), and the other
 the Moon is from its place in DE421, seen from the Earth. m and s.
 """
 
-from __future__ import annotations
-
 import argparse
 from collections.abc import Collection, Sequence
 

@@ -5,8 +5,6 @@ R^2 of the body (a torque's unit is 1/time^2), places in the units of R, gravita
 of R^3/time^2.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -149,25 +147,6 @@ def tide_tensor(love: float, mass_ratio: float, radius: float, place: Vector) ->
     ]
 
 
-def tide_tensor_rate(love: float, mass_ratio: float, radius: float, place: Vector, rate: Vector) -> list:
-    """Its rate of change, from the place's rate in body axes."""
-    r2, along = dot(place, place), dot(place, rate)
-    factor = -love * mass_ratio * radius**3 * r2**-2.5
-    return [
-        [
-            factor
-            * (
-                place[i] * rate[j]
-                + rate[i] * place[j]
-                - 5.0 * along / r2 * place[i] * place[j]
-                + (along if i == j else 0.0)
-            )
-            for j in range(3)
-        ]
-        for i in range(3)
-    ]
-
-
 def spin_tensor(love: float, parameter: float, radius: float, w: Vector, mean_rate: float) -> list:
     """What the spin adds beyond a mean rate's share (which is in the measured moments).
 
@@ -177,16 +156,6 @@ def spin_tensor(love: float, parameter: float, radius: float, w: Vector, mean_ra
     w2, n2 = dot(w, w), mean_rate**2
     less = [(w2 - n2) / 3.0, (w2 - n2) / 3.0, (w2 + 2.0 * n2) / 3.0]
     return [[factor * (w[i] * w[j] - (less[i] if i == j else 0.0)) for j in range(3)] for i in range(3)]
-
-
-def spin_tensor_rate(love: float, parameter: float, radius: float, w: Vector, rate: Vector) -> list:
-    """Its rate of change."""
-    factor = love * radius**3 / (3.0 * parameter)
-    along = 2.0 / 3.0 * dot(w, rate)
-    return [
-        [factor * (w[i] * rate[j] + rate[i] * w[j] - (along if i == j else 0.0)) for j in range(3)]
-        for i in range(3)
-    ]
 
 
 def turned_back(w: Vector, acceleration: Vector, delay: float, vector: Vector) -> list:

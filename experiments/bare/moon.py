@@ -12,8 +12,6 @@ of the compiled system. What is left over against the package's own librations i
 fitted.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import math

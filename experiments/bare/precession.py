@@ -1,7 +1,5 @@
 """The Earth's mean equator and equinox of date by IAU 1976, Lieske et al. 1977, Astron. Astrophys. 58, 1."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -10,8 +10,6 @@ place of box and panel, which has no sides, in full light or with the shadow. Th
 python -m experiments.bare.satellite [--hours 24]
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import math

@@ -4,8 +4,6 @@ python -m experiments.benchmarking.ours CONFIG OUT             a run folder, imp
 python -m experiments.benchmarking.ours CONFIG --again TIMES   in memory, in a warm process, the median
 """
 
-from __future__ import annotations
-
 import json
 import resource
 import statistics

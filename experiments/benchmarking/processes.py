@@ -1,7 +1,5 @@
 """Fresh processes, timed: what a command costs as a whole, or what it says of its own work."""
 
-from __future__ import annotations
-
 import json
 import os
 import subprocess

@@ -1,7 +1,5 @@
 """The same dataset through other people's readers, and beside that of the bare script."""
 
-from __future__ import annotations
-
 import shutil
 import subprocess
 from pathlib import Path

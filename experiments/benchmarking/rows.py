@@ -1,7 +1,5 @@
 """The rows of the benchmark: what is run, what it is held against, and what the ratio may be at most."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path

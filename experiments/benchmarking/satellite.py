@@ -6,8 +6,6 @@ samples at start and end and what is recorded of them) and of a run until its sa
 file (with statistics and packing, which no peer does); the ratio with the latter stands beside.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 
 from experiments.peers.campaign import OURS, measure

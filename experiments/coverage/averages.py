@@ -1,7 +1,5 @@
 """The announced error of an averaged model, held against the full model."""
 
-from __future__ import annotations
-
 import time
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Random scenes with rotors, a fluid core, and states of one's own: controllers, filters, slosh."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 

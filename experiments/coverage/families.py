@@ -3,8 +3,6 @@
 The same seed and number always give the same scene; families take turns.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Random scenes of bodies with a gravity field, and of oblate sources: on orbits, at rest, and in flight."""
 
-from __future__ import annotations
-
 import math
 
 from experiments.random_scenes import Draw

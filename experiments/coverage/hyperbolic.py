@@ -2,8 +2,6 @@
 exponentially.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

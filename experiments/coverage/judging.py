@@ -1,7 +1,5 @@
 """What a scene's run announces of its errors at the end, held against what is true there."""
 
-from __future__ import annotations
-
 import math
 import time
 from collections.abc import Callable

@@ -2,8 +2,6 @@
 and in which a jet leaves while the moments fall.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

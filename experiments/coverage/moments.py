@@ -8,8 +8,6 @@ first and second integrals of g,
 A better integration by the same code could share its faults; this is exact, with the digits of the config.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any

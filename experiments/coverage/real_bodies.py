@@ -1,7 +1,5 @@
 """Random scenes under the bodies of a kernel, and of bodies that tides and their spin distort."""
 
-from __future__ import annotations
-
 import math
 
 from experiments.random_scenes import Draw

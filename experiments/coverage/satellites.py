@@ -1,7 +1,5 @@
 """Random satellites: surfaces in sunlight and in air, eddy currents, attractors with a field."""
 
-from __future__ import annotations
-
 import math
 
 from experiments.random_scenes import Draw

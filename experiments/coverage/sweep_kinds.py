@@ -2,8 +2,6 @@
 gyrostats, and laws with states of their own.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from rigidsim.scene.config import parse

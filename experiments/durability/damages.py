@@ -1,7 +1,5 @@
 """Files truncated, flipped, exchanged, lost: each recognised, and a run repaired with the same bits."""
 
-from __future__ import annotations
-
 import os
 import random
 import shutil

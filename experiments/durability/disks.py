@@ -1,7 +1,5 @@
 """Disks that fill up, and disks that become read-only, while a run writes to them."""
 
-from __future__ import annotations
-
 import os
 import random
 import resource

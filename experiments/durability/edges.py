@@ -1,7 +1,5 @@
 """SIGKILL where the integrator stands at the edge of a kernel's block: by the run itself, and counted."""
 
-from __future__ import annotations
-
 import os
 import random
 import shutil

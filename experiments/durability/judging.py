@@ -1,7 +1,5 @@
 """What a disturbed run has left, looked at from outside, and what is counted of it."""
 
-from __future__ import annotations
-
 import os
 from collections import Counter
 from dataclasses import dataclass, field

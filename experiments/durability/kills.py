@@ -1,7 +1,5 @@
 """SIGKILL at random moments."""
 
-from __future__ import annotations
-
 import os
 import random
 import shutil

@@ -1,7 +1,5 @@
 """Runs in processes of their own, and the moments at which something happens to them."""
 
-from __future__ import annotations
-
 import os
 import sys
 import time

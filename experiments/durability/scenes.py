@@ -1,7 +1,5 @@
 """Scenes of some tenths of a second of work each, and whether two datasets agree in every bit."""
 
-from __future__ import annotations
-
 import time
 from pathlib import Path
 

@@ -11,18 +11,10 @@ An adapter is a module with
 ``experiments.peers.child`` runs one adapter in a process of its own.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-ADAPTERS = {
-    "heyoka": "bare_heyoka",
-    "rigidsim": "own_runs",
-    "numba": "numba_dop853",
-    "scipy": "scipy_ivp",
-    "mujoco": "mujoco_steps",
-}
+ADAPTERS = {"heyoka": "bare_heyoka", "rigidsim": "own_runs", "numba": "numba_dop853"}
 """Package that must be there: module of its adapter."""
 
 

@@ -1,7 +1,5 @@
 """heyoka with no rigidsim around it: rates and quaternion, as its documentation would have one write them."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Peers in turn, each in fresh processes: their points, and what is missing and why."""
 
-from __future__ import annotations
-
 import functools
 import itertools
 import json

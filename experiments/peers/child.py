@@ -1,9 +1,7 @@
 """One peer in a process of its own: every scene, variant and knob, timed; a JSON line at a time on stdout.
 
-Run by ``experiments.peer_comparison``: python -m experiments.peers.child PEER REQUEST, with a JSON request.
+Run by ``experiments.benchmark``: python -m experiments.peers.child PEER REQUEST, with a JSON request.
 """
-
-from __future__ import annotations
 
 import functools
 import importlib

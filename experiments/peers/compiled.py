@@ -4,8 +4,6 @@ On an orbit the quaternion is that from the body to the frame which turns with t
 stands still: no sine, no cosine, no further state (``Scene.from_orbital`` turns the result back).
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Points of work against precision, the curves through them, and what an error costs on them."""
 
-from __future__ import annotations
-
 import math
 import statistics
 from collections.abc import Sequence

@@ -5,8 +5,6 @@ Norsett & Wanner, Solving Ordinary Differential Equations I (1993), section II.1
 from the orders 5 and 3, factor 0.9 err^(-1/8) within 1/3 and 6.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from typing import Any
 

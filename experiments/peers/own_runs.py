@@ -4,8 +4,6 @@ What a run's integration takes includes recording: all variables and drifts at t
 and what is packed for the file. Peers do none of that; with "propagated" neither does rigidsim.
 """
 
-from __future__ import annotations
-
 import tempfile
 import time
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """The scenes of the comparison; every number is a dyadic fraction, so that all peers start alike."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

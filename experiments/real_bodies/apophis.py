@@ -1,7 +1,5 @@
 """Apophis about the Earth in April 2029: the published orbit at perigee, carried back under DE421."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -4,8 +4,6 @@ Angles and their published numbers are those of Konopliv, Park & Folkner 2016, I
 nutations there is older: Reasenberg & King 1979, J. Geophys. Res. 84, 6231, as quoted.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Mercury's libration in longitude: the angle of an attitude, its lines, and published ones."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -6,8 +6,6 @@ are those of IAU 2000B (McCarthy & Luzum 2003, Celest. Mech. Dyn. Astr. 85, 37),
 line of 10,500 years is part of the cubic.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Measured speed and accuracy: errors are the true ones, nothing is dropped or extrapolated in silence."""
 
-from __future__ import annotations
-
 import numpy as np
 import xarray
 from hypothesis import given, settings

@@ -1,7 +1,5 @@
 """``accuracy``: the choice is cheap and says why, and the certificate tells the truth about the run."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 from types import SimpleNamespace
@@ -22,7 +20,6 @@ from rigidsim.accuracy.choice import choose, chosen
 from rigidsim.accuracy.comparison import angles_between
 from rigidsim.accuracy.setting import Setting
 from rigidsim.accuracy.trial import try_setting
-from rigidsim.model.loads import LoadModel
 
 FREE = """name = "free"
 [body]
@@ -43,10 +40,6 @@ euler_angles = [0.2, 1.1, 0.7]
 kind = "uniform_gravity"
 acceleration = [0, 0, -3]
 """
-PULSE = (
-    FREE
-    + '[[loads]]\nkind = "torque"\ncomponents = ["3*exp(-(4*(t - 90))^2)", "0", "5*exp(-(4*(t - 90))^2)"]\n'
-)
 
 
 def experiment(text: str, accuracy: Any, end: Any, *more: str, samples: int = 5) -> rigidsim.Experiment:
@@ -95,17 +88,6 @@ def test_what_was_chosen_runs_again_from_the_dataset_without_choosing(
     again = rigidsim.run(saved, out=tmp_path / "again")
     same_bits(run, again)
     assert again.summary["accuracy"]["certified"] == run.summary["accuracy"]["certified"]
-
-
-@pytest.mark.slow
-def test_a_resumed_run_is_certified_too(tmp_path: Path) -> None:
-    of = experiment(FREE, 1e-8, 4000, "limits.max_steps=500", 'integrator.method="taylor"')
-    run = rigidsim.run(of, out=tmp_path)
-    assert run.status != "finished"
-    assert run.summary["accuracy"]["certified"] is None
-    resumed = rigidsim.resume(run.folder.path, overrides=["limits.max_steps=100000000"])
-    assert resumed.status == "finished"
-    assert true_error(resumed, of) <= resumed.summary["accuracy"]["certified"] <= 1e-8
 
 
 def test_keys_that_are_given_stay() -> None:
@@ -175,24 +157,6 @@ def test_a_wrong_run_gets_no_certificate(tmp_path: Path) -> None:
         assert least <= found.error <= most  # its safety is 1.25
 
 
-def test_a_wrong_run_warns_in_its_summary(tmp_path: Path) -> None:
-    settings = ['integrator.precision="double"', "integrator.tolerance=1e-4", 'integrator.method="taylor"']
-    of = experiment(FREE, 1e-9, 60, *settings)
-    run = rigidsim.run(of, out=tmp_path)
-    certified = run.summary["accuracy"]["certified"]
-    assert true_error(run, of) <= certified
-    assert certified > 1e-9
-    (warning,) = [w for w in run.summary["warnings"] if "could be certified" in w]
-    assert "accuracy = 1e-09 rad was asked for, but only" in warning
-
-
-@pytest.mark.slow
-def test_a_pulse_that_the_beginning_knows_nothing_of_is_in_the_certificate(tmp_path: Path) -> None:
-    of = experiment(PULSE, 1e-9, 200, samples=50)
-    run = rigidsim.run(of, out=tmp_path)
-    assert true_error(run, of) <= run.summary["accuracy"]["certified"] <= 1e-9
-
-
 def test_runs_without_an_attitude_and_runs_that_stop_are_certified() -> None:
     record = 'output.record=["angular_velocity"]'
     run = rigidsim.run(experiment(FREE, 1e-9, 20, record, samples=2), out=None)
@@ -202,34 +166,6 @@ def test_runs_without_an_attitude_and_runs_that_stop_are_certified() -> None:
     run = rigidsim.run(of, out=None)
     assert run.status == "finished: event"
     assert true_error(run, of) <= run.summary["accuracy"]["certified"] <= 1e-9
-
-
-class Magnet(LoadModel):
-    """A dipole along the body's z in a field along the space axis X; nothing else tells of it."""
-
-    title = "magnet"
-    reads = frozenset({"attitude"})
-    conservative = True
-
-    def torque(self, m: Any) -> Any:
-        field, size = m.matrix[0], m.scene.context.mpf("0.3")  # N m
-        return [([-size, 0, 0], field[1]), ([0, size, 0], field[0])]
-
-    def potential(self, m: Any) -> Any:
-        size = m.scene.context.mpf("0.3")  # J
-        return -m.number(size) * m.matrix[0][2]
-
-
-@pytest.mark.slow
-def test_loads_from_python_are_part_of_the_certificate(tmp_path: Path) -> None:
-    of = experiment(FREE, 1e-9, 20)
-    run = rigidsim.run(of, out=tmp_path, loads=[Magnet()])
-    certificate = certify(run.dataset, rigidsim.load(run.folder.config), accuracy=1e-9, loads=[Magnet()])
-    assert certificate is not None
-    assert certificate.error == run.summary["accuracy"]["certified"] <= 1e-9
-    without = certify(run.dataset, rigidsim.load(run.folder.config), accuracy=1e-9)
-    assert without is not None
-    assert without.error > 0.1  # another motion
 
 
 # ---- ``accuracy_position``: settings are chosen for the path as well, and what it kept is certified
@@ -263,10 +199,3 @@ def test_what_a_fixed_setting_misses_is_said() -> None:
     run = run_text(ATTRACTORS, "integrator.accuracy_position=1e-12", *fixed)
     assert "not_certified" in run.summary["warning_codes"]
     assert any("accuracy_position = 1e-12 m was asked for" in text for text in run.summary["warnings"])
-
-
-def test_a_scene_without_a_path_refuses_an_accuracy_of_it() -> None:
-    with pytest.raises(ConfigError, match="the scene has no position"):
-        run_text(config(), "integrator.accuracy_position=1e-6")
-    with pytest.raises(ConfigError, match="a length above 0"):
-        rigidsim.parse(ATTRACTORS, overrides=["integrator.accuracy_position=0"])

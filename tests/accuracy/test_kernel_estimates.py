@@ -1,7 +1,5 @@
 """Announced errors under a kernel: followed through its blocks, at a part of the run's cost, and true."""
 
-from __future__ import annotations
-
 import pytest
 from support import angle_between, assert_announced, loaded, run_estimated, run_text
 

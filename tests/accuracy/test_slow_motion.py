@@ -2,10 +2,6 @@
 windows are too short to show it: what is announced covers the distance from a run at a tight tolerance.
 """
 
-from __future__ import annotations
-
-from pathlib import Path
-
 import numpy as np
 import pytest
 from support import angles_between, cases, run_estimated, run_text
@@ -13,7 +9,6 @@ from support import angles_between, cases, run_estimated, run_text
 from experiments.coverage.hyperbolic import hyperbolic_average
 from experiments.random_scenes import Draw
 
-FAULT = Path(__file__).parents[1] / "data" / "faults" / "accuracy_axis_missed.toml"
 LOOSELY = ["integrator.tolerance=1e-7", "integrator.hold_invariants=false", 'output.record=["quaternion"]']
 TIGHTLY = ['integrator.tolerance="auto"', *LOOSELY[1:]]
 # what the study allows: neighbours are three, and one step's error stands for many
@@ -37,12 +32,6 @@ def hyperbolic(number: int) -> tuple[str, float]:
     span = [f"end = {end!r}", "samples = 41"]
     text = ['name = "hyperbolic"', "[body]", *draw.lines, *load, "[time]", *span]
     return "\n".join(text), draw.decades(-9, -6.3)
-
-
-@pytest.mark.slow
-def test_the_axis_missed_is_covered_by_a_loose_full_run() -> None:
-    text = FAULT.read_text(encoding="utf-8").replace("accuracy_axis = ", "# ").replace('"auto"', '"full"')
-    assert beyond(text) < 1.2
 
 
 @pytest.mark.parametrize("number", cases(range(6), []))

@@ -1,7 +1,5 @@
 """Lines near Nyquist's frequency, where a line meets its mirror image around the circle of frequencies."""
 
-from __future__ import annotations
-
 from itertools import product
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Announced errors of secular rates beside what is neither a line nor a polynomial of degree one."""
 
-from __future__ import annotations
-
 from itertools import product
 
 import numpy as np

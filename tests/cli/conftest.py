@@ -1,7 +1,5 @@
 """Small experiments for the tests of commands."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

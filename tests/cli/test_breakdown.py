@@ -6,8 +6,6 @@ offset passes it at a distance of about ``offset``: phi and psi then turn by hal
 offset / |w|, and a Taylor step is about e^-2 of that.
 """
 
-from __future__ import annotations
-
 import json
 import math
 from collections.abc import Callable
@@ -96,50 +94,4 @@ def test_euler_angles_break_down_in_their_singularity(
     assert rigidsim_command("run", advised, "--force").exit_code == 0
 
 
-@pytest.mark.parametrize(("offset", "samples"), [(1e-4, 3001), (1e-6, 4)])
-def test_a_passage_close_to_the_singularity_is_warned_of(
-    offset: float, samples: int, config: Config, rigidsim_command: Command
-) -> None:
-    """Whether a sample falls on it or not."""
-    result = rigidsim_command("run", into_singularity(config, offset, "double", samples))
-    assert result.exit_code == 0, result.output
-    warnings = json.loads(Path("runs/free/summary.json").read_text())["warnings"]
-    (warning,) = [told for told in warnings if " drifted by " not in told]  # the digits that are lost there
-    assert "came near the singularity of xyz" in warning
-    assert 'choose formulation = "quaternion"' in warning
-    assert ("between two samples" in warning) == (samples == 4)
-    if samples == 4:  # the distance that the shortest step tells, here within a factor of two
-        near = float(warning.split("within about ")[1].split()[0])
-        assert offset / 2 < near < 2 * offset
-    assert "the Euler angles came near" in " ".join(result.stdout.split("\n"))
-    with rigidsim.open_run("runs/free").dataset as dataset:
-        assert dataset.attrs["warnings"].split("\n") == warnings
-
-
 SHORT, SPARSE = "end = 3\nsamples = 49", "end = 3000\nsamples = 4"
-
-
-@pytest.mark.parametrize(
-    ("rates", "integrator", "rest", "time"),
-    [
-        ("[0, 0, 1]", "", 'record = ["angular_velocity"]', SPARSE),  # a steady spin, in rates alone
-        ("[0, 0, 0]", "", "", SHORT),  # a body at rest
-        ("[0, 0, 1]", 'formulation = "euler_angles"\neuler_sequence = "xyz"', "", SPARSE),  # psi = 0.7 + t
-    ],
-)
-def test_a_motion_whose_series_ends_is_no_breakdown(
-    rates: str, integrator: str, rest: str, time: str, config: Config, rigidsim_command: Command
-) -> None:
-    """A Taylor series that is a polynomial would allow an infinite step, which is no state at all."""
-    initial = f"angular_velocity = {rates}\neuler_angles = [0, 0, 0.7]"
-    tables = {"body": "principal_moments = [1, 2, 3]", "initial": initial, "integrator": integrator}
-    result = rigidsim_command("run", config(time=time, rest=rest, **tables))
-    assert result.exit_code == 0, result.output
-    with rigidsim.open_run("runs/free").dataset as dataset:
-        assert dataset.sizes["time"] in (49, 4)
-        steady = np.broadcast_to(json.loads(rates), dataset.angular_velocity.shape)
-        np.testing.assert_array_equal(dataset.angular_velocity, steady)
-        if integrator:
-            # psi grows linearly, up to rounding of its size once per step, of which there are few
-            expected = 0.7 + dataset.time.values
-            np.testing.assert_allclose(dataset.euler_angles[:, 2], expected, rtol=1e-13, atol=0)

@@ -1,7 +1,5 @@
 """Every command on tiny experiments: what it prints, what it writes, how it ends."""
 
-from __future__ import annotations
-
 import json
 import subprocess
 import sys
@@ -13,7 +11,6 @@ import numpy as np
 import pytest
 
 import rigidsim
-from rigidsim.look import viewer
 
 Config = Callable[..., str]
 Command = Callable[..., Any]
@@ -72,92 +69,7 @@ def test_run_refuses_all_before_it_starts_any(config: Config, rigidsim_command: 
 # plan
 
 
-def test_plan_says_what_is_integrated_and_predicts_the_steps(
-    config: Config, rigidsim_command: Command
-) -> None:
-    """Within a fifth: a pilot of many periods of the motion knows the mean step."""
-    name = config(time="end = 20000\nsamples = 11")
-    result = rigidsim_command("plan", name, "--json")
-    assert result.exit_code == 0, result.output
-    plan = json.loads(result.stdout)
-    assert plan["states"][:3] == ["wx", "wy", "wz"]
-    assert plan["state_count"] == len(plan["states"]) == len(plan["equations"]) == 7
-    assert all(row["why"] for row in plan["reasons"] + plan["left_out"] + plan["invariants"])
-    assert {"time", "angular_velocity", "quaternion", "energy_drift"} <= set(plan["recorded"])
-    assert plan["predicted"]["dataset_bytes"] > 0
-    assert plan["predicted"]["growth_seconds"] > 0
-    assert rigidsim_command("run", name).exit_code == 0
-    assert plan["predicted"]["steps"] == pytest.approx(read("runs/free")["cost"]["steps"], rel=0.2)
-
-
 # info, plot, view
-
-
-def test_plot_by_name(config: Config, rigidsim_command: Command, tmp_path: Path) -> None:
-    """Each into a file of its own in the run, which --force removes with the run; or into a folder."""
-    rigidsim_command("run", config())
-    result = rigidsim_command("plot", "runs/free", "--what", "rates", "--what", "drift")
-    assert result.stdout.split() == ["runs/free/figure_rates.png", "runs/free/figure_drift.png"]
-    (tmp_path / "all").mkdir()
-    result = rigidsim_command("plot", "runs/free", "--what", "rates", "--what", "drift", "--out", "all")
-    assert result.stdout.split() == ["all/figure_rates.png", "all/figure_drift.png"]
-    for options, message in (
-        (
-            ["--what", "polhodes"],
-            "none of that name; did you mean 'polhode'? Available: overview, polar_motion",
-        ),
-        (
-            ["--what", "libration"],
-            "needs libration, roll_pitch_yaw, nadir or source_position recorded, which this run hasn't",
-        ),
-        (["--what", "all", "--out", "x.png"], "x.png: several figures need a folder that is there"),
-        (["--out", "x.pdf"], "the suffix must be one of .png, .svg, given '.pdf'"),
-        (["--out", "no/such/folder.png"], "there is no folder no/such; make it first"),
-    ):
-        result = rigidsim_command("plot", "runs/free", *options)
-        assert result.exit_code == 2
-        no_traceback(result)
-        assert message in " ".join(result.stderr.split())
-    assert rigidsim_command("run", config(), "--force").exit_code == 0
-    assert not Path("runs/free/figure_rates.png").exists()
-
-
-def test_view(config: Config, rigidsim_command: Command, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A run without a timeline gets one first; the viewer's exit code is handed on."""
-    opened: list[tuple[Path, bool]] = []
-
-    def pretend(path: Path, *, web: bool) -> int:
-        opened.append((path, web))
-        return 130
-
-    monkeypatch.setattr(viewer, "open_viewer", pretend)
-    rigidsim_command("run", config())
-    assert not Path("runs/free/timeline.rrd").exists()
-    result = rigidsim_command("view", "runs/free", "--web")
-    assert result.exit_code == 130, result.output
-    assert opened == [(Path("runs/free/timeline.rrd"), True)]
-    assert Path("runs/free/timeline.rrd").stat().st_size > 10_000
-
-
-REFUSED = [
-    (["view", "runs/free", "--png", "x.jpg"], "--png: given x.jpg; a name that ends in .png is allowed"),
-    (["view", "runs/free", "--gif", "nowhere/x.gif"], "there is no folder nowhere; make it first"),
-    (["view", "runs/free", "--gif", "x.gif", "--web"], "--web: opens the viewer, but --png"),
-    (["view", "runs/free", "--seconds", "3"], "--seconds: is for films (--gif, --mp4)"),
-    (["view", "runs/free", "--member", "2"], "--member is for one sweep: give its folder"),
-    (["view", "runs/free", "runs/none"], "no run here"),
-    (["info", "runs/nothing"], "rigidsim: runs/nothing: no run here; give a run folder"),
-    (["plot", "nothing.h5"], "rigidsim: nothing.h5: no run here; give a run folder"),
-]
-
-
-def test_what_cannot_be_looked_at_is_said(config: Config, rigidsim_command: Command) -> None:
-    rigidsim_command("run", config())
-    for arguments, message in REFUSED:
-        result = rigidsim_command(*arguments)
-        assert result.exit_code == 2
-        no_traceback(result)
-        assert message in result.stderr
 
 
 # Guards
@@ -197,13 +109,6 @@ def python(code: str, *arguments: str, cwd: Path | None = None) -> subprocess.Co
     return subprocess.run(
         [sys.executable, "-c", code, *arguments], capture_output=True, text=True, cwd=cwd, timeout=60
     )
-
-
-def test_version() -> None:
-    done = subprocess.run(
-        [sys.executable, "-m", "rigidsim", "--version"], capture_output=True, text=True, timeout=60
-    )
-    assert (done.returncode, done.stdout) == (0, f"rigidsim {rigidsim.__version__}\n")
 
 
 HEAVY = "{'rerun', 'xarray', 'matplotlib', 'heyoka', 'dask', 'h5py', 'numpy'}"

@@ -2,8 +2,6 @@
 ends with the code that it should, without a traceback, and what ``--json`` prints is strict JSON.
 """
 
-from __future__ import annotations
-
 import json
 import shutil
 from pathlib import Path
@@ -13,6 +11,7 @@ import click
 import pytest
 import support
 import typer
+from support import cases
 from typer.testing import CliRunner
 
 import rigidsim
@@ -182,7 +181,7 @@ def run_line(line: str, code: int, folder: Path, patch: pytest.MonkeyPatch) -> N
             assert Path(words[words.index(option) + 1]).exists(), line
 
 
-@pytest.mark.parametrize("line", QUICK)
+@pytest.mark.parametrize("line", cases(QUICK, list(QUICK)[::3], daily=6))
 def test_a_quick_line(line: str, made: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     run_line(line, QUICK[line], made, monkeypatch)
 

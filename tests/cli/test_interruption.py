@@ -1,7 +1,5 @@
 """Ctrl-C, SIGTERM and SIGKILL in the middle of a run: prompt, and nothing that was integrated is lost."""
 
-from __future__ import annotations
-
 import signal
 import subprocess
 import time

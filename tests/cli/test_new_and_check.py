@@ -1,7 +1,5 @@
 """Starting from an empty folder: ready scenes, validation alone, and what the shell completes."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from pathlib import Path
@@ -11,9 +9,7 @@ import pytest
 import support
 
 import rigidsim
-from rigidsim.cli import completion
-from rigidsim.scene.choices import METHODS
-from rigidsim.workflows.ready_scenes import ALIASES, SUBJECTS, described, ready_scenes, write_new
+from rigidsim.workflows.ready_scenes import write_new
 
 Config = Callable[..., str]
 Command = Callable[..., Any]
@@ -63,21 +59,6 @@ def test_a_ready_scene_runs_by_its_name(
     assert rigidsim.run("coin", changes={"time.end": 0.1}, out=None).status == "finished"
 
 
-def test_an_existing_file_comes_before_a_scene(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, rigidsim_command: Command
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    Path("coin").write_text(support.config(name="mine"))
-    assert rigidsim.load("coin").config.name == "mine"
-    Path("top").symlink_to("nowhere")  # it is meant, and missing
-    assert "No such file" in rigidsim_command("check", "top").output
-    for name in ("coins", "coin.toml", "feynmann"):
-        said = rigidsim_command("run", name).stderr
-        assert "no such file, nor a ready scene" in said
-        assert "did you mean" in said
-    assert "can't be read: No such file" in rigidsim_command("run", "my/experiment.toml").stderr
-
-
 # new
 
 
@@ -110,15 +91,6 @@ def test_new(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, rigidsim_command: 
 READY = sorted((Path(__file__).parents[2] / "configs").rglob("*.toml"))
 
 
-def test_every_ready_scene_has_one_name_and_one_subject() -> None:
-    listed = [name for names in SUBJECTS.values() for name in names]
-    assert sorted(listed) == sorted(path.stem for path in READY)
-    assert list(ready_scenes()) == listed
-    assert set(ALIASES.values()) <= set(listed)
-    assert not set(ALIASES) & set(listed)
-    assert [name for name, text in described().items() if not 10 < len(text) < 100] == []
-
-
 def test_every_ready_scene_is_written_with_what_it_reads(tmp_path: Path) -> None:
     for path in READY:
         place = tmp_path / path.stem
@@ -131,22 +103,6 @@ def test_every_ready_scene_is_written_with_what_it_reads(tmp_path: Path) -> None
         name = f'name = "{path.stem}"'.encode()
         assert config.read_bytes() == path.read_bytes().replace(name, b'name = "mine"', 1)
         assert write_new(path.stem, "other", place) == [place / "other.toml"]  # its tables are there already
-
-
-def test_scenes_are_known_by_other_names(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, rigidsim_command: Command
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    for name in ("cassini", "Feynman", "dzhanibekov", "chandler"):
-        assert rigidsim_command("new", name).exit_code == 0
-        assert rigidsim.load(f"{name}.toml").config.name == name
-    assert "mars_secular.csv: read by mars.toml" in rigidsim_command("new", "mars_obliquity", "mars").stdout
-    assert "rigidsim sweep flip_sphere.toml" in rigidsim_command("new", "flip_sphere").stdout
-    Path("mars_secular.csv").write_text("another table")
-    there = rigidsim_command("new", "mars_obliquity")
-    assert there.exit_code == 2
-    assert "mars_secular.csv: another file of this name, which mars_obliquity reads, is there" in there.stderr
-    assert not Path("mars_obliquity.toml").exists()
 
 
 # check
@@ -174,20 +130,3 @@ def test_check(config: Config, rigidsim_command: Command) -> None:
 
 
 # help and completion
-
-
-def test_completion(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, rigidsim_command: Command) -> None:
-    monkeypatch.chdir(tmp_path)
-    for name in ("one", "two"):
-        (tmp_path / "runs" / name).mkdir(parents=True)
-        (tmp_path / "runs" / name / "config.toml").touch()
-    assert completion.runs("") == ["runs/one", "runs/two"]
-    assert completion.runs("runs/t") == ["runs/two"]
-    assert [name for name, _ in completion.scenes("cas")] == ["cassini"]
-    assert completion.settings("integrator.euler_s") == ["integrator.euler_sequence"]
-    methods = completion.settings("integrator.method=")
-    assert methods == [f"integrator.method={name}" for name in METHODS]  # also those that a test registers
-    assert "integrator.precision=quadruple" in completion.settings("integrator.precision=")
-    assert completion.settings("output.timeline=f") == ["output.timeline=false"]
-    assert completion.settings("nonsense=") == []
-    assert "--install-completion" in rigidsim_command("--help").stdout

@@ -1,9 +1,5 @@
 """Folders that can't be written: one clear message, everything saved kept, the same bits once they can."""
 
-from __future__ import annotations
-
-import importlib.util
-import re
 import subprocess
 from collections.abc import Callable, Iterator
 from functools import partial
@@ -23,7 +19,6 @@ from rigidsim.store.segments import SegmentLimits
 Config = Callable[..., str]
 Command = Callable[..., Any]
 Remount = Callable[[str], None]
-LONG = "end = 3000\nsamples = 3001"
 
 
 @pytest.fixture
@@ -82,35 +77,6 @@ def test_a_finished_run_is_read_verified_and_drawn(
     assert rigidsim_command("view", "disk/free").exit_code == 0
     assert not shown[0].exists()  # drawn for the viewer alone
     assert sorted(p.name for p in Path("disk/free").iterdir()) == before
-
-
-@pytest.mark.slow
-def test_what_has_to_be_written_there_is_refused(
-    config: Config, rigidsim_command: Command, remount: Remount
-) -> None:
-    name = config()
-    assert rigidsim_command("run", name, "--out", "disk").exit_code == 0
-    remount("ro")
-    why = r"can't be written: Read-only file system"
-    zarr = [(["export", "disk/free", "--format", "zarr", "--out", "disk/free.zarr"], "disk/free.zarr")]
-    if importlib.util.find_spec("zarr") is None:  # an optional extra
-        zarr = []
-    for command, place in (
-        (["run", name, "--out", "disk", "--force"], "disk/free"),
-        (["run", name, "--out", "disk", "--set", 'name="other"'], "disk/other"),
-        (["run", "--from", "disk/free/dataset.h5", "--out", "disk/more"], "disk/more/free"),
-        (["plot", "disk/free"], "disk/free/figure.png"),
-        (["export", "disk/free", "--format", "csv", "--out", "disk/free.csv"], "disk/free.csv"),
-        *zarr,
-    ):
-        said = message(rigidsim_command(*command))
-        assert said.startswith(f"rigidsim: {place}: {why}; ")
-        assert re.search("choose another --out|give another name", said)
-    later = message(rigidsim_command("resume", "disk/free", "--until", "6"))
-    assert later.startswith(f"rigidsim: disk/free: {why}; once its file system is mounted for writing again")
-    done = rigidsim_command("resume", "disk/free")
-    assert done.exit_code == 0
-    assert "nothing is left to do: the run reached its last sample" in done.stderr
 
 
 @pytest.mark.slow

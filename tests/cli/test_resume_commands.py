@@ -1,7 +1,5 @@
 """``resume``, ``verify`` and ``run --from`` as commands: exit codes, messages, signals to real processes."""
 
-from __future__ import annotations
-
 import json
 import signal
 import subprocess
@@ -52,7 +50,7 @@ def test_a_dataset_is_enough(config: Config, rigidsim_command: Command) -> None:
 @pytest.mark.parametrize("number", cases([signal.SIGTERM, signal.SIGKILL], [signal.SIGKILL]))
 def test_a_process_that_was_ended_is_resumed(number: int, config: Config, start: Start) -> None:
     """With the bits of a run in one go."""
-    time_table = "end = 40000\nsamples = 4001"
+    time_table = "end = 15000\nsamples = 1501"
     process = start("run", config(time=time_table, integrator='precision = "extended"'), prelude=OFTEN)
     deadline = time.monotonic() + 60
     while len(list(Path("runs/free/segments").glob("[0-9]*.h5"))) < 2:
@@ -63,7 +61,7 @@ def test_a_process_that_was_ended_is_resumed(number: int, config: Config, start:
     assert process.returncode == (-9 if number == signal.SIGKILL else 130)
     assert "Traceback" not in err
     with rigidsim.open_run("runs/free").dataset as partial:
-        assert 0 < partial.sizes["time"] < 4001
+        assert 0 < partial.sizes["time"] < 1501
     resumed = rigidsim.resume("runs/free")
     whole = rigidsim.run("free.toml", out="whole")
     same_bits(resumed, whole)

@@ -1,7 +1,5 @@
 """``rigidsim tradeoff`` from the command line: table, files, refusals."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from pathlib import Path
@@ -40,18 +38,3 @@ def test_table_dataset_and_figure(config: Callable[..., str], rigidsim_command: 
         keys = [f"--set=integrator.{key.replace(' ', '')}" for key in row["keys"]]
         ran = rigidsim_command("run", name, "--force", *keys)
         assert ran.exit_code == 0, ran.stderr
-
-
-def test_impossible_requests_end_with_a_message(
-    config: Callable[..., str], rigidsim_command: Callable[..., Any]
-) -> None:
-    short = rigidsim_command("tradeoff", config(), "--budget", "1")
-    assert short.exit_code == 2
-    assert "--budget 1 s is too short; 5 s or more is needed" in short.stderr
-    bad = rigidsim_command("tradeoff", config(), "--set", "time.end=-1")
-    assert bad.exit_code == 2
-    assert "[time] end" in bad.stderr
-    Path("plain").write_text("")
-    blocked = rigidsim_command("tradeoff", config(), "--out", "plain")
-    assert blocked.exit_code == 2
-    assert "can't be made" in blocked.stderr

@@ -1,14 +1,11 @@
 """The end of a run's screen: verdict, advice, what to do next, in eighty columns."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from typing import Any
 
 import pytest
 
-LONG = "end = 12000\nsamples = 101"
 ESTIMATED = ("--set", "output.estimate=true")
 DETAILS = "rigidsim info runs/free   (invariants, start, cost by phase)"
 
@@ -33,17 +30,6 @@ def said(lines: list[str], label: str) -> list[str]:
     rest = lines[begun + 1 :]
     more = next((n for n, line in enumerate(rest) if not line.startswith(" " * 9)), len(rest))
     return [line[9:] for line in lines[begun : begun + 1 + more]]
-
-
-def test_a_long_run_is_told_what_would_do_better(screen: Callable[..., list[str]]) -> None:
-    lines = screen("--set", "integrator.hold_invariants=false", time=LONG)
-    assert lines[0].split() == ["free", "finished"]
-    assert " ".join(said(lines, "verdict")).startswith("sound: every drift is within what rounding explains")
-    told = "\n".join(lines)
-    assert "hold_invariants = true would bring" in told
-    assert 'method = "closed_form" is right to' in told
-    assert said(lines, "next") == ["rigidsim view runs/free", "rigidsim plot runs/free", DETAILS]
-    assert max(map(len, lines)) <= 80
 
 
 def test_a_run_that_a_guard_stopped_is_resumed_next(screen: Callable[..., list[str]]) -> None:

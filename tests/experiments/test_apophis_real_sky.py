@@ -9,6 +9,7 @@ from experiments.common import simulate
 from experiments.real_bodies import apophis
 
 
+@pytest.mark.slow
 def test_perigee_is_where_the_published_elements_have_it() -> None:
     """Forwards, from where DOP853 came backwards: 3 m are 1e-11 of the way, 1000 times grown."""
     settings = ("time.end=2 day", "time.every=1 day", "output.record=['position']", "output.estimate=false")

@@ -14,6 +14,7 @@ def _left_over(days, without=()):
     return moon.left_over("de421", computed.start, found["days"], found["quaternion"])
 
 
+@pytest.mark.slow
 def test_two_years_of_the_full_moon_are_de421s():
     assert _left_over(732.0)["rms"] < 0.1
 

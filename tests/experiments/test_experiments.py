@@ -1,21 +1,11 @@
 """Every study passes at reduced length, draws its figure, and can fail."""
 
-from __future__ import annotations
-
 import functools
-import subprocess
-import sys
 from pathlib import Path
 
 import mpmath
-import numpy as np
 import pytest
-import xarray
 from matplotlib.image import imread
-
-from experiments import long_horizon, peer_comparison
-from experiments.peers import ADAPTERS, campaign
-from experiments.peers.scenes import SCENES
 
 ROOT = Path(__file__).parents[2]
 
@@ -70,17 +60,6 @@ def test_a_wrong_expected_value_makes_the_exit_code_1(
     assert "**FAILED**" in capsys.readouterr().out
 
 
-@pytest.mark.slow
-def test_a_study_runs_as_a_command(tmp_path: Path) -> None:
-    done = subprocess.run(
-        [sys.executable, "-m", "experiments.earth_free_nutation", "--out", str(tmp_path / "out")],
-        capture_output=True, text=True, cwd=ROOT, check=False,
-    )  # fmt: skip
-    assert done.returncode == 0, done.stderr
-    assert "all passed" in done.stdout
-    assert (tmp_path / "out" / "earth_free_nutation.png").exists()
-
-
 def check(measured: float, kind: str = "relative", tolerance: float = 0.1) -> Check:
     return Check("x", measured, 10.0, tolerance, "s", "nowhere", kind)  # type: ignore[arg-type]
 
@@ -127,108 +106,5 @@ def test_closed_forms_agree_with_quadrature() -> None:
 
 # ---- every peer integrates the same motion; costs are read off curves rightly; absence is said, not hidden
 
-SHORT = [(name, 16.0) for name in SCENES]
-
-
-@pytest.fixture(scope="module")
-def reports() -> dict[str, campaign.Measured]:
-    """A few settings of each peer over 16 s, as far as they are installed."""
-    return {}
-
-
-def short_runs(reports: dict[str, campaign.Measured], peer: str) -> campaign.Measured:
-    if peer not in reports:
-        reports[peer] = campaign.measure(
-            [peer], SHORT, repeats=1, stride=20 if peer == "rigidsim" else 6, fill=0.0, fewest=1, cap=0.5
-        )
-    return reports[peer]
-
-
-@pytest.mark.parametrize(
-    "peer", [pytest.param(p, marks=pytest.mark.slow if p in ("rigidsim", "heyoka") else ()) for p in ADAPTERS]
-)
-def test_errors_against_128_bits_vanish_as_the_setting_gets_tighter(
-    peer: str, reports: dict[str, campaign.Measured]
-) -> None:
-    measured = short_runs(reports, peer)
-    if peer not in measured.imports:
-        assert any(f"{peer} left out" in note and "pip install" in note for note in measured.notes)
-        pytest.skip(measured.notes[0])
-    assert not [note for note in measured.notes if "broke down" in note]
-    curves = {(p.scene, p.title) for p in measured.points.values()}
-    assert curves
-    for scene, title in curves:
-        curve = [p for p in measured.points.values() if (p.scene, p.title) == (scene, title)]
-        loose, tight = curve[0], curve[-1]
-        if title == "MuJoCo implicit":  # first order: 2^8 times smaller steps, as much smaller errors
-            assert tight.error < loose.error * (tight.knob / loose.knob) ** 0.8
-        else:
-            # another motion would be off by radians; nine digits are within reach of each in these 16 s
-            assert tight.error < (1e-5 if peer == "mujoco" else 1e-9), (scene, title)
-            assert tight.error <= max(loose.error, 2.0**-51)  # of two at a double's end either may win
-
-
-@pytest.mark.slow
-def test_the_command_prints_ratios_and_draws(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    arguments = ["--short", "--scenes", "free_top", "--peers", "heyoka,scipy", "--repeats", "1"]
-    assert peer_comparison.main([*arguments, "--cap", "0.1", "--out", str(tmp_path)]) == 0
-    printed = capsys.readouterr().out
-    assert "| scene, horizon | error, rad | bare heyoka, CPU ms | scipy |" in printed
-    # a compiled Taylor method against a step loop in Python: far more than any noise of the machine
-    row = next(line for line in printed.splitlines() if "| 1e-06 |" in line)
-    assert float(row.split("|")[4]) > 5
-    pixels = imread(tmp_path / "peer_comparison.png")[:, :, :3]
-    assert 0.01 < (pixels < 0.9).any(axis=2).mean() < 0.9
-
 
 # ---- the study of long runs: its fit knows the laws, and its measurement the closed form
-
-HORIZON = 3e3
-
-
-def made_up(walk: float, drift: float, starts: int = 400, horizon: float = 1e7) -> xarray.Dataset:
-    """Random walks of a rate, which tilt a phase, with a constant drift of the rate beside them."""
-    moments = np.array(long_horizon.times(horizon)[1:])
-    generator = np.random.default_rng(1)
-    steps = np.diff(moments, prepend=0.0)
-    rate = walk * np.cumsum(generator.standard_normal((starts, len(moments))) * np.sqrt(steps), axis=1)
-    rate += drift * moments
-    phase = np.cumsum(rate * steps, axis=1)
-    errors = np.abs(np.array([rate, rate, phase]))
-    return xarray.Dataset(
-        {"error": (("quantity", "start", "time"), errors), "cpu_seconds": ("start", np.zeros(starts))},
-        coords={"quantity": list(long_horizon.QUANTITIES), "time": moments},
-        attrs={"body": "free asymmetric body", "precision": "double", "held": 0},
-    )
-
-
-def test_a_random_walk_has_the_exponents_of_brouwer() -> None:
-    data = made_up(1e-17, 0.0)
-    for quantity in long_horizon.QUANTITIES:
-        fitted = long_horizon.fit(data, quantity)
-        assert fitted is not None
-        # four times the uncertainty that the fit itself claims, over 400 walks of some per cent
-        assert abs(fitted.exponent - long_horizon.LAW[quantity]) < 4 * fitted.sigma + 0.02
-        assert fitted.sigma < 0.05
-    assert all(check.passed for check in long_horizon.checks([data]))
-
-
-@pytest.fixture(scope="module")
-def measured() -> dict[tuple[str, bool], xarray.Dataset]:
-    return {
-        (body, held): long_horizon.measure(body, "double", held, HORIZON, starts=3)
-        for body in long_horizon.BODIES
-        for held in (False, True)
-    }
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("body", long_horizon.BODIES)
-def test_errors_stay_within_the_law(body: str, measured: dict[tuple[str, bool], xarray.Dataset]) -> None:
-    plain, held = (measured[body, h]["error"].sel(quantity="attitude") for h in (False, True))
-    # five times (eps/2) sqrt(steps) t / sqrt 3 with at most 4 steps to a radian: five sigma of a random walk
-    law = 5 * 2.0**-53 * (4 * HORIZON) ** 0.5 * HORIZON * 1.5 / 3**0.5
-    assert plain.max() < law
-    assert (plain > 0).all()
-    # held: no more than some eps to a radian is left
-    assert held.max() < 8 * 2.0**-52 * HORIZON

@@ -25,6 +25,7 @@ def test_the_free_core_nutation_is_a_mode_of_the_pages_equations() -> None:
     )
 
 
+@pytest.mark.slow
 def test_a_martian_year_of_the_ready_scene_nutates_by_an_arcsecond() -> None:
     pytest.importorskip("de421")
     from experiments import mars_rotation

@@ -32,6 +32,7 @@ def test_phobos_turns_as_the_planar_equation_says() -> None:
     assert np.abs(turned - truth).max() < 1e-11
 
 
+@pytest.mark.slow
 def test_a_year_of_vesta_nods_by_two_arcseconds() -> None:
     settings = ("output.record=['obliquity']", "output.estimate=false", "time.end=1325.5 day")
     values = simulate(study.VESTA, *settings).dataset["obliquity"].sel(axis="figure").values

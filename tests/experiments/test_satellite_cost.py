@@ -1,7 +1,5 @@
 """A satellite with everything on against the same equations with heyoka alone, from other formulas."""
 
-from __future__ import annotations
-
 import pytest
 
 from experiments import satellite_cost

@@ -1,7 +1,5 @@
 """What a module of this folder registers, by its ``register``, is there for its own tests alone."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import pytest

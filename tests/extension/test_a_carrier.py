@@ -4,8 +4,6 @@ The body's tensor is that of all but the wheel's turning about its bearing: then
 kinetic energy is h^2 / 2 J. Everything above the tests is what an author writes.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import heyoka as hy

@@ -17,7 +17,6 @@ from typing import Any
 
 import heyoka as hy
 import numpy as np
-import pytest
 from support import angle_between, config, loaded, run_text, wide
 
 import rigidsim
@@ -138,12 +137,3 @@ def test_its_errors_are_announced_and_true(tmp_path: Path) -> None:
     for invariant in run.summary["invariants"].values():
         assert invariant["largest_drift"] < invariant["bound"]
     assert rigidsim.verify(run.folder.path).identical
-
-
-def test_names_that_are_not_registered_are_refused() -> None:
-    with pytest.raises(
-        rigidsim.ConfigError, match=r'did you mean "rodrigues".*allowed: auto, .*planar, rodri'
-    ):
-        rigidsim.parse(text("rodrigue"))
-    with pytest.raises(ValueError, match='named "planar" is registered already'):
-        formulates(Variables("planar"))(type("Another", (Formulation,), {}))

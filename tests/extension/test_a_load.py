@@ -9,11 +9,10 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any, Literal
 
-import mpmath
 import numpy as np
 import pytest
 from equations import CLOSE, derivative
-from support import STARTS, assert_announced_from, config, run_text, tried
+from support import config, run_text
 
 import rigidsim
 from rigidsim import ConfigError
@@ -101,52 +100,4 @@ def test_its_keys_are_checked_like_any_others() -> None:
         rigidsim.parse(config(loads=WIRE.replace("torsion_wire", "torsion_wires")))
 
 
-def test_a_name_is_given_once_and_a_config_needs_keys() -> None:
-
-    class Other(TorsionWire):
-        """Another class of the same kind."""
-
-    with pytest.raises(ValueError, match='a load of kind "torsion_wire" is registered already'):
-        register_load(Other)
-
-    class Bare(Load):
-        """Only for Python."""
-
-    with pytest.raises(ValueError, match="Bare has no Fields"):
-        register_load(Bare)
-
-
-LONGER = config(loads=WIRE, time="end = 6\nsamples = 25")
-
-
-@pytest.mark.campaign
-def test_its_announced_errors_are_true() -> None:
-    # true ones are some last bits of the attitude
-    assert_announced_from(LONGER, STARTS, exact="quadruple", at_most=20)
-
-
 # --- loads that share an orbit ------------------------------------------------------------------------------
-
-ORBIT = "orbit = {semi_major_axis = 1, eccentricity = 0.2, inclination = 0.3, period = 5}"
-
-
-def gradient(strength: str, orbit: str = ORBIT) -> str:
-    return f'kind = "gravity_gradient"\ngravitational_parameter = "{strength}"\n{orbit}'
-
-
-def test_two_loads_on_one_orbit_share_its_states() -> None:
-    """With the period given the orbit doesn't depend on the strength, and torques are linear in it."""
-    twice = config(loads=[gradient("3/4"), gradient("5/4")], time="end = 10\nsamples = 21")
-    once = config(loads=gradient("2"), time="end = 10\nsamples = 21")
-    states = prepare(rigidsim.parse(twice)).system.states
-    assert [name for name in states if "anomaly" in name] == ["cos_anomaly1", "sin_anomaly1"]
-    assert states == prepare(rigidsim.parse(once)).system.states
-    two, one = tried(twice), tried(once)
-    # the sum of two torques rounds once more than their joint coefficient does, at each of the steps; what is
-    # off by then turns the body by the time that is left
-    bound = 4 * 2.0**-52 * np.sqrt(one.steps) * 10 * float(mpmath.norm([0.3, 1.0, 0.5]))
-    chord = np.abs(two.attitudes[0] - one.attitudes[0]).max()
-    assert chord <= bound
-    other = gradient("5/4", ORBIT.replace("inclination = 0.3", "inclination = 0.4"))
-    states = prepare(rigidsim.parse(config(loads=[gradient("3/4"), other]))).system.states
-    assert [name for name in states if name.startswith("cos_anomaly")] == ["cos_anomaly1", "cos_anomaly2"]

@@ -4,16 +4,12 @@ Everything above the tests is what an author writes. Whatever reads the name is 
 resumed as with rigidsim's own.
 """
 
-from __future__ import annotations
-
 from collections.abc import Collection, Iterable, Mapping
 from typing import Any
 
 import numpy as np
-import pytest
 from support import config, loaded, run_text
 
-from rigidsim import ConfigError
 from rigidsim.model.kinematics import Kinematics
 from rigidsim.scene.attitude import rotation_matrix
 from rigidsim.scene.expressions.names import NameProvider, Readable, provides
@@ -58,12 +54,3 @@ def test_a_name_is_what_it_stands_for() -> None:
     assert found.sizes["half"] == written.sizes["half"] >= 2
     for name in ("angular_velocity", "quaternion", "half_time"):  # rounding along some hundred steps
         np.testing.assert_allclose(found[name].values, written[name].values, rtol=0, atol=1e-12)
-
-
-def test_its_unit_is_checked_and_others_are_told_where_it_is() -> None:
-    with pytest.raises(ConfigError, match="can't be added"):
-        run_text(text().replace("0.1*max(lux, 0.3)", "0.1*max(lux, 3 s)"))
-    with pytest.raises(ConfigError, match=r'unknown name "lux".*; lux with "a lamp" in the description'):
-        run_text(text().replace("a lamp", "the dark"))
-    with pytest.raises(ConfigError, match=r'\[parameters\] lux: given the name "lux"'):
-        run_text(text(more="[parameters]\nlux = 1"))

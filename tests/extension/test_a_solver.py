@@ -177,25 +177,3 @@ def test_a_killed_run_resumes_bit_for_bit(tmp_path: Path) -> None:
         assert done.summary["cost"][name] == whole.summary["cost"][name]
     announced = [run.summary["accuracy"]["estimated_attitude_error"] for run in (whole, done)]
     assert announced[0] == announced[1]
-
-
-def test_a_plan_is_of_its_steps_and_forecasts_no_errors(tmp_path: Path) -> None:
-    """Which error laws would tell of Taylor series."""
-    plan = rigidsim.plan(rigidsim.parse(text()), out=tmp_path)
-    run = run_text(text())
-    assert plan.predicted.steps == pytest.approx(run.summary["cost"]["steps"], rel=1e-3)
-    assert plan.predicted.attitude_error_rad is None
-
-
-def test_scenes_that_it_does_not_solve_are_refused() -> None:
-    refused = {
-        "computes in double precision": {"more": '[integrator]\nprecision = "quadruple"'},
-        "steps in which no events": {"more": '[[events]]\nname = "a"\nexpression = "wy"'},
-        "where the equations change": {"loads": 'kind = "torque"\ncomponents = ["-0.1*sign(wx)", "0", "0"]'},
-    }
-    for why, tables in refused.items():
-        given = text(**tables)
-        if "integrator" in tables.get("more", ""):
-            given = text().replace("[integrator]", '[integrator]\nprecision = "quadruple"')
-        with pytest.raises(rigidsim.ConfigError, match=f'method.*given "runge_kutta", which .*{why}'):
-            run_text(given)

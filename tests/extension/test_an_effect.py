@@ -117,13 +117,6 @@ def test_a_killed_run_resumes_bit_for_bit(method: str, tmp_path: Path) -> None:
     assert rigidsim.verify(done.folder.path).identical
 
 
-def test_errors_are_those_of_the_motion_without_it() -> None:
-    """Which a closed form isn't: nothing is compared with that."""
-    how = run_text(text("taylor"), estimate=True).summary["accuracy"]["estimated_how"]
-    assert "motions beside this one" in how
-    assert how.endswith("they are without the effects impulses")
-
-
 def test_it_is_missed_where_it_is_not_registered(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     limited = text("taylor") + "[limits]\nmax_steps = 9\n"
     run = run_text(limited, out=tmp_path)
@@ -132,9 +125,3 @@ def test_it_is_missed_where_it_is_not_registered(tmp_path: Path, monkeypatch: py
         rigidsim.resume(run.folder.path)
     monkeypatch.undo()
     assert rigidsim.resume(run.folder.path, overrides=["limits.max_steps=100000"]).status == "finished"
-
-
-def test_a_closed_form_without_steps_refuses_it() -> None:
-    given = text("taylor").replace("tolerance = 1e-16\n", "")
-    with pytest.raises(rigidsim.ConfigError, match='no steps between which the effect "impulses" could act'):
-        run_text(given, 'integrator.method="closed_form"')

@@ -3,22 +3,17 @@
 Everything above the tests is what their author writes.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 
 import heyoka as hy
 import numpy as np
-import pytest
-from support import config, run_text, wide
+from support import config, run_text
 
 import rigidsim
-from rigidsim.errors import ConfigError
 from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.observables import Observable, only_when_named
 from rigidsim.scene.registry import register_observable
-from rigidsim.solve.problem import prepare
 
 
 def spin_parameter(m: Mechanics) -> list[Any]:
@@ -67,32 +62,6 @@ def test_an_observable_is_recorded_by_its_name() -> None:
     rates = dataset["angular_velocity"].values
     # two products, a sum and the rounding of the recorded rates
     np.testing.assert_allclose(found.values, rates[:, 0] ** 2 + rates[:, 1] ** 2, rtol=8 * 2.0**-53)
-
-
-def test_its_residuals_are_recorded_in_extended_precision() -> None:
-    text = config(
-        integrator='precision = "extended"',
-        output='record = ["angular_velocity", "transverse_rate_squared"]',
-    )
-    dataset = run_text(text).dataset
-    assert np.any(dataset["transverse_rate_squared_lo"].values != 0)
-    rates = wide(dataset, "angular_velocity")
-    exact = rates[:, 0] ** 2 + rates[:, 1] ** 2
-    error = np.abs(wide(dataset, "transverse_rate_squared") - exact)
-    assert (error <= 8 * 2.0**-64 * exact).all()
-    # the high part is the nearest double
-    assert (dataset["transverse_rate_squared"].values == exact.astype(float)).mean() > 0.99
-
-
-def test_unknown_names_still_name_the_nearest() -> None:
-    for wrong, nearest in (
-        ("transverse_rate_square", "transverse_rate_squared"),
-        ("angular_velocty", "angular_velocity"),
-    ):
-        with pytest.raises(ConfigError, match=f'"{nearest}"'):
-            prepare(rigidsim.parse(config(output=f'record = ["{wrong}"]')))
-    with pytest.raises(ValueError, match='an observable named "energy" is registered already'):
-        register_observable(Observable("energy", (), "J", "mine", spin_parameter))
 
 
 RECORDED = config(

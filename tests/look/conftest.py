@@ -1,7 +1,5 @@
 """Recorded runs to look at, from closed forms: no integrator is needed to test a picture."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from pathlib import Path

@@ -1,14 +1,11 @@
 """Bodies with a fluid core as figures and timelines show them."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from support import config, run_text
 
 import rigidsim
 from rigidsim.look.figures.catalogue import available, figure
-from rigidsim.look.stages.registry import build_picture
 
 CORE = (
     'core = {moment = 0.3, flattening = 0.02, friction = "0.01 s^-1", angular_velocity = [0.1, -0.05, 0.9]}'
@@ -20,6 +17,7 @@ def run() -> rigidsim.Run:
     return run_text(config(f"principal_moments = [1, 1.2, 1.5]\n{CORE}", time="end = 30\nsamples = 301"))
 
 
+@pytest.mark.slow
 def test_its_axis_and_rate_are_drawn_and_nothing_that_holds_for_rigid_bodies(run: rigidsim.Run) -> None:
     names = available(run.dataset)
     assert "core" in names
@@ -30,14 +28,3 @@ def test_its_axis_and_rate_are_drawn_and_nothing_that_holds_for_rigid_bodies(run
     core, mantle = (run.dataset[name].values for name in ("core_angular_velocity", "angular_velocity"))
     cosine = (core * mantle).sum(axis=1) / np.linalg.norm(core, axis=1) / np.linalg.norm(mantle, axis=1)
     np.testing.assert_allclose(curves[0].get_ydata(), np.degrees(np.arccos(cosine)), rtol=1e-6)
-
-
-def test_a_timeline_has_an_arrow_for_it(run: rigidsim.Run) -> None:
-    picture, _ = build_picture(run.dataset.load())
-    arrows = {arrow.name: arrow for arrow in picture.stages[0].arrows}
-    assert {"angular_velocity", "core_angular_velocity"} <= set(arrows)
-    assert not picture.stages[0].trails  # no polhode of a rigid body
-    sizes = [np.linalg.norm(arrows[name].vectors, axis=1) for name in sorted(arrows) if "velocity" in name]
-    core, mantle = (run.dataset[name].values for name in ("core_angular_velocity", "angular_velocity"))
-    ratio = np.linalg.norm(core, axis=1) / np.linalg.norm(mantle, axis=1)
-    np.testing.assert_allclose(sizes[1] / sizes[0], ratio, rtol=1e-12)

@@ -2,8 +2,6 @@
 ecliptic.
 """
 
-from __future__ import annotations
-
 import json
 from typing import Any
 
@@ -12,8 +10,6 @@ import pytest
 import xarray
 from scipy.spatial.transform import Rotation
 
-from rigidsim.look import signals
-from rigidsim.look.plots import plan_plots
 from rigidsim.look.stages.registry import build_picture
 
 DAY, YEAR = 86400.0, 3.15576e7
@@ -65,6 +61,7 @@ def seen() -> tuple[Any, ...]:
     return dataset, earth, attitude, *build_picture(dataset)
 
 
+@pytest.mark.slow
 def test_the_view_turns_with_the_direction_of_the_earth_and_has_north_upwards(seen: tuple[Any, ...]) -> None:
     _, earth, attitude, picture, subject = seen
     face = picture.stages[0]
@@ -84,31 +81,3 @@ def test_the_view_turns_with_the_direction_of_the_earth_and_has_north_upwards(se
     seen = (frame.inv() * attitude).apply([1.0, 0.0, 0.0])
     assert np.abs(seen[:, 1]).max() == pytest.approx(np.sin(SWING), rel=2e-3)
     assert np.abs(seen[:, 2]).max() < np.sin(INCLINED) * 1.01
-
-
-def test_librations_are_plotted_in_a_window_beside_the_legend(seen: tuple[Any, ...]) -> None:
-    dataset, _, _, picture, _ = seen
-    point = picture.derived["sub-Earth_point"]
-    longitude, latitude = point.values.T
-    assert np.abs(longitude).max() == pytest.approx(SWING, rel=2e-3)
-    assert np.abs(latitude).max() == pytest.approx(INCLINED, rel=1e-3)
-    first = plan_plots(dataset.assign(picture.derived), picture.leading)[0]
-    assert first.title == "Sub-Earth point [°]"
-    assert 20 * 27 < first.window < 30 * 27
-    assert first.range is not None
-    assert first.range[1] > 1.3 * np.rad2deg(SWING)  # room for the legend
-
-
-def test_poles_count_from_the_ecliptic_in_axes_of_the_equator(seen: tuple[Any, ...]) -> None:
-    dataset, _, _, picture, _ = seen
-    tilt, node = signals.orientation(dataset, "figure") or (np.zeros(1), np.zeros(1))
-    np.testing.assert_allclose(tilt, INCLINED, atol=1e-9)
-    np.testing.assert_allclose(np.gradient(node, dataset.time.values), NODE, rtol=1e-6)
-    words = {line.words for line in picture.stages[1].lines}
-    assert {"ecliptic", "prime meridian", "precession of the pole: once in 18.6 yr"} <= words
-    # Venus raises a tide of a millionth of the Earth's, and isn't pointed to
-    assert [arrow.label for arrow in picture.stages[1].arrows] == [
-        "figure axis",
-        "to the Earth",
-        "to the Sun",
-    ]

@@ -1,7 +1,5 @@
 """Physical librations in figures: found again from attitudes that were made with known ones."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import xarray
@@ -67,10 +65,3 @@ def test_known_librations_are_found(days: int) -> None:
     assert "libration" in available(data)
     titles = [axes.get_title(loc="left") for axes in figure(data, "libration").axes]
     assert sum("Physical" in title for title in titles) == 2
-
-
-def test_a_body_that_turns_otherwise_has_none() -> None:
-    data, _ = made(2 * YEAR, 86400.0)
-    assert librations(data.drop_vars("nadir")) is None
-    away = data.assign(nadir=data["nadir"].roll(body_axis=1))
-    assert librations(away) is None

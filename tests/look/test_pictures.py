@@ -3,13 +3,10 @@
 Skipped where there is no Vulkan driver (Mesa's software driver will do).
 """
 
-from __future__ import annotations
-
 import io
 import time
 from collections.abc import Callable
 from dataclasses import replace
-from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -27,7 +24,7 @@ from rigidsim.look.timeline.drawn import DrawnRun
 from rigidsim.look.timeline.writing import recording_to
 
 pytestmark = [
-    pytest.mark.skipif(not vulkan_drivers(), reason="no Vulkan driver: apt-get install mesa-vulkan-drivers"),
+    pytest.mark.skipif(not vulkan_drivers(), reason="no Vulkan driver: apt-get install mesa-vulkan-drivers")
 ]
 
 Ready = Callable[..., rigidsim.Run]
@@ -106,6 +103,7 @@ def _write_empty(dataset: rigidsim.Run, path: Path) -> None:
         bare.draw_rows(recording, slice(0, len(drawn.seconds)))
 
 
+@pytest.mark.slow
 def test_the_viewer_turns_the_body_as_the_dataset_says(tmp_path: Path, ready: Ready) -> None:
     with ready("intermediate_axis").dataset as dataset:
         write_timeline(dataset, tmp_path / "t.rrd")
@@ -126,25 +124,3 @@ def test_the_viewer_turns_the_body_as_the_dataset_says(tmp_path: Path, ready: Re
             np.testing.assert_allclose(shown, rotation_matrix(quaternion[row]), rtol=0, atol=1e-6)
     finally:
         viewer.__exit__()
-
-
-def test_films_have_moving_frames(tmp_path: Path, ready: Ready) -> None:
-    from PIL import Image
-
-    from rigidsim.look import film
-
-    with ready("heavy_top_fast").dataset as dataset:
-        write_timeline(dataset, tmp_path / "t.rrd", rows=ROWS)
-    told: list[tuple[int, int]] = []
-    film.render(tmp_path / "t.rrd", tmp_path / "t.gif", seconds=0.5, told=lambda *now: told.append(now))
-    assert told == [(k, 4) for k in range(1, 5)]
-    with Image.open(tmp_path / "t.gif") as picture:
-        frames = []
-        for number in range(picture.n_frames):
-            picture.seek(number)
-            frames.append(np.asarray(picture.convert("RGB"), dtype=float))
-    assert len(frames) == 4
-    assert all(np.abs(b - a).max() > 60 for a, b in pairwise(frames))
-    film.render(tmp_path / "t.rrd", tmp_path / "t.png")
-    with Image.open(tmp_path / "t.png") as picture:
-        assert picture.size == film.SIZE

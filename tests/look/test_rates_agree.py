@@ -1,7 +1,5 @@
 """Figures, timelines and ``analyse`` say the same mean motions and periods."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable
 
@@ -34,6 +32,7 @@ def period(text: str) -> float:
     return float(number) * _UNITS[unit]
 
 
+@pytest.mark.slow
 def test_precession_and_nutation(ready: Ready) -> None:
     dataset = ready("mars_precession").dataset
     analysis = rigidsim.analyse(dataset, ["node_longitude.figure", "obliquity.figure"])

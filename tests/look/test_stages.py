@@ -1,7 +1,5 @@
 """Each kind of scene gets its stage, and what stands on it is where the dataset says."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from typing import Any
@@ -9,7 +7,6 @@ from typing import Any
 import numpy as np
 import pytest
 import xarray
-from scipy.spatial.transform import Rotation
 
 from rigidsim.look.stages.registry import build_picture
 
@@ -80,65 +77,6 @@ KINDS = {
 @pytest.mark.parametrize("kind", KINDS)
 def test_the_stage_is_that_of_the_scene(symmetric_top: Build, kind: str) -> None:
     assert picture(KINDS[kind](symmetric_top(count=101))).kind == kind
-
-
-def averaged(dataset: xarray.Dataset, axis: str, drawn: xarray.Dataset) -> xarray.Dataset:
-    """A pole that goes backwards about Z, 0.4 rad from it, and nothing else; the Sun goes round fast."""
-    node = 1.0 - 0.05 * dataset["time"].values
-    pole = np.stack([np.sin(0.4) * np.sin(node), -np.sin(0.4) * np.cos(node), np.cos(0.4) + 0 * node], axis=1)
-    bare = dataset.drop_vars(["quaternion", "angular_velocity", "angular_momentum", "energy"])
-    known = {
-        f"{axis}_axis": (("time", "space_axis"), pole),
-        "obliquity": (("time", "axis"), np.full((len(node), 1), 0.4), {"units": "rad"}),
-        "node_longitude": (("time", "axis"), node[:, None], {"units": "rad"}),
-    }
-    bare = bare.assign(known).assign_coords(axis=[axis]).assign_attrs(formulation="orbit_averaged")
-    sun = {
-        "what": "source",
-        "gravitational_parameter": 1.32712440018e20,
-        "orbit": {**CIRCLE, "mean_motion": 60},
-    }
-    return around(bare.assign_attrs(drawing=drawn.attrs["drawing"]), sun)
-
-
-def test_a_globe_without_rotation_points_where_its_axis_does(symmetric_top: Build) -> None:
-    top = symmetric_top(count=101)
-    dataset = averaged(top, "figure", earth(top))
-    for known in (dataset, dataset.drop_vars("figure_axis")):  # by itself, and from its angles
-        found = picture(known)
-        assert found.kind == "rotation of the Earth in space"
-        (stage,) = found.stages
-        assert stage.quaternion is not None
-        turn = Rotation.from_quat(stage.quaternion).as_matrix()
-        np.testing.assert_allclose(turn[:, :, 2], dataset["figure_axis"].values, rtol=0, atol=1e-6)  # float32
-        # about its axis it keeps to the node: the first of its axes across stays level
-        assert np.abs(turn[:, 2, :2]).min(axis=1).max() < 1e-6
-        assert [arrow.name for arrow in stage.arrows] == ["figure_axis"]  # the Sun would jump about
-        assert "prime_meridian" not in [line.name for line in stage.lines]
-        (ring,) = [line for line in stage.lines if line.name == "precession"]
-        assert ring.words == "precession of the pole: once in 2.09 min"  # 2 pi / 0.05 s
-        np.testing.assert_allclose(ring.points[:, 2], 1.45 * np.cos(0.4), rtol=1e-12)
-        assert any("averaged over" in note for note in found.notes)
-        assert any("direction of the Sun isn't shown" in note for note in found.notes)
-
-
-def test_a_satellite_without_attitude_in_space_is_turned_by_roll_pitch_and_yaw(symmetric_top: Build) -> None:
-    dataset = satellite(symmetric_top(count=101)).drop_vars(["quaternion", "angular_momentum"])
-    angles = np.deg2rad(np.tile([10.0, 20.0, 30.0], (101, 1)))
-    dataset["roll_pitch_yaw"] = (("time", "angle"), angles)
-    stage = picture(dataset).stages[0]
-    assert stage.quaternion is not None
-    shown = Rotation.from_quat(stage.quaternion).as_matrix()
-    along = CIRCLE["mean_anomaly"] + CIRCLE["mean_motion"] * dataset["time"].values
-    plane = Rotation.from_euler("ZX", [CIRCLE["ascending_node"], CIRCLE["inclination"]])
-    down = plane.apply(np.stack([np.cos(along), np.sin(along), 0 * along], axis=1))  # where the source is
-    right = np.tile(-plane.apply([0, 0, 1]), (len(down), 1))
-    local = np.stack([np.cross(right, down), right, down], axis=2)
-    relative = np.einsum("tji,tjk->tik", local, shown)
-    # 3-2-1: pitch, yaw and roll from the matrix (Diebel 2006, eq. 290)
-    np.testing.assert_allclose(-np.arcsin(relative[:, 2, 0]), np.deg2rad(20), atol=1e-6)
-    np.testing.assert_allclose(np.arctan2(relative[:, 1, 0], relative[:, 0, 0]), np.deg2rad(30), atol=1e-6)
-    np.testing.assert_allclose(np.arctan2(relative[:, 2, 1], relative[:, 2, 2]), np.deg2rad(10), atol=1e-6)
 
 
 def test_the_ellipsoid_of_energy_touches_the_invariable_plane_at_the_tip(symmetric_top: Build) -> None:

@@ -1,15 +1,11 @@
 """Long runs as pictures show them: fast motions keep their amplitude, whole spans their extremes."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import xarray
 
 pytest.importorskip("matplotlib")
 
-from rigidsim.look.figures.composing import compose, shown_rows
-from rigidsim.look.figures.timelines import rates
 from rigidsim.look.thinning import by_extremes, thin
 
 FAST = 0.039
@@ -34,18 +30,3 @@ def test_extremes_of_two_strides_stand_in_two_rows() -> None:
     assert np.abs(growth).max() <= 2 * 100 * 2 / 400_001 * 1.01
     part = dataset.isel(time=slice(0, 4001))
     np.testing.assert_array_equal(by_extremes(part, 4001)["angular_velocity"], part["angular_velocity"])
-
-
-def test_a_panel_of_many_swings_shows_the_whole_run_and_its_beginning() -> None:
-    dataset = long_run(100_001)
-    figure = compose(shown_rows(dataset), [rates])
-    whole, first = figure.axes
-    seconds = {"s": 1.0, "min": 60.0, "h": 3600.0}
-    unit = whole.get_xlabel().partition("[")[2].rstrip("]")
-    assert whole.get_xlim()[1] * seconds[unit] == pytest.approx(10_000)
-    (low, high) = whole.get_ylim()
-    assert low < -FAST
-    assert high > 1.99
-    assert len(whole.collections) == 3  # bands between extremes
-    assert first.get_title(loc="left").startswith("the first")
-    assert first.get_xlim()[1] < 0.01 * 10_000

@@ -1,9 +1,6 @@
 """Cones of uncertainty: half-angles by eigenvalues in closed form, in space and in the body, and drawn."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,11 +8,9 @@ import xarray
 
 pytest.importorskip("rerun")
 
-from rigidsim.look.plots import plan_plots
 from rigidsim.look.solids import rotation_matrix
 from rigidsim.look.stages.registry import build_picture
-from rigidsim.look.stages.uncertainty import COVARIANCE, AxisUncertainty, drawn_factor
-from rigidsim.look.timeline import write_timeline
+from rigidsim.look.stages.uncertainty import COVARIANCE, AxisUncertainty
 
 Top = Callable[..., xarray.Dataset]
 Z = np.array([0.0, 0.0, 1.0])
@@ -73,41 +68,3 @@ def test_a_cone_that_stays_in_space_turns_against_the_body_that_carries_it(symme
     # it is the cone of this space axis at each time, so in the body it goes round
     first = cone.rim[:, int(np.argmax(angle[0]))]
     assert np.ptp(np.arctan2(first[:, 1], first[:, 0])) > 3.0
-
-
-@pytest.mark.parametrize(
-    ("largest", "factor"),
-    [(1.0, 1.0), (0.2, 2.0), (1e-3, 300.0), (60.0, 1 / 100)],
-)
-def test_cones_that_cannot_be_seen_are_drawn_by_a_round_factor(largest: float, factor: float) -> None:
-    assert drawn_factor(largest) == pytest.approx(factor, rel=1e-12)
-
-
-def test_the_factor_stands_in_the_legend_and_true_angles_are_plotted(symmetric_top: Top) -> None:
-    from rigidsim.look.timeline.plotting import legend_of
-
-    top = with_covariance(symmetric_top(count=11), np.tile(1e-6 * np.eye(3), (11, 1, 1)))
-    picture, _ = build_picture(top)
-    words = [text for text, _ in legend_of(picture.stages)]
-    assert "1 sigma of the figure axis, drawn × 300" in words
-    plots = plan_plots(top.assign(picture.derived), picture.leading)
-    (plot,) = [plot for plot in plots if plot.key == "figure_axis_uncertainty"]
-    assert plot.place == "leading"
-    np.testing.assert_allclose(plot.series[0].values, 1e-3 * 3600 * 180 / np.pi, rtol=1e-12)  # arcsec
-    assert not any(COVARIANCE in series.name for plot in plots for series in plot.series)
-
-
-def test_the_recording_has_the_cone_in_body_axes(
-    symmetric_top: Top, read_back: Callable[[Path, str], dict[str, np.ndarray]], tmp_path: Path
-) -> None:
-    covariance = np.tile(np.diag([0.3**2, 0.25**2, 0.1**2]), (31, 1, 1))
-    top = with_covariance(symmetric_top(count=31), covariance)
-    picture, _ = build_picture(top)
-    (cone,) = picture.stages[0].cones
-    write_timeline(top, tmp_path / "t.rrd")
-    rows = read_back(tmp_path / "t.rrd", "/scene/body/figure_axis_uncertainty/surface")
-    vertices = rows["Mesh3D:vertex_positions"].reshape(31, -1, 3)
-    assert not vertices[:, 0].any()  # the apex
-    corners = cone.rim.shape[1]
-    np.testing.assert_array_equal(vertices[:, 1 : 1 + corners], cone.rim.astype(np.float32))
-    np.testing.assert_array_equal(vertices[:, 1 + corners :], -cone.rim.astype(np.float32))

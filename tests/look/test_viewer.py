@@ -1,9 +1,6 @@
 """The viewer that came with rerun-sdk."""
 
-from __future__ import annotations
-
 import subprocess
-import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -12,20 +9,11 @@ import pytest
 import xarray
 
 pytest.importorskip("rerun")
-import rerun as rr
 
-from rigidsim.look import film, viewer
-from rigidsim.look.timeline.comparison import MOST, write_comparison
-from rigidsim.look.timeline.writing import LiveRecording
+from rigidsim.look import viewer
+from rigidsim.look.timeline.comparison import write_comparison
 
 Build = Callable[..., xarray.Dataset]
-
-
-def test_missing_file_is_named(tmp_path: Path) -> None:
-    with pytest.raises(FileNotFoundError, match=r"no timeline at .*nothing\.rrd"):
-        viewer.open_viewer(tmp_path / "nothing.rrd")
-    with pytest.raises(FileNotFoundError, match="no timeline at"):
-        film.render(tmp_path / "nothing.rrd", tmp_path / "x.png")
 
 
 def test_viewer_listens_on_this_machine_only_and_sends_no_statistics(
@@ -53,15 +41,6 @@ def test_viewer_listens_on_this_machine_only_and_sends_no_statistics(
         assert command[command.index("--bind") + 1] == "127.0.0.1"
     assert "--serve-web" in commands[1]
     assert "--serve-web" not in commands[0]
-
-
-def test_importing_the_package_loads_neither_rerun_nor_matplotlib() -> None:
-    code = (
-        "import sys; from rigidsim.look import figure_names, film, viewer; "
-        "print(sorted({'rerun', 'matplotlib', 'xarray', 'pyarrow'} & set(sys.modules)))"
-    )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout.strip() == "[]"
 
 
 # ---- several runs in one recording, and a run that grows while it is looked at
@@ -92,41 +71,3 @@ def _turn_about_z(angle: float) -> np.ndarray:
     """What a quaternion w x y z becomes with a rotation about Z after it."""
     c, s = np.cos(angle / 2), np.sin(angle / 2)
     return np.array([[c, 0, 0, -s], [0, c, -s, 0], [0, s, c, 0], [s, 0, 0, c]])
-
-
-@pytest.mark.parametrize("count", [1, MOST + 1])
-def test_too_few_and_too_many_runs_are_refused(symmetric_top: Build, tmp_path: Path, count: int) -> None:
-    runs = [(str(k), symmetric_top(count=11)) for k in range(count)]
-    with pytest.raises(ValueError, match=f"given {count} runs; 2 to {MOST}"):
-        write_comparison(runs, tmp_path / "t.rrd")
-    assert not (tmp_path / "t.rrd").exists()
-
-
-def test_a_run_that_goes_on_is_sent_once_and_as_a_whole(
-    symmetric_top: Build, read_back: Read, tmp_path: Path
-) -> None:
-    whole = symmetric_top(count=901)
-    with rr.RecordingStream("rigidsim") as stream:
-        stream.save(tmp_path / "t.rrd")
-        recording = LiveRecording(stream)
-        recording.update(whole.isel(time=slice(0, 0)))
-        assert recording.rows == 0
-        for end in (300, 300, 640, 901):
-            recording.update(whole.isel(time=slice(0, end)))
-            assert recording.rows == end  # none twice: the scales of this motion never change
-    rows = read_back(tmp_path / "t.rrd", "/scene/body")
-    np.testing.assert_array_equal(rows["step"], np.arange(901))
-    wanted = whole["quaternion"].values[:, [1, 2, 3, 0]]
-    np.testing.assert_allclose(rows["Transform3D:quaternion"], wanted, rtol=0, atol=2.0**-25)
-
-
-def test_without_a_display_it_is_said_what_to_do(
-    symmetric_top: Build, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    (tmp_path / "t.rrd").write_bytes(b"")
-    monkeypatch.setattr(viewer, "has_display", lambda: False)
-    said = r"--web serves .* --png, --gif or --mp4 FILE"
-    with pytest.raises(viewer.NoDisplay, match=said):
-        viewer.open_viewer(tmp_path / "t.rrd")
-    with pytest.raises(viewer.NoDisplay, match=said):
-        viewer.follow(lambda: (None, False))

@@ -1,13 +1,11 @@
 """Drag in NRLMSISE-00, as heyoka's network has it, against the model itself."""
 
-from __future__ import annotations
-
 from datetime import datetime, timedelta
 
 import numpy as np
 import pytest
 from equations import array, derivative
-from support import run_text
+from support import cases, run_text
 
 import rigidsim
 from rigidsim import ConfigError
@@ -52,7 +50,7 @@ def text(
     )
 
 
-@pytest.mark.parametrize("case", PYMSIS)
+@pytest.mark.parametrize("case", cases(PYMSIS, [(172, 29000, 400, 60, -70, 150, 150, 4)]))
 def test_the_density_is_that_of_the_model_within_the_network(case: tuple[float, ...]) -> None:
     day, second, altitude, latitude, longitude, f107, f107a, ap = case
     context = context_for("double")
@@ -103,18 +101,10 @@ def test_a_run_ends_where_the_network_does() -> None:
             'number 2 ap: missing; density = "nrlmsise00" takes f107, f107a, ap',
         ),
         ({"keys": "f107 = 150\nf107a = 150\nap = -1"}, "ap: given -1; 0 to 400 is allowed"),
-        ({"keys": "f107 = 1.5e-20\nf107a = 150\nap = 4"}, "f107: given 1.5e-20; 60 to 400 is allowed"),
-        ({"keys": "ap = 4", "density": "1e-12"}, 'ap: given without density = "nrlmsise00"'),
         ({"epoch": ""}, 'density: given "nrlmsise00", a model of date and place, which takes [time] epoch'),
-        ({"axes": ""}, 'takes [frame] axes; give axes = "ICRF"'),
-        ({"mu": 4.2828e13}, "the Earth's air, where 4.283e+13 m^3/s^2 attracts the body"),
         (
             {"place": np.array([6500e3, 0, 0])},
             "the body starts 121.9 km above the Earth; its network holds from",
-        ),
-        (
-            {"keys": "f107 = 150\nf107a = 150\nap = 4\naltitude = 1\nscale_height = 1"},
-            "scale_height: given beside",
         ),
     ],
 )

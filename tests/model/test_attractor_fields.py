@@ -1,8 +1,8 @@
 """An attracting body that is no point: ``figure`` and ``gravity_field`` of central_gravity."""
 
-from __future__ import annotations
-
 import math
+from functools import cache
+from typing import Any
 
 import mpmath
 import numpy as np
@@ -10,7 +10,7 @@ import pytest
 from equations import Random, array, derivative, matrix, observed, prepared
 from numpy.polynomial import Polynomial
 from scipy.integrate import solve_ivp
-from support import config, run_text
+from support import cases, config, run_text
 
 import rigidsim
 from rigidsim import ConfigError
@@ -38,9 +38,11 @@ def table(extra: str = "pole = [0, 0, 1]", field: dict[str, dict[tuple[int, int]
     return f"gravity_field = {{radius = {RADIUS!r}, {', '.join(rows)}, {extra}}}"
 
 
-def legendre(n: int, m: int) -> Polynomial:
-    """P_nm(x) over (1 - x^2)^(m/2), by Rodrigues' formula."""
-    return (Polynomial([-1, 0, 1]) ** n).deriv(n + m) / (2**n * math.factorial(n))
+@cache
+def legendre(n: int, m: int) -> tuple[Polynomial, Polynomial]:
+    """P_nm(x) over (1 - x^2)^(m/2), by Rodrigues' formula, and its slope."""
+    found = (Polynomial([-1, 0, 1]) ** n).deriv(n + m) / (2**n * math.factorial(n))
+    return found, found.deriv()
 
 
 def attraction(x: np.ndarray) -> np.ndarray:
@@ -53,24 +55,24 @@ def attraction(x: np.ndarray) -> np.ndarray:
             wave, slope = math.cos(m * longitude), -m * math.sin(m * longitude)
             if name == "S":
                 wave, slope = math.sin(m * longitude), m * math.cos(m * longitude)
-            p = legendre(n, m)
+            p, slant_of_p = (f(z) for f in legendre(n, m))
             size = value * MU / r**2 * (RADIUS / r) ** n
-            radial -= size * (n + 1) * flat**m * p(z) * wave
-            slant = m * z * flat ** (m - 1) * p(z) if m else 0.0
-            north += size * wave * (flat ** (m + 1) * p.deriv()(z) - slant)
-            east += size * slope * flat ** (m - 1) * p(z) if m else 0.0
+            radial -= size * (n + 1) * flat**m * p * wave
+            slant = m * z * flat ** (m - 1) * p if m else 0.0
+            north += size * wave * (flat ** (m + 1) * slant_of_p - slant)
+            east += size * slope * flat ** (m - 1) * p if m else 0.0
     up = x / r
     eastward = np.array([-x[1], x[0], 0]) / rho
     return radial * up + north * np.cross(up, eastward) + east * eastward
 
 
-@pytest.mark.parametrize("rate", [0.0, 7.292115e-5])
+@pytest.mark.parametrize("rate", cases([0.0, 7.292115e-5], [7.292115e-5]))
 def test_a_field_in_axes_that_turn_agrees_with_another_integrator_and_formula(rate: float) -> None:
     pole, meridian = np.array([0.3, -0.2, 0.9]), 0.7
     p = pole / np.linalg.norm(pole)
     node = np.cross([0, 0, 1], p) / np.linalg.norm(np.cross([0, 0, 1], p))
     keys = table(f"pole = {array(pole)}, rate = {rate!r}, prime_meridian = {meridian!r}")
-    run = run_text(flown(keys))
+    run = run_text(flown(keys, end="8000"))
     assert run.summary["warnings"] == []
 
     def rates(t: float, y: np.ndarray) -> np.ndarray:
@@ -80,8 +82,8 @@ def test_a_field_in_axes_that_turn_agrees_with_another_integrator_and_formula(ra
         return np.concatenate([y[3:], axes.T @ attraction(axes @ y[:3])])
 
     start = np.array([7000e3, 0, 0, 0, 5000, 5600])
-    found = solve_ivp(rates, (0, 86400), start, method="DOP853", rtol=1e-13, atol=1e-9).y[:3, -1]
-    # the other integrator's 1e-13 of each of some thousand steps, along an orbit of 90 rad
+    found = solve_ivp(rates, (0, 8000), start, method="DOP853", rtol=1e-13, atol=1e-9).y[:3, -1]
+    # the other integrator's 1e-13 of each of some hundred steps, along an orbit of 8 rad
     assert np.linalg.norm(run.dataset["position"].values[-1] - found) <= 1e-2 * 7000e3 * 1e-8
     invariants = list(run.summary["invariants"])
     assert ("energy" in invariants) == (rate == 0.0)
@@ -97,12 +99,11 @@ def test_a_zonal_field_keeps_the_energy_and_the_momentum_along_its_pole() -> Non
     assert max(row["largest_drift"] for row in found.values()) < 3e-14
 
 
-@pytest.mark.parametrize("j2", [0.1, 0.0])
-def test_a_flight_about_an_oblate_body_moves_by_the_gradient_of_its_energy(j2: float) -> None:
+def test_a_flight_about_an_oblate_body_moves_by_the_gradient_of_its_energy() -> None:
     """Forces and torques by numerical derivatives of -(1/2) grad grad Phi : I + m Phi, in 40 digits."""
     random = Random(4)
     tensor, q, pole = random.tensor(), random.quaternion(), random.vector()
-    place, mass, radius = 3 * random.vector(), 2.0, 0.3
+    place, mass, radius, j2 = 3 * random.vector(), 2.0, 0.3, 0.1
     place *= max(1.0, 2 / np.linalg.norm(place))
     keys = f"figure = {{J2 = {j2}, radius = {radius}, pole = {array(pole)}}}"
     start = f"angular_velocity = [0.1, 0, 0]\nquaternion = {array(q)}\n"
@@ -122,22 +123,26 @@ def test_a_flight_about_an_oblate_body_moves_by_the_gradient_of_its_energy(j2: f
             order = [int(i == k) + int(j == k) for k in range(3)]
             return mpmath.diff(lambda *y: phi(list(y)), tuple(x), tuple(order), h=mpmath.mpf(10) ** -9)
 
-        def energy(x: list[mpmath.mpf], r: mpmath.matrix) -> mpmath.mpf:
+        def curved(x: list[mpmath.mpf]) -> dict[tuple[int, int], mpmath.mpf]:
+            return {(i, j): hessian(x, i, j) * (2 - (i == j)) for i in range(3) for j in range(i + 1)}
+
+        def energy(x: list[mpmath.mpf], r: mpmath.matrix, second: Any) -> mpmath.mpf:
             inertia = r * mpmath.matrix(tensor.tolist()) * r.T
-            shape = sum(hessian(x, i, j) * inertia[i, j] for i in range(3) for j in range(3))
-            return mass * phi(x) - shape / 2
+            return mass * phi(x) - sum(value * inertia[place] for place, value in second.items()) / 2
 
         x0 = [mpmath.mpf(v) for v in place.tolist()]
         step = mpmath.mpf(10) ** -8
+        here = curved(x0)
         force, torque = [], []
         for k in range(3):
             ahead, behind = ([v + sign * step * (i == k) for i, v in enumerate(x0)] for sign in (1, -1))
-            force.append(float(-(energy(ahead, turn) - energy(behind, turn)) / (2 * step)))
+            change = energy(ahead, turn, curved(ahead)) - energy(behind, turn, curved(behind))
+            force.append(float(-change / (2 * step)))
             axis = [mpmath.mpf(i == k) for i in range(3)]
             spin = mpmath.matrix([[0, -axis[2], axis[1]], [axis[2], 0, -axis[0]], [-axis[1], axis[0], 0]])
             there, back = (turn * mpmath.expm(sign * step * spin) for sign in (1, -1))
-            torque.append(float(-(energy(x0, there) - energy(x0, back)) / (2 * step)))
-        potential = float(energy(x0, turn))
+            torque.append(float(-(energy(x0, there, here) - energy(x0, back, here)) / (2 * step)))
+        potential = float(energy(x0, turn, here))
     w, v = np.array([0.1, 0, 0]), np.array([0.1, 0.2, 0.3])
     state = np.concatenate([w, q / np.linalg.norm(q), place, v])
     found = derivative(system, state)
@@ -157,7 +162,7 @@ def test_node_and_perigee_drift_at_the_secular_rates() -> None:
     start = f"position = [{a * (1 - e)!r}, 0, 0]\nangular_velocity = [0, 0, 1e-3]\n"
     start += f"velocity = [0, {swift * math.cos(inclination)!r}, {swift * math.sin(inclination)!r}]"
     n = math.sqrt(MU / a**3)
-    turns = 100
+    turns = 20
     end = repr(turns * 2 * math.pi / n)
     keys = table("pole = [0, 0, 1]", {"C": {(2, 0): -j2}})
     data = run_text(flown(keys, start=start, end=end)).dataset
@@ -178,19 +183,11 @@ def test_node_and_perigee_drift_at_the_secular_rates() -> None:
     ("keys", "message"),
     [
         ('gravity_field = {radius = 1, C = {"2,0" = 1e-3}}', "pole"),
-        ('gravity_field = {radius = 1, C = {"2,0" = 1e-3}, pole = [0, 0, 0]}', "given [0, 0, 0]; a vector"),
         ('gravity_field = {radius = 1, C = {"1,0" = 1e-3}, pole = [0, 0, 1]}', "its centre of mass"),
         ('gravity_field = {radius = 1, C = {"2,2" = 10}, pole = [0, 0, 1]}', "no mass within 2 radii"),
         ('gravity_field = {radius = 8e6, C = {"2,0" = 1e-3}, pole = [0, 0, 1]}', "the series doesn't hold"),
-        ("figure = {J2 = 1e-3, radius = 8e6, pole = [0, 0, 1]}", "the series doesn't hold"),
-        ('figure = {J2 = 1e-3, radius = 6e6, pole = "iau1976"}', "which takes [time] epoch"),
-        (
-            'figure = {J2 = 1e-3, radius = 6e6, pole = [0, 0, 1]}\ngravity_field = {radius = 6e6, '
-            'C = {"2,0" = -1e-3}, pole = [0, 0, 1]}',
-            "beside figure, whose J2 says it",
-        ),
     ],
-)  # fmt: skip
+)
 def test_nonsense_is_refused(keys: str, message: str) -> None:
     with pytest.raises(ConfigError) as caught:
         prepare(rigidsim.parse(flown(keys)))

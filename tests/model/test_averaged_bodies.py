@@ -1,7 +1,5 @@
 """Averages over the rotation under point masses that are integrated beside the body."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
@@ -9,8 +7,6 @@ import pytest
 from support import run_text
 
 import rigidsim
-from rigidsim import ConfigError, parse
-from rigidsim.solve.problem import prepare
 
 AU, SUN, EARTH, MOON = 149597870700.0, 1.32712440018e20, 3.986004418e14, 4.9028e12
 DAY = 86400.0
@@ -47,13 +43,6 @@ THE_MOON = f"""
 name = "moon"
 gravitational_parameter = {MOON!r}
 orbit = {{about = "earth", semi_major_axis = "384400 km", eccentricity = 0.0549, inclination = "5.145 deg"}}
-"""
-PASSING = """
-[[bodies]]
-name = "passing"
-gravitational_parameter = 4e14
-position = [1.6e11, 1e10, 0]
-velocity = [0, "-40 km/s", 0]
 """
 
 
@@ -104,45 +93,3 @@ def test_the_momentum_is_that_of_every_rotation_as_announced(
     assert found["whole"]
     true = np.linalg.norm(moved - averaged.dataset.momentum_axis.values, axis=1).max()
     assert true <= found["momentum_axis"] <= 10 * true
-
-
-# halves the spin in the time of the run
-SLOWED = '[[loads]]\nkind = "viscous_torque"\ncoefficients = [1e31, 1e31, 1e31]\n'
-
-
-@pytest.mark.parametrize("more", ["", SLOWED], ids=["gradient alone", "beside friction"])
-def test_two_masses_are_a_kepler_orbit(more: str) -> None:
-    """The Sun as the planet sees it: the same average by elements."""
-    run = run_text(scene("spin_averaged", "sun", beside=more))
-    period = 2 * math.pi * math.sqrt(AU**3 / (SUN + EARTH))
-    orbit = (
-        f'{{semi_major_axis = "1 au", eccentricity = 0.3, inclination = "7 deg", periapsis = {math.pi!r}, '
-    )
-    orbit += f"period = {period!r}}}"
-    load = f'[[loads]]\nkind = "gravity_gradient"\ngravitational_parameter = {SUN!r}\norbit = {orbit}\n'
-    axes = 'output.record=["momentum_axis"]'
-    kepler = run_text(SCENE % ("", SPIN, more + load, "spin_averaged"), axes)
-    path = np.linalg.norm(run.dataset.momentum_axis.values[-1] - run.dataset.momentum_axis.values[0])
-    assert path > 5e-7
-    assert apart(run, kepler) < 2.0**-42  # the tolerance of averaged motions on Kepler orbits, 1024 epsilon
-
-
-@pytest.mark.parametrize(
-    ("text", "said"),
-    [
-        (
-            scene("orbit_averaged"),
-            'orbit of the point mass "sun" is integrated.*choose "spin_averaged", or wr',
-        ),
-        (
-            scene("spin_averaged", coupling="full"),
-            r'set \[body\] coupling to "one_way", or choose level = "f',
-        ),
-        (scene("spin_averaged", spin=13.176), r'n of \[\[loads\]\] number 2 \("moon"\).*a resonance'),
-        (scene("spin_averaged", "passing", beside=PASSING, spin=0.01), "isn't bound to the body and passes"),
-    ],
-    ids=["orbit_averaged", "full coupling", "resonance", "a slow body passed by"],
-)
-def test_what_has_no_average_is_refused(text: str, said: str) -> None:
-    with pytest.raises(ConfigError, match=said):
-        prepare(parse(text))

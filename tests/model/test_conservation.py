@@ -4,8 +4,6 @@ A good integration lets an invariant wander like a random walk of its steps' rou
 relative to the invariant's scale, leaves each step some tens of them (Brouwer 1937).
 """
 
-from __future__ import annotations
-
 import math
 
 import mpmath
@@ -58,97 +56,70 @@ def attractor(position: str = "[0, 0, 0]") -> str:
 # body, start, loads, what is kept beside representations' own norms
 SCENES: dict[str, tuple[str, str, str, set[str]]] = {
     "circular orbit": (ASYMMETRIC, TURNING, orbiting(CIRCLE), {"jacobi_constant"}),
-    "circular orbit, its period overridden": (
-        ASYMMETRIC, TURNING, orbiting(CIRCLE + ", period = 5"), {"jacobi_constant"},
-    ),
-    "circular orbit, moving periapsis": (
-        ASYMMETRIC, TURNING, orbiting(CIRCLE + ", periapsis = 1, periapsis_rate = 0.25"), {"jacobi_constant"},
-    ),
     "circular orbit in the plane of reference, moving node": (
-        ASYMMETRIC, TURNING, orbiting("semi_major_axis = 1, node_rate = -0.25"), {"jacobi_constant"},
-    ),
-    "circular orbit, moving node": (
-        ASYMMETRIC, TURNING, orbiting(CIRCLE + ", node_rate = 0.1"), {"energy_balance"},
+        ASYMMETRIC,
+        TURNING,
+        orbiting("semi_major_axis = 1, node_rate = -0.25"),
+        {"jacobi_constant"},
     ),
     "symmetric body on a circular orbit": (
-        SYMMETRIC, TURNING, orbiting(CIRCLE), {"jacobi_constant", L + "axial"},
+        SYMMETRIC,
+        TURNING,
+        orbiting(CIRCLE),
+        {"jacobi_constant", L + "axial"},
     ),
     "eccentric orbit": (ASYMMETRIC, TURNING, orbiting(CIRCLE + ", eccentricity = 0.1"), {"energy_balance"}),
     "circular orbit and damping": (
-        ASYMMETRIC, TURNING, several(orbiting(CIRCLE), VISCOUS), {"energy_balance"},
-    ),
-    "two sources on circles of one plane and period": (
-        ASYMMETRIC, TURNING, several(orbiting(CIRCLE), orbiting(CIRCLE + ", mean_anomaly = 2")),
-        {"jacobi_constant", "energy_balance"},
+        ASYMMETRIC,
+        TURNING,
+        several(orbiting(CIRCLE), VISCOUS),
+        {"energy_balance"},
     ),
     "circular orbit and a field along its normal": (
-        ASYMMETRIC, TURNING, several(orbiting(CIRCLE), dipole("[1, 2, 3]", "[0, 0.7, 0]")),
+        ASYMMETRIC,
+        TURNING,
+        several(orbiting(CIRCLE), dipole("[1, 2, 3]", "[0, 0.7, 0]")),
         {"jacobi_constant", "energy_balance"},
     ),
-    "circular orbit of a body in free fall": (
-        ASYMMETRIC, FLYING, several(orbiting(CIRCLE), DOWN),
-        {"jacobi_constant", "linear_momentum_horizontal", "energy_balance"},
-    ),
     "source, general axes": (GENERAL, TURNING, gradient(SOURCE), {"energy", L + "source", "brun_constant"}),
-    "sources in two directions": (
-        GENERAL, TURNING, several(gradient(SOURCE), gradient("[0, -1, 0.6]", 2)),
-        {"energy", "brun_constant", "bogoyavlensky_constant"},
-    ),
     "two equal sources at right angles": (
-        GENERAL, TURNING, several(gradient("[1, 0, 0]"), gradient("[0, 1, 0]")),
+        GENERAL,
+        TURNING,
+        several(gradient("[1, 0, 0]"), gradient("[0, 1, 0]")),
         {"energy", L + "source", "brun_constant", "bogoyavlensky_constant"},
     ),
-    "source and weight": (ASYMMETRIC + HANGING, TURNING, several(GRAVITY, gradient(SOURCE)), {"energy"}),
     "sphere and source": (SPHERE, TURNING, gradient(SOURCE), FREE | {"energy"}),
     "dipole": (ASYMMETRIC, TURNING, dipole("[1, 2, 3]", SOURCE), {"energy", L + "field"}),
-    "dipole on the axis": (
-        SYMMETRIC, TURNING, dipole("[0, 0, 3]", SOURCE), {"energy", L + "field", L + "axial"},
-    ),
-    "dipole towards the centre of mass": (
-        ASYMMETRIC + HANGING, TURNING, several(GRAVITY, dipole("[0.6, 0.2, 1]", SOURCE)),
-        {"energy", L + "field"},
-    ),
     "source along a dipole's field": (
-        ASYMMETRIC, TURNING, several(gradient("[0, 2, 0]"), dipole("[1, 2, 3]", "[0, 1, 0]")),
+        ASYMMETRIC,
+        TURNING,
+        several(gradient("[0, 2, 0]"), dipole("[1, 2, 3]", "[0, 1, 0]")),
         {"energy", L + "source"},
     ),
     "torque along an axis": (
-        ASYMMETRIC, TURNING, applied("torque", '[0, "sin(t)", 0]'), {"energy_balance", L + "x", L + "z"},
+        ASYMMETRIC,
+        TURNING,
+        applied("torque", '[0, "sin(t)", 0]'),
+        {"energy_balance", L + "x", L + "z"},
     ),
     "force on a point": (
-        ASYMMETRIC, TURNING, applied("force", '[0, 0, "sin(t)"]', "point = [1, 2, 3]"),
+        ASYMMETRIC,
+        TURNING,
+        applied("force", '[0, 0, "sin(t)"]', "point = [1, 2, 3]"),
         {"energy_balance", L + "z"},
     ),
-    "constant force on a point": (
-        ASYMMETRIC, TURNING, applied("force", "[1, 2, 3]", "point = [1, 2, 3]"),
-        {"energy_balance", L + "field"},
-    ),
-    "a push at the centre of mass": (
-        SYMMETRIC, FLYING, applied("force", '["1", 0, "t"]'),
-        FREE | {"energy_balance", L + "axial", "rotational_energy"},
-    ),
-    "damped": (ASYMMETRIC, TURNING, VISCOUS, {"energy_balance"}),
     "damping in proportion to the moments": (
-        ASYMMETRIC, TURNING, 'kind = "viscous_torque"\ncoefficients = [0.1, 0.175, 0.2]',
+        ASYMMETRIC,
+        TURNING,
+        'kind = "viscous_torque"\ncoefficients = [0.1, 0.175, 0.2]',
         {"energy_balance", L + "across"},
     ),
-    "no damping after all": (
-        ASYMMETRIC, TURNING, 'kind = "viscous_torque"\ncoefficients = [0, 0, 0]', FREE | {"energy"},
-    ),
-    "heavy body about a fixed point": (
-        ASYMMETRIC + HANGING, TURNING, GRAVITY, {"energy", L + "vertical"},
-    ),
-    "heavy symmetric top": (
-        SYMMETRIC + ON_AXIS, TURNING, DOWN, {"energy", L + "vertical", L + "axial"},
-    ),
-    "heavy symmetric top with damping": (
-        SYMMETRIC + ON_AXIS, TURNING, several(DOWN, VISCOUS), {"energy_balance"},
-    ),
-    "heavy symmetric top with a source": (
-        SYMMETRIC + ON_AXIS, TURNING, several(DOWN, gradient(SOURCE)), {"energy", L + "axial"},
-    ),
+    "heavy body about a fixed point": (ASYMMETRIC + HANGING, TURNING, GRAVITY, {"energy", L + "vertical"}),
+    "heavy symmetric top": (SYMMETRIC + ON_AXIS, TURNING, DOWN, {"energy", L + "vertical", L + "axial"}),
     "Kovalevskaya's top": (
-        HEAVY_TOP + "\ncenter_of_mass = [1, 0, 0]", TURNING, GRAVITY,
+        HEAVY_TOP + "\ncenter_of_mass = [1, 0, 0]",
+        TURNING,
+        GRAVITY,
         {"energy", L + "vertical", "kovalevskaya_constant"},
     ),
     "Goryachev's and Chaplygin's top": (
@@ -158,32 +129,25 @@ SCENES: dict[str, tuple[str, str, str, set[str]]] = {
         {"energy", L + "vertical", "goryachev_chaplygin_constant"},
     ),
     "free flight in uniform gravity": (
-        ASYMMETRIC, FLYING, GRAVITY,
+        ASYMMETRIC,
+        FLYING,
+        GRAVITY,
         FREE | {"energy", "rotational_energy", "linear_momentum_horizontal"},
     ),
     "attracting point": (SMALL, FLYING, attractor(), {"energy", "total_angular_momentum"}),
-    "attracting point and a symmetric body": (
-        "principal_moments = [0.01, 0.01, 0.015]\nmass = 1", FLYING, attractor(),
-        {"energy", "total_angular_momentum", L + "axial"},
-    ),
     "two attracting points": (
-        SMALL, FLYING, several(attractor(), attractor("[0.2, -0.4, 0.4]")),
+        SMALL,
+        FLYING,
+        several(attractor(), attractor("[0.2, -0.4, 0.4]")),
         {"energy", "total_angular_momentum_axial"},
     ),
-    "two attracting points in one place": (
-        SMALL, FLYING, several(attractor(), attractor()), {"energy", "total_angular_momentum"},
-    ),
-    "three attracting points": (
-        SMALL, FLYING, several(*map(attractor, ("[0, 0, 0]", "[0, -1, 0]", "[-1, 0, 1]"))), {"energy"},
-    ),
     "attracting point in a uniform field": (
-        SMALL, FLYING, several(GRAVITY, attractor("[0.1, 0, 0]")), {"energy", "total_angular_momentum_axial"},
+        SMALL,
+        FLYING,
+        several(GRAVITY, attractor("[0.1, 0, 0]")),
+        {"energy", "total_angular_momentum_axial"},
     ),
-    "attracting point and a dipole": (
-        SMALL, FLYING, several(GRAVITY, attractor("[0.1, 0, 0]"), dipole("[1, 2, 3]", "[0.01, 0, 0]")),
-        {"energy"},
-    ),
-}  # fmt: skip
+}
 
 
 TRIED = [(name, "double") for name in SCENES]
@@ -204,6 +168,22 @@ def test_they_are_found_where_they_hold_and_kept(case: tuple[str, str]) -> None:
         if invariant != L + "across":  # zeros, recorded when named
             assert run.dataset[invariant].attrs["invariant"] == 1
     assert any(rows[invariant]["largest_drift"] > 0 for invariant in expected)
+
+
+@pytest.mark.parametrize(
+    ("name", "changing"),
+    [
+        ("torque along an axis", ["energy", L + "norm"]),
+        ("heavy body about a fixed point", [L + "norm"]),
+        ("eccentric orbit", ["energy", L + "norm"]),
+    ],
+)
+def test_what_is_not_listed_does_change(name: str, changing: list[str]) -> None:
+    body, start, loads, _ = SCENES[name]
+    run = run_text(config(body, start, loads, "end = 10\nsamples = 41"))
+    for quantity in changing:
+        assert quantity not in run.summary["invariants"]
+        assert np.ptp(run.dataset[quantity].values) > 1e-2 * np.abs(run.dataset[quantity].values).max()
 
 
 def test_their_values_are_those_of_their_formulas() -> None:

@@ -1,7 +1,5 @@
 """Averages under torques of the body alone: means over polhodes, their start, and what forbids them."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
@@ -119,6 +117,7 @@ def test_what_has_no_average_is_refused_with_the_reason(given: dict[str, object]
     assert "choose" in str(found.value)
 
 
+@pytest.mark.slow
 def test_the_time_at_which_the_separatrix_comes_near_is_told() -> None:
     """Up to then a run goes; and the full motion leaves its axis soon after."""
     given = {"rates": [0.3, 1.2, 0.2], "loads": VISCOUS.replace("2e-4", "1e-3")}
@@ -137,6 +136,7 @@ def test_the_time_at_which_the_separatrix_comes_near_is_told() -> None:
     assert told < crossed[0] < 1.35 * told
 
 
+@pytest.mark.slow
 def test_a_resonance_with_a_source_is_passed_fast_or_refused() -> None:
     """A hundred times slower, it may capture."""
 
@@ -152,17 +152,3 @@ def test_a_resonance_with_a_source_is_passed_fast_or_refused() -> None:
         assert passing(slower).system.states[-2:] == ["axial", "transverse"]
     with pytest.raises(ConfigError, match=r"may be captured in a resonance.*or end the run before"):
         passing(100)
-
-
-@pytest.mark.filterwarnings("error")
-@pytest.mark.parametrize(
-    ("torque", "words"),
-    [
-        ("((wx - 1)/0.01)^20", "near the separatrix"),
-        ("sqrt(wx)", "no finite value somewhere on the rotation"),
-    ],
-)
-def test_a_torque_too_strong_or_without_a_value_on_the_way_is_refused(torque: str, words: str) -> None:
-    load = f'kind = "torque"\ncomponents = ["0.01*({torque})", "0", "0"]'
-    with pytest.raises(ConfigError, match=words):
-        prepared(load, rates=[0.1, 1, 0.2], moments=[1, 2, 2.5], end="2")

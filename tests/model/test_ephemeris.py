@@ -1,7 +1,5 @@
 """Where heyoka's series put the Sun and the Moon, against an almanac, and the torque that follows."""
 
-from __future__ import annotations
-
 import heyoka as hy
 import numpy as np
 import pytest
@@ -52,6 +50,7 @@ def test_the_sun_comes_round_in_a_sidereal_year_and_the_moon_in_a_sidereal_month
     assert abs((end - begin + 180) % 360 - 180) < 15  # inequalities of up to 7.5 degrees at either end
 
 
+@pytest.mark.slow
 def test_the_torque_of_the_ephemeris_is_that_of_the_place() -> None:
     """The Sun nearly stands still in an hour: a fixed source in its place gives the same motion."""
     longitude, latitude, distance = at("sun", 1800.0)

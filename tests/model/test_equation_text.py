@@ -1,7 +1,5 @@
 """Equations as they are written out: the same numbers as what is compiled, and nothing twice."""
 
-from __future__ import annotations
-
 import math
 
 import heyoka as hy

@@ -1,7 +1,5 @@
 """Kovalevskaya's and Goryachev-Chaplygin's constants: where they hold, and only there."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import heyoka as hy
@@ -105,12 +103,3 @@ def test_goryachev_chaplygins_constant_holds(axis: int) -> None:
     states = travel(lifted)
     values = constants(states, frame, 1.0, verticals(lifted, states))["goryachev_chaplygin_constant"]
     assert np.ptp(values) > 1e-3
-
-
-def test_other_tops_have_neither() -> None:
-    for moments in ([1, 2, 2.5], [2, 2, 2], [3, 3, 1]):
-        body = f"principal_moments = {moments}\nmass = 1\ncenter_of_mass = [1, 0, 0]"
-        assert named(prepared(body, "angular_velocity = [1, 2, 3]", PULL).system) == set()
-    free = prepared("principal_moments = [2, 2, 1]\nmass = 1\ncenter_of_mass = [1, 0, 0]",
-                    "angular_velocity = [1, 2, 3]").system  # fmt: skip
-    assert named(free) == set()

@@ -1,7 +1,5 @@
 """Flights on which loads do work, held against scipy's integration of the plain equations in SI."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -14,7 +12,7 @@ from rigidsim import ConfigError
 
 IN_ORBIT = Flight(
     np.array([1.0, 2.0, 3.0]), 100.0, np.array([0.01, 0.02, 0.015]), np.array([1.0, 0.1, 0.2, 0.3]),
-    np.array([6900e3, 0.0, 0.0]), np.array([0.0, 5000.0, 5700.0]), 3600.0, strength=MU, drag=1e-9,
+    np.array([6900e3, 0.0, 0.0]), np.array([0.0, 5000.0, 5700.0]), 3600.0, strength=MU, drag=1e-9, power=2.0,
 )  # fmt: skip
 
 
@@ -35,7 +33,8 @@ def test_a_source_among_the_bodies_leaves_the_quaternion_its_norm() -> None:
         "velocity = [0, 1000, 100]\n"
     )
     text = replace(IN_ORBIT, drag=0.0).text
-    text = text.replace(f"gravitational_parameter = {MU!r}", 'orbit = {body = "earth"}')
+    place = f"gravitational_parameter = {MU!r}\nposition = [0.0, 0.0, 0.0]"
+    text = text.replace(place, 'orbit = {body = "earth"}')
     assert run_text(text + bodies).summary["warnings"] == []
     gradient = '[[loads]]\nkind = "gravity_gradient"\norbit = {body = "earth"}\n'
     with pytest.raises(ConfigError, match="which has its torque; remove it"):

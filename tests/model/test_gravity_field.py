@@ -1,19 +1,13 @@
 """The field of the body from degree 3 on: torque and force against Legendre functions and point masses."""
 
-from __future__ import annotations
-
-import math
 import re
 from pathlib import Path
-from typing import Any
 
-import heyoka as hy
 import numpy as np
 import pytest
 from equations import CLOSE, Random, array, derivative, general_body, matrix, prepared
 from field_truth import gradient, keys, lumpy, moments_of, pulled, random_field, tensor_of
-from gyrostats import exact, followed
-from support import config, matrices, run_text, wide
+from support import config, run_text
 
 import rigidsim
 from rigidsim import ConfigError
@@ -24,11 +18,6 @@ LUMPS = (
     'gravity_field = {radius = 0.5, C = {"3,0" = -0.02, "3,1" = 0.013, "3,3" = 0.004, "4,0" = 0.008, '
     '"4,2" = -0.003, "4,4" = 1e-4}, S = {"3,1" = 5.9e-3, "3,2" = -2e-3, "4,1" = 3e-3, "4,3" = 1e-3}}'
 )
-LUMPY = {
-    (3, 0): ("-0.02", "0"), (3, 1): ("0.013", "5.9e-3"), (3, 2): ("0", "-2e-3"), (3, 3): ("0.004", "0"),
-    (4, 0): ("0.008", "0"), (4, 1): ("0", "3e-3"), (4, 2): ("-0.003", "0"), (4, 3): ("0", "1e-3"),
-    (4, 4): ("1e-4", "0"),
-}  # fmt: skip
 BODY = f"principal_moments = [1, 1.2, 1.5]\nmass = 10\n{LUMPS}"
 START = "angular_velocity = [0.1, 0.4, 0.5]\neuler_angles = [0.3, 0.7, 0.2]"
 ORBIT = "orbit = {semi_major_axis = 2, eccentricity = 0.2, inclination = 0.3}"
@@ -65,28 +54,6 @@ def test_the_torque_is_that_of_the_differentiated_series_in_any_body_axes(degree
             assert np.allclose(found, torque, atol=1e-7 * np.abs(torque).max())
             continue
         assert np.abs(found - torque).max() < 20 * CLOSE * np.abs(torque).max()
-
-
-def test_the_force_in_flight_is_that_of_the_differentiated_series() -> None:
-    degree = 5
-    random = Random(10 + degree)
-    tensor, field = random.tensor(), random_field(random.generator, degree)
-    q, w, x, v = random.quaternion(), random.vector(), np.array([1.2, -0.8, 0.9]), random.vector()
-    body = f"{general_body(tensor, MASS)}\n{keys(field, RADIUS)}"
-    start = f"angular_velocity = {array(w)}\nquaternion = {array(q)}\n"
-    start += f"position = {array(x)}\nvelocity = {array(v)}"
-
-    def motion(degree: int) -> np.ndarray:
-        load = f'kind = "central_gravity"\ngravitational_parameter = {MU}\ndegree = {degree}'
-        return derivative(prepared(body, start, load).system, np.array([*w, *q, *x, *v]))
-
-    beyond = motion(degree) - motion(2)
-    r = matrix(q)
-    pull = gradient(field, RADIUS, r.T @ -x)
-    # the source feels G M m grad Phi, and the body the opposite
-    assert np.abs(beyond[-3:] + MU * r @ pull).max() < 20 * CLOSE * np.abs(motion(2)[-3:]).max()
-    torque = -MU * MASS * np.cross(r.T @ -x, pull)
-    assert np.abs(tensor @ beyond[:3] - torque).max() < 20 * CLOSE * np.abs(tensor @ motion(2)[:3]).max()
 
 
 def test_degrees_converge_to_a_body_of_point_masses() -> None:
@@ -162,46 +129,6 @@ def test_point_masses_feel_the_force_of_the_field() -> None:
     assert np.abs(run.dataset.point_mass_position - other.dataset.point_mass_position).max() > 1e-3
 
 
-def series_torque(t: Any, w: Any, r: Any) -> list[Any]:
-    """c x dU/dc of the potential written out (Rodrigues' formula), by a source on a circle of radius 2."""
-    number, distance, strength, mass, radius = exact, exact("2"), exact("2"), exact("10"), exact("0.5")
-    motion = (strength / distance**3) ** number("0.5")
-    c = [r[0][k] * hy.cos(motion * hy.time) + r[1][k] * hy.sin(motion * hy.time) for k in range(3)]
-    x, y, z = seen = list(hy.make_vars("x", "y", "z"))
-    moments = zip(("1", "1.2", "1.5"), seen, strict=True)
-    potential = sum(number(i) * a * a for i, a in moments) * (number("1.5") * strength / distance**3)
-    for (n, m), (cosine, sine) in LUMPY.items():
-        turns = [hy.expression(1.0), hy.expression(0.0)]  # (x + i y)^m
-        for _ in range(m):
-            turns = [turns[0] * x - turns[1] * y, turns[0] * y + turns[1] * x]
-        zonal = hy.expression(0.0)
-        for k in range((n - m) // 2 + 1):
-            top = (-1) ** k * math.factorial(2 * n - 2 * k)
-            below = math.factorial(k) * math.factorial(n - k) * math.factorial(n - 2 * k - m) * 2**n
-            zonal += number(str(top)) / number(str(below)) * math.prod([z] * (n - 2 * k - m))
-        both = number(cosine) * turns[0] + number(sine) * turns[1]
-        potential -= strength * mass * radius**n / distance ** (n + 1) * both * zonal
-    slope = [hy.subs(hy.diff(potential, v), dict(zip(seen, c, strict=True))) for v in seen]
-    return [c[j] * slope[k] - c[k] * slope[j] for j, k in ((1, 2), (2, 0), (0, 1))]
-
-
-@pytest.mark.parametrize(
-    ("precision", "formulation", "most"),
-    [("double", "auto", 2e-13), ("extended", "rotation_matrix", 1e-16)],
-)
-def test_motions_are_those_of_the_series_written_out(precision: str, formulation: str, most: float) -> None:
-    """Carried in the frame of the circle, or in space."""
-    text = config(
-        BODY, "angular_velocity = [0.1, 0.2, 1.0]", gradient_of("orbit = {semi_major_axis = 2}"),
-        "end = 20\nsamples = 3", f'precision = "{precision}"\nformulation = "{formulation}"',
-    )  # fmt: skip
-    data = run_text(text).dataset
-    moments, rates = ("1", "1.2", "1.5"), ("0.1", "0.2", "1.0")
-    truth = followed(moments, (), rates, np.eye(3), data["time"].values, series_torque)
-    assert np.abs(matrices(wide(data, "quaternion")) - truth[1]).max() < most
-    assert np.abs(wide(data, "angular_velocity") - truth[0]).max() < most
-
-
 def test_a_field_symmetric_to_the_orbit_keeps_the_motion_in_its_plane() -> None:
     body = "principal_moments = [1, 1.2, 1.5]\nmass = 10\ngravity_field = {radius = 0.5, "
     start = "angular_velocity = [0, 0, 0.9]"
@@ -216,14 +143,6 @@ def test_a_field_symmetric_to_the_orbit_keeps_the_motion_in_its_plane() -> None:
         for x in ("planar", "quaternion")
     )
     assert np.abs(plane.quaternion.values - full.quaternion.values).max() < 1e-12
-
-
-def test_momentum_about_an_axis_of_symmetry_is_kept_by_a_zonal_field_alone() -> None:
-    body = "principal_moments = [1, 1, 1.5]\nmass = 10\ngravity_field = "
-    body += '{radius = 0.5, C = {"4,0" = 0.02, "3,0" = 0.01'
-    for more, kept in (("}}", True), (', "3,1" = 1e-3}}', False)):
-        run = run_text(config(body + more, START, gradient_of(), "end = 20\nsamples = 11"))
-        assert ("angular_momentum_axial" in drifts(run)) is kept
 
 
 def test_the_moons_axis_librates_about_a_direction_an_arcminute_off() -> None:
@@ -249,13 +168,6 @@ NONSENSE = {
     "degree without a field": ("", gradient_of(), "has no gravity_field; give it, or leave degree out"),
     "beyond its end": (LUMPS, gradient_of(degree=5), "ends at degree 4"),
     "first degree": (FIELD + '{radius = 1, C = {"1,0" = 0.1}}', "", "the centre of mass is the origin"),
-    "second degree": (FIELD + '{radius = 1, C = {"2,0" = 0.1}}', "", "the inertia tensor says it"),
-    "order beyond degree": (FIELD + '{radius = 1, C = {"3,4" = 0.1}}', "", "the order is at most the degree"),
-    "no such key": (
-        FIELD + '{radius = 1, C = {"J3" = 0.1}}',
-        "",
-        'degree and order are allowed, such as "3,0"',
-    ),
     "both": (FIELD + '{radius = 1, C = {"3,0" = 0.1}, file = "x.gfc"}', "", "either file, or radius"),
 }
 
@@ -268,25 +180,3 @@ def test_nonsense_is_refused(which: str) -> None:
     )
     with pytest.raises(ConfigError, match=re.escape(message)):
         prepare(rigidsim.parse(text))
-
-
-def test_a_field_takes_a_mass_and_a_centre() -> None:
-    for body, message in (
-        (f"principal_moments = [1, 1.2, 1.5]\n{LUMPS}", "mass is missing"),
-        (f"{BODY}\ncenter_of_mass = [0, 0, 0.1]", "another point than its centre of mass"),
-    ):
-        with pytest.raises(ConfigError, match=message):
-            prepare(rigidsim.parse(config(body, START, gradient_of())))
-
-
-def test_no_average_takes_the_field() -> None:
-    text = config(BODY, "angular_velocity = [0, 0, 50]", gradient_of())
-    with pytest.raises(ConfigError, match="has no average, which the gradient alone has"):
-        prepare(rigidsim.parse(text, overrides=['model.level="spin_averaged"']))
-
-
-def test_a_field_that_no_load_feels_is_warned_of() -> None:
-    time = "end = 1\nsamples = 2"
-    unfelt = run_text(config(BODY, START, gradient_of().replace("degree = 4", ""), time))
-    assert any("gravity_field has no effect" in text for text in unfelt.summary["warnings"])
-    assert not run_text(config(BODY, START, gradient_of(degree=2), time)).summary["warnings"]

@@ -1,7 +1,5 @@
 """Compiled expressions against mpmath's values: each function, and powers at zero."""
 
-from __future__ import annotations
-
 import mpmath
 import numpy as np
 import pytest

@@ -1,7 +1,5 @@
 """SPK files: read as they are written, and refused where they are cut, swapped or damaged."""
 
-from __future__ import annotations
-
 import random
 from collections.abc import Callable
 from pathlib import Path
@@ -23,6 +21,7 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> bytes:
     return path.read_bytes()
 
 
+@pytest.mark.slow
 def test_a_file_by_hand_places_bodies_as_the_package_does(tmp_path: Path, whole: bytes) -> None:
     """The file has the Moon about the barycentre with the Earth, the package about the Earth."""
     path = tmp_path / "moon.bsp"

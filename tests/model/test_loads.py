@@ -1,7 +1,5 @@
 """Loads: torques and forces against numpy, exact solutions, and the work that they do."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import heyoka as hy
@@ -10,7 +8,7 @@ import pytest
 from equations import CLOSE, EPS, Random, array, derivative, general_body, matrix, prepared
 from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
-from support import angle_between, config, law, run_text, wide
+from support import config, run_text
 
 
 def gradient(strength: float, orbit: dict[str, float]) -> str:
@@ -110,36 +108,6 @@ def test_gradient_torque_of_a_body_on_an_orbit(shape: str) -> None:
         )
 
 
-def test_eccentric_anomaly_solves_keplers_equation() -> None:
-    """Also near a parabola, where Newton's method from a poor start wanders."""
-    for e in (0.0, 0.9, 0.9999):
-        for mean in (-6.9, -3.2, -1.0, -1e-3, 0.0, 1e-6, 0.02, 0.3, 3.1, 6.2, 6.3, 12.6):
-            orbit = {"semi_major_axis": 1.0, "eccentricity": e, "mean_anomaly": float(mean)}
-            scene = prepared("principal_moments = [1, 2, 2.5]", "angular_velocity = [0, 0, 1]",
-                             gradient(1.0, orbit)).scene  # fmt: skip
-            kepler, context = scene.loads[0].orbit, scene.context
-            anomaly = kepler.eccentric_anomaly(context, scene.start)
-            residual = anomaly - kepler.eccentricity * context.sin(anomaly) - kepler.mean_anomaly
-            assert abs(residual) < 1e-18
-
-
-@pytest.mark.slow
-def test_attitude_on_a_circular_orbit_after_long() -> None:
-    """n t = 2^13, 28,672 rad, against 80 bits: an explicit cos(n t) would be wrong by 1e-8 (errors like
-    t^2.5), where the law gives 5e-10.
-    """
-    load, found = gradient(1.0, {"semi_major_axis": 1, "inclination": 0.1}), []
-    for precision in ("extended", "double"):
-        time, integrator = "end = 8192\nsamples = 17", f'precision = "{precision}"'
-        run = run_text(config("principal_moments = [1, 1.75, 2]", "angular_velocity = [0, 0, 3.5]", load,
-                              time, integrator, 'record = ["quaternion"]'))  # fmt: skip
-        row = run.summary["invariants"]["jacobi_constant"]
-        assert row["largest_drift"] <= row["bound"]
-        found.append(wide(run.dataset, "quaternion"))
-    allowed = law(EPS, run.summary["cost"]["steps"], 3.5, 8192)
-    assert angle_between(*found).max() <= allowed < 5e-10
-
-
 @pytest.mark.parametrize("formulation", ["quaternion", "rates"])
 def test_damping_in_proportion_to_inertia(formulation: str) -> None:
     """tau = -c I w: abs(L) = L0 exp(-c t), E = E0 exp(-2 c t), the direction of L stays."""
@@ -157,26 +125,6 @@ def test_damping_in_proportion_to_inertia(formulation: str) -> None:
     if formulation == "quaternion":
         direction = dataset["angular_momentum"].values / size[0] / decay[:, None]
         np.testing.assert_allclose(direction - direction[0], 0 * direction, atol=bound / decay.min())
-
-
-def test_power_of_a_constant_body_torque() -> None:
-    """dE/dt = w . tau: about a principal axis in closed form, else by the balance of energy."""
-    body, time = "principal_moments = [1, 1.75, 2]", "end = 20\nsamples = 2001"
-    load = 'kind = "torque"\ncomponents = ["0.1", "-0.05", 0.2]'
-    run = run_text(config(body, "angular_velocity = [0.3, 0.2, 1]", load, time))
-    row = run.summary["invariants"]["energy_balance"]
-    assert 0 < row["largest_drift"] <= row["bound"]
-    work, w, time_of = (run.dataset[name].values for name in ("work", "angular_velocity", "time"))
-    power = w @ [0.1, -0.05, 0.2]
-    assert np.ptp(run.dataset["energy"].values) > 1
-    # the trapezoidal rule leaves h^2 / 12 times the change of the power's slope, at most 2 here
-    trapezoid = np.concatenate([[0], np.cumsum((power[1:] + power[:-1]) / 2 * np.diff(time_of))])
-    assert np.abs(work - trapezoid).max() < 1e-4 / 12 * 4
-    load = 'kind = "torque"\ncomponents = [0, 0, 0.2]'
-    spun = run_text(config(body, "angular_velocity = [0, 0, 1]", load, time)).dataset
-    rate = 1 + 0.1 * time_of
-    np.testing.assert_allclose(spun["angular_velocity"].values[:, 2], rate, rtol=1e-14)
-    np.testing.assert_allclose(spun["work"].values, rate**2 - 1, rtol=0, atol=9 * 1e-14)
 
 
 @pytest.mark.parametrize("frame", ["body", "space"])
@@ -223,20 +171,6 @@ def test_force_of_expressions_in_flight(frame: str, size: float, point: list[flo
     np.testing.assert_allclose(got[10:13], force / mass, rtol=0, atol=CLOSE * np.linalg.norm(force))
     power = torque @ w + force @ v
     assert got[-1] == pytest.approx(power, abs=CLOSE * np.linalg.norm(force) * 10)
-
-
-def test_force_about_a_fixed_point() -> None:
-    """By default it acts at the centre of mass, whose place is given from the fixed point."""
-    center, w, q = [0.1, 0.2, 0.3], np.array([0.1, 0.2, 0.3]), Random(1).quaternion()
-    body = f"principal_moments = [1, 2, 2.5]\nmass = 1\ncenter_of_mass = {center}"
-    load = 'kind = "force"\ncomponents = ["1", "2", "3"]'
-    system = prepared(body, "angular_velocity = [0, 0, 1]", load).system
-    tensor = np.diag([1, 2, 2.5])
-    for text, point in ((load, center), (load + "\npoint = [0, 1, 0]", [0, 1, 0])):
-        system = prepared(body, "angular_velocity = [0, 0, 1]", text).system
-        expected = turning(tensor, w, np.cross(point, matrix(q).T @ [1, 2, 3]))
-        got = derivative(system, np.concatenate([w, q, [0.0]]))
-        np.testing.assert_allclose(got[:3], expected, rtol=0, atol=CLOSE * 5)
 
 
 @pytest.mark.parametrize(

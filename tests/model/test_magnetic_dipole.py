@@ -1,7 +1,5 @@
 """A magnetic dipole of the body: torque m x B in a uniform field, and in that of a dipole along an orbit."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import replace
 
@@ -9,9 +7,7 @@ import numpy as np
 import pytest
 from equations import CLOSE, Random, array, derivative, general_body, matrix, observed, prepared
 from flights import MU, Flight, by_scipy, turned_by
-from scipy.integrate import solve_ivp
-from scipy.optimize import brentq
-from support import angle_between, config, run_text
+from support import config, run_text
 
 import rigidsim
 from rigidsim import ConfigError
@@ -23,36 +19,11 @@ ORBIT = (
     "orbit = {semi_major_axis = 7e6, eccentricity = 0.2, inclination = 0.9, ascending_node = 0.3, "
     "periapsis = 0.5, mean_anomaly = 0.7, node_rate = 0.01, period = 20}"
 )
-SOURCE = np.array([3e22, -2e22, 7e22])  # A m^2
 
 
 def text(load: str, end: float = 20.0, extra: str = "") -> str:
     load = f'kind = "magnetic_dipole"\n{load}'
     return config(BODY, START, load, f"end = {end}\nsamples = 201", more=extra, name="magnet")
-
-
-def dipole_field(r: np.ndarray, moment: np.ndarray = SOURCE) -> np.ndarray:
-    """B of a dipole (T) at r (m): Jackson, Classical Electrodynamics, eq. 5.56."""
-    distance = np.linalg.norm(r)
-    c = r / distance
-    return 1e-7 * (3 * c * (moment @ c) - moment) / distance**3
-
-
-def position(t: float) -> np.ndarray:
-    """On ``ORBIT``, by Kepler's equation and three rotations, m."""
-    e, a = 0.2, 7e6
-    mean = 0.7 + 2 * np.pi / 20 * t
-    anomaly = brentq(lambda x: x - e * np.sin(x) - mean, mean - 1, mean + 1, xtol=1e-15)
-    x, y = a * (np.cos(anomaly) - e), a * np.sqrt(1 - e * e) * np.sin(anomaly)
-    node = 0.3 + 0.01 * t
-
-    def turn(angle: float, i: int, j: int) -> np.ndarray:
-        m = np.eye(3)
-        m[i, i] = m[j, j] = np.cos(angle)
-        m[i, j], m[j, i] = -np.sin(angle), np.sin(angle)
-        return m
-
-    return turn(node, 0, 1) @ turn(0.9, 1, 2) @ turn(0.5, 0, 1) @ np.array([x, y, 0.0])
 
 
 def test_the_torque_is_the_moment_cross_the_field_in_any_body_axes() -> None:
@@ -72,28 +43,6 @@ def test_the_torque_is_the_moment_cross_the_field_in_any_body_axes() -> None:
         assert np.abs(found - expected).max() <= CLOSE * np.linalg.cond(tensor) * (1 + np.abs(expected).max())
         energy = w @ tensor @ w / 2 - moment @ (matrix(q).T @ field)
         assert abs(observed(system, state)["energy"][0] - energy) <= CLOSE * (1 + abs(energy))
-
-
-def test_along_an_orbit_it_agrees_with_another_integrator_of_the_plain_equations() -> None:
-    moment, inertia = np.array([2.0, -3.0, 5.0]) * 1e5, np.array([1, 1.5, 2])
-    load = f"moment = {array(moment)}\n{ORBIT}\nsource_moment = {array(SOURCE)}"
-    run = run_text(text(load))
-    assert run.summary["warnings"] == []
-    assert list(run.summary["invariants"]) == ["energy_balance", "orbit_norm_1", "orbit_norm_2",
-                                               "quaternion_norm"]  # fmt: skip
-
-    def rates(t: float, y: np.ndarray) -> np.ndarray:
-        w, q = y[:3], y[3:]
-        field = matrix(q / np.linalg.norm(q)).T @ dipole_field(position(t))
-        turn = np.array([[0, *-w], [w[0], 0, w[2], -w[1]], [w[1], -w[2], 0, w[0]], [w[2], w[1], -w[0], 0]])
-        return np.concatenate([(np.cross(inertia * w, w) + np.cross(moment, field)) / inertia, turn @ q / 2])
-
-    q = np.array([0.3, -0.5, 0.2, 0.75])
-    start = np.concatenate([[0.4, -0.7, 0.9], q / np.linalg.norm(q)])
-    times = run.dataset["time"].values
-    there = solve_ivp(rates, (0, 20), start, method="DOP853", t_eval=times, rtol=1e-11, atol=1e-12).y[3:].T
-    # the other integrator's tolerance, some hundred steps of it, and the growth of 20 s at 1 rad/s
-    assert angle_between(run.dataset["quaternion"].values, there).max() <= 1e-8
 
 
 @pytest.mark.parametrize(
@@ -145,11 +94,6 @@ def test_a_magnet_in_flight_follows_no_orbit_of_its_own(load: str, message: str)
     plain = replace(IN_FLIGHT, moment=np.zeros(3)).text.replace("[time]", f"{magnet}[time]")
     with pytest.raises(ConfigError, match=re.escape(message)):
         prepare(rigidsim.parse(plain))
-
-
-def test_without_one_attracting_point_the_dipole_needs_a_place() -> None:
-    with pytest.raises(ConfigError, match="position: missing"):
-        prepare(rigidsim.parse(replace(IN_FLIGHT, strength=0.0).text))
 
 
 def test_a_gradient_of_what_attracts_the_body_in_flight_is_refused() -> None:

@@ -1,7 +1,5 @@
 """Roll, pitch and yaw, libration and nadir: against their definitions, and against closed forms."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np
@@ -9,8 +7,6 @@ import pytest
 import xarray
 from mpmath import mp
 from support import EPSILON, config, loaded, run_text, wide
-
-from rigidsim import ConfigError
 
 NAMES = 'record = ["quaternion", "roll_pitch_yaw", "libration", "nadir"{}]'
 BODY = 'principal_moments = ["0.9", 1, "0.4"]\nmass = 2'
@@ -134,32 +130,6 @@ def test_in_free_flight_they_count_from_the_path() -> None:
     assert "libration" not in everything  # only when named
 
 
-def test_a_source_at_rest_counts_from_space_z() -> None:
-    """And of several sources the first counts."""
-    rest = GRADIENT + "position = [3, 4, 5]"
-    orbit = GRADIENT + ORBIT.format(e=0, node=0, periapsis=0)
-    dataset = ran([rest, orbit])
-    with mp.workdps(40):
-        down, z = unit(mp.matrix([3, 4, 5])), mp.matrix([0, 0, 1])
-        normal = unit(z - down * down[2])
-        assert max(misses(dataset, row, down, normal) for row in range(4)) < 50 * EPSILON["double"]
-        above = ran(GRADIENT + "position = [0, 0, -2]", time="end = 1\nsamples = 2")
-        assert misses(above, 1, mp.matrix([0, 0, -1]), mp.matrix([1, 0, 0])) < 50 * EPSILON["double"]
-
-
-@pytest.mark.parametrize(
-    ("loads", "body", "name", "said"),
-    [
-        ("", BODY, "nadir", "no load has a source"),
-        (GRADIENT + ORBIT.format(e=0, node=0, periapsis=0), "principal_moments = [1, 1, 2]", "libration",
-         "no single axis of smallest moment"),
-    ],
-)  # fmt: skip
-def test_what_a_scene_lacks_is_said(loads: str, body: str, name: str, said: str) -> None:
-    with pytest.raises(ConfigError, match=said):
-        run_text(config(body, START, loads, output=f'record = ["{name}"]'))
-
-
 def polar(time: str, initial: str, record: str = '"roll_pitch_yaw", "nadir"', body: str = BODY) -> str:
     """A satellite at the Earth's unit distance, whose local frame starts along the space axes; n = 1."""
     orbit = 'orbit = {semi_major_axis = 1, inclination = "90 deg", periapsis = "90 deg"}'
@@ -180,21 +150,3 @@ def test_a_satellite_at_rest_in_its_orbit_has_none_and_a_small_pitch_swings_at_i
         small**2 / 4 * rate * 40 + 1e-9
     )
     assert np.abs(angles[:, [0, 2]]).max() < 1e-15
-
-
-def test_sparse_samples_keep_true_turns() -> None:
-    """A satellite that spins in roll, eight turns between samples, and one that tumbles in the orbit's plane:
-    its in-plane angle obeys a'^2 = a'(0)^2 - k sin(a)^2 with k = 3 (I_x - I_z)/I_y, as a pendulum.
-    """
-    spun = "angular_velocity = [200, 0, 0]\neuler_angles = [0, 0.1, 0]"
-    stable = 'principal_moments = [1, "0.9", "0.4"]'
-    dense = loaded(run_text(polar("end = 1\nevery = 0.005", spun, '"roll_pitch_yaw"', stable)))
-    sparse = loaded(run_text(polar("end = 1\nevery = 0.25", spun, '"roll_pitch_yaw"', stable)))
-    every, few = (found["roll_pitch_yaw"].values for found in (dense, sparse))
-    assert np.abs(np.diff(every, axis=0)).max() < 1.5  # so dense that it tells turns
-    assert np.abs(few - every[::50]).max() < 1e-9
-    assert few[-1, 0] > 150
-    rate, k = 31.0, 3 * (0.9 - 0.4)
-    found = loaded(run_text(polar("end = 12\nevery = 4", "angular_velocity = [0, 30, 0]", '"libration"')))
-    turned, time = found["libration"].values[:, 0], found["time"].values
-    assert np.abs(turned - (rate - k / (4 * rate)) * time).max() < 1e-3  # to first order in k / rate^2 = 2e-3

@@ -1,13 +1,10 @@
 """On a circular orbit the attitude is carried in the frame that turns with it, and recorded in space."""
 
-from __future__ import annotations
-
 import numpy as np
-import pytest
 from equations import derivative, prepared
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from support import law, run_text, tried
+from support import law, tried
 
 from rigidsim.accuracy.comparison import angles_between
 from rigidsim.model.system import System
@@ -81,14 +78,3 @@ def test_at_rest_in_the_orbital_frame_it_stays_bit_for_bit() -> None:
     carried = dict(zip(system.states, moving, strict=True))
     assert [carried[name] for name in ("wx", "wy", "wz", "pw", "px", "py", "pz")] == [0.0] * 7
     assert carried["sin_half_anomaly1"] == 0.5
-
-
-def test_events_read_the_attitude_in_space() -> None:
-    """A body that turns about the orbit's normal, in a gradient too weak to be felt."""
-    text = TEXT.format(
-        rates=[0, 0, 2], quaternion=[1, 0, 0, 0], strength=1e-12, start=0, end=3, orbit="mean_anomaly = 0",
-        more='[[events]]\nname = "half"\nexpression = "qw"', formulation="auto", precision="double",
-    )  # fmt: skip
-    dataset = run_text(text).dataset
-    # the torque turns the body by some 1e-11 rad at most, and q_w = cos(t)
-    assert dataset["half_time"].values == pytest.approx([np.pi / 2], abs=1e-10)

@@ -1,7 +1,5 @@
 """Loads given from Python: the example of the documentation, and how such runs are marked."""
 
-from __future__ import annotations
-
 import re
 from contextlib import redirect_stdout
 from io import StringIO

@@ -1,7 +1,5 @@
 """An observable of one's own: the documentation's example is recorded by its name like those of rigidsim."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator
 from contextlib import redirect_stdout

@@ -1,10 +1,9 @@
 """Values that are allowed but implausible are warned of in the right words, and nothing else is."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 
+import numpy as np
 import pytest
 from documented_blocks import blocks_of
 
@@ -71,30 +70,10 @@ IMPLAUSIBLE = {
         "orbit.semi_major_axis: given 6950 without a unit, which is taken as m: 6950 m "
         'from the centre of the Earth, below its surface at 6378 km; write "6950 km"',
     ),
-    "km^3/s^2": (
-        scene(orbit('semi_major_axis = "6950 km"', "gravitational_parameter = 398600.4418\n")),
-        "length_without_unit",
-        'while the Earth\'s is 398600 km^3/s^2; write "398600.4418 km^3/s^2" if',
-    ),
     "a velocity in km/s": (
         flight('["7000 km", 0, 0]', "[0, 7.5, 0]"),
         "length_without_unit",
         'a circular orbit there has 7546 m/s; write "7.5 km/s" if',
-    ),
-    "an air's altitude in km": (
-        flight('["6800 km", 0, 0]', '[0, "7.6 km/s", 0]').replace(
-            "mass = 100", "mass = 100, surfaces = [{radius = 1}]"
-        )
-        + 'radius = "6378 km"\n[[loads]]\nkind = "drag"\ndensity = 1e-12\naltitude = 400\n'
-        "scale_height = 60\n",
-        "length_without_unit",
-        "[[loads]] number 2 altitude: given 400 without a unit, which is taken as m, while the body starts "
-        '422 km above the surface; write "400 km" if',
-    ),
-    "an altitude": (
-        scene(orbit('semi_major_axis = "550 km"')),
-        "below_surface",
-        "550 km from the centre of the Earth, below its surface at 6378 km; to an altitude, add the radius",
     ),
     "a period": (
         scene(orbit('semi_major_axis = "7000 km", period = "45 min"')),
@@ -112,16 +91,6 @@ IMPLAUSIBLE = {
         "angle_without_unit",
         "components[0]: given sin(30), whose argument is taken as radians: 1718.87 "
         "deg; write sin(30 deg) if degrees are meant, sin(30 rad) if not",
-    ),
-    "a tilt in degrees": (
-        scene("", "angular_velocity = [0, 5, 0]\neuler_angles = [0, 5, 0]"),
-        "angle_without_unit",
-        "euler_angles: given 5 without a unit, which is taken as radians: 286.479 deg",
-    ),
-    "a spin in deg/s": (
-        scene(orbit('semi_major_axis = "7000 km"'), "angular_velocity = [0, 0, 0.0618]"),
-        "angle_without_unit",
-        '0.0617653 deg/s; write "0.0618 deg/s" if',
     ),
     "a sidereal month as the anomalistic one": (
         month('period = "27.321661 day"', 5e-6),
@@ -142,19 +111,13 @@ def test_it_is_warned_of_once_in_the_right_words(text: str, code: str, words: st
 
 PLAUSIBLE = {
     "km said": scene(orbit('semi_major_axis = "6950 km"', 'gravitational_parameter = "398600 km^3/s^2"\n')),
-    "a small body": scene(orbit("semi_major_axis = 6950", 'gravitational_parameter = "398600 m^3/s^2"\n')),
     "a month": scene(orbit(f'{MOON}, {MONTHS}, sidereal_period = "27.321661 day"')),
-    "an anomalistic month": scene(orbit(f'{MOON}, {MONTHS}, period = "27.55455 day"')),
     "the Moon about the Earth": scene(
         orbit(f'{MOON}, period = "27.321661 day"', "gravitational_parameter = 4.9028e12\n")
     ).replace("mass = 100", "mass = 5.9722e24"),
-    "a flight": flight('["7000 km", 0, 0]', '[0, "7.5 km/s", 0]'),
     "a fall": flight('["7000 km", 0, 0]', "[0, 0, 0]"),
-    "gravity down": gravity("[0, 0, -9.81]"),
     "gravity upwards elsewhere": gravity("[0, 0, 3.71]"),
     "radians": torque("sin(3)", "cos(t + 30)", "sin(30*t)"),
-    "locked": month('sidereal_period = "27.321661 day"', 5e-6),
-    "no resonance to hold it": month('period = "27.321661 day"', 0.0),
     "a tumbling moon": month('period = "27.321661 day"', 5e-6).replace(
         "[0, 0, ", '["0.1 rad/day", "0.2 rad/day", '
     ),
@@ -185,3 +148,50 @@ def test_random_scenes_raise_no_alarm() -> None:
     for number in range(12):
         for text in (random_scene(number, seed=25).text, coverage_scene(number, seed=25).text):
             assert warned(text) == [], number
+
+
+def librates(p: np.ndarray, e: float, asymmetry: np.ndarray, spin: np.ndarray) -> np.ndarray:
+    """Whether theta - p M stays near where it starts over 150 orbits, by Runge's and Kutta's method for the
+    planar motion theta'' = -(3/2) (B - A)/C (a/r)^3 sin 2(theta - f), with n = 1, from the periapsis.
+    """
+    steps = 96
+    mean = np.arange(2 * steps) * math.pi / steps
+    eccentric = mean.copy()
+    for _ in range(60):
+        eccentric -= (eccentric - e * np.sin(eccentric) - mean) / (1 - e * np.cos(eccentric))
+    true = 2 * np.arctan2(math.sqrt(1 + e) * np.sin(eccentric / 2), math.sqrt(1 - e) * np.cos(eccentric / 2))
+    cubes, step, far = (1 - e * np.cos(eccentric)) ** -3.0, 2 * math.pi / steps, np.zeros(len(p))
+
+    def slope(y: np.ndarray, half: int) -> np.ndarray:
+        at = half % (2 * steps)
+        return np.array([y[1], -1.5 * asymmetry * cubes[at] * np.sin(2 * (y[0] - true[at]))])
+
+    y = np.array([0 * spin, spin])
+    for k in range(150 * steps):
+        k1 = slope(y, 2 * k)
+        k2 = slope(y + step / 2 * k1, 2 * k + 1)
+        k3 = slope(y + step / 2 * k2, 2 * k + 1)
+        k4 = slope(y + step * k3, 2 * k + 2)
+        y = y + step / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
+        far = np.maximum(far, np.abs(y[0] - p * step * (k + 1)))
+    return far < math.pi / 2
+
+
+def test_a_spin_is_outside_its_resonance_where_the_planar_motion_circulates() -> None:
+    generator, e = np.random.default_rng(2025), 0.15
+    p = np.array([1.0, 1.5] * 6)
+    strength = np.where(p == 1, 1 - 2.5 * e**2, 3.5 * e - 7.7 * e**3)
+    width = generator.uniform(4e-3, 6e-3, 12)
+    asymmetry = width**2 / (3 * strength)
+    factor = np.tile([0.75, 1.3], 6)[np.argsort(generator.random(12))]
+    spin = p + generator.choice([-1, 1], 12) * factor * width
+    held = librates(p, e, asymmetry, spin)
+    assert (held == (factor < 1)).all()
+    motion = math.sqrt(3.986004418e14 / 8e6**3)
+    for number in range(12):
+        text = scene(
+            orbit(f'semi_major_axis = "{8e3 / (1 - e)!r} km", eccentricity = {e}'),
+            f"angular_velocity = [0, 0, {float(spin[number]) * motion * (1 - e) ** 1.5!r}]",
+            f"1, {1 + float(asymmetry[number]) * 1.2!r}, 1.2",
+        )
+        assert [c.code.value for c in warned(text)] == ["near_resonance"] * (not held[number]), number

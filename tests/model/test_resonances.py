@@ -1,7 +1,5 @@
 """A rotation in step with its source, averaged: against sums over the orbit, and against every rotation."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
@@ -10,7 +8,7 @@ from equations import derivative
 from support import config, run_text
 
 import rigidsim
-from rigidsim import ConfigError, parse
+from rigidsim import parse
 from rigidsim.solve.problem import InitialValueProblem, prepare
 
 MOMENTS = np.array([0.998, 0.999, 1.0])
@@ -93,6 +91,7 @@ def kept_angle(run: rigidsim.Run, turns: float) -> np.ndarray:
     return np.unwrap(2 * (np.arctan2(sine, (pericentre * long).sum(axis=1)) - turns * time)) / 2
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("spin", [1.005, 1.5])
 def test_the_commensurable_angle_is_that_of_every_rotation(
     spin: float, both: dict[float, tuple[rigidsim.Run, rigidsim.Run]]
@@ -118,19 +117,3 @@ def test_the_commensurable_angle_is_that_of_every_rotation(
     mean = apart.reshape(-1, 16, 3).mean(axis=1)
     left_out = eccentricity**2 if spin < 1.2 else eccentricity
     assert np.linalg.norm(mean, axis=1).max() < 3 * flattening * (flattening + left_out) * path.max()
-
-
-@pytest.mark.parametrize(
-    ("given", "said"),
-    [
-        ({"level": "spin_averaged"}, 'choose level = "orbit_averaged", which keeps its angle'),
-        (
-            {"more": "short_period = true"},
-            r"in resonance with \[\[loads\]\] number 1 \(1:1\).*set it to false",
-        ),
-        ({"record": '"quaternion"'}, 'given "quaternion": needs every rotation'),
-    ],
-)
-def test_what_a_resonance_can_not_give_is_refused(given: dict[str, str], said: str) -> None:
-    with pytest.raises(ConfigError, match=said):
-        averaged(1.005, 0.05, **given)

@@ -1,7 +1,5 @@
 """A spin driven by a table of an orbit, held against the same orbit given directly."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 
@@ -117,6 +115,7 @@ def saved(tmp_path_factory: pytest.TempPathFactory) -> rigidsim.Run:
     return rigidsim.resume(run.folder.path, until="210 day", tuning=IMPATIENT)
 
 
+@pytest.mark.slow
 def test_a_prolonged_run_is_the_run_in_one_go_and_verified_without_the_file(saved: rigidsim.Run) -> None:
     same_bits(saved.dataset, run_text(by_table(4.0)).dataset)
     assert rigidsim.verify(saved.folder.path).identical
@@ -131,6 +130,7 @@ def test_what_a_table_can_not_be_combined_with() -> None:
     assert "an orbit goes by a table" in str(caught.value)
 
 
+@pytest.mark.slow
 def test_steps_end_at_kinks_and_at_rows() -> None:
     kinked = '[[loads]]\nkind = "torque"\ncomponents = ["1e-12*max(sin(t/1e5), 0)", "1e-11*sign(qx*qz)", 0]\n'
     by_rows, by_elements = (

@@ -1,7 +1,5 @@
 """Tilt, precession and spin of a top, and the path of its tip: definitions and closed forms."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

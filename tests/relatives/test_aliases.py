@@ -5,8 +5,6 @@ and a planet that turns at W about its axis of largest moment C nutates freely a
 the body and, W faster, in space.
 """
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import xarray
@@ -20,7 +18,7 @@ def seen_at(frequency: float, spacing: float) -> float:
     return float(abs(frequency - turn * np.round(frequency / turn)))
 
 
-@pytest.mark.parametrize("seed", seeds(2, 60))
+@pytest.mark.parametrize("seed", seeds(1, 60))
 def test_lines_of_random_samplings(seed: int) -> None:
     """A slow and a fast known line, and an unknown one, sampled at random: only the last can be an alias."""
     rng = np.random.default_rng(seed)
@@ -69,7 +67,7 @@ estimate = false
 """
 
 
-@pytest.mark.parametrize("seed", seeds(2, 50))
+@pytest.mark.parametrize("seed", seeds(1, 50))
 def test_the_free_nutation_of_random_planets(seed: int) -> None:
     """Sampled every few days, it is labelled and unfolded."""
     rng = np.random.default_rng([1, seed])

@@ -1,7 +1,5 @@
 """AEM and OEM by writers of our own, from rotations of scipy and annex F of CCSDS 504.0-B-2."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from datetime import datetime, timedelta
 from pathlib import Path
@@ -230,7 +228,7 @@ class Aem:
         assert np.abs(rates - expected).max() < close, (self.text()[:900], found.notes)
 
 
-@pytest.mark.parametrize("seed", seeds(2, 60))
+@pytest.mark.parametrize("seed", seeds(1, 60))
 def test_attitudes_and_rates_are_those_that_were_written(seed: int, tmp_path: Path) -> None:
     """Ten messages a seed: both versions, KVN and XML, all types, directions, frames, clocks, segments."""
     rng = np.random.default_rng(seed)
@@ -238,7 +236,7 @@ def test_attitudes_and_rates_are_those_that_were_written(seed: int, tmp_path: Pa
         Aem(rng).check(tmp_path / f"{n}.aem")
 
 
-@pytest.mark.parametrize("seed", seeds(2, 50))
+@pytest.mark.parametrize("seed", seeds(1, 50))
 def test_rates_of_version_1_as_derivatives_are_known_by_the_motion(seed: int, tmp_path: Path) -> None:
     """QUATERNION/RATE and EULER_ANGLE/RATE as derivatives of Euler angles, as Orekit writes them."""
     rng = np.random.default_rng(seed)
@@ -315,7 +313,7 @@ def oem(rng: np.random.Generator, path: Path, xml: bool) -> tuple[list[str], np.
     return dates, np.array(rows) * 1e3
 
 
-@pytest.mark.parametrize("seed", seeds(2, 60))
+@pytest.mark.parametrize("seed", seeds(1, 60))
 def test_orbits_keep_all_their_segments(seed: int, tmp_path: Path) -> None:
     """Four messages a seed, with 2 to 4 segments, most with covariances; ``oem`` reads the same of KVN."""
     rng = np.random.default_rng(seed)

@@ -3,8 +3,6 @@
 The truth is SciPy's DOP853 at 3e-14 over equations written in ``experiments/compare_conventions.py``.
 """
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -15,7 +13,7 @@ from experiments.compare_conventions import NEAR, a_mixed_file
 from rigidsim.errors import RigidsimError
 
 
-@pytest.mark.parametrize("seed", seeds(2, 60))
+@pytest.mark.parametrize("seed", seeds(1, 60))
 def test_no_verdict_is_false(seed: int) -> None:
     one = a_mixed_file(seed)
     assert not one.wrong, (one.label, one.way, one.found.why)
@@ -66,7 +64,7 @@ def test_times_counted_from_another_zero_are_refused_with_the_shift(zero: float)
         rigidsim.compare(rigidsim.parse(SPIN), table)
 
 
-@pytest.mark.parametrize("seed", seeds(2, 60))
+@pytest.mark.parametrize("seed", seeds(1, 60))
 def test_a_wrong_rate_is_no_rounding_of_even_times(seed: int) -> None:
     """Attitudes that fall behind evenly look like times that do; even times show no rounding, though."""
     random = np.random.default_rng(seed)
@@ -81,7 +79,7 @@ def test_a_wrong_rate_is_no_rounding_of_even_times(seed: int) -> None:
         assert rigidsim.compare(scene, kept[1]).verdict == "agrees"
 
 
-@pytest.mark.parametrize("seed", seeds(2, 60))
+@pytest.mark.parametrize("seed", seeds(1, 60))
 def test_another_body_is_no_integration_error_in_rows_far_apart(seed: int) -> None:
     """A free symmetric body in closed form: L / A turns it about L, and it turns about its axis beside."""
     random = np.random.default_rng(seed)

@@ -1,7 +1,5 @@
 """Dates before 1972, and every spelling of a date, against ERFA and whole numbers."""
 
-from __future__ import annotations
-
 from datetime import date, datetime, timedelta, timezone
 from decimal import Decimal
 from fractions import Fraction
@@ -51,7 +49,7 @@ def spelled(day: date, seconds: Decimal, of_year: bool = False) -> str:
     return f"{head}T{whole // 3600:02}:{whole % 3600 // 60:02}:{whole % 60 + seconds % 1:012.9f}"
 
 
-@pytest.mark.parametrize("seed", seeds(2, 60))
+@pytest.mark.parametrize("seed", seeds(1, 60))
 def test_utc_before_1972_drifts_as_in_erfa(seed: int) -> None:
     """Fifty moments a seed, a fifth within 10 s of a step: to 1e-9 s, a few units in the last place of the
     doubles that ERFA keeps a date in; and some time later again.
@@ -114,7 +112,7 @@ def test_there_is_no_utc_before_1960_and_none_in_a_step(text: str) -> None:
         rigidsim.parse(SCENE.format(start=f"tle = {lines}", epoch="") + EARTH)
 
 
-@pytest.mark.parametrize("seed", seeds(2, 60))
+@pytest.mark.parametrize("seed", seeds(1, 60))
 def test_every_spelling_of_an_instant_is_the_same_one(seed: int, tmp_path: Path) -> None:
     """Twelve spellings: exactly the same instant, counted in whole microseconds; in TDB to 1e-5 s, the
     error of TDB - TT. Sample times may be dates, too.

@@ -1,7 +1,5 @@
 """Constants at the ends of the range: their value to the last digit, or a refusal that names the key."""
 
-from __future__ import annotations
-
 import random
 
 import mpmath
@@ -60,7 +58,7 @@ def scene(precision: str | int, more: str) -> str:
     return f"{SCENE}[integrator]\nprecision = {word}\n{more}"
 
 
-@pytest.mark.parametrize("seed", seeds(2, 60))
+@pytest.mark.parametrize("seed", seeds(1, 60))
 def test_a_constant_out_of_range_is_refused_by_its_key(seed: int) -> None:
     """Six constants for each seed, in all places, forms and precisions."""
     rng = random.Random(seed)
@@ -85,7 +83,7 @@ def test_a_constant_out_of_range_is_refused_by_its_key(seed: int) -> None:
         assert "can't hold" in str(refused.value)
 
 
-@pytest.mark.parametrize("seed", seeds(2, 50))
+@pytest.mark.parametrize("seed", seeds(1, 50))
 def test_a_number_out_of_range_is_refused_by_its_key(seed: int) -> None:
     rng = random.Random(seed)
     precision = rng.choice([*RANGE])
@@ -99,7 +97,7 @@ def test_a_number_out_of_range_is_refused_by_its_key(seed: int) -> None:
     )
 
 
-@pytest.mark.parametrize("seed", seeds(2, 50))
+@pytest.mark.parametrize("seed", seeds(1, 50))
 def test_a_constant_in_range_has_its_value(seed: int) -> None:
     """A state that grows at a rate near the end of the range: u = c t, to the last digits."""
     rng = random.Random(seed)

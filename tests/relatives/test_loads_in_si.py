@@ -1,7 +1,5 @@
 """Loads of users speak SI: their motion is scipy's of the same formulas, whatever the internal units are."""
 
-from __future__ import annotations
-
 import random
 from typing import Any
 
@@ -113,7 +111,7 @@ def _observable() -> None:
     register_observable(OWN)
 
 
-@pytest.mark.parametrize("seed", seeds(2, 40))
+@pytest.mark.parametrize("seed", seeds(1, 40))
 def test_a_load_in_si_moves_the_body_as_its_formulas_say(seed: int) -> None:
     rng = random.Random(seed)
     rate, inertia, size = 10 ** rng.uniform(-6, 2), 10 ** rng.uniform(-8, 30), 10 ** rng.uniform(-3, 9)
@@ -152,7 +150,7 @@ def test_a_load_in_si_moves_the_body_as_its_formulas_say(seed: int) -> None:
     np.testing.assert_allclose(run.dataset.momentum_of_a_user.values, momentum, rtol=1e-14)
 
 
-@pytest.mark.parametrize("seed", seeds(2, 20))
+@pytest.mark.parametrize("seed", seeds(1, 20))
 def test_a_carrier_in_si_turns_the_body_as_its_formulas_say(seed: int) -> None:
     rng = random.Random(seed)
     rate, inertia = 10 ** rng.uniform(-6, 2), 10 ** rng.uniform(-8, 30)

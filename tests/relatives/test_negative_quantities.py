@@ -1,7 +1,5 @@
 """Densities and rates by expressions that are, or become, negative, against the zeros of closed forms."""
 
-from __future__ import annotations
-
 import random
 
 import numpy as np
@@ -46,7 +44,7 @@ def drawn(draw: random.Random):
     return *draw.choice(falling), draw.choice(staying), T
 
 
-@pytest.mark.parametrize("seed", seeds(2, 55))
+@pytest.mark.parametrize("seed", seeds(1, 55))
 def test_what_becomes_negative_ends_the_run(seed: int) -> None:
     draw = random.Random(seed)
     kind = draw.choice(["drag", "mass_loss"])
@@ -64,7 +62,7 @@ def test_what_becomes_negative_ends_the_run(seed: int) -> None:
         prepare(rigidsim.parse(scene(kind, f"-1*({law})", 3 * T)))
 
 
-@pytest.mark.parametrize("seed", seeds(2, 50))
+@pytest.mark.parametrize("seed", seeds(1, 50))
 def test_where_a_law_stops_being_finite_is_named(seed: int) -> None:
     draw = random.Random(seed)
     T = round(draw.uniform(0.1, 4), 3)

@@ -3,8 +3,6 @@
 Truth: the numbers in the file, by numpy, and Python's own reader of TOML.
 """
 
-from __future__ import annotations
-
 import random
 import tomllib
 from pathlib import Path
@@ -21,7 +19,7 @@ SIGNS = "aZ09 _-+,;=()[]{}!#$%&'~^\"\\é\u0301ßøЖ日本語ﷺ\u200d🪐🛰�
 ROWS = [0, 0.25, 0.5, 1.75]
 
 
-@pytest.mark.parametrize("seed", seeds(2, 25))
+@pytest.mark.parametrize("seed", seeds(1, 25))
 def test_a_table_of_any_name_is_read(seed: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     draw = random.Random(seed)

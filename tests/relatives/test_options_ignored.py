@@ -3,8 +3,6 @@
 Truth: which options a command has a use for there, by hand.
 """
 
-from __future__ import annotations
-
 import random
 from pathlib import Path
 
@@ -40,7 +38,7 @@ OTHER_NAMES = {"-v": "--verbose", "--frame": "--axes"}
 CASES = [(line, option) for line, options in IGNORED.items() for option in options]
 
 
-@pytest.mark.parametrize("seed", seeds(2, 20))
+@pytest.mark.parametrize("seed", seeds(1, 20))
 def test_an_option_without_effect_is_refused(seed: int, made: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(made)
     before = sorted(Path().rglob("*"))

@@ -1,7 +1,5 @@
 """Loads asked for by names of other programs: each answer names the key or page of it here."""
 
-from __future__ import annotations
-
 import random
 import re
 from pathlib import Path
@@ -43,7 +41,7 @@ def refusal(kind: str) -> str:
     return str(caught.value)
 
 
-@pytest.mark.parametrize("seed", seeds(2, 70))
+@pytest.mark.parametrize("seed", seeds(1, 70))
 def test_a_load_is_found_by_other_names(seed: int) -> None:
     """In capitals, in the plural, with hyphens or spaces."""
     draw = random.Random(seed)

@@ -3,8 +3,6 @@
 The truth is DOP853, whose step control makes steps small at the kinks of the force, which is continuous.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 
@@ -119,7 +117,7 @@ def _quickly_compiled() -> Iterator[None]:
         yield
 
 
-@pytest.mark.parametrize("seed", seeds(2, 100))
+@pytest.mark.parametrize("seed", seeds(1, 100))
 def test_satellites_of_plates(seed: int) -> None:
     satellite = Satellite(seed)
     run = run_text(satellite.text(20.0))

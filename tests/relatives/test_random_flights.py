@@ -1,12 +1,10 @@
 """Random flights on which loads do work, compared with another integrator of the plain equations in SI."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np
 import pytest
-from random_flights import Flight, Flights, direction, in_orbit, turned_by
+from flights import Flight, Flights, direction, in_orbit, turned_by
 from support import run_estimated, unoptimised_code
 
 from rigidsim.session.verdict import Soundness, verdict_on

@@ -1,7 +1,5 @@
 """A source placed by the body's own elements (``satellite_orbit``), against Kepler's equation."""
 
-from __future__ import annotations
-
 import random
 
 import mpmath
@@ -75,7 +73,7 @@ def as_table(elements, end):
     return "\n".join(lines)
 
 
-@pytest.mark.parametrize("seed", seeds(2, 60))
+@pytest.mark.parametrize("seed", seeds(1, 60))
 def test_the_source_is_opposite_to_the_satellite(seed: int) -> None:
     draw = random.Random(seed)
     elements, table = drawn(draw)
@@ -150,7 +148,7 @@ def share_seen(sat, sun, radius, sun_radius):
     return 1 - (a * a * np.arccos(x / a) + b * b * np.arccos((c - x) / b) - c * y) / (np.pi * a * a)
 
 
-@pytest.mark.parametrize("seed", seeds(2, 20))
+@pytest.mark.parametrize("seed", seeds(1, 20))
 def test_eclipses_are_where_the_satellite_is(seed: int) -> None:
     """The Sun's light over an orbit, in eighths, against a sum over 40,000 moments."""
     draw = random.Random(seed)

@@ -3,8 +3,6 @@
 The truth is a spin about one axis in closed form: q = (cos(w t/2), 0, 0, sin(w t/2)).
 """
 
-from __future__ import annotations
-
 import random
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
@@ -64,7 +62,7 @@ def table(chance: random.Random, path: Path, names: dict[str, np.ndarray], times
     return "\n".join(lines)
 
 
-@pytest.mark.parametrize("seed", seeds(2, 60))
+@pytest.mark.parametrize("seed", seeds(1, 60))
 def test_any_style_is_read(seed: int, tmp_path: Path) -> None:
     chance = random.Random(seed)
     times = np.round(np.cumsum([0.0, *(chance.uniform(0.1, 1) for _ in range(10))]), 6)
@@ -76,7 +74,7 @@ def test_any_style_is_read(seed: int, tmp_path: Path) -> None:
     assert found.rows == len(times)
 
 
-@pytest.mark.parametrize("seed", seeds(2, 50))
+@pytest.mark.parametrize("seed", seeds(1, 50))
 def test_a_fit_reads_any_style(seed: int, tmp_path: Path) -> None:
     chance = random.Random(seed)
     times = np.arange(6.0)

@@ -3,9 +3,6 @@
 Truth: the command that the message names is given; it ends well, and its dataset is that of the whole file.
 """
 
-from __future__ import annotations
-
-import json
 import random
 import re
 import shutil
@@ -16,8 +13,6 @@ import pytest
 import xarray
 from made_by_commands import called
 from support import seeds
-
-import rigidsim
 
 LOOKS = ("info", "resume", "verify", "plot", "analyse", "export --format csv")
 
@@ -34,7 +29,7 @@ def damage(path: Path, draw: random.Random) -> None:
     path.write_bytes(content)
 
 
-@pytest.mark.parametrize("seed", seeds(2, 25))
+@pytest.mark.parametrize("seed", seeds(1, 25))
 def test_the_advice_about_a_damaged_dataset_leads_on(
     seed: int, made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -74,21 +69,3 @@ def test_a_sweep_is_written_again(
     Path("runs/swept/dataset.h5").unlink()
     assert called(["resume", "runs/swept"]).exit_code == 0
     assert len(Path("runs/swept/dataset.h5").read_bytes()) == len(whole)
-
-
-def test_a_later_versions_warning_is_plain_words(
-    made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-
-    monkeypatch.chdir(tmp_path)
-    shutil.copytree(made / "runs/free", "runs/free")
-    path = Path("runs/free/summary.json")
-    summary = json.loads(path.read_text())
-    summary |= {"warnings": ["the moon was full"], "warning_codes": ["full_moon"]}
-    path.write_text(json.dumps(summary))
-    outcome = rigidsim.open_run("runs/free").outcome
-    assert [(caution.code, caution.text) for caution in outcome.cautions] == [
-        ("full_moon", "the moon was full")
-    ]
-    assert "the moon was full" in called(["info", "runs/free"]).output
-    assert outcome.warned(outcome.cautions).as_dict()["warning_codes"] == ["full_moon"]

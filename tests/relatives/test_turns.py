@@ -143,7 +143,7 @@ def _quickly_compiled() -> Iterator[None]:
         yield
 
 
-@pytest.mark.parametrize("seed", seeds(2, 60))
+@pytest.mark.parametrize("seed", seeds(1, 60))
 def test_spectra(seed: int) -> None:
     end, drawn = 20.0, Drawn.of(seed)
     text = drawn.text(end, lyapunov=True)
@@ -157,7 +157,7 @@ def test_spectra(seed: int) -> None:
     assert np.abs(np.sort(exponents)[::-1] - found).max() < 1e-7
 
 
-@pytest.mark.parametrize("seed", seeds(2, 60))
+@pytest.mark.parametrize("seed", seeds(1, 60))
 def test_motions_and_announced_errors(seed: int) -> None:
     """In all precisions, whose steps may exceed half a turn; half of the bodies spin about an axis."""
     draw = np.random.default_rng(seed)

@@ -3,8 +3,6 @@
 The truth is the sign of a recorded rate less a number, whose logarithm the invariant takes times nothing.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -53,7 +51,7 @@ def _registered() -> Iterator[None]:
     del OBSERVABLES[NAME]
 
 
-@pytest.mark.parametrize("seed", seeds(2, 50))
+@pytest.mark.parametrize("seed", seeds(1, 50))
 def test_drifts(seed: int, tmp_path: Path) -> None:
     draw = np.random.default_rng(seed)
     LEAST[0] = float(draw.uniform(-0.7, 0.45))

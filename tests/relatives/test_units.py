@@ -1,7 +1,5 @@
 """Units have one meaning, with scipy's value; other dimensions, and angles for numbers, are refused."""
 
-from __future__ import annotations
-
 import math
 import random
 from typing import Any
@@ -108,7 +106,7 @@ def compound(rng: random.Random) -> tuple[str, float, tuple[int, ...], int]:
     return text, value, tuple(exponents), angle
 
 
-@pytest.mark.parametrize("seed", seeds(2, 60))
+@pytest.mark.parametrize("seed", seeds(1, 60))
 def test_right_units_have_their_value(seed: int) -> None:
     """Thirty random quantities for each seed, as constants of a config."""
     rng = random.Random(seed)
@@ -121,7 +119,7 @@ def test_right_units_have_their_value(seed: int) -> None:
         assert float(config.parameters[f"p{i}"]) == pytest.approx(number * value, rel=1e-14, abs=0), text
 
 
-@pytest.mark.parametrize("seed", seeds(2, 60))
+@pytest.mark.parametrize("seed", seeds(1, 60))
 def test_a_key_takes_its_dimension_only(seed: int) -> None:
     """Ten random units at keys for each seed: right ones are taken, others refused with the remedy."""
     rng = random.Random(seed)
@@ -139,7 +137,7 @@ def test_a_key_takes_its_dimension_only(seed: int) -> None:
         assert f"which is {wanted}; units for" in str(refused.value), given
 
 
-@pytest.mark.parametrize("seed", seeds(2, 60))
+@pytest.mark.parametrize("seed", seeds(1, 60))
 def test_no_angle_is_a_number_and_no_name_means_two_things(seed: int) -> None:
     rng = random.Random(seed)
     angles = [name for name, (_, dimension, angle) in UNITS.items() if angle and dimension == (0, 0, 0, 0)]

@@ -4,8 +4,6 @@ The truth: a table of units by hand, and numpy. A body held at its centre of mas
 no torque on it; one with a position flies.
 """
 
-from __future__ import annotations
-
 import json
 
 import numpy as np
@@ -50,7 +48,7 @@ def component(rng: np.random.Generator) -> tuple[str, float]:
     return f'"{size!r}*pi/3 {unit}"', size * np.pi / 3 * UNITS[unit]
 
 
-@pytest.mark.parametrize("seed", seeds(2, 60))
+@pytest.mark.parametrize("seed", seeds(1, 60))
 def test_random_fields(seed: int) -> None:
     rng = np.random.default_rng(seed)
     fields = [[component(rng) for _ in range(3)] for _ in range(rng.integers(1, 3))]
@@ -78,7 +76,7 @@ def test_random_fields(seed: int) -> None:
         assert way == pytest.approx(-up, abs=1e-9)
 
 
-@pytest.mark.parametrize("seed", seeds(2, 50))
+@pytest.mark.parametrize("seed", seeds(1, 50))
 def test_many_sources(seed: int) -> None:
     """Of up to 300 sources all are drawn whose tide is a thousandth of the strongest one's or more."""
     rng = np.random.default_rng([2, seed])

@@ -1,7 +1,5 @@
 """What can't be run is refused before any step; the message says what was given, where and what to do."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -68,16 +66,13 @@ WHOLE = ("moment", "rate", "name")  # whose problems are of the value itself
 # by group: text, where (but for what the group begins with), phrases of the message
 IN_ONE_TABLE: dict[str, list[tuple[str, ...]]] = {
     "moment": [
-        ('"two"', 'given "two"'),
         ("true", "given true", 'a number (in kg m^2), or a string such as "8.008e37 kg m^2", is allowed'),
         ("nan", "given nan; finite numbers are allowed"),
         ('"2 kg m"', 'given "2 kg m"', "is not a unit of the dimension asked for, which is kg m^2"),
-        ('"10^99999"', 'given "10^99999"', "a whole exponent of at most 5000"),
     ],
     "part": [
         ('colour = "red"', "colour", "unknown key", "allowed: euler_angles"),
         ("quaternion = [1, 0, 0, 0], euler_angles = [0, 0, 0]", "euler_angles", "given beside quaternion"),
-        ('euler_angles = [0, 0, 0], euler_sequence = "zzx"', "euler_sequence", 'given "zzx"'),
     ],
     "ball": [
         ("reference = [1, 2]", "reference", "given 2 entries; exactly 3 are needed"),
@@ -89,19 +84,9 @@ IN_ONE_TABLE: dict[str, list[tuple[str, ...]]] = {
     ],
     "body": [
         ('shape = "spere"\nmass = 1\nradius = 1', "shape", 'given "spere"', 'did you mean "sphere"?'),
-        ('preset = "erth"', "preset", 'given "erth"', 'did you mean "earth"?', "allowed: apophis, "),
-        ("points = [{mass = 1}]", "points[0].position", "missing; it must be given"),
         ("inertia_tensor = [[1, 0.1, 0], [0.2, 1, 0], [0, 0, 1]]", "inertia_tensor[1][0]", "given 0.2, but"),
-        ("inertia_tensor = [[1, 2, 0], [2, 1, 0], [0, 0, 1]]", "inertia_tensor", "principal moments -1.0,"),
-        ("principal_moments = [0, 0, 1]", "principal_moments", "at most one can be zero (a rod's)"),
         ("principal_moments = [1, 2, 3.25]", "principal_moments", "1.0, 2.0, 3.25", "I1 + I2 >= I3"),
         ('shape = "sphere"\nmass = 1', "radius", "missing; a sphere needs it: a positive length"),
-        ('shape = "sphere"\nradius = 1', "mass", "missing; this body needs a mass"),
-        (
-            'shape = "cone"\nradius = 1\nheight = 1\nmass = 1\nreference = "corner"',
-            "reference",
-            "allowed here: center_of_mass, apex, or a point [x, y, z]",
-        ),
     ],
     "rate": [
         (
@@ -115,7 +100,6 @@ IN_ONE_TABLE: dict[str, list[tuple[str, ...]]] = {
     "spin": [
         ('euler_angles = ["1 s", 0, 0]', "euler_angles[0]", "which is rad"),
         ("angular_momentum = [1, 0, 0]", "angular_momentum", "given beside angular_velocity"),
-        ("quaternion = [0, 0, 0, 0]", "quaternion", "given zero", "[w, x, y, z]"),
     ],
     "initial": [
         ("angular_velocty = [1, 0, 0]", "angular_velocty", 'did you mean "angular_velocity"?'),
@@ -136,28 +120,21 @@ IN_ONE_TABLE: dict[str, list[tuple[str, ...]]] = {
     ],
     "until 1": [
         ('epoch = "2029-04-13T21:46:00"', "epoch", 'given "2029-04-13T21:46:00", without its time scale'),
-        ('unit = "km"', "unit", 'given "km"', "of the dimension asked for, which is s", 'such as "day"'),
         ('epoch = "2999-01-01 UTC"', "epoch", "UTC is known from 1960-01-01 to"),
         ("samples = 11.0", "samples", "given 11.0", "a whole number, without point or exponent, is allowed"),
     ],
     "time": [
         ("samples = 3", "end", "missing; it must be given, unless times are"),
-        ("end = 0", "end", "given 0.0 s; after start (0.0 s) is allowed"),
         ("times = [1, 2, 2]", "times[2]", "given 2.0 after 2.0; times must increase"),
     ],
     "integrator": [
         ('method = "rk4"', "method", 'given "rk4"', "allowed: taylor"),
-        ("hold_invariants = 1", "hold_invariants", "given 1; true, false or"),
         ("tolerance = 0", "tolerance", "given 0; allowed: above 0 and at most 1"),
         ('formulation = "canonical"', "formulation", "singularity of the sequence zxz"),
-        ("accuracy = 0", "accuracy", "given 0", "an angle above 0 and below pi"),
     ],
     "output": [
         ('record = ["angular_velocity", "enegry"]', "record[1]", 'given "enegry"', 'did you mean "energy"?'),
-        ("record = []", "record", "given an empty array", "leave the key out"),
-        ('record = ["energy", "energy"]', "record", "named twice; name each once"),
         ('record = ["position"]', "record", 'given "position"', "no position", "leave it out"),
-        ('record = ["potential_energy"]', "record", 'given "potential_energy"', "no load"),
     ],
     "limits": [
         ("wal_time = 1", "wal_time", 'did you mean "wall_time"?'),
@@ -166,7 +143,6 @@ IN_ONE_TABLE: dict[str, list[tuple[str, ...]]] = {
     "source": [
         ("position = [1, 0, 0]\norbit = {semi_major_axis = 1}", "orbit", "given orbit and position"),
         ("position = [0, 0, 0]", "position", "given the origin", "another point is allowed"),
-        ("orbit = {semi_major_axis = 1, eccentricity = 1}", "orbit.eccentricity", "given 1.0"),
     ],
     "torque": [
         ('components = ["0", "2*vx", "1"]', "components[1]", 'column 3: unknown name "vx"'),
@@ -174,13 +150,11 @@ IN_ONE_TABLE: dict[str, list[tuple[str, ...]]] = {
     ],
     "load": [
         ('kind = "uniform_gravty"', "kind", 'given "uniform_gravty"', 'did you mean "uniform_gravity"?'),
-        ('kind = "friction"', "kind", 'given "friction"; did you mean "viscous_torque" or "torque"?'),
         ('kind = "gravity_gradient"\ngravitational_parameter = 1', "orbit", "given none"),
         ('kind = "central_gravity"\ngravitational_parameter = 1', "kind", 'given "central_gravity" for a'),
     ],
     "more": [
         ('[integratr]\nprecision = "double"', "integratr", "unknown key", 'did you mean "integrator"?'),
-        ('[integrator2]\nprecision = "double', "TOML", "can't be read", "line 1"),
         ("[time]\nend = 2", "TOML", 'Cannot declare "time" twice', "line"),
         ("[fit.data]\nsigma = 1", "[[fit.data]]", "write [[fit.data]] in double brackets"),
     ],
@@ -189,9 +163,7 @@ FLYING = "angular_velocity = [1, 0, 0]\nvelocity = [0, 0, 0]"
 ROD = {"body": 'shape = "rod"\nmass = 1\nlength = 1'}
 ASKEW = {"body": "principal_moments = [1, 2, 2]\nmass = 1\ncenter_of_mass = [0, 0, 1]"}
 SUN = SOURCE + 'ephemeris = "sun"'
-FIXED = SOURCE + "position = [1, 0, 0]"
 RATES, SINGLE = {"integrator": 'formulation = "rates"'}, {"integrator": 'precision = "single"'}
-TWO_SOURCES = {"body": 'shape = "sphere"\nradius = 1\nmass = 1\nprincipal_moments = [1, 1, 1]'}
 # tables, where, phrases
 IN_SEVERAL: list[tuple[Any, ...]] = [
     ({"top": ""}, "name", "missing; it must be given"),
@@ -246,25 +218,6 @@ def test_refused_with_a_message_that_helps(
         assert foreign not in text  # no Python but the user's own
 
 
-GOOD_CASES: dict[str, dict[str, str | None]] = {
-    "as it is": {},
-    "plate: I1 + I2 = I3": {"body": "principal_moments = [1, 2, 3]"},
-    "plate printed by a double program": {"body": "principal_moments = [0.1, 0.2, 0.30000000000000004]"},
-    "rod at rest along its axis": ROD | {"initial": "angular_velocity = [1, 2, 0]"},
-    "one digit": {"integrator": "precision = 1"},
-    "every as long as the run": {"time": "end = 10\nevery = 10"},
-    "a single time": {"time": "times = [5]"},
-    "zero gravity needs no mass": {"loads": 'kind = "uniform_gravity"'},
-    "Euler start in another sequence": {"integrator": 'formulation = "euler_angles"\neuler_sequence = "xyz"'},
-}
-
-
-@pytest.mark.parametrize("case", GOOD_CASES)
-def test_accepted(case: str) -> None:
-    experiment = parse(config(**GOOD_CASES[case]))
-    assert prepare(experiment).scene.config == experiment.config
-
-
 @pytest.mark.parametrize(
     ("tables", "places"),
     [
@@ -309,26 +262,6 @@ def test_the_text_counts_the_problems_and_names_the_file() -> None:
     assert lines[2].startswith("  [time] samples: given 1.5")
 
 
-@pytest.mark.parametrize(
-    ("content", "phrases"),
-    [
-        (b"\xff\xfe\x00", ["file: not UTF-8 text (byte 0); save it as UTF-8"]),
-        (b"name = ", ["TOML: can't be read: Invalid value (at end of document)"]),
-        (b"a = [" * 100_000, ["TOML: can't be read"]),
-        (b"# " + b"x" * 4_000_000, ["file: 4000002 bytes; a config has at most 4000000"]),
-        (b"", ["name: missing", "[body]: missing", "[initial]: missing", "[time]: missing"]),
-    ],
-)
-def test_unreadable_files(tmp_path: Path, content: bytes, phrases: list[str]) -> None:
-    path = tmp_path / "scene.toml"
-    path.write_bytes(content)
-    with pytest.raises(ConfigError) as caught:
-        load(path)
-    assert str(caught.value).startswith(f"{path}: ")
-    for phrase in phrases:
-        assert phrase in str(caught.value)
-
-
 def test_missing_file_and_folder(tmp_path: Path) -> None:
     for path, why in ((tmp_path / "none.toml", "No such file"), (tmp_path, "Is a directory")):
         with pytest.raises(ConfigError) as caught:
@@ -359,12 +292,6 @@ def test_the_command_line_says_it_and_leaves_no_folder(
         assert phrase in result.stderr
     assert "Traceback" not in result.stderr
     assert not out.exists()
-
-
-@pytest.mark.parametrize("given", [3])
-def test_what_is_no_path_is_refused_in_words(given: Any) -> None:
-    with pytest.raises(ConfigError, match=r"path: given .*; the path of a config is allowed"):
-        load(given)
 
 
 def test_every_table_is_named_in_brackets() -> None:

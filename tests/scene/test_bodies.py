@@ -1,7 +1,5 @@
 """Inertia of bodies against integrals over their volume and the theorems of every mechanics course."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from fractions import Fraction
 from typing import Any
@@ -13,10 +11,9 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from rigidsim import parse
-from rigidsim.scene.arithmetic import context_for, diagonal
+from rigidsim.scene.arithmetic import context_for
 from rigidsim.scene.bodies.shapes import SHAPES
 from rigidsim.scene.scene import build_scene
-from rigidsim.solve.precision import precision_of
 
 DIGITS = 50
 CONTEXT = context_for(DIGITS)
@@ -36,13 +33,6 @@ def numbers(matrix: Any) -> np.ndarray:
 def number(value: Fraction | int) -> Any:
     value = Fraction(value)
     return CONTEXT.mpf(value.numerator) / value.denominator
-
-
-def assert_same(matrix: Any, expected: Any, scale: Any = 1) -> None:
-    """To the scene's own arithmetic."""
-    for row, other in zip(matrix, expected, strict=True):
-        for x, y in zip(row, other, strict=True):
-            assert abs(x - y) <= LAST * scale
 
 
 # ---- shapes against integrals -----------------------------------------------------------------------------
@@ -151,36 +141,7 @@ def test_shape_about_another_point_is_the_integral_from_there(name: str) -> None
     np.testing.assert_allclose(numbers(solid.center_of_mass), seen, rtol=0, atol=CLOSE)
 
 
-def test_cone_has_its_apex_below() -> None:
-    """The integral starts at the apex: seen from there the centre of mass is at 3/4 of the height."""
-    points, weights = cone(1.3, 2.4)
-    expected, center = moments_of(points, weights, 2.5)
-    top = body(f'shape = "cone"\nmass = 2.5\n{SOLIDS["cone"][0]}\nreference = "apex"')
-    np.testing.assert_allclose(numbers(top.inertia), expected, rtol=0, atol=CLOSE * expected.max())
-    np.testing.assert_allclose(numbers(top.center_of_mass), center, rtol=0, atol=CLOSE)
-    assert_same([top.center_of_mass], [[0, 0, number(Fraction(9, 5))]])
-
-
 # ---- textbook formulas, exactly ---------------------------------------------------------------------------
-
-
-def square_plate() -> tuple[Any, Fraction]:
-    plate = body('shape = "plate"\nmass = 3\nsize = [0.7, 0.7]\nreference = "corner"')
-    return plate, 3 * Fraction(49, 100)
-
-
-def test_square_plate_has_its_diagonals_as_axes() -> None:
-    plate, ma2 = square_plate()
-    for found, twelfths in zip(plate.principal_moments, (1, 7, 8), strict=True):
-        assert abs(found - number(ma2 * Fraction(twelfths, 12))) <= LAST
-    half, zero = 1 / CONTEXT.sqrt(2), CONTEXT.zero
-    along, across, normal = plate.principal_axes
-    last_bit = precision_of(DIGITS).number  # rounded to fifty digits the axes are right to the last bit
-    assert [last_bit(abs(x)) for x in along] == [last_bit(x) for x in (half, half, zero)]
-    assert along[0] * along[1] > 0
-    assert [last_bit(abs(x)) for x in across] == [last_bit(x) for x in (half, half, zero)]
-    assert across[0] * across[1] < 0
-    assert [last_bit(abs(x)) for x in normal] == [last_bit(x) for x in (zero, zero, CONTEXT.one)]
 
 
 # ---- points -----------------------------------------------------------------------------------------------
@@ -224,26 +185,6 @@ def test_points_about_the_origin(cloud: tuple[list[int], list[tuple[int, int, in
 # ---- composite bodies -------------------------------------------------------------------------------------
 
 
-def test_two_halves_are_the_whole() -> None:
-    whole = body('shape = "cuboid"\nmass = 3\nsize = [0.7, 1.9, 3.1]\nreference = [0.1, 0.2, 0.3]')
-    half = '{{shape = "cuboid", mass = 1.5, size = [0.35, 1.9, 3.1], position = [{}, 0, 0]}}'
-    parts = f"parts = [{half.format('0.175')}, {half.format('-0.175')}]\nreference = [0.1, 0.2, 0.3]"
-    joined = body(parts)
-    assert_same(joined.inertia, whole.inertia)
-    assert_same([joined.center_of_mass], [whole.center_of_mass])
-    assert joined.mass == whole.mass
-
-
-def test_a_point_part_moves_the_centre_of_mass() -> None:
-    """A light ball on a heavy one: the body turns about the common centre, at 1/4 of the distance."""
-    ball_at = '{{shape = "sphere", mass = {}, radius = 0.5, position = [0, 0, {}]}}'
-    pair = body(f"parts = [{ball_at.format(3, 0)}, {ball_at.format(1, 4)}]")
-    assert pair.center_of_mass == [0, 0, 0]
-    across, along = Fraction(2, 5) + 3 * 1 + 1 * 9, Fraction(2, 5)
-    assert_same(pair.inertia, diagonal([number(across), number(across), number(along)]))
-    assert [entry["position"][2] for entry in pair.drawing] == [-1.0, 3.0]
-
-
 @given(st.tuples(*[st.integers(-10, 10)] * 4).filter(any))
 def test_a_parts_quaternion_turns_its_tensor(q: tuple[int, ...]) -> None:
     """Part to body: I = R diag R^T, with scipy's R of the same quaternion."""
@@ -254,12 +195,7 @@ def test_a_parts_quaternion_turns_its_tensor(q: tuple[int, ...]) -> None:
     np.testing.assert_allclose(numbers(turned.inertia), r @ straight @ r.T, rtol=0, atol=CLOSE)
 
 
-@pytest.mark.parametrize(
-    "sequence",
-    [
-        "zyx",
-    ],
-)
+@pytest.mark.parametrize("sequence", ["zyx"])
 def test_a_parts_euler_angles_turn_its_tensor(sequence: str) -> None:
     """Intrinsic angles, as scipy's capitals mean them; the config's sequence unless the part has one."""
     part = 'shape = "cuboid", mass = 2, size = [0.7, 1.9, 3.1], euler_angles = ["40 deg", 0.6, "pi/4"]'

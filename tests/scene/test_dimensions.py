@@ -1,7 +1,5 @@
 """Units in expressions: what they mean, exactly, and what is refused for its dimension."""
 
-from __future__ import annotations
-
 import re
 from fractions import Fraction
 from pathlib import Path
@@ -14,8 +12,6 @@ from rigidsim.scene.exact import ExactNumber, parse_quantity
 from rigidsim.scene.expressions.names import BODY_NAMES
 from rigidsim.scene.expressions.parser import parse_expression
 from rigidsim.scene.expressions.tree import (
-    FUNCTIONS,
-    PIECEWISE,
     Constant,
     Expression,
     ExpressionError,
@@ -148,9 +144,3 @@ def test_every_example_of_the_page_has_the_value_shown(name: str, example: str, 
     digits = len(shown.lstrip("-0.").replace(".", ""))
     allowed = abs(found) * CONTEXT.mpf(10) ** -digits if digits > 4 else CONTEXT.mpf(10) ** -40
     assert abs(found - CONTEXT.mpf(shown)) <= 5 * allowed
-
-
-def test_every_function_has_its_example() -> None:
-    assert sorted(row[0] for row in ROWS) == sorted([*FUNCTIONS, *PIECEWISE])
-    text = PAGE.read_text(encoding="utf-8")
-    assert all(f"`{key} = {value}`" in text for key, value in STATE.items())

@@ -1,7 +1,5 @@
 """The Earth's axes at a date, against ERFA."""
 
-from __future__ import annotations
-
 import erfa
 import numpy as np
 import pytest
@@ -14,8 +12,7 @@ ARCSEC = np.pi / (180 * 3600)
 
 
 @pytest.mark.parametrize(
-    "date",
-    ["2025-06-01T03:04:05 UTC", "2016-12-31T23:59:59 UTC", "2000-01-01T12:00:00 TDB"],
+    "date", ["2025-06-01T03:04:05 UTC", "2016-12-31T23:59:59 UTC", "2000-01-01T12:00:00 TDB"]
 )
 def test_they_are_those_of_the_mean_pole_and_of_sidereal_time(date: str) -> None:
     epoch, context = parse_epoch(date), context_for("double")

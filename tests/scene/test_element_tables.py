@@ -1,7 +1,5 @@
 """Tables of elements: what is read, what is refused, and how well they are interpolated."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import mpmath

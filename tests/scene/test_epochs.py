@@ -1,7 +1,5 @@
 """Epochs: what time zero of a scene is, in five time scales, with leap seconds where they are."""
 
-from __future__ import annotations
-
 from decimal import Decimal
 from fractions import Fraction
 

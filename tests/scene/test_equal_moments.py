@@ -1,7 +1,5 @@
 """Two principal moments are equal if they differ by the rounding of the numbers that were given."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import mpmath
@@ -101,18 +99,3 @@ def test_nearly_symmetric_bodies_have_three_moments(difference: float, digits: i
             assert float((middle - small) / difference) == pytest.approx(
                 1, abs=16 * 10.0 ** (1 - digits) / difference + 1e-12
             )
-
-
-def test_three_points_on_a_circle_are_a_symmetric_body() -> None:
-    """Written as a program writes them, with 16 digits, on a circle that lies askew."""
-    random = np.random.default_rng(28)
-    for _ in range(20):
-        axes = np.linalg.qr(random.normal(size=(3, 3)))[0]
-        begin = random.uniform(0, 6)
-        points = [
-            (axes.T @ [np.cos(a), np.sin(a), 0.0]).tolist() for a in begin + np.arange(3) * 2 * np.pi / 3
-        ]
-        rows = ", ".join(f"{{mass = 0.5, position = {p!r}}}" for p in points)
-        found = scene(f"points = [{rows}]")
-        assert found.figure.described == "axis of symmetry"
-        assert sine_between(found.figure.pole, axes[2]) <= 1e-14

@@ -1,7 +1,5 @@
 """Files of gravity fields: ICGEM and SHADR, read exactly, cut to what is asked for, or refused."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 
@@ -122,18 +120,6 @@ def test_the_text_belongs_to_the_config_to_the_degree_that_is_asked(tmp_path: Pa
         prepare(again.replace({"loads[0].degree": 5}))
 
 
-def test_a_degree_beside_the_file_and_one_of_a_sweep_decide_what_is_kept(tmp_path: Path) -> None:
-    experiment = saved(tmp_path, gfc(), degree=3)
-    assert "gfc 4 0" not in experiment.text
-    with pytest.raises(ConfigError, match="ends at degree 3"):
-        prepare(experiment)
-    (tmp_path / "scene.toml").write_text(
-        text('{file = "lumps.gfc"}', degree=2)
-        + '\n[sweep]\nkeep = ["final"]\naxes."loads[0].degree" = {values = [2, 4]}\n'
-    )
-    assert "gfc 4 4" in rigidsim.load(tmp_path / "scene.toml").text
-
-
 def test_every_digit_is_kept(tmp_path: Path) -> None:
     """In 40 digits a file is the list of its unnormalized numbers, to the last digit."""
     digits = "1.234567890123456789012345678901234567890e-5"
@@ -176,11 +162,3 @@ def test_a_bad_file_is_refused_with_the_reason(tmp_path: Path, which: str) -> No
     field, message = REFUSED[which]
     with pytest.raises(ConfigError, match=re.escape(message)):
         prepare(saved(tmp_path, field))
-
-
-def test_a_missing_file_is_refused(tmp_path: Path) -> None:
-    (tmp_path / "scene.toml").write_text(text('{file = "lumps.gfc"}'))
-    with pytest.raises(ConfigError, match=r"lumps\.gfc is looked for, beside the config"):
-        rigidsim.load(tmp_path / "scene.toml")
-    with pytest.raises(ConfigError, match="without files beside it; put the file's text into"):
-        prepare(rigidsim.parse(text('{file = "lumps.gfc"}')))

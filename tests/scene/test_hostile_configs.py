@@ -1,7 +1,5 @@
 """Configs from strangers: refused with one clear message, or read; no traceback and no hang."""
 
-from __future__ import annotations
-
 import resource
 import time
 from pathlib import Path

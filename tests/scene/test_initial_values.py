@@ -1,16 +1,10 @@
 """Expressions without a value at the start of a run are refused, with the place and the values there."""
 
-from __future__ import annotations
-
-from typing import Any
-
-import heyoka as hy
 import pytest
 from support import run_text
 
 import rigidsim
 from rigidsim import ConfigError
-from rigidsim.model.loads import LoadModel
 from rigidsim.solve.problem import prepare
 
 SCENE = """name = "start"
@@ -64,20 +58,6 @@ def test_a_value_that_is_lost_later_is_no_matter_of_the_start() -> None:
     assert 4 < run.summary["engine_time"] <= 5
 
 
-@pytest.mark.parametrize("precision", ["double", "quadruple"])
-def test_loads_from_python(precision: str) -> None:
-    class Pole(LoadModel):
-        title = "pole"
-
-        def torque(self, m: Any) -> list[Any]:
-            one = m.scene.context.one
-            return [([one, 0, 0], hy.log(m.rates[0]))]
-
-    experiment = rigidsim.parse(SCENE.format(initial="", loads="", precision=precision))
-    with pytest.raises(ConfigError, match="derivatives of wx, work aren't finite at the start"):
-        prepare(experiment, loads=[Pole()])
-
-
 NO_DERIVATIVE = "has no finite derivative at the start"
 
 
@@ -102,11 +82,3 @@ def test_roots_of_zero_at_the_start_are_refused_wherever_they_stand() -> None:
     moved = SCENE.replace("[1, 2, 3]", '["1 + sqrt(t - 2)/20", 2, 2.5]')
     with pytest.raises(ConfigError, match="principal_moments"):
         rigidsim.run(rigidsim.parse(moved.format(initial="", loads="", precision="double")), out=None)
-
-
-@pytest.mark.parametrize("derivative", ["sqrt(s^2)", "sqrt((t - 2)^2)*wy", "sqrt(s + 1)"])
-def test_roots_that_have_series_are_none_of_these(derivative: str) -> None:
-    """A square's root is an absolute value, which steps end at; near zero is not zero."""
-    state = f'[[states]]\nname = "s"\nderivative = "{derivative}"\n'
-    run = run_text(SCENE.format(initial="", loads=state, precision="double"))
-    assert run.status == "finished"

@@ -1,7 +1,5 @@
 """``[time] times = "FILE"``: sample times from the column of time of a table, digit by digit."""
 
-from __future__ import annotations
-
 from fractions import Fraction
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """An orbit's pace: by its anomalistic period, its sidereal period, or the rate of its longitude."""
 
-from __future__ import annotations
-
 import math
 import random
 from typing import Any
@@ -55,8 +53,7 @@ def test_64_random_paces_are_exact() -> None:
 
 
 @pytest.mark.parametrize(
-    "elements",
-    ["eccentricity = 0.2, inclination = 0.3", "eccentricity = 0, inclination = 0"],
+    "elements", ["eccentricity = 0.2, inclination = 0.3", "eccentricity = 0, inclination = 0"]
 )
 def test_the_mean_longitude_returns_after_the_sidereal_period(elements: str) -> None:
     """Node, periapsis and anomaly together, however a circle's or an untilted orbit's are carried."""

@@ -1,7 +1,5 @@
 """``--set KEY=VALUE``: the same config as if it had been written so, and a text that says so."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest
@@ -77,21 +75,6 @@ def test_no_comment_is_executed(text: str, tmp_path: Path) -> None:
         assert experiment.config.time.end is not None
         assert experiment.config.time.end.rational == 10
         assert "#:set time.end=20" in experiment.text
-
-
-def test_later_overrides_win_also_over_those_in_the_file(tmp_path: Path) -> None:
-    path = tmp_path / "config.toml"
-    path.write_text(parse(BASE, overrides=["time.end=1", "time.end=2"]).text, encoding="utf-8")
-    assert load(path).config.time.end.rational == 2
-    assert load(path, overrides=["time.end=3"]).config.time.end.rational == 3
-    path.write_text(load(path, overrides=["time.end=3"]).text, encoding="utf-8")
-    assert load(path).config.time.end.rational == 3
-
-
-def test_without_overrides_the_text_is_as_given(tmp_path: Path) -> None:
-    path = tmp_path / "scene.toml"
-    path.write_text(BASE + "# a remark without a final line end", encoding="utf-8")
-    assert load(path).text == path.read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize(

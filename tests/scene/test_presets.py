@@ -1,7 +1,5 @@
 """Published bodies, held against published facts that they were not made from, where there are any."""
 
-from __future__ import annotations
-
 import math
 from fractions import Fraction
 from typing import Any
@@ -251,30 +249,6 @@ def test_a_cubesat_is_the_sum_of_its_parts() -> None:
     assert float(found.mass) == pytest.approx(total, rel=1e-15)
     assert np.diag(tensor) == pytest.approx([float(m) for m in found.principal_moments], rel=1e-13)
     assert len(found.drawing) == 5
-
-
-MOMENTS_OF_MARS = [float(m) for m in body("mars").principal_moments]
-CASES = {
-    "mass = 1e23": ([m * 1e23 / 6.41691e23 for m in MOMENTS_OF_MARS], 1e23),
-    "principal_moments = [1, 2, 2.5]": ([1, 2, 2.5], 6.41691e23),
-    'shape = "sphere"\nradius = 10\nmass = 3': ([120] * 3, 3),
-    "points = [{mass = 1, position = [1, 0, 0]}, {mass = 1, position = [-1, 0, 0]}]": ([0, 2, 2], 2),
-}
-
-
-@pytest.mark.parametrize("keys", CASES)
-def test_keys_beside_a_preset_take_the_place_of_its_own(keys: str) -> None:
-    found = body_of(f'preset = "mars"\n{keys}')
-    moments, mass = CASES[keys]
-    assert [float(m) for m in found.principal_moments] == pytest.approx(moments, rel=1e-14)
-    assert float(found.mass) == pytest.approx(mass, rel=1e-14)
-    assert "preset mars (" in found.source
-    heavier = body_of('preset = "cubesat_3u"\nmass = 6')
-    assert float(heavier.principal_moments[2]) == pytest.approx(
-        1.5 * float(body("cubesat_3u").principal_moments[2])
-    )
-    named = body_of('preset = "cubesat_3u"\nprincipal_moments = [1, 1, 1]')
-    assert (float(named.mass), len(named.drawing)) == (4.0, 5)
 
 
 def test_a_whole_presets_keys_are_overridden_one_by_one() -> None:

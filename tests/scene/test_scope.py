@@ -1,7 +1,5 @@
 """What isn't modelled is answered with what to use instead, wherever a config asks for it by its name."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

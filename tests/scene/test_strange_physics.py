@@ -1,7 +1,5 @@
 """What a stranger may write about real bodies: refused beforehand with good words, or told as doubtful."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import subprocess

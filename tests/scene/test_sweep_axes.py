@@ -1,7 +1,5 @@
 """Sweeps: the exact values that members are known by, and what is no sweep."""
 
-from __future__ import annotations
-
 from fractions import Fraction
 from math import sqrt
 
@@ -110,23 +108,6 @@ def test_directions_lie_on_the_sphere_and_cover_it() -> None:
     assert len(unit.axes[0].columns) == 4
 
 
-def test_words_and_whole_vectors_are_values_too() -> None:
-    table = 'axes."integrator.formulation" = {values = ["quaternion", "euler_angles"]}\n'
-    table += 'axes."body.principal_moments" = {values = [[1, 2, 2.5], [1, "3/2", 2]], name = "shape"}'
-    sweep = swept(table)
-    assert [axis.numeric for axis in sweep.axes] == [False, True]
-    assert sweep.texts(3) == ('"euler_angles"', "[1, 1.5, 2]")
-    config = sweep.experiment_of(3).config
-    assert config.integrator.formulation == "euler_angles"
-    assert config.body.principal_moments[1].rational == Fraction(3, 2)
-
-
-def test_a_setting_reaches_a_key_with_points_in_it() -> None:
-    text = f"{BASE}[sweep]\n{RATE} = {{linspace = [0, 1, 3]}}\n"
-    experiment = parse(text, overrides=['sweep.axes."initial.angular_velocity[2]".linspace=[0, 2, 5]'])
-    assert values(Sweep.of(experiment)) == [("0",), ("0.5",), ("1",), ("1.5",), ("2",)]
-
-
 REFUSED = {
     "nan": (f"{RATE} = {{values = [0.1, nan]}}", "finite numbers are allowed"),
     "too many": (
@@ -154,9 +135,3 @@ def test_what_is_no_sweep_is_refused(case: str) -> None:
         swept(table)
     assert told in str(caught.value)
     assert "[sweep]" in str(caught.value)
-
-
-def test_a_member_that_cannot_be_is_named() -> None:
-    with pytest.raises(ConfigError) as caught:
-        swept('axes."time.samples" = {values = [2, 2.5]}').experiment_of(1)
-    assert "member 1 (samples = 2.5)" in str(caught.value)

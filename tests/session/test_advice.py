@@ -1,7 +1,5 @@
 """What a run says would do better does, by as much; and what can't be promised isn't said."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest
@@ -49,12 +47,6 @@ def test_advice_keeps_its_word(plain: rigidsim.Run, code: AdviceCode, key: str, 
     better = run(LONG, changes={key: value})
     # "about": the estimate of a held run has a margin of 3 over what it found against the closed form
     assert error(better) <= 3 * promised["then"]
-
-
-def test_short_runs_and_exact_ones_need_none() -> None:
-    short = config(time="end = 3\nsamples = 11", estimate=True)
-    assert advised(run(short)) == {}
-    assert advised(run(LONG, changes={"integrator.method": "closed_form"})) == {}
 
 
 def test_what_has_no_closed_form_is_promised_nothing() -> None:

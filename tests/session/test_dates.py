@@ -1,7 +1,5 @@
 """Dates along time: years, Julian dates and calendar dates of samples and events, where time 0 is known."""
 
-from __future__ import annotations
-
 import warnings
 from fractions import Fraction
 from pathlib import Path
@@ -12,7 +10,6 @@ import xarray
 from support import EAGER, config, run_text
 
 import rigidsim
-from rigidsim import ConfigError
 from rigidsim.scene.epochs import parse_epoch
 
 FLYBY = parse_epoch("2029-04-13T21:46:00 TDB")
@@ -81,18 +78,3 @@ def test_a_run_with_an_epoch_has_its_dates_as_coordinates(tmp_path: Path) -> Non
     with cut.opened(indexed=False) as bare:
         assert not bare.xindexes
     assert rigidsim.verify(run.folder.path).identical
-
-
-@pytest.mark.parametrize(
-    ("events", "double"),
-    [
-        (["julian"], "julian_date"),
-        (["energy"], "energy"),
-        (["flip_time", "flip"], "flip_time"),
-    ],
-)
-def test_events_whose_names_are_taken_are_refused(events: list[str], double: str) -> None:
-    tables = "".join(FLIP.replace("flip", name) for name in events)
-    text = config(time='end = 2\nepoch = "J2000"', more=tables)
-    with pytest.raises(ConfigError, match=f'given "{events[-1]}", by which .* the name "{double}" twice'):
-        run_text(text)

@@ -1,7 +1,5 @@
 """Guards are exact and outcomes depend on the motion alone: not on the clock, nor on how a run is driven."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Bit for bit: however a run is driven or sampled, and one bare call of heyoka."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 

@@ -2,8 +2,6 @@
 eighth of the precision's epsilon, below which orders rise and errors don't fall.
 """
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from support import EPSILON, angle_between, cases, config, run_text
@@ -58,17 +56,3 @@ def test_one_far_below_is_refused_as_a_tolerance(precision: str, tolerance: str)
     """Also where the precision can't hold it: the scene's own numbers aren't at fault."""
     with pytest.raises(ConfigError, match=r"\[integrator\] tolerance: given .* gain nothing"):
         prepare(rigidsim.parse(config(integrator=f'precision = "{precision}"\ntolerance = {tolerance}')))
-
-
-@pytest.mark.parametrize("tolerance", ["0", "nan", "2", '"1 m"'])
-def test_what_is_no_tolerance_is_refused(tolerance: str) -> None:
-    with pytest.raises(ConfigError, match=r"\[integrator\] tolerance: given "):
-        rigidsim.parse(config(integrator=f"tolerance = {tolerance}"))
-
-
-def test_lost_digits_are_blamed_on_the_loose_tolerance() -> None:
-    text = config(time="end = 20\nsamples = 9", integrator="tolerance = 0.1", estimate=True)
-    (warning,) = run_text(text, estimate=True).summary["warnings"]
-    assert "digits are gone" in warning
-    assert 'choose tolerance = "auto"' in warning
-    assert "higher precision" not in warning

@@ -1,7 +1,5 @@
 """The double path of the closed forms: right to rounding at any horizon, next to anything singular."""
 
-from __future__ import annotations
-
 import mpmath
 import numpy as np
 import pytest
@@ -104,12 +102,3 @@ def test_a_top_and_a_throw_in_closed_form() -> None:
 def test_what_has_none_is_refused(table: str, message: str) -> None:
     with pytest.raises(ConfigError, match=rf"\[integrator\] method: given \"closed_form\".*{message}"):
         rigidsim.plan(rigidsim.parse(f"{FREE}{table}\n"))
-
-
-def test_plan_says_where_it_applies() -> None:
-    taylor = FREE.replace('method = "closed_form"', "")
-    assert rigidsim.plan(rigidsim.parse(taylor)).closed_form is not None
-    damped = taylor.replace("[time]", '[[loads]]\nkind = "viscous_torque"\ncoefficients = [1, 1, 1]\n[time]')
-    plan = rigidsim.plan(rigidsim.parse(damped))
-    assert plan.closed_form is None
-    assert "viscous" in plan.closed_form_why_not

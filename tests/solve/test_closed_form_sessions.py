@@ -1,7 +1,5 @@
 """A run in closed form needs no Taylor engine, and goes on after a kill bit for bit."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,15 +1,10 @@
 """Steps of motions whose series end, which could be as long as anything: what happens within is found."""
 
-from __future__ import annotations
-
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
 from support import cases, config, run_text
-
-import rigidsim
 
 THROWN = config(
     "principal_moments = [1, 1, 1]\nmass = 1",
@@ -70,50 +65,3 @@ def test_a_series_with_gaps_bounds_the_step(power: int) -> None:
     # roundings of a few steps, and of an angle of some turns
     steps = sparse.summary["cost"]["steps"]
     assert np.abs(quaternion[-1] - exact).max() < 8 * 2.0**-52 * max(turned, 1.0) * math.sqrt(steps)
-
-
-def from_rest(torque: str, time: str, load: str = "", initial: str = "", integrator: str = "") -> str:
-    """A sphere under a torque."""
-    return config(
-        "principal_moments = [1, 1, 1]",
-        f"angular_velocity = [0, 0, 0]\n{initial}",
-        [f'kind = "torque"\ncomponents = [{torque}]', load],
-        time,
-        integrator,
-        'record = ["quaternion"]',
-    )
-
-
-def test_it_does_where_steps_end_at_the_rows_of_a_table(tmp_path: Path) -> None:
-    """A gradient has no torque on a sphere; a row every 200 s (0.3 t for 4 s was 5e-3 off, in one step)."""
-    rows = [f"{t}, 1, 0, 0, 0, 0, {1e-3 * t}" for t in range(-1000, 1001, 200)]
-    header = "time, semi_major_axis, eccentricity, inclination, ascending_node, periapsis, mean_anomaly"
-    (tmp_path / "orbit.csv").write_text("\n".join([header, *rows]))
-    gradient = 'kind = "gravity_gradient"\ngravitational_parameter = 1e-6\norbit = {table = "orbit.csv"}'
-    scene = tmp_path / "scene.toml"
-    scene.write_text(from_rest('"0", "0", "0.3*t"', "end = 4\nsamples = 2", gradient))
-    run = rigidsim.run(scene, out=None)
-    half = 0.3 * 4**3 / 12
-    exact = np.array([math.cos(half), 0, 0, math.sin(half)])
-    bound = 8 * 2.0**-52 * 2 * half * math.sqrt(run.summary["cost"]["steps"])
-    assert np.abs(run.dataset["quaternion"].values[-1] - exact).max() < bound
-
-
-def test_it_does_in_the_sequence_that_takes_over_at_the_start() -> None:
-    """Near the singularity of the one asked for, where no step is longer than a radian (1.5e-11 off)."""
-    axis = np.array([2, 4, -3]) / math.sqrt(29)
-    text = from_rest(
-        ", ".join(f'"{0.046875 * x!r}*t"' for x in axis.tolist()),
-        "end = 4\nsamples = 2",
-        initial="euler_angles = [0.3, 1.5, 0.2]",
-        integrator='formulation = "euler_angles"\neuler_sequence = "xyz"',
-    )
-    run = run_text(text)
-    begin, end = run.dataset["quaternion"].values
-    half = 0.046875 * 4**3 / 12  # the axis is that of the body, to which the quaternion's right side belongs
-    s, v, turned = begin[0], begin[1:], math.sin(half) * axis
-    cosine = math.cos(half)
-    exact = [s * cosine - v @ turned, *(s * turned + cosine * v + np.cross(v, turned))]
-    # angles are rounded in a chart whose derivatives are at most 1 / sin(pi / 6)
-    bound = 8 * 2.0**-52 * 2 * math.sqrt(run.summary["cost"]["steps"])
-    assert np.abs(end - exact).max() < bound

@@ -1,7 +1,5 @@
 """Pulses and spikes late in a run: their impulse is the one that was written, not that of rounded times."""
 
-from __future__ import annotations
-
 import math
 from itertools import product
 from pathlib import Path
@@ -76,21 +74,6 @@ def test_narrow_beside_the_last_digit_of_the_time(case: tuple[str, str]) -> None
     assert abs(gained - exact) <= (4 if kind == "pulse" else 2 * math.sqrt(50)) * EPSILON[precision]
 
 
-@pytest.mark.slow
-def test_pulses_of_a_square_wave_don_t_wander() -> None:
-    """Each switch is at its own exact time: after 1000 of them the rate is a triangle wave's."""
-    text = LATE.format(spin=0, torque="sign(sin(pi*t))", end=1001, precision="double")
-    assert abs(run_text(text).dataset["angular_velocity"].values[-1, 2] - 1) <= 1e-14
-
-
-def test_soft_switches_keep_their_digits() -> None:
-    """tanh near -1, whose own series would amplify a rounding by e^2u within a step."""
-    torque = "(1 - tanh((t - 449)/0.041)^2)/0.041"
-    text = LATE.format(spin=0, torque=torque, end=500, precision="double")
-    gained = run_text(text).dataset["angular_velocity"].values[-1, 2]
-    assert abs(gained - 2) <= 2 * math.sqrt(100) * EPSILON["double"]  # of some hundred steps
-
-
 U = "((t - 700.3)/{w})"
 NARROW = {
     "triangle": (f"max(0, 1 - abs({U} - 1))", 1.0),
@@ -133,12 +116,6 @@ def test_pulses_beyond_two_numbers_are_refused_with_the_reason() -> None:
     summary = run_text(LATE.format(spin=0, torque=torque, end=1000, precision="double")).summary
     assert summary["status"] == "stopped: switching unresolved"
     assert "two numbers of double precision don't tell its impulse" in summary["message"]
-
-
-def test_a_pulse_of_no_consequence_is_no_reason_to_stop() -> None:
-    """As of 0.3 beside 0.1 + 0.2."""
-    text = LATE.format(spin=1, torque="pulse(t, 0.3, 0.30000000000000004)", end=2, precision="single")
-    assert run_text(text).dataset["angular_velocity"].values[-1].tolist() == [0, 0, 1]
 
 
 @pytest.mark.parametrize(

@@ -1,7 +1,5 @@
 """Projected invariants stay at their initial values to the last bit, to the gain of the attitude."""
 
-from __future__ import annotations
-
 import json
 import math
 from itertools import product
@@ -9,8 +7,7 @@ from itertools import product
 import numpy as np
 import pytest
 import xarray
-from equations import Random, array
-from support import EPSILON, angle_between, cases, config, law, loaded, run_text
+from support import EPSILON, cases, config, loaded, run_text
 
 import rigidsim
 
@@ -101,33 +98,6 @@ def test_every_precision_is_held_in_the_next(precision: str) -> None:
     assert max(drifts(found).values()) < rounding(precision)
 
 
-def attitude(found: rigidsim.Run) -> np.ndarray:
-    return loaded(found)["quaternion"].values[-1:]
-
-
-@pytest.mark.campaign
-def test_attitude_errors_no_longer_grow_faster_than_the_root_of_the_steps() -> None:
-    """Against 80-bit runs, whose own error is 2000 times smaller than a plain double's. Between corrections
-    the frequency is off by the wander of energy and momentum, some eps sqrt(k) after k steps, and its part
-    over the ends is taken back: eps K sqrt(N / 12) in all over N steps K apart, where the law without
-    correction has eps N^1.5 / (2 sqrt 3).
-    """
-    random, time = Random(7), 2e4
-    held, plain = [], []
-    for _ in range(5):
-        rates = random.generator.uniform(0.3, 1.0, 3)
-        parts = (FREE[0], f"angular_velocity = {array(rates)}\n{ATTITUDE}", "")
-        reference = attitude(run(parts, time, 'precision = "extended"', 2))
-        for found, hold in ((held, "true"), (plain, "false")):
-            trial = run(parts, time, f"hold_invariants = {hold}", 2)
-            found.append(angle_between(attitude(trial), reference)[0])
-    steps = trial.summary["cost"]["steps"]
-    assert max(held) < EPSILON["double"] * STEPS_BETWEEN * math.sqrt(steps / 12)
-    # the law bounds what runs scatter below; the gain is its quotient, of which chance takes a part
-    assert np.median(plain) < law(EPSILON["double"], steps, 2.0, time)
-    assert np.median(held) < np.median(plain) / 30
-
-
 def test_nothing_to_hold_is_refused() -> None:
     driven = (FREE[0], FREE[1], 'kind = "viscous_torque"\ncoefficients = [0.1, 0.1, 0.1]')
     with pytest.raises(rigidsim.ConfigError, match=r"\[integrator\] hold_invariants.*nothing constant"):
@@ -186,23 +156,3 @@ def test_what_was_put_back_along_time_is_what_the_drift_would_have_been(formulat
             assert values[0] == 0
             assert values[-1] == rows[name.removesuffix("_put_back")]["put_back"]
             assert len(np.unique(values)) > 20  # it changes along the way
-
-
-@pytest.mark.parametrize(
-    "precision", cases(['"single"', '"double"', '"extended"', '"quadruple"', "25"], ['"double"'])
-)
-def test_what_was_put_back_does_not_depend_on_when_it_is_looked_at(precision: str) -> None:
-    """Dense samples come in grids, single ones after skipped steps: the same bits at the same times."""
-    end = 64 if precision in ('"quadruple"', "25") else 512
-    integrator = f"hold_invariants = true\nprecision = {precision}\n"
-    often, rarely, seldom = (
-        run_text(LOOSE.format(time=f"end = {end}\nsamples = {n}", integrator=integrator), f'name="n{n}"')
-        for n in (4 * end + 1, end // 16 + 1, 3)
-    )
-    with often.dataset as dense, rarely.dataset as sparse, seldom.dataset as ends:
-        all_of_them = put_back_of(dense)
-        assert len(all_of_them) == 3
-        for name, values in all_of_them.items():
-            assert np.any(values != 0)
-            np.testing.assert_array_equal(sparse[name].values, values[::64])
-            np.testing.assert_array_equal(ends[name].values, values[:: 2 * end])

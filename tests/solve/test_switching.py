@@ -3,15 +3,13 @@
 Truth is what each side integrates to by itself, in closed form.
 """
 
-from __future__ import annotations
-
 from itertools import product
 from typing import Any
 
 import mpmath
 import numpy as np
 import pytest
-from support import EPSILON, angles_between, cases, config, run_text
+from support import EPSILON, angles_between, cases, config
 
 import rigidsim
 from rigidsim import ConfigError
@@ -100,12 +98,6 @@ def test_dry_friction_brings_the_body_to_rest_and_holds_it(precision: str) -> No
         assert abs(found["qz"] - mpmath.sin(half)) < 16 * EPSILON[precision]
 
 
-def test_it_sticks_until_what_pulls_is_stronger() -> None:
-    """From rest under -0.3 sign(w) + 0.1 t it slips at t = 3: then w = 0.05 (t - 3)^2."""
-    _, found = about_z("-0.3*sign(wz) + 0.1*t")
-    assert abs(float(found["wz"]) - 2.45) < 8 * EPSILON["double"] * 2.45
-
-
 def test_friction_about_three_axes_ends_in_rest() -> None:
     """Three surfaces at once; the work is minus the energy at the start."""
     friction = ", ".join(f'"-0.3*sign(w{axis})"' for axis in "xyz")
@@ -190,31 +182,6 @@ def test_all_formulations_agree(scene: str) -> None:
         assert angles_between(truth.attitudes, found.attitudes).max() < 1e-11
 
 
-def test_an_event_on_a_surface_is_found_once() -> None:
-    """The torque's own surface as an event, and one whose own kink lies there."""
-    text = config(
-        SPHERE,
-        "angular_velocity = [0, 0, 1]",
-        'kind = "torque"\ncomponents = ["0", "0", "-1 - 0.5*sign(wz)"]',
-        "end = 5\nsamples = 3",
-        more='[[events]]\nname = "still"\nexpression = "wz"\n'
-        '[[events]]\nname = "half"\nexpression = "abs(wz) - 0.5"\n',
-    )
-    dataset = run_text(text).dataset
-    # 1 - 1.5 t, then -0.5 (t - 2/3)
-    assert dataset["still_time"].values == pytest.approx([2 / 3], rel=8 * EPSILON["double"])
-    assert dataset["half_time"].values == pytest.approx([1 / 3, 5 / 3], rel=8 * EPSILON["double"])
-
-
-def test_a_load_odd_in_the_quaternion_is_refused() -> None:
-    text = config(loads='kind = "torque"\ncomponents = ["0.5*qx", "0", "0.2*qw"]')
-    with pytest.raises(ConfigError) as refused:
-        prepare(rigidsim.parse(text))
-    for words in ("[[loads]] number 1", "sign of the quaternion", "qw*qx", "sign(qw)*qx"):
-        assert words in str(refused.value)
-    prepare(rigidsim.parse(text.replace("0.5*qx", "qw*qx").replace("0.2*qw", "sign(qw)*qx")))
-
-
 @pytest.mark.parametrize(
     ("text", "words"),
     [
@@ -238,15 +205,6 @@ def test_what_would_be_wrong_is_refused(text: str, words: list[str]) -> None:
         prepare(rigidsim.parse(text))
     for word in words:
         assert word in str(refused.value)
-
-
-def test_a_plan_lists_the_surfaces_each_once() -> None:
-    """2*wz and -wz are zero together; smooth powers have no surface."""
-    torque = '"sign(2*wz)", "abs(-wz)*min(t, 3)", "-0.1*psi + sqrt(wx^4)"'
-    text = config(initial=TILTED, loads=f'kind = "torque"\ncomponents = [{torque}]')
-    plan = rigidsim.plan(rigidsim.parse(text), pilot_seconds=0.0)
-    assert [surface.surface for surface in plan.switching] == ["sign(2*wz)", "min(t, 3)"]
-    assert plan.turning == ["psi"]
 
 
 def test_a_norm_that_vanishes_is_not_passed_over() -> None:

@@ -1,14 +1,10 @@
 """Turns of Euler angles are those of the motion, however far apart the samples lie."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
 import pytest
-from support import bits, cases, config, loaded, run_text
-
-import rigidsim
+from support import bits, cases, config, run_text
 
 ANGLES = 'record = ["quaternion", "euler_angles"]'
 SYMMETRIC = "principal_moments = [1, 1, 1.5]"
@@ -59,23 +55,6 @@ def test_a_tumbling_body_that_passes_poles_has_the_angles_that_states_have() -> 
     np.testing.assert_array_equal(bits(ours.dataset["quaternion"]), bits(without.dataset["quaternion"]))
 
 
-def test_a_faster_spin_than_expected_is_counted() -> None:
-    """A torque about the axis speeds the body up to sixty times: psi = a t^2 / 2 + w t."""
-    body, start = SYMMETRIC, "angular_velocity = [0, 0, 1]\neuler_angles = [0, 1, 0]"
-    torque = 'kind = "torque"\ncomponents = [0, 0, "1.5*0.6"]'
-    run = run_text(config(body, start, torque, "end = 100\nsamples = 3", "", ANGLES))
-    assert run.dataset["euler_angles"].values[:, 2] == pytest.approx([0, 800, 3100], abs=1e-6)
-
-
-def within_one_turn(run: rigidsim.Run, since: float) -> None:
-    dataset = loaded(run)
-    assert dataset.attrs["angles_wrapped_from"] == since
-    late = dataset["euler_angles"].values[dataset["time"].values >= since]
-    assert np.abs(late).max() <= math.pi
-    assert run.summary["warning_codes"] == ["not_joined"]
-    assert f"from {since:.6g} " in run.summary["warnings"][0]
-
-
 def test_angles_at_events_are_within_one_turn_and_say_so() -> None:
     """Nobody follows the motion from event to event; phi = 0.3 + 2 t."""
     event = '[[events]]\nname = "level"\nexpression = "wx"'
@@ -104,10 +83,3 @@ def test_turns_of_a_motion_with_switching_surfaces() -> None:
         sparse.dataset["euler_angles"].values, dense.dataset["euler_angles"].values[::200]
     )
     assert not sparse.summary["warnings"]
-
-
-def test_turns_that_a_load_reads_are_not_counted_from_samples() -> None:
-    torque = 'kind = "torque"\ncomponents = ["-0.001*psi", 0, 0]'
-    within_one_turn(run_text(config(loads=torque, time="end = 30\nsamples = 4", output=ANGLES)), 0.0)
-    dense = run_text(config(loads=torque, time="end = 30\nsamples = 301", output=ANGLES), 'name="d"')
-    assert "angles_wrapped_from" not in dense.dataset.attrs

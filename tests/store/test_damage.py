@@ -1,7 +1,5 @@
 """Segments torn, missing, foreign, edited or old: named, moved aside, and made again with the same bits."""
 
-from __future__ import annotations
-
 import os
 import shutil
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """A run in memory has the dataset that its file would have, as xarray reads it."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

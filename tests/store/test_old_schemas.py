@@ -1,7 +1,5 @@
 """Files of the schema of 1.0 are read for good; those of any other are refused with the reason."""
 
-from __future__ import annotations
-
 import shutil
 from collections.abc import Callable
 from pathlib import Path

@@ -1,11 +1,8 @@
 """The run folder: nothing finished is overwritten by accident, nothing foreign is touched."""
 
-from __future__ import annotations
-
 import json
 import math
 from collections.abc import Callable
-from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -14,8 +11,6 @@ import pytest
 
 import rigidsim
 from rigidsim import RunFolderError
-from rigidsim.store.atomic import replacing
-from rigidsim.store.summary import read_summary
 
 
 @pytest.fixture
@@ -60,18 +55,6 @@ def test_foreign_files_are_left_alone(force: bool, tmp_path: Path, free_body: Ca
     assert thesis.read_text() == "years of work"
 
 
-def test_a_place_that_cannot_be_written(tmp_path: Path, free_body: Callable[..., str]) -> None:
-    """/proc refuses even root; and a config that can't run writes nothing."""
-    (tmp_path / "file").touch()
-    for out in (Path("/proc/rigidsim-test"), tmp_path / "file" / "runs"):
-        with pytest.raises(RunFolderError, match=r"can't be written: .+; choose another out"):
-            rigidsim.run(rigidsim.parse(free_body()), out=out)
-    text = free_body("end = 1", formulation="canonical").replace("[0.2, 1.1, 0.7]", "[0.2, 0, 0.7]")
-    with pytest.raises(rigidsim.ConfigError, match="singularity"):
-        rigidsim.run(rigidsim.parse(text), out=tmp_path / "runs")
-    assert not (tmp_path / "runs").exists()
-
-
 def test_an_unfinished_run_opens_and_is_not_overwritten(
     tmp_path: Path, free_body: Callable[..., str]
 ) -> None:
@@ -92,49 +75,9 @@ def test_an_unfinished_run_opens_and_is_not_overwritten(
     assert not again.folder.segments.exists()
 
 
-def test_a_run_is_found_by_its_folder_or_a_file_in_it(
-    finished: rigidsim.Run, free_body: Callable[..., str], tmp_path: Path
-) -> None:
-    names = ["checkpoint.h5", "config.toml", "dataset.h5", "summary.json"]
-    assert sorted(p.name for p in finished.folder.path.iterdir()) == names
-    assert finished.folder.config.read_text() == free_body()
-    assert json.loads(finished.folder.summary.read_text()) == finished.summary
-    for name in ("", *names[1:]):
-        opened = rigidsim.open_run(finished.folder.path / name)
-        assert opened.folder == finished.folder
-        assert opened.summary == finished.summary
-        assert opened.outcome == finished.outcome
-    nothing = tmp_path / "nothing"
-    for _ in range(2):  # missing, then a folder of other things
-        with pytest.raises(RunFolderError, match=r"no run here; give a run folder \(runs/NAME\) or its"):
-            rigidsim.open_run(nothing)
-        nothing.mkdir(exist_ok=True)
-        (nothing / "config.toml").touch()
-
-
-def test_a_run_without_a_summary_was_killed(finished: rigidsim.Run) -> None:
-    finished.folder.summary.unlink()
-    finished.folder.dataset.unlink()
-    finished.folder.segments.mkdir()
-    opened = rigidsim.open_run(finished.folder.path)
-    assert opened.status == "running"
-    assert "killed" in opened.summary["message"]
-    with pytest.raises(RunFolderError, match="nothing was saved"):
-        _ = opened.dataset
-
-
 # ---- ``summary.json``: what is written is what is read; what isn't a summary is refused
 
 # hundreds of turns between samples, of a quaternion that matrices don't carry: a warning is certain
-
-
-def test_an_older_summary_is_read_and_written_again_as_it_is(finished: rigidsim.Run, tmp_path: Path) -> None:
-    older = {**finished.summary, "of_another_version": [1, {"x": 2.5}]}
-    for key in ("warning_codes", "method", "hold_invariants", "lyapunov", "events", "chart_changes"):
-        older.pop(key)
-    path = tmp_path / "summary.json"
-    path.write_text(json.dumps(older))
-    assert read_summary(path).as_dict() == older
 
 
 DAMAGES: dict[str, tuple[Callable[[dict[str, Any]], Any], str]] = {
@@ -163,24 +106,3 @@ def test_a_damaged_summary_is_refused_by_its_place(finished: rigidsim.Run) -> No
 
 
 # ---- what takes the place of a file or folder is whole, or nothing changes
-
-
-class Cut(Exception):
-    """Where a test breaks off."""
-
-
-def test_a_file_that_fails_leaves_the_old_one_and_no_remains(tmp_path: Path) -> None:
-    place = tmp_path / "file"
-    with replacing(place) as new:
-        new.write_text("old")
-    with suppress(Cut), replacing(place) as new:
-        new.write_text("torn")
-        raise Cut
-    assert place.read_text() == "old"
-    with replacing(place) as new, replacing(tmp_path / "other") as other:
-        assert other != new
-        new.write_text("new")
-        other.write_text("")
-        assert place.read_text() == "old"
-    assert place.read_text() == "new"
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["file", "other"]

@@ -1,7 +1,5 @@
 """Segments: written once and whole, merged without a trace, refused when one is missing."""
 
-from __future__ import annotations
-
 import errno
 import os
 from collections.abc import Callable

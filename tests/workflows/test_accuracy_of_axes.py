@@ -1,7 +1,5 @@
 """``accuracy_axis``: it is kept, or the summary, a warning and the verdict say that it isn't."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np
@@ -44,13 +42,6 @@ def test_an_accuracy_that_is_not_shown_is_told(level: str, settings: list[str], 
     assert "sound" not in verdict_line(run.outcome)[0]
     told = summary["accuracy" if level == "full" else "modelling"]
     assert told["requested"] == (1e-9 if "integrator.accuracy_axis=1e-9" in settings else 1e-3)
-
-
-def test_an_accuracy_that_is_kept_is_sound() -> None:
-    run = rigidsim.run(missed_scene("auto"), out=None, progress=False)
-    assert run.summary["modelling"]["level"] == "spin_averaged"
-    assert run.summary["modelling"]["requested"] == 1e-3
-    assert verdict_on(run.outcome).soundness is Soundness.SOUND
 
 
 @pytest.mark.slow

@@ -1,9 +1,5 @@
 """Averaged runs against the full one, end to end: how near they are, and whether they say so."""
 
-from __future__ import annotations
-
-import math
-
 import numpy as np
 import pytest
 from support import config, run_text
@@ -11,7 +7,6 @@ from support import config, run_text
 import rigidsim
 from rigidsim import ConfigError
 from rigidsim.accuracy.choice import choose_level
-from rigidsim.session.session import AdviceLimits, Tuning
 
 FLATTENING, SPIN, ECCENTRICITY = 0.02, 60.0, 0.2
 BODY = f"principal_moments = [{1 - FLATTENING}, {1 - FLATTENING}, 1]"
@@ -68,20 +63,6 @@ def test_each_level_is_as_near_as_its_order(full: rigidsim.Run, reduced: Both) -
     assert errors["orbit_averaged", True] < 0.05 * errors["orbit_averaged", False]
 
 
-def test_figure_and_spin_axes_stand_off_as_they_do(full: rigidsim.Run, reduced: Both) -> None:
-    """By (A / L) s x s', and the start adds a free nutation of that size."""
-    offset = 2 * RATE * (1 - ECCENTRICITY) ** -3 / SPIN
-    run = reduced["spin_averaged", True]
-    for name in ("figure_axis", "spin_axis"):
-        assert apart(run, full, name) < 2 * offset
-    # against which the mean is not right by more than it: seen where the full run starts, without nutation
-    stands = run.dataset["figure_axis"].values - run.dataset["momentum_axis"].values
-    assert 0.1 * offset < np.linalg.norm(stands, axis=1).max() < 2 * offset
-    mean = reduced["spin_averaged", False]
-    same = mean.dataset["figure_axis"].values - mean.dataset["momentum_axis"].values
-    assert np.abs(same).max() <= 4 * np.finfo(float).eps  # both are divided by their length
-
-
 def test_the_announced_error_covers_the_true_one(full: rigidsim.Run) -> None:
     for level, more in (("spin_averaged", True), ("orbit_averaged", False)):
         run = run_text(text(level, short_period=more), estimate=True)
@@ -91,28 +72,6 @@ def test_the_announced_error_covers_the_true_one(full: rigidsim.Run) -> None:
         assert true <= found["momentum_axis"] <= 10 * true
         assert apart(run, full, "figure_axis") <= found["figure_axis"]
         assert run.summary["accuracy"]["estimated_attitude_error"] < 1e-9  # of the integration: apart from it
-
-
-@pytest.mark.slow
-def test_windows_tell_what_becomes_of_a_long_run() -> None:
-    """Twenty times as long as the windows: a beginning, a middle and an end."""
-    run = run_text(text("orbit_averaged", short_period=True, time="end = 4000\nsamples = 81"), estimate=True)
-    found = run.summary["modelling"]
-    assert not found["whole"]
-    begins = [window["start"] for window in found["windows"]]
-    assert begins == pytest.approx([0, 2000, 3950], abs=60)
-    true = run_text(text("full", time="end = 4000\nsamples = 81"))
-    assert apart(run, true, "momentum_axis") <= found["momentum_axis"]
-    assert found["momentum_axis"] <= 10 * apart(run, true, "momentum_axis")
-
-
-def test_more_digits_are_kept_from_text_to_dataset() -> None:
-    given = text("orbit_averaged", time="end = 100\nsamples = 3")
-    exact = run_text(given, 'integrator.precision="quadruple"')
-    double = run_text(given)
-    assert "momentum_axis_lo" in exact.dataset
-    assert 0 < apart(exact, double, "momentum_axis") < 1e-10
-    assert math.isclose(float(np.linalg.norm(exact.dataset["momentum_axis"].values[-1])), 1, rel_tol=1e-15)
 
 
 def test_the_accuracy_of_axes_chooses_the_model() -> None:
@@ -171,39 +130,3 @@ def test_the_accuracy_of_axes_is_kept_over_1e5_years_of_the_earth() -> None:
     assert nearer.summary["modelling"]["momentum_axis"] < 0.05 * announced
     assert apart(run, nearer, "momentum_axis") <= announced
     assert apart(run, nearer, "figure_axis") <= run.summary["modelling"]["figure_axis"]
-
-
-def test_plan_says_what_each_level_costs_and_leaves_out() -> None:
-    given = text("auto", time="end = 20\nsamples = 21")
-    planned = rigidsim.plan(rigidsim.parse(given), changes={"integrator.accuracy_axis": 1e-2})
-    rows = {row.level: row for row in planned.levels}
-    assert list(rows) == ["orbit_averaged", "spin_averaged", "full"]
-    assert [level for level, row in rows.items() if not row.why_not] == ["orbit_averaged"]
-    errors = [row.error_rad for row in rows.values()]
-    assert errors[0] > errors[1] > errors[2] == 0
-    steps = [row.steps for row in rows.values()]
-    assert steps[0] < steps[1] < steps[2]
-    assert planned.predicted.steps == pytest.approx(steps[0], rel=0.5)
-    plain = rigidsim.plan(rigidsim.parse(config(BODY, START, LOAD, "end = 1\nsamples = 2")))
-    assert plain.levels == []
-
-
-@pytest.mark.slow
-def test_a_long_run_that_records_axes_is_told_of_the_cheaper_model(full: rigidsim.Run) -> None:
-    """What is promised is kept: the model advised is as near, at that part of the steps."""
-    from rigidsim.cli.screens.words import advice_line
-
-    assert full.summary["cost"]["steps"] < AdviceLimits().steps
-    assert run_text(text("full"), estimate=True).summary["advice"] == []
-    near = Tuning(advice=AdviceLimits(steps=1000, apart=1e-4))
-    told = run_text(text("full"), estimate=True, tuning=near)
-    (advice,) = told.summary["advice"]
-    assert (advice["code"], advice["level"]) == ("averaged", "orbit_averaged")
-    line = advice_line(told.outcome.advice[0])
-    assert line is not None
-    assert line.startswith('[model] level = "orbit_averaged" with short_period = true keeps the axes within ')
-    better = run_text(text(advice["level"], short_period=True))
-    assert apart(full, better, "momentum_axis") <= advice["then"] <= 1e-4
-    assert better.summary["cost"]["steps"] <= 1.1 * advice["share"] * full.summary["cost"]["steps"]
-    nearer = Tuning(advice=AdviceLimits(steps=1000, apart=1e-9))
-    assert run_text(text("full"), estimate=True, tuning=nearer).summary["advice"] == []

@@ -1,7 +1,5 @@
 """Sweeps over averaged models: each member has the error of its model, as a run of its own announces it."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np
@@ -70,6 +68,7 @@ def as_single_runs(text: str, out: Path) -> None:
     assert 0 < found.summary["cost"]["estimate_cpu_seconds"] < found.summary["cost"]["cpu_seconds"]
 
 
+@pytest.mark.slow
 def test_a_sweep_keeps_and_tells_the_error_of_each_model(tmp_path: Path) -> None:
     as_single_runs(SPINNING, tmp_path)
     told = CliRunner().invoke(app, ["info", str(tmp_path / "precessing")], env={"COLUMNS": "400"}).output

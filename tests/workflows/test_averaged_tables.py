@@ -1,7 +1,5 @@
 """Averages over orbits by a table: against the same orbit by its elements, and against every rotation."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 
@@ -57,6 +55,7 @@ def full() -> rigidsim.Run:
     return run_text(text("full", by_table=True))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("level", cases(["spin_averaged", "orbit_averaged"], ["orbit_averaged"]))
 def test_a_table_of_an_orbit_averages_as_the_orbit_does(level: str, full: rigidsim.Run) -> None:
     found = run_text(text(level, by_table=True), estimate=True)

@@ -1,7 +1,5 @@
 """Fits to attitudes in SPICE's CK: rows at the kernel's own times, whatever its type, and from other axes."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +8,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import rigidsim
-from rigidsim.errors import ConfigError, RigidsimError
+from rigidsim.errors import ConfigError
 from rigidsim.formats.ck_reading import read_rows
 from rigidsim.scene.epochs import parse_epoch
 
@@ -135,24 +133,6 @@ def test_rows_are_those_that_were_written(kind: int, rated: bool, count: int, he
         np.testing.assert_allclose(read, attitude.inv().apply(rates), atol=1e-13)
 
 
-def test_of_segments_that_overlap_the_last_one_counts(here: Path) -> None:
-    """But not in its gap, where SPICE reads the earlier one, nor between the instants of one."""
-    ticks, attitude, rates = some(40)
-    write(here / "seen.bc", 3, ticks, attitude, rates)
-    within = np.concatenate([np.linspace(ticks[n] + 0.5, ticks[n + 3] + 0.5, 6) for n in (10, 30)])
-    _, other, _ = some(12)
-    write(here / "seen.bc", 3, within, other, None)
-    write(here / "seen.bc", 1, ticks[[2, 5]], other[:2], None)
-    times, quaternions, read = rows_of(here)
-    hidden = [11, 12, 13, 31, 32, 33]
-    wanted = np.concatenate([np.delete(ticks, hidden), within])
-    np.testing.assert_allclose(times, np.sort(wanted) * TICK, atol=2e-7)
-    assert read is not None
-    assert np.isnan(read).any(axis=1).sum() == len(within) + 2
-    turned = Rotation.from_quat(quaternions[[2, 5]][:, [1, 2, 3, 0]])
-    assert (turned.inv() * other[:2]).magnitude().max() < 1e-14
-
-
 def seen(folder: Path) -> dict[str, float]:
     """A run's attitudes and rates with noise as a CK relative to J2000; and the truth."""
     truth = {"initial.angular_velocity[1]": 0.1003, "body.principal_moments[1]": 1.603}
@@ -179,26 +159,6 @@ def test_a_fit_to_a_kernel_finds_start_and_moment(here: Path) -> None:
         right = truth.get(one.key, one.start)
         assert abs(one.value - right) < 3 * one.sigma, one.key
     assert found.sigma("initial.attitude[0]") < ATTITUDE
-
-
-WRONG: dict[str, tuple[str, str, str]] = {
-    "no clock": ('kernels = ["clock.tsc"]', "", "give its clock and leap seconds as kernels"),
-    "a missing clock": ("clock.tsc", "cluck.tsc", "cluck.tsc: there is no such file"),
-    "a list of kernels": ("clock.tsc", "all.tm", "all.tm is a meta-kernel"),
-    "no date": (f'epoch = "{EPOCH}"', "", r"give the date of time 0 as \[time\] epoch"),
-    "no axes": ('axes = "ecliptic J2000"', "", r"say by \[frame\] axes"),
-    "another day": ("2029-04-13", "2029-04-14", "no row lies within the run"),
-    "nothing of the kind": ('observable = "quaternion"', 'observable = "energy"', "has no column"),
-}
-
-
-def test_what_a_kernel_needs_is_told(here: Path) -> None:
-    ticks, attitude, rates = some(9)
-    write(here / "seen.bc", 3, ticks, attitude, rates)
-    (here / "all.tm").write_text("KPL/MK\n\\begindata\nKERNELS_TO_LOAD = ( 'clock.tsc' )\n")
-    for given, instead, message in WRONG.values():
-        with pytest.raises(RigidsimError, match=message):
-            rigidsim.fit(rigidsim.parse((TUMBLING + FIT).replace(given, instead)))
 
 
 def test_a_message_is_turned_from_its_own_axes(here: Path) -> None:

@@ -1,19 +1,13 @@
 """A fit's folder in the viewer: the fitted motion with the uncertainty that its covariance tells."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
 pytest.importorskip("rerun")
 
 import rigidsim
-from rigidsim.cli.app import app
-from rigidsim.errors import RunFolderError
-from rigidsim.look import viewer
 from rigidsim.look.stages.registry import build_picture
 from rigidsim.workflows.view import runs_of
 
@@ -54,6 +48,7 @@ def fits(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder / "fits" / "ball"
 
 
+@pytest.mark.slow
 def test_the_cone_of_a_uniform_spin_is_as_wide_as_the_covariance_of_a_straight_line(fits: Path) -> None:
     ((name, run),) = runs_of([fits])
     assert name == "ball"
@@ -69,37 +64,3 @@ def test_the_cone_of_a_uniform_spin_is_as_wide_as_the_covariance_of_a_straight_l
     np.testing.assert_allclose(angles[:, 1], 0.0, atol=1e-8)
     assert "attitude_error" not in dataset.attrs  # the integration's own, which isn't what is meant here
     assert "converged" in dataset.attrs["fit"]
-
-
-def test_a_fit_is_viewed_by_its_folder_from_the_command_line(
-    fits: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    from rerun.chunk import RrdReader
-
-    entities: set[str] = set()
-
-    def pretend(path: Path, *, web: bool) -> int:
-        entities.update(chunk.entity_path for chunk in RrdReader(path).stream())
-        return 0
-
-    monkeypatch.setattr(viewer, "open_viewer", pretend)
-    result = CliRunner().invoke(app, ["view", str(fits)], prog_name="rigidsim")
-    assert result.exit_code == 0, result.output
-    assert {f"/scene/body/figure_axis_uncertainty/{part}" for part in ("rim", "surface")} <= entities
-
-
-def test_what_is_no_finished_fit_is_refused(fits: Path, tmp_path: Path) -> None:
-    """Nor is a fit a run, nor one whose fitted config was changed."""
-    with pytest.raises(RunFolderError, match="is a fit, no run"):
-        rigidsim.open_run(fits)
-    (tmp_path / "begun.json").write_text("{}")
-    with pytest.raises(RunFolderError, match="unfinished fit"):
-        runs_of([tmp_path])
-    fitted = fits / "fitted.toml"
-    text = fitted.read_text()
-    fitted.write_text(text.replace("[2, 2, 2]", "[2, 2, 2.5]"))
-    assert runs_of([fits])  # the same motion: a spin about z is one for any moments
-    fitted.write_text(text.replace("angular_velocity = [0, 0, 0.", "angular_velocity = [0, 0.1, 0."))
-    with pytest.raises(RunFolderError, match="was it changed"):
-        runs_of([fits])
-    fitted.write_text(text)

@@ -1,7 +1,5 @@
 """Runs with kernels: SPK files, resuming at block edges, and kernels that are missing, swapped or moved."""
 
-from __future__ import annotations
-
 import os
 from pathlib import Path
 
@@ -9,12 +7,9 @@ import numpy as np
 import pytest
 from kernel_scenes import HEAVY, LANDING, STRENGTHS, TURNED, moon
 from kernels import write_spk
-from support import IMPATIENT
 
 import rigidsim
 from rigidsim.scene.kernels.reading import FOLDERS
-from rigidsim.session.session import Tuning
-from rigidsim.solve.sampler import Pacing
 
 TIME = 'end = "60 day"\nsamples = 61'
 BEGIN, END = 2440420.0, 2440500.0
@@ -56,18 +51,6 @@ def test_a_file_says_what_the_package_does(scene: Path) -> None:
     assert by_file.attrs["ephemeris_kernel"] == "small.bsp"
 
 
-def test_samples_have_the_same_bits_however_many_steps_are_taken_at_once(scene: Path) -> None:
-    """Those of several steps together, through edges, or step by step; and one alone as among many."""
-    samples = 121
-    changes = {"time.samples": samples, "output.estimate": False}
-    at_once = rigidsim.run(scene, out=None, changes=changes, tuning=Tuning(Pacing(chunk_seconds=1.0)))
-    one_by_one = rigidsim.run(scene, out=None, changes=changes, tuning=IMPATIENT)
-    same(at_once, one_by_one)
-    every = (samples - 1) // 12
-    fewer = rigidsim.run(scene, out=None, changes=changes | {"time.samples": 13})
-    np.testing.assert_array_equal(at_once.dataset["quaternion"][::every], fewer.dataset["quaternion"])
-
-
 @pytest.mark.slow
 def test_resumed_anywhere_it_has_the_same_bits(scene: Path, tmp_path: Path) -> None:
     """At each of many steps, among them those that end at edges."""
@@ -85,6 +68,7 @@ def test_resumed_anywhere_it_has_the_same_bits(scene: Path, tmp_path: Path) -> N
     assert edges > 0
 
 
+@pytest.mark.slow
 def test_the_same_bytes_go_on_elsewhere_and_others_are_refused(
     scene: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -110,35 +94,6 @@ def test_the_same_bytes_go_on_elsewhere_and_others_are_refused(
     assert rigidsim.verify(tmp_path / "whole" / "moon").identical
 
 
-BAD = {
-    "truncated": (lambda x: x[: len(x) // 2], "which is truncated"),
-    "no kernel": (lambda x: b"hello" * 1000, "which is no SPK file"),
-    "empty": (lambda x: b"", "which is no SPK file"),
-}
-
-
-MISTAKES: list[tuple[dict[str, object], str]] = [
-    ({"loads[0].gravitational_parameter": None}, "small.bsp has none of .*give it, in m.3/s.2"),
-    ({"time.end": "200 day"}, "from 1969-07-.* to 1969-.*but the run goes from 1969-07-20T12:00:00 to"),
-    ({"ephemeris.kernel": "small"}, 'the file beside the config is "./small.bsp"'),
-    ({"ephemeris.kernel": "de421.bsp"}, 'the package is named without a suffix: "de421"'),
-    ({"ephemeris.kernel": "../configs"}, "is no installed package|which is a folder"),
-    ({"loads[0].source": "mars"}, 'given "mars"; .*small.bsp has .*earth'),
-]
-
-
-def test_damaged_files_and_mistakes_with_them_are_refused(scene: Path) -> None:
-    for changes, words in MISTAKES:
-        with pytest.raises(rigidsim.ConfigError, match=words):
-            rigidsim.run(rigidsim.load(scene).replace(changes), out=None)
-    kernel = scene.parent / "small.bsp"
-    whole = kernel.read_bytes()
-    for damage, words in BAD.values():
-        kernel.write_bytes(damage(whole))
-        with pytest.raises(rigidsim.ConfigError, match=words):
-            rigidsim.run(scene, out=None)
-
-
 def test_reading_a_config_changes_nothing_for_the_next(
     scene: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -151,19 +106,7 @@ def test_reading_a_config_changes_nothing_for_the_next(
         rigidsim.run(rigidsim.parse(scene.read_text()), out=None)
 
 
-def test_a_swept_source_has_an_axis_of_another_name_than_the_sources(tmp_path: Path) -> None:
-    """Whose places every member records along a dimension of that name."""
-    text = moon(body=HEAVY, start=TURNED, epoch=LANDING, time=TIME.replace('"60 day"', '"2 day"'))
-    axis = '[sweep.axes]\n"loads[1].source" = {values = ["sun", "venus"]%s}\n'
-    path = tmp_path / "moon.toml"
-    path.write_text(text + axis % "")
-    with pytest.raises(rigidsim.ConfigError, match="a name that the dataset needs itself"):
-        rigidsim.sweep(path, out=tmp_path)
-    path.write_text(text + axis % ', name = "other"')
-    done = rigidsim.sweep(path, out=tmp_path)
-    assert done.dataset["source_position_final"].dims == ("other", "source", "space_axis")
-
-
+@pytest.mark.slow
 def test_a_sweep_finds_the_kernel_beside_its_config_and_notes_its_hash(scene: Path) -> None:
     swept = scene.with_name("sweep.toml")
     axes = '"initial.angular_velocity[0]" = {linspace = [0, 1e-8, 3]}'

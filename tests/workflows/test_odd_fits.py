@@ -1,7 +1,5 @@
 """Fits as nobody means them: data given twice, estimates at a wall, priors that are none."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np
@@ -62,20 +60,6 @@ def test_observations_that_are_given_twice_are_told(here: Path) -> None:
     once, twice = (rigidsim.fit(rigidsim.parse(text + n * RATES)) for n in (1, 2))
     assert not once.told
     assert any("data 1 and 2 have rows" in told and "(11)" in told for told in twice.told)
-
-
-def test_units_in_the_names_of_columns_count(here: Path) -> None:
-    rates(here, [1, 2, 2.5])
-    rows = np.loadtxt("rates.csv", delimiter=",", skiprows=1)
-    rows = np.column_stack([rows[:, 0] / 60, np.rad2deg(rows[:, 1:]), np.full(len(rows), np.rad2deg(1e-3))])
-    names = ["t_min", "wx [deg/s]", "wy [deg/s]", "wz [deg/s]", "s [deg/s]"]
-    np.savetxt("degrees.csv", rows, "%.17g", ",", header=",".join(names), comments="")
-    told = RATES.replace("rates.csv", "degrees.csv").replace('["x", "y", "z"]', str(names[1:4]))
-    told = told.replace("sigma = 1e-3", 'sigma = "s [deg/s]"\ntime = "t_min"')
-    text = LAMINA.replace("2, 3]", "2, 2.4]")
-    one, other = (rigidsim.fit(rigidsim.parse(text + data)) for data in (RATES, told))
-    assert other.value("body.principal_moments[2]") == pytest.approx(2.5, abs=1e-9)
-    assert other.sigma("body.principal_moments[2]") == pytest.approx(one.sigma("body.principal_moments[2]"))
 
 
 REFUSED = {

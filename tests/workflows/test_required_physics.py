@@ -1,12 +1,8 @@
 """``plan --physics``: what effects are worth, and the least model, against all models run one by one."""
 
-from __future__ import annotations
-
 import json
 import math
 import re
-import subprocess
-import sys
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -93,7 +89,7 @@ def required(text: str, error: str, out: Path, **given: Any) -> Any:
 
 @pytest.mark.campaign
 def test_no_cheaper_model_is_within_the_error(tmp_path: Path) -> None:
-    """Of a body without a core; ``experiments.least_models`` draws others."""
+    """Of a body without a core."""
     full = attitudes(satellite(core=False))
     errors: dict[frozenset[str], float] = {}
     for flags in product((True, False), repeat=4):
@@ -139,41 +135,6 @@ def test_the_written_config_runs_and_is_the_least_model(tmp_path: Path) -> None:
     json.dumps(plan.as_dict())
 
 
-@pytest.mark.slow
-@pytest.mark.optimised  # as in the process that is killed
-def test_killed_and_called_again_it_goes_on(tmp_path: Path) -> None:
-    text = satellite(figure=False, core=False)
-    (tmp_path / "scene.toml").write_text(text)
-    asked = ["plan", "scene.toml", "--physics", "0.5 arcsec", "--out", "killed"]
-    process = subprocess.Popen(
-        [sys.executable, "-m", "rigidsim", *asked], cwd=tmp_path, stderr=subprocess.PIPE, text=True
-    )
-    assert process.stderr is not None
-    begun = 0
-    while begun < 3:
-        line = process.stderr.readline()
-        assert line, "it ended by itself"
-        begun += "begun" in line
-    process.kill()
-    process.wait()
-    process.stderr.close()
-    done = sorted((tmp_path / "killed/satellite-physics").glob("*/dataset.h5"))
-    before = [path.stat().st_mtime_ns for path in done]
-    assert len(done) >= 2
-    told: list[str] = []
-    plan = required(text, "0.5 arcsec", tmp_path / "killed", told=told.append)
-    assert [path.stat().st_mtime_ns for path in done] == before
-    whole = required(text, "0.5 arcsec", tmp_path / "whole")
-    for one, other in zip(plan.effects, whole.effects, strict=True):
-        assert (one.code, one.largest_arcsec, one.steps) == (other.code, other.largest_arcsec, other.steps)
-    assert plan.least.left_out == whole.least.left_out
-    told.clear()
-    required(text, "0.5 arcsec", tmp_path / "killed", told=told.append)
-    assert not told
-    with pytest.raises(rigidsim.RunFolderError, match="holds the run of another config; force=True"):
-        required(text.replace('"6 deg"', '"7 deg"'), "0.5 arcsec", tmp_path / "killed")
-
-
 def test_what_is_left_out_of_an_elastic_body() -> None:
     given = rigidsim.parse(satellite(elastic=ELASTIC))
     assert list(effects_of(given.config)) == [
@@ -215,6 +176,7 @@ level = "orbit_averaged"
 """
 
 
+@pytest.mark.slow
 def test_an_average_is_compared_by_its_axis(tmp_path: Path) -> None:
     """Sun and Moon turn the equinox by 16 and 34 arcsec a year, the axis by these times sin(23.44 deg)."""
     plan = required(AVERAGED, "1000 arcsec", tmp_path)
@@ -227,51 +189,6 @@ def test_an_average_is_compared_by_its_axis(tmp_path: Path) -> None:
     assert "error runs measure" in told["averaging"]
     rate = float(re.search(r"some ([\d.]+) arcsec", told["geodetic precession"])[1]) / 100  # type: ignore[index]
     assert rate == pytest.approx(0.0192, rel=0.06)  # published: 19.2 mas a year
-
-
-def test_what_averaging_is_worth(tmp_path: Path) -> None:
-    text = AVERAGED.replace('"orbit_averaged"', '"full"').replace('"100 yr"', '"100 day"')
-    plan = required(text, "1 deg", tmp_path)
-    assert [row.level for row in plan.averaged] == ["spin_averaged", "orbit_averaged"]
-    assert all(0 < row.largest_arcsec < 10 for row in plan.averaged)
-    assert plan.least.left_out == ["sun", "moon"]
-
-
-def test_wheels_and_tops(tmp_path: Path) -> None:
-    top = """
-    name = "top"
-    [body]
-    principal_moments = [1, 1, 0.5]
-    mass = 1
-    center_of_mass = [0, 0, 0.1]
-    [initial]
-    angular_velocity = [0, 0, 20]
-    euler_angles = [0, "30 deg", 0]
-    [[loads]]
-    kind = "uniform_gravity"
-    [[loads]]
-    kind = "viscous_torque"
-    coefficients = [1e-6, 1e-6, 1e-6]
-    [[rotors]]
-    name = "wheel"
-    axis = [1, 0, 0]
-    moment = 0.01
-    rate = 1e-3
-    [time]
-    end = 10
-    samples = 11
-    """
-    plan = required(top, "10 deg", tmp_path)
-    assert plan.least.left_out == ["viscous_torque", "rotor-wheel"]
-    assert plan.models == 8
-    everything = required(top, "179.99 deg", tmp_path)
-    assert set(everything.least.left_out) == {"uniform_gravity", "viscous_torque", "rotor-wheel"}
-    free = rigidsim.load(Path(everything.least.run) / "config.toml").config
-    assert not free.loads
-    assert not free.rotors
-    tiny = required(top, "1e-12 mas", tmp_path)
-    assert tiny.least.left_out == []
-    assert "uncertain by" in tiny.warnings[0]
 
 
 REFUSED: list[tuple[str, dict[str, Any], str]] = [

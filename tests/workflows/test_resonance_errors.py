@@ -1,7 +1,5 @@
 """Bodies that keep pace with their source: the error announced for their average, against every rotation."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -1,7 +1,5 @@
 """A run that was cut, however often and by whatever, gives the bits of one in one go."""
 
-from __future__ import annotations
-
 import os
 import resource
 from pathlib import Path
@@ -11,8 +9,7 @@ import pytest
 from support import EAGER, IMPATIENT, cases, config, loaded, same_bits
 
 import rigidsim
-from rigidsim import ConfigError, RunFolderError
-from rigidsim.session.session import Observer
+from rigidsim import RunFolderError
 from rigidsim.solve import driver
 from rigidsim.store import atomic, provenance
 
@@ -66,29 +63,6 @@ def resumed_to_the_end(run: rigidsim.Run, *overrides: str, most: int = 400) -> t
             return run, count
         run = rigidsim.resume(run.folder.path, overrides=overrides, tuning=IMPATIENT)
     raise AssertionError(f"not finished after {most} sessions")
-
-
-USUAL = ("double, uneven times", "30 digits, tiny components")
-
-
-@pytest.mark.parametrize("case", cases(CASES, USUAL))
-def test_a_run_cut_many_times_is_the_run_in_one_go(case: str, tmp_path: Path) -> None:
-    text = text_of(case)
-    whole = rigidsim.run(rigidsim.parse(text), out=tmp_path / "whole", tuning=IMPATIENT)
-    every = max(1, whole.summary["cost"]["steps"] // 4)
-    guard = f"limits.max_steps={every}"
-    experiment = rigidsim.parse(text + f"max_steps = {every}\n")
-    cut = rigidsim.run(experiment, out=tmp_path / "cut", tuning=IMPATIENT)
-    assert cut.status == "stopped: max_steps"
-    done, sessions = resumed_to_the_end(cut, guard)
-    assert sessions >= 1
-    assert done.status == whole.status
-    same_bits(whole, done)
-    for key in ("samples", "invariants", "events", "bit_for_bit", "states"):
-        assert done.summary[key] == whole.summary[key], key
-    assert done.summary["cost"]["steps"] == whole.summary["cost"]["steps"]
-    assert done.summary["cost"]["sessions"] == sessions + 1
-    assert not done.folder.segments.exists()
 
 
 # --- what can end a session -------------------------------------------------------------------------
@@ -245,47 +219,7 @@ def test_a_later_end(given: tuple[str, str], tmp_path: Path) -> None:
     assert rigidsim.verify(done.folder.path).identical
 
 
-def test_what_would_change_the_experiment_leaves_a_finished_run_finished(tmp_path: Path) -> None:
-    run = rigidsim.run(rigidsim.parse(text_with("end = 60\nsamples = 121")), out=tmp_path)
-    before = {p.name: p.read_bytes() for p in run.folder.path.iterdir()}
-    for until, says in (
-        ("50", "no later than the run's end"),
-        ("60", "no later than the run's end"),
-        ("60.3", "lies between two samples of the grid"),
-        ("-inf", "time"),
-        ("soon", "time"),
-    ):
-        with pytest.raises((RunFolderError, ConfigError), match=says):
-            rigidsim.resume(run.folder.path, until=until)
-    with pytest.raises(RunFolderError, match=r"time\.end=7: would change the experiment; only limits\.KEY"):
-        rigidsim.resume(run.folder.path, overrides=["time.end=7"])
-    assert {p.name: p.read_bytes() for p in run.folder.path.iterdir()} == before
-
-
-class Told(Observer):
-    """Keeps what it is told of runs in which nothing was left to do."""
-
-    def __init__(self) -> None:
-        self.said: list[str] = []
-
-    def nothing_left(self, why: str) -> None:
-        self.said.append(why)
-
-
 # --- what can't be resumed --------------------------------------------------------------------------
-
-
-def test_a_finished_run_has_nothing_left(tmp_path: Path) -> None:
-    run = rigidsim.run(rigidsim.parse(text_with("end = 3\nsamples = 7")), out=tmp_path)
-    leftover = run.folder.path / ".dataset.h5.1.partial"
-    leftover.write_text("of a killed process")
-    before = {p.name: p.read_bytes() for p in run.folder.path.iterdir() if p != leftover}
-    told = Told()
-    again = rigidsim.resume(run.folder.path, observer=told)
-    assert again.status == "finished"
-    assert again.summary == run.summary
-    assert told.said == ["the run reached its last sample"]
-    assert {p.name: p.read_bytes() for p in run.folder.path.iterdir()} == before
 
 
 def test_what_a_ctrl_c_left_out_after_the_dataset_is_made_up_for(
@@ -309,20 +243,6 @@ def test_what_a_ctrl_c_left_out_after_the_dataset_is_made_up_for(
         assert again.summary["message"] == "the run reached its last sample"
         assert again.summary["timeline_sha256"] == provenance.file_sha256(run.folder.timeline)
         assert run.folder.dataset.read_bytes() == content
-
-
-def test_a_run_that_broke_down_has_nothing_left(tmp_path: Path) -> None:
-    text = text_with("end = 1e6\nsamples = 11", loads='kind = "torque"\ncomponents = ["wx*wx*wx", "0", "0"]')
-    run = rigidsim.run(rigidsim.parse(text), out=tmp_path)
-    assert run.status in ("stopped: non-finite state", "stopped: step size collapsed")
-    told = Told()
-    again = rigidsim.resume(run.folder.path, observer=told)
-    assert again.summary == run.summary
-    assert again.summary["exit_code"] == 3
-    assert len(told.said) == 1
-    assert told.said[0].startswith("the st")
-    with pytest.raises(RunFolderError, match="cannot be prolonged: the st"):
-        rigidsim.resume(run.folder.path, until="2e6")
 
 
 def test_nothing_saved_begins_anew(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -383,19 +303,3 @@ def test_another_process_or_a_link_is_not_disturbed(tmp_path: Path) -> None:
             assert elsewhere.read_text() == "mine"
     assert sorted((p.name, p.read_bytes()) for p in run.folder.segments.iterdir()) == before
     assert resumed_to_the_end(run)[0].status == "finished"
-
-
-def test_other_versions_are_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The bits are still those that both versions give, but nobody promises it."""
-    from rigidsim.store import provenance
-
-    run = rigidsim.run(
-        rigidsim.parse(text_with("end = 60\nsamples = 61", "max_steps = 20")), out=tmp_path, tuning=IMPATIENT
-    )
-    versions = provenance.versions()
-    monkeypatch.setattr(provenance, "versions", lambda: versions | {"heyoka": "99.0"})
-    done, _ = resumed_to_the_end(run)
-    claim = done.summary["bit_for_bit"]
-    assert claim["claim"] is False
-    assert f"version_heyoka {versions['heyoka']} -> 99.0" in claim["holds_for"]
-    assert "99.0" in loaded(done).attrs["mixed_provenance"]

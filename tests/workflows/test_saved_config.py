@@ -1,22 +1,13 @@
 """What was run stands in a run's config; what was given is known beside it."""
 
-from __future__ import annotations
-
-from pathlib import Path
-
 import pytest
-from support import IMPATIENT, config, loaded
+from support import config, loaded
 
 import rigidsim
 from rigidsim.workflows.read import embedded
 
 TEXT = config(time="end = 10 # long\nevery = 0.5", more="# the end", name="cut")
 SETTINGS = ["time.end=60", " integrator.tolerance=1.0000000000000000000000001e-15 "]
-
-
-def guarded(text: str, out: Path) -> rigidsim.Run:
-    experiment = rigidsim.parse(text, overrides=[*SETTINGS, "limits.max_steps=20"])
-    return rigidsim.run(experiment, out=out, tuning=IMPATIENT)
 
 
 @pytest.fixture(scope="module")
@@ -38,16 +29,3 @@ def test_the_folder_says_what_was_run_and_the_dataset_what_was_given(whole: rigi
     assert rigidsim.parse(TEXT, overrides=attributes["config_set"].splitlines()).text == text
     again = embedded(whole.folder.dataset, overrides=["time.end=3"])
     assert (again.given, again.settings[-1]) == (TEXT, "time.end=3")
-
-
-def test_what_was_given_outlives_a_resume(tmp_path: Path) -> None:
-    run = guarded(TEXT, tmp_path)
-    done = rigidsim.resume(run.folder.path, overrides=["limits.max_steps=100000"], until="70")
-    attributes = loaded(done).attrs
-    assert attributes["config_given"] == TEXT
-    assert attributes["config_set"].splitlines() == [
-        *(line.strip() for line in SETTINGS), "limits.max_steps=20", "time.end=70",
-    ]  # fmt: skip
-    assert rigidsim.parse(TEXT, overrides=attributes["config_set"].splitlines()).text == attributes["config"]
-    assert done.folder.config.read_text() == attributes["config"]
-    assert rigidsim.verify(done.folder.path).identical

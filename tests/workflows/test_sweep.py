@@ -1,7 +1,5 @@
 """Sweeps from config to dataset: labels, exactness against single runs, extension, shares, workers, kills."""
 
-from __future__ import annotations
-
 import json
 import multiprocessing
 import os
@@ -25,7 +23,6 @@ from rigidsim import sweep as run_sweep
 from rigidsim.cli.app import app
 from rigidsim.store.seal import seal
 from rigidsim.store.sweeps.folder import SweepFolder
-from rigidsim.workflows.sweeps.members import run_members, sweep_of
 from rigidsim.workflows.sweeps.sweep import resume_sweep
 
 pytestmark = pytest.mark.optimised  # compared with runs of other processes
@@ -114,14 +111,6 @@ def test_members_are_single_runs_with_labels(folder: Path) -> None:
     )
 
 
-def test_given_again_it_computes_nothing(folder: Path) -> None:
-    before = {path: path.stat().st_mtime_ns for path in folder.rglob("*")}
-    told = CliRunner().invoke(app, ["resume", str(folder)])
-    assert told.exit_code == 0, told.output
-    assert "nothing is left" in told.stderr
-    assert before == {path: path.stat().st_mtime_ns for path in folder.rglob("*")}
-
-
 def test_a_longer_axis_and_one_more_output_compute_only_what_is_new(tmp_path: Path) -> None:
     first = swept(tmp_path)
     tiles = SweepFolder(tmp_path / "box").tiles
@@ -139,58 +128,6 @@ def test_a_longer_axis_and_one_more_output_compute_only_what_is_new(tmp_path: Pa
     assert np.isfinite(dataset.angular_velocity_final).all()
     with pytest.raises(RunFolderError, match="another experiment"):
         swept(tmp_path, (CONFIG + SWEEP).replace("end = 5", "end = 6"))
-
-
-PLANAR_MAP = """\
-name = "planar_map"
-[body]
-principal_moments = [34021, 49096, 57125]
-[initial]
-euler_angles = [0, 0, 0]
-angular_velocity = [0, 0, 1]
-[[loads]]
-kind = "gravity_gradient"
-gravitational_parameter = 1
-orbit = {semi_major_axis = 1, eccentricity = 0.1}
-[time]
-end = 40
-samples = SAMPLES
-[integrator]
-formulation = "planar"
-tolerance = 1e-9
-[output]
-record = ["angular_velocity"]
-estimate = false
-[sweep]
-keep = ["final"]
-axes."initial.euler_angles[2]" = {linspace = [0, 3, 3], name = "angle"}
-axes."initial.angular_velocity[2]" = {linspace = [0, 3, 5], name = "rate"}
-"""
-
-
-def test_an_indicator_moves_no_bit_of_what_else_is_kept() -> None:
-    config = PLANAR_MAP.replace("SAMPLES", "21")
-    found = {}
-    for keep in (("final",), ("final", "megno")):
-        sweep = sweep_of(config.replace('["final"]', json.dumps(keep)))
-        results = run_members(sweep, range(sweep.count), keep)
-        assert all(engine.startswith("batch") for engine in results.engines)
-        found[keep] = {name: variable.values for name, variable in results.kept.items()}
-    without, along = found.values()
-    assert set(along) - set(without) == {"megno", "growth_time"}
-    for name, values in without.items():
-        assert values.tobytes() == along[name].tobytes(), name
-    assert np.isfinite(without["angular_velocity_final"]).all()
-
-
-def test_what_is_kept_of_a_member_has_the_same_bits_alone_and_in_company() -> None:
-    keep = ("final", "extremes", "means", "megno", "fli", "lyapunov")
-    sweep = sweep_of(PLANAR_MAP.replace("SAMPLES", "200").replace('["final"]', json.dumps(keep)))
-    together = run_members(sweep, range(sweep.count), keep).kept
-    for member in (1, 13):
-        alone = run_members(sweep, [member], keep).kept
-        for name, variable in alone.items():
-            assert variable.values[0].tobytes() == together[name].values[member].tobytes(), name
 
 
 def test_verify_runs_members_again_and_finds_a_flipped_bit(folder: Path, tmp_path: Path) -> None:
@@ -269,6 +206,7 @@ def test_bad_sweeps_are_refused_before_work_begins(tmp_path: Path) -> None:
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.slow
 def test_shares_make_the_same_dataset(folder: Path, tmp_path: Path) -> None:
     (tmp_path / "c.toml").write_text(CONFIG + SWEEP)
     run = CliRunner().invoke
@@ -283,23 +221,7 @@ def test_shares_make_the_same_dataset(folder: Path, tmp_path: Path) -> None:
     assert wrong.exit_code == 2
 
 
-def test_info_tells_how_far_a_sweep_is(tmp_path: Path) -> None:
-    swept(tmp_path, tiles=(0, 1))
-    with pytest.raises(RunFolderError, match="open_sweep"):
-        rigidsim.open_run(tmp_path / "box")
-    told = CliRunner().invoke(app, ["info", str(tmp_path / "box")])
-    assert told.exit_code == 0
-    assert "2 of 6 members" in told.output
-    summary = open_sweep(tmp_path / "box").summary
-    assert (summary["status"], summary["tiles_done"], summary["tiles"]) == ("interrupted", 1, 3)
-    damaged = tmp_path / "box" / "tiles" / "g000-0000000.h5"
-    damaged.write_bytes(damaged.read_bytes()[:-200])
-    with pytest.raises(RunFolderError, match="torn or foreign"):
-        resume_sweep(tmp_path / "box")
-    damaged.unlink()
-    assert resume_sweep(tmp_path / "box").finished
-
-
+@pytest.mark.slow
 def test_what_a_batch_estimates_is_told_of_all_and_of_one(tmp_path: Path) -> None:
     output = CONFIG[CONFIG.index("estimate") : CONFIG.index("[[ev")]
     text = CONFIG.replace(output, "").replace('rates"', 'quaternion"')

@@ -1,7 +1,5 @@
 """Exports of sweeps: every number of the dataset, by member, in files that other tools read."""
 
-from __future__ import annotations
-
 import csv
 from decimal import Decimal, localcontext
 from pathlib import Path
@@ -108,35 +106,6 @@ def test_csv_has_a_row_per_member_with_every_digit(box: SavedSweep, tmp_path: Pa
     assert "# axes: w_value is initial.angular_velocity, C is body.principal_moments[2]" in head
     assert any(line.startswith("# status: 0 finished, 1 finished_event, ") for line in head)
     assert any(line.startswith("# warnings: 1 drift, 2 singularity, ") for line in head)
-
-
-def test_series_and_events_are_long_tables(box: SavedSweep, tmp_path: Path) -> None:
-    _, series, events = written(box, "csv", tmp_path)
-    dataset, found = box.dataset, rows(series)
-    assert len(found) == 6 * 11
-    assert [float(row["time"]) for row in found] == [*dataset.time.values] * 6
-    values = dataset.angular_velocity.sel(body_axis="y").values.ravel()
-    assert [float(row["angular_velocity_y"]) for row in found] == values.tolist()
-    assert [row["C"] for row in found[11:22]] == ["2.5"] * 11
-    found = rows(events)
-    counts = dataset.middle_count.values.ravel()
-    assert 0 < counts.sum() < counts.size * dataset.sizes["middle_occurrence"]  # some slots are empty
-    assert [int(row["member"]) for row in found] == np.repeat(np.arange(6), counts).tolist()
-    assert [int(row["middle_occurrence"]) for row in found] == [i for n in counts for i in range(n)]
-    times = dataset.middle_times.values
-    assert [float(row["middle_times"]) for row in found] == times[~np.isnan(times)].tolist()
-
-
-def test_zarr_is_the_dataset_of_the_sweep(box: SavedSweep, tmp_path: Path) -> None:
-    pytest.importorskip("zarr")
-    (store,) = written(box, "zarr", tmp_path)
-    with xarray.open_zarr(store) as found, box.dataset as dataset:
-        assert found.status.dtype == dataset.status.dtype
-        assert found.angular_velocity.encoding["chunks"] == (2, 3, 11, 3)
-        assert (set(found.variables), set(found.coords)) == (set(dataset.variables), set(dataset.coords))
-        for name in dataset.variables:
-            np.testing.assert_array_equal(found[name].values, dataset[name].values, strict=True)
-        assert found.attrs["config"] == dataset.attrs["config"]
 
 
 def test_texts_failures_and_angles(pairs: SavedSweep, tmp_path: Path) -> None:

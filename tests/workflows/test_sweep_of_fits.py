@@ -1,7 +1,5 @@
 """Sweeps whose members are fits: each is the fit of its config; data, failures, resumption, pictures."""
 
-from __future__ import annotations
-
 import shutil
 from collections.abc import Iterator
 from pathlib import Path
@@ -10,7 +8,7 @@ import numpy as np
 import pytest
 
 import rigidsim
-from rigidsim.errors import ConfigError, RigidsimError, RunFolderError
+from rigidsim.errors import RigidsimError
 from rigidsim.look.figures.sweep_maps import sweep_figure
 from rigidsim.store.sweeps.run import open_sweep
 from rigidsim.workflows.sweeps.members import single_member
@@ -113,17 +111,6 @@ def test_a_sweep_of_fits_goes_on_from_its_own_copies(here: Path, monkeypatch: py
         resume_sweep(folder)
 
 
-def test_other_data_under_the_same_name_are_refused(here: Path) -> None:
-    path = here / "seen/2.csv"
-    path.write_text(path.read_text().replace("10.000000", "9.900000"))
-    with pytest.raises(RunFolderError, match="isn't the file that the sweep was begun with"):
-        rigidsim.sweep("nights.toml")
-    path.unlink()
-    assert rigidsim.sweep("nights.toml").finished  # the copy is there
-    with pytest.raises(RigidsimError, match="there is no such file"):
-        rigidsim.sweep("nights.toml", force=True)
-
-
 def test_fits_that_fail_are_told_with_their_reason(here: Path) -> None:
     """Beside others: one of another day, and one that tells moments from no ratio."""
     (here / "seen/1.csv").write_text("time,x,y,z\n20,1,1,1\n")
@@ -140,21 +127,3 @@ def test_fits_that_fail_are_told_with_their_reason(here: Path) -> None:
     assert found.outcome.outcomes == {"finished": 1, "failed": 1}
     assert found.outcome.warning_codes == ["members_failed", "fits_undetermined"]
     assert found.outcome.fitted["body.principal_moments[0]"].sigma is None
-
-
-WRONG = {
-    'keep = ["final"]\n': "each member is a fit, and what it finds is kept",
-    'axes."fit.parameters" = {values = [["initial.angular_velocity"]]}\n': "estimate the same parameters",
-    'axes."fit.data[0].sigma" = {values = [0.1, 0.2]}\n': "a name that the dataset needs itself",
-    'axes."fit.data[0].unit" = {values = ["deg/s", 3]}\n': "unit",
-}
-
-
-def test_wrong_sweeps_of_fits_are_refused(here: Path) -> None:
-    for line, told in WRONG.items():
-        text = (SPUN + FIT + NIGHTS + line).replace('"nights"', '"wrong"')
-        with pytest.raises(ConfigError, match=told):
-            rigidsim.sweep(rigidsim.parse(text), out=here / "runs")
-    assert not (here / "runs/wrong").exists()
-    with pytest.raises(ConfigError, match=r"many fits, which rigidsim\.sweep"):
-        rigidsim.fit(here / "nights.toml")

@@ -1,17 +1,13 @@
 """Sweeps whose folder or config is damaged or wrong: nothing is lost or replaced unasked, and all is told."""
 
-from __future__ import annotations
-
 import shutil
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from rigidsim import ConfigError, RunFolderError, SavedSweep, open_sweep, parse
+from rigidsim import ConfigError, RunFolderError, SavedSweep, parse
 from rigidsim import sweep as run_sweep
 from rigidsim.cli.app import app
 from rigidsim.workflows.sweeps.sweep import SweepObserver
@@ -71,20 +67,6 @@ def same(one: SavedSweep, other: SavedSweep) -> bool:
     return one.dataset.drop_attrs().identical(other.dataset.drop_attrs())
 
 
-def test_another_experiment_replaces_no_finished_sweep_without_tiles(out: Path) -> None:
-    shutil.rmtree(out / "box" / "tiles")
-    before = (out / "box" / "dataset.h5").read_bytes()
-    with pytest.raises(RunFolderError, match=r"holds a sweep of another experiment.*force=True"):
-        swept(out, CONFIG.replace("[1, 2, 3]", "[1, 2, 2.5]"))
-    assert (out / "box" / "dataset.h5").read_bytes() == before
-    found, run = swept(out, LONGER)  # the same experiment goes on, though nothing of it can be used again
-    assert (found.summary["members"], run) == (7, 7)
-    shutil.rmtree(out / "box" / "tiles")
-    (out / "box" / "config.toml").unlink()
-    with pytest.raises(RunFolderError, match="another experiment"):
-        swept(out)
-
-
 def test_a_damaged_tile_is_told_with_its_remedy_which_works(out: Path, finished: Path) -> None:
     tile = out / "box" / "tiles" / "g000-0000001.h5"
     content = bytearray(tile.read_bytes())
@@ -129,26 +111,6 @@ def test_impossible_members_are_marked_where_that_is_asked_and_the_others_run(tm
         swept(tmp_path / "none", text("[3.5, 3.1]", 'impossible = "mark"\n'))
 
 
-def test_what_is_gone_from_earlier_tiles_is_computed_again(out: Path) -> None:
-    """The latest generation has none of it, and was complete."""
-    more = CONFIG.replace("[sweep]\n", '[sweep]\nkeep = ["final", "means"]\n')
-    found, run = swept(out, more)
-    whole = found.dataset.load()
-    assert run == 6
-    (out / "box" / "tiles" / "g000-0000002.h5").unlink()
-    (out / "box" / "dataset.h5").unlink()
-    again, run = swept(out, more)
-    assert run == 2
-    assert whole.drop_attrs().identical(again.dataset.drop_attrs())
-
-
-def test_axes_can_be_given_as_dictionaries(tmp_path: Path) -> None:
-    axes = {"time.end": {"values": [1, 2, 3]}, "initial.angular_velocity": {"sphere": 1, "count": 2}}
-    changes = {"sweep": {"tile": 100, "axes": axes}}
-    found = run_sweep(parse(CONFIG.partition("[sweep]")[0]), out=tmp_path, changes=changes)
-    assert found.dataset.status.dims == ("end", "initial_angular_velocity")
-
-
 REFUSED = {
     "an index past the end": (
         'axes."initial.angular_velocity[3]" = {values = [1]}',
@@ -188,27 +150,3 @@ def test_a_bad_sweep_is_told_where_and_why(tmp_path: Path) -> None:
         assert told in str(caught.value)
         assert len(caught.value.problems) == 1
     assert not list(tmp_path.iterdir())
-
-
-def test_a_limit_of_time_is_kept_where_it_is_swept(tmp_path: Path) -> None:
-    axes = 'axes."limits.wall_time" = {values = ["1e-9 s", "1 h"], name = "limit"}\n'
-    found, _ = swept(tmp_path, CONFIG.partition("tile")[0] + axes)
-    assert found.summary["outcomes"] == {"finished": 1, "stopped: wall_time": 1}
-    assert found.summary["why_alone"] == "wall_time"
-
-
-@pytest.mark.slow  # five times two processes that import everything
-def test_a_script_without_a_guard_is_told_what_it_lacks(tmp_path: Path) -> None:
-    (tmp_path / "c.toml").write_text(CONFIG)
-    script = tmp_path / "script.py"
-    script.write_text('import rigidsim\nrigidsim.sweep("c.toml", workers=2)\n')
-    command = [sys.executable, script.name]
-    found = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=300)
-    assert found.returncode == 1
-    assert 'under  if __name__ == "__main__":' in found.stderr
-    assert "freeze_support" not in found.stderr
-    script.write_text(
-        'import rigidsim\nif __name__ == "__main__":\n    rigidsim.sweep("c.toml", workers=2)\n'
-    )
-    subprocess.run(command, cwd=tmp_path, check=True, capture_output=True, timeout=300)
-    assert open_sweep(tmp_path / "runs" / "box").finished

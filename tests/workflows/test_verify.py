@@ -1,7 +1,5 @@
 """``verify``: identical, or what differs first; flipped bits and changed digits are found, sealed or not."""
 
-from __future__ import annotations
-
 import io
 import json
 import shutil
@@ -113,33 +111,6 @@ def test_a_changed_digit_in_the_config(original: Path, tmp_path: Path) -> None:
     assert 'line 5 is "angular_velocity = [0.3, 1.0, 0.6]"' in verdict.problems[0]
 
 
-def test_another_machine_or_version_is_named(original: Path, tmp_path: Path) -> None:
-    def elsewhere(file: h5py.File) -> None:
-        file.attrs["version_heyoka"] = "6.0.0"
-        file.attrs["code_target_cpu"] = "z80"
-        file["energy"][7] = np.nextafter(file["energy"][7], 9)
-
-    verdict = rigidsim.verify(forged(original, tmp_path / "elsewhere.h5", elsewhere))
-    assert verdict.differing == ["energy"]
-    assert verdict.difference is not None
-    assert verdict.difference.sample == 7
-    assert 0 < verdict.difference.size < 1e-14
-    assert any(text.startswith("version_heyoka 6.0.0 -> ") for text in verdict.environment)
-    assert any(text.startswith("code_target_cpu z80 -> ") for text in verdict.environment)
-
-
-def test_a_dataset_exchanged_for_a_run_of_the_same_config(tmp_path: Path) -> None:
-    one = rigidsim.run(rigidsim.parse(TEXT), out=tmp_path / "a")
-    other = rigidsim.run(rigidsim.parse(TEXT), out=tmp_path / "b")
-    one.folder.dataset.write_bytes(other.folder.dataset.read_bytes())
-    verdict = rigidsim.verify(one.folder.path)
-    assert not verdict.identical
-    assert verdict.differing == []
-    assert "was written for another dataset" in verdict.problems[0]
-    with pytest.raises(RunFolderError, match=r"isn't the dataset that summary\.json beside it"):
-        _ = one.dataset
-
-
 def edited(folder: Path, change: Callable[[dict[str, Any]], Any]) -> None:
     path = folder / "summary.json"
     summary = json.loads(path.read_text())
@@ -186,16 +157,3 @@ def test_a_summary_is_true_but_for_times_and_machines(complete: Path, tmp_path: 
     verdict = rigidsim.verify(folder)
     (problem,) = verdict.problems
     assert problem.startswith(f"{path}: was damaged")
-
-
-def test_a_summary_or_a_timeline_that_is_gone(complete: Path, original: Path, tmp_path: Path) -> None:
-    folder = shutil.copytree(original.parent, tmp_path / "v")
-    (folder / "summary.json").unlink()
-    verdict = rigidsim.verify(folder)
-    assert not verdict.identical
-    assert verdict.differing == []
-    assert any("summary.json: is missing" in problem for problem in verdict.problems)
-    folder = shutil.copytree(complete, tmp_path / "w")
-    (folder / "timeline.rrd").unlink()
-    (problem,) = rigidsim.verify(folder).problems
-    assert problem.startswith(f"{folder / 'timeline.rrd'}: is missing")

@@ -131,33 +131,6 @@ def test_bits_depend_neither_on_neighbours_nor_on_place() -> None:
     assert np.abs(narrow[0][0]["quaternion"] - again[0][0]["quaternion"]).max() < 1e-11
 
 
-def test_gaps_in_a_series_bound_the_steps_of_that_lane() -> None:
-    """From rest under k t, against the turn k t^3 / 6; every third lane turns already and isn't bounded."""
-    text = config(
-        "principal_moments = [1, 1, 1]",
-        "angular_velocity = [0, 0, 0]",
-        'kind = "torque"\ncomponents = ["0", "0", "k*t"]',
-        "end = 4\nsamples = 3",
-        output='record = ["quaternion"]',
-        more="[parameters]\nk = 0.1",
-    )
-    factors, rates = [0.1, 0.3, 0.2, 0.5, 0.4, 0.25], [0, 0, 0.3] * 2
-    sweep = swept(
-        text, {"parameters.k": f"values = {factors}", "initial.angular_velocity[2]": f"values = {rates}"}
-    )
-    together = by_member(blocks_of(sweep))
-    order = [4, 2, 1]
-    again = by_member(blocks_of(sweep, order))
-    for place, member in enumerate(order):
-        assert again[place][0]["quaternion"].tobytes() == together[member][0]["quaternion"].tobytes()
-    for member, (k, rate) in enumerate(zip(factors, rates, strict=True)):
-        values, steps, _ = together[member]
-        half = rate * 4 / 2 + k * 4**3 / 12
-        exact = np.array([np.cos(half), 0, 0, np.sin(half)])
-        bound = 8 * EPSILON["double"] * max(2 * half, 1) * np.sqrt(steps)
-        assert np.abs(values["quaternion"][-1] - exact).max() < bound
-
-
 @pytest.mark.parametrize("samples", cases([2, 5], [2]))
 def test_a_lost_member_takes_no_other_with_it(samples: int) -> None:
     text = TORQUE.replace("k*sin(t)^2/2", "k*wx^2").replace("-k*wz", "0").replace("wx - k/3", "wx - 3/4")
@@ -175,31 +148,6 @@ def test_a_lost_member_takes_no_other_with_it(samples: int) -> None:
         assert found[member][2] is Status.FINISHED
         for name, table in alone[place][0].items():
             assert table.tobytes() == found[member][0][name].tobytes(), name
-
-
-@pytest.mark.slow
-def test_events_are_those_of_single_runs() -> None:
-    axes = {
-        "parameters.k": "values = [0.05, 0.1, 0.3, 0.2]",
-        "initial.angular_velocity[0]": "values = [0.5, 0.0, 0.1, 0.4]",
-    }
-    for samples in (2, 5):
-        sweep = swept(TORQUE.replace("samples = 5", f"samples = {samples}"), axes)
-        seen = 0
-        for block in blocks_of(sweep):
-            (event,) = block.events
-            assert event.name == "flip"
-            for m, member in enumerate(block.members.tolist()):
-                dataset = rigidsim.run(
-                    sweep.experiment_of(member), changes={"output.estimate": False}, out=None
-                ).dataset
-                times, mine = dataset["flip_time"].values, event.member == m
-                assert len(times) == mine.sum()
-                assert np.allclose(event.time[mine], times, rtol=0, atol=1e-11)
-                theirs = dataset["flip_angular_velocity"].values
-                assert np.allclose(event.values["angular_velocity"][mine], theirs, rtol=0, atol=1e-11)
-                seen += len(times)
-        assert seen > 4
 
 
 def test_events_and_guards_end_members() -> None:

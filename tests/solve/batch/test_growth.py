@@ -1,7 +1,5 @@
 """Growth of tangent vectors beside members that run side by side: no bit of the motion moves."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

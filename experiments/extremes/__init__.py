@@ -1,1 +1,0 @@
-"""Scenes at the edge of what numbers hold, and what each formulation makes of them."""
