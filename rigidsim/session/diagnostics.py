@@ -261,7 +261,7 @@ class Diagnostics:
 _DIRECTED = 0.3
 """Error of a direction (rad) from which on it is of no use to anyone."""
 _LONG = 8192
-"""Steps from which projecting invariants pays off (experiments/README.md, what accuracy costs: from 1e4 rad on,
+"""Steps from which projecting invariants pays off (experiments/README.md: from 1e4 rad on,
 some 2500 steps in double precision).
 """
 _HELD = 3.0

@@ -115,7 +115,7 @@ class TaylorSolver(StepwiseSolver):
             left = (float(self._last) - float(stepper.time)) / max(self.ways.longest, 1e-300)
             if left < _NEAR:
                 return self.step_by_step(count, boundary)
-            part = int(min(count, self.corrected.left, _SPARE * left))  # left is inf before the first step
+            part = int(min(count, self.corrected.left, _SPARE * left))  # inf is left before the first
             times = buffer.until(self._last, min(buffer.room, _MOST_SAMPLES))
             samples = SamplesWithin(times)
             if not stepper.take(part, samples) or stepper.unresolved:
