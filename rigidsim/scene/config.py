@@ -21,10 +21,12 @@ from rigidsim.scene.bodies.gravity_field import asked_degree
 from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.fields import NAME_OR_VECTOR
 from rigidsim.scene.kernels.reading import EMBEDDED, folders_of
+from rigidsim.scene.paths import leaves
 from rigidsim.scene.python_values import assignments_of, inline, toml_text
 from rigidsim.scene.registry import LOADS
 from rigidsim.scene.schema import Config, config_model
 from rigidsim.scene.toml_text import FLAG, apply_overrides, long_integers, parse_toml, written
+from rigidsim.scene.validation_errors import config_error
 
 Overrides = Sequence[str] | Mapping[str, Any]
 """Values to replace: ``KEY=VALUE`` texts, or dotted keys with Python values."""
@@ -158,19 +160,13 @@ class Experiment:
         return f"<b>{escape(self.config.name)}</b><pre>{escape(self.text)}</pre>"
 
 
-def texts_in(value: Any) -> Iterator[str]:
-    """Strings in a table, and in the tables in it, by which a file may be named."""
-    if isinstance(value, str):
-        if "\n" not in value:
+def texts_in(tables: Mapping[str, Any]) -> Iterator[str]:
+    """Strings in tables by which a file may be named, and names of tables that stand in the config by now."""
+    for path, value in leaves(tables):
+        if isinstance(value, str) and "\n" not in value:
             yield value
-    elif isinstance(value, Mapping):
-        for name, inner in value.items():
-            yield from texts_in(inner)
-            if isinstance(inner, Mapping) and "text" in inner:  # a table that stands in the config by now
-                yield name
-    elif isinstance(value, list):
-        for inner in value:
-            yield from texts_in(inner)
+        if path.steps[1:] and path.steps[-1] == "text":
+            yield str(path.steps[-2])
 
 
 def parse(text: str, *, source: str = "config", overrides: Overrides = ()) -> Experiment:
@@ -210,7 +206,7 @@ def validated(table: dict[str, Any], source: str) -> Config:
         config = model.model_validate(table, context=table)
     except ValidationError as error:
         named = {problem.where for problem in problems}
-        found = messages.config_error(model, error, {*NAME_OR_VECTOR, *LOADS["kind"]}).problems
+        found = config_error(model, table, error, {*NAME_OR_VECTOR, *LOADS["kind"]}).problems
         problems += [problem for problem in found if problem.where not in named]
     if problems:
         raise ConfigError(problems, source)

@@ -4,7 +4,6 @@ A config's ``0.1`` is one tenth until the moment that it becomes a coefficient o
 working precision; binary floating point never stands in between.
 """
 
-import math
 import re
 from dataclasses import dataclass, field
 from decimal import MAX_EMAX, MIN_EMIN, Context, Decimal, Inexact, InvalidOperation
@@ -44,10 +43,16 @@ _STEP = re.compile(
 
 @dataclass(frozen=True)
 class ExactNumber:
-    """``rational * pi**pi_power``, in SI (angles in rad); ``assumed`` is its unit if none was written."""
+    """``rational * pi**pi_power`` in SI (angles in rad), and how it was written, which no comparison reads.
+
+    Attributes:
+        unit: the unit written after it; empty if none was.
+        assumed: the unit that it has since none was written; empty for a plain number.
+    """
 
     rational: Fraction
     pi_power: int = 0
+    unit: str = field(default="", compare=False)
     assumed: str = field(default="", compare=False)
 
     @property
@@ -77,6 +82,26 @@ class ExactNumber:
         """Sign: -1, 0 or 1."""
         return (self.rational > 0) - (self.rational < 0)
 
+    @property
+    def in_its_unit(self) -> "ExactNumber":
+        """The number that stands before its unit."""
+        factor, turns = units.to_si(self.unit) if self.unit else (1, 0)
+        return ExactNumber(self.rational / factor, self.pi_power - turns)
+
+    @property
+    def text(self) -> str:
+        """A TOML value that denotes it, in its unit."""
+        number = self.in_its_unit
+        plain = decimal_text(number.rational)
+        if number.pi_power:
+            plain = f"{plain}*pi" if number.pi_power == 1 else f"{plain}*pi^{number.pi_power}"
+        if self.unit:
+            return f'"{plain} {self.unit}"'
+        return f'"{plain}"' if "/" in plain or "*" in plain else plain
+
+
+ZERO = ExactNumber(Fraction(0))
+
 
 @cache
 def _for_doubles() -> Any:
@@ -84,16 +109,6 @@ def _for_doubles() -> Any:
     context = mpmath.MPContext()
     context.prec = 120
     return context
-
-
-@dataclass(frozen=True)
-class Quantity(ExactNumber):
-    """A number in SI with the unit that was written after it."""
-
-    unit: str = ""
-
-
-ZERO = ExactNumber(Fraction(0))
 
 
 def rounded(value: Fraction, context: Any) -> Any:
@@ -159,43 +174,6 @@ def _product(text: str) -> tuple[Fraction, int]:
     return rational, pi_power
 
 
-def _from_text(text: str, unit: str) -> ExactNumber:
-    if len(text) > _LONGEST_TEXT:
-        raise ValueError(f"given {len(text)} characters; a number has at most {_LONGEST_TEXT}")
-    match = _NUMBER_AND_UNIT.fullmatch(text)
-    if match is None:
-        raise ValueError(
-            f"given {shown(text)}; a number, or a string of a number and a unit, is allowed, "
-            f'such as 1.5, "1/3", "2^-20", "pi/4" or {example(unit)}'
-        )
-    try:
-        rational, pi_power = _product(match["number"])
-    except ValueError as error:
-        raise ValueError(f"given {shown(text)}; {error}") from None
-    if match["unit"] is None:
-        return ExactNumber(rational, pi_power, assumed=_assumed(unit))
-    try:
-        factor, turns = units.conversion(match["unit"].strip(), unit)
-    except units.UnitError as error:
-        raise ValueError(f"given {shown(text)}: {error}; write for instance {example(unit)}") from None
-    return ExactNumber(rational * factor, pi_power + turns)
-
-
-def parse_quantity(value: Any) -> ExactNumber:
-    """Read a number in SI, see ``parse_number``: a ``Quantity``, of whatever dimension, if it has a unit."""
-    number, unit = in_its_unit(value)
-    return with_unit(number, unit, value) if unit else number
-
-
-def in_its_unit(value: Any) -> tuple[ExactNumber, str]:
-    """Read a number, see ``parse_number``, and the unit after it, which isn't looked at (empty if none)."""
-    short = isinstance(value, str) and len(value) <= _LONGEST_TEXT
-    match = _NUMBER_AND_UNIT.fullmatch(value) if short else None
-    if match is None or match["unit"] is None:
-        return parse_number(value, "1"), ""
-    return parse_number(match["number"], "1"), match["unit"].strip()
-
-
 def exact_decimal(value: Fraction) -> Decimal | None:
     """The same number as a decimal without zeros at its end; None for a fraction that isn't one."""
     digits = value.numerator.bit_length() + value.denominator.bit_length() + 1
@@ -216,22 +194,10 @@ def decimal_text(value: Fraction) -> str:
     return f"{number:f}" if short else f"{number:e}".replace("e+", "e")
 
 
-def with_unit(number: ExactNumber, unit: str, text: str) -> Quantity:
-    """A number of some unit, in SI; ``ValueError`` (with the ``text`` written) if there is no such unit."""
-    try:
-        factor, turns = units.to_si(unit)
-    except units.UnitError as error:
-        raise ValueError(f"given {shown(text)}: {error}") from None
-    return Quantity(number.rational * factor, number.pi_power + turns, unit=unit)
-
-
-def _assumed(unit: str) -> str:
-    return "" if unit == "1" else unit
-
-
 def example(unit: str) -> str:
     """An example of a number with this unit, for messages."""
     return {
+        "": '"1/3"',
         "1": '"1/3"',
         "rad": '"23.44 deg"',
         "rad/s": '"7.292115e-5 rad/s"',
@@ -242,29 +208,49 @@ def example(unit: str) -> str:
     }.get(unit, f'"1.5 {unit}"')
 
 
-def parse_number(value: Any, unit: str) -> ExactNumber:
-    """Read a TOML value as an exact number in the SI unit ``unit``.
+def parse_number(value: Any, unit: str = "") -> ExactNumber:
+    """Read a TOML value as an exact number.
 
     Args:
         value: an int, a Decimal (as the TOML reader yields), a float (taken as the exact binary number
             that it is), an ExactNumber, or a string such as ``"430 day"``, ``"1/3"``, ``"-3*pi/4"`` or
             ``"2^-20 kg m^2"``.
-        unit: SI unit that bare numbers have and that a written unit must agree with; ``"1"`` for none.
+        unit: SI unit that bare numbers have and that a written unit must agree with; ``"1"`` for none, empty
+            for any.
 
     Raises:
         ValueError: not a finite number, or a unit of another dimension; the text says what is allowed.
     """
     if isinstance(value, ExactNumber):
         return value
+    assumed = "" if unit == "1" else unit
     if isinstance(value, bool) or not isinstance(value, int | float | Decimal | str):
-        number = "a number" if unit == "1" else f"a number (in {unit})"
+        number = f"a number (in {unit})" if assumed else "a number"
         raise ValueError(f"given {shown(value)}; {number}, or a string such as {example(unit)}, is allowed")
-    if isinstance(value, str):
-        return _from_text(value, unit)
-    if isinstance(value, float) and not math.isfinite(value):
-        raise ValueError(f"given {value}; finite numbers are allowed")
     try:
-        rational = _rational(value) if isinstance(value, Decimal) else Fraction(value)
+        if isinstance(value, str):
+            return _from_text(value, unit)
+        rational = Fraction(value) if isinstance(value, int) else _rational(Decimal(value))
+    except units.UnitError as error:
+        such = f"; write for instance {example(unit)}" if unit else ""
+        raise ValueError(f"given {shown(value)}: {error}{such}") from None
     except ValueError as error:
         raise ValueError(f"given {shown(value)}; {error}") from None
-    return ExactNumber(rational, assumed=_assumed(unit))
+    return ExactNumber(rational, assumed=assumed)
+
+
+def _from_text(text: str, unit: str) -> ExactNumber:
+    if len(text) > _LONGEST_TEXT:
+        raise ValueError(f"it has {len(text)} characters, and a number at most {_LONGEST_TEXT}")
+    match = _NUMBER_AND_UNIT.fullmatch(text)
+    if match is None:
+        raise ValueError(
+            "a number, or a string of a number and a unit, is allowed, such as 1.5, "
+            f'"1/3", "2^-20", "pi/4" or {example(unit)}'
+        )
+    rational, pi_power = _product(match["number"])
+    if match["unit"] is None:
+        return ExactNumber(rational, pi_power, assumed="" if unit == "1" else unit)
+    written = match["unit"].strip()
+    factor, turns = units.conversion(written, unit) if unit else units.to_si(written)
+    return ExactNumber(rational * factor, pi_power + turns, written)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from datetime import date, time
 from decimal import Decimal
@@ -24,7 +24,7 @@ from pydantic import (
 from pydantic_core import PydanticCustomError, core_schema
 
 from rigidsim.scene.epochs import Epoch, parse_epoch
-from rigidsim.scene.exact import ExactNumber, parse_number, parse_quantity
+from rigidsim.scene.exact import ExactNumber, parse_number
 from rigidsim.scene.two_line_elements import TwoLineElements, parse_elements
 from rigidsim.scene.units import UnitError, time_unit
 from rigidsim.scene.validation_messages import meant, shown
@@ -46,21 +46,6 @@ class ConfigTable(BaseModel):
         defer_build=True,
         use_attribute_docstrings=True,
     )
-
-
-def numbers_in(value: object, path: tuple[str | int, ...] = ()) -> Iterator[tuple[Any, list[ExactNumber]]]:
-    """Numbers in a table with their places: single ones, and arrays of them."""
-    if isinstance(value, ExactNumber):
-        yield path, [value]
-    elif isinstance(value, BaseModel):
-        for name, entry in value:
-            yield from numbers_in(entry, (*path, name))
-    elif isinstance(value, list):
-        if value and all(isinstance(entry, ExactNumber) for entry in value):
-            yield path, value
-            return
-        for number, entry in enumerate(value):
-            yield from numbers_in(entry, (*path, number))
 
 
 NAME_OR_VECTOR = ("as a name", "as a vector")
@@ -110,7 +95,7 @@ class InUnit:
     unit: str
 
     def _parse(self, value: Any) -> ExactNumber:
-        return parse_number(value, self.unit) if self.unit else parse_quantity(value)
+        return parse_number(value, self.unit)
 
     def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> Any:
         return reading(self._parse).__get_pydantic_core_schema__(source, handler)
@@ -198,22 +183,28 @@ class NumberOrFormula(InUnit):
         return {"anyOf": [{"type": "string"}, {"type": "number"}], "x-unit": self.unit}
 
 
-def _exactly(count: int) -> BeforeValidator:
-    def validate(value: Any) -> Any:
+@dataclass(frozen=True)
+class Exactly:
+    """Annotation of an array of so many entries."""
+
+    count: int
+
+    def _counted(self, value: Any) -> Any:
         if not isinstance(value, list):
-            raise refuse(f"given {shown(value)}; an array of {count} is allowed")
-        if len(value) != count:
-            raise refuse(f"given {len(value)} {'entry' if len(value) == 1 else 'entries'}; "
-                          f"exactly {count} are needed")  # fmt: skip
+            raise refuse(f"given {shown(value)}; an array of {self.count} is allowed")
+        if len(value) != self.count:
+            entries = "entry" if len(value) == 1 else "entries"
+            raise refuse(f"given {len(value)} {entries}; exactly {self.count} are needed")
         return value
 
-    return BeforeValidator(validate)
+    def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> Any:
+        return BeforeValidator(self._counted).__get_pydantic_core_schema__(source, handler)
 
 
-Pair = Annotated[list[T], Field(min_length=2, max_length=2), _exactly(2)]
-Triple = Annotated[list[T], Field(min_length=3, max_length=3), _exactly(3)]
+Pair = Annotated[list[T], Field(min_length=2, max_length=2), Exactly(2)]
+Triple = Annotated[list[T], Field(min_length=3, max_length=3), Exactly(3)]
 """A vector of three components."""
-Four = Annotated[list[T], Field(min_length=4, max_length=4), _exactly(4)]
+Four = Annotated[list[T], Field(min_length=4, max_length=4), Exactly(4)]
 """A quaternion's four components."""
 
 

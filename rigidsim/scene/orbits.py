@@ -234,7 +234,7 @@ def resolve_tabulated_orbit(fields: Elements, strength: Any | None, around: Sett
         what += f'CSV into [tables."{name}"] text (there now: {known})'
         raise around.fault(f"{fields.key}.table", what)
     parts = None if strength is None else strength._mpf_
-    constants = tuple((key, value.alone) for key, value in given if value is not None)
+    constants = tuple((key, value) for key, value in given if value is not None)
     try:
         orbit = tabulated_orbit(
             name, around.config.texts[name], around.context.prec, constants, parts, fields.opposite

@@ -12,7 +12,7 @@ from typing import Any
 from pydantic import Field, StrictStr, field_validator
 
 from rigidsim.scene import units
-from rigidsim.scene.exact import ZERO, Quantity
+from rigidsim.scene.exact import ZERO
 from rigidsim.scene.expressions.names import BODY_NAMES
 from rigidsim.scene.expressions.tree import RESERVED, Expression, states_read
 from rigidsim.scene.fields import AnyQuantity, ConfigTable, Formula, VariableName, refuse
@@ -89,7 +89,7 @@ def resolve_states(setting: Setting) -> list[OwnState]:
     found = []
     for number, table in enumerate(setting.config.states):
         here, start = setting.at("states", number), table.initial
-        if isinstance(start, Quantity) and table.unit is not None:
+        if start.unit and table.unit is not None:
             try:
                 units.conversion(start.unit, table.unit)
             except UnitError as error:

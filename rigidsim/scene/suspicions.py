@@ -9,11 +9,10 @@ from rigidsim.errors import Problem
 from rigidsim.scene.events import Event
 from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.expressions.tree import Constant, Expression, Name, Operation, operations
-from rigidsim.scene.fields import numbers_in
+from rigidsim.scene.paths import numbers
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.schema import Config
 from rigidsim.scene.units import time_unit
-from rigidsim.scene.validation_messages import key_path
 
 _TURN = 2 * math.pi
 
@@ -25,9 +24,10 @@ def suspicious_angles(config: Config) -> list[Problem]:
     A multiple of pi is meant in radians, and a value with a unit is unambiguous.
     """
     found = []
-    for path, numbers in numbers_in(config):
-        bare = [x for x in numbers if x.assumed == "rad" and not x.pi_power]
-        half = [numbers[1]] if path[-1] == "euler_angles" else numbers if path[-1] == "inclination" else []
+    for path, given in numbers(config):
+        bare = [x for x in given if x.assumed == "rad" and not x.pi_power]
+        key = path.steps[-1]
+        half = given[1:2] if key == "euler_angles" else given if key == "inclination" else []
         beyond = [
             x
             for x in bare
@@ -35,15 +35,15 @@ def suspicious_angles(config: Config) -> list[Problem]:
             or (x.rational.denominator == 1 and abs(x.rational) > math.pi and any(x is one for one in half))
         ]
         if beyond:
-            given, degrees = (
+            bare_text, degrees = (
                 ", ".join(f"{value:.6g}" for value in values)
                 for values in (map(float, beyond), (math.degrees(float(x)) for x in beyond))
             )
             first = f"{float(beyond[0]):.6g}"
             found.append(
                 Problem(
-                    key_path(path),
-                    f"given {given} without a unit, which is taken as radians: {degrees} deg; write "
+                    path.where,
+                    f"given {bare_text} without a unit, which is taken as radians: {degrees} deg; write "
                     f'"{first} deg" if degrees are meant, "{first} rad" if not',
                 )
             )

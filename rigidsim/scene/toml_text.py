@@ -6,14 +6,14 @@ import re
 import tomllib
 from collections.abc import Callable, Sequence
 from decimal import Decimal, InvalidOperation
-from itertools import pairwise
 from typing import Any
 
 import tomlkit
 from tomlkit.exceptions import TOMLKitError
 
 from rigidsim.errors import ConfigError, Problem
-from rigidsim.scene import validation_messages as messages
+from rigidsim.scene.paths import Path, leaves
+from rigidsim.scene.validation_messages import LONGEST_INTEGER, shown
 
 # The TOML reader's time and memory grow with the square of a dotted key's length. (Runs of keys, quoted or
 # bare, joined by points; the look-behind lets the search pass over each run once.)
@@ -65,19 +65,12 @@ def parse_toml(text: str, source: str) -> dict[str, Any]:
 
 def long_integers(table: dict[str, Any]) -> list[Problem]:
     """Problems of whole numbers too long to be shown; TOML sets no limit for hexadecimal ones."""
-    problems = []
-    waiting: list[tuple[tuple[str | int, ...], Any]] = [((), table)]
-    while waiting:
-        path, node = waiting.pop()
-        if isinstance(node, dict):
-            waiting += [((*path, key), child) for key, child in node.items()]
-        elif isinstance(node, list):
-            waiting += [((*path, index), child) for index, child in enumerate(node)]
-        elif isinstance(node, int) and node.bit_length() > messages.LONGEST_INTEGER:
-            most = messages.LONGEST_INTEGER
-            what = f"given {messages.shown(node)}; whole numbers of at most {most} bits are allowed"
-            problems.append(Problem(messages.key_path(path), what))
-    return problems
+    most = LONGEST_INTEGER
+    return [
+        Problem(path.where, f"given {shown(value)}; whole numbers of at most {most} bits are allowed")
+        for path, value in leaves(table)
+        if isinstance(value, int) and value.bit_length() > most
+    ]
 
 
 _PLACE = re.compile(r"\(at line (\d+), column (\d+)\)")
@@ -143,21 +136,14 @@ def _apply(table: dict[str, Any], assignment: str, where: str, read: Callable[[s
         raise ConfigError(Problem(where, "write KEY=VALUE on one line, such as time.end=10"))
     if _DEEP_KEY.search(assignment):
         raise ConfigError(Problem(where, f"a key of more than {_DEEPEST_KEY} parts"))
-    target, last = _found(table, key, where, new=bool(value_text))
     try:
-        value = read(value_text)
+        value = read(value_text) if value_text else None
     except (ValueError, RecursionError):
         value = value_text
     try:
-        if not value_text:
-            del target[last]
-        elif isinstance(target, list) == isinstance(last, str):
-            raise TypeError
-        else:
-            target[last] = value
-    except (TypeError, LookupError):
-        purpose = "set" if value_text else "remove"
-        raise ConfigError(Problem(where, _nothing(target, last, purpose))) from None
+        Path.of(key).set(table, value)
+    except ValueError as error:
+        raise ConfigError(Problem(where, str(error))) from None
 
 
 def _plain_value(text: str) -> Any:
@@ -181,48 +167,3 @@ def assignments(text: str, keys: Sequence[str]) -> list[str]:
         if name in document.get(table, {}):
             found.append(f"{key}={document[table][name].as_string()}")
     return found
-
-
-_KEY_PART = re.compile(r"""\s*(?:"([^"\n]+)"|'([^'\n]+)'|([^\[\].\"']+))((?:\[\d{1,9}\])*)\s*(\.|$)""")
-
-
-def key_steps(key: str, where: str) -> list[str | int]:
-    """The parts of a dotted key and its indices, counted from 0; a part that contains dots is quoted."""
-    steps: list[str | int] = []
-    begin = 0
-    while True:
-        match = _KEY_PART.match(key, begin)
-        if match is None:
-            part = key[begin:].split(".")[0]
-            what = f'"{part}" is not a key, or a key with an index counted from 0, such as times[0]'
-            raise ConfigError(Problem(where, what))
-        steps.append(match[1] or match[2] or match[3].strip())
-        steps.extend(int(index) for index in re.findall(r"\d+", match[4]))
-        if not match[5]:
-            return steps
-        begin = match.end()
-
-
-def _found(table: dict[str, Any], key: str, where: str, *, new: bool) -> tuple[Any, str | int]:
-    """The table or array that a key's last part is in, and that part."""
-    steps = key_steps(key, where)
-    target: Any = table
-    for step, following in pairwise(steps):
-        if isinstance(target, dict) and isinstance(step, str) and (new or step in target):
-            if step not in target:
-                target[step] = [] if isinstance(following, int) else {}
-            target = target[step]
-        elif isinstance(target, list) and isinstance(step, int) and 0 <= step < len(target):
-            target = target[step]
-        else:
-            raise ConfigError(Problem(where, _nothing(target, step)))
-    return target, steps[-1]
-
-
-def _nothing(target: Any, step: str | int, purpose: str = "set") -> str:
-    """What to say of a place that doesn't exist."""
-    there = ""
-    if isinstance(target, list) and isinstance(step, int):
-        entries = f"entries 0 to {len(target) - 1}" if target else "no entries"
-        there = f"; the array there has {entries}"
-    return f'there is nothing at "{step}" to {purpose}{there}'

@@ -8,7 +8,7 @@ space. A tensor of inertia stays symmetric: an entry beside the diagonal stands 
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Any
@@ -18,17 +18,15 @@ from rigidsim.scene.arithmetic import norm
 from rigidsim.scene.attitude import product
 from rigidsim.scene.config import Experiment
 from rigidsim.scene.exact import ExactNumber, fraction_of
+from rigidsim.scene.paths import Path, leaves
 from rigidsim.scene.scene import Scene, build_scene
+from rigidsim.scene.schema import config_model
 from rigidsim.scene.starts import RATES
-from rigidsim.scene.sweeps.axes import unit_and_length
-from rigidsim.scene.toml_text import key_steps, parse_toml
 
 ATTITUDE = "initial.attitude"
 _TABLES = ("body", "initial", "loads", "rotors", "parameters", "states", "bodies")
 _WHERE = "[output] sensitivity"
 _TENSOR = ("body", "inertia_tensor")
-
-Steps = tuple[str | int, ...]
 
 
 @dataclass(frozen=True)
@@ -38,7 +36,7 @@ class VariedKey:
     Attributes:
         name: its key with indices from 0, as ``initial.angular_velocity[0]``.
         unit: its SI unit; "1" for none or one that the config doesn't tell.
-        places: where it stands, as steps into the config; empty for a component of ``initial.attitude``.
+        places: where it stands in the config; empty for a component of ``initial.attitude``.
         number: its value, SI.
         size: of numbers beside it, for what is small against it where it is zero.
         component: of ``initial.attitude``.
@@ -46,7 +44,7 @@ class VariedKey:
 
     name: str
     unit: str
-    places: tuple[Steps, ...]
+    places: tuple[Path, ...]
     number: ExactNumber
     size: ExactNumber
     component: int = 0
@@ -96,7 +94,7 @@ def scene_of(
     vector = [context.zero] * 3
     for key, value in zip(keys, values, strict=True):
         for place in key.places:
-            config = replaced(config, place, replace(value_at(config, place), rational=value, pi_power=0))
+            config = place.replaced(config, replace(key.number, rational=value, pi_power=0))
         if not key.places:
             vector[key.component] = context.mpf(value.numerator) / context.mpf(value.denominator)
     scene = build_scene(replace(experiment, config=config), context)
@@ -121,16 +119,16 @@ def _turned(scene: Scene, vector: Sequence[Any]) -> Scene:
 def _numbers_of(experiment: Experiment, key: str, where: str) -> list[VariedKey]:
     """The numbers of one key; ValueError, to be read after the key, if there are none."""
     try:
-        steps = tuple(key_steps(key, where))
-    except ConfigError as error:
-        raise ValueError(f"isn't a key: {error.problems[0].what}") from None
-    if steps[:2] == ("initial", "attitude"):
-        return _of_attitude(experiment, steps)
-    if steps[0] not in _TABLES:
+        path = Path.of(key)
+    except ValueError as error:
+        raise ValueError(f"isn't a key: {error}") from None
+    if path.steps[:2] == ("initial", "attitude"):
+        return _of_attitude(experiment, path)
+    if path.steps[0] not in _TABLES:
         raise ValueError(f"is no number of the motion; keys of {', '.join(_TABLES)} are allowed")
-    unit, _ = unit_and_length(key, parse_toml(experiment.text, experiment.source))
-    value = value_at(experiment.config, steps)
-    named = {steps: value} if isinstance(value, ExactNumber) else dict(_entries(value, steps))
+    unit = path.taken(config_model(), experiment.to_dict()).unit
+    value = path.get(experiment.config)
+    named = _numbers_in(value, path)
     if value is None or not named:
         what = "isn't given in the config" if value is None else "has no number there"
         raise ValueError(
@@ -139,17 +137,18 @@ def _numbers_of(experiment: Experiment, key: str, where: str) -> list[VariedKey]
         )
     found = []
     for place, number in named.items():
-        if place[:2] == _TENSOR and len(place) == 4 and int(place[2]) > int(place[3]) and len(named) > 1:
+        places = _places(place)
+        if place != places[0] and len(named) > 1:
             continue
         size = number if number.sign else _largest_beside(experiment.config, place)
-        found.append(VariedKey(_name(place), unit, _places(place), number.alone, size.alone))
+        found.append(VariedKey(str(place), unit, places, number, size))
     return found
 
 
-def _of_attitude(experiment: Experiment, steps: Steps) -> list[VariedKey]:
+def _of_attitude(experiment: Experiment, path: Path) -> list[VariedKey]:
     if experiment.config.initial.equilibrium is not None:
         raise ValueError("turns a start that is found; give attitude and rates instead of equilibrium")
-    chosen = steps[2:]
+    chosen = path.steps[2:]
     if len(chosen) > 1 or (chosen and chosen[0] not in (0, 1, 2)):
         raise ValueError(f'has no such part; "{ATTITUDE}" is a rotation vector, with the indices 0, 1 and 2')
     one = ExactNumber(Fraction(1))
@@ -160,59 +159,25 @@ def _of_attitude(experiment: Experiment, steps: Steps) -> list[VariedKey]:
     ]
 
 
-def value_at(value: Any, steps: Sequence[str | int]) -> Any:
-    """What stands at a place; None for nothing."""
-    for step in steps:
-        if isinstance(step, int):
-            value = value[step] if isinstance(value, list | tuple) and step < len(value) else None
-        else:
-            value = value.get(step) if isinstance(value, Mapping) else getattr(value, step, None)
-    return value
+def _numbers_in(value: Any, path: Path) -> dict[Path, ExactNumber]:
+    """A number with its place, or those in an array and in arrays within it."""
+    if not isinstance(value, ExactNumber | list | tuple):
+        return {}
+    return {place: one for place, one in leaves(value, path) if isinstance(one, ExactNumber)}
 
 
-def _entries(value: Any, steps: Steps) -> list[tuple[Steps, ExactNumber]]:
-    """The numbers in an array and in arrays within it."""
-    if isinstance(value, ExactNumber):
-        return [(steps, value)]
-    if not isinstance(value, list | tuple):
-        return []
-    return [found for i, entry in enumerate(value) for found in _entries(entry, (*steps, i))]
+def _places(place: Path) -> tuple[Path, ...]:
+    """Where the number stands: of an entry of a symmetric tensor first the place above the diagonal."""
+    *table, row, column = place.steps
+    if tuple(table) != _TENSOR or row == column:
+        return (place,)
+    low, high = sorted((int(row), int(column)))
+    return (Path((*_TENSOR, low, high)), Path((*_TENSOR, high, low)))
 
 
-def _places(place: Steps) -> tuple[Steps, ...]:
-    if place[:2] == _TENSOR and len(place) == 4 and place[2] != place[3]:
-        row, column = sorted(int(i) for i in place[2:])
-        return ((*_TENSOR, row, column), (*_TENSOR, column, row))
-    return (place,)
-
-
-def _largest_beside(config: Any, place: Steps) -> ExactNumber:
+def _largest_beside(config: Any, place: Path) -> ExactNumber:
     """The largest number in the array that a place is in; 1 without one."""
-    depth = next((n for n, step in enumerate(place) if isinstance(step, int) and n > 1), len(place))
-    beside = [x for _, x in _entries(value_at(config, place[:depth]), place[:depth]) if x.sign]
+    depth = next((n for n, x in enumerate(place.steps) if isinstance(x, int) and n > 1), len(place.steps))
+    array = Path(place.steps[:depth])
+    beside = [x for x in _numbers_in(array.get(config), array).values() if x.sign]
     return max(beside, key=lambda x: abs(float(x)), default=ExactNumber(Fraction(1)))
-
-
-def _name(steps: Steps) -> str:
-    """A key of such steps."""
-    text = ""
-    for step in steps:
-        if isinstance(step, int):
-            text += f"[{step}]"
-        else:
-            plain = step.replace("_", "").replace("-", "").isalnum()
-            text += ("." if text else "") + (step if plain else f'"{step}"')
-    return text
-
-
-def replaced(value: Any, steps: Sequence[str | int], number: ExactNumber) -> Any:
-    """A copy of a table with another number in one place, where one stands."""
-    if not steps:
-        return number
-    first, *rest = steps
-    if isinstance(value, Mapping):
-        return {**value, first: replaced(value[first], rest, number)}
-    if isinstance(first, int):
-        changed = [*value[:first], replaced(value[first], rest, number), *value[first + 1 :]]
-        return tuple(changed) if isinstance(value, tuple) else changed
-    return value.model_copy(update={first: replaced(getattr(value, first), rest, number)})

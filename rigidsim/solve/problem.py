@@ -22,10 +22,9 @@ from rigidsim.model.two_part import in_two_parts
 from rigidsim.scene.choices import AUTO, FORMULATIONS
 from rigidsim.scene.config import Experiment
 from rigidsim.scene.expressions.tree import ExpressionError
-from rigidsim.scene.fields import numbers_in
 from rigidsim.scene.initial_values import check_start
+from rigidsim.scene.paths import numbers
 from rigidsim.scene.scene import Scene, build_scene
-from rigidsim.scene.validation_messages import key_path
 from rigidsim.solve.first_step import refuse_non_finite_start, refuse_roots_of_zero
 from rigidsim.solve.precision import Precision, Scalar, precision_of
 from rigidsim.solve.sampling import SampleClock
@@ -209,9 +208,9 @@ def _out_of_range(scene: Scene, error: OverflowError | ExpressionError) -> list[
     single = config.integrator.precision == "single"
     largest = 10 ** (30 if single else 250)
     extreme = [
-        Problem(key_path(path), f"given {scene.context.nstr(x.at(scene.context), 6)}; {error}: {_REMEDY}")
-        for path, numbers in numbers_in(config)
-        for x in numbers
+        Problem(path.where, f"given {scene.context.nstr(x.at(scene.context), 6)}; {error}: {_REMEDY}")
+        for path, found in numbers(config)
+        for x in found
         if x.sign and not 1 < largest * abs(x.rational) < largest**2
     ]
     if extreme:

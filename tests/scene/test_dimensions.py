@@ -8,7 +8,7 @@ import pytest
 
 from rigidsim import ConfigError, parse
 from rigidsim.scene.arithmetic import context_for
-from rigidsim.scene.exact import ExactNumber, parse_quantity
+from rigidsim.scene.exact import ExactNumber, parse_number
 from rigidsim.scene.expressions.names import BODY_NAMES
 from rigidsim.scene.expressions.parser import parse_expression
 from rigidsim.scene.expressions.tree import (
@@ -23,7 +23,7 @@ PAGE = Path(__file__).parents[2] / "docs" / "expressions.md"
 GIVEN = {
     "k": "0.25", "c": "2e-4 N m s", "tau": "0.1 N m", "w0": "30 deg/s", "m": "2", "l": "10 cm", "T": "3 T",
 }  # fmt: skip
-PARAMETERS = {name: parse_quantity(value) for name, value in GIVEN.items()}
+PARAMETERS = {name: parse_number(value) for name, value in GIVEN.items()}
 CONTEXT = context_for(50)
 
 

@@ -28,7 +28,7 @@ from rigidsim.scene.bodies.pieces import (
 )
 from rigidsim.scene.bodies.presets import PRESETS
 from rigidsim.scene.exact import ExactNumber, exact_decimal, parse_number
-from rigidsim.scene.fields import numbers_in
+from rigidsim.scene.paths import numbers
 from rigidsim.scene.tracing.numbers import plain
 
 SOURCES = ("principal_moments", "inertia_tensor", "points", "shape", "parts", "preset")
@@ -262,7 +262,8 @@ def momentum(body: RigidBody, angular_velocity: Vector) -> Vector:
 
 def rounding_of(table: BaseModel) -> Fraction:
     """Relative rounding of the coarsest number of a table that looks rounded; 0 if none does."""
-    return max((_rounding(x) for _, numbers in numbers_in(table) for x in numbers), default=Fraction(0))
+    given = [x for path, found in numbers(table) for x in found if path.steps[0] != "gravity_field"]
+    return max(map(_rounding, given), default=Fraction(0))
 
 
 def merged(

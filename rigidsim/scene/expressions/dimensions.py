@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 
 from rigidsim.scene import units
-from rigidsim.scene.exact import ExactNumber, Quantity
+from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.expressions.tree import Constant, Expression, ExpressionError, Name, Operation
 
 _WORD_OF_UNIT = re.compile(
@@ -61,8 +61,8 @@ NUMBER, ANY = Measure(()), Measure(None)
 
 def of_constant(node: Constant) -> Measure:
     """Dimension of a number: that of its unit, if it has one."""
-    unit = node.value.unit if isinstance(node.value, Quantity) else None
-    return ANY if unit is None else Measure(units.powers(unit), written=True)
+    unit = node.value.unit
+    return Measure(units.powers(unit), written=True) if unit else ANY
 
 
 def of_name(node: Name) -> Measure:

@@ -23,7 +23,7 @@ from typing import NoReturn
 
 from rigidsim.scene import units
 from rigidsim.scene.arithmetic import context_for
-from rigidsim.scene.exact import ExactNumber, Quantity, parse_number, with_unit
+from rigidsim.scene.exact import ExactNumber, parse_number
 from rigidsim.scene.expressions import dimensions
 from rigidsim.scene.expressions.dimensions import Measure, check_unit, end_of_unit
 from rigidsim.scene.expressions.names import BODY_NAMES, Readable
@@ -263,7 +263,7 @@ class _Parser:
         """Whether it is a number with a unit without parentheses around it."""
         while isinstance(node, Operation) and node.operator == "negative":
             node = node.operands[0]
-        number = isinstance(node, Constant) and node is not self.enclosed and isinstance(node.value, Quantity)
+        number = isinstance(node, Constant) and node is not self.enclosed and bool(node.value.unit)
         return number and node.text[0] in "0123456789."
 
     def primary(self) -> Expression:
@@ -297,11 +297,9 @@ class _Parser:
         """Parse a number and the unit after it."""
         token = self.advance()
         try:
-            value = parse_number(token, "1")
             end = end_of_unit(self.text, self.end, BODY_NAMES, self.others)
             unit = self.text[self.start : end] if self.kind == "name" else ""
-            if unit:
-                value = with_unit(value, unit, self.text[start:end])
+            value = parse_number(" ".join([token, *unit.split()]))
         except ValueError as error:
             self.fail(str(error), start)
         if unit:

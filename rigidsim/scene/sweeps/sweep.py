@@ -10,10 +10,12 @@ from typing import Self
 from rigidsim.errors import ConfigError, MemberError, Problem, either
 from rigidsim.scene.choices import AUTO, FULL
 from rigidsim.scene.config import Experiment, validated
+from rigidsim.scene.paths import Path
+from rigidsim.scene.schema import config_model
 from rigidsim.scene.sweep_table import INDICATORS, SweepTable
-from rigidsim.scene.sweeps.axes import Axis, axis_name, clashes, refuse_unsettable, unit_and_length
+from rigidsim.scene.sweeps.axes import Axis, axis_name, clashes, refuse_unsettable
 from rigidsim.scene.sweeps.values import axis_values
-from rigidsim.scene.toml_text import apply_overrides, key_steps, parse_toml
+from rigidsim.scene.toml_text import apply_overrides, parse_toml
 
 MOST_MEMBERS = 100_000_000
 FITS = "fit"
@@ -53,19 +55,16 @@ class Sweep:
         for key, given in table.axes.items():
             where = f'[sweep] axes."{key[:60]}"'
             try:
-                plain = _plain_key(key)
+                path, plain = Path.of(key), ".".join(part.strip() for part in key.split("."))
+                if path.steps[0] in _SAME_FOR_ALL:
+                    raise ValueError(f"can't be swept: {_SAME_FOR_ALL[str(path.steps[0])]}")
                 tables = parse_toml(experiment.text, experiment.source)
-                unit, length = unit_and_length(plain, tables)
-                refuse_unsettable(plain, tables)
-                values = axis_values(given, plain, table.seed, length, unit)
-                name = axis_name(plain, given.name)
-                axes.append(Axis(plain, name, unit, values))
-                if axes[-1].numeric:  # its unit, where it has one, is known
-                    axes[-1].exact(0)
+                taken = path.taken(config_model(), tables)
+                refuse_unsettable(path, tables)
+                values = axis_values(given, plain, table.seed, taken.length, taken.unit)
+                axes.append(Axis(plain, axis_name(plain, given.name), taken.unit, values))
             except ValueError as error:
                 problems.append(Problem(where, str(error)))
-            except ConfigError as error:
-                problems += [Problem(where, problem.what) for problem in error.problems]
         events = [event.name for event in experiment.config.events]
         problems += clashes(axes, events, product=table.mode == "product")
         if experiment.config.fit is not None:
@@ -197,15 +196,6 @@ def _of_fits(table: SweepTable) -> list[Problem]:
             what = "can't be swept: all members estimate the same parameters"
             problems.append(Problem(f'[sweep] axes."{key[:60]}"', what))
     return problems
-
-
-def _plain_key(key: str) -> str:
-    """A key without blanks; refused if members have no such key."""
-    steps = key_steps(key, "axes")
-    first = str(steps[0])
-    if first in _SAME_FOR_ALL:
-        raise ValueError(f"can't be swept: {_SAME_FOR_ALL[first]}")
-    return ".".join(part.strip() for part in key.split("."))
 
 
 def _counts(table: SweepTable, axes: Sequence[Axis]) -> list[Problem]:

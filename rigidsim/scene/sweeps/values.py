@@ -8,28 +8,20 @@ import hashlib
 import math
 import re
 import tomllib
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from fractions import Fraction
 from functools import cache
 from statistics import NormalDist
 from typing import Any
 
+import mpmath
+
 from rigidsim.errors import ConfigError, Problem
 from rigidsim.scene.config import Experiment
-from rigidsim.scene.exact import ExactNumber, fraction_of
+from rigidsim.scene.exact import ExactNumber, fraction_of, parse_number
 from rigidsim.scene.python_values import inline
 from rigidsim.scene.sweep_table import LARGEST_AXIS, AxisTable
-from rigidsim.scene.sweeps.written import (
-    DIGITS,
-    AxisValues,
-    Entry,
-    Rational,
-    Written,
-    alike,
-    long_context,
-    rounded,
-)
-from rigidsim.scene.units import to_si
 from rigidsim.scene.validation_messages import shown
 
 _PRODUCT = re.compile(r"[\d.)i]\s*\*\s*[A-Za-z]")
@@ -39,6 +31,28 @@ _SPECS = (
     "uniform(from, to, count), normal(mean, deviation, count), sphere(radius, count), or a table such as "
     '{values = [1, 2], name = "a"}'
 )
+
+Entry = tuple[ExactNumber, ...]
+
+
+@dataclass(frozen=True)
+class AxisValues:
+    """Values of an axis: by their index, either the numbers of each, or the TOML text of what is none. A
+    value is the same number whatever else the axis holds, so that its values identify a member.
+    """
+
+    count: int
+    components: int  # of each value; 0 for plain numbers, and for values that aren't numbers
+    entry: Callable[[int], Entry] | None
+    word: Callable[[int], str] | None = None
+
+    def text(self, index: int) -> str:
+        """A value as written in a config, which identifies it."""
+        if self.entry is None:
+            assert self.word is not None
+            return self.word(index)
+        texts = [number.text for number in self.entry(index)]
+        return f"[{', '.join(texts)}]" if self.components else texts[0]
 
 
 def axis_values(table: AxisTable, key: str, seed: int, length: int, unit: str = "") -> AxisValues:
@@ -52,8 +66,8 @@ def axis_values(table: AxisTable, key: str, seed: int, length: int, unit: str = 
     if table.way == "sphere":
         if length < 3:
             raise ValueError("sphere is for keys that take a vector, such as initial.angular_velocity")
-        radius = Written.of(given)
-        if radius.number.sign <= 0:
+        radius = parse_number(given)
+        if radius.sign <= 0:
             raise ValueError(f"given {shown(given)}; a radius above zero is allowed")
         if table.grid is None:
             assert table.count is not None
@@ -67,24 +81,37 @@ def axis_values(table: AxisTable, key: str, seed: int, length: int, unit: str = 
         return _random_values(table.way, given, _counted(table.count), key, seed, length)
     count = _counted(given[2])
     if table.way == "step":
-        first, step = alike(given[0], given[1])
-        return _numbers(count, lambda i: first[0] + i * step[0], first)
+        first, step = _alike(given[0], given[1])
+        return _numbers(count, lambda i: first.rational + i * step.rational, first)
     if count < 2:
         raise ValueError(f"given a count of {count}; at least 2 are needed, both ends being included")
-    first, last = alike(given[0], given[1])
+    first, last = _alike(given[0], given[1])
     if table.way == "linspace":
-        width = last[0] - first[0]
-        return _numbers(count, lambda i: first[0] + width * i / (count - 1), first)
-    if first[0] * last[0] <= 0:
+        width = last.rational - first.rational
+        return _numbers(count, lambda i: first.rational + width * i / (count - 1), first)
+    if first.sign * last.sign <= 0:
         raise ValueError("both ends of a logspace must be above zero, or both below")
-    return _numbers(count, _geometric(first[0], last[0], count), first)
+    return _numbers(count, _geometric(first, last, count), first)
 
 
-def _numbers(count: int, value: Callable[[int], Fraction], like: Rational) -> AxisValues:
-    def entry(index: int) -> Entry:
-        return (Written(ExactNumber(value(index), like[1]), like[2]),)
+def _numbers(count: int, value: Callable[[int], Fraction], like: ExactNumber) -> AxisValues:
+    return AxisValues(count, 0, lambda index: (_other(value(index), like),))
 
-    return AxisValues(count, 0, entry)
+
+def _other(rational: Fraction, like: ExactNumber) -> ExactNumber:
+    """Another number in the unit of one."""
+    return ExactNumber(rational, like.pi_power, like.unit)
+
+
+def _alike(*given: Any) -> list[ExactNumber]:
+    """Numbers in a common unit, with a common power of pi; ValueError if there is none."""
+    numbers = [parse_number(value) for value in given]
+    some = [x for x in numbers if x.sign]
+    turns, written = {x.pi_power for x in some or numbers[:1]}, {x.unit for x in numbers}
+    if len(turns) > 1 or (len(written) > 1 and not all(x.unit for x in some)):
+        raise ValueError(f"given {' and '.join(map(shown, given))}; write both in one unit")
+    unit = written.pop() if len(written) == 1 else ""
+    return [ExactNumber(x.rational, *turns, unit) for x in numbers]
 
 
 def _counted(count: Any) -> int:
@@ -99,11 +126,9 @@ def _listed(given: Sequence[Any], *, products: bool) -> AxisValues:
         raise ValueError(f"given {len(given)} values; at most 1e7 are allowed")
     try:
         if all(isinstance(value, list) for value in given) and len({len(value) for value in given}) == 1:
-            vectors = [tuple(Written.of(x) for x in value) for value in given]
-            _refuse_what_is_none((x for value in given for x in value), products=products)
+            vectors = [tuple(_number(x, products=products) for x in value) for value in given]
             return AxisValues(len(given), len(vectors[0]), vectors.__getitem__)
-        numbers = [(Written.of(value),) for value in given]
-        _refuse_what_is_none(given, products=products)
+        numbers = [(_number(value, products=products),) for value in given]
         return AxisValues(len(given), 0, numbers.__getitem__)
     except ValueError:
         if not any(isinstance(value, bool | str | list | dict) for value in given):
@@ -112,29 +137,48 @@ def _listed(given: Sequence[Any], *, products: bool) -> AxisValues:
         return AxisValues(len(given), 0, None, words.__getitem__)
 
 
-def _refuse_what_is_none(given: Iterable[Any], *, products: bool) -> None:
-    """Raise ValueError for texts that only begin like numbers: a date, or an expression."""
-    units = set()
-    for value in given:
-        if isinstance(value, str):
-            unit = Written.of(value).unit
-            if unit and products and _PRODUCT.search(value):
-                raise ValueError("an expression")
-            units.add(unit)
-    for unit in units - {""}:
-        to_si(unit)
+def _number(value: Any, *, products: bool) -> ExactNumber:
+    """A number; ValueError for a text that only begins like one: a date, or an expression."""
+    number = parse_number(value)
+    if number.unit and products and _PRODUCT.search(value):
+        raise ValueError("an expression")
+    return number
 
 
-def _geometric(first: Fraction, last: Fraction, count: int) -> Callable[[int], Fraction]:
-    context = long_context()
+DIGITS = 40
+"""Significant decimal digits of values that aren't rational: of logspace, and on a sphere."""
+
+
+def _context() -> Any:
+    """A context in which values that aren't rational are worked out, before they are ``_rounded``."""
+    context = mpmath.MPContext()
+    context.dps = DIGITS + 20
+    return context
+
+
+def _rounded(value: Fraction) -> Fraction:
+    """The nearest number of ``DIGITS`` decimal digits."""
+    if not value:
+        return value
+    size = abs(value)
+    magnitude = math.floor(math.log10(size.numerator) - math.log10(size.denominator))
+    scale = Fraction(10) ** (DIGITS - 1 - magnitude)
+    return round(value * scale) / scale
+
+
+def _geometric(begin: ExactNumber, end: ExactNumber, count: int) -> Callable[[int], Fraction]:
+    """Values between two of one unit, in SI; they are rounded in that unit."""
+    context = _context()
+    first, last = begin.in_its_unit.rational, end.in_its_unit.rational
     ratio = context.log(context.mpf(last.numerator) / last.denominator * first.denominator / first.numerator)
 
     @cache
     def value(index: int) -> Fraction:
         if index in (0, count - 1):
-            return first if index == 0 else last
+            return begin.rational if index == 0 else end.rational
         power = context.exp(ratio * index / (count - 1))
-        return rounded(fraction_of(power * first.numerator / first.denominator))
+        found = _rounded(fraction_of(power * first.numerator / first.denominator))
+        return found * begin.rational / first
 
     return value
 
@@ -190,33 +234,33 @@ def _random_values(
     if length and not vectors:
         raise ValueError(f"the key takes a vector of {length}; give vectors, such as {way} = {_SUCH_AS[way]}")
     pairs = [
-        alike(*(value[i] if isinstance(value, list) else value for value in given))
+        _alike(*(value[i] if isinstance(value, list) else value for value in given))
         for i in range(components or 1)
     ]
-    if way == "uniform" and any(low[0] > high[0] for low, high in pairs):
+    if way == "uniform" and any(low.rational > high.rational for low, high in pairs):
         raise ValueError("the first end of a uniform interval must not be above the second")
-    if way == "normal" and any(deviation[0] < 0 for _, deviation in pairs):
+    if way == "normal" and any(deviation.sign < 0 for _, deviation in pairs):
         raise ValueError("a standard deviation of zero or more is allowed")
 
     lines = []
-    for k, ((first, power, unit), (second, *_)) in enumerate(pairs):
+    for k, (first, second) in enumerate(pairs):
         if way == "uniform":
-            draw, step = _uniform(seed, key, k), (second - first) / (2 * _PLACES)
+            draw, step = _uniform(seed, key, k), (second.rational - first.rational) / (2 * _PLACES)
         else:
-            draw, step = _normal(seed, key, k), second / _DEVIATION
-        below = math.lcm(first.denominator, step.denominator)  # sums of fractions take four times as long
-        lines.append((draw, int(first * below), int(step * below), below, power, unit))
+            draw, step = _normal(seed, key, k), second.rational / _DEVIATION
+        below = math.lcm(first.rational.denominator, step.denominator)  # fractions take four times as long
+        lines.append((draw, int(first.rational * below), int(step * below), below, first))
 
     def entry(index: int) -> Entry:
         return tuple(
-            Written(ExactNumber(Fraction(first + step * draw(index), below), power), unit)
-            for draw, first, step, below, power, unit in lines
+            _other(Fraction(first + step * draw(index), below), like)
+            for draw, first, step, below, like in lines
         )
 
     return AxisValues(count, components, entry)
 
 
-def _random_directions(radius: Written, key: str, seed: int, length: int) -> Callable[[int], Entry]:
+def _random_directions(radius: ExactNumber, key: str, seed: int, length: int) -> Callable[[int], Entry]:
     """Random points of uniform density on a sphere: normal draws scaled to its radius."""
     normals = [_normal(seed, key, component) for component in range(length)]
 
@@ -229,9 +273,9 @@ def _random_directions(radius: Written, key: str, seed: int, length: int) -> Cal
     return entry
 
 
-def _grid_of_directions(radius: Written, polar: int, azimuths: int) -> Callable[[int], Entry]:
+def _grid_of_directions(radius: ExactNumber, polar: int, azimuths: int) -> Callable[[int], Entry]:
     """Centres of cells of equal area on a sphere; the azimuth varies fastest."""
-    context = long_context()
+    context = _context()
 
     @cache
     def sine_and_cosine(j: int) -> tuple[Fraction, Fraction]:
@@ -247,14 +291,13 @@ def _grid_of_directions(radius: Written, polar: int, azimuths: int) -> Callable[
     def entry(index: int) -> Entry:
         sine, cosine = sine_and_cosine(index // azimuths)
         x, y = around(index % azimuths)
-        return _scaled(radius, [rounded(sine * x), rounded(sine * y), rounded(cosine)])
+        return _scaled(radius, [_rounded(sine * x), _rounded(sine * y), _rounded(cosine)])
 
     return entry
 
 
-def _scaled(radius: Written, unit: Sequence[Fraction]) -> Entry:
-    factor, power = radius.number.rational, radius.number.pi_power
-    return tuple(Written(ExactNumber(factor * x, power), radius.unit) for x in unit)
+def _scaled(radius: ExactNumber, unit: Sequence[Fraction]) -> Entry:
+    return tuple(_other(radius.rational * x, radius) for x in unit)
 
 
 # --- axes given with a command ------------------------------------------------------------------------------

@@ -16,8 +16,8 @@ from rigidsim.model.scaling import Drive
 from rigidsim.scene.choices import DEFAULT_METHOD, FULL, variables_named
 from rigidsim.scene.config import Experiment
 from rigidsim.scene.exact import ExactNumber
+from rigidsim.scene.paths import Path
 from rigidsim.scene.sweeps.sweep import Sweep
-from rigidsim.scene.toml_text import key_steps
 from rigidsim.scene.tracing.numbers import Traced, Untraceable
 from rigidsim.solve.batch.tracing import TRACED_TABLES, Reals, Replay, TracedSystem, real_of, trace
 from rigidsim.solve.effects.effect import registered_effects
@@ -71,7 +71,7 @@ def batchable(experiment: Experiment, keys: Sequence[str]) -> NotBatchable | Non
         NotBatchable.AVERAGED: config.model.level != FULL,
         NotBatchable.ORIENTATION: config.output.orientation is not None,
         NotBatchable.LYAPUNOV: config.output.lyapunov,
-        NotBatchable.KEY: any(key_steps(key, "axes")[0] not in TRACED_TABLES for key in keys),
+        NotBatchable.KEY: any(Path.of(key).steps[0] not in TRACED_TABLES for key in keys),
     }
     return next((reason for reason, holds in reasons.items() if holds), None)
 
@@ -113,7 +113,7 @@ class AxisNumbers:
     def traced(self, place: int) -> bool:
         """Whether an axis has numbers that can become parameters."""
         axis = self.sweep.axes[place]
-        return axis.numeric and key_steps(axis.key, "axes")[0] in TRACED_TABLES
+        return axis.numeric and Path.of(axis.key).steps[0] in TRACED_TABLES
 
     def _reals_of(self, place: int, index: int) -> list[hy.real]:
         return [real_of(number) for number in self.sweep.axes[place].exact(index)]

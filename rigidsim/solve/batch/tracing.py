@@ -26,11 +26,10 @@ from rigidsim.scene.arithmetic import context_for
 from rigidsim.scene.config import Experiment
 from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.initial_values import check_start
+from rigidsim.scene.paths import Path
 from rigidsim.scene.scene import Scene, build_scene
-from rigidsim.scene.toml_text import key_steps
 from rigidsim.scene.tracing.arithmetic import TracingContext, swept_number
 from rigidsim.scene.tracing.numbers import BINARY, Graph, Traced, Untraceable
-from rigidsim.scene.varied_keys import replaced, value_at
 from rigidsim.solve.precision import precision_of
 from rigidsim.solve.problem import InitialValueProblem, prepare
 
@@ -121,10 +120,10 @@ def trace(
     graph = Graph(context_for(representative.config.integrator.precision))
     config = representative.config
     for column, (key, number) in enumerate(zip(keys, numbers, strict=True)):
-        steps = key_steps(key, "axes")
-        if not isinstance(value_at(config, steps), ExactNumber):
+        path = Path.of(key)
+        if not isinstance(path.get(config), ExactNumber):
             raise Untraceable(f"what is swept, {key}, is no number")
-        config = replaced(config, steps, swept_number(graph, column, number))
+        config = path.replaced(config, swept_number(graph, column, number))
     context = TracingContext(graph)
     scene: Scene = build_scene(replace(representative, config=config), context)
     check_start(scene)

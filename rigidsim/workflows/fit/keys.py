@@ -11,7 +11,7 @@ import numpy as np
 
 from rigidsim.errors import ConfigError, Problem
 from rigidsim.scene.config import Experiment, validated
-from rigidsim.scene.exact import ExactNumber, Quantity, parse_number, parse_quantity
+from rigidsim.scene.exact import parse_number
 from rigidsim.scene.fit_table import KnownWithin
 from rigidsim.scene.row_rotations import multiplied, of_vector
 from rigidsim.scene.scene import Scene, build_scene
@@ -102,11 +102,11 @@ class FitKeys:
         suffix, unit = "", varied.unit
         table, _, name = varied.name.partition(".")
         given = self._experiment.config.parameters.get(name) if table == "parameters" else None
-        if isinstance(given, Quantity):  # constants of expressions have units of their own
+        if given is not None and given.unit:  # constants of expressions have units of their own
             found = unit_text(powers(given.unit)) or "rad"
             suffix = unit = f"rad{found[1:]}" if found.startswith("1/") else found
         known = None if sigma is None else _sigma(sigma, varied, given)
-        places = [written_key(place) for place in varied.places]
+        places = [str(place) for place in varied.places]
         size = abs(float(varied.number)) or abs(float(varied.size)) or 1.0
         return FitKey(varied.name, unit, float(varied.number), known, suffix, tuple(places), size)
 
@@ -158,14 +158,6 @@ class FitKeys:
         return self._experiment.having(["fit=", *self.overrides(everything)])
 
 
-def written_key(place: Sequence[str | int]) -> str:
-    """A key of such steps, as it is given to replace a value."""
-    parts = [f"[{step}]" if isinstance(step, int) else f'."{step}"' for step in place]
-    return (
-        "".join(parts)[1:].replace('"', "") if all("." not in str(x) for x in place) else "".join(parts)[1:]
-    )
-
-
 def _given(sigmas: Mapping[str, KnownWithin], varied: VariedKey, key: str, index: int) -> Any:
     """What is known beforehand of a number, by its own key or by that of its vector, as written."""
     plain = {name.replace(" ", ""): table for name, table in sigmas.items()}
@@ -182,13 +174,10 @@ def _given(sigmas: Mapping[str, KnownWithin], varied: VariedKey, key: str, index
 def _sigma(given: Any, varied: VariedKey, parameter: Any) -> float:
     """A standard deviation in SI, of a key or of a parameter."""
     anything = varied.name.startswith(("parameters", "states")) and varied.unit == "1"
-    number: ExactNumber = parse_quantity(given) if anything else parse_number(given, varied.unit)
-    if (
-        isinstance(number, Quantity)
-        and isinstance(parameter, Quantity)
-        and powers(number.unit) != powers(parameter.unit)
-    ):
-        raise ValueError(f"given {shown(given)}, where {parameter.unit}, the parameter's unit, is needed")
+    number = parse_number(given, "" if anything else varied.unit)
+    needed = parameter.unit if parameter is not None else ""
+    if number.unit and needed and powers(number.unit) != powers(needed):
+        raise ValueError(f"given {shown(given)}, where {needed}, the parameter's unit, is needed")
     if not float(number) > 0:
         raise ValueError(f"given {shown(given)} as sigma; a standard deviation above zero is allowed")
     return float(number)

@@ -16,7 +16,7 @@ from rigidsim.formats import ck_reading
 from rigidsim.formats.attitude_messages import MESSAGE_COLUMNS
 from rigidsim.formats.trajectories import Trajectory, read_columns
 from rigidsim.scene.config import Experiment
-from rigidsim.scene.exact import parse_number, parse_quantity
+from rigidsim.scene.exact import parse_number
 from rigidsim.scene.fit_table import FitDataTable
 from rigidsim.scene.row_rotations import SEQUENCES, normalised, of_euler
 from rigidsim.scene.scene import Scene
@@ -320,6 +320,6 @@ def _usable(sigma: Any) -> Any:
 def parse_any(value: Any, fault: Any) -> Any:
     """A number with any unit, in SI."""
     try:
-        return parse_quantity(value)
+        return parse_number(value)
     except ValueError as error:
         raise fault("unit", str(error)) from None
