@@ -3,50 +3,60 @@
 from __future__ import annotations
 
 import errno
-import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
 _MOST_SHOWN = 30
-_COMMAND, _PYTHON, _END = "\x02", "\x03", "\x04"  # none is ever shown
-_EITHER = re.compile(f"{_COMMAND}([^{_PYTHON}]*){_PYTHON}([^{_END}]*){_END}")
 
 
-def either(command_line: str, python: str) -> str:
-    """A remedy in two wordings: commands print the first, Python errors show the second."""
-    return f"{_COMMAND}{command_line}{_PYTHON}{python}{_END}"
+class Wording:
+    """Whether remedies are worded as commands and options, which only a command's process asks for."""
+
+    commands = False
+
+    @classmethod
+    @contextmanager
+    def of_commands(cls) -> Iterator[None]:
+        """Word remedies as commands and options meanwhile."""
+        before, cls.commands = cls.commands, True
+        try:
+            yield
+        finally:
+            cls.commands = before
 
 
-FORCE = either("--force", "force=True")
-OUT = either("--out", "out")
-RESUME = either("rigidsim resume", "rigidsim.resume(...)")
-SWEEP = either("rigidsim sweep", "rigidsim.sweep(...)")
-VIEW = either("rigidsim view", "run.view()")
+@dataclass(frozen=True)
+class Remedy:
+    """What to do, for the command line and in Python; its text is the one that the reader can use."""
+
+    command: str
+    python: str
+
+    def __str__(self) -> str:
+        return self.command if Wording.commands else self.python
+
+
+FORCE = Remedy("--force", "force=True")
+OUT = Remedy("--out", "out")
+RESUME = Remedy("rigidsim resume", "rigidsim.resume(...)")
+SWEEP = Remedy("rigidsim sweep", "rigidsim.sweep(...)")
+VIEW = Remedy("rigidsim view", "run.view()")
 
 
 def run_again(folder: Path) -> str:
     """What to do about a damaged file in a run's folder, which only a copy or another run replaces."""
     config = folder / "config.toml"
-    command = either(f"rigidsim run {config} --out ELSEWHERE", f'rigidsim.run("{config}", out=...)')
+    command = Remedy(f"rigidsim run {config} --out ELSEWHERE", f'rigidsim.run("{config}", out=...)')
     again = command if config.is_file() else "run its config again"
     return f"copy it again from where it is whole, or make it again: {again}"
 
 
 class RigidsimError(Exception):
-    """Base of all errors that rigidsim raises on purpose; its text is meant for the user.
-
-    Remedies are worded for Python; ``for_command_line`` words them as options and commands.
-    """
+    """Base of all errors that rigidsim raises on purpose; its text is meant for the user."""
 
     exit_code = 2
-
-    def __str__(self) -> str:
-        return _EITHER.sub(r"\2", super().__str__())
-
-    def for_command_line(self) -> str:
-        """The text with remedies worded as commands and options."""
-        return _EITHER.sub(r"\1", super().__str__())
 
 
 @dataclass(frozen=True)
@@ -66,17 +76,7 @@ class Problem:
 
 
 def _visible(text: str) -> str:
-    """The text with control characters escaped, so that a terminal shows them instead of obeying; the marks
-    of ``either`` stay.
-    """
-    shown, begin = "", 0
-    for match in _EITHER.finditer(text):
-        shown += _escaped(text[begin : match.start()]) + either(_escaped(match[1]), _escaped(match[2]))
-        begin = match.end()
-    return shown + _escaped(text[begin:])
-
-
-def _escaped(text: str) -> str:
+    """The text with control characters escaped, so that a terminal shows them instead of obeying."""
     return "".join(c if c.isprintable() or c == "\n" else ascii(c)[1:-1] for c in text)
 
 

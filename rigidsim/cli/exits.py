@@ -5,7 +5,7 @@ import signal
 import sys
 from collections.abc import Callable
 
-from rigidsim.errors import RigidsimError
+from rigidsim.errors import RigidsimError, Wording
 
 
 def refuse_options(what: str, **given: object) -> None:
@@ -27,9 +27,10 @@ def exit_code(command: Callable[[], int]) -> int:
     ending = (signal.SIGINT, signal.SIGTERM)
     before = {number: signal.signal(number, signal.default_int_handler) for number in ending}
     try:
-        code = command()
+        with Wording.of_commands():
+            code = command()
     except RigidsimError as error:
-        print(f"rigidsim: {error.for_command_line()}", file=sys.stderr)
+        print(f"rigidsim: {error}", file=sys.stderr)
         return error.exit_code
     except BrokenPipeError:
         sys.stderr.close()

@@ -13,7 +13,7 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import Discriminator, Field, StrictInt, StrictStr, Tag
 
-from rigidsim.errors import ConfigError, Problem, either
+from rigidsim.errors import ConfigError, Problem, Remedy
 from rigidsim.scene.exact import ZERO, rounded
 from rigidsim.scene.fields import NAME_OR_VECTOR, ConfigTable, Instant, Second, TimeUnitName
 from rigidsim.scene.validation_messages import shown
@@ -139,7 +139,7 @@ def sample_times(table: Time, context: Any, texts: Mapping[str, str]) -> tuple[A
     """
     ways = [key for key in ("samples", "every", "times") if getattr(table, key) is not None]
     if len(ways) > 1:
-        less = either(f"--set time.{ways[0]}= removes it", "Experiment.replace removes keys, too")
+        less = Remedy(f"--set time.{ways[0]}= removes it", "Experiment.replace removes keys, too")
         allowed = "only one of samples, every, times is allowed: leave the other out"
         raise _fail(ways[1], f"given beside {ways[0]}; {allowed} ({less})")
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import mpmath
 import numpy as np
 
-from rigidsim.errors import ConfigError, Problem, either
+from rigidsim.errors import ConfigError, Problem, Remedy
 from rigidsim.model.carriers import carried_beside
 from rigidsim.model.load import Load, own_loads
 from rigidsim.model.model_plan import plan_model
@@ -121,7 +121,7 @@ def prepare(experiment: Experiment, *, loads: Sequence[Load] = ()) -> InitialVal
     if experiment.config.sweep is not None:
         what = (
             "describes many members, and this takes a single experiment: "
-            f"{either('rigidsim sweep runs', 'rigidsim.sweep(...) runs')} them; remove [sweep] to run the "
+            f"{Remedy('rigidsim sweep runs', 'rigidsim.sweep(...) runs')} them; remove [sweep] to run the "
             "experiment without it"
         )
         raise ConfigError(Problem("[sweep]", what), experiment.source)

@@ -10,7 +10,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
-from rigidsim.errors import FORCE, RESUME, RunFolderError, either, run_again
+from rigidsim.errors import FORCE, RESUME, Remedy, RunFolderError, run_again
 from rigidsim.look import viewer
 from rigidsim.store import atomic, segments
 from rigidsim.store.folder import RunFolder, find_run
@@ -263,12 +263,12 @@ def open_run(path: str | Path) -> SavedRun:
         RunFolderError: no run there, or a damaged summary.
     """
     if is_sweep(path):
-        what = either("rigidsim info shows it, and rigidsim resume completes it", "use rigidsim.open_sweep")
+        what = Remedy("rigidsim info shows it, and rigidsim resume completes it", "use rigidsim.open_sweep")
         raise RunFolderError(f"{path}: is a sweep, no single run; {what}; its dataset.h5 holds all members")
     from rigidsim.store.fits import is_fit  # which a run doesn't need
 
     if is_fit(path):
-        what = either("rigidsim info and rigidsim view show it", "xarray.open_dataset reads its dataset.h5")
+        what = Remedy("rigidsim info and rigidsim view show it", "xarray.open_dataset reads its dataset.h5")
         raise RunFolderError(f"{path}: is a fit, no run; {what}; rigidsim run takes its fitted.toml")
     folder = find_run(path)
     return SavedRun(folder, folder.read_summary())

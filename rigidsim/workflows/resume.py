@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from rigidsim.errors import FORCE, RunFolderError, either
+from rigidsim.errors import FORCE, Remedy, RunFolderError
 from rigidsim.model.load import Load
 from rigidsim.scene.cautions import Caution, WarningCode
 from rigidsim.scene.config import Experiment, Overrides, parse
@@ -34,8 +34,8 @@ from rigidsim.workflows.read import as_begun, embedded, refuse_other_kernel, tex
 from rigidsim.workflows.run import certified
 
 _ROWS_AT_ONCE = 65536
-_UNTIL = either("--until", "until")
-_SET = either("--set", "overrides")
+_UNTIL = Remedy("--until", "until")
+_SET = Remedy("--set", "overrides")
 
 
 def resume(

@@ -174,7 +174,7 @@ def _interpolated(name: str, found: TableErrors) -> str:
 def print_checked(found: Checked) -> None:
     """Print the result of a check; errors go to stderr, as for all commands."""
     if not found.valid:
-        print(f"rigidsim: {ConfigError(found.problems, found.source).for_command_line()}", file=sys.stderr)
+        print(f"rigidsim: {ConfigError(found.problems, found.source)}", file=sys.stderr)
         return
     on = Page()
     on.say((found.source, "bold"), "  ", ("valid", "bold green"))

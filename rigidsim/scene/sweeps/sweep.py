@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from dataclasses import replace as exchanged
 from typing import Self
 
-from rigidsim.errors import ConfigError, MemberError, Problem, either
+from rigidsim.errors import ConfigError, MemberError, Problem, Remedy
 from rigidsim.scene.choices import AUTO, FULL
 from rigidsim.scene.config import Experiment, validated
 from rigidsim.scene.paths import Path
@@ -20,7 +20,7 @@ from rigidsim.scene.toml_text import apply_overrides, parse_toml
 MOST_MEMBERS = 100_000_000
 FITS = "fit"
 """What is kept of a sweep whose members are fits."""
-_ASKED = either("is asked for with rigidsim run --sweep KEY=SPEC", "changes={'sweep': {...}} adds one")
+_ASKED = Remedy("is asked for with rigidsim run --sweep KEY=SPEC", "changes={'sweep': {...}} adds one")
 _SAME_FOR_ALL = {
     "name": "the sweep has one name",
     "description": "the sweep has one description",

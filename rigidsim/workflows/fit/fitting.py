@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from rigidsim.errors import SWEEP, ConfigError, Problem, RigidsimError, RunFolderError, either
+from rigidsim.errors import SWEEP, ConfigError, Problem, Remedy, RigidsimError, RunFolderError
 from rigidsim.scene.config import Experiment
 from rigidsim.store import atomic
 from rigidsim.store.outputs import refuse_inputs
@@ -117,7 +117,7 @@ def _refuse(experiment: Experiment) -> None:
     if config.fit is None:
         problems.append(Problem("[fit]", "missing; it names parameters and data, see docs/fits.md"))
     if config.sweep is not None:
-        one = either("--member N", "[sweep] removed")
+        one = Remedy("--member N", "[sweep] removed")
         what = f"asks for many fits, which {SWEEP} makes; with {one} here it is a single one"
         problems.append(Problem("[sweep]", what))
     if config.integrator.precision == "single":

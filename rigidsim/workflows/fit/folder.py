@@ -39,7 +39,7 @@ _NAMES = (
     "evaluations",
     BEGUN,
 )
-_AGAIN = f"copy it again from where it is whole, or make the fit again ({FORCE})"
+_AGAIN = "copy it again from where it is whole, or make the fit again"
 
 
 @dataclass(frozen=True)
@@ -120,7 +120,7 @@ class FitFolder(WorkFolder):
         try:
             return FitResult.model_validate_json(self.summary.read_text(encoding="utf-8"))
         except (OSError, ValueError) as error:
-            raise RunFolderError(f"{self.summary}: can't be read ({error}); {_AGAIN}") from None
+            raise RunFolderError(f"{self.summary}: can't be read ({error}); {_AGAIN} ({FORCE})") from None
 
     def motion(self) -> FittedRun:
         """The fitted experiment's motion with the predicted uncertainty, to be viewed.
@@ -132,7 +132,7 @@ class FitFolder(WorkFolder):
         try:
             fit = xarray.load_dataset(self.dataset, engine="h5netcdf")
         except (OSError, ValueError) as error:
-            raise RunFolderError(f"{self.dataset}: can't be read ({error}); {_AGAIN}") from None
+            raise RunFolderError(f"{self.dataset}: can't be read ({error}); {_AGAIN} ({FORCE})") from None
         return fitted_run(load(self.fitted), fit, str(self.path))
 
     def copies(self, experiment: Experiment) -> list[DataFiles]:

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from decimal import Decimal
 from pathlib import Path
 
-from rigidsim.errors import ConfigError, Problem, either
+from rigidsim.errors import ConfigError, Problem, Remedy
 from rigidsim.scene.config import Experiment
 from rigidsim.scene.exact import parse_number
 from rigidsim.scene.readable import span_text
@@ -29,7 +29,7 @@ from rigidsim.workflows.read import Given, as_experiment
 
 FIGURE = "ladder.png"
 _LONGEST = 94  # of a name that becomes the least model's
-_WHERE = either("--physics", "error")
+_WHERE = Remedy("--physics", "error")
 _CHEAPER = 0.95  # of the least model's cost, from which on one with more effects is told
 _UNCERTAIN = 0.1  # of the error, up to which rounding doesn't matter
 
@@ -153,10 +153,10 @@ def _asked(error: str | float | Decimal) -> float:
         value = float(parse_number(error, "rad"))
     except ValueError as problem:
         what = f'{problem}; an angle such as "0.1 arcsec" is allowed'
-        raise ConfigError(Problem(_WHERE, what)) from None
+        raise ConfigError(Problem(str(_WHERE), what)) from None
     if not 0 < value < math.pi:
         what = f'given {error}; an angle above 0 and below half a turn is allowed, such as "0.1 arcsec"'
-        raise ConfigError(Problem(_WHERE, what))
+        raise ConfigError(Problem(str(_WHERE), what))
     return value
 
 

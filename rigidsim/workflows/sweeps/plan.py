@@ -5,7 +5,7 @@ import math
 from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 
-from rigidsim.errors import ConfigError, Problem, either
+from rigidsim.errors import ConfigError, Problem, Remedy
 from rigidsim.scene.initial_values import check_start
 from rigidsim.scene.registry import OBSERVABLES
 from rigidsim.scene.scene import build_scene
@@ -171,7 +171,7 @@ def refuse_untold_tiles(sweep: Sweep) -> None:
     if sweep.table.tile is None and sweep.count > _FEW and not sweep.fits:
         length = max(_FEW, sweep.count // 1000)
         what = (
-            f"missing, and {either('--tiles needs', 'tiles=(...) needs')} it: otherwise the number of tiles "
+            f"missing, and {Remedy('--tiles needs', 'tiles=(...) needs')} it: otherwise the number of tiles "
             "depends on how fast a machine is, and shares could miss some; give the number of members of a "
             f"tile, such as tile = {length}"
         )

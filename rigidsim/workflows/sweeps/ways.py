@@ -21,7 +21,7 @@ from contextlib import AbstractContextManager, contextmanager, nullcontext, supp
 from pathlib import Path
 from typing import Any, TypeVar
 
-from rigidsim.errors import StoppedError
+from rigidsim.errors import StoppedError, Wording
 from rigidsim.scene.sweeps.sweep import Sweep
 from rigidsim.solve.compiled import quieten_engine
 from rigidsim.store.sweeps.tiles import Generation
@@ -145,7 +145,9 @@ class Workers(Way):
 
     def _started(self) -> ProcessPoolExecutor:
         context = multiprocessing.get_context("spawn")
-        return ProcessPoolExecutor(self._count, context, _begin_worker, (os.getpid(), self._between))
+        return ProcessPoolExecutor(
+            self._count, context, _begin_worker, (os.getpid(), self._between, Wording.commands)
+        )
 
     def _end(self) -> None:
         """End the workers at once; their results are no longer needed."""
@@ -188,11 +190,12 @@ def _refuse_deadly(generation: Generation, deaths: Counter[int]) -> None:
         )
 
 
-def _begin_worker(parent: int, between: Path) -> None:
+def _begin_worker(parent: int, between: Path, commands: bool) -> None:
     """Initialize a worker: ignore Ctrl-C, which is for the parent, and end when the parent ends, however it
     does.
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    Wording.commands = commands
     quieten_engine()
 
     def watch() -> None:
