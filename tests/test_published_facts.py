@@ -75,6 +75,7 @@ def tilt(run: rigidsim.Run) -> np.ndarray:
     return np.arccos(np.clip(1 - 2 * (q[:, 1] ** 2 + q[:, 2] ** 2), -1, 1))
 
 
+@pytest.mark.slow
 def test_sleeping_top_stays_up_above_the_threshold_and_falls_below(ready: Ready) -> None:
     # w3^2 = 4 A M g l / C^2: Landau & Lifshitz, section 35, problem 1
     threshold = math.sqrt(4 * 2e-4 * 0.1 * 9.80665 * 0.04) / 1e-4

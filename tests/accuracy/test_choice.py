@@ -79,6 +79,7 @@ def test_every_kind_of_scene_is_certified_to_what_is_true(number: int, tmp_path:
     assert run.summary["cost"]["seconds"]["choose"] > 0
 
 
+@pytest.mark.slow
 def test_what_was_chosen_runs_again_from_the_dataset_without_choosing(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

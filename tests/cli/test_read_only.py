@@ -50,6 +50,7 @@ def message(result: Any, code: int = 2) -> str:
     return lines[0]
 
 
+@pytest.mark.slow
 def test_a_finished_run_is_read_verified_and_drawn(
     config: Config, rigidsim_command: Command, remount: Remount, monkeypatch: pytest.MonkeyPatch
 ) -> None:

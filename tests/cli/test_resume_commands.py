@@ -20,6 +20,7 @@ Command = Callable[..., Any]
 Start = Callable[..., subprocess.Popen[str]]
 
 
+@pytest.mark.slow
 def test_resume_goes_on_and_verify_agrees(config: Config, rigidsim_command: Command) -> None:
     name = config(time="end = 3000\nsamples = 31", rest="[limits]\nmax_steps = 50")
     stopped = rigidsim_command("run", name)

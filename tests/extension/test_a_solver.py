@@ -149,6 +149,7 @@ def exact_attitudes() -> np.ndarray:
     return loaded(run_text(text(1e-16, "taylor")))["quaternion"].values
 
 
+@pytest.mark.slow
 def test_it_records_a_dataset_with_true_errors_of_its_own(tmp_path: Path) -> None:
     run = rigidsim.run(rigidsim.parse(text()), out=tmp_path)
     assert run.status == "finished"

@@ -78,6 +78,7 @@ def test_the_density_is_that_of_the_model_within_the_network(case: tuple[float, 
     assert np.abs(found - expected).max() <= 1e-14 + 1e-9 * np.abs(expected).max()
 
 
+@pytest.mark.slow
 def test_a_run_ends_where_the_network_does() -> None:
     """At 150 km above WGS 84, which the last sample and its velocity tell to the tilt of the pole."""
     run = run_text(text(place=np.array([6535e3, 0, 0]), end=20000.0, mass=0.2), "time.samples=2001")

@@ -66,6 +66,7 @@ def full(moments: np.ndarray, rates: list[float], damping: np.ndarray, times: np
     return np.einsum("abt,bt->at", found[:9].reshape(3, 3, -1), moments[:, None] * found[9:])
 
 
+@pytest.mark.slow
 def test_the_averaged_motion_starts_in_the_middle_of_the_full_one() -> None:
     """Direction and size of the momentum against means (Hann) of the full motion over some hundred turns."""
     start = f"angular_velocity = {RATES}\nquaternion = {Q.tolist()}"

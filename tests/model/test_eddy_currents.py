@@ -58,6 +58,7 @@ def test_a_spin_across_the_field_falls_exponentially(precision: str, error: floa
         assert np.abs(w[:, 1:]).max() == 0
 
 
+@pytest.mark.slow
 def test_it_agrees_with_another_integrator_of_other_equations() -> None:
     run = run_text(text(OF_TENSOR, end=300.0))
     assert run.summary["warnings"] == []

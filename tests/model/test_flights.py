@@ -16,6 +16,7 @@ IN_ORBIT = Flight(
 )  # fmt: skip
 
 
+@pytest.mark.slow
 def test_a_small_drag_leaves_the_attitude_as_right_as_announced() -> None:
     """The other integrator's own errors: 1e-13 of each of some thousand steps, over a hundred radians."""
     run, truth = run_estimated(IN_ORBIT.text), by_scipy(IN_ORBIT)

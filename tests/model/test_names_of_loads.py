@@ -136,6 +136,7 @@ def shadowed(radius: str, more: str = "", end: float = 5800, samples: int = 30, 
     return config(BODY, START, text, f"end = {end}\nsamples = {samples}", more=LIT + more, **tables)
 
 
+@pytest.mark.slow
 def test_the_shadow_on_a_point_jumps() -> None:
     begin, end = contacts(0)
     data = loaded(run_text(shadowed("")))

@@ -129,6 +129,7 @@ def test_no_false_alarm(text: str) -> None:
     assert warned(text) == []
 
 
+@pytest.mark.slow
 def test_what_is_ready_to_run_raises_no_alarm() -> None:
     """Every ready config and template, and every whole config in the documentation."""
     found = []

@@ -31,7 +31,7 @@ def _slope(_: float, state: np.ndarray) -> np.ndarray:
 
 
 @pytest.mark.parametrize(
-    ("rate", "saturated", "end"), [pytest.param(0.0, False, 60, marks=pytest.mark.slow), (622.0, True, 15)]
+    ("rate", "saturated", "end"), [pytest.param(0.0, False, 60, marks=pytest.mark.slow), (622.0, True, 6)]
 )
 def test_it_turns_by_its_wheels_within_their_limits(
     rate: float, saturated: bool, end: int, capfd: pytest.CaptureFixture[str]

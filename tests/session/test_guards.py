@@ -33,6 +33,7 @@ SCENES = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scene", cases(SCENES, ("events",)))
 def test_max_steps_is_never_exceeded_and_always_used_up(scene: str, tmp_path: Path) -> None:
     """A step is a natural step of the engine, as ``cost.steps`` counts them; in sessions of so many each, the

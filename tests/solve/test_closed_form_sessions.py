@@ -53,6 +53,7 @@ def killed(experiment: rigidsim.Experiment, out: Path) -> Path:
     return folder
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("precision", cases(PRECISIONS, ("double",)))
 def test_a_killed_run_resumes_bit_for_bit(precision: str, tmp_path: Path) -> None:
     whole = rigidsim.run(top(precision), out=tmp_path / "whole")

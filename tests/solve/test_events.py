@@ -99,6 +99,7 @@ def test_a_run_can_end_at_an_event() -> None:
     assert np.array_equal(run.dataset["quaternion"], whole["quaternion"][: len(times)])
 
 
+@pytest.mark.slow
 def test_a_coin_stops_when_it_lands(runs: Path) -> None:
     """Thrown up with 4 m/s from 0.2 m it lands at the root of its parabola; the time reached
     is that of the event, to its last digit, wherever the engine's step ended.

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pytest
 from support import EPSILON, config, run_text, same_bits
 
 import rigidsim
@@ -99,6 +100,7 @@ def test_what_could_swing_either_way_is_not_decided() -> None:
     assert "swings about it grow" in run.summary["message"]
 
 
+@pytest.mark.slow
 def test_resumed_at_rest_it_rests(tmp_path: Path) -> None:
     text = f"{PARKED} + step(t - 15)"
     whole = parked(text, out=tmp_path / "whole")

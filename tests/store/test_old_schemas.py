@@ -51,6 +51,7 @@ def test_a_kept_dataset_is_read(folder: Path) -> None:
         assert result.exit_code == 0, result.output
 
 
+@pytest.mark.slow
 def test_it_embeds_the_experiment_that_gives_the_same_numbers(folder: Path) -> None:
     """To a few roundings: bits are promised for the same versions and CPU features alone."""
     result = CliRunner().invoke(app, ["run", "--from", str(KEPT), "--out", str(folder)])

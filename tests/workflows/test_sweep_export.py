@@ -108,6 +108,7 @@ def test_csv_has_a_row_per_member_with_every_digit(box: SavedSweep, tmp_path: Pa
     assert any(line.startswith("# warnings: 1 drift, 2 singularity, ") for line in head)
 
 
+@pytest.mark.slow
 def test_texts_failures_and_angles(pairs: SavedSweep, tmp_path: Path) -> None:
     parquet = pytest.importorskip("pyarrow.parquet")
     dataset = pairs.dataset

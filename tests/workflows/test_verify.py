@@ -44,6 +44,7 @@ def forged(original: Path, target: Path, edit: Callable[[h5py.File], Any]) -> Pa
     return target
 
 
+@pytest.mark.slow
 def test_identical_from_the_dataset_alone(original: Path, tmp_path: Path) -> None:
     alone = tmp_path / "mine.h5"
     alone.write_bytes(original.read_bytes())
