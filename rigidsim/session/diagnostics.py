@@ -7,8 +7,8 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 
 from rigidsim.accuracy.error_law import CLOSED_FORM
-from rigidsim.accuracy.estimates.course import UNCERTAIN
 from rigidsim.accuracy.estimates.estimate import Estimate, estimate_errors, label_rounding
+from rigidsim.accuracy.estimates.margins import UNCERTAIN
 from rigidsim.accuracy.models.modelling import measure_modelling
 from rigidsim.accuracy.models.side_by_side import Unmeasured
 from rigidsim.errors import ConfigError
@@ -80,7 +80,6 @@ class Diagnostics:
             waypoints=None if corrected is None else corrected.effect(Waypoints),
             stepper=stepper,
             nearest=min(self.statistics.nearest_singularity, self._passed(), 1.0),
-            uneven=progress.largest_step / max(progress.smallest_step, 1e-300),
             go_on=go_on,
         )
         if found is not None and beside:

@@ -10,7 +10,7 @@ from rigidsim.model.rotations import Symbolic
 from rigidsim.model.state_blocks import BODY
 from rigidsim.model.system import System
 from rigidsim.solve.compiled import CompiledFunction, compiled_function, evaluate_rows
-from rigidsim.solve.precision import Precision
+from rigidsim.solve.precision import Precision, Scalar
 from rigidsim.solve.sample_block import SampleBlock
 
 
@@ -34,11 +34,14 @@ class SettledStates:
             functions.append(compiled_function(expressions, chart.variables, **options))
         return cls(functions, [wanted.states.index(name) for name in BODY.quaternion])
 
+    def from_state(self, state: np.ndarray, time: Scalar, chart: int) -> np.ndarray:
+        """States (states,) of a state in a chart, with the quaternion of either sign."""
+        times = np.array([time], dtype=state.dtype)
+        return np.array(evaluate_rows(self._functions[chart], state[None], times=times)[:, 0])
+
     def at(self, block: SampleBlock, row: int, near: np.ndarray) -> np.ndarray:
         """States of a sample (states,), with the quaternion's sign as in a state near it."""
-        function = self._functions[int(block.chart[row])]
-        states, times = block.states[row : row + 1], block.times[row : row + 1]
-        found = np.array(evaluate_rows(function, states, times=times)[:, 0])
+        found = self.from_state(block.states[row], block.times[row], int(block.chart[row]))
         if (found[self._signs] * near[self._signs]).sum() < 0:
             found[self._signs] = -found[self._signs]
         return found

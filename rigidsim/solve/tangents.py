@@ -15,6 +15,7 @@ control doesn't see them: their series have the same radius of convergence as th
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -59,7 +60,7 @@ class Derivatives:
     """Derivatives of a system's right-hand sides, and of outputs after them, by states and by coefficients.
 
     Args:
-        rights: right-hand sides of all states.
+        rights: right-hand sides of all states, or of the first ones.
         first, count: numbers of the first of the parameters that are coefficients, and how many there are.
     """
 
@@ -73,7 +74,8 @@ class Derivatives:
     ) -> None:
         self.system, self.rights, self.outputs = system, list(rights), list(outputs)
         self.first, self.count = first, count
-        self.by_state = jacobian_rows([*rights, *outputs], system.variables)
+        self.variables = system.variables[: len(self.rights)]
+        self.by_state = jacobian_rows([*rights, *outputs], self.variables)
         self.by_coefficient = jacobian_rows([*rights, *outputs], [hy.par[first + m] for m in range(count)])
 
     @classmethod
@@ -98,6 +100,23 @@ class Derivatives:
         known = range(0 if pieces is None else min(len(pieces.knots), 8) + 1)
         anew = {name for number in known for name in pieces.states(number)} if pieces is not None else set()
         return sorted(i for i in moved if self.system.states[i] not in anew)
+
+    def slopes(self, tangent: int) -> slice:
+        """Numbers of the parameters that are derivatives of coefficients along a tangent."""
+        first = int(self.first + self.count * (1 + tangent))
+        return slice(first, first + self.count)
+
+    def equations(
+        self, moving: Sequence[int], count: int
+    ) -> tuple[list[tuple[Symbolic, Symbolic]], list[dict[int, Symbolic]]]:
+        """Equations of the motion and of tangents, which some states have, and the variables of these."""
+        names = self.system.states
+        tangents = [{i: hy.make_vars(f"tangent_{j}_{names[i]}") for i in moving} for j in range(count)]
+        found = list(zip(self.variables, self.rights, strict=True))
+        for j, tangent in enumerate(tangents):
+            first = self.slopes(j).start
+            found += [(d, self.along(i, tangent, first)) for i, d in tangent.items()]
+        return found, tangents
 
     def along(self, row: int, tangent: Mapping[int, Symbolic], slopes: int) -> Symbolic:
         """Derivative of an expression along a tangent, with the number of the parameter that is the first
@@ -146,12 +165,8 @@ class Tangents:
         self.system, self.precision, self.moving, self.count = derivatives.system, precision, moving, count
         self._made, system, names = derivatives, derivatives.system, derivatives.system.states
         self.states = len(names)
-        tangents = [{i: hy.make_vars(f"tangent_{j}_{names[i]}") for i in moving} for j in range(count)]
+        equations, tangents = derivatives.equations(moving, count)
         self.one = [*system.variables, *tangents[0].values()]
-        equations = list(zip(system.variables, derivatives.rights, strict=True))
-        for j, tangent in enumerate(tangents):
-            slopes = self.slopes(j).start
-            equations += [(d, derivatives.along(i, tangent, slopes)) for i, d in tangent.items()]
         options = {**precision.options, **options}
         shape = (len(equations), width) if width else (len(equations),)
         self.numbers = precision.zeros((self.slopes(count).start, *shape[1:]))
@@ -166,9 +181,8 @@ class Tangents:
         self._place: Place | None = None
 
     def slopes(self, tangent: int) -> slice:
-        """Numbers of the parameters that are derivatives of coefficients along a tangent."""
-        first = int(self._made.first + self._made.count * (1 + tangent))
-        return slice(first, first + self._made.count)
+        """See ``Derivatives``."""
+        return self._made.slopes(tangent)
 
     def of(self, tangent: int) -> slice:
         """Places of a tangent's components."""
@@ -232,20 +246,24 @@ class Tangents:
         engine = self._engine
         if self._fresh and engine.time == time:
             self._meet()
-        self._steps_to(time, self._step, go_on)
+        self._steps_to(time, lambda _: self._step(), go_on)
         return self._true(engine.state if engine.time == time else engine.update_d_output(time))
 
-    def to(self, time: Scalar, go_on: Callable[[], bool] = lambda: True) -> tuple[np.ndarray, np.ndarray]:
-        """Go exactly to a time: state and tangents (count, moving) there; see ``sample``."""
-        self._steps_to(time, lambda: self._go(time, self._stride), go_on)
+    def to(
+        self, time: Scalar, go_on: Callable[[], bool] = lambda: True, most: int = sys.maxsize
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Go exactly to a time, or by so many steps: state and tangents (count, moving); see ``sample``."""
+        self._steps_to(time, lambda left: self._go(time, min(self._stride, left)), go_on, most)
         every = self._true(self._engine.state)
         return every[: self.states], every[self.states :].reshape(self.count, -1)
 
-    def _steps_to(self, time: Scalar, step: Callable[[], None], go_on: Callable[[], bool]) -> None:
-        engine, count, stuck = self._engine, 0, 0
-        while engine.time < time:
+    def _steps_to(
+        self, time: Scalar, step: Callable[[int], None], go_on: Callable[[], bool], most: int = sys.maxsize
+    ) -> None:
+        engine, count, stuck, last = self._engine, 0, 0, self.steps + most
+        while engine.time < time and self.steps < last:
             before = engine.time
-            step()
+            step(last - self.steps)
             count += 1
             stuck = stuck + 1 if engine.time == before else 0
             if stuck > _SINGLE_STEPS_LOST:

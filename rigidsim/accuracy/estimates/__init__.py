@@ -1,1 +1,1 @@
-"""Estimates of a run's errors, from neighbours of its motion or from its closed form."""
+"""Estimates of a run's errors, from better solutions or from neighbours of its motion."""

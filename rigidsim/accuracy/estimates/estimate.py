@@ -1,32 +1,33 @@
-"""Estimate of a run's errors until its end, from a shadow ensemble of its motion
-(``rigidsim.solve.shadow.ensemble``).
+"""Estimate of a run's errors until its end.
 
-The size of a step's errors is known: an epsilon's rounding of each state, and the truncation error of the
-series that the tolerance allows. Their growth is measured over the whole run or as much of it as the cost
-allows. If the motion has a closed form, some samples are simply compared with that.
+Samples are held against a better solution where there is one at little cost: the closed form, or, where
+tolerance or precision are coarse enough, the same motion at a tighter tolerance in double precision. Else
+the growth of rounding errors is measured by tangents (``rigidsim.accuracy.estimates.following``). Either goes
+over the whole run, or as much of it as the cost allows.
 """
 
 import math
 import sys
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 
 import heyoka as hy
 import numpy as np
 
 from rigidsim.accuracy.error_law import CLOSED_FORM, closed_form_if_any, stable_law
 from rigidsim.accuracy.estimates import margins
-from rigidsim.accuracy.estimates.course import Course, Followed, exponential_growth, power_of_time
-from rigidsim.accuracy.estimates.following import follow
+from rigidsim.accuracy.estimates.following import Course, follow, power_of_time
 from rigidsim.model.system import System
 from rigidsim.solve.closed_form import ClosedForm
+from rigidsim.solve.compiled import interruptible
 from rigidsim.solve.effects.waypoints import SampleTrail, Waypoints
-from rigidsim.solve.precision import Precision, precision_of
+from rigidsim.solve.precision import Precision, Scalar, precision_of
 from rigidsim.solve.problem import InitialValueProblem, double_twin
-from rigidsim.solve.shadow.measures import Spread
 from rigidsim.solve.stepper import OwnErrors
+from rigidsim.solve.switching.stepper import stepper_of
 from rigidsim.solve.taylor_stepper import TaylorStepper
 
+DOUBLE = float(np.finfo(float).eps)
 _VECTORS = {"rates": ("wx", "wy", "wz"), "position": ("x", "y", "z"), "velocity": ("vx", "vy", "vz")}
 
 
@@ -64,32 +65,64 @@ def estimate_errors(
     waypoints: Waypoints | None = None,
     stepper: TaylorStepper | None = None,
     nearest: float = 1.0,
-    uneven: float = math.inf,
     go_on: Callable[[], bool] = lambda: True,
 ) -> Estimate | None:
-    """Estimate the errors of a run, whose growth is examined at waypoints besides the beginning; None if
-    ``go_on`` ended it.
-    """
+    """Estimate the errors of a run; None if ``go_on`` ended it."""
     scene, system, epsilon = prepared.scene, prepared.system, float(prepared.precision.epsilon)
     if not prepared.has_steps:
         return _everywhere(prepared, CLOSED_FORM * epsilon, "a few roundings of the closed form")
-    start = float(prepared.clock.start)
-    end = start + math.ldexp(reached - float(scene.start), -system.scaling.time)
+    start, seconds = float(prepared.clock.start), reached - float(scene.start)
+    end = start + math.ldexp(seconds, -system.scaling.time)
     if steps == 0 or end <= start:
         how = "the rounding of the start, which the run didn't leave"
         return _everywhere(prepared, margins.LAST_BITS * epsilon, how)
-    if trail is not None and trail.samples:
-        form, _ = closed_form_if_any(scene, driven=bool(prepared.python_loads))
-        if form is not None:
-            duration = reached - float(scene.start)
-            law = stable_law(prepared.law_tolerance, steps, float(system.rate_bound), duration)
-            law = math.hypot(law, CLOSED_FORM * epsilon)  # of what it is held against
-            return _by_comparison(prepared, form, trail, law, duration)
-    course = Course(prepared, start, end, steps, waypoints, stepper, nearest, uneven, go_on)
-    found = follow(course)
-    if not go_on():
-        return None
-    return _conclusion(course, found)
+    course = Course(prepared, start, end, steps, waypoints, stepper, nearest, go_on)
+    samples = [] if trail is None else trail.samples
+    form = closed_form_if_any(scene, driven=bool(prepared.python_loads))[0] if samples else None
+    if form is not None:
+        seen = _by_closed_form(course, form, samples, seconds)
+    elif len(samples) > 1 and prepared.law_tolerance >= margins.COARSE * DOUBLE:
+        seen = _by_better_solution(course, samples, precision_of("double"), seconds)
+    elif len(samples) > 1 and prepared.law_tolerance >= margins.COARSE * epsilon:
+        seen = _by_better_solution(course, samples, prepared.precision, seconds)
+    else:
+        seen = _by_tangents(course, seconds)
+    return _conclusion(course, seen, seconds) if go_on() else None
+
+
+@dataclass(frozen=True)
+class Seen:
+    """What was seen of a run's errors.
+
+    Attributes:
+        times: since the start, ascending, s, (n,).
+        errors: of each quantity, with the margins for what wasn't seen, (n,): rad, relative or SI.
+        extent, speed: largest distance from the origin, m, and speed, m/s.
+        law: the leading error of a stable motion, rad.
+        whole: whether the motion could be followed over its share.
+    """
+
+    times: np.ndarray
+    errors: dict[str, np.ndarray]
+    extent: float
+    speed: float
+    law: float = 0.0
+    how: str = "the motion could not be followed"
+    whole: bool = True
+    share: float = 1.0
+    closed_form: bool = False
+
+    @property
+    def leading(self) -> np.ndarray:
+        """Errors of the attitude, or of the rates if no attitude is carried."""
+        return self.errors.get("attitude", self.errors.get("rates", np.zeros(len(self.times))))
+
+
+def _over(share: float) -> str:
+    if share >= 1:
+        return ", over the run"
+    words = f", over the first {100 * share:.2g} % of the run; errors are taken to go on growing so, "
+    return words + "and growth that sets in elsewhere isn't seen"
 
 
 def _everywhere(prepared: InitialValueProblem, error: float, how: str) -> Estimate:
@@ -104,40 +137,75 @@ def _everywhere(prepared: InitialValueProblem, error: float, how: str) -> Estima
     )
 
 
-def _by_comparison(
-    prepared: InitialValueProblem, form: ClosedForm, trail: SampleTrail, law: float, seconds: float
-) -> Estimate:
-    """Estimate from the errors of some samples, the last among them, with a margin for the times between; the
-    closed form, in the run's precision or better, rounds only a few times at any time.
-    """
+# --- by a better solution ---------------------------------------------------------------------------------
+
+Samples = list[tuple[int, Scalar, np.ndarray, int]]
+"""Index, time, state and chart."""
+
+
+def _by_closed_form(course: Course, form: ClosedForm, samples: Samples, seconds: float) -> Seen:
+    """Held against the closed form, which rounds only a few times at any time."""
+    prepared, system = course.prepared, double_twin(course.prepared)
     precision = precision_of("double") if prepared.precision.narrow else prepared.precision
-    there_system = double_twin(prepared)
-    times = np.array([time for _, time, _, _ in trail.samples], dtype=precision.scalar)
-    there = form.states(there_system, precision, times, precision.scalar(prepared.clock.start))
+    times = np.array([time for _, time, _, _ in samples], dtype=precision.scalar)
+    there = form.states(system, precision, times, precision.scalar(prepared.clock.start))
+    law = stable_law(prepared.law_tolerance, course.steps, float(prepared.system.rate_bound), seconds)
+    law = math.hypot(law, CLOSED_FORM * float(prepared.precision.epsilon))  # of what it is held against
+    found = _apart_at(prepared, system, samples, there)
+    how = "held against the closed form at some samples"
+    return replace(found, extent=found.extent + found.speed * seconds, law=law, how=how, closed_form=True)
+
+
+def _by_better_solution(course: Course, samples: Samples, precision: Precision, seconds: float) -> Seen:
+    """Held against a solution at a tighter tolerance, over the part of the run that is followed; over all of
+    it where errors grow faster than any power of time that would be extrapolated.
+    """
+    prepared, system = course.prepared, course.system.rounded(precision.number)
+    tolerance = max(prepared.law_tolerance * margins.BETTER, float(precision.epsilon))
+    better = replace(precision, compact=precision.compact or course.steps * course.part < margins.OPTIMISED)
+    unit = precision.scalar(2.0**course.shift)
+    start = precision.scalar(prepared.clock.start) * unit
+    stepper = interruptible(lambda: stepper_of(system, better, precision.scalar(tolerance), start))
+    turned = float(prepared.system.rate_bound) * seconds
+    # errors of the tolerance may add up one by one, and what they do to the rates with them: n^2 / 2 of phase
+    law = prepared.law_tolerance * course.steps * math.hypot(1.0, turned / 2)
+    there: list[np.ndarray] = []
+    for part in (course.part, 1.0):
+        last = course.start + part * (course.end - course.start)
+        for _, time, _, _ in samples[len(there) :]:
+            at = precision.scalar(time) * unit
+            if float(time) > last and part < 1:
+                break
+            if not course.go_on() or (at > stepper.time and not stepper.to(at)):
+                return replace(_apart_at(prepared, system, samples, there), law=law, whole=False)
+            there.append(np.array(stepper.state))
+        found = replace(_apart_at(prepared, system, samples, there), law=law)
+        if len(found.times) > 1 and power_of_time(found.times, found.leading) <= margins.MOST_POWER:
+            break
+    share = 1.0 if len(there) == len(samples) else float(found.times[-1]) / seconds
+    how = "held against a solution at a tighter tolerance at some samples" + _over(share)
+    return replace(found, share=share, how=how)
+
+
+def _apart_at(
+    prepared: InitialValueProblem, system: System, samples: Samples, there: Sequence[np.ndarray] | np.ndarray
+) -> Seen:
+    """How far samples of a run are from states of a better solution in another system, in time."""
+    precision = precision_of("double") if prepared.precision.narrow else prepared.precision
     here = [_Reader(s, precision) for s in (prepared.system, prepared.system.partner) if s is not None]
-    reference = _Reader(there_system, precision)
-    found: dict[str, float] = {}
-    for row, (_, _, state, chart) in enumerate(trail.samples):
-        apart = _apart(here[chart].read(state.astype(precision.scalar)), reference.read(there[row]))
-        found = {name: max(error, found.get(name, 0.0)) for name, error in apart.items()}
-    bits, label = margins.LAST_BITS * float(prepared.precision.epsilon), label_rounding(prepared, seconds)
-    rate = float(prepared.system.rate_bound)
-    extent, speed = _size(prepared.scene.position), _size(prepared.scene.velocity)
-
-    def with_margin(name: str, size: float = 1.0, pace: float = 0.0) -> float | None:
-        return margins.COMPARED * found[name] + bits * size + label * pace if name in found else None
-
-    attitude, rates = with_margin("attitude", pace=rate), with_margin("rates", pace=rate) or 0.0
-    amplification = (rates if attitude is None else attitude) / law if law > 0 else 1.0
-    return Estimate(
-        attitude=None if attitude is None else min(attitude, math.pi),
-        rates=rates,
-        position=with_margin("position", extent + speed * seconds, speed),
-        velocity=with_margin("velocity", speed),
-        amplification=amplification if amplification > margins.STABLE else 1.0,
-        seconds=seconds,
-        how="held against the closed form at some samples",
-        closed_form=True,
+    reference = _Reader(system, precision)
+    found: dict[str, list[float]] = {}
+    for (_, _, state, chart), better in zip(samples, there, strict=False):
+        own, other = (x.astype(precision.scalar) for x in (state, better))
+        for name, error in _apart(here[chart].read(own), reference.read(other)).items():
+            found.setdefault(name, []).append(margins.COMPARED * error)
+    exponent, begin = prepared.system.scaling.time, float(prepared.clock.start)
+    times = [math.ldexp(float(time) - begin, exponent) for _, time, _, _ in samples[: len(there)]]
+    return Seen(
+        np.array(times),
+        {name: np.array(errors) for name, errors in found.items()},
+        _size(prepared.scene.position),
+        _size(prepared.scene.velocity),
     )
 
 
@@ -206,77 +274,111 @@ def _size(vector: object) -> float:
     return math.hypot(*(float(x) for x in vector)) if vector is not None else 0.0  # type: ignore[attr-defined]
 
 
-def _conclusion(course: Course, followed: Followed) -> Estimate:
-    prepared, spread, end = course.prepared, followed.spread, course.end
-    system, start, exponent = prepared.system, course.start, prepared.system.scaling.time
-    level, carried = float(prepared.precision.epsilon), course.carried
-    duration = math.ldexp(end - start, exponent)
-    flight = "x" in system.states
-    times = spread.along("time") - start
+# --- by tangents ------------------------------------------------------------------------------------------
+
+
+def _by_tangents(course: Course, seconds: float) -> Seen:
+    """Errors that the rounding of each step makes grow, by tangents that are kicked as it does."""
+    prepared, system = course.prepared, course.system
+    followed = follow(course)
+    spread, scaling = followed.spread, system.scaling
+    # a looser tolerance may take more steps than the run does
+    taken = max(float(spread.largest("steps")[0]), 1.0)
+    fewer = min(max(course.steps * followed.share / taken, 0.25), 1.0)
+    level = float(prepared.precision.epsilon) * margins.SAFETY * math.sqrt(fewer)
+    begin = math.ldexp(course.start, course.shift)
+    units = {"position": scaling.length, "velocity": scaling.speed}
+    errors = {}
+    for name in ("attitude", "rates", "position", "velocity"):
+        if name in units and "x" not in system.states:
+            continue
+        size = level * (math.ldexp(margins.PATH, units[name]) if name in units else 1.0)
+        errors[name] = size * spread.along(name)
+    if not course.carried:
+        del errors["attitude"]
+    turned = float(prepared.system.rate_bound) * seconds
+    longer = 1 / max(followed.share, 1e-300)
+    # the tangents may take more steps than the run, of short motions above all, and are kicked at the start
+    steps = max(course.steps, round(float(spread.largest("steps")[0]) * longer) + 1)
+    found = Seen(
+        np.ldexp(spread.along("time") - begin, scaling.time),
+        errors,
+        math.ldexp(float(spread.largest("distance")[0]), scaling.length),
+        math.ldexp(float(spread.largest("speed")[0]), scaling.speed),
+        stable_law(prepared.law_tolerance, steps, turned, 1.0),
+        whole=bool(spread.whole[0]),
+        share=followed.share,
+    )
+    lost = not found.whole or found.leading.max(initial=0.0) >= math.pi
+    over = f", over the first {100 * found.share:.2g} % of the run, after which no digit is left"
+    how = "motions beside this one, perturbed at random as rounding does"
+    return replace(found, how=how + (over if lost and found.share < 1 else _over(found.share)))
+
+
+# --- conclusion -------------------------------------------------------------------------------------------
+
+
+def _conclusion(course: Course, seen: Seen, seconds: float) -> Estimate:
+    """Errors at the end from those along the beginning, with the rounding of samples and of their times."""
+    prepared, times = course.prepared, seen.times
+    carried, flight = course.carried, "position" in seen.errors
+    rate, label = float(prepared.system.rate_bound), label_rounding(prepared, seconds)
+    bits = margins.LAST_BITS * float(prepared.precision.epsilon)
     if not len(times):
-        unknown = 0.0 if spread.whole[0] else math.pi
+        unknown = 0.0 if seen.whole else math.pi
         return Estimate(unknown if carried else None, unknown, "the motion could not be followed")
-    errors = level * margins.SAFETY * course.leading(spread)
-    longer = max((end - start) / times[-1], 1.0)
+    longer = 1 / min(max(seen.share, 1e-300), 1.0)
 
-    def beyond(errors: np.ndarray) -> float:
-        return float(longer ** min(max(power_of_time(times, errors), margins.POWER), margins.MOST_POWER))
+    def beyond(name: str) -> float:
+        power = power_of_time(times, seen.errors[name]) if longer > 1 else 0.0
+        return float(longer ** min(max(power, margins.POWER), margins.MOST_POWER))
 
-    turned = beyond(errors)
-    moved = max(turned, beyond(spread.along("position"))) if flight else turned
-
-    label = math.ldexp(label_rounding(prepared, duration), -exponent)
-    rate = math.ldexp(float(system.rate_bound), exponent)
+    lead = "attitude" if carried else "rates"
+    turned = beyond(lead)
+    moved = max(turned, beyond("position")) if flight else turned
 
     def at_end(name: str, size: float, most: float, pace: float = 0.0) -> float:
-        further = (moved if name in ("position", "velocity") else turned) * followed.more.get(name, 1.0)
-        found = float(spread.largest(name)[0]) * level * margins.SAFETY * further
-        known = bool(spread.whole[0]) and math.isfinite(found)
-        return float(min(found + margins.LAST_BITS * level * size + label * pace, most)) if known else most
+        found = float(seen.errors[name].max()) * (moved if name in ("position", "velocity") else turned)
+        known = seen.whole and math.isfinite(found)
+        return float(min(found + bits * size + label * pace, most)) if known else most
 
-    lead = at_end("attitude" if carried else "rates", 1.0, sys.float_info.max, rate)
-    law = _stable(course, spread, longer, float(system.rate_bound) * duration)
-    amplification = lead / law if law > 0 else 1.0
-    growth, horizon = exponential_growth(times, errors, exponent, margins.POWER, margins.EXPONENTIAL)
-    scaling, size, speed = system.scaling, *(float(spread.largest(x)[0]) for x in ("distance", "speed"))
-    place = margins.PATH * at_end("position", size, margins.AS_LARGE * size, speed)
-    pace = margins.PATH * at_end("velocity", speed, margins.AS_LARGE * speed)
+    leading = at_end(lead, 1.0, sys.float_info.max, rate)
+    amplification = leading / seen.law if seen.law > 0 else 1.0
+    growth, horizon = 0.0, None
+    if not seen.closed_form:
+        growth, horizon = exponential_growth(times, seen.errors[lead])
+    extent, speed = seen.extent, seen.speed
+    place = at_end("position", extent, margins.AS_LARGE * extent, speed) if flight else None
     return Estimate(
-        attitude=min(lead, math.pi) if carried else None,
-        rates=at_end("rates", 1.0, 2.0),
-        position=math.ldexp(place, scaling.length) if flight else None,
-        velocity=math.ldexp(pace, scaling.speed) if flight else None,
+        attitude=min(leading, math.pi) if carried else None,
+        rates=at_end("rates", 1.0, 2.0, rate) if "rates" in seen.errors else 0.0,
+        position=place,
+        velocity=at_end("velocity", speed, margins.AS_LARGE * speed) if flight else None,
         amplification=amplification if amplification > margins.STABLE else 1.0,
         growth_rate=growth,
         predictable_seconds=horizon,
-        seconds=math.ldexp(float(times[-1]), exponent),
-        share=followed.share,
-        how=_words(course, followed),
+        seconds=float(times[-1]),
+        share=seen.share,
+        how=seen.how,
+        closed_form=seen.closed_form,
     )
 
 
-def _stable(course: Course, spread: Spread, longer: float, turned: float) -> float:
-    """Error at the end (rad) if the motion amplifies none of what its ensemble is perturbed by."""
-    prepared, epsilon = course.prepared, float(course.prepared.precision.epsilon)
-    # where steps end on surfaces, the tolerance itself is the size of perturbations
-    level = prepared.law_tolerance if prepared.system.switches else epsilon
-    # the ensemble may take more steps than the run, of short motions above all, and is perturbed at the start
-    steps = max(course.steps, round(float(spread.largest("steps")[0]) * longer) + 1)
-    # truncation errors may add up one by one, and what they do to the rates with them: n^2 / 2 of phase
-    cut = epsilon * float(spread.largest("cut")[0]) * longer * math.hypot(1.0, turned / 2)
-    return math.hypot(stable_law(level, steps, turned, 1.0), cut)
-
-
-def _words(course: Course, followed: Followed) -> str:
-    what = "motions beside this one, perturbed at random as rounding does"
-    if course.loose:
-        what += " and as the tolerance lets the series do"
-    if followed.share >= 1:
-        return what + ", over the run"
-    what += f", over the first {100 * followed.share:.2g} % of the run"
-    spread = followed.spread
-    if not spread.whole[0] or course.leading(spread).max() >= course.lost:
-        return what + ", after which no digit is left"
-    if followed.windows:
-        what += f" and in {followed.windows} windows beyond ({100 * followed.in_windows:.2g} %)"
-    return what + "; errors are taken to go on growing so, and growth that sets in elsewhere isn't seen"
+def exponential_growth(times: np.ndarray, errors: np.ndarray) -> tuple[float, float | None]:
+    """Rate of exponential growth, 1/s, and when digits are gone, seconds after the start; 0 and None if
+    growth isn't exponential. Times in s since the start, errors in rad, or relative.
+    """
+    largest = np.maximum.accumulate(errors)
+    gone = int(np.searchsorted(largest, margins.UNCERTAIN))
+    last = min(gone, len(times) - 1)
+    if last < 2 or power_of_time(times[: last + 1], largest[: last + 1]) < margins.EXPONENTIAL:
+        return 0.0, None
+    early = int(np.searchsorted(times, times[last] / 4))
+    if not largest[early] > 0:  # errors begin where a load does: they have not grown from anything
+        return 0.0, None
+    span, ratio = float(times[last] - times[early]), min(largest[last], 1e300) / largest[early]
+    rate = (math.log(ratio) - margins.POWER * math.log(times[last] / times[early])) / span
+    seconds = float(times[last])
+    if rate > 0 and gone >= len(times):
+        seconds += math.log(margins.UNCERTAIN / largest[last]) / rate
+    return max(rate, 0.0), seconds

@@ -1,37 +1,41 @@
-"""Errors of a batch's members until their ends, from a shadow ensemble of their motions, with the
-perturbations and margins of single runs.
+"""Errors of a batch's members until their ends, from tangents of their motions, with the perturbations and
+margins of single runs.
 
-Each member is followed over all of its motion, at a loose tolerance; where errors grow so much that a motion
-so followed becomes another one, once more at the run's own. Where the tolerance lets steps be wrong by more
-than rounding does, members are run again at a tighter one and compared at their samples, which costs no more
-than an ensemble would, and is no question of chance.
+Each member is followed over all of its motion, which begins anew at some of its samples. Where the tolerance
+lets steps be wrong by more than rounding does, members are run again at a tighter one and compared at their
+samples, which costs no more than tangents would, and is no question of chance.
 """
+
+from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
 from rigidsim.accuracy.estimates import margins
-from rigidsim.accuracy.estimates.course import UNCERTAIN, plain_perturbations
+from rigidsim.accuracy.estimates.following import plain_perturbations
 from rigidsim.solve.batch.family import Family, Numbers
-from rigidsim.solve.batch.motion import MemberCarrier, ShadowLanes
+from rigidsim.solve.batch.lanes import BatchEngine, BatchSystem
 from rigidsim.solve.batch.run import BatchBlock
-from rigidsim.solve.shadow.ensemble import ShadowEnsemble
-from rigidsim.solve.shadow.measures import Measures, Spread, Starts
+from rigidsim.solve.error_tangents import (
+    TANGENTS,
+    ErrorTangents,
+    Known,
+    Measures,
+    Spread,
+    Starts,
+    beside,
+    timed,
+)
 
-LOOSE, FINER = 1e-6, 1e-8
-"""Tolerances of the lanes: the first for all members; the second, whose steps cost 1.5 times as much, where
-errors grow so much that the motion followed becomes another one: beside a separatrix errors were announced
-ten times larger at the first.
-"""
+_TOLERANCE = 1e-8  # of lanes, which begin anew at some of the samples
+_BEGUN_ANEW = 16  # times at most
 _STRETCHES = 6
-_DRIFTED = 1e-2
-"""Tolerance times growth from which a motion followed so loosely becomes a different one."""
-_FASTER = 3.0
-"""Power of time from which errors are taken to grow exponentially; those of few perturbed motions scatter."""
-_EARLY = 0.25
-"""Part of the time by whose end growth is compared with that at the end."""
+_TO_SAME = 64  # steps at most from where a neighbour is to where the motion is
+_LANES = 8
+"""Least number of lanes: a step of eight in vectors of four costs 1.6 of one of four."""
 _BY_CHANCE = 8.0
 """Tolerance in epsilons up to which a step's error is mostly random rounding."""
 _TIGHTER = 2.0**-10
@@ -53,7 +57,7 @@ class MemberErrors:
     @property
     def uncertain(self) -> np.ndarray:
         """Mask of the members whose digits are gone."""
-        return (self.rates if self.attitude is None else self.attitude) > UNCERTAIN
+        return (self.rates if self.attitude is None else self.attitude) > margins.UNCERTAIN
 
 
 class MemberEstimates:
@@ -63,14 +67,27 @@ class MemberEstimates:
         self._traced, self._width = family.traced, width
         self._system, self._prepared = family.traced.system, family.traced.prepared
         self._epsilon = float(self._prepared.precision.epsilon)
-        self._lanes: dict[float | None, ShadowLanes] = {}
         self._measures = Measures(self._system, self._traced.moving, self._traced.parameters.variables)
+
+    def _engine(self, tolerance: float) -> BatchEngine:
+        """Integrator of the motion alone, with an error of the time after its parameters."""
+        traced = self._traced
+        rights = traced.as_parameters([right for _, right in traced.system.equations[: traced.moving]])
+        equations = zip(traced.system.variables, timed(rights, len(traced.in_equations)), strict=False)
+        system = BatchSystem(list(equations), [], tolerance, traced.system.wide)
+        return BatchEngine(system, max(self._width, _LANES))
+
+    @cached_property
+    def _lanes(self) -> BatchEngine:
+        return self._engine(_TOLERANCE)
+
+    @cached_property
+    def _better(self) -> BatchEngine:
+        return self._engine(float(self._prepared.effective_tolerance) * _TIGHTER)
 
     def compile(self) -> None:
         """Compile beforehand what most members need."""
-        self._through(LOOSE)
-        if not self._by_chance:
-            self._through(self._prepared.effective_tolerance * _TIGHTER)
+        _ = self._lanes if self._by_chance else self._better
 
     def of(self, numbers: Numbers, block: BatchBlock) -> MemberErrors:
         """Errors of a block's members."""
@@ -105,7 +122,7 @@ class MemberEstimates:
             numbers.parameters[:, places],
         )
         by_chance = self._by_chance
-        spread = self._followed(starts) if by_chance else self._compared(block, some, starts)
+        spread = self._followed(block, some, starts) if by_chance else self._compared(block, some, starts)
         label = margins.LABEL * self._epsilon * np.maximum(abs(begin_seconds), np.abs(seconds))
         pace = numbers.doubles(system.rate_bound)[places]
         level = margins.SAFETY * self._epsilon if by_chance else margins.COMPARED
@@ -133,9 +150,11 @@ class MemberEstimates:
 
     def _compared(self, block: BatchBlock, some: np.ndarray, starts: Starts) -> Spread:
         """Distance of members from runs at a tighter tolerance."""
-        lanes = self._through(self._prepared.effective_tolerance * _TIGHTER)
+        read = starts.parameters[self._traced.in_equations]
         most = _MORE_STEPS * int(starts.steps.max()) + 1000
-        there = lanes.at_samples(starts, block.moments[:, some], most)
+        moments = block.moments[:, some]
+        read = np.concatenate([read, np.zeros((1, len(some)))])
+        there = self._better.run(starts.states, read, starts.begin, moments, most).states
         spread = Spread(len(some))
         for row, (state, apart) in enumerate(zip(there, block.states[:, :, some] - there, strict=True)):
             known = np.flatnonzero(block.reached[some] > row)
@@ -143,35 +162,60 @@ class MemberEstimates:
             spread.note(known, **self._measures.differences(state[:, known], away, starts, known))
         return spread
 
-    def _through(self, tolerance: float | None) -> ShadowLanes:
-        if tolerance not in self._lanes:
-            self._lanes[tolerance] = ShadowLanes(self._traced, self._width, tolerance)
-        return self._lanes[tolerance]
-
-    def _followed(self, starts: Starts) -> Spread:
-        epsilon = self._epsilon
-        lost, lead = math.pi / epsilon, "attitude" if self._measures.carried else "rates"
+    def _followed(self, block: BatchBlock, some: np.ndarray, starts: Starts) -> Spread:
+        epsilon, read = self._epsilon, starts.parameters[self._traced.in_equations]
+        carrier = MemberCarrier(self._lanes, read, starts)
         plain = plain_perturbations(self._prepared.system)
         errors = replace(plain, own=plain.own * max(self._prepared.effective_tolerance / epsilon, 1.0))
-        quarter = starts.begin + _EARLY * (starts.end - starts.begin)
+        rows = np.unique(np.linspace(0, len(block.moments) - 1, _BEGUN_ANEW + 2).astype(int)[1:-1])
+        times, states = (
+            block.moments[np.ix_(rows, some)],
+            block.states[:, : self._traced.moving][rows][:, :, some],
+        )
+        unknown = ~np.isfinite(states).all(axis=1) | (rows[:, None] >= block.reached[some])
+        known = Known(np.where(unknown, np.nan, times), states)
+        tangents = ErrorTangents(
+            carrier, self._measures, starts, errors, epsilon, known=known, stretches=_STRETCHES
+        )
+        return tangents.follow(lost=math.pi / epsilon)
 
-        def through(tolerance: float | None, which: np.ndarray) -> tuple[Spread, np.ndarray]:
-            some = starts.of(which)
-            carrier = MemberCarrier(self._through(tolerance), some)
-            ensemble = ShadowEnsemble(carrier, self._measures, some, errors, epsilon, stretches=_STRETCHES)
-            spread = ensemble.follow(lost=lost)
-            return spread, spread.largest(lead, quarter[which])
 
-        spread, early = through(LOOSE, np.arange(len(quarter)))
-        for tolerance, tighter in ((LOOSE, FINER), (FINER, None)):
-            grown = spread.largest(lead)
-            with np.errstate(divide="ignore", invalid="ignore"):
-                power = np.log(grown / early) / math.log(1 / _EARLY)
-            far = (grown > _DRIFTED / tolerance) & (power > _FASTER)
-            if tighter is None:
-                far &= spread.whole & (grown < margins.GONE * lost) & (starts.steps < margins.TIGHT_STEPS)
-            again = np.flatnonzero(far | (~spread.whole & (tolerance == LOOSE)))
-            if len(again):
-                anew, early[again] = through(tighter, again)
-                spread.put(again, anew)
-        return spread
+class MemberCarrier:
+    """Carrier of members and their neighbours in lanes, all of whose stretches of as many steps go together;
+    see ``Carrier``.
+    """
+
+    def __init__(self, engine: BatchEngine, read: np.ndarray, starts: Starts) -> None:
+        self._engine = engine
+        self._read = np.concatenate([read, np.zeros((1, read.shape[1]))])
+        self._longest = engine.longest(starts.states, self._read, starts.begin)
+
+    def advance(
+        self,
+        which: np.ndarray,
+        states: np.ndarray,
+        tangents: np.ndarray,
+        late: np.ndarray,
+        begin: np.ndarray,
+        end: np.ndarray,
+        steps: np.ndarray,
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """See ``Carrier``."""
+        factors, lanes = beside(tangents, late), 1 + TANGENTS
+        every = np.repeat(states[:, :, None], lanes, axis=2)
+        every[:, :, 1:] += factors * tangents
+        read = np.repeat(self._read[:, which][:, :, None], lanes, axis=2)
+        read[-1, :, 1:] = factors * late
+        times, taken = np.empty(every.shape[1:]), np.empty(every.shape[1:])
+        for stride in np.unique(steps).tolist():
+            alike = np.flatnonzero(steps == stride)
+            first, last, bounds = (np.repeat(x[alike], lanes) for x in (begin, end, self._longest[which]))
+            there, flat = (x[:, alike].reshape(len(x), -1) for x in (every, read))
+            there, then, gone = self._engine.onward(int(stride), there, flat, first, last, bounds)
+            # neighbours took steps of almost the same lengths
+            reached = np.repeat(then.reshape(-1, lanes)[:, 0], lanes)
+            there, *_ = self._engine.onward(_TO_SAME, there, flat, then, reached, bounds)
+            every[:, alike] = there.reshape(len(every), -1, lanes)
+            times[alike], taken[alike] = then.reshape(-1, lanes), gone.reshape(-1, lanes)
+        moved = (every[:, :, 1:] - every[:, :, :1]) / factors
+        return every[:, :, 0], moved, taken[:, 0], times[:, 0]

@@ -1,4 +1,4 @@
-"""Members' motions with their events, tangent vectors beside them, and the lanes of perturbed motions.
+"""Members' motions with their events, and tangent vectors beside them.
 
 As in a single run an event's expression is given a unit in which it is of order one, and is taken off a zero
 that the motion begins at (``rigidsim.solve.events``). Both depend on the member, so that they are parameters.
@@ -15,12 +15,8 @@ from rigidsim.solve.batch.lanes import BatchEngine, BatchSystem, LaneResults
 from rigidsim.solve.batch.tracing import TracedSystem
 from rigidsim.solve.compiled import compiled_function, evaluate_rows
 from rigidsim.solve.events import BESIDE, STATES, TIMES, exponents_of
-from rigidsim.solve.shadow.ensemble import EnsembleCarrier
-from rigidsim.solve.shadow.measures import Starts, padded_function
 
 _BITS = 53
-_LANES = 8
-"""Least number of lanes of perturbed motions: a step of eight in vectors of four costs 1.6 of one of four."""
 
 
 def _engine(
@@ -110,67 +106,3 @@ class BatchMotion:
         """Values (events, members) of the events' expressions."""
         with np.errstate(all="ignore"):
             return evaluate_rows(self._function, np.concatenate([states, swept]).T, times=times)
-
-
-class ShadowLanes:
-    """Batch integrator of the motion alone, as wide as the members' or wider; no tolerance is epsilon."""
-
-    def __init__(self, traced: TracedSystem, width: int, tolerance: float | None) -> None:
-        self.tolerance, self._traced = tolerance, traced
-        self.engine = _engine(traced, traced.moving, max(width, _LANES), tolerance)
-
-    @cached_property
-    def slopes(self) -> Any:
-        """Function of states (states, n), the traced system's parameters (parameters, n) and times (n,)."""
-        system, moving = self._traced.system, self._traced.moving
-        rights = [hy.expression(right) for _, right in system.equations[:moving]]
-        return padded_function(rights, [*system.variables[:moving], *self._traced.parameters.variables])
-
-    def read(self, starts: Starts) -> np.ndarray:
-        """Parameters of the equations, (read, motions)."""
-        return starts.parameters[self._traced.in_equations]
-
-    def longest(self, starts: Starts) -> np.ndarray:
-        """Bounds of the steps of motions from their starts, (motions,)."""
-        return self.engine.longest(starts.states, self.read(starts), starts.begin)
-
-    def at_samples(self, starts: Starts, times: np.ndarray, most: int) -> np.ndarray:
-        """States (samples, states, motions) at times (samples, motions), nan from where a motion ended."""
-        return self.engine.run(starts.states, self.read(starts), starts.begin, times, most).states
-
-
-class MemberCarrier:
-    """Carrier of members, all of whose stretches of as many steps go together (see ``EnsembleCarrier``)."""
-
-    def __init__(self, lanes: ShadowLanes, starts: Starts) -> None:
-        self.tolerance, self._lanes = lanes.tolerance, lanes
-        self._every, self._read, self._longest = starts.parameters, lanes.read(starts), lanes.longest(starts)
-
-    def again(self, steps: float) -> EnsembleCarrier:
-        """See ``EnsembleCarrier``."""
-        return self
-
-    def advance(
-        self, which: np.ndarray, states: np.ndarray, begin: np.ndarray, end: np.ndarray, steps: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """See ``EnsembleCarrier``: lanes arrive at slightly different times, which the equations even out."""
-        beside = begin.shape[1]
-        found, times, taken = np.empty_like(states), np.empty_like(begin), np.empty_like(begin)
-        for stride in np.unique(steps).tolist():
-            alike = np.flatnonzero(steps == stride)
-            motions = which[alike]
-            there, then, gone = self._lanes.engine.onward(
-                int(stride),
-                states[:, alike].reshape(len(states), -1),
-                np.repeat(self._read[:, motions], beside, axis=1),
-                begin[alike].ravel(),
-                end[alike].ravel(),
-                np.repeat(self._longest[motions], beside),
-            )
-            found[:, alike] = there.reshape(len(states), -1, beside)
-            times[alike], taken[alike] = then.reshape(-1, beside), gone.reshape(-1, beside)
-        reached = times[:, 0].copy()
-        early = (times - begin) - (reached - begin[:, 0])[:, None]
-        slopes = self._lanes.slopes(found[:, :, 0], self._every[:, which], reached)
-        found[:, :, 1:] -= slopes[:, :, None] * early[:, 1:]
-        return found, taken[:, 0], reached
