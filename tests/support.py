@@ -26,13 +26,12 @@ from rigidsim.session.session import Tuning
 from rigidsim.solve import compiled
 from rigidsim.solve.problem import prepare
 from rigidsim.solve.sampler import Pacing
-from rigidsim.solve.solvers.taylor.ways import Ways
 from rigidsim.solve.status import Status
 from rigidsim.store.segments import SegmentLimits
 
 CONFIGS = sorted((Path(__file__).parents[1] / "configs").glob("*.toml"))
 # a look at the guards after every few steps, so that they cut short runs where they say
-IMPATIENT = Tuning(Pacing(chunk_seconds=0.0, patience=0.0, solver=Ways(block_steps=16)))
+IMPATIENT = Tuning(Pacing(chunk_seconds=0.0, patience=0.0))
 # and a segment for each
 EAGER = Tuning(IMPATIENT.pacing, SegmentLimits(seconds=0.0))
 # for a process of its own, before it calls the command line

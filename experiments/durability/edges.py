@@ -14,12 +14,11 @@ from experiments.durability.processes import child, exit_code
 from experiments.durability.scenes import DAYS, FREQUENT, MOONS, Undisturbed, text_of
 from rigidsim.session.session import Observer, Tuning
 from rigidsim.solve.sampler import Pacing, Progress
-from rigidsim.solve.solvers.taylor.ways import Ways
 from rigidsim.store.segments import SegmentLimits
 
 _BLOCK = 4 * DAYS  # of the Moon; the scenes begin at an edge
 _EACH_STEP = Tuning(
-    Pacing(chunk_seconds=0.0, patience=0.0, solver=Ways(block_steps=1, least_block_steps=2)),
+    Pacing(chunk_seconds=0.0, patience=0.0),
     SegmentLimits(seconds=0.0),
 )
 """A look at the guards and a segment after every step or two."""

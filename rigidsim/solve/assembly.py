@@ -19,7 +19,7 @@ from rigidsim.solve.projection import Projection, steps_between
 from rigidsim.solve.sampler import MEASURED, Check, Pacing, Progress, SampleReceiver
 from rigidsim.solve.sampling import SampleClock
 from rigidsim.solve.solvers.algorithm import Algorithm
-from rigidsim.solve.solvers.taylor.solver import Taylor
+from rigidsim.solve.solvers.taylor import Taylor
 from rigidsim.solve.status import Status
 from rigidsim.solve.stepper import Stepper
 from rigidsim.solve.taylor_stepper import TaylorStepper

@@ -14,7 +14,6 @@ import numpy as np
 
 from rigidsim.solve.checkpoint import Arrays, pack, unpack
 from rigidsim.solve.effects.effect import Effect
-from rigidsim.solve.effects.whole_time import WholeTime
 from rigidsim.solve.precision import Scalar
 from rigidsim.solve.sample_block import SampleBlock
 from rigidsim.solve.stepper import Mark, Stepper
@@ -52,7 +51,6 @@ class CorrectedStepper:
     def __init__(self, stepper: Stepper, effects: Sequence[Effect], *, stride: int = STRIDE) -> None:
         self.stepper, self.effects, self._longest_stride = stepper, tuple(effects), stride
         self._anywhere = [effect for effect in effects if effect.anywhere]
-        self.whole_times = self.effect(WholeTime) is not None
         self._stuck = False
         self._set_limits()
 
@@ -67,11 +65,6 @@ class CorrectedStepper:
     def _set_until(self) -> None:
         ends = [effect.until for effect in self._anywhere]
         self.stepper.until = min((end for end in ends if end is not None), default=None)
-
-    @property
-    def acts_anywhere(self) -> bool:
-        """Whether effects may be due within a stride."""
-        return bool(self._anywhere)
 
     @property
     def left(self) -> int:

@@ -4,7 +4,7 @@ import time
 from bisect import bisect_left, bisect_right
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
 
@@ -72,7 +72,9 @@ class Pacing:
     patience: float = 2.0  # seconds until samples of a slow run are handed over
     rows_at_once: int = 8192  # samples in a block that is evaluated; more are no faster, and take memory
     rows_waiting: int = 32768  # in memory before they are evaluated, as many as in the time of a chunk
-    solver: Any = None  # numbers by which the solver chooses its ways; None for those that were measured
+    skipped_from: int = 12  # steps to a sample from which a call without dense output costs less
+    margin: float = 0.97  # of the steps to a sample, if as long as those of the latest call, that are skipped
+    spare: float = 4.0  # and fewer by so many, some of which are far from the mean
 
 
 MEASURED = Pacing()

@@ -2,6 +2,8 @@
 which the engine, which uses the last two terms of a series, can't tell.
 """
 
+from __future__ import annotations
+
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -37,32 +39,36 @@ class Watcher(Protocol):
 
 
 class SamplesWithin:
-    """Takes samples at given times, (n,) ascending, from the dense output of steps as they are taken."""
+    """Samples within steps as they are taken, at all sample times (n,), ascending, up to a limit, past which
+    it asks to end the call.
+    """
 
-    def __init__(self, times: np.ndarray) -> None:
-        self._times = list(times)
-        self.states: list[np.ndarray] = []
+    def __init__(self, times: np.ndarray, limit: Scalar) -> None:
+        self.times, self.limit = times, limit
+        self.states: Any = []  # or an array (n, states)
+        self.ended = False
 
     def __call__(self, engine: TaylorEngine) -> bool:
-        """Take the samples within the step just taken; False once all are taken."""
-        times, states, now = self._times, self.states, engine.time
-        while len(states) < len(times) and times[len(states)] <= now:
-            states.append(np.array(engine.update_d_output(times[len(states)])))  # heyoka reuses its buffer
-        return len(states) < len(times)
+        """Take those within the step just taken, from its dense output; False if it asks to end the call."""
+        now, count = engine.time, len(self.states)
+        while count < len(self.times) and self.times[count] <= now:
+            self.states.append(np.array(engine.update_d_output(self.times[count])))  # a buffer is reused
+            count += 1
+        return self.within(engine)
 
-    @property
-    def count(self) -> int:
-        """Number of samples taken."""
-        return len(self.states)
+    def within(self, engine: TaylorEngine) -> bool:
+        """False if it asks to end the call."""
+        self.ended = engine.time >= self.limit
+        return not self.ended
 
-    @property
-    def complete(self) -> bool:
-        """Whether all are taken."""
-        return len(self.states) == len(self._times)
+    def until(self, stop: Scalar | None) -> np.ndarray:
+        """The samples taken that lie before a time, None for any."""
+        return np.asarray(self.states if stop is None else self.states[: int((self.times <= stop).sum())])
 
     def back_to(self, count: int) -> None:
         """Forget all but the first."""
         del self.states[count:]
+        self.ended = False
 
 
 @dataclass(frozen=True)

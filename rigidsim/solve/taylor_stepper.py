@@ -1,8 +1,4 @@
-"""heyoka's integrator stepping freely: natural steps only, dense output, no step ever shortened.
-
-Four ways to go on, which give the same bits and differ in cost alone
-(``rigidsim.solve.solvers.taylor.ways``).
-"""
+"""heyoka's integrator stepping freely: natural steps only, dense output, no step ever shortened."""
 
 from __future__ import annotations
 
@@ -25,6 +21,7 @@ _FAR = 1e300  # a target that no run reaches: propagation ends by the count of s
 _MOST_TO_WHOLE_TIME = 1000  # steps
 _CHUNK_TO, _MOST_CHUNKS_TO = 256, 4000  # steps to a given time at once, and how often between two limits
 _HOPELESS_STEPS = 1e15  # left to the last sample; at the fastest pace they would take years
+_LEAST_GRID = 8  # steps from which a grid, of 20 us, costs less than a callback
 _TINY_STEPS = 32  # in a row, before a run is given up: a close passage has some
 _LONGEST_FOLLOWED = 1.0  # a turn by 1 rad or less: in the partner chart angles are followed step by step
 
@@ -124,7 +121,9 @@ class TaylorStepper(Stepper):
             return self.until
         return _earlier(self._requirement.end_after(self.time), self.until)
 
-    def _watched(self, samples: SamplesWithin | None = None) -> Callable[[TaylorEngine], bool] | None:
+    def _watched(
+        self, samples: Callable[[TaylorEngine], bool] | None = None
+    ) -> Callable[[TaylorEngine], bool] | None:
         """What to call after each of the steps that begin now."""
         if self.watcher is not None:
             self.watcher.begin(self._integrator.time)
@@ -164,11 +163,6 @@ class TaylorStepper(Stepper):
     def unpack(self, arrays: Mapping[str, np.ndarray]) -> int:
         return int(arrays.get("rhythm_tiny", np.zeros(1))[0])
 
-    @property
-    def at_whole_time(self) -> bool:
-        """Whether time is a single number, as ``grid`` needs it."""
-        return bool(self._integrator.dtime[1] == 0)
-
     def to_whole_time(self) -> bool:
         """Go to the high part of time; stays and returns False if that takes too many natural steps."""
         engine = self._integrator
@@ -186,42 +180,6 @@ class TaylorStepper(Stepper):
         engine.dtime = time
         engine.state[:] = state
         return False
-
-    def grid(self, times: np.ndarray, count: int) -> tuple[bool, np.ndarray]:
-        """Take ``count`` steps, from a whole time unless steps have to end at given times: whether all went
-        well, and the states (n, states) at those ``times`` that they reached. The times ascend, and none lies
-        before the current one.
-        """
-        if self.end is not None:
-            return self._one_by_one(times, count)
-        self._meet()
-        ends = np.array([self._integrator.time, self._far], dtype=times.dtype)
-        first = int(len(times) > 0 and times[0] == ends[0])
-        before = self._integrator.dtime
-        outcome, smallest, largest, taken, _, states = self._integrator.propagate_grid(
-            np.concatenate([ends[:1], times[first:], ends[1:]]),
-            max_steps=count,
-            max_delta_t=self._longest,
-            callback=self._watched(),
-        )
-        return self._account(before, outcome, smallest, largest, taken), states[1 - first :]
-
-    def _one_by_one(self, times: np.ndarray, count: int) -> tuple[bool, np.ndarray]:
-        """As ``grid``, which would take a step of no length at the beginning of each call."""
-        states, finite = np.empty((len(times), len(self.state)), dtype=times.dtype), True
-        smallest, largest, row = np.inf, 0.0, 0
-        for _ in range(count):
-            if not (finite := self.step()):
-                break
-            smallest, largest = min(smallest, self.smallest), max(largest, self.largest)
-            now = self._integrator.time
-            while row < len(times) and times[row] <= now:
-                states[row] = self._integrator.update_d_output(times[row])
-                row += 1
-            if self.collapsed:
-                break
-        self.smallest, self.largest = smallest, largest
-        return finite, states[:row]
 
     def step(self) -> bool:
         """Take one step with dense output; False if the state is no longer finite."""
@@ -245,8 +203,30 @@ class TaylorStepper(Stepper):
         return np.array(self._integrator.update_d_output(time))  # heyoka reuses its buffer
 
     def take(self, count: int, samples: SamplesWithin | None = None) -> bool:
-        """As ``skip``, with the samples within the steps."""
-        return self._propagate(self._meet(), count, samples, write_tc=True)[0]
+        """As ``skip``, with samples within the steps: by the engine's own grid, which has the same bits and
+        costs half, where that takes no other steps, as it would from a time that is two numbers.
+        """
+        until = self._meet()
+        each = self._requirement is not None and self._requirement.each
+        if (
+            samples is None
+            or until is not None
+            or each
+            or count < _LEAST_GRID
+            or self._integrator.dtime[1] != 0
+        ):
+            return self._propagate(until, count, samples, write_tc=True)[0]
+        engine, times = self._integrator, samples.times
+        before = engine.dtime
+        first = int(len(times) > 0 and times[0] == before[0])
+        outcome, smallest, largest, taken, _, states = engine.propagate_grid(
+            np.concatenate([[before[0]], times[first:], [self._far]]).astype(times.dtype),
+            max_steps=count,
+            max_delta_t=self._longest,
+            callback=self._watched(samples.within),
+        )
+        samples.states = states[1 - first :]
+        return self._account(before, outcome, smallest, largest, taken)
 
     def skip(self, count: int) -> bool:
         """Take at most ``count`` steps, fewer if the watcher ends the call; False if the state is lost."""
@@ -270,10 +250,6 @@ class TaylorStepper(Stepper):
                 break
             chunks = _MOST_CHUNKS_TO if outcome == _ARRIVED else chunks - 1
         return False
-
-    def block(self, count: int) -> tuple[bool, Callable[[np.ndarray], np.ndarray]]:
-        """As ``skip``, with dense output: a function from times (n,) to states (n, states)."""
-        return self._propagate(self._meet(), count, c_output=True, write_tc=self.watcher is not None)
 
     def _propagate(
         self, until: Scalar | None, count: int, samples: SamplesWithin | None = None, **options: bool

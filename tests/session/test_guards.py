@@ -9,14 +9,13 @@ from support import cases, config, loaded, run_text, same_bits
 import rigidsim
 from rigidsim.session.session import Tuning
 from rigidsim.solve.sampler import Pacing
-from rigidsim.solve.solvers.taylor.ways import Ways
 
 PLAIN = "estimate = false"  # which is the larger part of such short runs
 DRIVES = {
     "as measured": Pacing(),
-    "one step at a time": Pacing(chunk_seconds=0.0, solver=Ways(grid_rows=0, least_block_steps=10**9)),
-    "blocks": Pacing(solver=Ways(block_steps=13, least_block_steps=1, skip_from=1e9, grid_rows=0)),
-    "skips too far": Pacing(solver=Ways(skip_from=2.0, skip_margin=1.7, grid_rows=0)),
+    "one step at a time": Pacing(chunk_seconds=0.0),
+    "no skips": Pacing(skipped_from=10**9),
+    "skips too far": Pacing(skipped_from=2, margin=1.7, spare=0.0),
 }
 SCENES = {
     "free": config(time="end = 150\nsamples = 301"),
@@ -64,7 +63,7 @@ def test_max_drift_ends_with_the_first_sample_past_it(tmp_path: Path) -> None:
     first = int(np.flatnonzero(drifts > guard)[0])
     assert 0 < first < 600
     steps = set()
-    for number, drive in enumerate(["as measured", "one step at a time", "blocks"]):
+    for number, drive in enumerate(["as measured", "one step at a time", "no skips"]):
         pacing = DRIVES[drive]
         run = run_text(text, f"limits.max_drift={guard!r}", tuning=Tuning(pacing), out=tmp_path / str(number))
         assert (run.status, run.summary["exit_code"]) == ("stopped: max_drift", 3)

@@ -13,7 +13,6 @@ import rigidsim
 from rigidsim.session.session import Tuning
 from rigidsim.solve.problem import prepare
 from rigidsim.solve.sampler import Pacing
-from rigidsim.solve.solvers.taylor.ways import Ways
 
 pytestmark = pytest.mark.optimised
 
@@ -31,16 +30,11 @@ def run(text: str, out: Path) -> xarray.Dataset:
 
 
 DRIVES = {
-    "one step at a time": Pacing(chunk_seconds=0.0, solver=Ways(grid_rows=0, least_block_steps=10**9)),
-    "grids of one step": Pacing(chunk_seconds=0.0),
-    "few rows": Pacing(rows_at_once=7, solver=Ways(block_steps=13, least_block_steps=1, grid_rows=0)),
-    "blocks of three": Pacing(solver=Ways(block_steps=3, least_block_steps=1, skip_from=1e9, grid_rows=0)),
-    "skips wherever it can": Pacing(solver=Ways(skip_from=1.0, skip_margin=0.5, look_ahead=1, grid_rows=0)),
-    "skips too far": Pacing(solver=Ways(skip_from=2.0, skip_margin=1.7, grid_rows=0)),
-    "skips of even steps too far": Pacing(
-        solver=Ways(skip_from=2.0, skip_margin=0.2, even_margin=1.7, grid_rows=0)
-    ),
-    "skips mixed with grids": Pacing(solver=Ways(skip_from=1.0, grid_strides=0.01)),
+    "one step at a time": Pacing(chunk_seconds=0.0),
+    "few rows": Pacing(rows_at_once=7),
+    "no skips": Pacing(skipped_from=10**9),
+    "skips wherever it can": Pacing(skipped_from=1, margin=0.5, spare=0.0),
+    "skips too far": Pacing(skipped_from=2, margin=1.7, spare=0.0),
     "impatient": Pacing(chunk_seconds=1e-7, patience=0.0),
 }
 

@@ -13,7 +13,6 @@ import rigidsim
 from rigidsim import ConfigError
 from rigidsim.session.session import Tuning
 from rigidsim.solve.sampler import Pacing
-from rigidsim.solve.solvers.taylor.ways import Ways
 
 FLIPS = """
 name = "flips"
@@ -78,9 +77,7 @@ def test_events_do_not_depend_on_the_samples_or_on_how_the_run_is_driven() -> No
     sparse = run_text(FLIPS.format(samples=3) + FLIP, setting, 'name="sparse"').dataset
     assert np.array_equal(expected["flip_time"], sparse["flip_time"])
     # skips that go too far are taken back, and their events with them
-    tuning = Tuning(
-        Pacing(chunk_seconds=10.0, solver=Ways(skip_margin=1.7, skip_from=2.0))
-    )  # however slow the machine
+    tuning = Tuning(Pacing(chunk_seconds=10.0, skipped_from=2, margin=1.7, spare=0.0))
     driven = run_text(FLIPS.format(samples=3) + FLIP, setting, 'name="driven"', tuning=tuning)
     assert driven.summary["cost"]["steps_redone"] > 0
     assert np.array_equal(expected["flip_time"], driven.dataset["flip_time"])

@@ -13,7 +13,6 @@ import rigidsim
 from rigidsim import RunFolderError
 from rigidsim.session.session import Tuning
 from rigidsim.solve.sampler import Pacing
-from rigidsim.solve.solvers.taylor.ways import Ways
 from rigidsim.store import seal
 from rigidsim.store.segments import SegmentLimits, read_chain
 
@@ -27,9 +26,7 @@ NUMBER = 2  # of the segment that something happens to
 
 def begun(out: Path) -> rigidsim.Run:
     """A run that was stopped, with a segment for every few steps."""
-    tuning = Tuning(
-        Pacing(chunk_seconds=0.0, patience=0.0, solver=Ways(block_steps=4)), SegmentLimits(seconds=0.0)
-    )
+    tuning = Tuning(Pacing(chunk_seconds=0.0, patience=0.0), SegmentLimits(seconds=0.0))
     run = rigidsim.run(rigidsim.parse(TEXT + "[limits]\nmax_steps = 30\n"), out=out, tuning=tuning)
     assert run.status == "stopped: max_steps"
     assert len(list(run.folder.segments.iterdir())) >= 5

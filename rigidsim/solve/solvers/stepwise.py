@@ -1,6 +1,5 @@
 """A solver that takes natural steps and finds the samples within them: single ones, whatever takes them."""
 
-import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -103,8 +102,8 @@ class StepwiseSolver(Solver):
             self._careful = 2 * self._careful if self._careful < _CAREFUL else None
         return count
 
-    def step_by_step(self, count: int, boundary: StepBoundary, enough: float = math.inf) -> bool:
-        """Take single steps to the first sample, and on while the next is at most ``enough`` steps away."""
+    def step_by_step(self, count: int, boundary: StepBoundary) -> bool:
+        """Take single steps, and the samples within them."""
         upcoming, tried = self.buffer.upcoming, 0
         for _ in range(count):
             if tried and float(upcoming) - float(self.stepper.time) < self.stepper.largest:
@@ -124,8 +123,6 @@ class StepwiseSolver(Solver):
                 break
             if reached:
                 upcoming, boundary, tried = self.buffer.upcoming, self.corrected.boundary(), 0
-                if float(upcoming) - float(self.stepper.time) > enough * self.stepper.largest:
-                    break
         return True
 
     # --- samples, and the run's end ---------------------------------------------------------------------

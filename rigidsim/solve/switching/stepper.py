@@ -370,7 +370,7 @@ class SwitchingStepper(TaylorStepper):
                 alone = self._together(min(last - before, self._ahead), samples)
                 if self.steps > before:
                     smallest, largest = min(smallest, self.smallest), max(largest, self.largest)
-                going = samples is None or not samples.complete
+                going = samples is None or not samples.ended
             if alone and going and self.steps < last:
                 if not self._one():
                     return False
@@ -395,7 +395,7 @@ class SwitchingStepper(TaylorStepper):
         self._set()
         self._quieten()
         self._roots.clear()
-        engine, begun, known = self._integrator, self.mark(), 0 if samples is None else samples.count
+        engine, begun, known = self._integrator, self.mark(), 0 if samples is None else len(samples.states)
         self._passed, self._samples, self._cut, self._halted = [], samples, None, False
         self._fresh = bool(self._crossed) or not self.steps
         try:
@@ -471,7 +471,7 @@ class SwitchingStepper(TaylorStepper):
                 crossed,
                 (self._count, self._since),
                 len(self.log.found),
-                0 if samples is None else samples.count,
+                0 if samples is None else len(samples.states),
                 abs(float(engine.last_h)),
                 np.array(engine.tc) if self._fresh else None,
             )
