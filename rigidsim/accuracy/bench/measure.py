@@ -195,7 +195,7 @@ def best_reference(
 
     solutions = over(plan.times)
     exact = exact_to(LEAST_DIGITS, plan.exact).setting if plan.exact else None
-    if exact in solutions:
+    if exact is not None and exact in solutions:
         own = np.full(len(plan.times), 10.0 ** (2 - LEAST_DIGITS))  # two digits are left to rounding
         return ReferenceSolution(solutions[exact], own, f"closed form to {LEAST_DIGITS} digits"), None
     for precision in ("quadruple", "extended", "double"):

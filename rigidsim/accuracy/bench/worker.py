@@ -16,8 +16,9 @@ import time
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, field
+from io import BufferedReader
 from select import select
-from typing import IO, Self
+from typing import IO, Self, cast
 
 import mpmath
 import numpy as np
@@ -115,7 +116,7 @@ def _per_unit(one_pass: Callable[[int], None], count: int, most: int, patience: 
 def work() -> None:
     """Do the tasks that come on stdin, answering each on stdout."""
     quieten_engine()
-    given, answers = sys.stdin.buffer, sys.stdout.buffer
+    given, answers = cast(BufferedReader, sys.stdin.buffer), sys.stdout.buffer
     text, source = pickle.load(given)
     experiment = parse(text, source=source)
     while given.peek(1):

@@ -212,8 +212,8 @@ class Replay:
             base, power = self._number(arguments[0]), arguments[1]
             return base * base if power == 2 else _one_by_one(lambda x: x**power, base)
         if operation == "call":
-            function, *arguments = arguments
-            return _one_by_one(lambda *x: function(_CONTEXT, *x), *map(self._number, arguments))
+            function, *nodes = arguments
+            return _one_by_one(lambda *x: function(_CONTEXT, *x), *map(self._number, nodes))
         values = [self._number(argument) for argument in arguments]
         known = BINARY.get(operation) or _OF_ARRAYS.get(operation)
         if known is None:
