@@ -15,7 +15,7 @@ from rigidsim.model.system import System
 from rigidsim.solve.checkpoint import Arrays
 from rigidsim.solve.compiled import CompiledFunction, compiled_function, evaluate_rows, interruptible
 from rigidsim.solve.effects.angle_wrapping import AngleWrapping
-from rigidsim.solve.effects.charts import Lift
+from rigidsim.solve.effects.charts import AngleContinuation
 from rigidsim.solve.precision import Precision
 from rigidsim.solve.sample_block import SampleBlock
 from rigidsim.solve.turns.joined import Continuity, JoinedAngles
@@ -36,7 +36,7 @@ class _PartnerChart:
         partner = system.partner
         assert partner is not None
         self._precision = precision
-        self._lift = Lift(system.sequence, precision)
+        self._lift = AngleContinuation(system.sequence, precision)
         self._positions = list(system.angle_states)
         found = [r.first for r in partner.recorded if r.continuity == "wrapped"]
         self._angles = slice(found[0], found[0] + 3) if found else None

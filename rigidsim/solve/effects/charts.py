@@ -48,7 +48,7 @@ _NEAR_POLE = 2.0**-20  # singular factor below which a reference doesn't tell it
 _TURN = 2 * math.pi
 
 
-class Lift:
+class AngleContinuation:
     """Joins the requested sequence's angles, in the partner chart, to the ones before."""
 
     def __init__(self, sequence: str, precision: Precision) -> None:
@@ -111,7 +111,7 @@ class Charts(Effect):
         self._middle = self._positions[1]
         self._precision = precision
         self._half = precision.number(mpmath.mpf(0.5))
-        self._lift = Lift(asked.sequence, precision)
+        self._lift = AngleContinuation(asked.sequence, precision)
         self._wrapping, self._whole = wrapping, whole
         self.changes = 0
         self._passed: list[tuple[Scalar, tuple[float, ...]]] = []  # times and asked angles since ``begin``

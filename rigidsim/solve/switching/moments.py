@@ -140,14 +140,6 @@ def between(begin: tuple[Scalar, Scalar], end: tuple[Scalar, Scalar]) -> Scalar:
     return (end[0] - begin[0]) - begin[1] + end[1]
 
 
-def later(begin: tuple[Scalar, Scalar], span: Scalar) -> tuple[Scalar, Scalar]:
-    """A time in two numbers, by a span after another, without rounding the first sum (Knuth's TwoSum)."""
-    high = begin[0] + span
-    part = high - begin[0]
-    low = (begin[0] - (high - part)) + (span - part) + begin[1]
-    return high + low, low - ((high + low) - high)
-
-
 def _zero(
     function: Callable[[Any], Any], about: Any, width: Any, middles: Sequence[Any], side: int, context: Any
 ) -> Any | None:

@@ -29,7 +29,6 @@ HELD = 2
 """Mode in place of a side: the motion keeps to the surface while it slides along surface number m, whose side
 it has (``HELD + m``) or the opposite one (``-HELD - m``); see ``rigidsim.solve.switching.sliding``.
 """
-_MOST_KEPT = 4  # looks: from both sides, at a boundary and within the step before it
 _ROUNDINGS = 32.0  # units of rounding of an argument's terms, below which it is zero
 PARALLEL = 1e-9  # relative difference of fields that count as equal
 _RATE_ROUNDINGS = 1024.0  # the same for its rate, whose terms are products of derivatives
@@ -41,7 +40,7 @@ _CLEAR = 2.0**-40  # relative size of a rate from which on double precision tell
 
 
 @dataclass(frozen=True)
-class Look:
+class SurfaceValues:
     """Surfaces and field at a state: arguments, their partial derivatives, gradients (surfaces, states)."""
 
     u: np.ndarray
@@ -74,7 +73,7 @@ class Look:
 
 
 @dataclass(frozen=True)
-class Looks:
+class SurfacesAtStates:
     """The same at many states, float64: (surfaces, n), gradients (surfaces, states, n), field (states, n)."""
 
     u: np.ndarray
@@ -109,7 +108,7 @@ def in_order(first: np.ndarray, terms: np.ndarray) -> Any:
     return np.concatenate([first, terms]).cumsum(axis=0)[-1]
 
 
-class Probe:
+class SurfaceFunctions:
     """Compiled functions of a system that locate its surfaces."""
 
     def __init__(self, system: System, precision: Precision) -> None:
@@ -144,7 +143,6 @@ class Probe:
         self._beside = hy.cfunc([*system.surfaces, *changes, *named], variables, **options)
         outputs = [*system.surfaces, *by_time, *gradients, *field, *named]
         self._everything = hy.cfunc(outputs, variables, **options)
-        self._latest: dict[tuple[bytes, ...], Look] = {}
 
     def values(
         self, state: np.ndarray, time: Scalar, pars: np.ndarray
@@ -176,12 +174,12 @@ class Probe:
         u, sizes = found[: self.surfaces], found[self.surfaces : 2 * self.surfaces]
         return np.asarray((sides.T * u <= _CLOSE * self._epsilon * (sizes + 1.0)).any(axis=0))
 
-    def looks(self, states: np.ndarray, times: np.ndarray, pars: np.ndarray) -> Looks:
+    def looks(self, states: np.ndarray, times: np.ndarray, pars: np.ndarray) -> SurfacesAtStates:
         """Surfaces and fields at many states (n, states), times (n,) and parameters (n, parameters)."""
         found = _by_columns(self._everything, states, times, pars)
         s, n, count = self.surfaces, self._states, len(times)
         spans = np.array([moments.all_rounded_from(times) for moments in self.moments])
-        return Looks(
+        return SurfacesAtStates(
             found[:s],
             found[s : 2 * s],
             found[2 * s : 2 * s + s * n].reshape(s, n, count),
@@ -196,42 +194,29 @@ class Probe:
         half = len(found) // 2
         return np.asarray((found[:half] <= _RATE_ROUNDINGS * self._epsilon * found[half:]).any(axis=0))
 
-    def look(self, state: np.ndarray, time: Scalar, pars: np.ndarray) -> Look:
-        """Surfaces and field at a state; those of the latest states are kept, since a step that ends on a
-        surface asks for them several times.
-        """
-        asked = [state, np.array([time]), pars]
-        if not all(issubclass(array.dtype.type, np.floating) for array in asked):  # numbers behind pointers
-            return self._evaluated(state, time, pars)
-        key = tuple(array.tobytes() for array in asked)
-        if key not in self._latest:
-            self._latest[key] = self._evaluated(state, time, pars)
-            if len(self._latest) > _MOST_KEPT:
-                del self._latest[next(iter(self._latest))]
-        return self._latest[key]
-
-    def _evaluated(self, state: np.ndarray, time: Scalar, pars: np.ndarray) -> Look:
+    def look(self, state: np.ndarray, time: Scalar, pars: np.ndarray) -> SurfaceValues:
+        """Surfaces and field at a state."""
         found = self._everything(np.array(state), pars=pars, time=time)
         s, n = self.surfaces, self._states
-        return Look(
+        return SurfaceValues(
             found[:s], found[s : 2 * s], found[2 * s : 2 * s + s * n].reshape(s, n), found[-2 - n : -2], time
         )
 
-    def noises(self, look: Look, states: Sequence[np.ndarray]) -> np.ndarray:
+    def noises(self, look: SurfaceValues, states: Sequence[np.ndarray]) -> np.ndarray:
         """Sizes below which the arguments count as zero because of rounding."""
         times = np.array([moments.rounded_from(look.time) for moments in self.moments])
         return _ROUNDINGS * self._epsilon * look.sizes(states, times)
 
-    def noise(self, look: Look, j: int, states: Sequence[np.ndarray]) -> float:
+    def noise(self, look: SurfaceValues, j: int, states: Sequence[np.ndarray]) -> float:
         """The same of one argument."""
         return float(self.noises(look, states)[j])
 
-    def swing_noises(self, look: Look, state: np.ndarray) -> np.ndarray:
+    def swing_noises(self, look: SurfaceValues, state: np.ndarray) -> np.ndarray:
         """The same for small differences of states of order one, as when swings come to rest."""
         gradients = np.hypot.reduce(look.gradients.astype(np.float64), axis=1)
         return _ROUNDINGS * self._epsilon * gradients * np.abs(state.astype(np.float64)).max()
 
-    def rate_noise(self, look: Look, j: int) -> float:
+    def rate_noise(self, look: SurfaceValues, j: int) -> float:
         """Size below which an argument's rate counts as zero because of rounding."""
         return _RATE_ROUNDINGS * self._epsilon * look.rate_size(j)
 
@@ -251,7 +236,7 @@ class Continuation:
     tangential: bool = False
 
 
-def contributions(looks: Mapping[tuple[int, ...], Look]) -> tuple[np.ndarray, np.ndarray, bool]:
+def contributions(looks: Mapping[tuple[int, ...], SurfaceValues]) -> tuple[np.ndarray, np.ndarray, bool]:
     """Field without sides and what each side adds, (surfaces, states), float64, from looks at all
     combinations of sides; and whether these add up to all fields.
     """
@@ -268,8 +253,8 @@ def contributions(looks: Mapping[tuple[int, ...], Look]) -> tuple[np.ndarray, np
 class Fields:
     """Fields of all combinations of sides of some surfaces, at one state."""
 
-    def __init__(self, at: Any, probe: Probe, surfaces: Sequence[int]) -> None:
-        """``at``: from sides by number to a ``Look``."""
+    def __init__(self, at: Any, probe: SurfaceFunctions, surfaces: Sequence[int]) -> None:
+        """``at``: from sides by number to a ``SurfaceValues``."""
         self.surfaces = list(surfaces)
         self._looks = {
             sides: at(dict(zip(surfaces, sides, strict=True)))
@@ -290,7 +275,7 @@ class Fields:
         """Whether the contributions of all surfaces to the field add up."""
         return contributions(self._looks)[2]
 
-    def idle(self) -> list[int]:
+    def tangential_surfaces(self) -> list[int]:
         """Surfaces on which the motion stays, or which it touches, whatever the sides."""
         return [
             j
@@ -341,12 +326,14 @@ class Fields:
         return all(modes[i] * rates[i] > self._noise[i] for i in beside)
 
 
-def crossings(at: Callable[[dict[int, int]], Look], probe: Probe, sides: Mapping[int, int]) -> dict[int, int]:
+def crossings(
+    at: Callable[[dict[int, int]], SurfaceValues], probe: SurfaceFunctions, sides: Mapping[int, int]
+) -> dict[int, int]:
     """Sides to which surfaces are crossed whatever the sides of all are, as those of plates in the light: the
     sides don't change a rate by so much that its sign could change.
 
     Args:
-        at: from sides by number to a ``Look``.
+        at: from sides by number to a ``SurfaceValues``.
         sides: of the surfaces that meet, to begin with.
     """
     seen: list[dict[int, int]] = []

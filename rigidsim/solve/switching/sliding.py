@@ -27,7 +27,15 @@ from rigidsim.model.rotations import Symbolic
 from rigidsim.model.step_limiter import slopes
 from rigidsim.model.system import System
 from rigidsim.solve.precision import Scalar
-from rigidsim.solve.switching.sides import HELD, PARALLEL, SLIDES, Continuation, Look, Probe, contributions
+from rigidsim.solve.switching.sides import (
+    HELD,
+    PARALLEL,
+    SLIDES,
+    Continuation,
+    SurfaceFunctions,
+    SurfaceValues,
+    contributions,
+)
 
 MOST_AT_ONCE = 3
 """Largest number of surfaces along which a motion slides at once."""
@@ -113,16 +121,16 @@ _BLENDS = (
     "different directions, so that what follows isn't unique"
 )
 
-LookAt = Callable[[Mapping[int, int], np.ndarray, Scalar], Look]
-"""Function from sides by number, a state and a time to a ``Look``."""
+ValuesAt = Callable[[Mapping[int, int], np.ndarray, Scalar], SurfaceValues]
+"""Function from sides by number, a state and a time to a ``SurfaceValues``."""
 
 
 @dataclass(frozen=True)
 class Meeting:
     """Surfaces that meet at a state; ``at`` looks at them on given sides and at states nearby."""
 
-    at: LookAt
-    probe: Probe
+    at: ValuesAt
+    probe: SurfaceFunctions
     state: np.ndarray
     time: Scalar
     epsilon: float
@@ -149,7 +157,7 @@ class Meeting:
     def _sign(self, i: int, m: int, others: Sequence[int]) -> int | str:
         """Side of surface i at rest: that of m (1), the opposite (-1); 0 for no rest; a text if undecided."""
         fixed = dict.fromkeys(others, 1)
-        looks: dict[tuple[int, ...], Look] = {
+        looks: dict[tuple[int, ...], SurfaceValues] = {
             (s, t): self.at({**fixed, i: s, m: t}, self.state, self.time)
             for s, t in ((1, 1), (1, -1), (-1, 1), (-1, -1))
         }
@@ -214,7 +222,7 @@ class Meeting:
         kept: np.ndarray = base + np.array(parts).T @ sides
         return kept
 
-    def _slope(self, i: int, m: int, here: Look) -> float:
+    def _slope(self, i: int, m: int, here: SurfaceValues) -> float:
         """Derivative of the rate of surface i by the argument of m, by a finite difference."""
         gradient = here.gradients[m].astype(np.float64)
         length = float(np.linalg.norm(gradient))

@@ -37,14 +37,14 @@ from rigidsim.solve.events import BESIDE, EventLog, engine_events, of_order_one
 from rigidsim.solve.precision import Precision, Scalar
 from rigidsim.solve.requirements import SetAtKnots
 from rigidsim.solve.stepper import Mark, SamplesWithin, bound_of_sparse_series, may_be_sparse
-from rigidsim.solve.switching.moments import between, later, of_time
+from rigidsim.solve.switching.moments import between, of_time
 from rigidsim.solve.switching.sides import (
     HELD,
     SLIDES,
     Continuation,
     Fields,
-    Look,
-    Probe,
+    SurfaceFunctions,
+    SurfaceValues,
     crossings,
 )
 from rigidsim.solve.switching.sliding import MOST_AT_ONCE, Meeting, sliding
@@ -63,7 +63,6 @@ _ROUNDINGS = 2.0**15  # in the square of an interval
 _MOST_LEFT_OUT = 8.0  # roundings of the state, by a moment in two numbers
 _NOT_RESOLVED = "choose a higher precision, or count time from an epoch shortly before"
 _WIDTH = 2.0**8  # roundings of a time between two findings of the same crossing
-_NEAR = 2.0**-12  # of a step: within it Newton's method improves a root
 _BISECTIONS = 4  # bisections of a step per bit of the precision
 
 Root = tuple[Any, int, int]
@@ -112,7 +111,7 @@ class SwitchingStepper(TaylorStepper):
         self._halted = self._fresh = False
         self._offset: list[int] = []  # parameters that are added to events
         self._ahead = _FIRST_AHEAD
-        self._probes: dict[int, Probe] = {}
+        self._functions_by_chart: dict[int, SurfaceFunctions] = {}
         self._engines: dict[tuple[int, tuple[int, ...], tuple[int, ...]], TaylorEngine] = {}
         self._chart = 0
         surfaces = system.plan.surfaces
@@ -145,11 +144,13 @@ class SwitchingStepper(TaylorStepper):
         }
 
     @property
-    def _probe(self) -> Probe:
-        if self._chart not in self._probes:
+    def _functions(self) -> SurfaceFunctions:
+        if self._chart not in self._functions_by_chart:
             system = self._system_of(self._chart)
-            self._probes[self._chart] = interruptible(lambda: Probe(system, self.precision))
-        return self._probes[self._chart]
+            self._functions_by_chart[self._chart] = interruptible(
+                lambda: SurfaceFunctions(system, self.precision)
+            )
+        return self._functions_by_chart[self._chart]
 
     def mark(self) -> Mark:
         mark = super().mark()
@@ -287,7 +288,7 @@ class SwitchingStepper(TaylorStepper):
             numbers += [0.0] * (self.system.first_of_pieces - len(numbers))
             return np.concatenate([_scalars(self.precision, numbers), self._piece])
         pars = _scalars(self.precision, numbers)
-        if not self._probe.clocked:
+        if not self._functions.clocked:
             return pars
         return np.concatenate([pars, np.array([self._off if low is None else low], dtype=pars.dtype)])
 
@@ -310,25 +311,21 @@ class SwitchingStepper(TaylorStepper):
         """Parameters at this boundary; turns and sign continue from the latest step."""
         return self._pars(self._joined(self.state, self.time), over, self._low)
 
-    def _look(self, state: np.ndarray, time: Scalar, low: Scalar | None = None) -> Look:
-        """Look at the surfaces in a state of the latest step, at a time in one number or two."""
-        return self._probe.look(state, time, self._pars(self._joined(state, time), low=low))
-
-    def _values(self, state: np.ndarray, time: Scalar, low: Scalar | None = None) -> np.ndarray:
-        """Arguments of the surfaces in a state of the latest step, likewise."""
-        return self._probe.values(state, time, self._pars(self._joined(state, time), low=low))[0]
+    def _look(self, state: np.ndarray, time: Scalar, low: Scalar | None = None) -> SurfaceValues:
+        """SurfaceValues at the surfaces in a state of the latest step, at a time in one number or two."""
+        return self._functions.look(state, time, self._pars(self._joined(state, time), low=low))
 
     def _plain(self, state: np.ndarray, time: Scalar) -> tuple[list[float], list[float]]:
         """Angles within one turn, and the quaternion without its sign, that expressions read."""
-        return self._probe.values(state, time, self._pars(self._probe.unturned))[1:]
+        return self._functions.values(state, time, self._pars(self._functions.unturned))[1:]
 
     def _joined(self, state: np.ndarray, time: Scalar) -> list[float]:
         """Turns and sign, continued from the latest step on to a state."""
-        return self._turned.parameters(*self._plain(state, time)) if self._probe.unturned else []
+        return self._turned.parameters(*self._plain(state, time)) if self._functions.unturned else []
 
     def _follow(self) -> None:
         """Continue angles and quaternion to the end of the step just taken."""
-        if self._probe.unturned:
+        if self._functions.unturned:
             self._turned = self._turned.followed(*self._plain(self.state, self.time))
 
     def _set(self) -> None:
@@ -338,22 +335,26 @@ class SwitchingStepper(TaylorStepper):
         with next to nothing.
         """
         engine, pars = self._integrator, self._parameters()
-        look = self._probe.look(self.state, self.time, pars)
+        look = self._functions.look(self.state, self.time, pars)
         # what a unit of time makes of the state tells its size
-        noises = self._probe.noises(look, [self.state, look.field])
+        noises = self._functions.noises(look, [self.state, look.field])
         moved = [0.0] * len(self._modes)
         for j, (u, noise, mode) in enumerate(zip(look.u, noises, self._modes, strict=True)):
-            of_time = self._probe.moments[j].of_time
+            of_time = self._functions.moments[j].of_time
             near = abs(float(u)) <= noise or (j + 1 == self._crossed and not of_time)
             if near and abs(mode) < HELD:
-                moved[j] = mode * (noise if of_time else self._probe.beside(self.state, self.time, pars, j))
+                moved[j] = mode * (
+                    noise if of_time else self._functions.beside(self.state, self.time, pars, j)
+                )
         if self.has_events:
-            moved += [self._beside(*found) for found in self._probe.crossings(self.state, self.time, pars)]
+            moved += [
+                self._event_offset(*found) for found in self._functions.crossings(self.state, self.time, pars)
+            ]
         everything = np.concatenate([pars, _scalars(self.precision, moved)])
         engine.pars[:] = everything[: len(engine.pars)]  # along a surface the last ones have no meaning
         self._offset = [self.system.parameters + i for i, number in enumerate(moved) if number]
 
-    def _beside(self, value: float, noise: float) -> float:
+    def _event_offset(self, value: float, noise: float) -> float:
         """Offset to add to an event's expression."""
         if self._along and abs(value) <= noise:  # it is zero all along the surface and crosses nothing
             return 2 * noise
@@ -385,7 +386,7 @@ class SwitchingStepper(TaylorStepper):
     @property
     def _single(self) -> bool:
         """Whether steps have to be taken one by one here."""
-        if self._unsettled or self._probe.unturned or self.watcher is not None:
+        if self._unsettled or self._functions.unturned or self.watcher is not None:
             return True
         return any(abs(mode) != 1 for mode in self._modes)
 
@@ -442,7 +443,7 @@ class SwitchingStepper(TaylorStepper):
             return False
         self._modes[j], first, pars = side, self._count_of_pars, engine.pars
         pars[j] = self._plus if side > 0 else self._minus
-        beside = self._probe.beside(engine.state, engine.time, pars[:first], j)
+        beside = self._functions.beside(engine.state, engine.time, pars[:first], j)
         pars[first + j] = self.precision.of_double(side * beside)
         self.log.quiet_until = engine.time + self._width(engine.time)
         return True
@@ -458,7 +459,7 @@ class SwitchingStepper(TaylorStepper):
             if place not in offset:
                 engine.pars[place] = self._off
         time = engine.dtime
-        if self._probe.clocked and self.system.pieces is None:
+        if self._functions.clocked and self.system.pieces is None:
             engine.pars[first - 1] = time[1]
         samples = self._samples
         going = samples is None or samples(engine)
@@ -495,7 +496,7 @@ class SwitchingStepper(TaylorStepper):
         crossed = np.array([one.crossed - 1 for one in passed])
         sides = np.where(pars[:, : len(self._modes)] > 0, 1.0, -1.0)
         bad, near = np.zeros((2, len(passed)), dtype=bool)
-        rows = np.flatnonzero((crossed >= 0) | self._probe.asks(states[1:], times, pars, sides))
+        rows = np.flatnonzero((crossed >= 0) | self._functions.asks(states[1:], times, pars, sides))
         if len(rows):
             there = states[:-1][rows], states[1:][rows], times[rows], pars[rows]
             bad[rows], near[rows] = self._wrong_or_near(*there, sides[rows].T, crossed[rows])
@@ -508,7 +509,7 @@ class SwitchingStepper(TaylorStepper):
         for k in np.flatnonzero(maybe):
             row, found = series[k]
             bad[row] |= bound_of_sparse_series(found) < passed[row].size
-        if self._probe.hides:
+        if self._functions.hides:
             begins = [begun.time[0], *times[:-1]]
             for row, (begin, end) in enumerate(zip(begins, times, strict=True)):
                 bad[row] |= bool(self._hidden(begin, end, [int(side) for side in sides[row]]))
@@ -526,7 +527,7 @@ class SwitchingStepper(TaylorStepper):
         crossed: np.ndarray,
     ) -> tuple[np.ndarray, np.ndarray]:
         """At which of many boundaries a surface other than the one crossed is on the wrong side, or near."""
-        looks = self._probe.looks(states, times, pars)
+        looks = self._functions.looks(states, times, pars)
         others = np.arange(len(looks.u))[:, None] != crossed
         wrong = sides * looks.u < -looks.noises(states)
         near = np.abs(looks.u) <= looks.widest_noises(before, states)
@@ -539,10 +540,10 @@ class SwitchingStepper(TaylorStepper):
         rows = np.arange(len(crossed))
         side, flipped = np.where(pars[rows, crossed] > 0, 1.0, -1.0), pars.copy()
         flipped[rows, crossed] = -flipped[rows, crossed]
-        looks = [self._probe.looks(states, times, given) for given in (pars, flipped)]
+        looks = [self._functions.looks(states, times, given) for given in (pars, flipped)]
         (here, noise), (there, other) = (look.rates(crossed, rows) for look in looks)
         found = np.minimum(side * here, side * there) > np.maximum(noise, other)
-        return found & ~self._probe.crosses_too(states, times, pars) if self.has_events else found
+        return found & ~self._functions.crosses_too(states, times, pars) if self.has_events else found
 
     # --- one step -------------------------------------------------------------------------------------------
 
@@ -595,11 +596,11 @@ class SwitchingStepper(TaylorStepper):
             if root is None:
                 break
             log.drop_after(events, root[0] + self._width(root[0]))
-            moment, known = self.moment(root)
+            moment, known = self._moment(root)
             left = between(time, moment)
             if left > 0:
-                size = self._again(root, time, before, left, moment if known else None)
-                self._cut = root[1:]
+                self._again(time, before, left, moment if known else None)
+                size, self._cut = left, root[1:]
                 break
             # the step begins on the surface and leaves its side at once
             self._return(time, before, events)
@@ -630,7 +631,7 @@ class SwitchingStepper(TaylorStepper):
         noted = {event.index for event in found if event.time >= self.time - width}
         pars = self._parameters()
         earlier, here = (
-            self._probe.crossings(*place, pars) for place in ((before, begun), (self.state, self.time))
+            self._functions.crossings(*place, pars) for place in ((before, begun), (self.state, self.time))
         )
         for i, ((value, _), (now, noise)) in enumerate(zip(earlier, here, strict=True)):
             direction = self.system.crossings[i].direction
@@ -655,11 +656,11 @@ class SwitchingStepper(TaylorStepper):
 
     def _bound_of_turn(self, before: np.ndarray, time: Scalar) -> float:
         """Bound of a step just taken within which turns can be continued: series of many terms go far."""
-        if not self._probe.unturned:
+        if not self._functions.unturned:
             return math.inf
-        pars = self._pars(self._probe.unturned)  # those of the engine are fewer where it slides
+        pars = self._pars(self._functions.unturned)  # those of the engine are fewer where it slides
         after = np.array(self.state), self.time
-        rates = [self._probe.rate(*there, pars) for there in ((before, time), after)]
+        rates = [self._functions.rate(*there, pars) for there in ((before, time), after)]
         return MOST / max(sum(rates) / 2, 1e-300)
 
     def _width(self, time: Scalar) -> Scalar:
@@ -673,9 +674,9 @@ class SwitchingStepper(TaylorStepper):
 
     # --- roots that the engine doesn't stop at -----------------------------------------------------------
 
-    def moment(self, root: Root) -> tuple[tuple[Scalar, Scalar], bool]:
+    def _moment(self, root: Root) -> tuple[tuple[Scalar, Scalar], bool]:
         """Time of a root in two numbers, and whether it is known from the surface's expression."""
-        known = self._probe.moments[root[1]].near(root[0], self._modes)
+        known = self._functions.moments[root[1]].near(root[0], self._modes)
         return known or (root[0], root[0] * 0), known is not None
 
     def _first_root(self, begun: tuple[Scalar, Scalar], before: np.ndarray) -> Root | None:
@@ -685,7 +686,7 @@ class SwitchingStepper(TaylorStepper):
         states = [before, after]
         hidden = self._hidden(begun[0], end, self._modes)
         # those of known moments may differ by less than one number tells
-        roots = sorted([*self._roots, *hidden], key=lambda root: self.moment(root)[0])
+        roots = sorted([*self._roots, *hidden], key=lambda root: self._moment(root)[0])
         for n, (time, j, side) in enumerate(roots):
             if self._modes[j] == SLIDES or roots[n] in hidden:
                 return roots[n]
@@ -694,14 +695,14 @@ class SwitchingStepper(TaylorStepper):
             following = next((t for t, i, _ in roots[n + 1 :] if i == j), end)
             middle = time + (following - time) / 2
             look = self._look(engine.update_d_output(middle), middle)
-            if float(look.u[j]) * side > self._probe.noise(look, j, states):
+            if float(look.u[j]) * side > self._functions.noise(look, j, states):
                 return roots[n]
-        values = self._values(after, end, self._low)
-        for j, mode in enumerate(self._modes):
-            if abs(mode) >= HELD or mode * float(values[j]) >= 0 or (self._cut and self._cut[0] == j):
-                continue
-            look = self._look(after, end, self._low)
-            if -mode * float(look.u[j]) <= self._probe.noise(look, j, states):
+        look = self._look(after, end, self._low)
+        for j, (mode, noise) in enumerate(
+            zip(self._modes, self._functions.noises(look, states), strict=True)
+        ):
+            wrong = abs(mode) < HELD and -mode * float(look.u[j]) > noise
+            if not wrong or (self._cut and self._cut[0] == j):
                 continue
             inside = self._seen(j, begun, before)
             if inside is None:
@@ -711,31 +712,19 @@ class SwitchingStepper(TaylorStepper):
 
     def _hidden(self, begin: Scalar, end: Scalar, modes: Sequence[int]) -> list[Root]:
         """Roots within a step that its polynomials may have missed."""
-        middles = [moments.hidden(begin, end, modes) for moments in self._probe.moments]
+        middles = [moments.hidden(begin, end, modes) for moments in self._functions.moments]
         return [(middle, j, -modes[j]) for j, middle in enumerate(middles) if middle is not None]
 
     def _again(
         self,
-        root: Root,
         time: tuple[Scalar, Scalar],
         before: np.ndarray,
         size: Scalar,
         moment: tuple[Scalar, Scalar] | None,
-    ) -> Scalar:
-        """Repeat the step up to a root, to its last digits, or to its known moment; returns the step's size.
-
-        Args:
-            size: of the step to the root as the engine found it, within the step just taken.
-        """
-        engine = self._integrator
-        if moment is None and root[1] not in self._along:  # by that step's own polynomials
-            high, low = later(time, size)
-            look = self._look(np.array(engine.update_d_output(high)), high, low)
-            rate = look.rate(root[1])
-            correction = look.u[root[1]] / rate if rate != 0 else rate
-            if 0 < abs(float(correction)) < _NEAR * float(size):
-                size = size - correction
-        muted, self.log.muted = self.log.muted, True
+    ) -> None:
+        """Repeat the step just taken up to a root, or to its known moment."""
+        engine, muted = self._integrator, self.log.muted
+        self.log.muted = True
         try:
             engine.dtime = time
             engine.state[:] = before
@@ -744,18 +733,17 @@ class SwitchingStepper(TaylorStepper):
                 engine.dtime = moment
         finally:
             self.log.muted = muted
-        return size
 
     def _seen(self, j: int, begun: tuple[Scalar, Scalar], before: np.ndarray) -> Scalar | None:
         """A time within the latest step at which an argument has the sign of its side, or None."""
         begin, end, mode = begun[0], self._integrator.time, self._modes[j]
         look = self._look(before, *begun)
-        known = self._probe.noise(look, j, [before])
+        known = self._functions.noise(look, j, [before])
         beside = mode * float(look.u[j]) > known  # of the surface, as the step began
         some = self.precision.bits // 2
         for power in range(1, _BISECTIONS * self.precision.bits):
             then = begin + (end - begin) * self.precision.of_double(2.0**-power)
-            value = mode * float(self._values(self._integrator.update_d_output(then), then)[j])
+            value = mode * float(self._look(self._integrator.update_d_output(then), then).u[j])
             if value > 0:
                 return then
             if power >= some and (beside or abs(value) <= known):  # nearer than that it is on the surface
@@ -768,7 +756,7 @@ class SwitchingStepper(TaylorStepper):
             middle = begin + (end - begin) / 2
             if not begin < middle < end:
                 break
-            value = self._values(self._integrator.update_d_output(middle), middle)[j]
+            value = self._look(self._integrator.update_d_output(middle), middle).u[j]
             if self._modes[j] * float(value) > 0:
                 begin = middle
             else:
@@ -789,17 +777,17 @@ class SwitchingStepper(TaylorStepper):
             else:
                 self._take(choice)
 
-    def _at_rest(self, on: list[int], look: Look) -> Continuation | None:
+    def _at_rest(self, on: list[int], look: SurfaceValues) -> Continuation | None:
         """How to continue if swings about two surfaces have decayed to rounding; None otherwise."""
-        resting = np.abs(look.u.astype(np.float64)) <= self._probe.swing_noises(look, self.state)
+        resting = np.abs(look.u.astype(np.float64)) <= self._functions.swing_noises(look, self.state)
         small = [i for i, mode in enumerate(self._modes) if i in on or abs(mode) >= HELD or resting[i]]
         if len(small) < 2:
             return None
 
-        def at(sides: Mapping[int, int], state: np.ndarray, time: Scalar) -> Look:
-            return self._probe.look(state, time, self._parameters(dict(sides)))
+        def at(sides: Mapping[int, int], state: np.ndarray, time: Scalar) -> SurfaceValues:
+            return self._functions.look(state, time, self._parameters(dict(sides)))
 
-        meeting = Meeting(at, self._probe, np.array(self.state), self.time, self._epsilon)
+        meeting = Meeting(at, self._functions, np.array(self.state), self.time, self._epsilon)
         kept = {j: self._modes[j] for j in (*self._along, *self._held)}
         return meeting.rest(sorted({*small, *kept}), kept)
 
@@ -813,9 +801,9 @@ class SwitchingStepper(TaylorStepper):
             if square != 0:
                 state[:] = state - (look.u[j] / square) * gradient
 
-    def _lying_on(self, look: Look, states: list[np.ndarray]) -> list[int]:
+    def _lying_on(self, look: SurfaceValues, states: list[np.ndarray]) -> list[int]:
         """Surfaces whose arguments are zero but for rounding of these states."""
-        near = np.abs(look.u.astype(np.float64)) <= self._probe.noises(look, states)
+        near = np.abs(look.u.astype(np.float64)) <= self._functions.noises(look, states)
         return [int(j) for j in np.flatnonzero(near)]
 
     @property
@@ -845,7 +833,7 @@ class SwitchingStepper(TaylorStepper):
         look = self._look(self.state, self.time, self._low)
         on = [j, *self._along, *self._held]
         on += [i for i in self._lying_on(look, states) if i not in on]
-        moments = [i for i in on if self._probe.moments[i].of_time]
+        moments = [i for i in on if self._functions.moments[i].of_time]
         alone = len(moments) == 1
         if (again or not alone) and any(self._unresolved(i, alone) for i in moments):
             why = (
@@ -865,7 +853,7 @@ class SwitchingStepper(TaylorStepper):
         begins, nothing is known yet.
         """
         before, after = (
-            self._probe.look(self.state, self.time, self._parameters({j: side * self._modes[j]})).field
+            self._functions.look(self.state, self.time, self._parameters({j: side * self._modes[j]})).field
             for side in (1, -1)
         )
         if alone and float(np.abs(after).max()) > float(np.abs(before).max()):
@@ -875,15 +863,15 @@ class SwitchingStepper(TaylorStepper):
         allowed, time = _MOST_LEFT_OUT * self._epsilon * size, self._integrator.dtime
         if change * self._epsilon**2 * abs(float(time[0])) <= allowed:
             return False
-        return change * self._probe.moments[j].left_out(time, self._modes) > allowed
+        return change * self._functions.moments[j].left_out(time, self._modes) > allowed
 
-    def _agree(self, known: Collection[int] = ()) -> Look:
+    def _agree(self, known: Collection[int] = ()) -> SurfaceValues:
         """Put all surfaces except the known ones on the sides where the state lies, since an argument that
         reads another surface's side jumps with it; returns the last look.
         """
         for _ in range(len(self._modes) + 1):
             look, changed = self._look(self.state, self.time, self._low), False
-            noises = self._probe.noises(look, [self.state])
+            noises = self._functions.noises(look, [self.state])
             for j, mode in enumerate(self._modes):
                 u = float(look.u[j])
                 beyond = mode * u < 0 and abs(u) > noises[j]
@@ -905,18 +893,18 @@ class SwitchingStepper(TaylorStepper):
     def _chosen(self, on: list[int], hint: tuple[int, int] | None = None) -> Continuation:
         """How to continue from the surfaces on which the state lies."""
 
-        def at(sides: dict[int, int]) -> Look:
-            return self._probe.look(self.state, self.time, self._parameters(sides))
+        def at(sides: dict[int, int]) -> SurfaceValues:
+            return self._functions.look(self.state, self.time, self._parameters(sides))
 
         moving = [j for j in on if hint is not None and j == hint[0]]
         for j in on:
-            if j not in moving and j not in Fields(at, self._probe, [j]).idle():
+            if j not in moving and j not in Fields(at, self._functions, [j]).tangential_surfaces():
                 moving.append(j)
         idle = {j: self._modes[j] or 1 for j in on if j not in moving}
         if not moving:
             return self._by_trial(idle)
         crossed = (
-            crossings(at, self._probe, {j: self._modes[j] or 1 for j in moving})
+            crossings(at, self._functions, {j: self._modes[j] or 1 for j in moving})
             if len(moving) > MOST_AT_ONCE
             else {}
         )
@@ -925,7 +913,7 @@ class SwitchingStepper(TaylorStepper):
             return Continuation(None, f"more than {MOST_AT_ONCE} surfaces meet there")
         if not moving:
             return Continuation({**idle, **crossed})
-        choice = Fields(lambda sides: at({**crossed, **sides}), self._probe, moving).choose()
+        choice = Fields(lambda sides: at({**crossed, **sides}), self._functions, moving).choose()
         if choice.modes is not None:
             return Continuation({**idle, **crossed, **choice.modes})
         if not choice.tangential or hint is None or hint[0] in crossed:
@@ -964,7 +952,7 @@ class SwitchingStepper(TaylorStepper):
             for part in (1 / 16, 1 / 2, 1.0):
                 then = begin + self.precision.of_double(part) * (trial.time - begin)
                 look = self._look(np.array(trial.update_d_output(then)), then)
-                if abs(float(look.u[j])) > self._probe.noise(look, j, [before, np.array(trial.state)]):
+                if abs(float(look.u[j])) > self._functions.noise(look, j, [before, np.array(trial.state)]):
                     return 1 if look.u[j] > 0 else -1
             return found
         finally:
