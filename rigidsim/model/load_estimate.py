@@ -23,11 +23,10 @@ from rigidsim.model.capabilities import having, orbit_of, table_of
 from rigidsim.model.carriers import Carrier
 from rigidsim.model.formulations.formulation import Requirements
 from rigidsim.model.formulations.quaternion import quaternion_states
-from rigidsim.model.heyoka_expressions import to_heyoka
 from rigidsim.model.kinematics import in_common_unit
 from rigidsim.model.load import Load, Term, force_terms, loads_of, torque_terms
 from rigidsim.model.mechanics import Mechanics
-from rigidsim.model.names import state_names
+from rigidsim.model.names import written
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.scaling import Drive, choose_scaling, scaled_numbers
 from rigidsim.model.state_blocks import BODY, StateBlock
@@ -73,7 +72,7 @@ def estimate_drive(scene: Scene, loads: Sequence[Load], requirements: Requiremen
     names, start = start_of(m, loads)
     narrow = [u for load in loads for u in load.narrow(m)]
     in_time = (s.expression for s in surfaces_of(scene).found if names_used(s.expression) == {"t"})
-    narrow += [to_heyoka(u, state_names(m, ("t",)), m.number, m.scene.context) for u in in_time]
+    narrow += written(m, in_time)
     samples = _Samples(m, names, start, narrow)
     context, scaling = scene.context, m.scaling
     inverse = np.array([[float(x) for x in row] for row in m.numbers.inverse_inertia])

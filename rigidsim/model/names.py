@@ -36,7 +36,7 @@ from rigidsim.scene.surfaces import random_states, value_at
 _ROUNDING = 2.0**-16  # of a quantity's size, by which it may be negative where it ends at zero
 
 
-def state_names(m: Kinematics, names: Collection[str], *, clocked: bool = True) -> dict[str, Any]:
+def _state_names(m: Kinematics, names: Collection[str], *, clocked: bool) -> dict[str, Any]:
     """Expressions in SI units for the names that a user's expression reads; a ``TwoPartTime`` where the time
     takes two numbers, and ``clocked``.
     """
@@ -50,11 +50,13 @@ def state_names(m: Kinematics, names: Collection[str], *, clocked: bool = True) 
     return {name: found[name] for name in names}
 
 
-def written(m: Kinematics, expressions: Iterable[Expression]) -> list[Symbolic]:
-    """A user's expressions in heyoka's terms, SI."""
-    return [
-        to_heyoka(x, state_names(m, names_used(x)), m.number, m.scene.context, m.sides) for x in expressions
-    ]
+def written(m: Kinematics, expressions: Iterable[Expression], *, clocked: bool = True) -> list[Symbolic]:
+    """A user's expressions in heyoka's terms, SI; the time takes two numbers where it needs them and
+    ``clocked``.
+    """
+    context = m.scene.context
+    named = ((x, _state_names(m, names_used(x), clocked=clocked)) for x in expressions)
+    return [to_heyoka(x, names, m.number, context, m.sides) for x, names in named]
 
 
 def above_zero(m: Kinematics, expression: Expression) -> Symbolic:

@@ -25,7 +25,7 @@ from rigidsim.scene.initial_values import start_values
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.schema import Config
 from rigidsim.scene.surfaces import changes, random_states
-from rigidsim.scene.transitions import narrow_parts, root_parts
+from rigidsim.scene.transitions import narrow_parts
 
 _TO_AND_FRO, _ONWARD = 6, 10
 """Binary exponents of the units of time over which a state adds up its derivative if nothing brings it back:
@@ -104,21 +104,6 @@ def refuse_odd_states(scene: Scene) -> None:
             raise ConfigError(
                 Problem(state.derivative.where, what + "such as qw*qx, or say where it jumps: sign(qw)*qx")
             )
-
-
-def narrow_arguments(m: Kinematics) -> list[tuple[str, Any]]:
-    """(description, argument) of what is narrow in derivatives, as ``capabilities.Narrow`` has of loads."""
-    return [
-        (f"state {state.name}", u)
-        for state in m.scene.states
-        for u in written(m, narrow_parts(state.derivative))
-    ]
-
-
-def radicands(m: Kinematics) -> list[tuple[str, Any]]:
-    """(description, radicand) of roots in derivatives, as ``capabilities.Rooted`` has of loads."""
-    states = m.scene.states
-    return [(f"state {state.name}", u) for state in states for u in written(m, root_parts(state.derivative))]
 
 
 # --- units --------------------------------------------------------------------------------------------------

@@ -23,14 +23,13 @@ from collections.abc import Mapping
 import heyoka as hy
 
 from rigidsim.model.euler_poles import components_of_factor, starts_in_pole
-from rigidsim.model.heyoka_expressions import to_heyoka
 from rigidsim.model.mechanics import Mechanics
-from rigidsim.model.names import state_names
-from rigidsim.model.own_states import narrow_arguments, radicands
+from rigidsim.model.names import written
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.state_blocks import StateBlock
 from rigidsim.scene.expressions.names import EULER_NAMES
-from rigidsim.scene.transitions import WIDE, narrow_parts
+from rigidsim.scene.expressions.tree import names_used
+from rigidsim.scene.transitions import WIDE, narrow_parts, root_parts
 
 PACE = "pace"
 _POLE = 2.0**20  # over the factor that vanishes in a pole of the Euler angles
@@ -41,7 +40,8 @@ def pace_block(m: Mechanics, before: StateBlock) -> list[StateBlock]:
     """The state that keeps steps from passing over a pulse or a switch in ``before``; none without."""
     watched = _arguments(m)
     rooted = [(load.title, v) for load in m.loads for v in load.roots(m)]
-    rooted += radicands(m)
+    states = [(f"state {state.name}", state.derivative) for state in m.scene.states]
+    rooted += [(title, v) for title, slope in states for v in written(m, root_parts(slope))]
     if not (watched or rooted):
         return []
     derivatives = dict(zip(before.names, before.derivatives, strict=True))
@@ -56,16 +56,14 @@ def pace_block(m: Mechanics, before: StateBlock) -> list[StateBlock]:
 def _arguments(m: Mechanics) -> list[tuple[str, Symbolic]]:
     """(description, argument) of what is narrow in loads and events; dimensionless."""
     found = [(load.title, u) for load in m.loads for u in load.narrow(m)]
-    found += narrow_arguments(m)
+    states = [(f"state {state.name}", state.derivative) for state in m.scene.states]
+    found += [(title, u) for title, slope in states for u in written(m, narrow_parts(slope))]
     angles = frozenset(EULER_NAMES)
     for event in m.scene.events:
-        names = state_names(m, event.reads, clocked=False)
-        if event.reads & angles and starts_in_pole(m.scene):
+        if names_used(event.expression) & angles and starts_in_pole(m.scene):
             found += [(f"event {event.name}", _POLE * x) for x in components_of_factor(m)]
-        found += [
-            (f"event {event.name}", to_heyoka(part, names, m.number, m.scene.context, m.sides))
-            for part in narrow_parts(event.expression)
-        ]
+        parts = written(m, narrow_parts(event.expression), clocked=False)
+        found += [(f"event {event.name}", part) for part in parts]
     return found
 
 

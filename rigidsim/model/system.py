@@ -12,9 +12,9 @@ import heyoka as hy
 from rigidsim.model.assembly import assemble_states
 from rigidsim.model.capabilities import Ending, Ranged, having
 from rigidsim.model.formulations.formulation import Formulation, ModelPlan
-from rigidsim.model.heyoka_expressions import carries_sign, plain_angles, to_heyoka
+from rigidsim.model.heyoka_expressions import carries_sign, plain_angles
 from rigidsim.model.mechanics import Mechanics
-from rigidsim.model.names import above_zero, state_names, written
+from rigidsim.model.names import above_zero, written
 from rigidsim.model.orbits.pieces import Pieces, PieceSeries
 from rigidsim.model.orbits.prescribed import TablePieces
 from rigidsim.model.outputs import Invariant, Recorded, drift_outputs, find_invariants, recorded_variables
@@ -227,8 +227,7 @@ class System:
         """
         m, found = self.mechanics, []
         for event in self.scene.events:
-            names = state_names(m, event.reads, clocked=False)
-            expression = to_heyoka(event.expression, names, m.number, m.scene.context, m.sides)
+            (expression,) = written(m, [event.expression], clocked=False)
             found.append(Crossing(event.name, expression, _DIRECTIONS[event.direction], event.stop))
         endings = [(*one, False) for load in having(Ending, m.loads) for one in load.endings(m)]
         endings += [

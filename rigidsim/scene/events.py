@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from rigidsim.scene.expressions.tree import Expression, names_used, states_read
+from rigidsim.scene.expressions.tree import Expression, names_used
 from rigidsim.scene.registry import Setting
 
 
@@ -16,16 +16,6 @@ class Event:
     expression: Expression
     direction: str
     stop: bool
-
-    @property
-    def reads(self) -> frozenset[str]:
-        """Names that the expression uses."""
-        return names_used(self.expression)
-
-    @property
-    def states(self) -> frozenset[str]:
-        """States without which the expression has no value."""
-        return states_read(self.expression)
 
 
 def resolve_events(setting: Setting) -> tuple[Event, ...]:

@@ -148,7 +148,8 @@ def _operated(node: Operation, meant: list[_Meant]) -> _Meant:
         if abs(value) > LARGEST_POWER:
             raise last.error(f"the exponent {last.quoted} is beyond 64; -64 to 64 are allowed")
     found = placed(written_out(node.operator, *operands), node.place)
-    if sum(1 for _ in nodes(found)) > MOST_NODES:
+    repeating = node.operator == "power" or node.operator in _FUNCTIONS
+    if repeating and sum(1 for _ in nodes(found)) > MOST_NODES:
         raise node.error("too many piecewise functions within one another; write fewer")
     return found, measure
 
