@@ -214,17 +214,6 @@ class SceneLoad:
         """Whether one that is always zero is carried all the same, for what expressions read of it."""
         return False
 
-    def check(self, number: int, position: Vector | None) -> None:
-        """Refuse the load if this scene can't have it.
-
-        Args:
-            number: its place in the config, counted from 0.
-            position: position of the body's centre of mass; None if it has none.
-
-        Raises:
-            ConfigError: says what to do instead.
-        """
-
     def among(self, masses: PointMasses) -> SceneLoad:
         """The load where the point masses are elsewhere: itself, unless its source is one of them."""
         return self

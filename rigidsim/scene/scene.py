@@ -200,8 +200,6 @@ def _with_loads(setting: Setting, samples: SampleTimes, source: str) -> Scene:
         turning = turning_inertia(context, body, bearings, apart)
     fields = [load.uniform_field for load in resolved if load.uniform_field is not None]
     gravity = [sum(x, context.zero) for x in zip(*fields, strict=True)] if fields else None
-    for number, load in enumerate(resolved):
-        load.check(number, setting.position)
     pulled = setting.free_flight or any(x != 0 for x in body.center_of_mass)
     if gravity is not None and body.mass is None and pulled:
         raise _fail("body", "mass", "missing; uniform_gravity needs it")

@@ -68,6 +68,7 @@ class AttractorField(Load):
         field = TurningHarmonics(
             coefficients_of(given, around), given.radius.at(context), frame, given.rate.at(context)
         )
+        refuse_inside(around, load.position, field.radius, "gravity_field")
         return cls(load, field, around.number + 1, context)
 
     @staticmethod
@@ -92,10 +93,6 @@ class AttractorField(Load):
     @property
     def conservative(self) -> bool:  # type: ignore[override]
         return self.field.rests
-
-    def check(self, number: int, position: Vector | None) -> None:
-        centre = self.beside.position
-        refuse_inside(position, centre, self.field.radius, "gravity_field", self.number, self.context)
 
     def symmetry_line(self) -> tuple[Vector, Vector] | None:
         return (self.beside.position, self.field.frame[2]) if self.field.zonal else None

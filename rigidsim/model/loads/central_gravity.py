@@ -8,7 +8,6 @@ from typing import Any, Literal
 
 from pydantic import Field
 
-from rigidsim.errors import ConfigError, Problem
 from rigidsim.model.gradient import tidal_range
 from rigidsim.model.kinematics import Kinematics
 from rigidsim.model.load import Load, Term
@@ -18,7 +17,6 @@ from rigidsim.model.loads.kernel_attractor import KernelAttractor
 from rigidsim.model.loads.point_attraction import (
     MovingAttractor,
     PointAttraction,
-    check_flies,
     kernel_strength,
     positive_strength,
 )
@@ -106,27 +104,30 @@ class CentralGravity(PointAttraction):
             for key in ("gravitational_parameter", "position", "source"):
                 if key in fields.model_fields_set:
                     raise around.fault(key, "given beside orbit.body, which says it; remove it")
+            if around.carried_bodies.host is not None:
+                what = 'given "central_gravity", but [body] host makes the body one of [[bodies]], which '
+                raise around.fault("kind", what + 'attract each other anyway; give "gravity_gradient"')
             return MovingAttractor(around.carried_bodies, number)
+        if around.position is None:
+            what = 'given "central_gravity" for a body without a position; give [initial] position and '
+            raise around.fault("kind", f'{what}velocity, or use "gravity_gradient" for a prescribed orbit')
         if fields.source is not None:
             if "position" in fields.model_fields_set:
                 raise around.fault("position", "given beside source, which says it; remove it")
             strength = kernel_strength(fields.gravitational_parameter, fields.source, around)
-            if fields.source == around.host:  # the origin of the space axes
-                return cls(strength, [around.context.zero] * 3)
-            return KernelAttractor.of(fields.source, strength, around)
-        strength = positive_strength(fields.gravitational_parameter, around)
-        return cls(strength, [x.at(around.context) for x in fields.position])
+            if fields.source != around.host:  # which is the origin of the space axes
+                return KernelAttractor.of(fields.source, strength, around)
+        else:
+            strength = positive_strength(fields.gravitational_parameter, around)
+        place = [x.at(around.context) for x in fields.position]
+        if around.position == place:
+            raise around.fault("kind", "the body starts at the attracting point; start it elsewhere")
+        return cls(strength, place)
 
     def pictured(self) -> dict[str, Any]:
         place = [float(x) for x in self.position]
         strength = float(self.gravitational_parameter)
         return {"what": "attractor", "gravitational_parameter": strength, "position": place}
-
-    def check(self, number: int, position: Vector | None) -> None:
-        check_flies(number, position)
-        where = f"[[loads]] number {number + 1} kind"
-        if position == self.position:
-            raise ConfigError(Problem(where, "the body starts at the attracting point; start it elsewhere"))
 
     @property
     def attracting_point(self) -> Vector:

@@ -18,7 +18,6 @@ from typing import Any
 
 import heyoka as hy
 
-from rigidsim.errors import ConfigError, Problem
 from rigidsim.model.kinematics import Kinematics, inertia_times
 from rigidsim.model.load import Load, Term
 from rigidsim.model.loads.central_gravity import CentralGravity
@@ -35,9 +34,6 @@ class FigureInFlight(FigureAttraction):
     """Torque and force of the oblateness of a point at rest, which unrolled take seconds to compile."""
 
     wide = True
-
-    def check(self, number: int, position: Vector | None) -> None:
-        refuse_inside(position, self.beside.position, self.radius, "figure", self.number, self.context)
 
     def symmetry_line(self) -> tuple[Vector, Vector] | None:
         return None if self.pole is None else (self.beside.position, self.pole)
@@ -89,17 +85,14 @@ class FigureInFlight(FigureAttraction):
         return self.beside.fastest_rate(scene)
 
 
-def refuse_inside(
-    position: Vector | None, centre: Vector, radius: Any, key: str, number: int, context: Any
-) -> None:
+def refuse_inside(around: Setting, centre: Vector, radius: Any, key: str) -> None:
     """Refuse a body that starts within the radius of the one that attracts it."""
-    if position is None:
-        return
-    far = norm(context, [x - a for x, a in zip(position, centre, strict=True)])
+    assert around.position is not None
+    far = norm(around.context, [x - a for x, a in zip(around.position, centre, strict=True)])
     if far < radius:
-        what = f"given {context.nstr(radius, 6)} m, but the body starts {context.nstr(far, 6)} m from the "
-        what += "attracting point, where the series doesn't hold; check both"
-        raise ConfigError(Problem(f"[[loads]] number {number} {key}.radius", what))
+        given, there = (around.context.nstr(x, 6) for x in (radius, far))
+        what = f"given {given} m, but the body starts {there} m from the attracting point, where the series "
+        raise around.fault(f"{key}.radius", what + "doesn't hold; check both")
 
 
 @register_load(beside="figure")
@@ -115,7 +108,9 @@ class Figures:
     def beside_of(cls, load: Any, fields: FigureFields, around: Setting) -> Load:
         """See ``SceneLoad``."""
         if isinstance(load, CentralGravity):
-            return FigureInFlight.beside_of(load, fields, around)
+            made: Any = FigureInFlight.beside_of(load, fields, around)
+            refuse_inside(around, load.position, made.radius, "figure")
+            return made
         if load.title == CentralGravity.title:
             what = "given for an attracting body that moves; allowed for one at rest, with position"
             raise around.fault("figure", what)

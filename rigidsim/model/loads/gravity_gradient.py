@@ -81,7 +81,11 @@ class GravityGradient(GradientSource, Load):
             for key in ("gravitational_parameter", *_PLACES[1:]):
                 if getattr(fields, key) is not None:
                     raise around.fault(key, "given beside orbit.body, which says it; remove it")
-            return MovingGradient(around.carried_bodies, attracting_body(fields.orbit, around))
+            made = MovingGradient(around.carried_bodies, attracting_body(fields.orbit, around))
+            if made.masses.host is None and made.masses.full:
+                what = 'given "gravity_gradient" for a body that flies by itself under coupling = "full"; '
+                raise around.fault("kind", what + 'give "central_gravity", whose force the bodies feel')
+            return made
         given = [key for key in _PLACES if getattr(fields, key) is not None]
         if len(given) != 1:
             found, places = " and ".join(given) or "none", f"{', '.join(_PLACES[:-1])} and {_PLACES[-1]}"

@@ -15,12 +15,11 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
-from rigidsim.errors import ConfigError, Problem
 from rigidsim.model.gradient import tidal_range
 from rigidsim.model.kinematics import Kinematics
 from rigidsim.model.load import Term
 from rigidsim.model.load_words import reach_text, source_text, value_text
-from rigidsim.model.loads.point_attraction import PointAttraction, check_flies
+from rigidsim.model.loads.point_attraction import PointAttraction
 from rigidsim.model.placements.kernel_body import PlacedByKernel, kernel_body
 from rigidsim.model.plausibility import about_named_strength, about_start, named_body
 from rigidsim.model.rotations import Symbolic, length
@@ -46,7 +45,11 @@ class KernelAttractor(PointAttraction):
     def of(cls, source: str, strength: Any, around: Setting) -> KernelAttractor:
         """The body of this name, seen from the host or from the barycentre."""
         ephemeris = kernel_body(source, around)
-        return cls(strength, PlacedByKernel(ephemeris, ephemeris.sight(source, around.host)))
+        made = cls(strength, PlacedByKernel(ephemeris, ephemeris.sight(source, around.host)))
+        assert around.position is not None
+        if norm(around.context, made._apart(around.context, around.position)) == 0:
+            raise around.fault("kind", "the body starts at the attracting point; start it elsewhere")
+        return made
 
     @property
     def axes(self) -> str:  # type: ignore[override]
@@ -59,14 +62,6 @@ class KernelAttractor(PointAttraction):
     @property
     def strength(self) -> Any:
         return self.gravitational_parameter
-
-    def check(self, number: int, position: Vector | None) -> None:
-        check_flies(number, position)
-        assert position is not None
-        context = self.strength.context
-        if norm(context, self._apart(context, position)) == 0:
-            what = "the body starts at the attracting point; start it elsewhere"
-            raise ConfigError(Problem(f"[[loads]] number {number + 1} kind", what))
 
     def pictured(self) -> dict[str, Any]:
         strength = float(self.gravitational_parameter)

@@ -73,6 +73,8 @@ class InMagneticField(Load):
             found["source"] = numbers(cast("list[ExactNumber]", fields.field), around)
         if flies:
             found["place"] = [] if fields.position is None else numbers(fields.position, around)
+            if found["place"] == around.position:
+                raise around.fault("position", "the body starts at the dipole; start it elsewhere")
         elif fields.elements is not None:
             motion = None if strength is None else strength.at(around.context)
             for key in ("body", "table"):
@@ -85,11 +87,6 @@ class InMagneticField(Load):
     @staticmethod
     def effect_parts(fields: MagneticFieldFields) -> Iterator[EffectPart]:
         return field_parts(fields)
-
-    def check(self, number: int, position: Vector | None) -> None:
-        if self.place and self.place == position:
-            what = "the body starts at the dipole; start it elsewhere"
-            raise ConfigError(Problem(f"[[loads]] number {number + 1} position", what))
 
     def read_by(self, names: frozenset[str]) -> bool:
         """On an orbit, whose states it brings: its field, or names of its source."""

@@ -79,6 +79,9 @@ class MassLoss(Load):
     def resolve(cls, fields: MassLossFields, around: Setting) -> MassLoss:
         context = around.context
         rate = around.expression("rate", fields.rate, "kg/s")
+        if around.free_flight:
+            what = "given for a body with a position or velocity, whose flight is that of a constant mass; "
+            raise around.fault("mass_loss", what + "leave out [initial] position and velocity")
         if fields.exit_radius.sign < 0:
             what = f"given {float(fields.exit_radius):g} m; a radius of at least 0 is allowed"
             raise around.fault("exit_radius", what)
@@ -97,12 +100,6 @@ class MassLoss(Load):
                 row[i] = row[i] + radius**2 / 4
             geometry.append(row)
         return cls(rate, geometry, arm, around.number)
-
-    def check(self, number: int, position: Vector | None) -> None:
-        """Refused in flight, where the mass is constant."""
-        if position is not None:
-            what = "given for a body with a position or velocity, whose flight is that of a constant mass; "
-            raise self._fault(what + "leave out [initial] position and velocity")
 
     def _fault(self, what: str) -> ConfigError:
         return ConfigError(Problem(f"[[loads]] number {self.number + 1} mass_loss", what))

@@ -14,7 +14,6 @@ from typing import Any, ClassVar
 
 import heyoka as hy
 
-from rigidsim.errors import ConfigError, Problem
 from rigidsim.model.capabilities import SourcePlace
 from rigidsim.model.gradient import GradientSource, gradient_terms, tidal_range
 from rigidsim.model.kinematics import Kinematics, inertia_times, quadratic_form
@@ -126,14 +125,6 @@ def kernel_strength(given: Any, source: str, around: Setting) -> Any:
         what = f'missing; {ephemeris.kernel.name} has none of "{source}"'
         raise around.fault("gravitational_parameter", f"{what}: give it, in m^3/s^2 or km^3/s^2")
     return exactly(around.context, found)
-
-
-def check_flies(number: int, position: Vector | None) -> None:
-    """Refuse a point that attracts a body without a position; ``number`` is the load's, from 0."""
-    if position is None:
-        what = 'given "central_gravity" for a body without a position; give [initial] position and '
-        what += 'velocity, or use "gravity_gradient" for a prescribed orbit'
-        raise ConfigError(Problem(f"[[loads]] number {number + 1} kind", what))
 
 
 _UNROLLED = 2
@@ -272,12 +263,6 @@ class MovingGradient(MovingSource):
             return None
         return GradientSource(self.strength, PlacedAsMass(PointMassPair(self.masses, self.number)))
 
-    def check(self, number: int, position: Vector | None) -> None:
-        if self.masses.host is None and self.masses.full:
-            what = 'given "gravity_gradient" for a body that flies by itself under coupling = "full"; give '
-            what += '"central_gravity", whose force the bodies feel'
-            raise ConfigError(Problem(f"[[loads]] number {number + 1} kind", what))
-
 
 class MovingAttractor(MovingSource):
     """The torque and force of a point mass on a body with a position of its own."""
@@ -285,12 +270,6 @@ class MovingAttractor(MovingSource):
     title = "central_gravity"
     as_points = True
     felt = "; the bodies feel the forces of this one"
-
-    def check(self, number: int, position: Vector | None) -> None:
-        if self.masses.host is not None:
-            what = 'given "central_gravity", but [body] host makes the body one of [[bodies]], which attract '
-            what += 'each other anyway; give "gravity_gradient"'
-            raise ConfigError(Problem(f"[[loads]] number {number + 1} kind", what))
 
     def force(self, m: Kinematics) -> list[Term]:
         return list(zip(unit_vectors(m.scene.context), self.acceleration(m), strict=True))
