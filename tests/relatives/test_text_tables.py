@@ -4,7 +4,9 @@ The truth is a spin about one axis in closed form: q = (cos(w t/2), 0, 0, sin(w 
 """
 
 import random
+import re
 from datetime import UTC, datetime, timedelta
+from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +15,7 @@ from support import seeds
 
 import rigidsim
 from rigidsim.errors import RigidsimError
+from rigidsim.scene.scene import build_scene
 
 RATE = 0.49
 SPIN = f"""
@@ -83,6 +86,28 @@ def test_a_fit_reads_any_style(seed: int, tmp_path: Path) -> None:
     (tmp_path / "config.toml").write_text(SPIN + FIT)
     found = rigidsim.fit(tmp_path / "config.toml", out=tmp_path / "fit")
     assert found.parameters[0].value == pytest.approx(np.mean(rate["z"]), abs=1e-9), text
+
+
+@pytest.mark.parametrize("seed", seeds(2, 60))
+def test_sample_times_of_any_style(seed: int, tmp_path: Path) -> None:
+    """Each is the number that is written, digit by digit; dates need a time scale here."""
+    chance = random.Random(seed)
+    times = np.round(np.cumsum([0.0, *(chance.uniform(0.1, 1) for _ in range(10))]), 6)
+    text = table(chance, tmp_path / "theirs.csv", {"x": times, "y": 2 * times}, times)
+    (tmp_path / "config.toml").write_text(SPIN.replace("end = 11", 'times = "theirs.csv"'))
+    experiment = rigidsim.load(tmp_path / "config.toml")
+    if "-03-01T" in text:
+        with pytest.raises(rigidsim.ConfigError, match="without its time scale"):
+            build_scene(experiment)
+        return
+    head, *rows = (line for line in text.splitlines() if line.strip() and line != "# a comment")
+    separator = next((c for c in ";\t," if c in head), " ")
+    cells = [row.split(separator)[0].replace(",", ".") for row in rows]
+    unit = next(
+        unit for unit in sorted(UNITS, key=len, reverse=True) if re.search(rf"time\W*_?{unit}\b", head)
+    )
+    exact = [Fraction(cell) * Fraction(str(UNITS[unit])) for cell in cells]
+    assert list(build_scene(experiment).samples.times or ()) == exact, text
 
 
 BAD = {
