@@ -240,8 +240,9 @@ def _orientation(setting: Setting, source: str) -> Orientation | None:
         return None
     from rigidsim.scene.kernels.spice import resolve_orientation
 
-    span = setting.start, setting.end
-    return resolve_orientation(table, setting.config.body.host, setting.axes, setting.epoch, span, source)
+    span, host = (setting.start, setting.end), setting.config.body.host
+    asked = table.orientation, table.orientation_of
+    return resolve_orientation(*asked, host, setting.axes, setting.epoch, span, source)
 
 
 def _body_at_start(config: schema.Config, context: Any) -> RigidBody:

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from functools import cache
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
@@ -128,40 +128,29 @@ class Orientation:
         return np.asarray(found).reshape(-1, 3, 3).transpose(0, 2, 1)
 
 
-class Asked(Protocol):
-    """The keys of ``[output]`` that ask for one."""
-
-    orientation: str | None
-    orientation_of: str | None
-
-
 def resolve_orientation(
-    table: Asked,
+    given: str | None,
+    asked: str | None,
     host: str | None,
     axes: str | None,
     epoch: Epoch | None,
     run: tuple[Any, Any],
     source: str,
-) -> Orientation | None:
-    """The published orientation that a config names; None without one.
+) -> Orientation:
+    """The published orientation that a config names.
 
     Args:
-        table: ``[output]``.
-        host: ``[body] host``, the body if the table names none.
+        given, asked: ``[output] orientation`` and ``orientation_of``, one of which is there.
+        host: ``[body] host``, the body if none is asked for.
         axes, epoch, run: space axes, date of time 0, and start and end of the run (mpf, s).
         source: where the config is, if it is a file.
 
     Raises:
         ConfigError: the kernel can't be read, or hasn't the body or the dates.
     """
-    given, asked = table.orientation, table.orientation_of
     if given is None:
-        if asked is not None:
-            what = (
-                f'given "{asked}" without [output] orientation, the kernel that has it; give that, or leave '
-            )
-            raise ConfigError(Problem("[output] orientation_of", what + "this out"))
-        return None
+        what = f'given "{asked}" without [output] orientation, the kernel that has it; give that, or leave '
+        raise ConfigError(Problem("[output] orientation_of", what + "this out"))
     if epoch is None:
         what = 'missing; [output] orientation needs the date of time 0, such as "J2000"'
         raise ConfigError(Problem("[time] epoch", what))
