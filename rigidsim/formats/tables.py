@@ -161,7 +161,8 @@ class Table:
             return np.asarray(wide.values.reshape(-1, *own.values()))
 
         def parts(column: TableColumn) -> list[np.ndarray]:
-            found = [rows(name)[(slice(None), *column.index)] for name in column.parts]
+            place: Any = (slice(None), *column.index)
+            found = [rows(name)[place] for name in column.parts]
             # members of fewer bits than others have no residuals: nan
             found[1:] = [np.where(np.isnan(x) & ~np.isnan(found[0]), 0.0, x) for x in found[1:]]
             unit = column.angle_unit
