@@ -27,15 +27,12 @@ _COLUMNS = (
     "config",
     "steps",
     "attitude uncertain by, rad",
-    "largest drift of what rounding explains",
 )
 
 
 def numbers(run: rigidsim.Run, config: Path) -> list[str]:
     """The row of a config's run."""
     summary = run.summary
-    drifts = [(row["largest_drift"] or 0.0, row["bound"]) for row in summary["invariants"].values()]
-    largest, bound = max(drifts, default=(0.0, 1.0))
     error = summary["accuracy"]["estimated_attitude_error"]
     uncertain = "no attitude" if error is None else f"{error:.1e}"
     if (averaged := run.dataset.attrs.get("modelling_error")) is not None:
@@ -44,7 +41,6 @@ def numbers(run: rigidsim.Run, config: Path) -> list[str]:
         f"[{config.stem}](../{config.relative_to(ROOT).as_posix()})",
         str(summary["cost"]["steps"]),
         uncertain,
-        f"{largest / bound:.1e}",
     ]
 
 

@@ -242,7 +242,7 @@ def dataset_page() -> str:
             "[conventions](../conventions.md).",
             "## Variables\n\n"
             + table(["variable", "dimensions", "unit", "what", "frame", "needs", "recorded"], rows),
-            "Every invariant of the scene has a `NAME_drift` beside it, (value - initial) / scale, whose "
+            "Every invariant of the scene has a `NAME_drift`, (value - initial) / scale, whose "
             "attributes name the scale; where invariants are held, `NAME_put_back` is the correction "
             "accumulated so far. Events have `NAME_time` and, at that time, `NAME_VARIABLE` for all that is "
             "recorded. "
@@ -286,7 +286,7 @@ def python_page() -> str:
     functions = [name for name in rigidsim.__all__ if inspect.isfunction(getattr(rigidsim, name))]
     classes = [name for name in rigidsim.__all__ if name not in functions]
     parts = [
-        "# Python\n\nWhat `import rigidsim` offers, and what loads and observables of your own are made of. "
+        "# Python\n\nWhat `import rigidsim` offers, and the parts of user-defined loads and observables. "
         "How they are used: [from Python](../howto/python.md), [a load](../howto/own_load.md), "
         "[a carrier of momentum](../howto/own_carrier.md), "
         "[an observable](../howto/own_observable.md), [a solver](../howto/own_solver.md), "
@@ -307,6 +307,7 @@ def python_page() -> str:
                 ),
                 _directive("autoclass", "rigidsim.model.observables.observable.Observable"),
                 _directive("autofunction", "rigidsim.model.observables.observable.continuous_angles"),
+                _directive("autoclass", "rigidsim.solve.effects.effect.Effect", members=True),
                 _directive("autofunction", "rigidsim.scene.registry.register_load"),
                 _directive("autofunction", "rigidsim.scene.registry.register_observable"),
             ]
@@ -337,7 +338,7 @@ def codes_page() -> str:
             "# Statuses and warnings\n\nWhat to do about them: [troubleshooting](../troubleshooting.md).",
             "## Statuses\n\nAttribute `status` of the dataset, key `status` of `summary.json`.\n\n"
             + table(["status", "what happened", "exit code"], statuses),
-            "## Warnings\n\nKey `warning_codes` of `summary.json`, beside the texts in `warnings`.\n\n"
+            "## Warnings\n\nKey `warning_codes` of `summary.json`, with the texts in `warnings`.\n\n"
             + table(["code", "about"], warnings),
         ]
     )

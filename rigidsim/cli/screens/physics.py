@@ -52,8 +52,8 @@ def print_physics(plan: PhysicsPlan) -> None:
     ran = len(plan.tried)
     on.line(
         "models",
-        f"{plan.models:,} in all: {ran:,} run, {plan.ruled_out:,} beyond the error by what is known of their "
-        f"effects, {plan.models - ran - plan.ruled_out:,} neither smaller nor cheaper",
+        f"{plan.models:,} in all: {ran:,} run, {plan.ruled_out:,} predicted to be too inaccurate, "
+        f"{plan.models - ran - plan.ruled_out:,} skipped as no cheaper",
     )
     spent = [row.cpu_seconds for row in plan.effects]
     ends = [span_text(min(spent), 2), span_text(max(spent), 2)]
