@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
-from typing import Any
 
 import heyoka as hy
 import numpy as np
@@ -185,7 +185,7 @@ class TaylorStepper(Stepper):
         """Take one step with dense output; False if the state is no longer finite."""
         until = self._meet()
         if until is not None:
-            return self._propagate(until, 1, write_tc=True)[0]
+            return self._propagate(until, 1, dense=True)
         self._watched()
         before = self._integrator.time
         outcome, size = self._integrator.step(self._longest, write_tc=True)
@@ -203,21 +203,32 @@ class TaylorStepper(Stepper):
         return np.array(self._integrator.update_d_output(time))  # heyoka reuses its buffer
 
     def take(self, count: int, samples: SamplesWithin | None = None) -> bool:
-        """As ``skip``, with samples within the steps: by the engine's own grid, which has the same bits and
-        costs half, where that takes no other steps, as it would from a time that is two numbers.
+        """Take at most ``count`` steps, fewer if the watcher or all samples asked for end the call, and the
+        samples within them; False if the state is lost.
         """
-        until = self._meet()
+        last, smallest, largest, end = self.steps + count, math.inf, 0.0, None
+        while True:
+            end = self._meet()
+            if not self._within_piece(last - self.steps, end, samples):
+                return False
+            smallest, largest = min(smallest, self.smallest), max(largest, self.largest)
+            if end is None or end == self.until or self.time != end or self.steps >= last:
+                break
+            wanted = samples is not None and not samples.ended and self.watcher is None
+            if not wanted or self.unresolved or self.collapsed or self.log.stop is not None:
+                break
+        self.smallest, self.largest = smallest, largest
+        return True
+
+    def _within_piece(self, count: int, end: Scalar | None, samples: SamplesWithin | None) -> bool:
+        """Take steps, none beyond a time: by the engine's own grid, which has the same bits and costs half,
+        where that takes no other steps, as it would from a time that is two numbers.
+        """
+        engine, before = self._integrator, self._integrator.dtime
         each = self._requirement is not None and self._requirement.each
-        if (
-            samples is None
-            or until is not None
-            or each
-            or count < _LEAST_GRID
-            or self._integrator.dtime[1] != 0
-        ):
-            return self._propagate(until, count, samples, write_tc=True)[0]
-        engine, times = self._integrator, samples.times
-        before = engine.dtime
+        if samples is None or end is not None or each or count < _LEAST_GRID or before[1] != 0:
+            return self._propagate(end, count, samples)
+        times = samples.times
         first = int(len(times) > 0 and times[0] == before[0])
         outcome, smallest, largest, taken, _, states = engine.propagate_grid(
             np.concatenate([[before[0]], times[first:], [self._far]]).astype(times.dtype),
@@ -229,8 +240,7 @@ class TaylorStepper(Stepper):
         return self._account(before, outcome, smallest, largest, taken)
 
     def skip(self, count: int) -> bool:
-        """Take at most ``count`` steps, fewer if the watcher ends the call; False if the state is lost."""
-        return self._propagate(self._meet(), count, write_tc=self.watcher is not None)[0]
+        return self._propagate(self._meet(), count)
 
     def to(self, time: float) -> bool:
         """Go exactly to a time with a shortened last step: for comparisons, never for a run's samples."""
@@ -252,18 +262,18 @@ class TaylorStepper(Stepper):
         return False
 
     def _propagate(
-        self, until: Scalar | None, count: int, samples: SamplesWithin | None = None, **options: bool
-    ) -> tuple[bool, Any]:
-        """Take at most ``count`` steps, none beyond a time: whether all went well, and continuous output."""
+        self, until: Scalar | None, count: int, samples: SamplesWithin | None = None, *, dense: bool = False
+    ) -> bool:
+        """Take at most ``count`` steps, none beyond a time: whether all went well."""
         before = self._integrator.dtime
-        outcome, smallest, largest, taken, output, _ = self._integrator.propagate_until(
+        outcome, smallest, largest, taken, *_ = self._integrator.propagate_until(
             self._far if until is None else until,
             max_steps=count,
             max_delta_t=self._longest,
             callback=self._watched(samples),
-            **options,
+            write_tc=dense or samples is not None or self.watcher is not None,
         )
-        return self._account(before, outcome, smallest, largest, taken), output
+        return self._account(before, outcome, smallest, largest, taken)
 
     def _account(
         self,
