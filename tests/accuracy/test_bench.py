@@ -1,6 +1,7 @@
 """Measured speed and accuracy: errors are the true ones, nothing is dropped or extrapolated in silence."""
 
 import numpy as np
+import pytest
 import xarray
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -43,6 +44,7 @@ POINTS = st.lists(
 )
 
 
+@pytest.mark.slow
 @settings(max_examples=20, deadline=None)
 @given(POINTS)
 def test_the_advice_is_the_cheapest_that_keeps_the_accuracy(points: list[tuple[float, float, str]]) -> None:

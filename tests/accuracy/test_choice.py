@@ -195,6 +195,7 @@ def test_the_path_is_certified_and_right() -> None:
     assert off <= accuracy["certified_position"]
 
 
+@pytest.mark.slow
 def test_what_a_fixed_setting_misses_is_said() -> None:
     fixed = ['integrator.precision="double"', "integrator.tolerance=1e-4", 'integrator.method="taylor"']
     run = run_text(ATTRACTORS, "integrator.accuracy_position=1e-12", *fixed)

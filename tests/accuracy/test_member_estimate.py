@@ -48,6 +48,7 @@ def test_a_tolerance_is_part_of_the_error(satellites: MemberResults) -> None:
     assert (loose["attitude_error"].values > true / 3).all()
 
 
+@pytest.mark.slow
 def test_a_member_whose_digits_are_gone_says_so() -> None:
     kept = results_of("satellites, long").kept
     gone = kept["attitude_error"].values > 1e-2

@@ -75,6 +75,7 @@ def test_run_refuses_all_before_it_starts_any(config: Config, rigidsim_command: 
 # Guards
 
 
+@pytest.mark.slow
 def test_a_guard_ends_the_run_and_keeps_the_samples(config: Config, rigidsim_command: Command) -> None:
     """And the next run is made."""
     guard = "max_steps"

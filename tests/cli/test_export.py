@@ -143,6 +143,7 @@ def test_independent_readers_read_orbit_messages(sky: xarray.Dataset) -> None:
     np.testing.assert_allclose(found, state, rtol=1e-15, atol=1e-18)
 
 
+@pytest.mark.slow
 def test_an_independent_reader_reads_attitude_messages(sky: xarray.Dataset) -> None:
     """``brahe``; not ``ccsds-ndm`` 3.1, which raises a KeyError on every AEM 2.0 with quaternions (it looks
     for the field by the name of version 1), and would take the scalar for the first of the four.

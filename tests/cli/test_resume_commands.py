@@ -39,15 +39,6 @@ def test_resume_goes_on_and_verify_agrees(config: Config, rigidsim_command: Comm
         assert dataset.sizes["time"] == 41
 
 
-def test_a_dataset_is_enough(config: Config, rigidsim_command: Command) -> None:
-    assert rigidsim_command("run", config()).exit_code == 0
-    Path("runs/free/dataset.h5").rename("mine.h5")
-    again = rigidsim_command("run", "--from", "mine.h5", "--out", "again")
-    assert again.exit_code == 0, again.output
-    assert rigidsim_command("verify", "mine.h5").exit_code == 0
-    assert Path("again/free/config.toml").read_text() == Path("free.toml").read_text()
-
-
 @pytest.mark.parametrize("number", cases([signal.SIGTERM, signal.SIGKILL], [signal.SIGKILL]))
 def test_a_process_that_was_ended_is_resumed(number: int, config: Config, start: Start) -> None:
     """With the bits of a run in one go."""

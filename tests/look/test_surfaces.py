@@ -26,6 +26,7 @@ def shuttlecock() -> xarray.Dataset:
     return short("aerostable_cubesat", 1200.0)
 
 
+@pytest.mark.slow
 def test_the_angle_to_the_wind_is_that_of_the_velocity_in_turning_air(shuttlecock: xarray.Dataset) -> None:
     attitude = Rotation.from_quat(np.roll(shuttlecock["quaternion"].values, -1, axis=1))
     place, velocity = shuttlecock["position"].values, shuttlecock["velocity"].values

@@ -66,6 +66,7 @@ def test_a_satellite_feels_the_tides_of_moon_and_sun() -> None:
     assert np.linalg.norm(alone - wanted[:3]) > 1e2
 
 
+@pytest.mark.slow
 def test_point_masses_start_from_the_kernel_and_go_on_as_it_says() -> None:
     dataset = run_text(SYSTEM).dataset
     last = dataset["point_mass_position"].values[-1]

@@ -33,6 +33,7 @@ def names(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
     return found | {"printed": printed.getvalue()}
 
 
+@pytest.mark.slow
 def test_the_example_of_the_readme(names: dict[str, Any]) -> None:
     run = names["run"]
     assert float(names["printed"]) == run.summary["invariants"]["energy"]["largest_drift"]

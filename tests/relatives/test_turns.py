@@ -173,7 +173,7 @@ def test_motions_and_announced_errors(seed: int) -> None:
     assert angle_between(*quaternions)[-1] < 10 * announced < 1e-3
 
 
-@pytest.mark.parametrize("seed", seeds(1, 50))
+@pytest.mark.parametrize("seed", seeds(0, 50))
 def test_members_and_growth(seed: int, tmp_path: Path) -> None:
     """Members run one by one; and a tangent vector under an orbit, as without a term that does nothing."""
     drawn = Drawn.of(seed)

@@ -53,6 +53,7 @@ def test_max_steps_is_never_exceeded_and_always_used_up(scene: str, tmp_path: Pa
         same_bits(run, whole)
 
 
+@pytest.mark.slow
 def test_max_drift_ends_with_the_first_sample_past_it(tmp_path: Path) -> None:
     """Whichever way the run takes, with the same samples and steps; under another guard it goes on."""
     text = config(time="end = 300\nsamples = 601", integrator='precision = "single"', output=PLAIN)

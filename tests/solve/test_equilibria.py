@@ -250,6 +250,7 @@ def test_a_planet_of_two_equal_moments_has_colombos_states(number: int) -> None:
     assert told.stable == (number != 4)
 
 
+@pytest.mark.slow
 def test_independent_equations_come_back_and_grow_alike() -> None:
     """Angular momentum and rotation matrix in space axes, by scipy: the Moon's return and librations."""
     scene = scene_of(MOON)

@@ -47,6 +47,7 @@ def test_a_full_disk_ends_a_run_with_a_message(
         assert 0 < dataset.sizes["time"] < 49
 
 
+@pytest.mark.slow
 def test_a_dense_run_that_was_killed_resumes_from_its_segments(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, free_body: Callable[..., str]
 ) -> None:

@@ -25,6 +25,7 @@ def apart(one: rigidsim.Run, other: rigidsim.Run) -> float:
         return max(float(np.linalg.norm(a[x].values - b[x].values, axis=1).max()) for x in AXES)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("level", "settings", "code"),
     [

@@ -199,6 +199,7 @@ def test_what_cannot_be_analysed_is_refused() -> None:
             rigidsim.analyse(dataset, **options)
 
 
+@pytest.mark.slow
 def test_the_command_prints_a_table_and_writes_dataset_and_figure(tmp_path: Path) -> None:
     text = config(
         time="end = 60\nsamples = 601",

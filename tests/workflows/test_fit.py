@@ -190,6 +190,7 @@ def killed_after(lines: int) -> Callable[[str], None]:
     return told
 
 
+@pytest.mark.slow
 def test_a_killed_fit_goes_on_with_the_same_bits_and_verifies(here: Path) -> None:
     turning(here)
     keys = '[fit]\nparameters = ["initial.attitude[2]", "initial.angular_velocity[2]"]\n'

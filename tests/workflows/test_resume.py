@@ -154,21 +154,6 @@ def test_a_full_disk_while_the_dataset_is_written(tmp_path: Path, monkeypatch: p
         same_bits(whole, rigidsim.resume(out / "cut"))
 
 
-def test_a_guard_can_be_moved_when_resuming(tmp_path: Path) -> None:
-    limits = "max_steps = 100"
-    text = text_with("end = 60\nsamples = 121")
-    whole = rigidsim.run(rigidsim.parse(text), out=tmp_path / "whole", tuning=IMPATIENT)
-    stopped = rigidsim.run(
-        rigidsim.parse(text.replace("[limits]\n", f"[limits]\n{limits}\n")), out=tmp_path, tuning=IMPATIENT
-    )
-    assert stopped.status == "stopped: max_steps"
-    assert stopped.summary["exit_code"] == 3
-    done = rigidsim.resume(stopped.folder.path, overrides=["limits.max_steps=1000000"], tuning=IMPATIENT)
-    assert done.status == "finished"
-    same_bits(whole, done)
-    assert limits in done.folder.config.read_text()  # the config is the one that was given
-
-
 @pytest.mark.parametrize(
     ("load", "integrator", "end", "steps"),
     [
@@ -276,6 +261,7 @@ def test_a_changed_config_is_refused(tmp_path: Path) -> None:
     assert resumed_to_the_end(run)[0].status == "finished"
 
 
+@pytest.mark.slow
 def test_another_process_or_a_link_is_not_disturbed(tmp_path: Path) -> None:
     text = text_with("end = 300\nevery = 1", "max_steps = 150")
     run = rigidsim.run(rigidsim.parse(text), out=tmp_path, tuning=IMPATIENT)

@@ -87,6 +87,7 @@ def test_a_damaged_tile_is_told_with_its_remedy_which_works(out: Path, finished:
     assert same(found, fresh)
 
 
+@pytest.mark.slow
 def test_impossible_members_are_marked_where_that_is_asked_and_the_others_run(tmp_path: Path) -> None:
     """The first member and the last exceed I1 + I2 >= I3; what is left is as if it had been swept alone."""
 

@@ -131,6 +131,7 @@ def test_bits_depend_neither_on_neighbours_nor_on_place() -> None:
     assert np.abs(narrow[0][0]["quaternion"] - again[0][0]["quaternion"]).max() < 1e-11
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("samples", cases([2, 5], [2]))
 def test_a_lost_member_takes_no_other_with_it(samples: int) -> None:
     text = TORQUE.replace("k*sin(t)^2/2", "k*wx^2").replace("-k*wz", "0").replace("wx - k/3", "wx - 3/4")

@@ -35,6 +35,7 @@ SCENES = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scene", cases(SCENES, ["planar"]))
 def test_the_motion_has_the_same_bits_with_and_without(scene: str) -> None:
     text, axes = SCENES[scene]
