@@ -16,12 +16,12 @@ import numpy as np
 
 from rigidsim.accuracy.error_law import CLOSED_FORM, closed_form_if_any, stable_law
 from rigidsim.accuracy.estimates import margins
-from rigidsim.accuracy.estimates.following import Course, follow, power_of_time
+from rigidsim.accuracy.estimates.following import Course, Samples, follow, power_of_time
 from rigidsim.model.system import System
 from rigidsim.solve.closed_form import ClosedForm
 from rigidsim.solve.compiled import interruptible
 from rigidsim.solve.effects.waypoints import SampleTrail, Waypoints
-from rigidsim.solve.precision import Precision, Scalar, precision_of
+from rigidsim.solve.precision import Precision, precision_of
 from rigidsim.solve.problem import InitialValueProblem, double_twin
 from rigidsim.solve.stepper import OwnErrors
 from rigidsim.solve.switching.stepper import stepper_of
@@ -82,7 +82,7 @@ def estimate_errors(
     if form is not None:
         seen = _by_closed_form(course, form, samples, seconds)
     elif len(samples) > 1 and prepared.law_tolerance >= margins.COARSE * DOUBLE:
-        seen = _by_better_solution(course, samples, precision_of("double"), seconds)
+        seen = _by_better_solution(course, course.with_waypoints(samples), precision_of("double"), seconds)
     elif len(samples) > 1 and prepared.law_tolerance >= margins.COARSE * epsilon:
         seen = _by_better_solution(course, samples, prepared.precision, seconds)
     else:
@@ -138,9 +138,6 @@ def _everywhere(prepared: InitialValueProblem, error: float, how: str) -> Estima
 
 
 # --- by a better solution ---------------------------------------------------------------------------------
-
-Samples = list[tuple[int, Scalar, np.ndarray, int]]
-"""Index, time, state and chart."""
 
 
 def _by_closed_form(course: Course, form: ClosedForm, samples: Samples, seconds: float) -> Seen:

@@ -34,13 +34,16 @@ from rigidsim.solve.error_tangents import (
     Starts,
     SteppedCarrier,
 )
-from rigidsim.solve.precision import precision_of
+from rigidsim.solve.precision import Scalar, precision_of
 from rigidsim.solve.problem import InitialValueProblem, double_twin
 from rigidsim.solve.projection import LATE, steps_between
 from rigidsim.solve.settled import SettledStates
 from rigidsim.solve.switching.stepper import stepper_of
 from rigidsim.solve.tangents import jacobian_rows
 from rigidsim.solve.taylor_stepper import TaylorStepper
+
+Samples = list[tuple[int, Scalar, np.ndarray, int]]
+"""Index, time, state and chart."""
 
 
 @dataclass(frozen=True)
@@ -83,6 +86,12 @@ class Course:
             return double_twin(self.prepared)
         as_it_is = self.prepared.precision.name == "double" and not system.in_two_parts
         return system if as_it_is else system.rounded(precision_of("double").number)
+
+    def with_waypoints(self, samples: Samples) -> Samples:
+        """Samples, and the boundaries of steps that the run remembers, in time."""
+        there = [] if self.waypoints is None else self.waypoints.between(1, self.steps)
+        places: Samples = [(0, one.time, one.state, one.chart) for one in there if one.time < self.end]
+        return sorted([*samples, *places], key=lambda place: float(place[1]))
 
     @property
     def shift(self) -> int:
