@@ -101,16 +101,15 @@ def suspicious_end(config: Config) -> list[Problem]:
 def unreachable_events(events: Sequence[Event]) -> list[Problem]:
     """Events that compare the middle Euler angle with what it never is: meant in degrees?"""
     found = []
-    for number, event in enumerate(events):
+    for event in events:
         root = event.expression
         parts = root.operands if isinstance(root, Operation) and root.operator == "sum" else ()
         constants = [float(part.value) for part in parts if isinstance(part, Constant)]
         names = [part.name for part in parts if isinstance(part, Name)]
         if len(parts) == 2 and names == ["theta"] and constants and abs(constants[0]) > math.pi:
-            where = f"[[events]] number {number + 1} expression"
             what = (
-                f'given "{event.expression.text}", which is never zero: theta is from 0 to pi rad, or from '
+                f'given "{root.text}", which is never zero: theta is from 0 to pi rad, or from '
                 f'-pi/2 to pi/2; write "{abs(constants[0]):.6g} deg" if degrees are meant'
             )
-            found.append(Problem(where, what))
+            found.append(Problem(root.where, what))
     return found

@@ -69,7 +69,6 @@ class MassLoss(Load):
     rate: Expression
     geometry: Matrix
     arm: Vector  # from the centre of mass to the middle of the exit, body axes, m (mpf)
-    number: int  # place in the config, for messages
 
     Fields = MassLossFields
     title = "mass_loss"
@@ -99,10 +98,7 @@ class MassLoss(Load):
                 row = [g + radius**2 / 4 * x * y / length**2 for g, y in zip(row, arm, strict=True)]
                 row[i] = row[i] + radius**2 / 4
             geometry.append(row)
-        return cls(rate, geometry, arm, around.number)
-
-    def _fault(self, what: str) -> ConfigError:
-        return ConfigError(Problem(f"[[loads]] number {self.number + 1} mass_loss", what))
+        return cls(rate, geometry, arm)
 
     def acts(self) -> bool:
         vanishes = isinstance(self.rate, Constant) and self.rate.value.sign == 0
@@ -119,7 +115,8 @@ class MassLoss(Load):
             what = (
                 "given beside uniform_gravity on a body that is held off its centre of mass, whose weight is "
             )
-            raise self._fault(what + "that of a constant mass; hold it at its centre of mass")
+            what += "that of a constant mass; hold it at its centre of mass"
+            raise ConfigError(Problem(self.rate.where, what))
         (rate,), terms = written(m, [self.rate]), []
         for column, (state, unit) in enumerate(zip(m.rate_states, m.numbers.rate_units, strict=True)):
             size = context.ldexp(unit, -scaling.time - scaling.energy)
