@@ -175,9 +175,13 @@ def _setting(
     )  # fmt: skip
 
 
-def _with_loads(setting: Setting, samples: SampleTimes, source: str) -> Scene:
-    """The scene with any start."""
-    config, context, body = setting.config, setting.context, setting.body
+def _resolved(
+    setting: Setting,
+) -> tuple[Setting, list[SceneLoad], dict[str, tuple[SceneLoad, ...]], list[SceneLoad]]:
+    """The setting with the axes and the date that loads imply; the loads of ``[[loads]]``; those with tables
+    of their own, by the table's name; all of them, with what ``[body]`` and keys of other loads bring.
+    """
+    config = setting.config
     places = enumerate(config.loads)
     given = [LOADS["kind"][x.kind].resolve(x, setting.at("loads", n)) for n, x in places]
     tabled = {
@@ -190,9 +194,15 @@ def _with_loads(setting: Setting, samples: SampleTimes, source: str) -> Scene:
     for n, (load, fields) in enumerate(zip(given, config.loads, strict=True)):
         kinds = [kind for key, kind in LOADS["beside"].items() if getattr(fields, key, None) is not None]
         brought += [kind.beside_of(load, fields, setting.at("loads", n)) for kind in kinds]
-    resolved = [*given, *(load for found in tabled.values() for load in found)]
-    resolved += [load for load in brought if load is not None]
-    setting = _dated(setting, resolved)
+    found = [*given, *(load for loads in tabled.values() for load in loads)]
+    found += [load for load in brought if load is not None]
+    return _dated(setting, found), given, tabled, found
+
+
+def _with_loads(begun: Setting, samples: SampleTimes, source: str) -> Scene:
+    """The scene with any start."""
+    setting, given, tabled, resolved = _resolved(begun)
+    config, context, body = setting.config, setting.context, setting.body
     bearings = [load.bearing for load in resolved if load.bearing is not None]
     apart = [load.apart for load in resolved if load.apart is not None]
     turning = body.inertia, inverse_inertia(context, body)
