@@ -63,7 +63,6 @@ _ROUNDINGS = 2.0**15  # in the square of an interval
 _MOST_LEFT_OUT = 8.0  # roundings of the state, by a moment in two numbers
 _NOT_RESOLVED = "choose a higher precision, or count time from an epoch shortly before"
 _WIDTH = 2.0**8  # roundings of a time between two findings of the same crossing
-_BISECTIONS = 4  # bisections of a step per bit of the precision
 
 Root = tuple[Any, int, int]
 """Time, number of a surface, and the side to which it leads."""
@@ -578,12 +577,12 @@ class SwitchingStepper(TaylorStepper):
         until = self._meet()
         self._watched()
         self._quieten()
-        log, events = self.log, len(self.log.found)
-        for _ in range(_ATTEMPTS):
+        log, events, longest = self.log, len(self.log.found), self._longest
+        for attempt in range(_ATTEMPTS + self.precision.bits):
             engine = self._integrator
             self._set()
             time, before = engine.dtime, np.array(engine.state)
-            finite = self._natural(until, self._longest)
+            finite = self._natural(until, longest)
             bound = bound_of_sparse_series(engine.tc) if self._crossed or not self.steps else np.inf
             bound = min(bound, self._bound_of_turn(before, time[0]))
             if bound < abs(float(engine.last_h)):
@@ -593,6 +592,12 @@ class SwitchingStepper(TaylorStepper):
                 return False
             size = engine.last_h
             root = self._first_root(time, before)
+            if root is None and (missed := self._missed(before)) is not None:
+                if attempt < self.precision.bits:  # the engine finds it in a shorter step
+                    self._return(time, before, events)
+                    longest = size / 2
+                    continue
+                root = time[0], missed, -self._modes[missed]
             if root is None:
                 break
             log.drop_after(events, root[0] + self._width(root[0]))
@@ -697,17 +702,16 @@ class SwitchingStepper(TaylorStepper):
             look = self._look(engine.update_d_output(middle), middle)
             if float(look.u[j]) * side > self._functions.noise(look, j, states):
                 return roots[n]
-        look = self._look(after, end, self._low)
-        for j, (mode, noise) in enumerate(
-            zip(self._modes, self._functions.noises(look, states), strict=True)
-        ):
-            wrong = abs(mode) < HELD and -mode * float(look.u[j]) > noise
-            if not wrong or (self._cut and self._cut[0] == j):
-                continue
-            inside = self._seen(j, begun, before)
-            if inside is None:
-                return begun[0], j, -mode
-            return self._bisected(j, inside, end), j, -mode
+        return None
+
+    def _missed(self, before: np.ndarray) -> int | None:
+        """A surface on whose wrong side the step just taken ended, although the engine found no zero."""
+        look = self._look(self.state, self.time, self._low)
+        noises = self._functions.noises(look, [before, np.array(self.state)])
+        for j, mode in enumerate(self._modes):
+            wrong = abs(mode) < HELD and -mode * float(look.u[j]) > noises[j]
+            if wrong and (self._cut is None or self._cut[0] != j):
+                return j
         return None
 
     def _hidden(self, begin: Scalar, end: Scalar, modes: Sequence[int]) -> list[Root]:
@@ -733,35 +737,6 @@ class SwitchingStepper(TaylorStepper):
                 engine.dtime = moment
         finally:
             self.log.muted = muted
-
-    def _seen(self, j: int, begun: tuple[Scalar, Scalar], before: np.ndarray) -> Scalar | None:
-        """A time within the latest step at which an argument has the sign of its side, or None."""
-        begin, end, mode = begun[0], self._integrator.time, self._modes[j]
-        look = self._look(before, *begun)
-        known = self._functions.noise(look, j, [before])
-        beside = mode * float(look.u[j]) > known  # of the surface, as the step began
-        some = self.precision.bits // 2
-        for power in range(1, _BISECTIONS * self.precision.bits):
-            then = begin + (end - begin) * self.precision.of_double(2.0**-power)
-            value = mode * float(self._look(self._integrator.update_d_output(then), then).u[j])
-            if value > 0:
-                return then
-            if power >= some and (beside or abs(value) <= known):  # nearer than that it is on the surface
-                break
-        return begin if beside else None
-
-    def _bisected(self, j: int, begin: Scalar, end: Scalar) -> Scalar:
-        """A root that the engine missed, by bisection."""
-        for _ in range(_BISECTIONS * self.precision.bits):
-            middle = begin + (end - begin) / 2
-            if not begin < middle < end:
-                break
-            value = self._look(self._integrator.update_d_output(middle), middle).u[j]
-            if self._modes[j] * float(value) > 0:
-                begin = middle
-            else:
-                end = middle
-        return end
 
     # --- surfaces -------------------------------------------------------------------------------------------
 
