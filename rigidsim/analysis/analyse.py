@@ -235,8 +235,8 @@ def _notes(
     notes = []
     if raw.found.close:
         notes.append(
-            "something is left closer than a bin to a line or to the secular part: errors tell its size, "
-            "a longer run tells it apart"
+            "a residual is closer than a bin to a line or to the secular part: errors include its size, "
+            "a longer run separates it"
         )
     slow = _slow(known, clock)
     if slow and raw.signal.degree > 0:
@@ -257,7 +257,7 @@ def _notes(
     blends = [line for line in lines if abs(line.mismatch) >= 10 * raw.finest(line)]
     if blends:
         notes.append(
-            f"{len(blends)} lines lie off their labels by more than what is left explains: blends of lines "
+            f"{len(blends)} lines lie off their labels by more than the residual explains: blends of lines "
             "closer than a bin; their errors are those distances"
         )
     aliases = sum(line.can_be_alias for line in lines)

@@ -266,7 +266,7 @@ def _dataset(analysis: Analysis) -> xarray.Dataset:
     table("amplitude_error", "", "one standard deviation of the amplitude", "amplitude_error")
     table("phase", "rad", "phase at time zero", "phase")
     table("phase_error", "rad", "one standard deviation of the phase at mid-span", "phase_error")
-    table("mismatch", "rad s-1", "frequency less that of its label", "mismatch")
+    table("mismatch", "rad s-1", "frequency less the frequency of its label", "mismatch")
     table("label", "", "combination of known frequencies", "label.text", object, "")
     table("unfolded", "1", "1 where the frequency lies beyond Nyquist's", "unfolded", np.int8, 0)
     table(
@@ -289,7 +289,7 @@ def _dataset(analysis: Analysis) -> xarray.Dataset:
     along("secular_value", "", "secular part at mid-span", lambda s: real(s.value))
     along("secular_rate", "", "rate of the secular part, per s", lambda s: real(s.rate))
     along("secular_rate_error", "", "one standard deviation of the rate, per s", "rate_error")
-    along("left", "", "rms of what is left without lines and secular part", "left")
+    along("left", "", "rms of the residual without lines and secular part", "left")
     along("noise_level", "", "amplitude below which lines aren't seen", "level")
     along("window_order", "1", "order of the Hann window", "order", np.int64)
     put("spectrum_frequency", ("signal", "spectrum"), curves[0], units="rad s-1")

@@ -230,12 +230,12 @@ VariableOption = Annotated[
         "--variable",
         "NAME",
         "A variable (obliquity) or one of its signals (obliquity.figure); repeatable. Default: "
-        "those that the scene is about.",
+        "the main signals of the scene.",
     ),
 ]
 AnalysisOption = Annotated[
     Path | None,
-    _option("--out", "FILE", "Dataset; default analysis.h5 in the run. The figure goes beside it."),
+    _option("--out", "FILE", "Dataset; default analysis.h5 in the run. The figure goes next to it."),
 ]
 FitsOption = Annotated[
     Path, _option("--out", "DIR", "Folder of the fits' folders; an interrupted fit there goes on.")

@@ -222,7 +222,7 @@ class AttitudeRows:
                     along_body(self._derivatives(_RATES["RATE"]), "target"),
                 )
         elif self.kind == "SPIN":
-            yield "those of the spin", self._spin(back)
+            yield "the spin's rates", self._spin(back)
 
     def _rate_frames(self) -> list[str]:
         """Along which frame's axes rates are given: "source" or "target", or both where it isn't said."""

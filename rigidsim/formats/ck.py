@@ -72,7 +72,7 @@ def _write_clock(run: SpiceRun, path: Path) -> None:
     clock = "".join(f"   {name:<32} = {value}\n" for name, value in rows)
     more = [(f"CK_{ident}_SCLK", str(ident)), (f"CK_{ident}_SPK", str(run.body))]
     title = [
-        f"Clock and frame of the attitude of the run {run.source.title}: load it with the CK beside it.",
+        f"Clock and frame of the attitude of the run {run.source.title}: load it with the CK next to it.",
         f"The clock {ident} counts TDB in ticks of {float(run.spacing)!r} s from {begin} s after J2000 on.",
         f"pxform('J2000', '{run.name}', et) goes from J2000 to the body's axes.",
     ]
@@ -101,8 +101,8 @@ def write_ck(table: Table, path: Path, source: TableSource) -> None:
         _write_rows(run, made, pieces, [packets[np.searchsorted(counts, piece)] for piece in pieces])
         rows = np.searchsorted(counts, between)
         told = [
-            f"CK {ident}, frame {run.name} relative to J2000, by the clock {ident} of the text kernel beside "
-            "it",
+            f"CK {ident}, frame {run.name} relative to J2000, by the clock {ident} of the text kernel "
+            "next to it",
             f"type 5, subtype 3: quaternion and angular velocity, degree {_DEGREE}; {len(main)} rows, every "
             f"{float(step * run.spacing):.6g} s",
         ]

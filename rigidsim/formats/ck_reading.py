@@ -60,7 +60,7 @@ def read_rows(path: Path, kernels: Sequence[Path], epoch: Epoch, axes: str | Non
         RigidsimError: SPICE refuses a kernel, or a segment has no rows (types 4 and 6).
     """
     ahead = epoch.since_j2000()
-    with _opened(path, kernels, "as kernels = [...] beside file") as (toolkit, number):
+    with _opened(path, kernels, "as kernels = [...] next to file") as (toolkit, number):
         clock = toolkit.ckmeta(number, "SCLK")
         ticks, rated = _own_ticks(toolkit, path)
         dates = [toolkit.sct2e(clock, tick) for tick in ticks]
@@ -110,8 +110,9 @@ def _own_ticks(toolkit: Any, path: Path) -> tuple[np.ndarray, np.ndarray]:
             kind, rated, first, last = (int(x) for x in whole[2:])
             if kind not in (_INSTANTS, _RATES, _LINES, _POLYNOMIALS):
                 raise RigidsimError(
-                    f"{path}: a segment of type {kind}, which holds polynomials and no rows; those of types "
-                    f"{_INSTANTS}, {_RATES}, {_LINES} and {_POLYNOMIALS} are allowed: sample it into a CSV"
+                    f"{path}: a segment of type {kind}, which holds polynomials and no rows; segments of "
+                    f"types {_INSTANTS}, {_RATES}, {_LINES} and {_POLYNOMIALS} are allowed: sample it into "
+                    "a CSV"
                 )
             values = np.asarray(toolkit.dafgda(handle, first, last), dtype=np.float64)
             segments.append((_Segment.of(values, kind, rated=bool(rated)), bool(rated)))

@@ -46,7 +46,7 @@ def write_frame(table: Table, path: Path, source: TableSource) -> None:
     """Write the frame that the orientation is read by."""
     run = run_of(table, source)
     title = [
-        f"Frame of the orientation of the run {run.source.title}: load it with the binary PCK beside it.",
+        f"Frame of the orientation of the run {run.source.title}: load it with the binary PCK next to it.",
         f"pxform('J2000', '{run.name}', et) goes from J2000 to the body's axes.",
     ]
     write_text(path, "FK", title, frame_text(run, run.class_number, 2))
@@ -66,7 +66,7 @@ def write_pck(table: Table, path: Path, source: TableSource) -> None:
         frame, series, checks, truth = _fitted(run, begins, step)
         _write_series(run, made, frame, begins, series, step)
         told = [
-            f"PCK class {number}, frame {run.name} of the text kernel beside, relative to {frame}",
+            f"PCK class {number}, frame {run.name} of the text kernel next to it, relative to {frame}",
             f"type 2, degree {_DEGREE}; {sum(map(len, begins))} intervals of "
             f"{float(step * run.spacing):.6g} s",
         ]

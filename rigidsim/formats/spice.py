@@ -173,7 +173,7 @@ class SpiceRun:
         announced = self.source.attributes.get("attitude_error") or 0.0
         if not away <= max(_SAME, 10 * float(announced)):
             what = f"integrated again, the run is {away:.2g} rad from its own samples: it was made by other "
-            raise refused(f"{what}versions or on another machine (rigidsim verify tells)")
+            raise refused(f"{what}versions or on another machine (rigidsim verify checks it)")
 
     def comments(self, what: Sequence[str], errors: Errors) -> list[str]:
         """Lines of a kernel's comment area: what it holds, and how large its errors are."""
@@ -195,7 +195,7 @@ class SpiceRun:
             f"body: {self.body}" if self.body else "body: not named (--object-id); 0 stands for it",
             *what,
             *announced,
-            f"interpolation: read back by SPICE at {errors.count} times between those that it is made of, "
+            f"interpolation: read back by SPICE at {errors.count} times between its rows, "
             f"it is at most {errors.attitude:.1e} rad from the run, its angular velocity {errors.rate:.1e} "
             "of the largest",
             f"numbers: the run's {self.source.bits} bits rounded to doubles; SPICE's times are doubles, here "

@@ -176,7 +176,7 @@ def _check(scene: Scene) -> None:
     strength = getattr(source.of(scene), "strength", None) if source is not None else None
     if strength is not None and not EARTH.attracts_by(strength):
         what = f"the Earth's air, where {value_text(strength, 'm^3/s^2')} attracts the body, which isn't the "
-        raise _fault(scene, f"{given}{what}Earth; give density, altitude and scale_height of its own air")
+        raise _fault(scene, f"{given}{what}Earth; give density, altitude and scale_height of its air")
 
 
 def _fault(scene: Scene, text: str) -> ConfigError:

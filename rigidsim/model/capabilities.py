@@ -1,5 +1,5 @@
 # ruff: noqa: D102 (what a method gives is told by its protocol)
-"""What a load may be able to do beside its torque, force and potential, one small protocol each.
+"""What a load may be able to do in addition to torque, force and potential, one small protocol each.
 
 A load has a capability if it has its members; there is nothing to inherit or register. Who asks looks for it
 (``having``), and decides what a load without it means. Sizes from which scales are chosen are
@@ -27,7 +27,7 @@ C = TypeVar("C")
 
 
 def having(capability: type[C], loads: Iterable[object]) -> list[C]:
-    """Those of the loads that have a capability."""
+    """The loads that have a capability."""
     return [load for load in loads if isinstance(load, capability)]
 
 
@@ -110,7 +110,7 @@ class FlownAbout(Placed, Protocol):
 
 @runtime_checkable
 class InPlane(Protocol):
-    """Its source moves in a plane, or the body about its source, beside those of orbits and points."""
+    """Its source moves in a plane, or the body about its source, other than by an orbit or a point."""
 
     plane: OrbitPlane | None
 
@@ -192,7 +192,7 @@ class KeepsPlane(Protocol):
 
 @runtime_checkable
 class TurnsAbout(Protocol):
-    """Whether it may have a torque about a unit axis in space (mpf); not asked where its potential tells."""
+    """Whether it may have a torque about a unit axis in space (mpf); not asked if its potential decides."""
 
     def turns_about(self, m: Kinematics, axis: Vector) -> bool: ...
 
@@ -239,7 +239,7 @@ class Ranged(Protocol):
 
 @runtime_checkable
 class Beside(Protocol):
-    """It acts beside another load, on the same source, which that one places."""
+    """It acts with another load, on the same source, which the other load places."""
 
     beside: Any
 

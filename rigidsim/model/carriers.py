@@ -79,7 +79,7 @@ def carried_beside(loads: Iterable[Load]) -> str:
         return ""
     if isinstance(found, Reshaping):
         return found.changes
-    return f"{found.title} carries angular momentum beside the body"
+    return f"{found.title} carries angular momentum"
 
 
 def lends(carrier: object, m: Kinematics) -> bool:

@@ -61,7 +61,7 @@ class Load(SceneLoad):
             speaks_si(cls)
 
     def extra_states(self, m: Kinematics) -> StateBlock | None:
-        """States of its own besides those of an ``orbit``; None if it has none."""
+        """States in addition to the states of an ``orbit``; None if it has none."""
         return None
 
     def torque(self, m: Kinematics) -> list[Term]:

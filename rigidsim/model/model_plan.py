@@ -227,7 +227,7 @@ def _flight(scene: Scene, record: list[str] | None, readers: list[str]) -> str |
 
 def _takes(scene: Scene, name: str, states: str) -> bool:
     """Whether recording an observable requires these states."""
-    needs = OBSERVABLES[name].needs if name in OBSERVABLES else ()  # states of one's own are asked elsewhere
+    needs = OBSERVABLES[name].needs if name in OBSERVABLES else ()  # user-defined states are asked elsewhere
     return any(NEEDS[need].states(scene) == states for need in needs)
 
 
@@ -296,16 +296,16 @@ def refuse_second_orbits(scene: Scene, loads: Sequence[Load]) -> None:
         if isinstance(load, Reacting):
             named = [getattr(x, "number", None) for x in pulling if _flown_about(x)]
             if getattr(load, "number", None) in named:
-                what = "given beside central_gravity of the same body, which has its torque; remove it"
+                what = "given with central_gravity of the same body, which has its torque; remove it"
                 raise ConfigError(Problem(where, what))
         elif load.gradient_source is not None:
             strength = load.gradient_source.gravitational_parameter
             if known(strength, attractors):
                 what = "given for the point that attracts the body in flight; central_gravity has its torque "
-                what += "where the body is, and this one would follow an orbit of its own: remove it"
+                what += "where the body is, and this one would follow another orbit: remove it"
                 raise ConfigError(Problem(where, what))
             if known(strength, carried):
-                what = "given with the gravitational parameter of one of [[bodies]] and an orbit of its own; "
+                what = "given with the gravitational parameter of one of [[bodies]] and another orbit; "
                 what += 'give orbit = {body = "..."}, which is where that body is'
                 raise ConfigError(Problem(where, what))
 

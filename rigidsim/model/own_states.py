@@ -1,6 +1,6 @@
 """``[[states]]`` in the equations: what reads them, their blocks, units and recorded variables.
 
-A state of one's own is carried in a unit of 2^n of its SI unit. Step control is relative to the largest
+A user-defined state is carried in a unit of 2^n of its SI unit. Step control is relative to the largest
 state, and absolute below 1: one that grew far beyond 1 would loosen the steps of all others. Its size is
 estimated from its initial value, and from its derivative at the start and in a few states like it; the length
 of the run doesn't enter, so that a run can be prolonged.
@@ -42,7 +42,7 @@ _MOST_GROWTH = 100  # bits
 
 @provides
 class OwnStateNames(NameProvider):
-    """States of one's own by their names."""
+    """User-defined states by their names."""
 
     brings = "your own with [[states]]"
 
@@ -62,7 +62,7 @@ class OwnStateNames(NameProvider):
 
 
 def own_blocks(m: Kinematics) -> list[StateBlock]:
-    """A block for each state of one's own."""
+    """A block for each user-defined state."""
     context, blocks = m.scene.context, []
     for state in m.scene.states:
         unit = m.scaling.own.get(state.name, 0)
@@ -75,7 +75,7 @@ def own_blocks(m: Kinematics) -> list[StateBlock]:
 
 
 def refuse_taken_names(scene: Scene, blocks: Iterable[StateBlock]) -> None:
-    """Refuse a state of one's own with the name of another state of the equations.
+    """Refuse a user-defined state with the name of another state of the equations.
 
     Raises:
         ConfigError: says which.
@@ -110,7 +110,7 @@ def refuse_odd_states(scene: Scene) -> None:
 
 
 def own_units(scene: Scene, scaling: Scaling, like: Mapping[str, int] | None = None) -> dict[str, int]:
-    """Binary exponents of the units of states of one's own, from the sizes that they are expected to reach,
+    """Binary exponents of the units of user-defined states, from the sizes that they are expected to reach,
     and from initial values, which keep their digits in single precision.
 
     Args:
@@ -129,7 +129,7 @@ def own_units(scene: Scene, scaling: Scaling, like: Mapping[str, int] | None = N
 
 
 def _sizes(scene: Scene, scaling: Scaling) -> dict[str, Any]:
-    """About the largest values (mpf, SI) that states of one's own reach; 0 where nothing tells.
+    """About the largest values (mpf, SI) that user-defined states reach; 0 where nothing tells.
 
     What drives a state, its derivative where it is zero itself, acts for as long as the state takes to come
     back, or for 10 to 160 turns. One that follows others has its size from theirs.
@@ -161,7 +161,7 @@ def _sizes(scene: Scene, scaling: Scaling) -> dict[str, Any]:
 
 
 def _alike(scene: Scene, scaling: Scaling) -> list[tuple[dict[str, Any], dict[str, Any]]]:
-    """Values of all names, and those of states of one's own: at the start, and as parts of their sizes at any
+    """Values of all names, and those of user-defined states: at the start, and as parts of their sizes at any
     attitude, rates as large as they become, and times that don't depend on the run's end.
     """
     context, generator = scene.context, random.Random(0)
@@ -199,7 +199,7 @@ def driven(scene: Scene, name: str, values: Mapping[str, Any], sizes: Mapping[st
 
     Args:
         values: of all names.
-        sizes: of states of one's own.
+        sizes: of user-defined states.
         longest: time that it has, if it doesn't come back before, s.
     """
     context, slopes = scene.context, {x.name: x.derivative for x in scene.states}

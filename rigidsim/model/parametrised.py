@@ -80,7 +80,7 @@ class Parametrised:
         plain: the same motion in plain numbers, for pieces of the equations and for names.
         equations: right-hand sides with ``hy.par[first + i]`` for coefficient i.
         outputs: components of what is recorded of it (``recorded``), in the same way.
-        recorded: attitude, rates, flight, rotors, core, states of one's own, and what else was asked for.
+        recorded: attitude, rates, flight, rotors, core, user-defined states, and what else was asked for.
         first: number of parameters that the equations have themselves.
     """
 

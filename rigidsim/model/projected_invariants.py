@@ -36,7 +36,7 @@ _FOLLOWS = {
 }
 _WATCHED = "it is watched alone: what is projected is a set that keeps the numbers of earlier runs"
 _NEVER = {
-    "energy_balance": "it checks a work that is integrated beside the motion and doesn't act on it",
+    "energy_balance": "it checks a work that is integrated with the motion and doesn't act on it",
     **{observable.name: _WATCHED for observable in BUILT_IN},
 }
 

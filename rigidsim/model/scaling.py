@@ -40,7 +40,7 @@ class Scaling:
     length: int = 0
     speed: int = 0
     drive: Drive | None = None  # the estimate used for loads of unknown size
-    own: Mapping[str, int] = field(default_factory=dict)  # of states of one's own
+    own: Mapping[str, int] = field(default_factory=dict)  # of user-defined states
 
     @property
     def momentum(self) -> int:

@@ -88,7 +88,7 @@ def given_attitude(
     """Unit quaternion of a table's ``quaternion`` or ``euler_angles``, and these; or None."""
     if table.euler_angles is not None:
         if table.quaternion is not None:
-            what = "given beside quaternion; only one attitude is allowed: remove one of them"
+            what = "given with quaternion; only one attitude is allowed: remove one of them"
             raise refusal("euler_angles", what)
         angles = [x.at(context) for x in table.euler_angles]
         return quaternion_from_euler(context, angles, sequence), angles

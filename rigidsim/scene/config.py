@@ -290,7 +290,7 @@ def _text(
     try:
         if path.exists() and not path.is_file():
             what = (
-                f'given "{name}", which is a folder or a device: {path}; a file beside the config is allowed'
+                f'given "{name}", which is a folder or a device: {path}; a file next to the config is allowed'
             )
             raise ConfigError(Problem(where, what))
         with path.open(encoding="utf-8-sig") as file:
@@ -302,9 +302,9 @@ def _text(
                 _refuse_size(where, name, len(text))
     except OSError as error:
         what = (
-            f'given "{name}", which can\'t be read ({error.strerror or error}): {path} is looked for, beside '
+            f'given "{name}", which can\'t be read ({error.strerror or error}): {path} is looked for, next '
         )
-        raise ConfigError(Problem(where, what + "the config")) from None
+        raise ConfigError(Problem(where, what + "to the config")) from None
     except ValueError as error:
         text_error = where != _TIMES or isinstance(error, UnicodeDecodeError)
         told = f", which is not UTF-8 text; save it as {kind}" if text_error else f": {error}"

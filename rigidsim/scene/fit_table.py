@@ -42,10 +42,10 @@ class FitDataTable(ConfigTable):
     columns: EachOnce[StrictStr] | None = Field(None, examples=[["alpha_deg", "beta_deg", "gamma_deg"]])
     """columns of its components; by default NAME_COMPONENT as in exported tables, or NAME for a single one"""
     unit: StrictStr | None = Field(None, examples=["deg"])
-    """unit of these columns; by default that of the file, or SI"""
+    """unit of these columns; by default the file's, or SI"""
     sigma: Any = Field(examples=["5 deg", "sigma_deg", 1e-3])
     """standard deviation of each component: a number with its unit (bare ones are SI), or the name of a
-    column, in ``unit``; of attitudes that of each component of a rotation vector
+    column, in ``unit``; of attitudes, of each component of a rotation vector
     """
     scale: Literal["TDB", "TT", "TAI", "GPS", "UTC"] = "UTC"
     """time scale of dates that don't name theirs"""

@@ -38,7 +38,7 @@ def flight_start(config: Config, context: Any) -> tuple[Vector, Vector]:
     key = "tle" if table.tle is not None else "frame"
     for other in ("position", "velocity", "frame") if key == "tle" else ():
         if getattr(table, other) is not None:
-            raise _fault(other, "given beside tle, which says it; remove one of them")
+            raise _fault(other, "given with tle, which determines it; remove one of them")
     _check_geocentric(config, key)
     date = config.time.epoch
     if date is None:
@@ -80,16 +80,14 @@ def _given(config: Config, context: Any) -> tuple[Vector, Vector]:
 def _check_geocentric(config: Config, key: str) -> None:
     """Refuse scenes whose origin isn't known to be the Earth's centre."""
     if config.ephemeris is not None:
-        what = (
-            "given beside [ephemeris], whose kernel has its own origin and axes; give position and velocity "
-        )
+        what = "given with [ephemeris], whose kernel has its own origin and axes; give position and velocity "
         raise _fault(key, f"{what}in those, without {key}")
     for load in config.loads:
         if getattr(load, "kind", "") != "central_gravity":
             continue
         strength, place = load.gravitational_parameter, load.position  # type: ignore[attr-defined]
         if strength is None:  # of one of [[bodies]]
-            what = "counts from the centre of the Earth, but the central_gravity is that of one of [[bodies]]"
+            what = "counts from the centre of the Earth, but the central_gravity belongs to one of [[bodies]]"
         elif not EARTH.attracts_by(float(strength)):
             what = f"is about the Earth, but the central_gravity has {float(strength):.6g} m^3/s^2"
         elif any(x.sign for x in place):

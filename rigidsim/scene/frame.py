@@ -18,7 +18,7 @@ SPACE = "space"
 
 
 class Frame(ConfigTable):
-    """``[frame]``: what the scene's axes are, beside its own equations, and what angles are counted from."""
+    """``[frame]``: what the scene's axes are called, and what angles are counted from."""
 
     axes: SpaceAxes | None = None
     """name of the space axes; with an ephemeris they are ecliptic J2000"""

@@ -77,7 +77,7 @@ def moments_at_start(config: Config, context: Any, start: Any) -> Vector | None:
         least = least_part(config.integrator.precision)
         small = next((i for i in range(3) if 0 <= moments[i] <= least * sum(moments)), None)
         if small is not None:
-            what = f"given {context.nstr(moments[small], 6)} kg m^2 at the start, beside moments that vary; "
+            what = f"given {context.nstr(moments[small], 6)} kg m^2 at the start, with moments that vary; "
             raise ConfigError(
                 Problem(f"{WHERE}[{small}]", what + f"each has to be more than {least:.1g} of their sum")
             )

@@ -30,7 +30,7 @@ class Elements(ConfigTable):
     opposite: ClassVar[bool] = False
 
     table: StrictStr | None = Field(None, examples=["mars_elements.csv"])
-    """name of a CSV file beside the config, with elements over time"""
+    """name of a CSV file next to the config, with elements over time"""
     semi_major_axis: Metre | None = Field(None, examples=["7000 km"])
     """semi-major axis of the ellipse"""
     eccentricity: Dimensionless = ZERO
@@ -48,8 +48,8 @@ class Elements(ConfigTable):
     periapsis_rate: Rate = ZERO
     """rate of the argument of periapsis"""
     period: Second | None = Field(None, examples=["27.55455 day"])
-    """anomalistic period, from periapsis to periapsis: that of the mean anomaly (beside a table without one,
-    of the mean longitude); by default that of Kepler's third law
+    """anomalistic period, from periapsis to periapsis, of the mean anomaly (with a table without one, of the
+    mean longitude); by default by Kepler's third law
     """
     sidereal_period: Second | None = Field(None, examples=["27.321661 day"])
     """period of the mean longitude (node + periapsis + mean anomaly), such as a sidereal month or year,

@@ -88,7 +88,7 @@ def attracting_body(orbit: Orbit, around: Setting) -> int:
     """Index of the point mass that an orbit names."""
     more = sorted(orbit.model_fields_set - {"body"})
     if more:
-        raise around.fault(f"orbit.{more[0]}", "given beside body, whose motion is integrated; remove it")
+        raise around.fault(f"orbit.{more[0]}", "given with body, whose motion is integrated; remove it")
     masses = around.bodies
     names = () if masses is None else masses.names
     if masses is None or orbit.body not in names:
@@ -109,7 +109,7 @@ def pace_of(table: Elements, around: Setting) -> tuple[str, ExactNumber] | None:
             what = "rate" if key == "longitude_rate" else "time"
             raise around.fault(f"{table.key}.{key}", f"given {float(value):g}; a positive {what} is allowed")
     if len(given) > 1:
-        what = f"given beside {given[0][0]}; at most one of {', '.join(PACES)} is allowed"
+        what = f"given with {given[0][0]}; at most one of {', '.join(PACES)} is allowed"
         raise around.fault(f"{table.key}.{given[1][0]}", what)
     return given[0] if given else None
 
@@ -192,15 +192,15 @@ def tabulated_orbit(
     given = dict(constants)
     for key in given:
         if key in table.columns:
-            raise TableError(f"has a column {key}, which is given beside it, too; remove one of them")
+            raise TableError(f"has a column {key}, which is given in the config, too; remove one of them")
     if "semi_major_axis" not in table.columns and "semi_major_axis" not in given:
-        raise TableError("has no column semi_major_axis; add one, or give semi_major_axis beside table")
+        raise TableError("has no column semi_major_axis; add one, or give semi_major_axis with table")
     paces = [(key, given.pop(key)) for key in PACES if key in given]
     if paces:
         rate = rate_of(paces[0], context)
         motion: Callable[[Any], Any] = lambda axis: rate  # noqa: E731
     elif strength is None:
-        raise TableError("needs a mean motion; give period beside table")
+        raise TableError("needs a mean motion; give period with table")
     else:
         mass = context.make_mpf(strength)
         motion = lambda axis: context.sqrt(mass / axis**3)  # noqa: E731
@@ -225,12 +225,12 @@ def resolve_tabulated_orbit(fields: Elements, strength: Any | None, around: Sett
         raise Untraceable("an orbit by a table depends on it")
     for rate in ("node_rate", "periapsis_rate"):
         if getattr(fields, rate).sign != 0:
-            what = "given beside table, whose columns say what moves; remove it"
+            what = "given with table, whose columns determine what moves; remove it"
             raise around.fault(f"{fields.key}.{rate}", what)
     pace_of(fields, around)
     if name not in around.config.texts:
         known = ", ".join(around.config.texts) or "none"
-        what = f'given "{name}", but this config was given as text, without files beside it; put the '
+        what = f'given "{name}", but this config was given as text, without files next to it; put the '
         what += f'CSV into [tables."{name}"] text (there now: {known})'
         raise around.fault(f"{fields.key}.table", what)
     parts = None if strength is None else strength._mpf_

@@ -1,4 +1,4 @@
-"""``[[states]]``: states of one's own, such as controllers, filters, slosh and fuel, by their derivatives.
+"""``[[states]]``: user-defined states, such as controllers, filters, slosh and fuel, by their derivatives.
 
 They are carried by need: recorded, or read by a load, an event or another of them that is carried.
 """
@@ -25,7 +25,7 @@ _NUMBER = ("", "1")
 
 
 class OwnStateTable(ConfigTable):
-    """``[[states]]``: a state of one's own, integrated with the motion and readable in every expression."""
+    """``[[states]]``: a user-defined state, integrated with the motion and readable in every expression."""
 
     name: VariableName = Field(examples=["integral"])
     """its name in expressions, and of its variable in the dataset"""
@@ -65,7 +65,7 @@ class OwnStateTable(ConfigTable):
 
 @dataclass(frozen=True)
 class OwnState:
-    """A state of one's own that is carried; ``why`` says by whom it is needed."""
+    """A user-defined state that is carried; ``why`` says by whom it is needed."""
 
     name: str
     unit: str | None  # SI; "1" for a number, None if it isn't known

@@ -191,7 +191,7 @@ def resolve_point_masses(
     for i in range(len(tables)):
         for j in range(i):
             if positions[i] == positions[j]:
-                raise _fault(i, "position", f'the same as that of "{names[j]}"; start it elsewhere')
+                raise _fault(i, "position", f'the same position as "{names[j]}"; start it elsewhere')
     return PointMasses(tuple(names), strengths, tuple(positions), tuple(velocities), at_host, full)
 
 
@@ -200,7 +200,9 @@ def _refuse_overlap(tables: Sequence[PointMassBody]) -> None:
     placed = {table.name: number for number, table in enumerate(tables) if table.ephemeris}
     for name in ("earth", "moon"):
         if name in placed and "earth_moon_barycenter" in placed:
-            what = f'given "earth_moon_barycenter", whose mass contains that of "{name}"; remove one of them'
+            what = (
+                f'given "earth_moon_barycenter", whose mass contains the mass of "{name}"; remove one of them'
+            )
             raise _fault(placed["earth_moon_barycenter"], "name", what)
 
 
@@ -224,7 +226,7 @@ def _of_kernel(
     """Where the kernel has a body at the start, and its velocity, from the barycentre."""
     for key in ("position", "velocity", "orbit"):
         if getattr(table, key) is not None:
-            raise _fault(number, key, "given beside ephemeris = true, which says it; remove one of them")
+            raise _fault(number, key, "given with ephemeris = true, which determines it; remove one of them")
     if ephemeris is None:
         raise _fault(number, "ephemeris", "given true, but there is no [ephemeris]; add one with a kernel")
     return ephemeris.start_of(table.name, context)
@@ -234,13 +236,13 @@ def _host(host: str | None, names: Sequence[str], free_flight: bool) -> int | No
     if host is None:
         if not free_flight:
             what = "missing; name the one of [[bodies]] that this body is, or give it an [initial] position "
-            raise ConfigError(Problem("[body] host", what + "and velocity of its own"))
+            raise ConfigError(Problem("[body] host", what + "and velocity"))
         return None
     if host not in names:
         what = f"given {shown(host)}{nearest(host, names)}; allowed: {', '.join(names)}"
         raise ConfigError(Problem("[body] host", what))
     if free_flight:
-        what = f'given "{host}" beside [initial] position or velocity; remove one of them'
+        what = f'given "{host}" with [initial] position or velocity; remove one of them'
         raise ConfigError(Problem("[body] host", what))
     return names.index(host)
 
@@ -266,7 +268,7 @@ def _place(
         moving = [x.at(context) for x in table.velocity] if table.velocity else list(zero)
     else:
         if table.position is not None or table.velocity is not None:
-            raise _fault(number, "orbit", "given beside position or velocity; remove one of them")
+            raise _fault(number, "orbit", "given with position or velocity; remove one of them")
         about = table.orbit.about
         others = [name for name in names if name != table.name]
         if about not in others:

@@ -66,10 +66,10 @@ def turning_inertia(
         moments, _ = eigen(context, [[plain(x) for x in row] for row in tensor])
         listed = ", ".join(context.nstr(x, 8) for x in moments)
         what = (
-            "given moments that the body's own tensor can't include: without those of the rotors about their "
+            "given moments that the body's own tensor can't include: without the rotors' moments about their "
             f"axes it would have the principal moments {listed} kg m^2, which no body has (all are positive, "
             "and none is more than the sum of the others); make the rotors smaller, or add their tensors, "
-            "as of locked wheels, to that of [body]"
+            "as of locked wheels, to the tensor of [body]"
         )
         raise ConfigError(Problem("[[rotors]] moment", what))
     return tensor, _inverse(context, tensor)

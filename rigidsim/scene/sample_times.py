@@ -42,7 +42,7 @@ class Time(ConfigTable):
         ]
         | None
     ) = Field(None, examples=[[0, 1, 10, 100], "theirs.csv"])
-    """sample times, ascending, instead of end; or a CSV file beside the config with a column t or time"""
+    """sample times, ascending, instead of end; or a CSV file next to the config with a column t or time"""
     epoch: Instant | None = Field(None, examples=["J2000", "2029-04-13T21:46:00 TDB"])
     """date of time 0, in TDB, TT, TAI, GPS or UTC; 2029-04-13T21:46:00Z, with or without quotes, is UTC"""
     unit: TimeUnitName | None = Field(None, examples=["day"])
@@ -123,7 +123,7 @@ def _listed(table: Time, context: Any, texts: Mapping[str, str]) -> list[Fractio
     from rigidsim.scene.text_tables import times_in  # which few configs need
 
     if given not in texts:
-        what = "but this config was given as text, without files beside it; put the table's text into "
+        what = "but this config was given as text, without files next to it; put the table's text into "
         raise _fail("times", f'given "{given}", {what}[tables."{given}"] text')
     try:
         return times_in(texts[given], context, table.epoch)
@@ -141,7 +141,7 @@ def sample_times(table: Time, context: Any, texts: Mapping[str, str]) -> tuple[A
     if len(ways) > 1:
         less = Remedy(f"--set time.{ways[0]}= removes it", "Experiment.replace removes keys, too")
         allowed = "only one of samples, every, times is allowed: leave the other out"
-        raise _fail(ways[1], f"given beside {ways[0]}; {allowed} ({less})")
+        raise _fail(ways[1], f"given with {ways[0]}; {allowed} ({less})")
 
     def shortly(time: Fraction, digits: int = 12) -> str:
         return str(context.nstr(rounded(time, context), digits))

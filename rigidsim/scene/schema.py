@@ -86,7 +86,7 @@ class Initial(ConfigTable):
     says what the space axes are
     """
     prime_meridian: Angle | None = Field(None, examples=["176.6 deg"])
-    """the IAU's W, beside pole: from the ascending node of the body's equator on that of J2000, along the
+    """the IAU's W, with pole: from the ascending node of its equator on the equator of J2000, along the
     body's equator, to the figure's prime meridian (body x where the figure axis is z); by default 0
     """
     obliquity: Angle | None = Field(None, examples=["23.44 deg"])
@@ -117,7 +117,7 @@ class Initial(ConfigTable):
         ],
     )
     """two-line elements of a satellite of the Earth, instead of position and velocity: these are SGP4's at
-    the start, in GCRF; without [time] epoch that of the elements is time 0
+    the start, in GCRF; without [time] epoch their date is time 0
     """
     frame: Literal["GCRF", "ICRF", "EME2000", "J2000", "TEME", "ITRF"] | None = None
     """frame of position and velocity, at the date of [time] epoch, instead of the space axes; about the
@@ -173,7 +173,7 @@ class Output(ConfigTable):
     vectors component by component; initial.attitude stands for a turn of the start, body axes
     """
     orientation: StrictStr | None = Field(None, examples=["./pck00011.tpc"])
-    """a published orientation beside which the attitude is recorded: the path of a PCK of SPICE, text or
+    """a published orientation to compare with the attitude: the path of a PCK of SPICE, text or
     binary, from the config's folder; its SHA-256 is kept in the dataset
     """
     orientation_of: BodyName | None = Field(None, examples=["mars", 31006])
@@ -257,7 +257,7 @@ class Config(ConfigTable):
     rotors: list[RotorTable] = Field(default_factory=list, max_length=64)
     """wheels in the body, free, driven or at fixed rates"""
     states: list[OwnStateTable] = Field(default_factory=list, max_length=64)
-    """states of one's own (controllers, filters, slosh, fuel), by their derivatives"""
+    """user-defined states (controllers, filters, slosh, fuel), by their derivatives"""
     events: list[EventTable] = Field(default_factory=list)
     """events: zero crossings of an expression of time and the state"""
     frame: Frame = Field(default_factory=Frame.model_construct)
@@ -279,7 +279,7 @@ class Config(ConfigTable):
     tables: dict[StrictStr, TableText] = Field(
         default_factory=dict, examples=[{"elements.csv": {"text": "time [yr], eccentricity\n0, 0.01\n"}}]
     )
-    """texts of tables that loads refer to; the text of files beside the config is copied here"""
+    """texts of tables that loads refer to; the text of files next to the config is copied here"""
 
     @property
     def texts(self) -> dict[str, str]:
@@ -317,7 +317,7 @@ class Config(ConfigTable):
         names = [table.name for table in value]
         for name in filter(None, names):
             if names.count(name) > 1:
-                raise refuse(f'two {info.field_name} are named "{name}"; give each a name of its own')
+                raise refuse(f'two {info.field_name} are named "{name}"; give each another name')
             if info.field_name == "states" and name in OBSERVABLES:
                 raise refuse(f'a state is named "{name}", as a variable that can be recorded; rename it')
         return value

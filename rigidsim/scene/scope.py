@@ -72,7 +72,7 @@ OUT_OF_SCOPE = (
         " core [body] core, mass that leaves mass_loss; for free surfaces take a CFD program",
     ),
     OutOfScope(
-        "engines have no load of their own",
+        "engines have no load",
         (
             "thruster", "thrust", "engine", "rcs", "burn", "jet", "rocket", "nozzle",
         ),

@@ -104,7 +104,7 @@ def check_ways(table: Initial, context: Any) -> None:
         equilibrium = EQUILIBRIA[table.equilibrium]
         for way in (attitude_way, rates_way):
             if way is not None and way.key not in equilibrium.allowed:
-                what = f'given beside equilibrium = "{table.equilibrium}", which finds it; remove one of them'
+                what = f'given with equilibrium = "{table.equilibrium}", which finds it; remove one of them'
                 raise refusal(way.key, what)
     elif rates_way is None:
         raise refusal(
@@ -114,7 +114,7 @@ def check_ways(table: Initial, context: Any) -> None:
     for key in _BESIDE:
         if getattr(table, key) is not None and key not in beside:
             takers = [way.key for way in ATTITUDES.values() if key in (*way.needed, *way.allowed)]
-            raise refusal(key, f"given without {' or '.join(takers)}, beside which it counts; add that")
+            raise refusal(key, f"given without {' or '.join(takers)}, with which it counts; add that")
     for way in (attitude_way, rates_way):
         if way is not None:
             way.check(table, context)
@@ -124,7 +124,7 @@ def _chosen(table: Initial, ways: dict[str, StartForm], what: str) -> StartForm 
     """The way whose keys are given; None without any."""
     given = [way for way in ways.values() if getattr(table, way.key) is not None]
     if len(given) > 1:
-        text = f"given beside {given[0].key}; only one {what} is allowed: remove one of them"
+        text = f"given with {given[0].key}; only one {what} is allowed: remove one of them"
         raise refusal(given[1].key, text)
     for way in given:
         for key in way.needed:

@@ -62,7 +62,7 @@ class AxisTable(ConfigTable):
                 "such as grid = [16, 32]"
             )
         if way in ("normal", "uniform") and self.count is None:
-            raise refuse(f"{way} needs a count beside it, such as count = 100")
+            raise refuse(f"{way} needs a count, such as count = 100")
         if way not in RANDOM and self.count is not None:
             raise refuse(f"count is for random values ({', '.join(RANDOM)}); {way} says it itself")
         if way != "sphere" and self.grid is not None:

@@ -93,7 +93,7 @@ def published_of(prepared: InitialValueProblem) -> "PublishedAttitude | None":
 
     if not any(recorded.name == QUATERNION for recorded in prepared.system.recorded):
         named = scene.config.output.record
-        lacking = f"isn't recorded; name {QUATERNION} in record" if named else "this model hasn't"
+        lacking = f"isn't recorded; name {QUATERNION} in record" if named else "this model doesn't have"
         what = f"needs the attitude, which {lacking}, or leave orientation out"
         raise ConfigError(Problem("[output] orientation", what), prepared.experiment.source)
     return PublishedAttitude(orientation, scene.figure)

@@ -112,7 +112,7 @@ def _why_it_broke(prepared: InitialValueProblem, time: float) -> str:
                 when = time_words(scene).moment(float(moment))
                 return (
                     f'; "{part.text}" ({part.where}) changes at {when} within '
-                    f"{float(width):.2g} s, and {precision.name} precision tells times there to "
+                    f"{float(width):.2g} s, and {precision.name} precision resolves times there to "
                     f"{spacing * abs(float(moment)):.2g} s: choose a higher precision, a wider change, or "
                     "count time from an epoch shortly before"
                 )

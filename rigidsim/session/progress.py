@@ -23,7 +23,7 @@ _WIDE = 100  # columns from which simulated time has room
 _NOTHING_LEFT = "nothing is left to do: {}; --until prolongs a finished run to a later end"
 _PHASES = {
     "lyapunov": "Lyapunov exponents",
-    "modelling": "full model beside",
+    "modelling": "full model",
     "dataset": "writing dataset.h5",
     "timeline": "drawing timeline.rrd",
     "certify": "certifying",

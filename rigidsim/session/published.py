@@ -49,7 +49,7 @@ class PublishedAttitude:
             named("published_declination", (), "rad", "declination of the published pole",
                   convention="of the equator of J2000"),
             named("published_prime_meridian", (), "rad", "published prime meridian, the IAU's W",
-                  convention=f"from the equator's node on that of J2000; {turns}"),
+                  convention=f"from the equator's node on the equator of J2000; {turns}"),
             named("published_rotation", ("body_axis",), "rad", "rotation from the published attitude",
                   frame="body axes", convention="rotation vector from the published axes to the body's"),
             named("published_angle", (), "rad", "angle of the rotation from the published attitude"),

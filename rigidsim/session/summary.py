@@ -131,7 +131,7 @@ def _accuracy(found: Diagnostics) -> Accuracy:
     if estimate is None:
         why = "the run has not ended" if output.estimate else "[output] estimate = false"
         if output.estimate and found.progress.status.final and found.prepared.algorithm.own_errors:
-            why = "its method tells no errors of its own"
+            why = "its method reports no errors"
         unknown: dict[str, Any] = dict.fromkeys(("estimated_attitude_error", "amplification"))
         return Accuracy(**uncertified, **unknown, estimated_how=f"not estimated: {why}")
     caveat = found.prepared.system.formulation.variables.caveat
@@ -146,7 +146,7 @@ def _accuracy(found: Diagnostics) -> Accuracy:
         predictable_seconds=estimate.predictable_seconds,
         amplification_seconds=estimate.seconds,
         examined_share=estimate.share,
-        amplification_how="of the estimated error over that of a stable motion, whose rounding errors grow "
+        amplification_how="of the estimated error over a stable motion's, whose rounding errors grow "
         "as (eps/2) sqrt(steps) sqrt(4 + (|w| t)^2 / 3), and what the tolerance cuts off; 1 for a stable one",
     )
 

@@ -66,7 +66,7 @@ def span_of(scene: Scene) -> Span:
 
 
 def told_loads(prepared: InitialValueProblem) -> tuple[str, ...]:
-    """The loads and states of one's own in a reader's terms, one sentence for each."""
+    """The loads and user-defined states in a reader's terms, one sentence for each."""
     plan = prepared.system.plan
     locked = [x for found in plan.scene.tabled.values() for x in found if not x.acts()]
     told = [load.told(plan.scene) for load in [*plan.loads, *locked] if isinstance(load, Load)]
@@ -124,7 +124,7 @@ def cautions_of(scene: Scene) -> list[Caution]:
         found.append(
             Caution(
                 WarningCode.EPHEMERIS_OF_EARTH,
-                "the ephemerides are those of Sun and Moon as seen from the Earth, while the body is "
+                "the ephemerides give Sun and Moon as seen from the Earth, while the body is "
                 f"{preset}; give gravity_gradient the orbit of its source instead",
             )
         )

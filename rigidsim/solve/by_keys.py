@@ -45,7 +45,7 @@ def refuse_without_derivatives(scene: Scene, system: System, *, has_steps: bool,
         why = f'[model] level = "{scene.config.model.level}" has no attitude to differentiate; choose "full"'
     elif not has_steps:
         why = (
-            f'[integrator] method = "{integrator.method}" takes no steps beside which variational equations '
+            f'[integrator] method = "{integrator.method}" takes no steps with which variational equations '
             'could be integrated; choose "taylor"'
         )
     elif found:

@@ -158,7 +158,7 @@ def prepare_scene(
             _check_tolerance(given, precision)
         check_start(scene)
         if loads and scene.found_start is not None:
-            what = "given beside loads from Python, which have no part in finding it; give attitude and rates"
+            what = "given with loads from Python, which have no part in finding it; give attitude and rates"
             raise ConfigError(Problem("[initial] equilibrium", what))
         if scene.config.model.level == AUTO:
             what = 'given "auto", which run and plan settle by [integrator] accuracy_axis; choose a level'

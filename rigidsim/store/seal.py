@@ -94,4 +94,4 @@ def refuse_damaged(path: Path, expected: str | None) -> None:
     if "segment" in labels:
         raise RunFolderError(f"{path}: is a segment of an unfinished run, no complete dataset")
     if expected not in (None, digest):
-        raise RunFolderError(f"{path}: isn't the dataset that summary.json beside it was written for")
+        raise RunFolderError(f"{path}: isn't the dataset for which the summary.json next to it was written")

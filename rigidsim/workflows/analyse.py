@@ -133,7 +133,7 @@ def places_of(out: Path, inputs: Iterable[Path], *, force: bool = False) -> Save
     """
     if out.suffix.lower() in FIGURES:
         raise RigidsimError(
-            f"{out}: the dataset is no picture; give --out FILE.h5, the figure stands beside it"
+            f"{out}: the dataset is no picture; give --out FILE.h5, the figure goes next to it"
         )
     places = Saved(out, out.with_suffix(".png"))
     refuse_loss([places.dataset, places.figure], inputs, force=force)

@@ -42,9 +42,9 @@ def export(
         file_format: one of ``rigidsim.formats.FORMATS``; csv, parquet or zarr of a sweep.
         out: the file (for zarr the folder); ``NAME.FORMAT`` in the working folder by default (``NAME.bc`` and
             its clock ``NAME.tsc`` for ck, ``NAME.bpc`` and its frame ``NAME.tf`` for pck). In csv and
-            parquet, events and Lyapunov estimates go to files of their own beside it, ``NAME.flip.csv``; of a
+            parquet, events and Lyapunov estimates go to further files next to it, ``NAME.flip.csv``; of a
             sweep the file has a row per member, and whole series, occurrences of an event and spectral lines
-            go to long tables beside it: ``NAME.time.csv``, ``NAME.flip_occurrence.csv``, ``NAME.line.csv``.
+            go to long tables next to it: ``NAME.time.csv``, ``NAME.flip_occurrence.csv``, ``NAME.line.csv``.
         naming: epoch, axes and names that the run's config leaves open, for
             aem, oem, ck and pck; empty for sweeps.
         angle_unit: one of ``rigidsim.scene.readable.ANGLE_UNITS``; rad by default. For csv, parquet and zarr.
@@ -91,7 +91,7 @@ def export(
                 kept[path] = table, found.write
         for suffix, write in found.beside.items():
             if target.suffix == suffix:
-                raise RigidsimError(f"--out: given {target}, but {suffix} is that of a file beside it")
+                raise RigidsimError(f"--out: given {target}, but {suffix} is the suffix of a file next to it")
             kept[target.with_suffix(suffix)] = first, write
         refuse_loss(kept, saved.files, force=force, kind=found.folder or FILE)
         for path, (table, write) in kept.items():

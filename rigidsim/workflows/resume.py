@@ -60,8 +60,8 @@ def resume(
         tuning: as for ``rigidsim.run``.
 
     Returns:
-        The run. Its dataset is bit for bit that of a run in one go, on the same versions and CPU features;
-        on others the summary says so. A complete run is returned as it is, and the observer told.
+        The run. Its dataset has the bits of an uninterrupted run, on the same versions and CPU features; on
+        others the summary says so. A complete run is returned as it is, with a report to the observer.
 
     Raises:
         RunFolderError: the run doesn't exist, is in use, can't be written, or its config or segments were
@@ -192,7 +192,7 @@ def _of_finished(folder: RunFolder) -> Chain:
     check_seal(folder.checkpoint)
     after = root_attributes(folder.checkpoint)
     if after.get("run_id") != found.run_id or after.get("previous_seal") != last:
-        raise RunFolderError(f"{folder.checkpoint}: doesn't belong to {folder.dataset.name} beside it")
+        raise RunFolderError(f"{folder.checkpoint}: doesn't belong to {folder.dataset.name} next to it")
     rows = root_attributes(folder.dataset)["rows"]
     return Chain([folder.dataset, folder.checkpoint], rows, found.run_id or "", last)
 

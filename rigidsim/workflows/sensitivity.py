@@ -32,7 +32,7 @@ class Sensitivities:
         position, velocity: (n, 3), m and m/s, space axes; None unless the body moves.
         d_attitude: (n, k, 3), rotation vector, space axes, rad per SI unit of the key.
         d_angular_velocity, d_position, d_velocity: (n, k, 3), in the axes of what they are of.
-        extra: of each other variable (rotors, a core, states of one's own, and those asked for) its values
+        extra: of each other variable (rotors, a core, user-defined states, and those asked for) its values
             (n, components) and derivatives (n, k, components).
     """
 

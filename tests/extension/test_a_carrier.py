@@ -98,7 +98,7 @@ def test_what_knows_the_body_alone_refuses_it() -> None:
     orbit = 'kind = "gravity_gradient"\ngravitational_parameter = 1\norbit = {semi_major_axis = 1}'
     for way in ('[integrator]\nformulation = "canonical"', '[model]\nlevel = "spin_averaged"'):
         integrator, more = (way.split("\n")[1], "") if "[integrator]" in way else ("", way)
-        with pytest.raises(rigidsim.ConfigError, match="wheel carries angular momentum beside the body"):
+        with pytest.raises(rigidsim.ConfigError, match="wheel carries angular momentum"):
             run(loads=orbit, integrator=integrator, more=more)
     with pytest.raises(rigidsim.ConfigError, match="a load given from Python has no closed form"):
         run(integrator='method = "closed_form"')

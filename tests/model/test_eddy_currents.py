@@ -90,7 +90,7 @@ def test_beside_a_magnet_in_the_same_field_the_momentum_along_it_is_kept() -> No
     [
         ("field = [1, 0, 0]", "conductivity: missing; a sphere needs conductivity and radius"),
         ("field = [1, 0, 0]\nconductivity = 1\nradius = 1\nthickness = 2", "thickness: given 2; more than 0"),
-        ("field = [1, 0, 0]\nmagnetic_tensor = [1, 1, 1]\nradius = 1", "radius: given beside magnetic"),
+        ("field = [1, 0, 0]\nmagnetic_tensor = [1, 1, 1]\nradius = 1", "radius: given with magnetic"),
     ],
 )
 def test_nonsense_is_refused(load: str, message: str) -> None:

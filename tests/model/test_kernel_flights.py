@@ -97,8 +97,8 @@ def test_what_point_masses_leave_out() -> None:
     ("text", "setting", "words"),
     [
         (SCENE, "initial.position=; initial.velocity=", "for a body without a position"),
-        (SCENE, "loads[1].position=[1, 0, 0]", "given beside source, which says it"),
-        (SYSTEM, "bodies[0].position=[1, 0, 0]", "given beside ephemeris = true, which says it"),
+        (SCENE, "loads[1].position=[1, 0, 0]", "given with source, which determines it"),
+        (SYSTEM, "bodies[0].position=[1, 0, 0]", "given with ephemeris = true, which determines it"),
     ],
 )
 def test_mistakes_are_refused(text: str, setting: str, words: str) -> None:

@@ -101,7 +101,7 @@ def test_a_gradient_of_what_attracts_the_body_in_flight_is_refused() -> None:
     plain = replace(IN_FLIGHT, moment=np.zeros(3)).text
     for place in ("orbit = {semi_major_axis = 7e6}", "position = [7e6, 0, 0]"):
         gradient = f'[[loads]]\nkind = "gravity_gradient"\ngravitational_parameter = 3.986e14\n{place}\n'
-        with pytest.raises(ConfigError, match="an orbit of its own: remove it"):
+        with pytest.raises(ConfigError, match="another orbit: remove it"):
             prepare(rigidsim.parse(plain.replace("[time]", f"{gradient}[time]")))
         third = gradient.replace("3.986e14", "4.9028e12")
         prepare(rigidsim.parse(plain.replace("[time]", f"{third}[time]")))

@@ -76,7 +76,7 @@ def test_a_tensor_that_grows_as_a_whole_is_the_constant_one_in_another_time() ->
 
 
 def test_a_skaters_pirouette() -> None:
-    """Arms drawn in by a state of one's own: the rate follows the moment at once."""
+    """Arms drawn in by a user-defined state: the rate follows the moment at once."""
     text = scene(
         10, 'principal_moments = ["6 + 2*arms", "6 + 2*arms", "0.5 + 2*arms^2"]',
         initial="angular_velocity = [0, 0, 3]",

@@ -1,4 +1,4 @@
-"""States of one's own (``[[states]]``) against closed forms, and in the equations against numpy."""
+"""User-defined states (``[[states]]``) against closed forms, and in the equations against numpy."""
 
 from pathlib import Path
 from typing import Any

@@ -72,7 +72,7 @@ IN_ONE_TABLE: dict[str, list[tuple[str, ...]]] = {
     ],
     "part": [
         ('colour = "red"', "colour", "unknown key", "allowed: euler_angles"),
-        ("quaternion = [1, 0, 0, 0], euler_angles = [0, 0, 0]", "euler_angles", "given beside quaternion"),
+        ("quaternion = [1, 0, 0, 0], euler_angles = [0, 0, 0]", "euler_angles", "given with quaternion"),
     ],
     "ball": [
         ("reference = [1, 2]", "reference", "given 2 entries; exactly 3 are needed"),
@@ -99,7 +99,7 @@ IN_ONE_TABLE: dict[str, list[tuple[str, ...]]] = {
     ],
     "spin": [
         ('euler_angles = ["1 s", 0, 0]', "euler_angles[0]", "which is rad"),
-        ("angular_momentum = [1, 0, 0]", "angular_momentum", "given beside angular_velocity"),
+        ("angular_momentum = [1, 0, 0]", "angular_momentum", "given with angular_velocity"),
     ],
     "initial": [
         ("angular_velocty = [1, 0, 0]", "angular_velocty", 'did you mean "angular_velocity"?'),
@@ -114,7 +114,7 @@ IN_ONE_TABLE: dict[str, list[tuple[str, ...]]] = {
         ('[states]\nname = "s"', "[[states]]", "write [[states]] in double brackets"),
     ],
     "until 10": [
-        ("samples = 5\nevery = 1", "every", "given beside samples"),
+        ("samples = 5\nevery = 1", "every", "given with samples"),
         ("samples = 10_000_000_000_000", "samples", "given 10000000000000; 2 to 1e12"),
         ("every = 11", "every", "given 11.0 s, longer than the whole run"),
     ],

@@ -76,15 +76,15 @@ LEAPING = "time [day], semi_major_axis [au], eccentricity\n" + "\n".join(
     f"{10 * i}, 1, {0.1 * (7 * i % 5)}" for i in range(12)
 )
 REFUSED = {
-    "no such table": (CONFIG % "", "was given as text, without files beside it"),
-    "a column twice": (with_table(rows(), ', semi_major_axis = "1 au"'), "given beside it, too"),
+    "no such table": (CONFIG % "", "was given as text, without files next to it"),
+    "a column twice": (with_table(rows(), ', semi_major_axis = "1 au"'), "given with it, too"),
     "no axis": (
         with_table("time [day], eccentricity\n" + "\n".join(f"{10 * i}, 0.1" for i in range(9))),
-        "has no column semi_major_axis; add one, or give semi_major_axis beside table",
+        "has no column semi_major_axis; add one, or give semi_major_axis with table",
     ),
     "too short": (with_table(rows(every=7.0)), "but the run goes from 0.0 s to 5184000.0 s"),
-    "a rate": (with_table(rows(), ', node_rate = "1 deg/day"'), "whose columns say what moves"),
-    "turns": (with_table(rows(shift=-95.0)), "whole turns can't be told"),
+    "a rate": (with_table(rows(), ', node_rate = "1 deg/day"'), "whose columns determine what moves"),
+    "turns": (with_table(rows(shift=-95.0)), "whole turns can't be counted"),
     "hyperbola": (with_table(rows().replace("0.02", "1.02")), "row 1: eccentricity is out of range"),
 }
 

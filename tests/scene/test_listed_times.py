@@ -58,5 +58,5 @@ def test_tables_that_hold_no_times_are_refused(tmp_path: Path, table: str, told:
 
 
 def test_a_config_without_its_table_says_where_it_belongs() -> None:
-    with pytest.raises(rigidsim.ConfigError, match="without files beside it"):
+    with pytest.raises(rigidsim.ConfigError, match="without files next to it"):
         build_scene(rigidsim.parse(CONFIG))

@@ -84,7 +84,7 @@ def test_a_table_takes_them_for_its_mean_longitude() -> None:
 
 def test_a_wrong_pace_is_refused() -> None:
     with pytest.raises(
-        ConfigError, match="given beside period; at most one of period, sidereal_period, longitude_rate"
+        ConfigError, match="given with period; at most one of period, sidereal_period, longitude_rate"
     ):
         orbit_of('period = 5e3, longitude_rate = "1 deg/s"')
     for key in ("period", "sidereal_period", "longitude_rate"):

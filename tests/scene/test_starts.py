@@ -133,13 +133,13 @@ def test_start_and_observables_agree_to_the_last_digits(precision: str, axis: st
     [
         ("pole = [1, 0.5]", "", "pole", "set [frame] axes"),
         ('pole = [1, "91 deg"]', 'axes = "ICRF"', "pole", "declination of 91.0 deg; -90 to 90 deg"),
-        ("pole = [1, 0.5]\nquaternion = [1, 0, 0, 0]", 'axes = "ICRF"', "pole", "given beside quaternion"),
+        ("pole = [1, 0.5]\nquaternion = [1, 0, 0, 0]", 'axes = "ICRF"', "pole", "given with quaternion"),
         ("prime_meridian = 1", 'axes = "ICRF"', "prime_meridian", "given without pole or obliquity"),
         ("obliquity = 1", "", "node_longitude", "missing; obliquity needs it"),
         ("node_longitude = 1", "", "node_longitude", "given without obliquity"),
         ('obliquity = "-1 deg"\nnode_longitude = 1', "", "obliquity", "given -1.0 deg; 0 to 180 deg"),
         ("spin_period = 0", "", "spin_period", "given 0 s"),
-        ("spin_period = 1\nangular_velocity = [1, 0, 0]", "", "spin_period", "given beside angular_velocity"),
+        ("spin_period = 1\nangular_velocity = [1, 0, 0]", "", "spin_period", "given with angular_velocity"),
     ],
 )
 def test_starts_that_contradict_themselves_are_refused(start: str, frame: str, where: str, what: str) -> None:

@@ -57,10 +57,10 @@ def figure(j2: float = 1e-3, radius: str = "6378 km", pole: str = "[0, 0, 1]") -
 REFUSED = {
     "a module": (moon("os"), "which is no installed package of an ephemeris"),
     "no kernel": (moon().replace('[ephemeris]\nkernel = "de421"\n', ""), "neither [[bodies]] nor an [ephem"),
-    "with the body itself": (moon(sources=("earth_moon_barycenter",)), 'contains that of "moon"'),
+    "with the body itself": (moon(sources=("earth_moon_barycenter",)), 'contains "moon"'),
     "bodies, a part and the whole": (
         system(("earth", "moon", "earth_moon_barycenter")),
-        'whose mass contains that of "earth"',
+        'whose mass contains the mass of "earth"',
     ),
     "a coefficient that no mass has": (lumps('C = {"3,0" = 50}'), 'given 50.0 as "3,0" in C (unnormalized)'),
     "a source in the field's radius": (lumps('C = {"3,0" = 1e-6}', "1e9"), "within the radius of [body]"),

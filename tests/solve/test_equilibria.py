@@ -302,7 +302,7 @@ def test_independent_equations_come_back_and_grow_alike() -> None:
 @pytest.mark.parametrize(
     ("given", "changes", "where", "what"),
     [
-        (SATELLITE, {"start": "angular_velocity = [0, 0, 1]"}, "angular_velocity", "beside equilibrium"),
+        (SATELLITE, {"start": "angular_velocity = [0, 0, 1]"}, "angular_velocity", "with equilibrium"),
         (SATELLITE, {"orbit": "semi_major_axis = 7e6\neccentricity = 0.1"}, "equilibrium", "eccentricity is"),
         (SATELLITE, {"orbit": MOON["orbit"]}, "equilibrium", 'choose "cassini_1"'),
         (SATELLITE, {"more": '\n[[loads]]\nkind = "torque"\ncomponents = ["1e-4*sin(t)", "0", "0"]'},

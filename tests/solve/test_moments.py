@@ -121,7 +121,10 @@ def test_pulses_beyond_two_numbers_are_refused_with_the_reason() -> None:
 @pytest.mark.parametrize(
     ("torque", "words"),
     [
-        ("exp(-((t - 700.3)/{w})^2)/{w}", "double precision tells times there to 1.6e-13 s: choose a higher"),
+        (
+            "exp(-((t - 700.3)/{w})^2)/{w}",
+            "double precision resolves times there to 1.6e-13 s: choose a higher",
+        ),
         ("1/cosh(t - 700.3)^2", "exceeds the range of double precision there (2^1024): write it with"),
     ],
 )

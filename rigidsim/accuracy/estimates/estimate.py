@@ -308,7 +308,7 @@ def _by_tangents(course: Course, seconds: float) -> Seen:
     )
     lost = not found.whole or found.leading.max(initial=0.0) >= math.pi
     over = f", over the first {100 * found.share:.2g} % of the run, after which no digit is left"
-    how = "motions beside this one, perturbed at random as rounding does"
+    how = "motions near this one, perturbed at random as rounding does"
     return replace(found, how=how + (over if lost and found.share < 1 else _over(found.share)))
 
 

@@ -101,7 +101,7 @@ def carrying(
             ahead_of_it, _ = tangents.to(float(begin + ahead * (until - begin)), go_on)
             state, grown = tangents.to(float(until), go_on)
         except LostTangents:
-            why = "motions beside the averaged one can't be followed to its end"
+            why = "motions near the averaged one can't be followed to its end"
             raise Unmeasured(UnmeasuredCode.AVERAGED_STOPPED, why) from None
         except KeyboardInterrupt:
             raise Unmeasured(UnmeasuredCode.INTERRUPTED, "the measurement was interrupted") from None

@@ -102,7 +102,7 @@ def measure_modelling(
         oscillation, figure = window.recorded, window.recorded_figure
         changes = {name: _SPARE_OF_WHOLE * change.largest for name, change in window.changes.items()}
         growth = math.hypot(window.kept.growth_along, window.kept.growth_across)
-        how = "every rotation was resolved beside the run to its end"
+        how = "every rotation was resolved in a second run to its end"
     else:
         motions = [motion_at(average, states, exponent) for _, states, _ in places]
         steady = average.resonance is not None or not average.sources
@@ -112,8 +112,8 @@ def measure_modelling(
         changes, growth = _changed(average, windows, span), grown / span
         share = sum(w.kept.end - w.kept.start for w in windows) / span
         steps = sum(w.kept.steps for w in windows)
-        how = f"every rotation was resolved beside the run in {len(windows)} windows ({100 * share:.2g} % of "
-        how += f"it, {steps:,} steps), and the growth found there carried to its end"
+        how = f"every rotation was resolved in {len(windows)} windows ({100 * share:.2g} % of "
+        how += f"the run, {steps:,} steps), and the growth found there carried to its end"
     seconds = time.process_time() - started
     found = modelling_of(
         prepared,

@@ -233,7 +233,7 @@ def _followed(
     except ConfigError as error:
         code = UnmeasuredCode.FULL_REFUSED if average is None else UnmeasuredCode.AVERAGED_REFUSED
         why = "; ".join(problem.what for problem in error.problems)
-        raise Unmeasured(code, f"{words} can't be followed beside the run: {why}") from None
+        raise Unmeasured(code, f"{words} can't be followed: {why}") from None
     problem = compactly(begun)
     parts = assemble(problem)
     receiver = Collected(parts.evaluator, names)
@@ -246,7 +246,7 @@ def _followed(
         raise Unmeasured(UnmeasuredCode.INTERRUPTED, "the measurement was interrupted")
     if progress.status is not Status.FINISHED:
         code = UnmeasuredCode.FULL_STOPPED if average is None else UnmeasuredCode.AVERAGED_STOPPED
-        raise Unmeasured(code, f"{words}, beside the run, ended early: {progress.status.message}")
+        raise Unmeasured(code, f"{words} ended early: {progress.status.message}")
     return progress.steps, {name: receiver.parts(name)[0] for name in names}
 
 

@@ -29,7 +29,7 @@ def new(scene: str | None, name: str | None) -> None:
         for subject, scenes in by_subject():
             rows += [("", ""), ("", (subject, "bold")), *scenes.items()]
         on.table(["scene", "what it is"], rows[1:])
-        on.say("rigidsim new SCENE [NAME] writes NAME.toml, and beside it the tables that it reads")
+        on.say("rigidsim new SCENE [NAME] writes NAME.toml, and next to it the tables that it reads")
         return
     path, *beside = write_new(scene, name)
     for other in beside:

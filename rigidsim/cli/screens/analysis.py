@@ -106,7 +106,7 @@ def _print_signal(signal: SignalAnalysis, on: Page, length: float) -> None:
     if signal.lines:
         on.console.print(_lines(signal, angle, digits, length, narrow=on.width < _WIDE))
     else:
-        on.say(("  no line stands out of what is left", "dim"))
+        on.say(("  no line stands out of the residual", "dim"))
     left, level = (_with_unit(size, signal.units) for size in (signal.left, signal.level))
     more = "; more lines than were asked for (--lines)" if signal.exhausted else ""
     on.say((f"  left: rms {left}, lines below {level} aren't seen{more}", "dim"), whole=True)

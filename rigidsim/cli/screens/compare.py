@@ -15,7 +15,8 @@ def print_comparison(found: Comparison) -> None:
     """Print the result of ``rigidsim compare``."""
     on = Page()
     on.say(
-        (found.source, "bold"), f"  {found.rows:,} rows over {span_text(found.span_s)}, beside {found.name}"
+        (found.source, "bold"),
+        f"  {found.rows:,} rows over {span_text(found.span_s)}, compared with {found.name}",
     )
     good = found.verdict in (AGREES, UNDECIDED)
     on.line("verdict", found.verdict, "bold" if good else "bold yellow")

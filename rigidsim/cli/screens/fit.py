@@ -19,7 +19,7 @@ def print_fit(found: FitResult) -> None:
     on = Page()
     on.say((found.name, "bold"), f"  {found.sentence}")
     if not found.converged:
-        on.line("warning", "the fit hasn't converged: start nearer, or try several starts", "bold yellow")
+        on.line("warning", "the fit has not converged: start nearer, or try several starts", "bold yellow")
     rows: list[list[Styled]] = []
     for one in found.parameters:
         sigma = "undetermined" if one.sigma is None else f"{one.sigma:.2g}"

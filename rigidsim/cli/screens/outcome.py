@@ -39,7 +39,7 @@ def print_errors(accuracy: Accuracy, on: Page, what: str, *, brief: bool = False
         on.line(what, f"{text}{accuracy.times_compared} times)")
     elif estimate is not None:
         factor = accuracy.amplification or 1.0
-        unstable = f" ({factor:.1g} times that of a stable motion)" if factor > 1 and not brief else ""
+        unstable = f" ({factor:.1g} times a stable motion's)" if factor > 1 and not brief else ""
         size = f"uncertain by about {estimate:.1e} rad at the end{unstable}"
         if what == "axis":
             size = f"momentum's direction integrated to about {estimate:.1e} rad at the end{unstable}"

@@ -139,7 +139,7 @@ def print_tradeoff(result: dict[str, Any]) -> None:
     on.line("against", result["reference"])
     on.line(
         "cost",
-        "CPU time of integration over that of double precision in quaternions, and in seconds on this "
+        "CPU time of integration relative to double precision in quaternions, and in seconds on this "
         f"machine for what was measured; {result['processes']} fresh processes, medians, without recording",
     )
     if result["closed_form"] != "yes":

@@ -124,7 +124,7 @@ def _print_ended(summary: Summary, loads: Sequence[str], on: Page) -> None:
     on.line("drifts", "relative to: " + _scales(summary.invariants))
     if summary.held:
         on.line(
-            "projected", "correction: what the drift would have been; what is left is no independent check"
+            "projected", "correction: what the drift would have been; the residual is no independent check"
         )
     print_errors(summary.accuracy, on, "attitude" if summary.modelling is None else "axis")
     print_modelling(summary.modelling, on)

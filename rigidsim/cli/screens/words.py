@@ -83,7 +83,7 @@ def time_text(time: Span) -> str:
 
 
 def labelled(acting: str) -> tuple[str, str]:
-    """The label and the text of what is among the loads: rotors and states of one's own say so first."""
+    """The label and the text of what is among the loads: rotors and user-defined states say so first."""
     what, _, rest = acting.partition(" ")
     return (what, rest) if what in ("rotor", "state") else ("load", acting)
 
@@ -117,8 +117,7 @@ _WORDS = {
     Soundness.AMPLIFIED: _SOUND + "; the motion itself amplifies errors",
     Soundness.HELD: "sound: the corrections of invariants are within what rounding explains{share}; "
     "drifts themselves are projected away",
-    Soundness.LIMITED: "sound except for what the warning tells: every drift is within what rounding "
-    "explains{share}",
+    Soundness.LIMITED: "sound except for the warning: every drift is within what rounding explains{share}",
     Soundness.UNCHECKED: "unchecked: nothing is conserved here that could be watched",
     Soundness.INACCURATE: "not accurate enough, or not known to be: see the warning; drifts are within what "
     "rounding explains{share}",

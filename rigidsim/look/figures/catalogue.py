@@ -130,8 +130,7 @@ def figure(dataset: xarray.Dataset, what: str = OVERVIEW) -> Figure:
     kind = KINDS[what]
     if not kind.shows(shown.rows):
         raise ValueError(
-            f"figure {what!r}: needs {kind.needs}, which this run hasn't; "
-            f"it has {', '.join(available(dataset))}"
+            f"figure {what!r}: needs {kind.needs}; possible for this run: {', '.join(available(dataset))}"
         )
     return compose(shown, kind.curves, kind.planes)
 
@@ -195,7 +194,7 @@ def figure_format(path: Path) -> str:
 
 
 def _leading(rows: xarray.Dataset) -> tuple[Sequence[Panel], Sequence[Panel]]:
-    """Curves and planes of the page that suits a scene, with rates of rotors and states of one's own."""
+    """Curves and planes of the page that suits a scene, with rates of rotors and user-defined states."""
     found = gyrostat.leading(rows, timelines.rates)
     curves, planes = found or _of_body(rows)
     wheels = [] if found else [gyrostat.rotor_rates]

@@ -89,4 +89,4 @@ def _draw_states(axes: Axes, dataset: xarray.Dataset, found: tuple[Array, list[s
 
 
 OWN_STATES = [panel(_own_states(place), begins=True)(_draw_states) for place in range(3)]
-"""Panels of states of one's own, one for each of the first units."""
+"""Panels of user-defined states, one for each of the first units."""

@@ -32,7 +32,7 @@ def spectrum_figure(analysis: xarray.Dataset) -> Figure:
     with rc_context(STYLE):  # type: ignore[arg-type]
         figure = ShownFigure(figsize=(11, 3.6 * max(count, 0.5) + 0.5), layout="constrained")
         if not count:
-            figure.text(0.5, 0.5, "no line stands out of what is left", ha="center", color="#555555")
+            figure.text(0.5, 0.5, "no line stands out of the residual", ha="center", color="#555555")
         for number in range(count):
             axes = figure.add_subplot(count, 1, number + 1)
             _draw(axes, analysis.isel(signal=number), float(analysis.attrs["nyquist_frequency"]))

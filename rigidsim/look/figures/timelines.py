@@ -228,7 +228,7 @@ def braking(axes: Axes, dataset: xarray.Dataset, shares: dict[str, Array]) -> No
     hues = [{"angular momentum": VIOLET, "energy": ORANGE}[words] for words in shares]
     lines(axes, dataset, np.stack(list(shares.values()), axis=1), list(shares), hues)
     axes.set_ylim(bottom=min(0.0, axes.get_ylim()[0]))
-    key(axes, "What is left of the rotation")
+    key(axes, "Remaining rotation")
     axes.set_ylabel("share of the start")
 
 

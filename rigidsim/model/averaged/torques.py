@@ -105,7 +105,7 @@ class DrivingTorques:
         """Why they aren't functions of the rates alone; empty if they are."""
         bare, clock = self._mechanics(float), hy.make_vars(_CLOCK)
         if any(load.extra_states(bare) is not None for load in self.others):
-            return "a load has states of its own"
+            return "a load has states"
         torque = (hy.subs(x, {hy.time: clock}) for x in self._along_axes(float))
         return "a torque depends on time" if any(_CLOCK in hy.get_variables(x) for x in torque) else ""
 

@@ -63,7 +63,7 @@ class AttractorField(Load):
             what = "given for an attracting body that moves; allowed for one at rest, with position"
             raise around.fault("gravity_field", what)
         if fields.figure is not None and "2,0" in given.C:
-            raise around.fault("gravity_field.C", 'given "2,0" beside figure, whose J2 says it; remove one')
+            raise around.fault("gravity_field.C", 'given "2,0" and figure, whose J2 is the same; remove one')
         frame = frame_of(context, [x.at(context) for x in given.pole], given.prime_meridian.at(context))
         field = TurningHarmonics(
             coefficients_of(given, around), given.radius.at(context), frame, given.rate.at(context)

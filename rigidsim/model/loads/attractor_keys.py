@@ -27,7 +27,7 @@ class AttractorFieldTable(ConfigTable):
     C: dict[StrictStr, Dimensionless] = Field(default_factory=dict, examples=[{"2,0": -1.0826e-3}])
     """unnormalized coefficients of cos m lon by "degree,order", from degree 2 on: C_20 is minus J2"""
     S: dict[StrictStr, Dimensionless] = Field(default_factory=dict, examples=[{"2,2": -9.0387e-7}])
-    """those of sin m lon"""
+    """likewise with sin m lon"""
     pole: Triple[Dimensionless] = Field(examples=[[0, 0, 1]])
     """direction of its axis of rotation, space axes"""
     rate: Rate = Field(ZERO, examples=["7.2921151e-5 rad/s"], json_schema_extra={"default": 0})

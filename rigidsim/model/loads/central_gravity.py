@@ -103,7 +103,7 @@ class CentralGravity(PointAttraction):
             number = attracting_body(fields.orbit, around)
             for key in ("gravitational_parameter", "position", "source"):
                 if key in fields.model_fields_set:
-                    raise around.fault(key, "given beside orbit.body, which says it; remove it")
+                    raise around.fault(key, "given with orbit.body, which determines it; remove it")
             if around.carried_bodies.host is not None:
                 what = 'given "central_gravity", but [body] host makes the body one of [[bodies]], which '
                 raise around.fault("kind", what + 'attract each other anyway; give "gravity_gradient"')
@@ -113,7 +113,7 @@ class CentralGravity(PointAttraction):
             raise around.fault("kind", f'{what}velocity, or use "gravity_gradient" for a prescribed orbit')
         if fields.source is not None:
             if "position" in fields.model_fields_set:
-                raise around.fault("position", "given beside source, which says it; remove it")
+                raise around.fault("position", "given with source, which determines it; remove it")
             strength = kernel_strength(fields.gravitational_parameter, fields.source, around)
             if fields.source != around.host:  # which is the origin of the space axes
                 return KernelAttractor.of(fields.source, strength, around)

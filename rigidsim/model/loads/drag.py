@@ -54,7 +54,7 @@ class DragFields(LoadFields):
     )
     scale_height: Metre | None = Field(
         default=None,
-        description="height over which the density falls to 1/e; by default it is that of density everywhere",
+        description="height over which the density falls to 1/e; by default density holds everywhere",
         examples=["60 km"],
     )
     altitude: Metre | None = Field(
@@ -146,7 +146,7 @@ def _falling(fields: DragFields, around: Setting) -> list[Expression]:
     if fields.scale_height is None or fields.altitude is None:
         return []
     if not isinstance(fields.density, ExactNumber):
-        what = "given beside an expression for density, which says how it falls; remove it and altitude"
+        what = "given with an expression for density, which determines its fall; remove it and altitude"
         raise around.fault("scale_height", what)
     if fields.scale_height.sign <= 0:
         what = f"given {float(fields.scale_height):g}; a positive length is allowed"

@@ -140,7 +140,7 @@ class EddyCurrents(InMagneticField):
 def _of_tensor(given: list[ExactNumber], fields: EddyCurrentsFields, around: Setting) -> Vector:
     for key in ("conductivity", "radius", "thickness"):
         if getattr(fields, key) is not None:
-            raise around.fault(key, "given beside magnetic_tensor, which says it; remove one of them")
+            raise around.fault(key, "given with magnetic_tensor, which determines it; remove one of them")
     for i, x in enumerate(given):
         if x.sign < 0:
             raise around.fault(f"magnetic_tensor[{i}]", f"given {float(x):g}; zero or more is allowed")

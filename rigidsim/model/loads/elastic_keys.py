@@ -59,13 +59,13 @@ def elastic_values(
         what = f"given {context.nstr(plain(delay), 8)} s; a time of at least 0 is allowed: an effect "
         raise fault("delay", what + "comes after its cause")
     if around.free_flight:
-        what = "given for a body with a position or velocity, whose flight is that of a rigid one; leave "
+        what = "given for a body with a position or velocity, whose flight treats it as rigid; leave "
         raise fault("", what + "out [initial] position and velocity, and give the source's orbit")
     if any(isinstance(x, str) for x in config.body.principal_moments or []):
-        what = "given beside principal_moments that vary; only one of them can change the tensor"
+        what = "given with principal_moments that vary; only one of them can change the tensor"
         raise fault("", what)
     if config.initial.angular_momentum is not None:
-        what = "given beside [body] elasticity, on which it depends what the rates are then; give "
+        what = "given with [body] elasticity, on which it depends what the rates are then; give "
         raise ConfigError(Problem("[initial] angular_momentum", what + "angular_velocity"))
     rate = None if table.mean_rate is None else table.mean_rate.at(context)
     raising = _raising(config, table.raised_by)

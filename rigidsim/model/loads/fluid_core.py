@@ -101,9 +101,7 @@ class FluidCore(Load):
             )
             raise ConfigError(Problem("[body] core", what + "would turn; remove reference or center_of_mass"))
         if fields.initial.angular_momentum is not None and table.angular_velocity is not None:
-            what = (
-                "given beside angular_velocity of [body] core, from which the body's own would follow; give "
-            )
+            what = "given with angular_velocity of [body] core, from which the body's own would follow; give "
             raise ConfigError(Problem("[initial] angular_momentum", what + "angular_velocity here, too"))
         if fields.initial.equilibrium is not None:
             what = "given for a body with a fluid core, and equilibria are found for rigid bodies; give the "
@@ -113,7 +111,7 @@ class FluidCore(Load):
         if axis is None and flattening != 0 and moment != 0:
             what = (
                 f"given {_text(flattening)}, but the body's two largest moments are equal, so that no axis "
-                "of largest moment tells the core's; 0 is"
+                "of largest moment is the core's; 0 is"
             )
             raise _fault("flattening", what)
         rate = None if table.angular_velocity is None else [x.at(context) for x in table.angular_velocity]

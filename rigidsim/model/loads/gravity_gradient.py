@@ -80,7 +80,7 @@ class GravityGradient(GradientSource, Load):
         if fields.orbit is not None and fields.orbit.body is not None:
             for key in ("gravitational_parameter", *_PLACES[1:]):
                 if getattr(fields, key) is not None:
-                    raise around.fault(key, "given beside orbit.body, which says it; remove it")
+                    raise around.fault(key, "given with orbit.body, which determines it; remove it")
             made = MovingGradient(around.carried_bodies, attracting_body(fields.orbit, around))
             if made.masses.host is None and made.masses.full:
                 what = 'given "gravity_gradient" for a body that flies by itself under coupling = "full"; '

@@ -60,7 +60,7 @@ class MagneticFieldFields(OrbitFields):
     )
     position: Triple[Metre] | None = Field(
         default=None,
-        description="place of the source, space axes, for a body with a position of its own; by default the "
+        description="place of the source, space axes, for a body with a position; by default the "
         "point of its central_gravity",
         examples=[[0, 0, 0]],
     )
@@ -103,7 +103,7 @@ def refuse_contradictions(fields: MagneticFieldFields, around: Setting) -> None:
     if fields.elements is not None and (around.free_flight or host):
         why = "is one of [[bodies]]; a uniform field is allowed"
         if around.free_flight:
-            why = "has a position of its own, where the field is taken: remove it and "
+            why = "has a position, where the field is taken: remove it and "
             why += "gravitational_parameter, and keep source_moment"
         raise around.fault(fields.elements.key, f"given for a body that {why}")
     if fields.field_degree is not None and fields.field != IGRF:

@@ -1,4 +1,4 @@
-"""Mass that moves within the body: principal moments as expressions of time and states of one's own.
+"""Mass that moves within the body: principal moments as expressions of time and user-defined states.
 
 What moves does so symmetrically: it carries no momentum of its own relative to the body axes, and leaves the
 centre of mass where it is. With I(t) in the body axes
@@ -175,7 +175,7 @@ class MovedMass(Load):
         return found
 
     def _by_states(self, scene: Scene) -> float:
-        """Largest ratio by which a moment falls while states of one's own go to where they are driven at some
+        """Largest ratio by which a moment falls while user-defined states go to where they are driven at some
         times of the run, all together, part of the way or as far to the other side; 1 if none reads them.
         """
         if not self.reads:

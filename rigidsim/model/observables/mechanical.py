@@ -67,7 +67,7 @@ def rotational_scale(m: Mechanics, *, kept: bool = False) -> tuple[Any, str]:
     amplitude = potential_amplitude(scene) + loads_amplitude(scene) + carried + _driven(m)
     if kinetic + amplitude == 0:
         return context.one, "1 J (the body is at rest)"
-    name = "initial rotational energy" + (" plus that of the loads" if amplitude else "")
+    name = "initial rotational energy" + (" plus energy of the loads" if amplitude else "")
     return kinetic + amplitude, name
 
 

@@ -1,4 +1,4 @@
-"""What is recorded of states of one's own: the states themselves."""
+"""What is recorded of user-defined states: the states themselves."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from rigidsim.model.observables.observable import Observable
 
 
 def own_observables(m: Kinematics) -> Iterator[Observable]:
-    """The recorded variable of each state of one's own, which default records have."""
+    """The recorded variable of each user-defined state, which default records have."""
     for state in m.scene.states:
         unit = m.scaling.own.get(state.name, 0)
         yield Observable(

@@ -143,7 +143,7 @@ def _kept(m: Mechanics) -> str | None:
         return "the point masses feel each other's gravity alone"
     if m.drives_work or any(not isinstance(load, Reacting) for load in m.acting):
         return None
-    return "all forces are those of the bodies on each other"
+    return "all forces act between the bodies"
 
 
 def _alone(m: Mechanics) -> str | None:
@@ -153,7 +153,7 @@ def _alone(m: Mechanics) -> str | None:
 def _whole(m: Mechanics) -> str | None:
     if not _masses(m).full:
         return 'the bodies don\'t feel this one (orbital_...); leave it out, or set [body] coupling = "full"'
-    return None if _kept(m) else "other loads than those of the bodies act; leave it out"
+    return None if _kept(m) else "loads act that don't come from the bodies; leave it out"
 
 
 _POINTS = ("point_masses",)

@@ -184,7 +184,7 @@ def _no_largest(m: Mechanics) -> str | None:
     if unique_axis(m.scene.body, m.scene.context, largest=True) is not None:
         return None
     return (
-        "the two largest principal moments are equal, so that no axis is that of the largest; record "
+        "the two largest principal moments are equal, so that no single axis has the largest; record "
         "nutation_angle"
     )
 

@@ -97,7 +97,7 @@ class PointMassStates:
         exponents = ([scaling.length] * 3 + [scaling.speed] * 3) * len(masses.names)
         why = "[[bodies]]: point masses under mutual gravity"
         if pulls:
-            why += ", and that of the body's shape"
+            why += ", and gravity of the body's shape"
         return StateBlock(names, derivatives, initial, exponents=exponents, why=why)
 
 

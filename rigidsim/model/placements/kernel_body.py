@@ -190,9 +190,9 @@ def refuse_same_sources(loads: Iterable[Any], host: str | None) -> None:
         parts = [x for x in _PARTS if (load.kind, x) in seen or x == host]
         if (load.kind, _BOTH) in seen and parts:
             what = (
-                f'given "{name}", but the mass of "{_BOTH}" contains that of "{parts[0]}", a source or the '
+                f'given "{name}", but the mass of "{_BOTH}" contains "{parts[0]}", a source or the body as '
             )
-            what += 'body as well; give "earth" and "moon", or one of them'
+            what += 'well; give "earth" and "moon", or one of them'
             raise ConfigError(Problem(where, what))
 
 
@@ -208,5 +208,5 @@ def kernel_body(source: str, around: Setting) -> Ephemeris:
 def refuse_series(around: Setting) -> None:
     """Refuse analytic series beside a kernel whose axes they don't share."""
     if around.ephemeris is not None and around.axes is None:
-        what = 'given beside [ephemeris], whose axes are ICRF unless [frame] axes = "ecliptic J2000"; set '
+        what = 'given with [ephemeris], whose axes are ICRF unless [frame] axes = "ecliptic J2000"; set '
         raise around.fault("ephemeris", what + "that, or give source instead")

@@ -86,7 +86,7 @@ def build_body(
     own = [name for name in given if name != "preset"]  # they take the place of a preset's moments
     if len(own) > 1 or not given:
         found = " and ".join(own) if own else "no source of inertia"
-        beside = ", beside a preset at most one of the others" if preset else ""
+        beside = ", with a preset at most one of the others" if preset else ""
         raise refusal("", f"given {found}; exactly one of {', '.join(SOURCES)} is needed{beside}")
     source = own[0] if own else "preset"
     if source != "shape":

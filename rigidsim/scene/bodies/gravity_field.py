@@ -53,9 +53,9 @@ class GravityFieldTable(ConfigTable):
     C: dict[StrictStr, Dimensionless] | None = Field(None, examples=[{"3,0": -8.4e-6, "3,1": 2.8e-5}])
     """unnormalized coefficients of cos m lon by "degree,order", from degree 3 on: C_30 is minus J3"""
     S: dict[StrictStr, Dimensionless] | None = Field(None, examples=[{"3,1": 5.9e-6}])
-    """those of sin m lon"""
+    """likewise with sin m lon"""
     file: StrictStr | None = Field(None, examples=["FIELD.gfc"])
-    """instead: a file beside the config, ICGEM (.gfc) or SHADR (.tab), whose text is taken into the config"""
+    """instead: a file next to the config, ICGEM (.gfc) or SHADR (.tab), whose text is copied here"""
     degree: StrictInt | None = Field(None, ge=LEAST, le=MOST, examples=[8])
     """highest degree that is read from the file; by default the highest that a load asks for"""
 
@@ -70,7 +70,7 @@ class GravityFieldTable(ConfigTable):
     def _one_source(self) -> GravityFieldTable:
         listed = [key for key in ("radius", "C", "S") if getattr(self, key) is not None]
         if self.file is not None and listed:
-            raise refuse(f"given file beside {' and '.join(listed)}; either file, or radius with C and S")
+            raise refuse(f"given file with {' and '.join(listed)}; either file, or radius with C and S")
         if self.file is None:
             if self.radius is None:
                 raise refuse("missing radius, the reference radius of C and S; or give file")
@@ -177,7 +177,7 @@ def _of_file(name: str, body: Any, context: Any, texts: Mapping[str, str], degre
     given = f'given "{name}", '
     if name not in texts:
         known = ", ".join(texts) or "none"
-        what = "but this config was given as text, without files beside it; put the file's text into "
+        what = "but this config was given as text, without files next to it; put the file's text into "
         raise fault(f'{given}{what}[tables."{name}"] text (there now: {known})', " file")
     try:
         read = read_field(texts[name], degree)

@@ -46,7 +46,7 @@ class SurfaceTable(ConfigTable):
     specular: Dimensionless = ZERO
     """share of light that is reflected as by a mirror"""
     diffuse: Dimensionless = ZERO
-    """share of light that is scattered by Lambert's law; what is left of 1 is absorbed"""
+    """share of light that is scattered by Lambert's law; the rest is absorbed"""
     drag_coefficient: Dimensionless = _DRAG
     """of drag, for the area seen against the stream"""
 
@@ -117,7 +117,7 @@ def _of(table: SurfaceTable, place: str, center_of_mass: Vector, context: Any) -
             raise _refusal(f"{place}.{key}", f"given {float(getattr(table, key)):g}; zero or more is allowed")
     if table.specular.at(context) + table.diffuse.at(context) > 1 + context.ldexp(context.one, -_BITS):
         what = (
-            f"given {float(table.specular):g} beside diffuse = {float(table.diffuse):g}; shares of the light "
+            f"given {float(table.specular):g} with diffuse = {float(table.diffuse):g}; shares of the light "
         )
         raise _refusal(f"{place}.specular", what + "add up to at most 1")
     center = center_of_mass if table.position is None else [x.at(context) for x in table.position]

@@ -99,7 +99,7 @@ class Preset:
 
 
 def _filled(table: Mapping[str, Any], own: Mapping[str, Any]) -> dict[str, Any]:
-    """A table with its keys, and those of the tables within, replaced by one's own."""
+    """A table with its keys, also in the tables within, replaced by the given ones."""
     found = {**table, **own}
     for key, inner in table.items():
         if isinstance(inner, Mapping) and isinstance(own.get(key), Mapping):

@@ -96,7 +96,7 @@ class Part(Solid):
     euler_angles: Triple[Angle] | None = None
     """attitude from the part's own axes to the body's, instead of quaternion"""
     euler_sequence: EulerSequence | None = None
-    """sequence of euler_angles; by default that of [integrator]"""
+    """sequence of euler_angles; by default [integrator] euler_sequence"""
 
 
 class ElasticityTable(ConfigTable):
@@ -109,8 +109,8 @@ class ElasticityTable(ConfigTable):
     delay: Second = Field(ZERO, examples=["0.108 day"])
     """time by which the distortion lags behind its cause; without one nothing is dissipated"""
     mean_rate: Rate | None = Field(None, examples=["0.2299715 rad/day"])
-    """spin about the figure axis whose distortion is in the body's moments already; by default that of the
-    start
+    """spin about the figure axis whose distortion is in the body's moments already; by default the rate at
+    the start
     """
     raised_by: EachOnce[StrictStr] | None = Field(None, examples=[["earth"]])
     """names of the loads whose sources raise tides; by default all gravity gradients; [] for none"""
@@ -144,7 +144,7 @@ class Core(ConfigTable):
 
 
 class Body(Solid):
-    """``[body]``: exactly one source of inertia, and what loads need beside it."""
+    """``[body]``: exactly one source of inertia, and what loads need in addition."""
 
     principal_moments: Triple[MomentOrFormula] | None = Field(
         None, examples=[[1, 2, 2.5], [1, 2, "2 + 0.1*sin(t)"]]

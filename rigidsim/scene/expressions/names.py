@@ -45,7 +45,7 @@ class Readable:
     Attributes:
         unit: its SI unit; empty for numbers and angles, None if it isn't known.
         states: those without which it has no value, carried by need: "attitude", "flight", or the name of a
-            state of one's own.
+            user-defined state.
         bound: of its absolute value; of an angle that turns, within one turn.
         changes_sign: with the quaternion's sign, which means nothing.
         turns: whether it is an angle that is continued over full turns.

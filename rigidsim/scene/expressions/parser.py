@@ -72,7 +72,7 @@ _NUMBER = r"(?:[0-9]+(?:_[0-9]+)*\.?(?:[0-9]+(?:_[0-9]+)*)?|\.[0-9]+)(?:[eE][+-]
 _TOKEN = re.compile(
     rf"(?P<number>{_NUMBER})|(?P<name>[A-Za-z][A-Za-z0-9_]*)|(?P<sign>\*\*|[-+*/^(),])|(?P<end>\Z)"
 )
-_PARENTHESES = 'a number with a unit stands in parentheses beside "/" and "^"'
+_PARENTHESES = 'a number with a unit stands in parentheses next to "/" and "^"'
 _CHECKING = context_for("quadruple")
 
 

@@ -388,7 +388,7 @@ def kernel_of(given: str, source: str) -> Kernel:
         if (folder := _package(given)) is not None:
             return PackagedKernel(given, folder)
         beside = any(os.path.isfile(folder / f"{given}.bsp") for folder in folders_of(source))
-        hint = f'the file beside the config is "./{given}.bsp"' if beside else f"pip install {given}"
+        hint = f'the file next to the config is "./{given}.bsp"' if beside else f"pip install {given}"
         if not beside and given not in _PACKAGES:
             hint = f"allowed: {', '.join(_PACKAGES)}"
         what = f"which is no installed package of an ephemeris{nearest(given, _PACKAGES)}; {hint}, or the "

@@ -222,7 +222,7 @@ def _in_binary(
         raise KernelError(f"which has several axes; name one by its number in orientation_of: {known}")
     code = codes[0] if asked is None else _number(toolkit, asked)
     if code not in codes:
-        what = f"which has no axes {shown(asked)}; a number of those that it has is allowed: {known}"
+        what = f"which has no axes {shown(asked)}; one of its numbers is allowed: {known}"
         raise KernelError(what)
     window = toolkit.pckcov(str(place), code)
     spans = [toolkit.wnfetd(window, i) for i in range(toolkit.wncard(window))]

@@ -88,7 +88,7 @@ def _factors(table: TextTable) -> dict[str, Any]:
     if TIME not in found:
         raise TableError(f"line {table.head}: has no column {TIME}; it is needed, such as time [yr]")
     if len(found) < 2:
-        raise TableError(f"line {table.head}: has no column beside {TIME}; at least one element is needed")
+        raise TableError(f"line {table.head}: has no column except {TIME}; at least one element is needed")
     for one, other in (("periapsis", "longitude_of_periapsis"), ("mean_anomaly", "mean_longitude")):
         if one in found and other in found:
             raise TableError(f"line {table.head}: has both {one} and {other}; give one of them")

@@ -126,8 +126,8 @@ class TabulatedOrbit:
                 raise TableError(
                     f"rows {i} and {i + 1}: the mean longitude is {float(abs(part)):.2f} turns off the "
                     f"{float(expected / turn):.6g} turns of Kepler's third law between them, so that whole "
-                    "turns can't be told; give rows closer together, a column semi_major_axis, or period; or "
-                    "leave the anomaly's column out for a mean longitude by Kepler's law"
+                    "turns can't be counted; give rows closer together, a column semi_major_axis, or period; "
+                    "or leave the anomaly's column out for a mean longitude by Kepler's law"
                 )
             found.append(found[-1] + expected + part * turn)
         return found

@@ -70,7 +70,7 @@ class Sweep:
         if experiment.config.fit is not None:
             problems += _of_fits(table)
         if experiment.config.output.sensitivity:
-            what = "given beside [sweep], which keeps none; leave it out, or run its members by themselves"
+            what = "given with [sweep], which keeps none; leave it out, or run its members by themselves"
             problems.append(Problem("[output] sensitivity", what))
         if not problems:
             problems += _counts(table, axes)
@@ -189,7 +189,7 @@ def _of_fits(table: SweepTable) -> list[Problem]:
     """What a sweep of fits can't have."""
     problems = []
     if "keep" in table.model_fields_set:
-        what = "given beside [fit]: each member is a fit, and what it finds is kept; leave keep out"
+        what = "given with [fit]: each member is a fit, and what it finds is kept; leave keep out"
         problems.append(Problem("[sweep] keep", what))
     for key in table.axes:
         if re.fullmatch(r"\s*fit\s*(\.\s*parameters\b.*)?", key):

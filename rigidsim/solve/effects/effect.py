@@ -1,4 +1,4 @@
-"""An effect: something that happens at boundaries of natural steps, with a memory of its own."""
+"""An effect: something that happens at boundaries of natural steps, with a memory."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ class Effect:
         return None
 
     def back_to(self, memory: Any, stepper: Stepper) -> None:
-        """Return to an earlier memory; the stepper's state follows after that of all effects."""
+        """Return to an earlier memory; the stepper's state is restored after all effects."""
 
     def pack(self, memory: Any) -> dict[str, np.ndarray]:
         """A memory as arrays of a checkpoint, float64 or int64, with names that no other effect uses."""

@@ -286,9 +286,7 @@ def search_for(scene: Scene, name: str) -> SoughtReturn:
     if scene.config.initial.spin_period is not None:
         spin = spin_rate(scene)
         if spin < 0:
-            what = (
-                "given a negative time beside a Cassini state, whose spin is about the figure axis; states "
-            )
+            what = "given a negative time with a Cassini state, whose spin is about the figure axis; states "
             raise refusal(
                 "spin_period", what + "at more than 90 deg from the normal are retrograde: cassini_3"
             )

@@ -113,7 +113,7 @@ def _orbit(scene: Scene) -> KeplerOrbit:
     if not orbits or scene.free_flight:
         what = "no load has a source on an orbit (gravity_gradient with orbit)"
         if scene.free_flight:
-            what = "the body flies on an orbit of its own, and this is for a prescribed one"
+            what = "the body flies on another orbit, and this is for a prescribed one"
         raise refusal(_KEY, f"{given}{what}; give the attitude and rates themselves")
     if having(Reshaping, loads):
         what = "the body's moments vary, and its equilibria with them"

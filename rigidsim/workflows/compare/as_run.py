@@ -175,7 +175,7 @@ def _read(given: Attitudes, second: float) -> tuple[Reading, RateReading | None,
     if given.rates is None:
         if given.angles is not None or not (given.named or given.matrices is not None):
             raise RigidsimError(
-                f"{source}: without angular velocities its convention can't be told; name a quaternion "
+                f"{source}: without angular velocities its convention can't be determined; name a quaternion "
                 "qw qx qy qz, add wx wy wz, or let rigidsim compare CONFIG FILE --timeline find it"
             )
         told.append("the attitude was taken from body axes to space axes")
@@ -184,12 +184,12 @@ def _read(given: Attitudes, second: float) -> tuple[Reading, RateReading | None,
     if not near:
         raise RigidsimError(
             f"{source}: in no convention tried does its attitude turn at its rates, or its rows are too far "
-            "apart; rigidsim compare CONFIG FILE --timeline finds the convention beside an experiment"
+            "apart; rigidsim compare CONFIG FILE --timeline finds the convention with an experiment"
         )
     reading, rates = near[0].reading, near[0].rates
     told.append(f"taken as {reading}, rates along {rates.axes} axes in {rates.unit}: it turns at these")
     if len(near) > 1:
         told.append(
-            f"{len(near) - 1} other conventions would fit as well; beside an experiment compare tells more"
+            f"{len(near) - 1} other conventions would fit as well; compare with an experiment can decide"
         )
     return reading, rates, told

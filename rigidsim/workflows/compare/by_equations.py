@@ -132,7 +132,7 @@ class ByEquations:
             self.by_attitudes = found
             if self.rates is None:
                 self.told.append(
-                    "the file has no angular velocities: defects are those of the nearest rates, over "
+                    "the file has no angular velocities: defects are taken with the nearest rates, over "
                     f"{len(rows)} windows of {parts + 1} rows"
                 )
                 self._keep(rows[:, 0], np.sqrt(np.sum(found.defects**2, axis=1)), None)

@@ -52,7 +52,7 @@ from rigidsim.workflows.read import Given, as_experiment
 
 WITHIN = 1e-9
 """Largest angle (rad) between attitudes that agree, if nothing else is asked for."""
-_ROUNDED = "the attitude error is that of its times, which are rounded"
+_ROUNDED = "the attitude error comes from its times, which are rounded"
 _CLOSE = 0.2  # of the last digit of times, to which the rounding of evenly spaced ones is known
 _RANDOM = 0.5  # correlation of neighbours, up to which errors are those of rounding
 _EXACT = 1e-13  # relative, of times in double precision
@@ -226,7 +226,7 @@ class _Judging:
     def _judged(self, seen: Evidence, known: ByEquations | None) -> tuple[str, str]:
         """The verdict of attitudes that aren't the experiment's."""
         if known is None:
-            return UNDECIDED, f"model and integration can't be told apart: {self.why_not}"
+            return UNDECIDED, f"model and integration can't be distinguished: {self.why_not}"
         found, windows = None, known.windows
         if windows is not None:
             rate_defects = float(np.sqrt(np.mean(windows.rates**2)))

@@ -86,7 +86,7 @@ def agreement(known: Evidence) -> tuple[str, str] | None:
     if known.turn >= np.pi:
         return UNDECIDED, f"{aliased}, and its rates differ by {known.rate_error:.3g} rad/s; write more rows"
     return INCONSISTENT_RATES, (
-        f"its attitudes are the experiment's, but its rates aren't those at which these turn: they differ by "
+        f"its attitudes are the experiment's, but they don't turn at its rates, which differ by "
         f"up to {known.rate_error:.3g} rad/s, at a motion of {known.rate:.3g} rad/s"
     )
 
@@ -105,7 +105,7 @@ def contradiction(known: Evidence, windows: WindowDefects) -> tuple[str, str] | 
     if missed <= _NO_RATES * known.rate and not (moved and slip / _SAME < missed < slip * _SAME):
         return None
     return INCONSISTENT_RATES, (
-        f"its rates aren't those at which its attitudes turn: these miss {missed:.3g} rad/s, at a motion of "
+        f"its attitudes don't turn at its rates: these miss {missed:.3g} rad/s, at a motion of "
         f"{known.rate:.3g} rad/s; remove the rates to have its attitudes judged alone"
     )
 
@@ -176,7 +176,7 @@ def by_attitudes(known: Evidence, windows: WindowsOfAttitudes | None) -> tuple[s
             f"{windows.unexplained:.2g} rad"
         )
     return UNDECIDED, (
-        f"its model and its integration can't be told apart: {told} other moments or steady torques leave "
+        f"its model and its integration can't be distinguished: {told} other moments or steady torques leave "
         f"{left:.2g} rad; write angular velocities too (wx wy wz), or more rows"
     )
 

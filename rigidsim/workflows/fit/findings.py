@@ -191,7 +191,7 @@ class Findings:
             ),
         }  # fmt: skip
         if self.keys.considered:
-            words = {"long_name": "change of the parameter by that of a considered number"}
+            words = {"long_name": "change of the parameter with a considered number"}
             values["consider_sensitivity"] = (("parameter", "considered"), self.sensitivity, words)
         coordinates = {
             "parameter": names,

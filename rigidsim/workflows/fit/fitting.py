@@ -40,7 +40,7 @@ def fit(
     """Estimate the parameters of a config's ``[fit]`` from its data.
 
     Args:
-        experiment: as for ``rigidsim.run``; data files lie beside the config, or in the working directory
+        experiment: as for ``rigidsim.run``; data files lie next to the config, or in the working directory
             where it comes from no file.
         changes: values to replace, as for ``rigidsim.run``.
         out: folder of the fits' folders, where ``out/NAME/`` keeps everything, and where an interrupted fit
@@ -64,7 +64,7 @@ def fit(
     folder = FitFolder(Path(out) / asked.config.name)
     missing = [path for files in places for path in files.all if not path.exists()]
     if missing:
-        raise RigidsimError(f"{missing[0]}: there is no such file; [[fit.data]] files lie beside the config")
+        raise RigidsimError(f"{missing[0]}: there is no such file; [[fit.data]] files lie next to the config")
     refuse_inputs([folder.path], [*asked.files, *(path for files in places for path in files.all)])
     with folder.locked():
         folder.begin(asked, places, force=force)

@@ -88,6 +88,6 @@ def _refuse_other(found: xarray.Dataset, fit: xarray.Dataset, source: str) -> No
     worst = int(np.argmax(apart - _SHARE * sigma))
     if apart[worst] > max(_ROUNDING, _SHARE * sigma[worst]):
         raise RunFolderError(
-            f"{source}: the motion of fitted.toml is {apart[worst]:.2g} rad from that of the fit's dataset "
-            f"at {found['time'].values[worst]:.6g} s; was it changed? rigidsim verify {source} tells"
+            f"{source}: the motion of fitted.toml is {apart[worst]:.2g} rad from the fit's dataset "
+            f"at {found['time'].values[worst]:.6g} s; was it changed? rigidsim verify {source} checks it"
         )

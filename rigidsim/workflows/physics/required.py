@@ -169,7 +169,7 @@ def _refuse_without_effects(experiment: Experiment, models: Models) -> None:
     if models.effects:
         return
     what = "has neither loads nor rotors, elasticity or a core, so that nothing can be left out: the body "
-    what += "rotates freely; plan without --physics tells what is integrated"
+    what += "rotates freely; plan without --physics shows what is integrated"
     raise ConfigError(Problem("config", what), experiment.source)
 
 

@@ -111,7 +111,7 @@ def refuse_other_data(files: Sequence[str], beside: Path | None, folder: Path, *
 
 def _gone(given: str, place: Path) -> RigidsimError:
     return RigidsimError(
-        f'{place}: there is no such file, which [[fit.data]] names as "{given}"; it belongs beside the '
+        f'{place}: there is no such file, which [[fit.data]] names as "{given}"; it belongs next to the '
         f"config, from where {SWEEP} copies it into the sweep's folder"
     )
 

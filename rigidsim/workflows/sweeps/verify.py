@@ -64,7 +64,7 @@ def _problems(saved: SavedSweep, dataset: xarray.Dataset, sweep: Sweep) -> list[
     if dataset.attrs.get("config_sha256") != sweep.experiment.sha256:
         problems.append(f"{saved.folder.dataset}: embeds another config than its config_sha256 says")
     if saved.outcome.members != sweep.count:
-        problems.append(f"{saved.place}: the summary tells of {saved.outcome.members} members, "
+        problems.append(f"{saved.place}: the summary has {saved.outcome.members} members, "
                         f"the config of {sweep.count}")  # fmt: skip
     if saved.outcome.dataset_sha256 is None:
         problems.append(f"{saved.place}: the summary doesn't say which dataset it was written for")
