@@ -79,7 +79,7 @@ class MassLoss(Load):
         context = around.context
         rate = around.expression("rate", fields.rate, "kg/s")
         if around.free_flight:
-            what = "given for a body with a position or velocity, whose flight is that of a constant mass; "
+            what = "given for a body with a position or velocity, whose flight has a constant mass; "
             raise around.fault("mass_loss", what + "leave out [initial] position and velocity")
         if fields.exit_radius.sign < 0:
             what = f"given {float(fields.exit_radius):g} m; a radius of at least 0 is allowed"
@@ -89,7 +89,7 @@ class MassLoss(Load):
         radius, length = fields.exit_radius.at(context), norm(context, arm)
         if radius != 0 and length == 0:
             what = "given the centre of mass, from which the axis of a round exit points to its middle; "
-            raise around.fault("exit_point", what + "give a point beside it, or leave out exit_radius")
+            raise around.fault("exit_point", what + "give another point, or leave out exit_radius")
         geometry = []
         for i, x in enumerate(arm):
             row = [-x * y for y in arm]
@@ -112,10 +112,8 @@ class MassLoss(Load):
         """Refused beside a weight, whose torque is that of a constant mass."""
         context, scaling = m.scene.context, m.scaling
         if m.scene.torque_arm is not None:
-            what = (
-                "given beside uniform_gravity on a body that is held off its centre of mass, whose weight is "
-            )
-            what += "that of a constant mass; hold it at its centre of mass"
+            what = "given with uniform_gravity on a body that is held off its centre of mass, whose weight "
+            what += "takes a constant mass; hold it at its centre of mass"
             raise ConfigError(Problem(self.rate.where, what))
         (rate,), terms = written(m, [self.rate]), []
         for column, (state, unit) in enumerate(zip(m.rate_states, m.numbers.rate_units, strict=True)):
