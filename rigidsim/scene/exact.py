@@ -70,7 +70,7 @@ class ExactNumber:
         return self.rational if self.pi_power == 0 else fraction_of(self.at(context))
 
     def __float__(self) -> float:
-        return float(self.at(_for_doubles()))
+        return float(self.at(for_doubles()))
 
     @property
     def alone(self) -> "ExactNumber":
@@ -104,7 +104,7 @@ ZERO = ExactNumber(Fraction(0))
 
 
 @cache
-def _for_doubles() -> Any:
+def for_doubles() -> Any:
     """Context in which numbers are rounded to doubles; making one takes longer than reading a config."""
     context = mpmath.MPContext()
     context.prec = 120

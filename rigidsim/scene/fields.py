@@ -24,9 +24,9 @@ from pydantic import (
 from pydantic_core import PydanticCustomError, core_schema
 
 from rigidsim.scene.epochs import Epoch, parse_epoch
-from rigidsim.scene.exact import ExactNumber, parse_number
+from rigidsim.scene.exact import ExactNumber, for_doubles, parse_number
 from rigidsim.scene.two_line_elements import TwoLineElements, parse_elements
-from rigidsim.scene.units import UnitError, time_unit
+from rigidsim.scene.units import UnitError, powers, time_unit, unit_text
 from rigidsim.scene.validation_messages import meant, shown
 
 _NUMBER_TEXT = r"^\s*[-+]?(\d|\.\d|pi)"
@@ -137,6 +137,38 @@ def quantity(unit: str) -> Any:
     return Annotated[ExactNumber, InUnit(unit)]
 
 
+_KINDS = {"m": "length", "s": "time", "1/s": "rate", "rad/s": "rate"}
+
+
+@dataclass(frozen=True)
+class Range:
+    """Annotation of a number: whether its value in SI (mpf) is allowed, and how messages say it. It is asked
+    of a config's numbers, and of those that take their place, as in members of a sweep.
+    """
+
+    holds: Callable[[Any], bool]
+    allowed: str
+
+    def checked(self, number: ExactNumber, context: Any = None) -> ExactNumber:
+        """The number, which may stand for those of all members in their context; ValueError if it is out."""
+        if not self.holds(number.at(context or for_doubles())):
+            unit = number.assumed or (number.unit and unit_text(powers(number.unit)))
+            allowed = self.allowed.format(_KINDS.get(unit, "number"))
+            raise ValueError(f"given {float(number):g}; {allowed} is allowed")
+        return number
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> Any:
+        def validate(number: ExactNumber) -> ExactNumber:
+            try:
+                return self.checked(number)
+            except ValueError as error:
+                raise refuse(str(error)) from None
+
+        return core_schema.no_info_after_validator_function(validate, handler(source))
+
+
+Positive = Annotated[T, Range(lambda x: x > 0, "a positive {}")]
+NotNegative = Annotated[T, Range(lambda x: x >= 0, "zero or more")]
 Dimensionless = Annotated[ExactNumber, InUnit("1")]
 Metre = Annotated[ExactNumber, InUnit("m")]
 Kilogram = Annotated[ExactNumber, InUnit("kg")]

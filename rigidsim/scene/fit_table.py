@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import Field, StrictInt, StrictStr, field_validator, model_validator
 
-from rigidsim.scene.fields import ConfigTable, Dimensionless, EachOnce, refuse
+from rigidsim.scene.fields import ConfigTable, Dimensionless, EachOnce, Range, refuse
 from rigidsim.scene.validation_messages import shown
 
 MOST_STARTS = 10_000
+_ONE_OR_MORE = Range(lambda x: x >= 1, "1 or more")
 
 
 class KnownWithin(ConfigTable):
@@ -49,7 +50,7 @@ class FitDataTable(ConfigTable):
     """
     scale: Literal["TDB", "TT", "TAI", "GPS", "UTC"] = "UTC"
     """time scale of dates that don't name theirs"""
-    outliers: Dimensionless | None = Field(None, examples=[4])
+    outliers: Annotated[Dimensionless, _ONE_OR_MORE] | None = Field(None, examples=[4])
     """leave out, and tell, rows with a residual of more than so many standard deviations; by default none"""
 
     @field_validator("sigma")
@@ -57,13 +58,6 @@ class FitDataTable(ConfigTable):
     def _sigma(cls, value: Any) -> Any:
         if isinstance(value, bool | dict | list) or value is None:
             raise refuse(f"given {shown(value)}; a standard deviation, or the name of a column, is allowed")
-        return value
-
-    @field_validator("outliers")
-    @classmethod
-    def _beyond_one(cls, value: Any) -> Any:
-        if value is not None and float(value) < 1:
-            raise refuse(f"given {float(value):g}; 1 or more is allowed, such as 4")
         return value
 
 

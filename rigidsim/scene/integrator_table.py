@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, StrictBool, StrictInt, WithJsonSchema, field_validator
 
 from rigidsim.scene.choices import AUTO, DEFAULT_METHOD, FORMULATIONS, METHODS
-from rigidsim.scene.exact import ExactNumber, parse_number
+from rigidsim.scene.exact import parse_number
 from rigidsim.scene.fields import (
     Angle,
     ConfigTable,
@@ -15,6 +15,8 @@ from rigidsim.scene.fields import (
     EulerSequence,
     Metre,
     OneOf,
+    Positive,
+    Range,
     number_schema,
     refuse,
 )
@@ -23,6 +25,7 @@ from rigidsim.scene.validation_messages import shown
 # A number is carried and stored as a sum of float64 parts, which end at 2^-1074: 250 digits (833 bits) leave
 # room for numbers down to 1e-70.
 LARGEST_DIGITS = 250
+_BELOW_HALF_A_TURN = Range(lambda x: 0 < x < 3, "an angle above 0 and below pi, in rad,")
 PRECISION_NAMES = ("single", "double", "extended", "quadruple")
 
 
@@ -56,14 +59,20 @@ class Integrator(ConfigTable):
     """project the state onto its invariants, so that errors of long runs grow far more slowly; auto: from
     step 8192 on, leaving shorter runs unchanged; in sweeps auto means false
     """
-    accuracy: Angle | None = Field(None, examples=[1e-9], json_schema_extra={"x-above": 0, "x-below": 3})
+    accuracy: Annotated[Angle, _BELOW_HALF_A_TURN] | None = Field(
+        None, examples=[1e-9], json_schema_extra={"x-above": 0, "x-below": 3}
+    )
     """attitude error allowed at the end, instead of precision and tolerance; certified"""
     # version 1.0 promises that the schema shows no unit here
-    accuracy_axis: Annotated[Angle, WithJsonSchema(number_schema("1"))] | None = Field(None, examples=[1e-6])
+    accuracy_axis: Annotated[Angle, _BELOW_HALF_A_TURN, WithJsonSchema(number_schema("1"))] | None = Field(
+        None, examples=[1e-6]
+    )
     """error (rad) allowed until the end in the directions of the angular momentum and the figure axis; with
     [model] level = "auto" the cheapest model within it is chosen
     """
-    accuracy_position: Metre | None = Field(None, examples=["1 um"], json_schema_extra={"x-above": 0})
+    accuracy_position: Positive[Metre] | None = Field(
+        None, examples=["1 um"], json_schema_extra={"x-above": 0}
+    )
     """position error allowed at the end if the body flies; certified"""
 
     @property
@@ -88,20 +97,6 @@ class Integrator(ConfigTable):
             f"given {shown(value)}; allowed: {', '.join(PRECISION_NAMES)}, "
             f"or a number of decimal digits from 1 to {LARGEST_DIGITS}"
         )
-
-    @field_validator("accuracy", "accuracy_axis")
-    @classmethod
-    def _possible_accuracy(cls, value: ExactNumber | None) -> ExactNumber | None:
-        if value is not None and not 0 < float(value) < 3:
-            raise refuse(f"given {float(value):g}; an angle above 0 and below pi is allowed, in rad")
-        return value
-
-    @field_validator("accuracy_position")
-    @classmethod
-    def _possible_accuracy_of_position(cls, value: ExactNumber | None) -> ExactNumber | None:
-        if value is not None and value.sign <= 0:
-            raise refuse(f"given {float(value):g}; a length above 0 is allowed, in m")
-        return value
 
     @field_validator("tolerance", mode="before")
     @classmethod

@@ -13,7 +13,7 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
 from rigidsim.scene.exact import ExactNumber
-from rigidsim.scene.fields import Exactly, InUnit
+from rigidsim.scene.fields import Exactly, InUnit, Range
 from rigidsim.scene.validation_messages import nearest, shown
 
 ARRAYS_OF_TABLES = ("loads", "bodies", "rotors", "states", "events", "fit.data")
@@ -26,10 +26,13 @@ _PART = re.compile(r"""\s*(?:"([^"\n]+)"|'([^'\n]+)'|([^\[\].\"']+))((?:\[\d{1,9
 
 @dataclass(frozen=True)
 class Taken:
-    """What a key takes: the SI unit of its numbers ("1" for none), and their count (0 for a plain one)."""
+    """What a key takes: the SI unit of its numbers ("1" for none), their count (0 for a plain one), and the
+    ranges that each is in.
+    """
 
     unit: str
     length: int
+    ranges: list[Range]
 
 
 @dataclass(frozen=True)
@@ -134,14 +137,20 @@ class Path:
         if isinstance(tree, BaseModel):
             return tree.model_copy(update={first: inner})
         if isinstance(tree, Mapping):
-            return {**tree, first: inner}
+            return {**tree, str(first): inner}
         return type(tree)(inner if n == first else entry for n, entry in enumerate(tree))
+
+    def with_number(self, config: BaseModel, number: ExactNumber, context: Any) -> Any:
+        """A validated config with another number there; ValueError if the key allows none such."""
+        for one in self.taken(type(config), config).ranges:
+            one.checked(number, context)
+        return self.replaced(config, number)
 
     # --- what a config takes there --------------------------------------------------------------------------
 
-    def taken(self, model: type[BaseModel], tables: Mapping[str, Any]) -> Taken:
-        """What the key takes in a config of these tables, since a load's keys depend on its kind; ValueError
-        names the keys that there are if there is no such key.
+    def taken(self, model: type[BaseModel], tables: Mapping[str, Any] | BaseModel) -> Taken:
+        """What the key takes in a config of these tables, validated or not, since a load's keys depend on its
+        kind; ValueError names the keys that there are if there is no such key.
         """
         kinds, table = self._kinds(model, tables)
         fields = [x for _, about in kinds for x in about if isinstance(x, FieldInfo)]
@@ -149,8 +158,9 @@ class Path:
         beside = [table.get(x.get("x-unit-key")) for x in extra if isinstance(table, Mapping)]
         unit = next((unit for unit in beside if isinstance(unit, str)), None)  # written beside the number
         counts = [x.count for _, about in kinds for x in about if isinstance(x, Exactly)]
-        counts += [x["minItems"] for x in extra if x.get("minItems") == x.get("maxItems", 0)]
-        return Taken(unit or _unit(kinds), next(iter(counts), 0))
+        counts += [n for x in extra if isinstance(n := x.get("minItems"), int) and n == x.get("maxItems")]
+        ranges = [x for _, about in kinds for x in about if isinstance(x, Range)]
+        return Taken(unit or _unit(kinds), next(iter(counts), 0), ranges)
 
     def keys(self, model: type[BaseModel], tables: Mapping[str, Any]) -> list[str]:
         """The keys of the table there; none where there is no table."""
@@ -191,6 +201,8 @@ def _is_table(annotation: Any) -> bool:
 
 
 def _is_other_kind(model: type[BaseModel], value: Any) -> bool:
+    if isinstance(value, BaseModel):
+        return not isinstance(value, model)
     kind = model.model_fields.get("kind")
     known = isinstance(value, Mapping) and "kind" in value
     return kind is not None and known and value["kind"] not in get_args(kind.annotation)
@@ -230,9 +242,9 @@ def _entry(tree: Any, step: str | int) -> Any:
     """What a table or an array has at a step; LookupError for nothing."""
     if isinstance(tree, BaseModel) and step in type(tree).model_fields:
         return getattr(tree, str(step))
-    if (isinstance(tree, Mapping) and isinstance(step, str)) or (
-        isinstance(tree, list | tuple) and isinstance(step, int)
-    ):
+    if isinstance(tree, Mapping) and isinstance(step, str):
+        return tree[step]
+    if isinstance(tree, list | tuple) and isinstance(step, int):
         return tree[step]
     raise LookupError(step)
 

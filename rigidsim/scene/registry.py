@@ -11,18 +11,17 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, ClassVar
 
-from pydantic import Field, field_validator
+from pydantic import Field
 
 from rigidsim.errors import ConfigError, Problem
 from rigidsim.scene.arithmetic import Matrix, Vector
 from rigidsim.scene.bodies.body import RigidBody
 from rigidsim.scene.effect_parts import EffectPart
 from rigidsim.scene.epochs import Epoch
-from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.expressions.names import Names, origin
 from rigidsim.scene.expressions.parser import parse_expression
 from rigidsim.scene.expressions.tree import Expression, ExpressionError
-from rigidsim.scene.fields import ConfigTable, Metre, VariableName, refuse
+from rigidsim.scene.fields import ConfigTable, Metre, Positive, VariableName
 from rigidsim.scene.frame import Figure
 from rigidsim.scene.kernels.ephemeris import Ephemeris
 from rigidsim.scene.kernels.reading import Sight
@@ -45,7 +44,7 @@ class LoadFields(ConfigTable):
 class SourceFields(LoadFields):
     """Keys of a load whose source is a body at a known place."""
 
-    radius: Metre | None = Field(None, examples=["6378.137 km"])
+    radius: Positive[Metre] | None = Field(None, examples=["6378.137 km"])
     """radius of the source, for shadow_NAME and altitude in expressions; the load itself takes a point"""
 
     def placed_by(self, *, free_flight: bool) -> frozenset[str] | None:
@@ -53,13 +52,6 @@ class SourceFields(LoadFields):
         orbit = getattr(self, "orbit", None)
         relative = free_flight and orbit is not None and orbit.body is not None
         return frozenset({"flight"} if relative else ())
-
-    @field_validator("radius")
-    @classmethod
-    def _positive(cls, value: ExactNumber | None) -> ExactNumber | None:
-        if value is not None and value.sign <= 0:
-            raise refuse(f"given {float(value):g}; a positive length is allowed")
-        return value
 
 
 @dataclass(frozen=True, kw_only=True)

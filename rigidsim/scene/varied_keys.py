@@ -94,7 +94,10 @@ def scene_of(
     vector = [context.zero] * 3
     for key, value in zip(keys, values, strict=True):
         for place in key.places:
-            config = place.replaced(config, replace(key.number, rational=value, pi_power=0))
+            try:
+                config = place.with_number(config, replace(key.number, rational=value, pi_power=0), context)
+            except ValueError as error:
+                raise ConfigError(Problem(place.where, str(error)), experiment.source) from None
         if not key.places:
             vector[key.component] = context.mpf(value.numerator) / context.mpf(value.denominator)
     scene = build_scene(replace(experiment, config=config), context)

@@ -10,7 +10,7 @@ from pydantic import Field, StrictStr, field_validator, model_validator
 
 from rigidsim.scene.bodies.gravity_field import MOST, Harmonic
 from rigidsim.scene.exact import ZERO, ExactNumber
-from rigidsim.scene.fields import Angle, ConfigTable, Dimensionless, Metre, Rate, Triple, refuse
+from rigidsim.scene.fields import Angle, ConfigTable, Dimensionless, Metre, Positive, Rate, Triple, refuse
 from rigidsim.scene.registry import Setting
 from rigidsim.scene.validation_messages import shown
 
@@ -22,7 +22,7 @@ _WITHIN = 2
 class AttractorFieldTable(ConfigTable):
     """``gravity_field`` of ``central_gravity``: coefficients in axes that turn about the pole at a rate."""
 
-    radius: Metre = Field(examples=["6378.1366 km"])
+    radius: Positive[Metre] = Field(examples=["6378.1366 km"])
     """reference radius R of C and S"""
     C: dict[StrictStr, Dimensionless] = Field(default_factory=dict, examples=[{"2,0": -1.0826e-3}])
     """unnormalized coefficients of cos m lon by "degree,order", from degree 2 on: C_20 is minus J2"""
@@ -40,13 +40,6 @@ class AttractorFieldTable(ConfigTable):
     def _orders(cls, value: dict[str, Any], info: Any) -> dict[str, Any]:
         for key in value:
             _refuse_key(key, info.field_name)
-        return value
-
-    @field_validator("radius")
-    @classmethod
-    def _positive(cls, value: ExactNumber) -> ExactNumber:
-        if value.sign <= 0:
-            raise refuse(f"given {float(value):g}; a positive length is allowed")
         return value
 
     @field_validator("pole")

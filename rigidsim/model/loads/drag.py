@@ -24,7 +24,7 @@ from rigidsim.scene.bodies.presets import known_body
 from rigidsim.scene.cautions import Caution
 from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.expressions.tree import Expression
-from rigidsim.scene.fields import Dimensionless, Metre, NumberOrFormula
+from rigidsim.scene.fields import Dimensionless, Metre, NumberOrFormula, Positive
 from rigidsim.scene.initial_values import start_values
 from rigidsim.scene.registry import LoadFields, Setting, register_load
 from rigidsim.scene.scene import Scene
@@ -52,7 +52,7 @@ class DragFields(LoadFields):
     ap: Dimensionless | None = Field(
         default=None, description="of nrlmsise00: the day's geomagnetic index Ap", examples=[7]
     )
-    scale_height: Metre | None = Field(
+    scale_height: Positive[Metre] | None = Field(
         default=None,
         description="height over which the density falls to 1/e; by default density holds everywhere",
         examples=["60 km"],
@@ -147,9 +147,6 @@ def _falling(fields: DragFields, around: Setting) -> list[Expression]:
         return []
     if not isinstance(fields.density, ExactNumber):
         what = "given with an expression for density, which determines its fall; remove it and altitude"
-        raise around.fault("scale_height", what)
-    if fields.scale_height.sign <= 0:
-        what = f"given {float(fields.scale_height):g}; a positive length is allowed"
         raise around.fault("scale_height", what)
     if "altitude" not in around.names:
         what = "given without a surface to count from; give the central_gravity a radius"

@@ -24,7 +24,7 @@ from rigidsim.scene.arithmetic import (
     unit_vectors,
 )
 from rigidsim.scene.exact import ExactNumber
-from rigidsim.scene.fields import InUnit, Metre, Triple
+from rigidsim.scene.fields import InUnit, Metre, NotNegative, Positive, Triple
 from rigidsim.scene.readable import number_text
 from rigidsim.scene.registry import Setting, register_load
 from rigidsim.scene.scene import Scene
@@ -38,14 +38,16 @@ class EddyCurrentsFields(MagneticFieldFields):
     """Torque (M (w x B)) x B of the currents that a magnetic field induces in a conductor turning in it."""
 
     kind: Literal["eddy_currents"]
-    conductivity: Conductivity | None = Field(
+    conductivity: NotNegative[Conductivity] | None = Field(
         default=None, description="of a conducting sphere, with its radius", examples=["3.5e7 S/m"]
     )
-    radius: Metre | None = Field(default=None, description="of the sphere, outside", examples=["30 cm"])
+    radius: Positive[Metre] | None = Field(
+        default=None, description="of the sphere, outside", examples=["30 cm"]
+    )
     thickness: Metre | None = Field(
         default=None, description="of the wall of a hollow sphere; a solid one without it", examples=["2 mm"]
     )
-    magnetic_tensor: Triple[MagneticTensor] | None = Field(
+    magnetic_tensor: Triple[NotNegative[MagneticTensor]] | None = Field(
         default=None,
         description="moments of M about the body axes, of another conductor, instead of conductivity and "
         "radius",
@@ -141,9 +143,6 @@ def _of_tensor(given: list[ExactNumber], fields: EddyCurrentsFields, around: Set
     for key in ("conductivity", "radius", "thickness"):
         if getattr(fields, key) is not None:
             raise around.fault(key, "given with magnetic_tensor, which determines it; remove one of them")
-    for i, x in enumerate(given):
-        if x.sign < 0:
-            raise around.fault(f"magnetic_tensor[{i}]", f"given {float(x):g}; zero or more is allowed")
     return numbers(given, around)
 
 
@@ -153,9 +152,6 @@ def _of_sphere(fields: EddyCurrentsFields, around: Setting) -> Vector:
         if value is None:
             what = "missing; a sphere needs conductivity and radius, any other conductor magnetic_tensor"
             raise around.fault(key, what)
-        if value.sign < 0 or (key == "radius" and value.sign == 0):
-            allowed = "zero or more" if key == "conductivity" else "a positive length"
-            raise around.fault(key, f"given {float(value):g}; {allowed} is allowed")
     assert fields.conductivity is not None
     assert fields.radius is not None
     context, radius = around.context, fields.radius.at(around.context)

@@ -35,7 +35,7 @@ from rigidsim.scene.expressions.tree import (
     evaluate,
     states_read,
 )
-from rigidsim.scene.fields import Formula, Metre, Triple
+from rigidsim.scene.fields import Formula, Metre, NotNegative, Triple
 from rigidsim.scene.initial_values import start_values
 from rigidsim.scene.registry import LoadFields, Setting, register_load
 from rigidsim.scene.scene import Scene
@@ -54,7 +54,7 @@ class MassLossFields(LoadFields):
     exit_point: Triple[Metre] = Field(
         description="middle of the exit, in body axes from the reference point", examples=[[0, 0, -2]]
     )
-    exit_radius: Metre = Field(
+    exit_radius: NotNegative[Metre] = Field(
         default=ZERO,
         description="radius of a round exit, whose axis points from the centre of mass to its middle",
         examples=[0.3],
@@ -81,9 +81,6 @@ class MassLoss(Load):
         if around.free_flight:
             what = "given for a body with a position or velocity, whose flight has a constant mass; "
             raise around.fault("mass_loss", what + "leave out [initial] position and velocity")
-        if fields.exit_radius.sign < 0:
-            what = f"given {float(fields.exit_radius):g} m; a radius of at least 0 is allowed"
-            raise around.fault("exit_radius", what)
         point = [x.at(context) for x in fields.exit_point]
         arm = [x - c for x, c in zip(point, around.body.center_of_mass, strict=True)]
         radius, length = fields.exit_radius.at(context), norm(context, arm)

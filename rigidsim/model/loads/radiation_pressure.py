@@ -23,7 +23,7 @@ from rigidsim.model.loads.surface_load import Pushes, SurfaceLoad
 from rigidsim.scene.bodies.outside import OuterSurface, Plate
 from rigidsim.scene.effect_parts import EffectPart
 from rigidsim.scene.exact import ExactNumber
-from rigidsim.scene.fields import InUnit, VariableName
+from rigidsim.scene.fields import InUnit, NotNegative, VariableName
 from rigidsim.scene.registry import LoadFields, Setting, register_load
 
 SPEED_OF_LIGHT = 299792458  # m/s, exact
@@ -42,7 +42,7 @@ class RadiationPressureFields(LoadFields):
         '"sun"; its shadow_NAME counts where the scene has one',
         examples=["sun"],
     )
-    irradiance: Irradiance = Field(
+    irradiance: NotNegative[Irradiance] = Field(
         default=_SUN,
         description="at 1 au; the Sun's by default",
         examples=["1361 W/m^2"],
@@ -68,9 +68,6 @@ class RadiationPressure(SurfaceLoad):
 
     @classmethod
     def resolve(cls, fields: RadiationPressureFields, around: Setting) -> RadiationPressure:
-        if fields.irradiance.sign < 0:
-            what = f"given {float(fields.irradiance):g}; zero or more is allowed"
-            raise around.fault("irradiance", what)
         name = fields.light
         if f"r_{name}" not in around.names:
             known = [x.removeprefix("r_") for x in around.names if x.startswith("r_")]

@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 from typing import Annotated, Any, Literal
 
 import heyoka as hy
-from pydantic import Field, Tag, field_validator
+from pydantic import Field, Tag
 
 from rigidsim.model.capabilities import KeepsPlane, corotating_orbit_of, fixed_source_of, orbit_of, table_of
 from rigidsim.model.earth_pole import earth_pole
@@ -29,15 +29,15 @@ from rigidsim.model.rotations import Symbolic
 from rigidsim.scene.arithmetic import Vector, across, cross, norm, parallel, unit_vectors
 from rigidsim.scene.effect_parts import EffectPart
 from rigidsim.scene.epochs import Epoch
-from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.fields import (
     NAME_OR_VECTOR,
     ConfigTable,
     Dimensionless,
     Metre,
+    Positive,
+    Range,
     Triple,
     name_or_vector,
-    refuse,
 )
 from rigidsim.scene.orbit_tables.pieces import TabulatedOrbit
 from rigidsim.scene.orbits import KeplerOrbit
@@ -52,12 +52,18 @@ _MOST_CENTURIES = 20
 """From J2000: the polynomials' last terms make a degree of the pole there."""
 
 
+_POSSIBLE = Range(
+    lambda x: -1 <= x <= 0.5,
+    "-1 (a needle along the pole) to 0.5 (a ring), such as 1.0826e-3 of the Earth (J2 = -C20, unnormalized),",
+)
+
+
 class SourceFigure(ConfigTable):
     """``figure`` of a source: its oblateness."""
 
-    J2: Dimensionless = Field(examples=[1.0826e-3])
+    J2: Annotated[Dimensionless, _POSSIBLE] = Field(examples=[1.0826e-3])
     """its unnormalized coefficient J2 = -C20"""
-    radius: Metre = Field(examples=["6378.137 km"])
+    radius: Positive[Metre] = Field(examples=["6378.137 km"])
     """its equatorial radius, to which J2 refers"""
     pole: Annotated[
         Annotated[Literal["iau1976"], Tag(NAME_OR_VECTOR[0])]
@@ -65,23 +71,6 @@ class SourceFigure(ConfigTable):
         name_or_vector('"iau1976" (the Earth\'s, by precession and nutation) or a vector in space axes'),
     ] = Field(examples=["iau1976", [0, 0, 1]])
     """direction of its axis of figure: a vector in space axes, or iau1976, the Earth's of date"""
-
-    @field_validator("J2")
-    @classmethod
-    def _possible(cls, value: ExactNumber) -> ExactNumber:
-        if not -1 <= float(value) <= 0.5:
-            what = (
-                f"given {float(value):g}; -1 (a needle along the pole) to 0.5 (a ring) is allowed, such as "
-            )
-            raise refuse(what + "1.0826e-3 of the Earth (J2 = -C20, unnormalized)")
-        return value
-
-    @field_validator("radius")
-    @classmethod
-    def _positive(cls, value: ExactNumber) -> ExactNumber:
-        if value.sign <= 0:
-            raise refuse(f"given {float(value):g}; a positive length is allowed")
-        return value
 
 
 class FigureFields(AttractingFields):

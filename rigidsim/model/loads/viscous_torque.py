@@ -11,7 +11,7 @@ from rigidsim.model.kinematics import Kinematics
 from rigidsim.model.load import Load, Term
 from rigidsim.model.load_words import span_words
 from rigidsim.scene.arithmetic import Vector, cross, negligible, norm
-from rigidsim.scene.fields import Damping, Triple
+from rigidsim.scene.fields import Damping, NotNegative, Triple
 from rigidsim.scene.readable import number_text
 from rigidsim.scene.registry import LoadFields, Setting, register_load
 from rigidsim.scene.scene import Scene
@@ -21,7 +21,7 @@ class ViscousTorqueFields(LoadFields):
     """A torque -c_i w_i about each body axis."""
 
     kind: Literal["viscous_torque"]
-    coefficients: Triple[Damping] = Field(
+    coefficients: Triple[NotNegative[Damping]] = Field(
         description="c_i of the torque -c_i w_i about each body axis, zero or more",
         examples=[[0.01, 0.01, 0.02]],
     )
@@ -39,10 +39,6 @@ class ViscousTorque(Load):
 
     @classmethod
     def resolve(cls, fields: ViscousTorqueFields, around: Setting) -> ViscousTorque:
-        for i, coefficient in enumerate(fields.coefficients):
-            if coefficient.sign < 0:
-                given = f"given {float(coefficient):g}; zero or more is allowed"
-                raise around.fault(f"coefficients[{i}]", given)
         return cls([c.at(around.context) for c in fields.coefficients])
 
     def acts(self) -> bool:

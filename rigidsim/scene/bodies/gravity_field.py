@@ -20,8 +20,8 @@ from pydantic import Field, StrictInt, StrictStr, field_validator, model_validat
 
 from rigidsim.errors import ConfigError, Problem
 from rigidsim.scene.bodies.field_files import FieldFileError, read_field
-from rigidsim.scene.exact import ExactNumber, rounded
-from rigidsim.scene.fields import ConfigTable, Dimensionless, Metre, refuse
+from rigidsim.scene.exact import rounded
+from rigidsim.scene.fields import ConfigTable, Dimensionless, Metre, Positive, refuse
 from rigidsim.scene.point_masses import GRAVITATIONAL_CONSTANT
 from rigidsim.scene.tracing.numbers import plain
 from rigidsim.scene.validation_messages import shown
@@ -48,7 +48,7 @@ Harmonic = tuple[int, int, bool]
 class GravityFieldTable(ConfigTable):
     """``[body] gravity_field``: coefficients in body axes, or a file of them."""
 
-    radius: Metre | None = Field(None, examples=["1738 km"])
+    radius: Positive[Metre] | None = Field(None, examples=["1738 km"])
     """reference radius R of C and S"""
     C: dict[StrictStr, Dimensionless] | None = Field(None, examples=[{"3,0": -8.4e-6, "3,1": 2.8e-5}])
     """unnormalized coefficients of cos m lon by "degree,order", from degree 3 on: C_30 is minus J3"""
@@ -79,13 +79,6 @@ class GravityFieldTable(ConfigTable):
             if self.degree is not None:
                 raise refuse("given degree without file; leave out the coefficients that aren't wanted")
         return self
-
-    @field_validator("radius")
-    @classmethod
-    def _positive(cls, value: ExactNumber | None) -> ExactNumber | None:
-        if value is not None and value.sign <= 0:
-            raise refuse(f"given {float(value):g}; a positive length is allowed")
-        return value
 
 
 def _refuse_key(key: str, table: str) -> None:

@@ -274,11 +274,11 @@ class Families:
             raise Untraceable(str(error)) from error
 
     def _traced(self, member: int) -> Family | ConfigError | NotBatchable:
-        experiment = self._members.experiment(member)
-        reason = batchable(experiment, self._members.keys)
-        if reason is not None:
-            return reason
         try:
+            experiment = self._members.experiment(member)
+            reason = batchable(experiment, self._members.keys)
+            if reason is not None:
+                return reason
             traced = trace(experiment, self._members.keys, self._members.exact(member), lambda: self._drive)
         except ConfigError as error:
             return error

@@ -118,13 +118,12 @@ def trace(
     if plan.scaling.drive is not None:
         plan = replace(plan, scaling=replace(plan.scaling, drive=drive()))
     graph = Graph(context_for(representative.config.integrator.precision))
-    config = representative.config
+    config, context = representative.config, TracingContext(graph)
     for column, (key, number) in enumerate(zip(keys, numbers, strict=True)):
         path = Path.of(key)
         if not isinstance(path.get(config), ExactNumber):
             raise Untraceable(f"what is swept, {key}, is no number")
-        config = path.replaced(config, swept_number(graph, column, number))
-    context = TracingContext(graph)
+        config = path.with_number(config, swept_number(graph, column, number), context)
     scene: Scene = build_scene(replace(representative, config=config), context)
     check_start(scene)
     parameters = Parameters()
