@@ -135,7 +135,7 @@ class Path:
         first, rest = self.steps[0], Path(self.steps[1:])
         inner = rest.replaced(_entry(tree, first), value)
         if isinstance(tree, BaseModel):
-            return tree.model_copy(update={first: inner})
+            return tree.model_copy(update={str(first): inner})
         if isinstance(tree, Mapping):
             return {**tree, str(first): inner}
         return type(tree)(inner if n == first else entry for n, entry in enumerate(tree))

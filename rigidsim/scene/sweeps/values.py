@@ -110,8 +110,8 @@ def _alike(*given: Any) -> list[ExactNumber]:
     turns, written = {x.pi_power for x in some or numbers[:1]}, {x.unit for x in numbers}
     if len(turns) > 1 or (len(written) > 1 and not all(x.unit for x in some)):
         raise ValueError(f"given {' and '.join(map(shown, given))}; write both in one unit")
-    unit = written.pop() if len(written) == 1 else ""
-    return [ExactNumber(x.rational, *turns, unit) for x in numbers]
+    unit, power = written.pop() if len(written) == 1 else "", turns.pop()
+    return [ExactNumber(x.rational, power, unit) for x in numbers]
 
 
 def _counted(count: Any) -> int:
