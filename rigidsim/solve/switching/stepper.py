@@ -376,8 +376,10 @@ class SwitchingStepper(TaylorStepper):
                     return False
                 smallest, largest = min(smallest, self.smallest), max(largest, self.largest)
                 going = samples is None or samples(self._dense)
+                if self.watcher is not None and samples is not None and samples.states:
+                    break  # it knows of the latest step alone
             stuck = self.steps == before or self.collapsed or self.unresolved
-            if stuck or self.ended or self.time == self.until:
+            if stuck or self.ended or self.time == self.until or self.log.stop is not None:
                 break
         self.smallest, self.largest = smallest, largest
         return True
