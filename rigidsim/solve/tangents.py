@@ -15,7 +15,6 @@ control doesn't see them: their series have the same radius of convergence as th
 from __future__ import annotations
 
 import math
-import sys
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -60,7 +59,7 @@ class Derivatives:
     """Derivatives of a system's right-hand sides, and of outputs after them, by states and by coefficients.
 
     Args:
-        rights: right-hand sides of all states, or of the first ones.
+        rights: right-hand sides of all states.
         first, count: numbers of the first of the parameters that are coefficients, and how many there are.
     """
 
@@ -74,8 +73,7 @@ class Derivatives:
     ) -> None:
         self.system, self.rights, self.outputs = system, list(rights), list(outputs)
         self.first, self.count = first, count
-        self.variables = system.variables[: len(self.rights)]
-        self.by_state = jacobian_rows([*rights, *outputs], self.variables)
+        self.by_state = jacobian_rows([*rights, *outputs], system.variables)
         self.by_coefficient = jacobian_rows([*rights, *outputs], [hy.par[first + m] for m in range(count)])
 
     @classmethod
@@ -112,7 +110,7 @@ class Derivatives:
         """Equations of the motion and of tangents, which some states have, and the variables of these."""
         names = self.system.states
         tangents = [{i: hy.make_vars(f"tangent_{j}_{names[i]}") for i in moving} for j in range(count)]
-        found = list(zip(self.variables, self.rights, strict=True))
+        found = list(zip(self.system.variables, self.rights, strict=True))
         for j, tangent in enumerate(tangents):
             first = self.slopes(j).start
             found += [(d, self.along(i, tangent, first)) for i, d in tangent.items()]
@@ -246,24 +244,20 @@ class Tangents:
         engine = self._engine
         if self._fresh and engine.time == time:
             self._meet()
-        self._steps_to(time, lambda _: self._step(), go_on)
+        self._steps_to(time, self._step, go_on)
         return self._true(engine.state if engine.time == time else engine.update_d_output(time))
 
-    def to(
-        self, time: Scalar, go_on: Callable[[], bool] = lambda: True, most: int = sys.maxsize
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """Go exactly to a time, or by so many steps: state and tangents (count, moving); see ``sample``."""
-        self._steps_to(time, lambda left: self._go(time, min(self._stride, left)), go_on, most)
+    def to(self, time: Scalar, go_on: Callable[[], bool] = lambda: True) -> tuple[np.ndarray, np.ndarray]:
+        """Go exactly to a time: state and tangents (count, moving) there; see ``sample``."""
+        self._steps_to(time, lambda: self._go(time, self._stride), go_on)
         every = self._true(self._engine.state)
         return every[: self.states], every[self.states :].reshape(self.count, -1)
 
-    def _steps_to(
-        self, time: Scalar, step: Callable[[int], None], go_on: Callable[[], bool], most: int = sys.maxsize
-    ) -> None:
-        engine, count, stuck, last = self._engine, 0, 0, self.steps + most
-        while engine.time < time and self.steps < last:
+    def _steps_to(self, time: Scalar, step: Callable[[], None], go_on: Callable[[], bool]) -> None:
+        engine, count, stuck = self._engine, 0, 0
+        while engine.time < time:
             before = engine.time
-            step(last - self.steps)
+            step()
             count += 1
             stuck = stuck + 1 if engine.time == before else 0
             if stuck > _SINGLE_STEPS_LOST:
