@@ -3,12 +3,13 @@
 Truth is what each side integrates to by itself, in closed form.
 """
 
-from itertools import product
+from itertools import pairwise, product
 from typing import Any
 
 import mpmath
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 from support import EPSILON, angles_between, cases, config
 
 import rigidsim
@@ -220,3 +221,47 @@ def test_a_norm_that_vanishes_is_not_passed_over() -> None:
     assert progress.status is Status.FINISHED
     smooth, _ = about_z(drag.format("sqrt(1 + wx^2 + wy^2 + wz^2)"), initial=start)
     assert smooth.status is Status.FINISHED
+
+
+def test_events_are_kept_where_steps_are_taken_back() -> None:
+    """A pulse's edges, a torque that turns at wy = 0, and an event between: scipy's motion has them, too."""
+    text = """
+    name = "between"
+    [body]
+    principal_moments = [1, 2, 2.5]
+    [initial]
+    angular_velocity = [0.1, 0.2, 1]
+    [[loads]]
+    kind = "torque"
+    components = ["0.1*pulse(t, 1, 2)", "-0.01*abs(wy)", "max(0, sin(3*t))*0.1"]
+    [[states]]
+    name = "s"
+    derivative = "wz - s"
+    [[events]]
+    name = "half"
+    expression = "s - 0.5"
+    [time]
+    end = 3
+    samples = 4
+    """
+    run = rigidsim.run(rigidsim.parse(text), out=None)
+    moments = np.array([1, 2, 2.5])
+
+    def motion(t: float, y: np.ndarray) -> np.ndarray:
+        w = y[:3]
+        torque = [0.1 * (1 < t < 2), -0.01 * abs(w[1]), 0.1 * max(0.0, np.sin(3 * t))]
+        return np.append((torque - np.cross(w, moments * w)) / moments, w[2] - y[3])
+
+    state, crossed = np.array([0.1, 0.2, 1, 0]), []
+    edges = [0, 1, np.pi / 3, 2, 2 * np.pi / 3, 3]
+    for begin, end in pairwise(edges):
+
+        def half(_: float, y: np.ndarray) -> float:
+            return float(y[3] - 0.5)
+
+        within = (begin + 1e-14, end - 1e-14)
+        done = solve_ivp(motion, within, state, "DOP853", events=half, rtol=1e-12, atol=1e-13)
+        state = done.y[:, -1]
+        crossed += list(done.t_events[0])
+    assert run.dataset["angular_velocity"].values[-1] == pytest.approx(state[:3], abs=1e-10)
+    assert run.dataset["half_time"].values == pytest.approx(crossed, abs=1e-10)

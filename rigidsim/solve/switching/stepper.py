@@ -427,9 +427,10 @@ class SwitchingStepper(TaylorStepper):
         self, begun: Mark, known: int, passed: list[_Passed], samples: SamplesWithin | None
     ) -> None:
         """Go back to the last of the boundaries passed, or to where they began."""
+        found = self.log.found[:]
         self.back_to(begun)
         if passed:
-            last = passed[-1]
+            last, self.log.found[:] = passed[-1], found
             begun = replace(begun, time=last.time, state=last.state, events=last.events)
             self._modes = [1 if side > 0 else -1 for side in last.pars[: len(self._modes)]]
             self._count, self._since = last.switches
