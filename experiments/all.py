@@ -28,6 +28,7 @@ STUDIES = (
     "sweep_coverage",
     "apophis_flyby",
     "averaged_motions",
+    "whole_cycle",
     "cassini_states",
     "tumbling_averages",
     "damped_averages",

@@ -14,7 +14,13 @@ An adapter is a module with
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-ADAPTERS = {"heyoka": "bare_heyoka", "rigidsim": "own_runs", "numba": "numba_dop853"}
+ADAPTERS = {
+    "heyoka": "bare_heyoka",
+    "rigidsim": "own_runs",
+    "numba": "numba_dop853",
+    "scipy": "scipy_ivp",
+    "mujoco": "mujoco_steps",
+}
 """Package that must be there: module of its adapter."""
 
 

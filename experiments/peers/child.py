@@ -1,6 +1,8 @@
 """One peer in a process of its own: every scene, variant and knob, timed; a JSON line at a time on stdout.
 
-Run by ``experiments.benchmark``: python -m experiments.peers.child PEER REQUEST, with a JSON request.
+Run by ``experiments.peer_comparison`` and ``experiments.benchmark``, with a JSON request:
+
+    python -m experiments.peers.child PEER REQUEST
 """
 
 import functools
