@@ -77,7 +77,7 @@ LEAPING = "time [day], semi_major_axis [au], eccentricity\n" + "\n".join(
 )
 REFUSED = {
     "no such table": (CONFIG % "", "was given as text, without files next to it"),
-    "a column twice": (with_table(rows(), ', semi_major_axis = "1 au"'), "given with it, too"),
+    "a column twice": (with_table(rows(), ', semi_major_axis = "1 au"'), "given in the config, too"),
     "no axis": (
         with_table("time [day], eccentricity\n" + "\n".join(f"{10 * i}, 0.1" for i in range(9))),
         "has no column semi_major_axis; add one, or give semi_major_axis with table",

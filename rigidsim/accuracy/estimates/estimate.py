@@ -213,8 +213,9 @@ class _Reader:
         self._system, attitude = system, system.mechanics.attitude
         self._function = None
         self._places: list[int] = []
-        if attitude is not None and all(x in system.variables for x in attitude.quaternion):
-            self._places = [system.variables.index(x) for x in attitude.quaternion]
+        read = [] if attitude is None else attitude.quaternion or attitude.variables  # else a direction
+        if all(x in system.variables for x in read):
+            self._places = [system.variables.index(x) for x in read]
         elif attitude is not None:
             options = precision.options
             self._function = hy.cfunc(attitude.quaternion, system.variables, compact_mode=True, **options)
@@ -255,7 +256,11 @@ def _vector(system: System, values: np.ndarray, names: tuple[str, ...]) -> np.nd
 
 
 def _angle(one: np.ndarray, other: np.ndarray) -> float:
-    """Angle between attitudes given as quaternions, up to their sign, rad."""
+    """Angle between attitudes given as quaternions, up to their sign, or between directions, rad."""
+    if len(one) == 3:
+        return 2 * math.asin(
+            min(math.hypot(*(float(a - b) for a, b in zip(one, other, strict=True))) / 2, 1.0)
+        )
     opposite = sum(float(a) * float(b) for a, b in zip(one, other, strict=True)) < 0
     apart = [float(a + b) if opposite else float(a - b) for a, b in zip(one, other, strict=True)]
     return 4 * math.asin(min(math.hypot(*apart) / 2, 1.0))

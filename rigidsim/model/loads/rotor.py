@@ -73,7 +73,7 @@ class Rotor(Load):
             allowed = "zero or more is allowed" if fields.fixed else "a positive moment is allowed"
             raise around.fault("moment", f"given {float(plain(moment)):g}; {allowed}")
         if fields.fixed and fields.torque is not None:
-            what = "given beside fixed = true, which keeps the rate by whatever torque that takes; remove one"
+            what = "given with fixed = true, which keeps the rate by whatever torque that takes; remove one"
             raise around.fault("torque", what)
         own = dot(axis, apply(body.inertia, axis)) / dot(axis, axis)
         if moment > own:
