@@ -129,7 +129,7 @@ def own_units(scene: Scene, scaling: Scaling, like: Mapping[str, int] | None = N
 
 
 def _sizes(scene: Scene, scaling: Scaling) -> dict[str, Any]:
-    """About the largest values (mpf, SI) that user-defined states reach; 0 where nothing tells.
+    """About the largest values (mpf, SI) that user-defined states reach; 0 where they are unknown.
 
     What drives a state, its derivative where it is zero itself, acts for as long as the state takes to come
     back, or for 10 to 160 turns. One that follows others has its size from theirs.

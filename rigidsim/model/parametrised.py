@@ -108,7 +108,7 @@ class Parametrised:
             i for i, x in enumerate(base.noted) if any(self._differ(m.noted[i], x) for m in moved)
         ]
         self._fixed = {i: x for i, x in enumerate(base.noted) if i not in set(self._varied)}
-        made = self._pass(found, self._asparameters_of())
+        made = self._pass(found, self._as_parameters())
         self.equations, self.outputs = made.equations, made.outputs
         self.recorded = recorded_variables(self.plain.mechanics.observed, self._record)[0]
         self._refuse_hidden(base, found, made)
@@ -205,7 +205,7 @@ class Parametrised:
         outputs = recorded_variables(system.mechanics.observed, self._record)[1]
         return _Pass(system, noted, [hy.expression(x) for x in outputs], equations)
 
-    def _asparameters_of(self) -> Callable[[int, Any], Any]:
+    def _as_parameters(self) -> Callable[[int, Any], Any]:
         places = {i: self.first + n for n, i in enumerate(self._varied)}
         return lambda i, value: hy.par[places[i]] if i in places else self._number(self._fixed.get(i, value))
 
@@ -237,7 +237,7 @@ class Parametrised:
         for sign in (1, -1):
             there = [x + sign * _LOOK * s / (j + 3) for j, (x, s) in enumerate(zip(off, scales, strict=True))]
             try:
-                looked = self._pass(there, self._asparameters_of())
+                looked = self._pass(there, self._as_parameters())
             except ConfigError:
                 continue
             same = len(looked.noted) == len(base.noted) and not any(

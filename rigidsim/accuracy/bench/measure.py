@@ -2,7 +2,7 @@
 
 Every setting integrates the scene's own motion, attitude included, and is held against a reference whose own
 error is known: the closed form to 50 digits where there is one, else the best that a higher precision can do.
-References are integrated in a process of their own, next to the settings, cheap ones first; speeds are then
+References are integrated in a separate process, next to the settings, cheap ones first; speeds are then
 taken over several fresh processes, in turn. Long motions are measured over their beginning, quadruple
 precision over less of it, and what doesn't fit is listed as left out. Nothing is extrapolated.
 """

@@ -95,7 +95,7 @@ class Course:
 
     @property
     def shift(self) -> int:
-        """Binary exponent from the run's internal time to that of ``system``."""
+        """Binary exponent from the run's internal time to the time of ``system``."""
         return int(self.prepared.system.scaling.time - self.system.scaling.time)
 
     def suspicious(self, spread: Spread) -> bool:

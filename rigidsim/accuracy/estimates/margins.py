@@ -19,7 +19,7 @@ EXPONENTIAL = 5.0  # power of time past which growth counts as exponential
 # errors of a step
 ANGLES = 4.0  # rounding in Euler angles over that in quaternions
 NEAR, VERY_NEAR = 0.2, 0.01  # singular factors below which canonical momenta lose more than elsewhere
-COARSE = 8.0  # tolerance in epsilons from which a better solution in the next precision tells what is wrong
+COARSE = 8.0  # tolerance in epsilons from which a better solution in the next precision shows the error
 BETTER = 2.0**-10  # factor on the tolerance of that solution
 
 # how far is followed

@@ -36,7 +36,7 @@ _RATE_ROUNDINGS = 1024.0  # the same for its rate, whose terms are products of d
 _LEAST = 2.0**-20
 """The same where the state is zero: a rate that is zero but for a rounding turns back after its square."""
 _CLOSE = 2.0**10 * _ROUNDINGS  # roundings from which on an argument is far from zero
-_CLEAR = 2.0**-40  # relative size of a rate from which on double precision tells its sign
+_CLEAR = 2.0**-40  # relative size of a rate from which on double precision knows its sign
 
 
 @dataclass(frozen=True)

@@ -335,7 +335,7 @@ class SwitchingStepper(TaylorStepper):
         """
         engine, pars = self._integrator, self._parameters()
         look = self._functions.look(self.state, self.time, pars)
-        # what a unit of time makes of the state tells its size
+        # the change of the state in a unit of time shows its size
         noises = self._functions.noises(look, [self.state, look.field])
         moved = [0.0] * len(self._modes)
         for j, (u, noise, mode) in enumerate(zip(look.u, noises, self._modes, strict=True)):
@@ -666,7 +666,7 @@ class SwitchingStepper(TaylorStepper):
         """Bound of a step just taken within which turns can be continued: series of many terms go far."""
         if not self._functions.unturned:
             return math.inf
-        pars = self._pars(self._functions.unturned)  # those of the engine are fewer where it slides
+        pars = self._pars(self._functions.unturned)  # the engine has fewer where it slides
         after = np.array(self.state), self.time
         rates = [self._functions.rate(*there, pars) for there in ((before, time), after)]
         return MOST / max(sum(rates) / 2, 1e-300)
@@ -693,7 +693,7 @@ class SwitchingStepper(TaylorStepper):
         end, after = engine.time, np.array(engine.state)
         states = [before, after]
         hidden = self._hidden(begun[0], end, self._modes)
-        # those of known moments may differ by less than one number tells
+        # known moments may differ by less than one number resolves
         roots = sorted([*self._roots, *hidden], key=lambda root: self._moment(root)[0])
         for n, (time, j, side) in enumerate(roots):
             if self._modes[j] == SLIDES or roots[n] in hidden:
