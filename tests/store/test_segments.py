@@ -13,7 +13,6 @@ import rigidsim
 from rigidsim import RunFolderError
 from rigidsim.session.session import Tuning
 from rigidsim.solve.sampler import Pacing
-from rigidsim.store import netcdf
 from rigidsim.store.segments import SegmentLimits, SegmentWriter, read_chain
 
 
@@ -61,7 +60,7 @@ def test_a_dense_run_that_was_killed_resumes_from_its_segments(
             raise RunFolderError("killed")
         flush(self, *given)
 
-    tuning = Tuning(Pacing(rows_waiting=netcdf.CHUNK_ROWS), SegmentLimits(bytes=2_000_000))
+    tuning = Tuning(Pacing(chunk_seconds=0.002), SegmentLimits(bytes=2_000_000))
     with monkeypatch.context() as patch:
         patch.setattr(SegmentWriter, "flush", killed)
         with pytest.raises(RunFolderError, match="killed"):
