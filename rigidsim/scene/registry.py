@@ -64,7 +64,7 @@ class Setting:
         body: the rigid body at the start.
         start, end: of the run, s.
         axes, epoch: what the space axes and time 0 are, if the config says so or a load implies it.
-        position, velocity: those of the centre of mass, space axes; None unless the body moves freely.
+        position, velocity: of the centre of mass, space axes; None unless the body moves freely.
         names: what expressions may read.
         bodies: point masses besides the body; None if there are none.
         ephemeris: where bodies of a kernel are; None without one.

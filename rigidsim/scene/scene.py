@@ -42,7 +42,7 @@ class Scene(Setting):
         given_loads: all of ``[[loads]]``, in their order.
         tabled: all of loads with tables of their own, such as rotors, by the table's name.
         gravity: sum of all uniform fields, space axes, m/s^2; None without such a load.
-        states: those of ``[[states]]`` that are carried.
+        states: the states of ``[[states]]`` that are carried.
         events: crossings that are recorded, or end the run.
         turning_inertia: tensor of what turns with the body: ``body.inertia``, the one of the mass
             distribution, less the moments about their axes of what turns on bearings, and a fluid core's.

@@ -17,7 +17,7 @@ EQUATOR: SpaceAxes = "EME2000"
 """Mean equator and equinox of J2000: the ecliptic's, turned about their common X axis, the equinox."""
 ICRF: SpaceAxes = "ICRF"
 CELESTIAL = (ICRF, "GCRF")
-"""Axes of one orientation, 0.02 arcsec from those of ``EQUATOR``."""
+"""Axes of one orientation, 0.02 arcsec from the axes ``EQUATOR``."""
 OBLIQUITY = ExactNumber(Fraction(84381406, 1000 * 3600 * 180), pi_power=1)
 """Angle (rad) from the equator to the ecliptic of J2000, 84381.406 arcsec: IAU 2006 (resolution B1, the P03
 precession of Capitaine et al. 2003, A&A 412, 567).

@@ -6,8 +6,8 @@ from there to the end, whatever is passed on the way. No law of growth is assume
 
 Errors come between stretches of several steps: half of those that a stretch stands for before it, half after,
 so that few stretches suffice for errors that grow as time makes them; where they grow faster, stretches
-become shorter. The motion begins anew at each place where that of the run is known, so that a loose tolerance
-is good enough.
+become shorter. The motion begins anew at each known state of the run, so that a loose tolerance is good
+enough.
 """
 
 from __future__ import annotations

@@ -338,7 +338,7 @@ def freedoms_of(system: System, number: Rounder) -> list[Symbolic]:
 def coefficient_rounding_terms(exact: System, integrated: System) -> list[Symbolic]:
     """What integrated equations lack of each derivative, since their coefficients are rounded; empty where
     they have parameters, which change along the motion: orbits by tables, which are rounded themselves. Both
-    have the digits of the higher precision, ``integrated`` those of the integration in it.
+    have the digits of the higher precision, ``integrated`` the digits of the integration in it.
     """
     pairs = zip(exact.equations, integrated.equations, strict=True)
     if hy.get_params([right for _, right in exact.equations]):

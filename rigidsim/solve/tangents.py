@@ -145,7 +145,7 @@ class Tangents:
         options: of the engine, as ``tol`` and ``compact_mode``.
 
     Attributes:
-        one: variables of the motion, then those of its first tangent.
+        one: variables of the motion, then of its first tangent.
         numbers: parameters that equations and outputs read: the system's, coefficients, and the derivatives
             of these along each tangent; in lanes, (parameters, lanes). To be set before ``begin``.
     """

@@ -60,7 +60,7 @@ NUMBER, ANY = Measure(()), Measure(None)
 
 
 def of_constant(node: Constant) -> Measure:
-    """Dimension of a number: that of its unit, if it has one."""
+    """Dimension of a number: the dimension of its unit, if it has one."""
     unit = node.value.unit
     return Measure(units.powers(unit), written=True) if unit else ANY
 

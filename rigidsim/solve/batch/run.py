@@ -229,7 +229,7 @@ def _end(block: BatchBlock, member: int, samples: int) -> None:
 class BatchOutputs:
     """Recorded variables and drifts of a traced system.
 
-    The growth of tangent vectors has a function of its own, of states that the motion alone lacks; together
+    The growth of tangent vectors has a separate function, of states that the motion alone lacks; together
     with it the code of the others would be compiled differently.
     """
 

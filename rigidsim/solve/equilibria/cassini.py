@@ -226,7 +226,7 @@ class SoughtReturn:
         revolutions: of the source from one return to the next.
         scene: on that orbit.
         how: it is found, and to what order it is the state.
-        slow: the same with apsides at rest, whose map tells faster librations, too; None if nothing differs.
+        slow: the same with apsides at rest, whose map shows faster librations, too; None if nothing differs.
     """
 
     scene: Scene
