@@ -9,8 +9,6 @@ it keeps to the sphere |M| = L, and on it to a level of w . K w / 2 (Volterra 18
 Where M is along w it stays. Without rotors h vanishes, and the levels are the polhodes of Poinsot.
 """
 
-import itertools
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Self
@@ -24,9 +22,9 @@ from rigidsim.look.solids import Array
 _STEADY = 1e-5  # of its size, within which the momentum's is constant: more than rounding in single precision
 _ALIKE = 1e-9  # of the largest, within which moments are equal, and of the momentum, within which h vanishes
 _SAME = 1e-4  # rad, within which two points are one
-_FLAT = 1e-7  # of the spread of 1/K, squared, below which curvatures tell no stability
-_FAR = 0.05  # rad, by which Newton's method moves a root at most
-_STEP, _STEPS = 0.01, 4000  # along a separatrix, rad; at most
+_FLAT = 1e-7  # of the largest 1/K, squared, below which curvatures tell no stability
+_STARTS, _STEPS, _FAR = 300, 40, 0.2  # of Newton's method on the sphere; rad, that a step has at most
+_MOST = 6  # isolated equilibria of any gyrostat
 
 
 @dataclass(frozen=True)
@@ -111,38 +109,6 @@ class Equilibrium:
         return self.square > 0
 
 
-def _roots(inner: Array, moments: Array) -> list[float]:
-    """All x with sum h_i^2 / (1 - x K_i)^2 = 1: the sum is convex between its poles and falls beyond."""
-
-    def excess(x: float) -> float:
-        return float(((inner / (1 - x * moments)) ** 2).sum()) - 1
-
-    def slope(x: float) -> float:
-        return float((inner**2 * moments / (1 - x * moments) ** 3).sum())
-
-    poles = np.sort(1 / moments)
-    beyond = 2 * float(np.linalg.norm(inner)) / float(moments.min())
-    roots = []
-    with np.errstate(divide="ignore"):
-        roots += [
-            _crossing(excess, pole - side * beyond, pole) for pole, side in ((poles[0], 1), (poles[-1], -1))
-        ]
-        for low, high in itertools.pairwise(poles):
-            lowest = _crossing(slope, low, high)
-            if excess(lowest) < 0:
-                roots += [_crossing(excess, lowest, pole) for pole in (low, high)]
-    return roots
-
-
-def _crossing(function: Callable[[float], float], below: float, above: float) -> float:
-    """Where a function changes its sign, from negative `below` to positive, by halving."""
-    while True:
-        middle = (below + above) / 2
-        if middle in (below, above):
-            return float(middle)
-        below, above = (below, middle) if function(middle) > 0 else (middle, above)
-
-
 @dataclass(frozen=True)
 class Gyrostat:
     """A body with rotors whose motors, if any, are off: K (3, 3), h (3,), and the size L of its momentum."""
@@ -181,112 +147,34 @@ class Gyrostat:
 
     @cached_property
     def equilibria(self) -> list[Equilibrium]:
-        """All isolated ones, two to six. Of a body with equal moments whole circles may be equilibria."""
-        found: list[Array] = []
-        for point in self._stationary():
-            if all(np.linalg.norm(point - other) > _SAME for other in found):
-                found.append(point)
-        return [Equilibrium(point, self._square(point)) for point in found]
+        """All isolated ones, two to six, where the energy is stationary on the sphere: by Newton's method
+        from everywhere. Of a body with equal moments whole circles may be equilibria.
+        """
+        height, turn = np.linspace(-1, 1, _STARTS + 2)[1:-1], np.pi * (1 + 5**0.5) * np.arange(_STARTS)
+        flat = np.sqrt(1 - height**2)
+        points = np.stack([flat * np.cos(turn), flat * np.sin(turn), height], axis=1)
+        for _ in range(_STEPS):
+            slope, curvature = self._derivatives(points)
+            step = np.einsum("nij,nj->ni", np.linalg.pinv(curvature, hermitian=True), slope)
+            points = points - step * np.minimum(1, _FAR / np.maximum(signals.norms(step), 1e-300))[:, None]
+            points /= signals.norms(points)[:, None]
+        slope, curvature = self._derivatives(points)
+        scale = self.size * float(np.abs(self._inverse).max())
+        squares = -np.linalg.det(curvature)
+        squares[np.abs(squares) <= _FLAT * scale**2] = 0.0
+        found: list[Equilibrium] = []
+        for place in np.flatnonzero(signals.norms(slope) <= _SAME**2 * scale):
+            if all(np.linalg.norm(points[place] - one.direction) > _SAME for one in found):
+                found.append(Equilibrium(points[place], float(squares[place])))
+        return found if len(found) <= _MOST else [one for one in found if one.square]
 
-    def _stationary(self) -> list[Array]:
-        """Directions m with w = x m, so that (1 - x K) m = h."""
-        moments, axes = np.linalg.eigh(self.tensor)
-        moments = moments / moments[2]
-        axes = axes.T
-        for k in range(2):  # of equal moments any axes will do: one is taken along what h has in their plane
-            if moments[k + 1] - moments[k] <= _ALIKE:
-                pair = axes[[k, k + 1]]
-                part = pair @ self.inner
-                if np.linalg.norm(part) > 0:
-                    x, y = part / np.linalg.norm(part)
-                    axes[[k, k + 1]] = np.array([[x, y], [-y, x]]) @ pair
-        inner = axes @ self.inner / self.size
-        held = np.flatnonzero(np.abs(inner) > _ALIKE)
-        points = []
-        for root in _roots(inner[held], moments[held]) if len(held) else ():
-            point = np.zeros(3)
-            point[held] = inner[held] / (1 - root * moments[held])
-            points.append(point / np.linalg.norm(point))
-        for k in set(range(3)) - set(held):  # or x = 1 / K_k, and m may have any component there
-            alike = np.flatnonzero(np.abs(moments - moments[k]) <= _ALIKE)
-            if len(alike) > 1:  # a circle, or none
-                continue
-            point = np.zeros(3)
-            point[held] = inner[held] / (1 - moments[held] / moments[k])
-            rest = 1 - point @ point
-            if rest > _ALIKE:
-                point[k] = np.sqrt(rest)
-                points += [point, np.where(np.arange(3) == k, -point, point)]
-        return [self._closer(point @ axes) for point in points]
-
-    def _closer(self, direction: Array) -> Array:
-        """An equilibrium by Newton's method: roots near others have fewer digits."""
-        for _ in range(4):
-            values, tangents = self._curvatures(direction)
-            if abs(values.prod()) <= _FLAT * np.abs(self._inverse).max() ** 2:
-                break
-            step = (tangents @ self.rates(direction)) / (self.size * values) @ tangents
-            if np.linalg.norm(step) > _FAR:
-                break
-            direction = (direction - step) / np.linalg.norm(direction - step)
-        return direction
-
-    def _curvatures(self, direction: Array) -> tuple[Array, Array]:
-        """The energy's second derivatives over L^2 at an equilibrium, and their axes (2, 3)."""
-        pull = float(self.rates(direction) @ direction) / self.size
-        frame = np.stack(signals.across(direction))
-        values, turn = np.linalg.eigh(frame @ (self._inverse - pull * np.eye(3)) @ frame.T)
-        return values, turn.T @ frame
-
-    def _square(self, direction: Array) -> float:
-        curvatures, _ = self._curvatures(direction)
-        spread = np.linalg.eigvalsh(self._inverse)
-        product = float(curvatures.prod())
-        return 0.0 if abs(product) <= _FLAT * float(spread.max()) ** 2 else -product * self.size**2
-
-    def separatrices(self) -> list[Array]:
-        """Levels through unstable equilibria, as curves (points, 3) of directions from one to one."""
-        saddles = [one.direction for one in self.equilibria if one.unstable]
-        return [curve for saddle in saddles for curve in self._leaving(saddle, np.array(saddles))]
-
-    def _leaving(self, saddle: Array, saddles: Array) -> list[Array]:
-        """The two curves on which the motion leaves a saddle."""
-        (low, high), tangents = self._curvatures(saddle)
-        ways = [np.sqrt(high) * tangents[0] + sign * np.sqrt(-low) * tangents[1] for sign in (1, -1)]
-        starts = saddle + _STEP * np.array([way / np.linalg.norm(way) for way in ways])
-        way = next(
-            (w for w, start in zip(ways, starts, strict=True) if self._flow(start[None])[0] @ w > 0), ways[0]
-        )
-        level = self.energy(saddle)
-        now = self._back(saddle + _STEP * np.array([[1.0], [-1.0]]) * way / np.linalg.norm(way), level)
-        curves = [np.tile(saddle, (2, 1)), now]
-        near = np.full(2, -1)  # steps after which each comes to a saddle
-        ends = np.zeros(2, dtype=int)
-        for step in range(2, _STEPS):
-            middle = now + 0.5 * _STEP * self._flow(now)
-            now = self._back(now + _STEP * self._flow(middle), level)
-            curves.append(now)
-            apart = np.linalg.norm(now[:, None] - saddles, axis=2)
-            there = (apart.min(axis=1) < 1.2 * _STEP) & (near < 0) & (step > 10)
-            near[there], ends[there] = step, apart.argmin(axis=1)[there]
-            if (near > 0).all():
-                break
-        whole = np.array(curves)
-        return [
-            np.vstack([whole[: near[k] + 1, k], saddles[ends[k]]]) if near[k] > 0 else whole[:, k]
-            for k in (0, 1)
-        ]
-
-    def _flow(self, directions: Array) -> Array:
-        """Unit tangents (n, 3) along which the momentum's direction moves."""
-        ways = np.cross(directions, self.rates(directions))
-        return np.asarray(ways / np.maximum(np.linalg.norm(ways, axis=1, keepdims=True), 1e-300))
-
-    def _back(self, points: Array, level: Array) -> Array:
-        """Points (n, 3) near the sphere and a level, put back on both."""
-        points = points / np.linalg.norm(points, axis=1, keepdims=True)
-        rates = self.size * self.rates(points)
-        slopes = rates - (rates * points).sum(axis=1, keepdims=True) * points
-        over = (self.energy(points) - level) / np.maximum((slopes**2).sum(axis=1), 1e-300)
-        points = points - over[:, None] * slopes
-        return np.asarray(points / np.linalg.norm(points, axis=1, keepdims=True))
+    def _derivatives(self, points: Array) -> tuple[Array, Array]:
+        """The energy's slope (n, 3) over L along the sphere, and its second derivatives (n, 3, 3) over L
+        there, whose third axis is the normal, with 1.
+        """
+        rates = self.rates(points)
+        along = np.einsum("ni,ni->n", rates, points)
+        normal = points[:, :, None] * points[:, None, :]
+        flat = np.eye(3) - normal
+        whole = self.size * self._inverse - along[:, None, None] * np.eye(3)
+        return rates - along[:, None] * points, flat @ whole @ flat + normal

@@ -117,18 +117,6 @@ def test_a_wheel_steadies_the_middle_axis_beyond_its_threshold(rate: float, stab
     assert one.unstable is not stable
 
 
-def test_separatrices_of_a_body_alone_are_those_of_poinsot() -> None:
-    moments = np.array([1.0, 2.0, 2.5])
-    body = Gyrostat(np.diag(moments), np.zeros(3), 3.0)
-    curves = body.separatrices()
-    assert len(curves) == 4
-    for curve in curves:
-        x, _, z = (curve / moments).T  # along the planes w_a sqrt(A (B - A)) = ± w_c sqrt(C (C - B))
-        across = np.abs(x) * np.sqrt(1.0 * 1.0) - np.abs(z) * np.sqrt(2.5 * 0.5)
-        assert np.abs(across).max() < 1e-9
-        np.testing.assert_allclose(np.abs(curve[[0, -1]]), [[0, 1, 0], [0, 1, 0]], atol=1e-12)
-
-
 def test_rotors_are_in_the_recording_and_turn_by_their_rates(
     two: xarray.Dataset, driven: xarray.Dataset, read_back: Read, tmp_path: Path
 ) -> None:

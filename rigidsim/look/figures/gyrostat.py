@@ -63,22 +63,24 @@ def _draw(axes: Axes, dataset: xarray.Dataset, found: Sphere) -> None:
     grid = np.linspace(-1, 1, _FINE)
     right, up = np.meshgrid(grid, grid)
     depth = np.sqrt(np.maximum(1 - right**2 - up**2, 0.0))
-    points = right[..., None] * view.right + up[..., None] * view.up + depth[..., None] * view.toward
+    toward = depth[..., None] * view.toward
+    points = right[..., None] * view.right + up[..., None] * view.up + toward
     inside = right**2 + up**2 < 1
-    energy = np.where(inside, gyrostat.energy(points), np.nan)
-    both = np.concatenate([gyrostat.energy(points)[inside], gyrostat.energy(-points)[inside]])
+    sides = [np.where(inside, gyrostat.energy(side), np.nan) for side in (points, points - 2 * toward)]
+    both = np.concatenate([side[inside] for side in sides])
     weights = np.tile(1 / np.maximum(depth[inside], 1e-3), 2)  # of a pixel on the sphere
     if np.ptp(both) > 1e-9 * np.abs(both).max():
         order = np.argsort(both)
         shares = np.cumsum(weights[order]) / weights.sum()
         levels = np.interp((np.arange(_LEVELS) + 0.5) / _LEVELS, shares, both[order])
-        axes.contour(right, up, energy, np.unique(levels), colors=_LEVEL, linewidths=0.6, zorder=2)
+        axes.contour(right, up, sides[0], np.unique(levels), colors=_LEVEL, linewidths=0.6, zorder=2)
     entries = [Line2D([], [], color=PINK, lw=1.9, label=f"L = {number(gyrostat.size, 3)} kg m²/s")]
-    for curve in gyrostat.separatrices():
-        front = eyes.visible(curve, view, _ONES)
-        eyes.line(axes, view, curve, ~front, color=INK, lw=0.7, alpha=0.2, zorder=2.5)
-        eyes.line(axes, view, curve, front, color=INK, lw=1.3, zorder=3)
-        entries[1:] = [Line2D([], [], color=INK, lw=1.3, label="separatrix")]
+    saddles = np.array([one.direction for one in gyrostat.equilibria if one.unstable])
+    if len(saddles):
+        heights = np.unique(gyrostat.energy(saddles))
+        for side, style in zip(sides, ({"linewidths": 1.3, "zorder": 3}, {"alpha": 0.25}), strict=True):
+            axes.contour(right, up, side, heights, **{"colors": INK, "linewidths": 0.7, "zorder": 1} | style)
+        entries.append(Line2D([], [], color=INK, lw=1.3, label="separatrix"))
     eyes.path(axes, view, found.directions, eyes.visible(found.directions, view, _ONES))
     for square, marker, color, label in _KINDS:
         style: dict[str, Any] = {"marker": marker, "mfc": color, "mec": "white", "ms": 8.0, "ls": "none"}

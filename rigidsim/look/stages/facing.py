@@ -13,9 +13,8 @@ from rigidsim.look import librations, surroundings
 from rigidsim.look.solids import Array
 from rigidsim.look.stages import parts
 from rigidsim.look.stages.bodies import FIELD, Subject
-from rigidsim.look.stages.parts import BODY, Camera, Line, Plane, Solid, Spot, Stage, Trail
+from rigidsim.look.stages.parts import BODY, Camera, Line, Plane, Spot, Stage, Trail
 from rigidsim.look.stages.precession import plane_of
-from rigidsim.look.symbols import maria
 from rigidsim.scene.rotations import quaternion_of
 
 EYE = "eye"
@@ -38,7 +37,7 @@ class Facing:
     note: str
 
 
-def facing(dataset: xarray.Dataset, subject: Subject, figure: Array, name: str) -> Facing | None:
+def facing(dataset: xarray.Dataset, subject: Subject, figure: Array) -> Facing | None:
     """Those of a globe that faces its strongest source at the end of the run; None for others."""
     found = librations.seen(dataset)
     if found is None or not np.isfinite(found.directions).all():
@@ -50,8 +49,6 @@ def facing(dataset: xarray.Dataset, subject: Subject, figure: Array, name: str) 
     point = f"sub-{found.body.name if found.body else 'source'} point"
     coordinates = found.coordinates(figure)
     stage = _stage(subject, found.directions, figure, source, point, _loop(coordinates[:, 1]))
-    if name == "moon":
-        stage = replace(stage, solids=[Solid("maria", maria(), BODY)])
     seen_as = f"seen from the direction of {source}, from far away, the mean figure axis upwards"
     note = f"{stage.title}: {seen_as}; nothing is exaggerated"
     if subject.attitude is None:

@@ -25,7 +25,7 @@ from rigidsim.look.stages.parts import (
     Trail,
     Vector,
 )
-from rigidsim.look.symbols import earth, globe, graticule, maria
+from rigidsim.look.symbols import globe, graticule, pictured_globe
 from rigidsim.scene.bodies.presets import KNOWN, KnownBody
 
 _LARGE = 1e5  # m: a smaller body is no globe
@@ -52,7 +52,8 @@ def picture(dataset: xarray.Dataset, subject: Subject) -> Picture | None:
     known = _known(name, float(axes.max()))
     name = name or (known.name.lower() if known else "")
     half, west = axes / axes.max(), _X_AXIS_WEST.get(preset, 0.0)
-    mesh = earth(half) if name == "earth" else globe(half, surroundings.color_of(known, _UNKNOWN))
+    mapped = name in ("earth", "moon")
+    mesh = pictured_globe(half, name) if mapped else globe(half, surroundings.color_of(known, _UNKNOWN))
     figure = signals.figure_direction(dataset)
     turns, averaged = subject.attitude is not None, "angular_velocity" not in dataset
     if not turns and averaged:
@@ -66,10 +67,8 @@ def picture(dataset: xarray.Dataset, subject: Subject) -> Picture | None:
     stage.lines.extend(lines)
     zero = f"{west:.4g}° west of Greenwich" if west else "at longitude zero"
     notes = [f"continents: Natural Earth; the body's x axis is {zero}"] if name == "earth" else []
-    if name == "moon":
-        stage.solids.append(Solid("maria", maria(), BODY))
     planes = _pole_planes(dataset)
-    face = facing(dataset, subject, figure, name)
+    face = facing(dataset, subject, figure)
     faces, derived = [], {}
     if face is not None:
         faces, derived = [replace(face.stage, lines=[*lines, *face.stage.lines])], face.derived
