@@ -190,8 +190,8 @@ def _unreachable(forecasts: Forecasts, best: Setting | None, accuracy: float) ->
         f"given {accuracy:.3g} rad at the end, which no setting open to it reaches; the best, {best.title}, "
         f"{what}, in about {span_text(seconds, 2)}"
     )
-    if motion.growth.rate > 0:
-        text += f"; errors here grow e-fold every {span_text(1 / motion.growth.rate)}, so choose a nearer end"
+    if (rate := motion.growth.growth_rate) > 0:
+        text += f"; errors here grow e-fold every {span_text(1 / rate)}, so choose a nearer end"
     return text + "; ask for less, or leave precision, tolerance and method open"
 
 

@@ -57,7 +57,7 @@ class Forecasts:
         """Examine a motion's beginning."""
         self._experiment, self._accuracy = experiment, accuracy
         self._trials = Trials(experiment, loads, told)
-        self.motion = motion_of(experiment, loads=loads, pilot_steps=PILOT_STEPS)
+        self.motion = motion_of(experiment, loads=loads)
         self.samples = build_scene(experiment).samples.count
         self.part = min(1.0, PILOT_STEPS / self.motion.steps)
         self._times = spread_times(experiment, _TIMES, self.part)

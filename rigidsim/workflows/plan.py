@@ -13,8 +13,8 @@ from rigidsim.accuracy.error_law import (
     attitude_error,
     closed_form_if_any,
     held_error,
-    motion_growth,
 )
+from rigidsim.accuracy.motion import growth_of
 from rigidsim.model.equation_text import equation_texts
 from rigidsim.model.load import Load
 from rigidsim.session.dataset import dataset_variables, refuse_taken_names, unused_variables
@@ -216,16 +216,17 @@ def plan(
     record = samples * seconds_per_sample
     system, unused = prepared.system, unused_variables(prepared, int(steps))
     rate = float(system.rate_bound)
-    growth = motion_growth(prepared)
+    growth = growth_of(prepared, pilot.step)
+    amplification = growth.amplified(duration)
     first = LATE if prepared.holds_late else 0
     held = prepared.holds_invariants and closed is not None and steps > first
     shared, equations = equation_texts(system.equations, **prepared.precision.options)
     warnings = [(str(caution.code), caution.text) for caution in cautions_of(prepared.scene)]
     if room.problem is not None:
         warnings.append(("disk_space", f"the run {room.problem}"))
-    error: float | None = attitude_error(prepared.law_tolerance, int(steps), rate, duration, growth)
+    error: float | None = attitude_error(prepared.law_tolerance, int(steps), rate, duration, amplification)
     if held:
-        error = held_error(prepared, int(steps), rate, duration, growth)
+        error = held_error(prepared, int(steps), rate, duration, amplification)
     if not system.requirements.attitude or prepared.algorithm.own_errors:
         error = None
     return RunPlan(
@@ -284,7 +285,7 @@ def plan(
             free_bytes=room.free,
             attitude_error_rad=error,
             held=held,
-            amplification=growth.at(duration),
+            amplification=amplification,
             growth_seconds=growth.seconds,
         ),
         warnings=[text for _, text in warnings],

@@ -1,14 +1,11 @@
 """At the edges of what numbers hold, a run is right, says how wrong it is, or is refused with a message."""
 
-import math
-
 import pytest
 from support import config
 from support import run_estimated as run_text
 
 import rigidsim
 from rigidsim import ConfigError
-from rigidsim.accuracy.error_law import motion_growth
 from rigidsim.solve.problem import prepare
 
 
@@ -26,23 +23,6 @@ def scene(
         integrator=integrator,
         output=f'record = ["{record}"]',
     )
-
-
-@pytest.mark.parametrize(("offset", "digits"), [("1e-4", 8), ("1e-15", 30)])
-def test_growth_beside_the_middle_axis_is_that_of_the_elliptic_parameter(offset: str, digits: int) -> None:
-    """With I = (1, 2, 3) and rates (d, 1, d) 1 - m = 2 d^2 (2 for two components), whatever the precision
-    can resolve, and errors grow by up to 1 / (1 - m).
-    """
-    prepared = prepare(rigidsim.parse(scene(rates=f"[{offset}, 1, {offset}]", end="400")))
-    growth = motion_growth(prepared)
-    assert growth.rate == 0  # an integrable motion
-    assert growth.factor == pytest.approx(10.0**digits / 2, rel=0.01)
-
-
-def test_growth_is_no_faster_than_time_allows() -> None:
-    """exp(p t) with p^2 = (I2 - I1) (I3 - I2) / (I1 I3) on the separatrix itself."""
-    prepared = prepare(rigidsim.parse(scene(rates="[1e-15, 1, 1e-15]", end="60")))
-    assert math.log(motion_growth(prepared).factor) == pytest.approx(60 / math.sqrt(3), rel=0.01)
 
 
 def test_rates_without_an_attitude_say_that_their_digits_are_gone() -> None:
@@ -71,7 +51,7 @@ def test_numbers_beyond_doubles_are_refused_in_every_formulation(formulation: st
     record = "angular_velocity"
     text = scene(rates=rates, integrator=f'formulation = "{formulation}"', record=record)
     with pytest.raises(ConfigError, match=r"\[initial\] angular_velocity: given .*check its unit"):
-        motion_growth(prepare(rigidsim.parse(text)))
+        prepare(rigidsim.parse(text))
 
 
 @pytest.mark.parametrize("rate", ["1e-46"])

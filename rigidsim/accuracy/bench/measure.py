@@ -21,7 +21,7 @@ import numpy as np
 
 from rigidsim.accuracy.bench.worker import Answer, Task, Worker
 from rigidsim.accuracy.comparison import angles_between
-from rigidsim.accuracy.error_law import exact_method
+from rigidsim.accuracy.error_law import closed_form_if_any
 from rigidsim.accuracy.motion import run_pilot
 from rigidsim.accuracy.reference import LEAST_DIGITS, exact_to
 from rigidsim.accuracy.setting import Setting, cost, epsilon
@@ -111,7 +111,8 @@ def make_plan(experiment: Experiment, budget: float) -> Plan:
     corrected = assemble(prepared).steps()
     pilot = run_pilot(corrected.stepper, prepared.clock, corrected.skip, steps=_PILOT_STEPS, warming=_WARMING)
     whole = pilot.whole * pilot.seconds_per_step
-    exact, why = exact_method(scene)
+    form, why = closed_form_if_any(scene)
+    exact = form.method if form else ""
     part, reference, quadruple, digits = (
         share * budget / (whole * cost) for share, cost in (_ALL, _REFERENCE, _QUADRUPLE, _DIGITS)
     )

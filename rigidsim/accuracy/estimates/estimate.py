@@ -28,6 +28,7 @@ from rigidsim.solve.switching.stepper import stepper_of
 from rigidsim.solve.taylor_stepper import TaylorStepper
 
 DOUBLE = float(np.finfo(float).eps)
+_LARGEST_EXPONENT = 600.0  # keeps products within doubles
 _VECTORS = {"rates": ("wx", "wy", "wz"), "position": ("x", "y", "z"), "velocity": ("vx", "vy", "vz")}
 
 
@@ -54,6 +55,11 @@ class Estimate(OwnErrors):
     def leading(self) -> float:
         """Error of the attitude, or of the rates if no attitude is carried."""
         return self.rates if self.attitude is None else self.attitude
+
+    def amplified(self, seconds: float) -> float:
+        """The amplification after so many seconds, if errors go on growing as they were seen to."""
+        exponent = self.growth_rate * max(0.0, seconds - self.seconds)
+        return self.amplification * math.exp(min(exponent, _LARGEST_EXPONENT))
 
 
 def estimate_errors(

@@ -156,7 +156,7 @@ def _tangents_of(course: Course, start: float, end: float) -> ErrorTangents:
     prepared, system = course.prepared, course.system
     precision, measures, known = prepared.precision, Measures(system), None
     own = course.stepper if system is prepared.system else None
-    if system.switches or (own is not None and course.steps < margins.BY_ITSELF):
+    if system.switches or course.steps < margins.BY_ITSELF:
         double = replace(precision_of("double"), compact=True)
         stepper = own or stepper_of(system, double, None, double.scalar(start))
         carrier: Carrier = SteppedCarrier(stepper, start, end, course.steps)
