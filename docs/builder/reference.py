@@ -299,12 +299,7 @@ def python_page() -> str:
         + "\n\n".join(
             [
                 _directive("autoclass", "rigidsim.model.load.Load", members=True),
-                _directive("automodule", "rigidsim.model.capabilities", members=True),
                 _directive("autoclass", "rigidsim.model.carriers.Carrier", members=True),
-                *(
-                    _directive("autoclass", f"rigidsim.model.scaling.{name}", members=True)
-                    for name in ("Sized", "Swift", "BoundsFlight")
-                ),
                 _directive("autoclass", "rigidsim.model.observables.observable.Observable"),
                 _directive("autofunction", "rigidsim.model.observables.observable.continuous_angles"),
                 _directive("autoclass", "rigidsim.solve.effects.effect.Effect", members=True),

@@ -6,7 +6,6 @@ from dataclasses import replace
 
 import heyoka as hy
 
-from rigidsim.model.capabilities import Reacting, having, orbit_of, table_of
 from rigidsim.model.formulations.formulation import Formulation, ModelPlan
 from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.observables.mechanical import WORK
@@ -41,7 +40,7 @@ def assemble_states(
     if flies:
         blocks.append(_flight_block(m, plan))
     if m.point_masses is not None:  # which feel the forces that the body exerts on them
-        pulls = [part for load in having(Reacting, m.loads) for part in load.reaction(m)]
+        pulls = [part for load in m.loads for part in load.reaction(m)]
         blocks.append(m.point_masses.block(pulls))
     blocks += _load_blocks(m)
     blocks += own_blocks(m)
@@ -78,12 +77,12 @@ def _load_blocks(m: Mechanics) -> list[StateBlock]:
     blocks: list[StateBlock] = [] if m.sky is None else [m.sky.block()]
     carried: set[KeplerOrbit | TabulatedOrbit] = set()
     for load in m.loads:
-        if (orbit := orbit_of(load)) is not None and orbit not in carried:
+        if (orbit := load.orbit) is not None and orbit not in carried:
             carried.add(orbit)
-            titles = ", ".join(dict.fromkeys(x.title for x in m.loads if orbit_of(x) == orbit))
+            titles = ", ".join(dict.fromkeys(x.title for x in m.loads if x.orbit == orbit))
             block = m.orbit_block(orbit)
             blocks.append(replace(block, why=block.why or f"{titles}: where its source is"))
-        if (table := table_of(load)) is not None and table not in carried:
+        if (table := load.table) is not None and table not in carried:
             carried.add(table)
             block = m.table(table).block
             blocks.append(replace(block, why=f'{load.title}: where its source is, by "{table.name}"'))

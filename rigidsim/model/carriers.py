@@ -23,7 +23,6 @@ from typing import Any, Protocol, runtime_checkable
 
 import heyoka as hy
 
-from rigidsim.model.capabilities import Reshaping
 from rigidsim.model.kinematics import Kinematics
 from rigidsim.model.load import Load, Term
 from rigidsim.model.rotations import Symbolic
@@ -53,50 +52,24 @@ class Carrier(Protocol):
         """Its momentum (mpf, kg m^2/s, body axes) and kinetic energy (mpf, J) at the start."""
 
 
-@runtime_checkable
-class Lending(Protocol):
-    """If ``lends``, its own energy changes by what its drive does alone: that work is a function of the
-    state, and ``supplied_power`` tells only the drive's work on the body.
-    """
-
-    def lends(self, m: Kinematics) -> bool:
-        """Whether it does."""
-
-
-@runtime_checkable
-class Loose(Protocol):
-    """If ``loose``, its momentum isn't carried round with the body: ``exerted_torque`` is then all that it
-    exerts on the body, and -h' that less h x w.
-    """
-
-    loose: bool
-
-
 def carried_beside(loads: Iterable[Load]) -> str:
     """Why more turns than a body of constant moments, for what can't do with that; empty if it doesn't."""
     found = next((load for load in loads if isinstance(load, Carrier)), None)
     if found is None:
         return ""
-    if isinstance(found, Reshaping):
-        return found.changes
-    return f"{found.title} carries angular momentum"
+    return found.changes or f"{found.title} carries angular momentum"
 
 
-def lends(carrier: object, m: Kinematics) -> bool:
-    """Whether it is ``Lending``."""
-    return isinstance(carrier, Lending) and carrier.lends(m)
-
-
-def momentum_terms(carriers: Iterable[Carrier], m: Kinematics) -> list[Term]:
+def momentum_terms(carriers: Iterable[Any], m: Kinematics) -> list[Term]:
     """Momentum of all carriers beside the body; what is zero for good is left out."""
     terms = (term for carrier in carriers for term in carrier.carried_momentum(m))
     return [(vector, hy.expression(part)) for vector, part in terms if any(x != 0 for x in vector)]
 
 
-def inner_torque(carriers: Iterable[Carrier], m: Kinematics) -> list[Term]:
+def inner_torque(carriers: Iterable[Any], m: Kinematics) -> list[Term]:
     """Terms of h x w and of the torques that carriers exert on the body, in internal units of energy."""
     carriers, found = list(carriers), []
-    held = [x for x in carriers if not (isinstance(x, Loose) and x.loose)]
+    held = [x for x in carriers if not x.loose]
     for vector, expression in momentum_terms(held, m):
         for axis, unit, rate in zip(
             unit_vectors(m.scene.context), m.numbers.rate_units, m.rate_states, strict=True

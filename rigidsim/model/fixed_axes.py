@@ -28,15 +28,6 @@ from typing import Any
 
 import heyoka as hy
 
-from rigidsim.model.capabilities import (
-    AboutLine,
-    Attracting,
-    Spares,
-    TurnsAbout,
-    fixed_source_of,
-    having,
-    linear_potential_of,
-)
 from rigidsim.model.load import Load
 from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.rotations import Symbolic, apply, transpose
@@ -58,11 +49,11 @@ def _size(context: Any, matrix: Matrix) -> Any:
 
 
 def _linear(m: Mechanics, loads: Sequence[Load]) -> list[tuple[Vector, Vector]]:
-    return [pair for load in loads if (pair := linear_potential_of(load, m.scene)) is not None]
+    return [pair for load in loads if (pair := load.linear_potential(m.scene)) is not None]
 
 
 def _sources(m: Mechanics, loads: Sequence[Load]) -> list[tuple[Any, Vector]]:
-    return [pair for load in loads if (pair := fixed_source_of(load, m.scene)) is not None]
+    return [pair for load in loads if (pair := load.fixed_source(m.scene)) is not None]
 
 
 def _source_matrix(sources: list[tuple[Any, Vector]]) -> Matrix:
@@ -87,15 +78,10 @@ def keeps(m: Mechanics, axis: Vector, loads: Sequence[Load] | None = None) -> bo
         if twisted > tiny * _size(context, s):
             return False
     return not any(
-        _turns_about(m, load, axis)
+        load.turns_about(m, axis)
         for load in turning
-        if linear_potential_of(load, m.scene) is None and fixed_source_of(load, m.scene) is None
+        if load.linear_potential(m.scene) is None and load.fixed_source(m.scene) is None
     )
-
-
-def _turns_about(m: Mechanics, load: Load, axis: Vector) -> bool:
-    """Whether it may have a torque about a unit axis in space."""
-    return not isinstance(load, TurnsAbout) or load.turns_about(m, axis)
 
 
 def field_axis(m: Mechanics) -> Vector | None:
@@ -104,7 +90,7 @@ def field_axis(m: Mechanics) -> Vector | None:
     """
     linear = _linear(m, m.turning)
     if not linear:
-        spared = [load.spared_axis(m.scene) for load in having(Spares, m.turning)]
+        spared = [load.spared_axis(m.scene) for load in m.turning]
         return next((axis for axis in spared if axis is not None), None)
     context = m.scene.context
     total = _added([_outer(a, f) for a, f in linear])
@@ -174,7 +160,7 @@ def along(m: Mechanics, axis: Vector) -> Symbolic:
 def sources_alone(m: Mechanics) -> bool:
     """Whether all torque comes from fixed sources."""
     turning = [] if m.carriers else m.turning
-    return bool(turning) and all(fixed_source_of(load, m.scene) is not None for load in turning)
+    return bool(turning) and all(load.fixed_source(m.scene) is not None for load in turning)
 
 
 def several_directions(m: Mechanics) -> bool:
@@ -239,7 +225,7 @@ def _pulling(m: Mechanics) -> list[Load]:
 
 
 def _points(m: Mechanics) -> list[Vector]:
-    return [load.attracting_point for load in having(Attracting, m.loads)]
+    return [point for load in m.loads if (point := load.attracting_point) is not None]
 
 
 def one_point(m: Mechanics) -> bool:
@@ -255,14 +241,12 @@ def attracting_line(m: Mechanics) -> Vector | None:
     points, context = _points(m), m.scene.context
     if not points or one_point(m):
         return None
-    about = [
-        (load, line) for load in having(AboutLine, m.loads) if (line := load.symmetry_line()) is not None
-    ]
+    about = [(load, line) for load in m.loads if (line := load.symmetry_line()) is not None]
     points += [point for _, (point, _) in about]
     directions = [[x - y for x, y in zip(point, points[0], strict=True)] for point in points[1:]]
     directions += [axis for _, (_, axis) in about]
     known = [id(load) for load, _ in about]
-    others = [x for x in m.loads if not isinstance(x, Attracting) and id(x) not in known]
+    others = [x for x in m.loads if x.attracting_point is None and id(x) not in known]
     if m.scene.gravity is not None and any(load.uniform_field is not None for load in others):
         directions.append(m.scene.gravity)
     directions = [d for d in directions if any(x != 0 for x in d)]

@@ -11,7 +11,6 @@ from typing import Any
 
 import heyoka as hy
 
-from rigidsim.model.capabilities import FlownAbout
 from rigidsim.model.kinematics import Kinematics
 from rigidsim.model.names import in_si
 from rigidsim.model.rotations import apply, transpose
@@ -50,7 +49,6 @@ class FlightNames(NameProvider):
         if source is None:
             return {}
         load = source.of(scene)
-        assert isinstance(load, FlownAbout)
         place = [-x for x in load.source_at_start(scene)]
         swept = cross(_rate(source, scene), place)
         relative = [v - u for v, u in zip(load.motion_at_start(scene), swept, strict=True)]
@@ -65,7 +63,6 @@ class FlightNames(NameProvider):
         if source is None or not set(names) & {"altitude", *RELATIVE_NAMES}:
             return {}
         load, found = source.of(m.scene), {}
-        assert isinstance(load, FlownAbout)
         place = load.source_place(m)
         far = _number(m, place.unit) / place.inverse
         if source.extended:

@@ -35,19 +35,10 @@ from typing import Any
 import heyoka as hy
 
 from rigidsim.errors import ConfigError, Problem
-from rigidsim.model.capabilities import (
-    Sourced,
-    WithoutPlane,
-    corotating_orbit_of,
-    fixed_source_of,
-    has_source,
-    having,
-    plane_of,
-)
 from rigidsim.model.fixed_axes import keeps, parallel
 from rigidsim.model.load import Load, loads_of
 from rigidsim.model.mechanics import Mechanics
-from rigidsim.model.orbit_planes import OrbitPlane
+from rigidsim.model.orbit_planes import FlightPlane, KeplerPlane, OrbitPlane, TablePlane
 from rigidsim.model.rotations import Symbolic, along, apply, transpose, unit
 from rigidsim.model.two_part import as_factor
 from rigidsim.scene.arithmetic import Matrix, Vector, cross, norm
@@ -107,13 +98,24 @@ def plane_drift(scene: Scene, loads: Sequence[Load]) -> Any | None:
     return scene.context.zero if scene.reference is not None else _orbit_plane(loads).drift(scene)
 
 
+def plane_of(load: Load | None) -> OrbitPlane | None:
+    """Plane in which its source moves, or the body about its source; None if there is none."""
+    if load is None or load.plane is not None:
+        return None if load is None else load.plane
+    if load.orbit is not None:
+        return KeplerPlane(load.orbit)
+    if load.table is not None:
+        return TablePlane(load.table)
+    return None if load.attracting_point is None else FlightPlane(load.attracting_point)
+
+
 def _orbit_plane(loads: Sequence[Load]) -> OrbitPlane:
     """Plane of the first load that has one."""
     for load in loads:
         if (plane := plane_of(load)) is not None:
             return plane
     what = f'given "{ORBIT}", but no load of the scene has an orbit whose plane is known'
-    why = next((x.without_plane for x in having(WithoutPlane, loads) if x.without_plane), "")
+    why = next((x.without_plane for x in loads if x.without_plane), "")
     what += f" ({why})" if why else ""
     raise ConfigError(Problem("[frame] reference", what + '; "space" or a normal [x, y, z] is allowed'))
 
@@ -163,7 +165,7 @@ class LocalFrame:
 
 def first_source(loads: Iterable[Load]) -> Load | None:
     """The load whose source defines the local frame; None if no load has a source."""
-    return next((load for load in loads if has_source(load)), None)
+    return next((load for load in loads if load.has_source), None)
 
 
 def flies_about_source(scene: Scene) -> bool:
@@ -176,7 +178,6 @@ def flies_about_source(scene: Scene) -> bool:
 def local_frame(m: Mechanics) -> LocalFrame:
     """The local frame of the first source."""
     load = m.carried(first_source(m.loads))
-    assert isinstance(load, Sourced)
     down = m.carried(load.source_direction(m))
     normal, described = _normal(m, load, down)
     return LocalFrame(down, normal, f"source: {load.title}, number {m.loads.index(load) + 1}; {described}")
@@ -196,7 +197,7 @@ def _normal(m: Mechanics, load: Load, down: list[Symbolic]) -> tuple[list[Symbol
     if plane is not None and plane.called:
         return apply(transpose(m.matrix), plane.normal(m)), plane.called
     which, described = 2, "space Z, across the source's direction, as the normal"
-    fixed = fixed_source_of(load, m.scene)
+    fixed = load.fixed_source(m.scene)
     if fixed is not None and all(x == 0 for x in fixed[1][:2]):
         which, described = 0, "space X as the normal"
     pole = m.matrix[which]
@@ -209,7 +210,7 @@ def _normal(m: Mechanics, load: Load, down: list[Symbolic]) -> tuple[list[Symbol
 
 def rotating_orbit(m: Mechanics) -> KeplerOrbit | None:
     """An orbit with whose frame all potentials turn; None if there is none."""
-    orbits = [orbit for load in m.turning if (orbit := corotating_orbit_of(load)) is not None]
+    orbits = [orbit for load in m.turning if (orbit := load.corotating_orbit) is not None]
     if not orbits or m.driven_within:
         return None
     context, first = m.scene.context, orbits[0]
@@ -219,7 +220,7 @@ def rotating_orbit(m: Mechanics) -> KeplerOrbit | None:
         for orbit in orbits[1:]
     ):
         return None
-    others = [load for load in m.turning if corotating_orbit_of(load) is None]
+    others = [load for load in m.turning if load.corotating_orbit is None]
     if not all(load.conservative for load in others) or not keeps(m, normal, others):
         return None
     return first

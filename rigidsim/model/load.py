@@ -8,18 +8,23 @@ Loads in a config, rigidsim's own and those you write in Python all derive from 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from rigidsim.errors import ConfigError, Problem
+from rigidsim.model.inertia import MassDistribution
 from rigidsim.model.kinematics import Kinematics
 from rigidsim.model.names import written
+from rigidsim.model.orbit_planes import OrbitPlane
 from rigidsim.model.rotations import Symbolic
 from rigidsim.model.si import speaks_si
 from rigidsim.model.state_blocks import StateBlock
 from rigidsim.scene.arithmetic import Vector
 from rigidsim.scene.cautions import Caution
+from rigidsim.scene.orbit_tables.pieces import TabulatedOrbit
+from rigidsim.scene.orbits import KeplerOrbit
 from rigidsim.scene.registry import SceneLoad
 from rigidsim.scene.scene import Scene
 from rigidsim.scene.transitions import narrow_parts, root_parts
@@ -33,26 +38,70 @@ STATES_READ = ("attitude", "vertical", "flight")
 """What a load can ask for in ``reads``."""
 
 
+@dataclass(frozen=True)
+class SourcePlace:
+    """Place of a source as seen from the body: unit vector towards it, space axes; its distance in m is
+    ``unit`` (mpf) over ``inverse``.
+    """
+
+    direction: list[Symbolic]
+    inverse: Symbolic
+    unit: Any
+
+
 class Load(SceneLoad):
-    """Base of all loads; as it stands it does nothing.
+    """Base of all loads; as it stands it does nothing, and each class defines what it is more.
 
     A load of a user takes the state in SI (``rigidsim.model.si.InSI``) and gives SI: torques in N m,
     potentials in J, powers in W. rigidsim's own loads are written in internal units.
 
-    What else a load may define (an orbit, what it conserves, its size, widths of pulses, damping, momentum
-    that it carries) are the protocols of ``rigidsim.model.capabilities``, ``scaling`` and ``carriers``: it
-    has those whose members it defines.
+    A load that carries angular momentum is a ``rigidsim.model.carriers.Carrier``.
 
     Attributes:
         title: name used in reasons and messages.
         reads: states that it must find: "attitude", "vertical", "flight".
         conservative: whether it has a potential that doesn't depend on time.
+        orbit, table: what its source is on; all loads on one orbit or table share its states.
+        corotating_orbit: circular and in a fixed plane, in whose frame its potential rests: there is Jacobi's
+            constant.
+        plane: in which its source moves, or the body about its source, other than by an orbit or a point.
+        without_plane: why its source has an orbit, but no known plane; empty if it has one.
+        has_source: whether ``source_direction`` is known; nadir, roll and libration count from it.
+        attracting_point: centre that its force always points to (mpf, m, space axes).
+        gradient_source: the distant body whose gradient it is, and nothing else.
+        beside: the load that it acts beside, on the same source.
+        reacts: whether its source is one of the point masses besides the body, and feels ``reaction``.
+        magnetic: whether it is of a magnetic field, ``flux_density``.
+        seconds_ahead: by how much the time that it counts in is ahead of the scene's, which rounds it more.
+        of_time: whether it is a series, whose arguments are multiples of time.
+        wide: whether its expressions are too long to be unrolled (series of thousands of terms).
+        changes: what it does to the body's mass distribution, for what can't do with that; see ``shape``.
+        loose: of a carrier whose momentum isn't carried round with the body: ``exerted_torque`` is then all
+            that it exerts on the body, and -h' that less h x w.
+        unaveraged: why no average over the rotation takes it, and what to do with it instead.
     """
 
     title = "load"
     reads: frozenset[str] = frozenset()
     conservative = False
     described = "a load given from Python"
+    orbit: KeplerOrbit | None = None
+    table: TabulatedOrbit | None = None
+    corotating_orbit: KeplerOrbit | None = None
+    plane: OrbitPlane | None = None
+    without_plane: str = ""
+    has_source: bool = False
+    attracting_point: Vector | None = None
+    gradient_source: Any = None
+    beside: Any = None
+    reacts: bool = False
+    magnetic: bool = False
+    seconds_ahead: float = 0.0
+    of_time: bool = False
+    wide: bool = False
+    changes: str = ""
+    loose: bool = False
+    unaveraged: tuple[str, str] | None = None
 
     def __init_subclass__(cls) -> None:
         """Loads of users speak SI; those of rigidsim are in internal units."""
@@ -89,6 +138,110 @@ class Load(SceneLoad):
     def roots(self, m: Kinematics) -> list[Symbolic]:
         """Radicands in it that may touch zero, where no step may pass over the kink."""
         return written(m, root_parts(*self.formulas()))
+
+    # --- its source -----------------------------------------------------------------------------------------
+
+    def source_direction(self, m: Kinematics) -> list[Symbolic] | None:
+        """Unit vector towards its source, body axes; None without one."""
+        return None
+
+    def source_place(self, m: Kinematics) -> SourcePlace:
+        """Place of its source, where that is known (``LoadFields.placed_by``)."""
+        raise NotImplementedError
+
+    def source_at_start(self, scene: Scene) -> Vector:
+        """The same at the start (mpf, m, space axes)."""
+        raise NotImplementedError
+
+    def fixed_source(self, scene: Scene) -> tuple[Any, Vector] | None:
+        """Of a source at rest in space 3 G M / R^3 (mpf, 1/s^2), and the unit vector to it in space axes."""
+        return None
+
+    def reaction(self, m: Kinematics) -> list[tuple[int, Any, list[Symbolic]]]:
+        """Accelerations that the body causes on point masses, as ``PointMassStates.react`` takes them."""
+        return []
+
+    # --- axes and planes that it leaves alone ---------------------------------------------------------------
+
+    def keeps_axial(self, m: Kinematics, axis: Vector) -> bool | None:
+        """Whether it has no torque about an axis of symmetry (mpf, body axes); None: its vectors show it."""
+        return None
+
+    def keeps_plane(self, scene: Scene, axis: Vector, normal: Vector) -> bool:
+        """Whether its torque stays along a principal axis about which alone the body turns (unit, mpf),
+        ``axis`` in body and ``normal`` in space axes.
+        """
+        return False
+
+    def turns_about(self, m: Kinematics, axis: Vector) -> bool:
+        """Whether it may have a torque about a unit axis in space (mpf); its potential decides first."""
+        return True
+
+    def spared_axis(self, scene: Scene) -> Vector | None:
+        """A unit axis in space (mpf) about which it has no torque; None without one."""
+        return None
+
+    def symmetry_line(self) -> tuple[Vector, Vector] | None:
+        """Point (mpf, m) and unit vector, space axes, of a line about which its force and torque leave the
+        whole angular momentum; None without one.
+        """
+        return None
+
+    def linear_potential(self, scene: Scene) -> tuple[Vector, Vector] | None:
+        """Vectors a in body and f in space axes (mpf, SI) of a torque a x R^T f, of the potential
+        -a . R^T f; None for any other.
+        """
+        return None
+
+    # --- what it does to the body ---------------------------------------------------------------------------
+
+    def shape(self, m: Kinematics) -> MassDistribution:
+        """The mass distribution that the body has by it, if it ``changes`` that."""
+        raise NotImplementedError
+
+    def damping(self) -> Vector | None:
+        """Coefficients c_i (mpf, kg m^2/s) of a torque -c_i w_i about the body axes; None for any other."""
+        return None
+
+    def lends(self, m: Kinematics) -> bool:
+        """Whether a carrier's own energy changes by what its drive does alone: that work is a function of the
+        state, and ``supplied_power`` only the drive's work on the body.
+        """
+        return False
+
+    def endings(self, m: Kinematics) -> list[tuple[str, Symbolic]]:
+        """Quantities of order one whose passing below zero ends the motion, each with the reason."""
+        return []
+
+    def range_ends(self, m: Kinematics) -> list[tuple[str, Symbolic]]:
+        """Quantities of order one whose passing below zero leaves the range of a model, each with the
+        reason.
+        """
+        return []
+
+    # --- its size, from which units and drift scales are chosen ---------------------------------------------
+
+    def amplitude(self, scene: Scene) -> Any | None:
+        """Largest change of the energy of rotation that it can cause (mpf, J); None if unknown: then it is
+        estimated by trial (``rigidsim.model.load_estimate``).
+        """
+        return None
+
+    def fastest_rate(self, scene: Scene) -> Any:
+        """Fastest angular rate of its source as seen from the body (mpf, rad/s)."""
+        return scene.context.zero
+
+    def gyroscopic_momentum(self, scene: Scene) -> Vector | None:
+        """Angular momentum that it carries at the start (mpf, kg m^2/s, body axes); None for none."""
+        return None
+
+    def flight_bounds(self, scene: Scene, fed: Any) -> tuple[Any, Any] | None:
+        """Largest distance from the origin (m) and speed (m/s) of a body that flies under this load alone;
+        None if it doesn't bound the flight. Loads of unknown size add ``fed`` (m/s) to the speed.
+        """
+        return None
+
+    # --- for readers ----------------------------------------------------------------------------------------
 
     def told(self, scene: Scene) -> str:
         """What it is in a reader's terms, in one sentence for ``check``, ``plan`` and ``info``: sizes at the

@@ -19,7 +19,6 @@ from itertools import pairwise, product
 import heyoka as hy
 import numpy as np
 
-from rigidsim.model.capabilities import having, orbit_of, table_of
 from rigidsim.model.carriers import Carrier
 from rigidsim.model.formulations.formulation import Requirements
 from rigidsim.model.formulations.quaternion import quaternion_states
@@ -66,7 +65,7 @@ def estimate_drive(scene: Scene, loads: Sequence[Load], requirements: Requiremen
         return None
     m = probe(scene, requirements, loads)
     torque = [term for load in loads for term in torque_terms(load, m)]
-    carriers = having(Carrier, loads)
+    carriers = [load for load in loads if isinstance(load, Carrier)]
     inner = [term for carrier in carriers for term in carrier.exerted_torque(m)]
     force = [term for load in loads for term in force_terms(load, m)] if m.velocity is not None else []
     names, start = start_of(m, loads)
@@ -92,7 +91,7 @@ def estimate_drive(scene: Scene, loads: Sequence[Load], requirements: Requiremen
         impulse = frame @ samples.impulse(values)
         lasting = max(lasting, float(np.einsum("it,ij,jt->t", impulse, inverse, impulse).max()) / 2)
     peak = turned.peak(without_mean=lasting > 0 or bool(inner))
-    blocks = [block for x in carriers if (block := x.extra_states(m)) is not None]  # type: ignore[attr-defined]
+    blocks = [block for x in carriers if (block := x.extra_states(m)) is not None]
     if blocks:
         taken = samples.taken_up(blocks, [term for x in carriers for term in x.carried_momentum(m)])
         lasting += float(np.einsum("ti,ij,tj->t", taken, inverse, taken).max()) / 2
@@ -124,7 +123,7 @@ def probe(scene: Scene, requirements: Requirements, loads: Sequence[Load]) -> Me
 
 def orbit_tags(scene: Scene) -> dict[KeplerOrbit, str]:
     """Suffixes of the states of each orbit: the number of the first load on it."""
-    orbits = [(orbit_of(load), str(number)) for number, load in enumerate(loads_of(scene), start=1)]
+    orbits = [(load.orbit, str(number)) for number, load in enumerate(loads_of(scene), start=1)]
     return {orbit: tag for orbit, tag in reversed(orbits) if orbit is not None}
 
 
@@ -142,7 +141,7 @@ def start_of(m: Mechanics, loads: Sequence[Load]) -> tuple[list[str], np.ndarray
     if scene.position is not None and scene.velocity is not None:
         values |= zip(BODY.position, [context.ldexp(x, -scaling.length) for x in scene.position], strict=True)
         values |= zip(BODY.velocity, [context.ldexp(v, -scaling.speed) for v in scene.velocity], strict=True)
-    for orbit in {x: None for load in scene.loads if (x := orbit_of(load) or table_of(load)) is not None}:
+    for orbit in {x: None for load in scene.loads if (x := load.orbit or load.table) is not None}:
         block = (m.orbit(orbit) if isinstance(orbit, KeplerOrbit) else m.table(orbit)).block
         values |= zip(block.names, block.initial, strict=True)
     if m.sky is not None:

@@ -6,7 +6,6 @@ import random
 from collections.abc import Collection, Iterable, Mapping
 from typing import Any
 
-from rigidsim.model.capabilities import Magnetic
 from rigidsim.model.kinematics import Kinematics
 from rigidsim.model.sources import free_flight, in_body_axes, read_in
 from rigidsim.scene.arithmetic import norm
@@ -28,7 +27,7 @@ class FieldNames(NameProvider):
         """See ``NameProvider``."""
         flies, states, found = free_flight(config), {"attitude", PLACES}, False
         for fields in config.loads:
-            if issubclass(LOADS["kind"][fields.kind], Magnetic):  # type: ignore[attr-defined]
+            if LOADS["kind"][fields.kind].magnetic:  # type: ignore[attr-defined]
                 found, states = True, states | (fields.placed_by(free_flight=flies) or set())
         return (Readable(name, "T", frozenset(states)) for name in FIELD_NAMES if found)
 
@@ -58,9 +57,9 @@ def _total(vectors: list[list[Any]]) -> list[Any]:
     return [sum(x[1:], x[0]) for x in zip(*vectors, strict=True)]
 
 
-def _fields_of(scene: Scene) -> list[Magnetic]:
-    found: list[Magnetic] = []
+def _fields_of(scene: Scene) -> list[Any]:
+    found: list[Any] = []
     for load in scene.given_loads:
-        if isinstance(load, Magnetic) and not any(load.same_field(x) for x in found):
+        if load.magnetic and not any(load.same_field(x) for x in found):
             found.append(load)
     return found

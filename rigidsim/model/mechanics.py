@@ -8,8 +8,7 @@ from typing import Any
 
 import heyoka as hy
 
-from rigidsim.model.capabilities import KeepsAxial, Reshaping, having, linear_potential_of
-from rigidsim.model.carriers import Carrier, inner_torque, lends, momentum_terms
+from rigidsim.model.carriers import Carrier, inner_torque, momentum_terms
 from rigidsim.model.kinematics import Kinematics
 from rigidsim.model.load import Load, Term, force_terms, loads_of, torque_terms
 from rigidsim.model.rotations import Symbolic, apply
@@ -51,7 +50,7 @@ class Mechanics(Kinematics):
         return made._shaped()
 
     def _shaped(self) -> Mechanics:
-        reshaping = having(Reshaping, loads_of(self.scene))
+        reshaping = [load for load in loads_of(self.scene) if load.changes]
         if not reshaping:
             return self
         made = replace(self, shape=reshaping[0].shape(self))
@@ -102,9 +101,9 @@ class Mechanics(Kinematics):
     # --- sums over what carries momentum and energy ------------------------------------------------------
 
     @cached_property
-    def carriers(self) -> list[Carrier]:
+    def carriers(self) -> list[Any]:
         """What carries angular momentum beside the body."""
-        return having(Carrier, self.loads)
+        return [load for load in self.loads if isinstance(load, Carrier)]
 
     @cached_property
     def momentum_body(self) -> list[Symbolic]:
@@ -128,9 +127,9 @@ class Mechanics(Kinematics):
     @cached_property
     def kept_rotational_energy(self) -> Symbolic:
         """The same without carriers whose energy changes by what their drives do alone."""
-        return self._rotational([x for x in self.carriers if not lends(x, self)])
+        return self._rotational([x for x in self.carriers if not x.lends(self)])
 
-    def _rotational(self, carriers: list[Carrier]) -> Symbolic:
+    def _rotational(self, carriers: list[Any]) -> Symbolic:
         own = self.inertia.energy(self.bare_rates, self.own_momentum)
         others = [found for x in carriers if (found := x.carried_energy(self)) is not None]
         return hy.sum([own, *others]) if others else own
@@ -138,7 +137,7 @@ class Mechanics(Kinematics):
     @cached_property
     def lent_energy(self) -> Symbolic | None:
         """Energy of those carriers; None without any."""
-        found = [x.carried_energy(self) for x in self.carriers if lends(x, self)]
+        found = [x.carried_energy(self) for x in self.carriers if x.lends(self)]
         if found and self._rigid is not None and self.potential_energy is not None:
             found.append(self.potential_energy - self.carried(self._rigid.potential_energy))
         return hy.sum([x for x in found if x is not None]) if found else None
@@ -148,7 +147,7 @@ class Mechanics(Kinematics):
         """The same with the constant tensor, where a lending carrier changes it: the energy in fields that
         the change brings counts as lent.
         """
-        lending = any(lends(x, self) for x in self.carriers)
+        lending = any(x.lends(self) for x in self.carriers)
         return replace(self, shape=None) if lending and self.slip is not None else None
 
     @cached_property
@@ -167,7 +166,7 @@ class Mechanics(Kinematics):
             return self.scene.angular_velocity
         momentum = multiply(self.scene.turning_inertia, self.scene.angular_velocity)
         for carrier in self.carriers:
-            if isinstance(carrier, Reshaping):  # which has none of its own
+            if carrier.changes:  # which has none of its own
                 own, _ = carrier.carried_at_start(self.scene)
                 momentum = [x + y for x, y in zip(momentum, own, strict=True)]
         return multiply(self.scene.inverse_inertia, momentum)
@@ -300,7 +299,7 @@ class Mechanics(Kinematics):
     @property
     def marked(self) -> Vector | None:
         """To the centre of mass of a heavy body, or along the dipole of any other."""
-        pulled = [linear_potential_of(load, self.scene) for load in self.loads]
+        pulled = [load.linear_potential(self.scene) for load in self.loads]
         return self.numbers.arm or next((found[0] for found in pulled if found is not None), None)
 
     @property
@@ -310,11 +309,9 @@ class Mechanics(Kinematics):
         carried = momentum_terms(self.carriers, self)
         if axis is None or not all(parallel(context, vector, axis) for vector, _ in carried):
             return False
-        return all(
-            load.keeps_axial(self, axis) if isinstance(load, KeepsAxial) else self._spares(terms, axis)
-            for load, terms in zip(self.loads, self._torques, strict=True)
-            if terms
-        )
+        turning = [(load, terms) for load, terms in zip(self.loads, self._torques, strict=True) if terms]
+        kept = ((load.keeps_axial(self, axis), terms) for load, terms in turning)
+        return all(self._spares(terms, axis) if found is None else found for found, terms in kept)
 
     def _spares(self, torque: list[Term], axis: Vector) -> bool:
         """Whether the vectors of a torque have no part along an axis of the body."""

@@ -14,7 +14,6 @@ import numpy as np
 
 from rigidsim.errors import ConfigError, Problem
 from rigidsim.model.averaged.average import Average
-from rigidsim.model.capabilities import GradientAlone, Reacting, table_of
 from rigidsim.model.carriers import Carrier
 from rigidsim.model.formulations.averaged import Averaged
 from rigidsim.model.formulations.formulation import (
@@ -30,12 +29,14 @@ from rigidsim.model.formulations.rates import Rates
 from rigidsim.model.frames import refuse_without_plane
 from rigidsim.model.load import Load, force_terms, loads_of, torque_terms
 from rigidsim.model.load_estimate import estimate_drive, orbit_tags, probe, start_of
+from rigidsim.model.loads.gravity_gradient import GravityGradient
+from rigidsim.model.loads.point_attraction import MovingAttractor, MovingGradient
 from rigidsim.model.loads.uniform_gravity import UniformGravity
 from rigidsim.model.observables.observable import NEEDS
 from rigidsim.model.orbits.prescribed import places_of
 from rigidsim.model.own_states import own_units, refuse_odd_states
 from rigidsim.model.placements.kernel_body import refuse_same_sources
-from rigidsim.model.scaling import Scaling, amplitude_of, choose_scaling, scaled_numbers
+from rigidsim.model.scaling import Scaling, choose_scaling, scaled_numbers
 from rigidsim.model.state_blocks import BODY
 from rigidsim.scene.choices import AUTO, variables_named
 from rigidsim.scene.expressions.tree import readables, states_read
@@ -79,7 +80,7 @@ def plan_model(
     if scaling is None and like is not None:
         scaling = choose_scaling(scene, like.scaling.drive)
     elif scaling is None:
-        unknown = [x for x in loads if formulation.resolves_rotation and amplitude_of(x, scene) is None]
+        unknown = [x for x in loads if formulation.resolves_rotation and x.amplitude(scene) is None]
         refuse_odd_states(scene)
         refuse_odd_loads(scene, requirements, unknown)
         scaling = choose_scaling(scene, estimate_drive(scene, unknown, requirements))
@@ -88,7 +89,7 @@ def plan_model(
         scaling = replace(scaling, own=own_units(scene, scaling, known))
     if not formulation.carries_rates:
         scaling = replace(scaling, rates=(0, 0, 0))
-    tabulated = [(str(number), table_of(load)) for number, load in enumerate(loads_of(scene), start=1)]
+    tabulated = [(str(number), load.table) for number, load in enumerate(loads_of(scene), start=1)]
     surfaces = surfaces_of(scene)
     first = surfaces.parameters if formulation.resolves_rotation else 0
     tables = places_of([(tag, x) for tag, x in tabulated if x is not None], formulation.longitude, first)
@@ -291,10 +292,10 @@ def refuse_second_orbits(scene: Scene, loads: Sequence[Load]) -> None:
         return any(abs(strength - other) <= _SAME_BODY * other for other in others)
 
     for load in loads:
-        if not isinstance(load, GradientAlone):
+        if not isinstance(load, GravityGradient | MovingGradient):
             continue
-        if isinstance(load, Reacting):
-            named = [getattr(x, "number", None) for x in pulling if _flown_about(x)]
+        if load.reacts:
+            named = [getattr(x, "number", None) for x in pulling if isinstance(x, MovingAttractor)]
             if getattr(load, "number", None) in named:
                 what = "given with central_gravity of the same body, which has its torque; remove it"
                 raise ConfigError(Problem(where, what))
@@ -308,10 +309,6 @@ def refuse_second_orbits(scene: Scene, loads: Sequence[Load]) -> None:
                 what = "given with the gravitational parameter of one of [[bodies]] and another orbit; "
                 what += 'give orbit = {body = "..."}, which is where that body is'
                 raise ConfigError(Problem(where, what))
-
-
-def _flown_about(load: Load) -> bool:
-    return isinstance(load, Reacting) and not isinstance(load, GradientAlone)
 
 
 def _oddness(load: Load, quaternion: np.ndarray, here: float, there: float) -> Problem:

@@ -1,7 +1,7 @@
 # ruff: noqa: D102 (methods are those of OrbitPlane)
 """Orbital planes of sources or of the body itself: normals as expressions and at the start, and their drift.
 
-``rigidsim.model.capabilities.plane_of`` says which a load has. The mean ecliptic of date has its pole at
+``rigidsim.model.frames.plane_of`` says which a load has. The mean ecliptic of date has its pole at
 (P, -Q, sqrt(1 - P^2 - Q^2)) in the ecliptic and equinox of J2000, with P = sin(pi_A) sin(Pi_A) and
 Q = sin(pi_A) cos(Pi_A) from Capitaine, Wallace & Chapront 2003 (A&A 412, 567: the ecliptic of IAU 2006).
 """

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Any, Protocol, runtime_checkable
+from typing import Any
 
 import heyoka as hy
 
@@ -122,55 +122,16 @@ def potential_amplitude(scene: Scene) -> Any:
     return norm(scene.context, arm) * norm(scene.context, scene.gravity)
 
 
-@runtime_checkable
-class Sized(Protocol):
-    """A load of known size; others are estimated by trial (``rigidsim.model.load_estimate``)."""
-
-    def amplitude(self, scene: Scene) -> Any | None:
-        """Largest change of the energy of rotation that it can cause (mpf, J); None if unknown."""
-
-
-@runtime_checkable
-class Swift(Protocol):
-    """A load whose source may move."""
-
-    def fastest_rate(self, scene: Scene) -> Any:
-        """Fastest angular rate of the source as seen from the body (mpf, rad/s)."""
-
-
-@runtime_checkable
-class Gyroscopic(Protocol):
-    """A load that carries angular momentum relative to the body."""
-
-    def gyroscopic_momentum(self, scene: Scene) -> Vector:
-        """That momentum at the start (mpf, kg m^2/s, body axes)."""
-
-
-@runtime_checkable
-class BoundsFlight(Protocol):
-    """A load that keeps the body near."""
-
-    def flight_bounds(self, scene: Scene, fed: Any) -> tuple[Any, Any] | None:
-        """Largest distance from the origin (m) and speed (m/s) of a body that flies under this load alone;
-        None if it doesn't bound the flight. Loads of unknown size add ``fed`` (m/s) to the speed.
-        """
-
-
-def amplitude_of(load: object, scene: Scene) -> Any | None:
-    """The amplitude of a load that is ``Sized``; None if it is unknown."""
-    return load.amplitude(scene) if isinstance(load, Sized) else None
-
-
 def loads_amplitude(scene: Scene) -> Any:
     """Largest change of the energy of rotation, J, by all loads of known size except uniform gravity."""
-    known = [amplitude_of(load, scene) for load in scene.loads]
+    known = [load.amplitude(scene) for load in scene.loads]
     return sum((size for size in known if size is not None), scene.context.zero)
 
 
 def source_rate(scene: Scene) -> Any:
     """Fastest angular rate of any source seen from the body, rad/s; zero without one."""
-    rates = [load.fastest_rate(scene) for load in scene.loads if isinstance(load, Swift)]
-    return scene.context.maximum(rates or [scene.context.zero])
+    rates = [load.fastest_rate(scene) for load in scene.loads]
+    return scene.context.maximum([scene.context.zero, *rates])
 
 
 def gyroscopic_rate(scene: Scene) -> Any:
@@ -181,8 +142,7 @@ def gyroscopic_rate(scene: Scene) -> Any:
     context, inertia = scene.context, scene.turning_inertia
     total = context.zero
     for load in scene.loads:
-        if isinstance(load, Gyroscopic):
-            h = load.gyroscopic_momentum(scene)
+        if (h := load.gyroscopic_momentum(scene)) is not None:
             volume = dot(inertia[0], cross(inertia[1], inertia[2]))
             total += context.sqrt(dot(h, [dot(row, h) for row in inertia]) / volume)
     return total
@@ -194,8 +154,7 @@ def _flight_scales(scene: Scene, drive: Drive | None) -> tuple[Any, Any]:
     assert scene.position is not None
     assert scene.velocity is not None
     fed = context.zero if drive is None else drive.speed
-    loads = [load for load in scene.loads if isinstance(load, BoundsFlight)]
-    bounds = [found for load in loads if (found := load.flight_bounds(scene, fed)) is not None]
+    bounds = [found for load in scene.loads if (found := load.flight_bounds(scene, fed)) is not None]
     if len(bounds) == 1 and scene.gravity is None:
         return bounds[0]
     horizon = scene.end - scene.start

@@ -12,7 +12,6 @@ from typing import Any
 
 import heyoka as hy
 
-from rigidsim.model.capabilities import Placed
 from rigidsim.model.kinematics import Kinematics
 from rigidsim.model.rotations import apply, transpose
 from rigidsim.model.two_part import rounded
@@ -57,11 +56,9 @@ class SeenSource:
         """Radius of the source, m (mpf)."""
         return self.fields.radius.at(context)  # type: ignore[attr-defined]
 
-    def of(self, scene: Scene) -> Placed:
+    def of(self, scene: Scene) -> Any:
         """The load itself."""
-        load = scene.given_loads[self.number]
-        assert isinstance(load, Placed)
-        return load
+        return scene.given_loads[self.number]
 
 
 def sources_of(config: Config) -> list[SeenSource]:

@@ -10,7 +10,6 @@ from typing import Any
 import heyoka as hy
 
 from rigidsim.model.assembly import assemble_states
-from rigidsim.model.capabilities import Ending, Ranged, having
 from rigidsim.model.formulations.formulation import Formulation, ModelPlan
 from rigidsim.model.heyoka_expressions import carries_sign, plain_angles
 from rigidsim.model.mechanics import Mechanics
@@ -229,13 +228,13 @@ class System:
         for event in self.scene.events:
             (expression,) = written(m, [event.expression], clocked=False)
             found.append(Crossing(event.name, expression, _DIRECTIONS[event.direction], event.stop))
-        endings = [(*one, False) for load in having(Ending, m.loads) for one in load.endings(m)]
+        endings = [(*one, False) for load in m.loads for one in load.endings(m)]
         endings += [
             (f"{expression.where} is negative", above_zero(m, expression), False)
             for expression in self.scene.never_negative()
             if bounds(expression)[0] < 0
         ]
-        endings += [(*one, True) for load in having(Ranged, m.loads) for one in load.range_ends(m)]
+        endings += [(*one, True) for load in m.loads for one in load.range_ends(m)]
         down = _DIRECTIONS["down"]
         return found + [Crossing("", x, down, True, why, leaves_range) for why, x, leaves_range in endings]
 

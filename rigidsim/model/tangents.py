@@ -13,7 +13,6 @@ from collections.abc import Iterable, Mapping, Sequence
 
 import heyoka as hy
 
-from rigidsim.model.capabilities import orbit_of
 from rigidsim.model.formulations.planar import ANGLE, SPIN
 from rigidsim.model.heyoka_expressions import TANGENT
 from rigidsim.model.mechanics import Mechanics
@@ -187,7 +186,7 @@ def _absent(m: Mechanics) -> str | None:
     integrator = m.scene.config.integrator
     if m.attitude is not None and m.attitude.singular_factor is not None:
         return f'formulation = "{integrator.formulation}" has singularities that the vector would feel'
-    driven = any(map(orbit_of, m.loads))  # whose phase keeps the steps of any motion short
+    driven = any(load.orbit for load in m.loads)  # whose phase keeps the steps of any motion short
     if not driven and all(w == 0 for w in m.scene.angular_velocity):
         return "the body is at rest, where steps are as long as one likes; give it a small rate"
     if not driven and m.attitude is not None and m.attitude.momenta:

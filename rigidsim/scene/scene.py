@@ -58,8 +58,8 @@ class Scene(Setting):
 
     config: schema.Config
     samples: SampleTimes
-    loads: tuple[SceneLoad, ...]
-    given_loads: tuple[SceneLoad, ...] = ()
+    loads: tuple[Any, ...]
+    given_loads: tuple[Any, ...] = ()
     tabled: Mapping[str, tuple[SceneLoad, ...]] = field(default_factory=dict)
     gravity: Vector | None
     states: tuple[OwnState, ...] = ()

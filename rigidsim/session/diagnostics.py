@@ -12,7 +12,6 @@ from rigidsim.accuracy.estimates.margins import UNCERTAIN
 from rigidsim.accuracy.models.modelling import measure_modelling
 from rigidsim.accuracy.models.side_by_side import Unmeasured
 from rigidsim.errors import ConfigError
-from rigidsim.model.capabilities import gradient_source_of
 from rigidsim.scene.cautions import Caution, WarningCode
 from rigidsim.scene.choices import FULL, REDUCED
 from rigidsim.scene.readable import TimeWords, span_text
@@ -304,7 +303,7 @@ def cheaper_model(found: Diagnostics, limits: AdviceLimits, go_on: Callable[[], 
     """
     prepared, estimate = found.prepared, found.estimate
     config, loads = prepared.scene.config, prepared.system.plan.loads
-    suited = bool(loads) and all(gradient_source_of(load) is not None for load in loads)
+    suited = bool(loads) and all(load.gradient_source is not None for load in loads)
     short = found.progress.steps < limits.steps or estimate is None
     if short or not suited or config.model.level != FULL or config.output.record is None:
         return None

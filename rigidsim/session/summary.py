@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from rigidsim.accuracy.models.modelling import modelling_of
-from rigidsim.model.capabilities import table_of
 from rigidsim.scene.cautions import Caution
 from rigidsim.session.dataset import unused_variables
 from rigidsim.session.diagnostics import Diagnostics, advice_on
@@ -152,7 +151,7 @@ def _accuracy(found: Diagnostics) -> Accuracy:
 
 
 def _tables(found: Diagnostics) -> dict[str, TableErrors]:
-    orbits = [table_of(load) for load in found.prepared.system.plan.loads]
+    orbits = [load.table for load in found.prepared.system.plan.loads]
     return {orbit.name: TableErrors(**vars(orbit.error)) for orbit in orbits if orbit is not None}
 
 

@@ -11,9 +11,10 @@ from __future__ import annotations
 from typing import Any
 
 from rigidsim.analysis.labels import Known
-from rigidsim.model.capabilities import Beside, GradientAlone, Placed, gradient_source_of, orbit_of
 from rigidsim.model.load import loads_of
 from rigidsim.model.loads.fluid_core import FluidCore, core_of
+from rigidsim.model.loads.gravity_gradient import GravityGradient
+from rigidsim.model.loads.point_attraction import MovingGradient
 from rigidsim.model.sources import in_body_axes
 from rigidsim.scene.arithmetic import Vector, dot, norm
 from rigidsim.scene.scene import Scene
@@ -43,13 +44,15 @@ def modes_of_core(scene: Scene) -> list[Known]:
     spin, moments = turning
     rates = [dot(axis, scene.angular_velocity) for axis in scene.body.principal_axes]
     largest = max(range(3), key=lambda i: abs(dot(core.axis, scene.body.principal_axes[i])))
-    change = spin_change(scene, spin, rates, largest, moments, (Beside, FluidCore))
+    change = spin_change(scene, spin, rates, largest, moments, FluidCore)
     found = _core_modes(scene, core, spin, moments)
     if found is None:
         return []
     (wobble, fading), (nutation, core_fading) = found
     source = "linearised equations of mantle and core"
-    pulled = all(isinstance(x, Beside | GradientAlone | FluidCore) for x in loads_of(scene))
+    pulled = all(
+        x.beside or isinstance(x, GravityGradient | MovingGradient | FluidCore) for x in loads_of(scene)
+    )
     rough, symmetric = 0.0 if pulled else _TORQUES, abs(moments[0] - moments[1]) <= SYMMETRIC * moments[2]
     errors = [float(_SMALL * abs(x) + y) for x, y in ((wobble, fading), (nutation, core_fading))]
     exact = change is not None and core.friction == 0
@@ -71,12 +74,12 @@ def modes_of_core(scene: Scene) -> list[Known]:
 
 
 def spin_change(
-    scene: Scene, spin: Any, rates: Vector, axis: int, moments: Vector, beside: tuple[type, ...] = ()
+    scene: Scene, spin: Any, rates: Vector, axis: int, moments: Vector, known: type | None = None
 ) -> tuple[float, float] | None:
     """Relative errors of the spin about a principal axis as at the start, and of the torque-free wobble.
 
-    None where other torques than gravity gradients (and loads of types `beside`) act, or where the amplitude
-    of a body without symmetry counts.
+    None where other torques than gravity gradients (and a `known` type, or beside others) act, or where
+    the amplitude of a body without symmetry counts.
 
     Args:
         rates: along all principal axes, rad/s; moments: across the axis, and along it.
@@ -85,11 +88,11 @@ def spin_change(
     low, high, polar = moments
     tides = context.zero
     for load in loads_of(scene):
-        source = gradient_source_of(load)
+        source = load.gradient_source
         if source is not None:
             distance = source.placement.nearest(context)
             tides += 3 * source.gravitational_parameter / distance**3 / spin**2
-        elif not isinstance(load, beside):
+        elif known is None or not (load.beside or isinstance(load, known)):
             return None
     uneven = float(abs(high - low) / polar)
     tumbling = float(sum(w**2 for k, w in enumerate(rates) if k != axis) / spin**2)
@@ -163,8 +166,8 @@ def synchronous_modes(scene: Scene, node_rate: Any = None) -> list[Known]:
         return []
     a, b, c = (body.principal_moments[i] for i in (least, middle, largest))
     for load in loads_of(scene):
-        source = gradient_source_of(load)
-        if source is None or not isinstance(load, Placed) or a == 0 or a == b or b == c:
+        source = load.gradient_source
+        if source is None or a == 0 or a == b or b == c:
             continue
         place = load.source_at_start(scene)
         distance = norm(context, place)
@@ -172,7 +175,7 @@ def synchronous_modes(scene: Scene, node_rate: Any = None) -> list[Known]:
         in_step = source.gravitational_parameter / distance**3 / turning[0] ** 2
         if abs(facing) < _FACING or abs(in_step - 1) > _IN_STEP:
             continue
-        orbit = orbit_of(load)
+        orbit = load.orbit
         n = abs(turning[0]) if orbit is None else orbit.mean_motion + orbit.periapsis_rate + orbit.node_rate
         sx, sz = (c - a) / b, (c - b) / a
         half, product = (1 + 3 * sx + sx * sz) / 2, 4 * sx * sz

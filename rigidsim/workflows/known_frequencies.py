@@ -9,7 +9,6 @@ from typing import Any
 import mpmath
 
 from rigidsim.analysis.labels import Known
-from rigidsim.model.capabilities import Beside, gradient_source_of, orbit_of
 from rigidsim.model.carriers import carried_beside
 from rigidsim.model.load import loads_of
 from rigidsim.model.loads.elasticity import Elasticity
@@ -47,16 +46,16 @@ def known_frequencies(scene: Scene, *, driven: bool = False) -> list[Known]:
         found = _of_motion(closed.motion)
         return [Known(k.name, mpmath.ldexp(k.value, -closed.scaling.time), 0.0, k.source) for k in found]
     found = []
-    loads = [load for load in loads_of(scene) if not isinstance(load, Beside)]
+    loads = [load for load in loads_of(scene) if load.beside is None]
     elastic = any(isinstance(load, Elasticity) for load in loads)
     cored = [] if elastic else modes_of_core(scene)
     known = (Elasticity, FluidCore) if cored or elastic else ()
     if carried_beside([load for load in loads if not isinstance(load, known)]):
         return []
-    orbits = [orbit for load in loads if (orbit := orbit_of(load)) is not None]
+    orbits = [orbit for load in loads if (orbit := load.orbit) is not None]
     for number, orbit in enumerate(orbits, 1):
         found += _of_orbit(orbit, str(number) if len(orbits) > 1 else "")
-    sources = [gradient_source_of(load) for load in loads]
+    sources = [load.gradient_source for load in loads]
     if any(source is not None and source.placement.lunisolar for source in sources):
         found += _delaunay(scene)
     librations = _librations(scene, orbits[0]) if len(orbits) == 1 == len(loads) else []

@@ -11,7 +11,6 @@ from rigidsim.accuracy.models.side_by_side import Unmeasured
 from rigidsim.accuracy.motion import Pilot, run_pilot
 from rigidsim.errors import ConfigError
 from rigidsim.model.averaged.torques import reads_rates_alone
-from rigidsim.model.capabilities import gradient_source_of
 from rigidsim.model.load import Load
 from rigidsim.scene.choices import FULL
 from rigidsim.scene.config import Experiment
@@ -91,7 +90,7 @@ def torques_change_pace(prepared: InitialValueProblem, pilot: Pilot) -> bool:
     brake the rotation, or spin it up.
     """
     plan, clock = prepared.system.plan, prepared.clock
-    alone = [load for load in plan.loads if gradient_source_of(load) is None]
+    alone = [load for load in plan.loads if load.gradient_source is None]
     braked = plan.formulation.resolves_rotation and alone and all(map(reads_rates_alone, alone))
     ahead = pilot.taken * pilot.step < float(clock.at(clock.count - 1)) - float(clock.start)
     return bool(prepared.has_steps and braked and ahead)

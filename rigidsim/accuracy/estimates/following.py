@@ -15,7 +15,6 @@ import heyoka as hy
 import numpy as np
 
 from rigidsim.accuracy.estimates import margins
-from rigidsim.model.capabilities import Ahead, having
 from rigidsim.model.formulations.formulation import Rounding
 from rigidsim.model.projected_invariants import projected_invariants
 from rigidsim.model.system import System
@@ -235,7 +234,7 @@ _WITHIN_MONTH = 4.0
 
 def plain_perturbations(system: System) -> Perturbations:
     """Errors of a step in quaternions or rates at the precision's own tolerance."""
-    loads = list(having(Ahead, system.plan.loads))
+    loads = system.plan.loads
     ahead = max((load.seconds_ahead for load in loads), key=abs, default=0.0)
     plain = Perturbations(ahead=math.ldexp(ahead, -system.scaling.time))
     if not any(load.of_time for load in loads):

@@ -17,7 +17,6 @@ from rigidsim.model.averaged.resonance import Resonance
 from rigidsim.model.averaged.sources import Source
 from rigidsim.model.averaged.spectrum import BodySpectrum
 from rigidsim.model.averaged.torques import reads_rates_alone
-from rigidsim.model.capabilities import Unaveraged, gradient_source_of, having
 from rigidsim.model.carriers import carried_beside
 from rigidsim.model.gradient import GradientSource
 from rigidsim.model.load import Load
@@ -49,14 +48,14 @@ than a weak harmonic's part at them.
 def refuse_scene(scene: Scene, loads: Sequence[Load]) -> None:
     """Raise a ConfigError for a scene that is of no kind that has averages."""
     config, level, integrator = scene.config, scene.config.model.level, scene.config.integrator
-    sources = [source for load in loads if (source := gradient_source_of(load)) is not None]
-    alone = [load for load in loads if gradient_source_of(load) is None]
+    sources = [source for load in loads if (source := load.gradient_source) is not None]
+    alone = [load for load in loads if load.gradient_source is None]
     against, instead = carried_beside(loads), ""
     if scene.free_flight:
         against = "the body has a position and flies"
     elif against:
         pass
-    elif unfit := [load.unaveraged for load in having(Unaveraged, loads)]:
+    elif unfit := [x.unaveraged for x in loads if x.unaveraged is not None]:
         against, instead = unfit[0]
     elif not loads:
         against = "no torque acts, so that the direction of the angular momentum rests"

@@ -20,7 +20,6 @@ from rigidsim.model.averaged.orbit_terms import nutation
 from rigidsim.model.averaged.resonance import Resonance, SlowStart
 from rigidsim.model.averaged.sources import Source, sources_of, unit
 from rigidsim.model.averaged.spectrum import BodySpectrum, body_spectrum
-from rigidsim.model.capabilities import gradient_source_of
 from rigidsim.model.load import Load
 from rigidsim.model.orbits.prescribed import Carried
 from rigidsim.model.scaling import Scaling
@@ -139,7 +138,7 @@ def average_of(
     try:
         motion = free_motion(context, body, momentum)
         spectrum = body_spectrum(motion)
-        alone = [load for load in loads if gradient_source_of(load) is None]
+        alone = [load for load in loads if load.gradient_source is None]
         if along is not None:
             resonance = None if along.resonance is None else along.resonance.among(sources)
         else:

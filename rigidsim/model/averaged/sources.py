@@ -11,7 +11,6 @@ import numpy as np
 
 from rigidsim.model.averaged.orbit_terms import Ellipse, OrbitPlace, place_by_elements
 from rigidsim.model.averaged.spectrum import orbit_harmonics
-from rigidsim.model.capabilities import gradient_source_of
 from rigidsim.model.gradient import GradientSource
 from rigidsim.model.load import Load
 from rigidsim.scene.arithmetic import Vector, eccentric_anomaly, norm
@@ -131,7 +130,7 @@ class Source:
 
 def sources_of(scene: Scene, loads: Sequence[Load]) -> list[Source]:
     """Sources of all gravity gradients of a scene, with their strengths."""
-    found = [(number, gradient_source_of(load)) for number, load in enumerate(loads, start=1)]
+    found = [(number, load.gradient_source) for number, load in enumerate(loads, start=1)]
     return [Source.at_start(scene.context, n, source) for n, source in found if source is not None]
 
 

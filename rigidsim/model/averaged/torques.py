@@ -18,7 +18,6 @@ import heyoka as hy
 import numpy as np
 
 from rigidsim.model.averaged.free_motion import Polhodes, mean_square_sine, means_needed, nodes_needed
-from rigidsim.model.capabilities import Damping, Reacting, has_source, orbit_of, table_of
 from rigidsim.model.carriers import Carrier
 from rigidsim.model.load import Load
 from rigidsim.model.mechanics import Mechanics
@@ -41,8 +40,8 @@ _BITS_CHECKED = 40
 
 def reads_rates_alone(load: Load) -> bool:
     """Whether a load is a function of the body's rates, in body axes, that doesn't depend on time."""
-    placed = orbit_of(load) or table_of(load) or has_source(load)
-    return not (load.reads or placed or isinstance(load, Reacting | Carrier))
+    placed = load.orbit or load.table or load.has_source
+    return not (load.reads or placed or load.reacts or isinstance(load, Carrier))
 
 
 @dataclass(frozen=True)
@@ -64,7 +63,7 @@ class DrivingTorques:
         context, others = scene.context, []
         damping = [context.zero] * 3
         for load in loads:
-            coefficients = load.damping() if isinstance(load, Damping) else None
+            coefficients = load.damping()
             if coefficients is None:
                 others.append(load)
                 continue

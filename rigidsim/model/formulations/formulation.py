@@ -14,7 +14,6 @@ from typing import Any, ClassVar, TypeVar
 import heyoka as hy
 
 from rigidsim.model.averaged.average import Average
-from rigidsim.model.capabilities import is_wide
 from rigidsim.model.kinematics import in_common_unit
 from rigidsim.model.load import Load
 from rigidsim.model.mechanics import Mechanics
@@ -74,7 +73,7 @@ class ModelPlan:
     def wide(self) -> bool:
         """Whether the equations are too long to be compiled unrolled."""
         read = readables(*self.scene.formulas())
-        return self.formulation.wide or any(map(is_wide, self.loads)) or any(x.long for x in read)
+        return self.formulation.wide or any(load.wide for load in self.loads) or any(x.long for x in read)
 
 
 class Formulation:

@@ -19,7 +19,6 @@ from typing import Any
 import heyoka as hy
 
 from rigidsim.model import rotations
-from rigidsim.model.capabilities import Beside, corotating_orbit_of
 from rigidsim.model.formulations.formulation import Formulation, ModelPlan
 from rigidsim.model.load import Load
 from rigidsim.model.rotations import Symbolic, SymbolicMatrix
@@ -51,7 +50,7 @@ class OrbitalQuaternion(Formulation):
         readers = [load for load in loads if {"attitude", "vertical"} & load.reads and not _rides_along(load)]
         if scene.torque_arm is not None or len(readers) != 1 or _reads_places(scene):
             return None
-        orbit = corotating_orbit_of(readers[0])
+        orbit = readers[0].corotating_orbit
         return None if orbit is None else cls(orbit)
 
     def attitude(self, plan: ModelPlan, rates: list[Symbolic], number: Rounder) -> AttitudeStates:
@@ -89,7 +88,7 @@ class OrbitalQuaternion(Formulation):
 
 def _rides_along(load: Load) -> bool:
     """Whether it acts beside another load, and rests in the same frame."""
-    return isinstance(load, Beside) and corotating_orbit_of(load) is not None
+    return load.beside is not None and load.corotating_orbit is not None
 
 
 def _reads_places(scene: Scene) -> bool:

@@ -18,7 +18,6 @@ from typing import Any
 import heyoka as hy
 
 from rigidsim.model import rotations
-from rigidsim.model.capabilities import KeepsPlane, has_source
 from rigidsim.model.carriers import carried_beside
 from rigidsim.model.formulations.formulation import Formulation, ModelPlan, Unsuited, formulates
 from rigidsim.model.load import Load
@@ -66,7 +65,7 @@ class Planar(Formulation):
         why = "the body turns about a principal axis, along which every torque points and stays "
         why += '(formulation = "quaternion" carries the full motion)'
         try:
-            return cls.of(scene, loads, why) if any(map(has_source, loads)) else None
+            return cls.of(scene, loads, why) if any(load.has_source for load in loads) else None
         except Unsuited:
             return None
 
@@ -129,7 +128,7 @@ def _plane_of(scene: Scene, loads: Sequence[Load]) -> tuple[Vector, Vector, Any]
     axis = _spin_axis(scene, loads)
     normal = apply(attitude.rotation_matrix(scene.quaternion), axis)
     for load in loads:
-        if not _keeps(load, scene, axis, normal):
+        if not load.keeps_plane(scene, axis, normal):
             raise Unsuited(f"the torque of {load.title} may turn the body out of its plane")
     turned = _least_turn(context, axis, normal)
     # the remaining rotation is about the axis, and the scalar product gives its half angle
@@ -141,10 +140,6 @@ def _plane_of(scene: Scene, loads: Sequence[Load]) -> tuple[Vector, Vector, Any]
     elif angle <= -context.pi:
         angle, turned = angle + 2 * context.pi, [-x for x in turned]
     return axis, turned, angle
-
-
-def _keeps(load: Load, scene: Scene, axis: Vector, normal: Vector) -> bool:
-    return isinstance(load, KeepsPlane) and load.keeps_plane(scene, axis, normal)
 
 
 def _spin_axis(scene: Scene, loads: Sequence[Load]) -> Vector:
@@ -160,7 +155,7 @@ def _spin_axis(scene: Scene, loads: Sequence[Load]) -> Vector:
         return axis
     matrix = attitude.rotation_matrix(scene.quaternion)
     for axis in scene.body.principal_axes[::-1]:
-        if all(_keeps(load, scene, axis, apply(matrix, axis)) for load in loads):
+        if all(load.keeps_plane(scene, axis, apply(matrix, axis)) for load in loads):
             return list(axis)
     raise Unsuited("the body is at rest, and none of its principal axes is one that every torque is along")
 

@@ -32,7 +32,7 @@ from rigidsim.scene.tracing.numbers import plain
 
 
 @register_load(beside="gravity_field")
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class AttractorField(Load):
     """Force of the harmonics of a point at rest.
 
@@ -51,7 +51,6 @@ class AttractorField(Load):
     title = "gravity_field"
     described = "the gravity field of an attracting body"
     reads = frozenset({"flight"})
-    has_source = False
     wide = True
 
     @classmethod
@@ -69,7 +68,7 @@ class AttractorField(Load):
             coefficients_of(given, around), given.radius.at(context), frame, given.rate.at(context)
         )
         refuse_inside(around, load.position, field.radius, "gravity_field")
-        return cls(load, field, around.number + 1, context)
+        return cls(beside=load, field=field, number=around.number + 1, context=context)
 
     @staticmethod
     def effect_parts(fields: CentralGravityFields) -> Iterator[EffectPart]:

@@ -130,7 +130,7 @@ class CentralGravity(PointAttraction):
         return {"what": "attractor", "gravitational_parameter": strength, "position": place}
 
     @property
-    def attracting_point(self) -> Vector:
+    def attracting_point(self) -> Vector:  # type: ignore[override]
         return self.position
 
     @property

@@ -20,7 +20,6 @@ from typing import Any, TypeVar
 
 import heyoka as hy
 
-from rigidsim.model.capabilities import corotating_orbit_of, fixed_source_of, gradient_source_of
 from rigidsim.model.distortion import Distortion, SeenTide, total
 from rigidsim.model.gradient import GradientSource
 from rigidsim.model.inertia import ConstantInertia, MassDistribution
@@ -100,7 +99,7 @@ class Elasticity(ElasticEffects, Load):
         Raises:
             ConfigError: a source whose derivatives aren't known.
         """
-        found = [gradient_source_of(scene.given_loads[n]) for n in self.raising]
+        found = [scene.given_loads[n].gradient_source for n in self.raising]
         sources = [source for source in found if source is not None]
         for source in sources:
             if why := source.placement.untracked:
@@ -271,7 +270,7 @@ class Elasticity(ElasticEffects, Load):
         squared = sum((x * x for row in bent for x in row), scene.context.zero)
         energy = dot(lost, momentum) / 2 + 3 * squared / (4 * self.strength)  # (K/8) F : F
         for load in loads_of(scene):
-            fixed = fixed_source_of(load, scene) if load.conservative else None
+            fixed = load.fixed_source(scene) if load.conservative else None
             if fixed is not None and self._lends(scene):
                 towards = apply(transpose(rotation_matrix(scene.quaternion)), fixed[1])
                 energy = energy + fixed[0] / 2 * dot(towards, apply(tensor, towards))
@@ -302,10 +301,10 @@ class Elasticity(ElasticEffects, Load):
             return True
         others = [load for load in loads_of(scene) if load is not self]
         raising = [scene.given_loads[n] for n in self.raising]
-        drawn = [load for load in others if gradient_source_of(load) is not None]
+        drawn = [load for load in others if load.gradient_source is not None]
         if any(all(x is not y for y in raising) for x in drawn):
             return True  # whose potential the distortion changes without being caused by it
-        alone = len(others) == 1 and corotating_orbit_of(others[0]) is not None
+        alone = len(others) == 1 and others[0].corotating_orbit is not None
         return not (alone or all(load.conservative for load in others))
 
     def supplied_power(self, m: Kinematics) -> Symbolic | None:

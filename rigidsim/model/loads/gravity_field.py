@@ -20,16 +20,6 @@ from typing import Any
 import heyoka as hy
 from pydantic import Field, StrictInt
 
-from rigidsim.model.capabilities import (
-    Attracting,
-    KeepsPlane,
-    Reacting,
-    corotating_orbit_of,
-    fixed_source_of,
-    is_wide,
-    orbit_of,
-    table_of,
-)
 from rigidsim.model.gradient import GradientSource
 from rigidsim.model.harmonics import Harmonics, Series, polynomial, turning
 from rigidsim.model.kinematics import Kinematics
@@ -66,7 +56,7 @@ class AttractingFields(SourceFields):
     )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class FieldAttraction(Load):
     """Attraction of the field from degree 3 on.
 
@@ -85,7 +75,6 @@ class FieldAttraction(Load):
 
     title = "gravity_field"
     described = "the body's gravity field"
-    has_source = False
     unaveraged = (
         "the gravity field of degree 3 and more has no average, which the gradient alone has",
         "set degree = 2",
@@ -100,20 +89,20 @@ class FieldAttraction(Load):
         return bool(self.beside.conservative)
 
     @property
-    def orbit(self) -> KeplerOrbit | None:
-        return orbit_of(self.beside)
+    def orbit(self) -> KeplerOrbit | None:  # type: ignore[override]
+        return self.beside.orbit
 
     @property
-    def table(self) -> TabulatedOrbit | None:
-        return table_of(self.beside)
+    def table(self) -> TabulatedOrbit | None:  # type: ignore[override]
+        return self.beside.table
 
     @property
-    def corotating_orbit(self) -> KeplerOrbit | None:
-        return corotating_orbit_of(self.beside)
+    def corotating_orbit(self) -> KeplerOrbit | None:  # type: ignore[override]
+        return self.beside.corotating_orbit
 
     @property
-    def wide(self) -> bool:
-        return is_wide(self.beside) or self.degree > _UNROLLED
+    def wide(self) -> bool:  # type: ignore[override]
+        return self.beside.wide or self.degree > _UNROLLED
 
     def acts(self) -> bool:
         return bool(self.coefficients)
@@ -209,7 +198,7 @@ class FieldAttraction(Load):
         for a field that is symmetric to the plane.
         """
         context, towards = scene.context, self.beside.source_at_start(scene)
-        if not (isinstance(self.beside, KeepsPlane) and self.beside.keeps_plane(scene, axis, normal)):
+        if not self.beside.keeps_plane(scene, axis, normal):
             return False
         if parallel(context, towards, normal):
             return all(self._keeps(context, axis, u) for u in (axis, [-x for x in axis]))
@@ -237,7 +226,7 @@ class FieldAttraction(Load):
 
     def turns_about(self, m: Kinematics, axis: Vector) -> bool:
         """Whether the axis isn't the line to a source at rest."""
-        fixed = fixed_source_of(self.beside, m.scene)
+        fixed = self.beside.fixed_source(m.scene)
         return fixed is None or not parallel(m.scene.context, fixed[1], axis)
 
     # --- sizes, and what readers are told -------------------------------------------------------------------
@@ -283,9 +272,10 @@ class FieldAttraction(Load):
             raise around.fault("degree", f"{given}[body] gravity_field ends at degree {field.degree}")
         if isinstance(load, GradientSource):
             _refuse_within(load, field, around)
-        kind = _Flown if isinstance(load, Attracting) else _Moving if isinstance(load, Reacting) else cls
+        kind = _Flown if load.attracting_point else _Moving if load.reacts else cls
         strength = getattr(load, "gravitational_parameter", None) or load.strength
-        return kind(load, field, degree, strength, around.number + 1)
+        numbers = {"degree": degree, "strength": strength, "number": around.number + 1}
+        return kind(beside=load, field=field, **numbers)
 
 
 register_load(FieldAttraction, beside="degree")
@@ -297,7 +287,7 @@ class _Flown(FieldAttraction):
     wide = True
 
     @property
-    def attracting_point(self) -> Vector:
+    def attracting_point(self) -> Vector:  # type: ignore[override]
         point: Vector = self.beside.attracting_point
         return point
 
@@ -309,6 +299,7 @@ class _Moving(FieldAttraction):
     """Of a point mass that moves besides the body."""
 
     wide = True
+    reacts = True
 
     def force(self, m: Kinematics) -> list[Term]:
         if not self.beside.as_points:

@@ -10,10 +10,9 @@ import heyoka as hy
 from pydantic import Field
 
 from rigidsim.errors import ConfigError, Problem
-from rigidsim.model.capabilities import SourcePlace
 from rigidsim.model.gradient import GradientSource, gradient_terms, tidal_range
 from rigidsim.model.kinematics import Kinematics, quadratic_form
-from rigidsim.model.load import Load, Term
+from rigidsim.model.load import Load, SourcePlace, Term
 from rigidsim.model.load_words import sides_text, source_text, value_text
 from rigidsim.model.loads.point_attraction import MovingGradient, kernel_strength, positive_strength
 from rigidsim.model.loads.source_figure import FigureFields
@@ -62,7 +61,7 @@ class GravityGradientFields(OrbitFields, FigureFields):
 
 @register_load
 @dataclass(frozen=True)
-class GravityGradient(GradientSource, Load):
+class GravityGradient(GradientSource, Load):  # type: ignore[override]
     """Torque (3 G M / R^3) c x (I c) of a distant body in direction c (MacCullagh), which is its own source.
 
     For an ephemeris the space axes are the mean ecliptic and equinox of J2000, and time counts from the
@@ -137,28 +136,28 @@ class GravityGradient(GradientSource, Load):
         return self.placement.rests() is not None
 
     @property
-    def wide(self) -> bool:
+    def wide(self) -> bool:  # type: ignore[override]
         return self.placement.wide
 
     @property
-    def corotating_orbit(self) -> KeplerOrbit | None:
+    def corotating_orbit(self) -> KeplerOrbit | None:  # type: ignore[override]
         orbit = self.orbit
         return orbit if orbit is not None and orbit.circular and orbit.fixed_plane else None
 
     @property
-    def plane(self) -> OrbitPlane | None:
+    def plane(self) -> OrbitPlane | None:  # type: ignore[override]
         return self.placement.plane
 
     @property
-    def without_plane(self) -> str:
+    def without_plane(self) -> str:  # type: ignore[override]
         return self.placement.without_plane
 
     @property
-    def seconds_ahead(self) -> float:
+    def seconds_ahead(self) -> float:  # type: ignore[override]
         return self.placement.seconds_ahead
 
     @property
-    def of_time(self) -> bool:
+    def of_time(self) -> bool:  # type: ignore[override]
         return self.placement.of_time
 
     def source_direction(self, m: Kinematics) -> list[Symbolic]:

@@ -9,9 +9,8 @@ from typing import Any, cast
 import heyoka as hy
 
 from rigidsim.errors import ConfigError, Problem
-from rigidsim.model.capabilities import Attracting, SourcePlace, having
 from rigidsim.model.kinematics import Kinematics
-from rigidsim.model.load import Load, loads_of
+from rigidsim.model.load import Load, SourcePlace, loads_of
 from rigidsim.model.load_words import length_text, orbit_text, sides_text, value_text
 from rigidsim.model.loads.central_gravity import CentralGravity
 from rigidsim.model.loads.earth_field import EarthField
@@ -53,6 +52,7 @@ class InMagneticField(Load):
     place: Vector | None = None  # None if it doesn't fly about a dipole
     name: str = ""
     earth: EarthField | None = None  # whose field it is; the source is then its dipole at time 0
+    magnetic = True
 
     @classmethod
     def field_of(cls, fields: MagneticFieldFields, around: Setting) -> dict[str, Any]:
@@ -105,12 +105,12 @@ class InMagneticField(Load):
         return self.orbit is None and self.place is None
 
     @property
-    def wide(self) -> bool:
+    def wide(self) -> bool:  # type: ignore[override]
         """Whether its expressions are too long to be unrolled: those of an Earth that turns take seconds."""
         return self.earth is not None
 
     @property
-    def has_source(self) -> bool:
+    def has_source(self) -> bool:  # type: ignore[override]
         return self.orbit is not None
 
     def source_direction(self, m: Kinematics) -> list[Symbolic] | None:
@@ -177,7 +177,7 @@ class InMagneticField(Load):
         """Position of the dipole about which the body flies, m; refused if it isn't told."""
         if self.place:
             return self._checked(self.place, scene)
-        points = [load.attracting_point for load in having(Attracting, loads_of(scene))]
+        points = [load.attracting_point for load in loads_of(scene) if load.attracting_point is not None]
         if not points or any(point != points[0] for point in points):
             found = "several points" if points else "no point at rest"
             what = f"missing; it is needed where {found} attracts the body by central_gravity"

@@ -14,10 +14,9 @@ from typing import Any, ClassVar
 
 import heyoka as hy
 
-from rigidsim.model.capabilities import SourcePlace
 from rigidsim.model.gradient import GradientSource, gradient_terms, tidal_range
 from rigidsim.model.kinematics import Kinematics, inertia_times, quadratic_form
-from rigidsim.model.load import Load, Term
+from rigidsim.model.load import Load, SourcePlace, Term
 from rigidsim.model.load_words import reach_text, source_text, value_text
 from rigidsim.model.orbit_planes import OrbitPlane
 from rigidsim.model.orbits.point_mass_states import PointMassPair
@@ -136,6 +135,7 @@ class MovingSource(PointAttraction):
 
     masses: PointMasses  # all of them
     number: int  # index of the one that attracts
+    reacts = True
     as_points: ClassVar[bool] = False  # whether it attracts the body as a point, too
     felt: ClassVar[str]  # by the masses under full coupling
 
@@ -148,7 +148,7 @@ class MovingSource(PointAttraction):
         return frozenset({"attitude", "flight"} if self.masses.host is None else {"attitude"})
 
     @property
-    def wide(self) -> bool:
+    def wide(self) -> bool:  # type: ignore[override]
         """Whether there are three or more masses, whose equations take ten seconds to compile unrolled."""
         return len(self.masses.names) > _UNROLLED
 
@@ -157,7 +157,7 @@ class MovingSource(PointAttraction):
         return self.masses.strengths[self.number]
 
     @property
-    def plane(self) -> OrbitPlane:
+    def plane(self) -> OrbitPlane:  # type: ignore[override]
         return _OsculatingPlane(self)
 
     def among(self, masses: PointMasses) -> MovingSource:

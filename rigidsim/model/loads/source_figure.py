@@ -18,7 +18,6 @@ from typing import Annotated, Any, Literal
 import heyoka as hy
 from pydantic import Field, Tag
 
-from rigidsim.model.capabilities import KeepsPlane, corotating_orbit_of, fixed_source_of, orbit_of, table_of
 from rigidsim.model.earth_pole import earth_pole
 from rigidsim.model.gradient import GradientSource, tensor_terms
 from rigidsim.model.kinematics import Kinematics, inertia_times
@@ -83,7 +82,7 @@ class FigureFields(AttractingFields):
     )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class FigureAttraction(Load):
     """Torque of the source's oblateness on the body's inertia.
 
@@ -110,7 +109,6 @@ class FigureAttraction(Load):
 
     title = "figure"
     described = "the figure of a source"
-    has_source = False
     unaveraged = "the figure of a source has no average", "leave figure out"
 
     @property
@@ -122,17 +120,17 @@ class FigureAttraction(Load):
         return bool(self.beside.conservative) and self.pole is not None
 
     @property
-    def orbit(self) -> KeplerOrbit | None:
-        return orbit_of(self.beside)
+    def orbit(self) -> KeplerOrbit | None:  # type: ignore[override]
+        return self.beside.orbit
 
     @property
-    def table(self) -> TabulatedOrbit | None:
-        return table_of(self.beside)
+    def table(self) -> TabulatedOrbit | None:  # type: ignore[override]
+        return self.beside.table
 
     @property
-    def corotating_orbit(self) -> KeplerOrbit | None:
+    def corotating_orbit(self) -> KeplerOrbit | None:  # type: ignore[override]
         """The orbit of the source, if its pole is along the orbit's normal."""
-        orbit = corotating_orbit_of(self.beside)
+        orbit = self.beside.corotating_orbit
         if orbit is None or self.pole is None:
             return None
         return orbit if parallel(self.context, orbit.normal(self.context), self.pole) else None
@@ -205,14 +203,14 @@ class FigureAttraction(Load):
 
     def keeps_plane(self, scene: Scene, axis: Vector, normal: Vector) -> bool:
         """Whether the source stays in the plane or on its normal, and the pole, too."""
-        if self.pole is None or not isinstance(self.beside, KeepsPlane):
+        if self.pole is None:
             return False
         flat = across(scene.context, self.pole, normal) or parallel(scene.context, self.pole, normal)
         return flat and self.beside.keeps_plane(scene, axis, normal)
 
     def turns_about(self, m: Kinematics, axis: Vector) -> bool:
         """Whether the axis isn't the line to a source at rest that is its pole as well."""
-        fixed, context = fixed_source_of(self.beside, m.scene), m.scene.context
+        fixed, context = self.beside.fixed_source(m.scene), m.scene.context
         if fixed is None or self.pole is None:
             return True
         return not (parallel(context, fixed[1], axis) and parallel(context, self.pole, axis))
@@ -255,7 +253,10 @@ class FigureAttraction(Load):
             )
             raise around.fault("figure.radius", what + "which would be within it; check both")
         strength = getattr(load, "gravitational_parameter", None) or load.strength
-        made = cls(load, strength, given.J2.at(context) * radius**2, radius, None, around.number + 1, context)
+        made = cls(
+            beside=load, strength=strength, size=given.J2.at(context) * radius**2, radius=radius, pole=None,
+            number=around.number + 1, context=context,
+        )  # fmt: skip
         if isinstance(given.pole, str):
             known = (
                 ("[time] epoch", around.epoch, 'epoch = "2000-01-01T12:00:00 TDB"'),

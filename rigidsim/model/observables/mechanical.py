@@ -8,8 +8,6 @@ from typing import Any
 import heyoka as hy
 
 from rigidsim.model import first_integrals, fixed_axes
-from rigidsim.model.capabilities import Attracting, having
-from rigidsim.model.carriers import lends
 from rigidsim.model.euler_poles import Poles, angles_of_matrix, squared_factor
 from rigidsim.model.frames import jacobi_constant
 from rigidsim.model.loads.central_gravity import CentralGravity
@@ -61,7 +59,7 @@ def rotational_scale(m: Mechanics, *, kept: bool = False) -> tuple[Any, str]:
     momentum = apply(scene.turning_inertia, scene.angular_velocity)
     kinetic = dot(scene.angular_velocity, momentum) / 2
     for carrier in m.carriers:
-        if not (kept and lends(carrier, m)):
+        if not (kept and carrier.lends(m)):
             kinetic += carrier.carried_at_start(scene)[1]
     carried = context.maximum(scene.body.principal_moments) * source_rate(scene) ** 2 / 2
     amplitude = potential_amplitude(scene) + loads_amplitude(scene) + carried + _driven(m)
@@ -110,7 +108,7 @@ def linear_momentum_scale(m: Mechanics) -> tuple[Any, str]:
 
 def attracting_point(m: Mechanics) -> Vector:
     """Position of the (first) attracting point, m, space axes."""
-    return having(Attracting, m.loads)[0].attracting_point
+    return next(point for load in m.loads if (point := load.attracting_point) is not None)
 
 
 def total_momentum_scale(m: Mechanics) -> tuple[Any, str]:
@@ -218,7 +216,7 @@ def _work(m: Mechanics) -> list[Symbolic]:
     if m.lent_energy is None:
         return [state]
     unit = m.scene.context.ldexp(m.scene.context.one, m.work_unit - m.scaling.energy)
-    lent = [x.carried_at_start(m.scene)[1] for x in m.carriers if lends(x, m)]
+    lent = [x.carried_at_start(m.scene)[1] for x in m.carriers if x.lends(m)]
     begun = m.scene.context.ldexp(sum(lent, m.scene.context.zero), -m.scaling.energy)
     return [hy.sum([m.number(unit) * state, m.lent_energy, hy.expression(m.number(-begun))])]
 

@@ -15,7 +15,6 @@ from typing import Any
 import heyoka as hy
 
 from rigidsim.model import fixed_axes
-from rigidsim.model.capabilities import Attracting, Damping, Reshaping, corotating_orbit_of
 from rigidsim.model.euler_poles import Poles
 from rigidsim.model.first_integrals import goryachev_chaplygin_top, kovalevskaya_top
 from rigidsim.model.frames import (
@@ -56,8 +55,8 @@ class Need:
 
 def work_is_needed(m: Mechanics) -> bool:
     """Whether the loads' power is integrated: energy isn't conserved, and there is no Jacobi constant."""
-    acting = [load for load in m.loads if m.driven_within or not isinstance(load, Reshaping)]
-    has_jacobi = m.attitude is not None and len(acting) == 1 and corotating_orbit_of(acting[0]) is not None
+    acting = [load for load in m.loads if m.driven_within or not load.changes]
+    has_jacobi = m.attitude is not None and len(acting) == 1 and acting[0].corotating_orbit is not None
     return _has_energy(m) and not m.conserves_energy and not has_jacobi and m.power is not None
 
 
@@ -102,7 +101,7 @@ _NO_SOURCE = _unless(
 
 def _sourced(m: Mechanics) -> bool:
     load = first_source(m.loads) if m.attitude is not None else None
-    return load is not None and (not isinstance(load, Attracting) or m.velocity is not None)
+    return load is not None and (load.attracting_point is None or m.velocity is not None)
 
 
 def _with_axis(found: Callable[[Mechanics], Vector | None]) -> Need:
@@ -111,7 +110,7 @@ def _with_axis(found: Callable[[Mechanics], Vector | None]) -> Need:
 
 def _isotropic_damping(m: Mechanics) -> bool:
     """Whether the body turns, under dampings alone that add up to a multiple of the inertia tensor."""
-    found = [load.damping() if isinstance(load, Damping) else None for load in m.turning]
+    found = [load.damping() for load in m.turning]
     at_rest = all(w == 0 for w in m.scene.angular_velocity)
     if m.carriers or not found or any(c is None for c in found) or at_rest:
         return False
@@ -158,7 +157,7 @@ NEEDS: dict[str, Need] = {
     "point_masses": Need(lambda m: m.scene.bodies is not None, missing=_NO_POINT_MASSES),
     "kernel": Need(lambda m: m.sky is not None, missing=_NO_KERNEL),
     "free_fall": Need(lambda m: m.velocity is not None and fixed_axes.falls_freely(m)),
-    "attractor": Need(lambda m: m.velocity is not None and any(isinstance(x, Attracting) for x in m.loads)),
+    "attractor": Need(lambda m: m.velocity is not None and any(x.attracting_point for x in m.loads)),
 }
 """All needs, by the names that ``Observable.needs`` uses."""
 

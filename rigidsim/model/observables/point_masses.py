@@ -12,7 +12,6 @@ from typing import Any
 
 import heyoka as hy
 
-from rigidsim.model.capabilities import Reacting
 from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.observables.mechanical import rotational_scale
 from rigidsim.model.observables.observable import SPACE, Observable, register_all, same_unit
@@ -141,7 +140,7 @@ def _flat(vectors: Sequence[list[Symbolic]]) -> list[Symbolic]:
 def _kept(m: Mechanics) -> str | None:
     if not _masses(m).full:
         return "the point masses feel each other's gravity alone"
-    if m.drives_work or any(not isinstance(load, Reacting) for load in m.acting):
+    if m.drives_work or not all(load.reacts for load in m.acting):
         return None
     return "all forces act between the bodies"
 

@@ -23,7 +23,6 @@ from typing import Any
 
 import heyoka as hy
 
-from rigidsim.model.capabilities import Beside, Reacting, gradient_source_of, orbit_of, table_of
 from rigidsim.model.frames import plane_drift
 from rigidsim.model.load import Load
 from rigidsim.model.mechanics import Mechanics
@@ -55,9 +54,9 @@ def _turns_about_its_figure(m: Mechanics) -> bool:
 
 
 def _moves(load: Load) -> bool:
-    source = gradient_source_of(load.beside if isinstance(load, Beside) else load)
+    source = (load.beside or load).gradient_source
     moves = source is not None and source.placement.moves
-    return bool(orbit_of(load) or table_of(load) or moves or isinstance(load, Reacting))
+    return bool(load.orbit or load.table or moves or load.reacts)
 
 
 def is_planet(m: Mechanics) -> bool:

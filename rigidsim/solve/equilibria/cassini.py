@@ -16,7 +16,6 @@ from typing import Any
 
 import numpy as np
 
-from rigidsim.model.capabilities import Beside, gradient_source_of
 from rigidsim.model.load import Load, loads_of
 from rigidsim.scene import attitude
 from rigidsim.scene.arithmetic import (
@@ -103,7 +102,7 @@ def _node(orbit: KeplerOrbit, time: Any) -> Any:
 
 def _averaged(search: SoughtReturn, number: int, name: str) -> AveragedState:
     scene, orbit = search.scene, search.orbit
-    (source,) = (s for load in loads_of(scene) if (s := gradient_source_of(load)) is not None)
+    (source,) = (s for load in loads_of(scene) if (s := load.gradient_source) is not None)
     least, middle, most = sorted(map(float, scene.body.principal_moments))
     place = float(orbit.periapsis + orbit.periapsis_rate * scene.start)
     strength = float(source.gravitational_parameter / orbit.semi_major_axis**3)
@@ -246,10 +245,10 @@ class SoughtReturn:
 
 def _source(scene: Scene, given: str) -> tuple[Load, KeplerOrbit, Any]:
     loads = loads_of(scene)
-    sources = [(load, source) for load in loads if (source := gradient_source_of(load)) is not None]
+    sources = [(load, source) for load in loads if (source := load.gradient_source) is not None]
     if scene.free_flight or len(loads) != 1 or len(sources) != 1 or sources[0][1].orbit is None:
         what = "it is for a body under the gravity_gradient of one source with elements of its orbit, and "
-        if any(isinstance(load, Beside) for load in loads):
+        if any(load.beside is not None for load in loads):
             what = f"it is found by the gradient alone: leave degree and figure out; {what}"
         raise refusal(
             "equilibrium", f"{given}{what}nothing else; remove other loads, or give attitude and rates"

@@ -20,7 +20,6 @@ from dataclasses import replace
 from itertools import permutations, product
 from typing import Any
 
-from rigidsim.model.capabilities import Reshaping, corotating_orbit_of, having, orbit_of
 from rigidsim.model.load import loads_of
 from rigidsim.scene import attitude
 from rigidsim.scene.arithmetic import (
@@ -108,14 +107,14 @@ def relative_equilibrium(scene: Scene) -> InitialRotation:
 
 def _orbit(scene: Scene) -> KeplerOrbit:
     loads = loads_of(scene)
-    orbits = [orbit for load in loads if (orbit := orbit_of(load)) is not None]
+    orbits = [orbit for load in loads if (orbit := load.orbit) is not None]
     given = 'given "relative", but '
     if not orbits or scene.free_flight:
         what = "no load has a source on an orbit (gravity_gradient with orbit)"
         if scene.free_flight:
             what = "the body flies on another orbit, and this is for a prescribed one"
         raise refusal(_KEY, f"{given}{what}; give the attitude and rates themselves")
-    if having(Reshaping, loads):
+    if any(load.changes for load in loads):
         what = "the body's moments vary, and its equilibria with them"
         raise refusal(_KEY, f"{given}{what}; give the attitude and rates themselves")
     moments = scene.body.principal_moments
@@ -130,7 +129,7 @@ def _orbit(scene: Scene) -> KeplerOrbit:
     if not first.fixed_plane:
         raise refusal(_KEY, f'{given}the orbit\'s node moves; choose "cassini_1" to "cassini_4"')
     normal = first.normal(scene.context)
-    turning = [orbit for load in loads if (orbit := corotating_orbit_of(load)) is not None]
+    turning = [orbit for load in loads if (orbit := load.corotating_orbit) is not None]
     for orbit in orbits:
         same = orbit in turning and orbit.mean_motion == first.mean_motion
         if not same or not parallel(scene.context, orbit.normal(scene.context), normal):

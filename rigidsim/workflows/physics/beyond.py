@@ -5,7 +5,6 @@ from __future__ import annotations
 from rigidsim.accuracy.models.modelling import measure_modelling
 from rigidsim.accuracy.models.side_by_side import Unmeasured
 from rigidsim.errors import ConfigError, Problem
-from rigidsim.model.capabilities import gradient_source_of
 from rigidsim.model.load import loads_of
 from rigidsim.scene.choices import FULL, REDUCED
 from rigidsim.scene.config import Experiment
@@ -50,7 +49,7 @@ def geodetic(scene: Scene) -> UnassessedEffect | None:
     """
     rates = []
     for load in loads_of(scene):
-        if source := gradient_source_of(load):
+        if source := load.gradient_source:
             distance = float(plain(source.placement.nearest(scene.context)))
             strength = float(plain(source.gravitational_parameter))
             rates.append(1.5 * strength**1.5 / (_LIGHT**2 * distance**2.5))
