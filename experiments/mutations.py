@@ -2,15 +2,17 @@
 
 Mistakes are drawn at random, over rooms and kinds: a sign, a product for a quotient, a comparison, an index
 off by one, a factor, min for max, a matrix untransposed, a frame. Messages, docstrings and annotations are
-spared. Test files that import the changed module run first; the first test that fails catches the mistake.
-What is committed is tried, in copies made by git. A mistake that no test catches takes a run of the suite.
+spared. Tests that execute the changed line run, the cheapest first, and the first that fails catches the
+mistake. Which tests execute which line is measured once, by ``coverage`` (``pip install coverage``),
+and kept in a file. Commits are tried, in copies made by git.
 
-Run: python -m experiments.mutations [--count N] [--seed S] [--seconds T] [--long] [--against REF]
+Run: python -m experiments.mutations [--count N] [--seed S] [--seconds T] [--long] [--lines FILE]
 """
 
 import argparse
 import ast
 import io
+import json
 import os
 import random
 import re
@@ -18,12 +20,17 @@ import subprocess
 import sys
 import tarfile
 import tempfile
+import time
 from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from copy import deepcopy
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
+
+import coverage
+import pytest
 
 ROOT = Path(__file__).parents[1]
 OPERATORS: dict[type, type] = {
@@ -37,7 +44,6 @@ DROPPED = ("transpose", "transposed", "conjugated", "conjugate", "normalised", "
 SPARED = (ast.Raise, ast.JoinedStr, ast.Import, ast.ImportFrom, ast.Assert)
 WORDS = re.compile(r"(Problem|Error|Warning|Caution|print|text|words|warn)$")
 """Calls that make messages."""
-NO_TESTS = ("test_house.py", "test_site.py", "test_config_comments.py")  # of style
 
 
 @dataclass(frozen=True)
@@ -141,52 +147,120 @@ def exchanged(text: str, mutant: Mutant) -> str:
     return text[:place] + mutant.new + text[place + len(mutant.old) :] if place >= 0 else ""
 
 
-def ordered(tree: Path, mutant: Mutant) -> list[list[str]]:
-    """Test files in groups: those that import the module, those of its room, all others."""
-    module = mutant.path.removesuffix(".py").replace("/", ".")
-    groups: list[list[str]] = [[], [], []]
-    for path in sorted((tree / "tests").rglob("test_*.py")):
-        place = 0 if module in path.read_text() else 1 if path.parent.name == mutant.room else 2
-        if path.name not in NO_TESTS:
-            groups[place].append(str(path.relative_to(tree)))
-    return [group for group in groups if group]
+class Executed:
+    """Which tests execute which lines, as measured by ``measure``."""
+
+    def __init__(self, path: Path) -> None:
+        kept = json.loads(path.read_text())
+        self._tests, self._seconds, self._lines = kept["tests"], kept["seconds"], kept["lines"]
+
+    def tests(self, mutant: Mutant) -> list[str]:
+        """Tests that execute a line, the cheapest first; those of the whole file for a line of its import."""
+        lines = self._lines.get(mutant.path, {})
+        found = lines.get(str(mutant.line)) or {test for each in lines.values() for test in each}
+        return [self._tests[i] for i in sorted(found, key=self._seconds.__getitem__)]
 
 
-def failing(tree: Path, tests: Sequence[str], seconds: float, long: bool, spared: Sequence[str] = ()) -> str:
+def measure(tree: Path, path: Path, long: bool) -> None:
+    """Write the file of executed lines; the suite takes half as long again as alone."""
+    with tempfile.TemporaryDirectory() as folder:
+        environment = {**os.environ, "PYTHONPATH": str(tree), FOLDER: folder}
+        command = [sys.executable, "-m", "pytest", "-q", "-n", "2", "-p", "experiments.mutations"]
+        subprocess.run(
+            [*command, *(["-m", "not campaign"] if long else [])], cwd=tree, env=environment, check=False
+        )
+        seconds: dict[str, float] = {}
+        for line in (Path(folder) / "seconds").read_text().splitlines():
+            spent, name = line.split("\t", 1)
+            seconds[name] = float(spent)
+        place, lines = {name: i for i, name in enumerate(seconds)}, dict[str, dict[int, set[int]]]()
+        for file in Path(folder).glob("lines.*"):
+            data = coverage.CoverageData(str(file))
+            data.read()
+            for source in data.measured_files():
+                kept = lines.setdefault(str(Path(source).relative_to(tree)), {})
+                for line, names in data.contexts_by_lineno(source).items():
+                    kept.setdefault(line, set()).update(place[name] for name in names if name)
+    content = {name: {line: sorted(tests) for line, tests in kept.items()} for name, kept in lines.items()}
+    path.write_text(json.dumps({"tests": list(seconds), "seconds": list(seconds.values()), "lines": content}))
+
+
+FOLDER = "RIGIDSIM_EXECUTED"
+"""Environment variable that names the folder of what the tests' processes execute."""
+_lines: Any = None
+
+
+def pytest_configure() -> None:
+    """As a plugin of pytest: note the lines that each test executes."""
+    global _lines
+    if worker := os.environ.get("PYTEST_XDIST_WORKER"):
+        name = str(Path(os.environ[FOLDER]) / f"lines.{worker}")
+        _lines = coverage.Coverage(name, source_pkgs=["rigidsim"], config_file=False)
+        _lines.start()
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_protocol(item: pytest.Item) -> Iterator[object]:
+    """Lines belong to the test that runs."""
+    if _lines is None:
+        return (yield)
+    _lines.switch_context(item.nodeid)
+    begin = time.process_time()
+    done = yield
+    with (Path(os.environ[FOLDER]) / "seconds").open("a") as out:
+        out.write(f"{time.process_time() - begin:.2f}\t{item.nodeid}\n")
+    _lines.switch_context("")
+    return done
+
+
+def pytest_sessionfinish() -> None:
+    """Keep the lines."""
+    if _lines is not None:
+        _lines.stop()
+        _lines.save()
+
+
+def failing(tree: Path, tests: Sequence[str], seconds: float) -> str:
     """The first test that fails; empty if none does, "time limit" if they take longer."""
-    options = ["-x", "-q", "-p", "no:cacheprovider", "--tb=no", *(f"--deselect={name}" for name in spared)]
-    options += ["-m", ""] if long else []
+    names = tree / "tests.txt"
+    names.write_text("".join(f"{name}\n" for name in tests))
+    command = [
+        sys.executable,
+        "-m",
+        "pytest",
+        "-x",
+        "-q",
+        "-p",
+        "no:cacheprovider",
+        "--tb=no",
+        "-m",
+        "",
+        f"@{names}",
+    ]
     environment = {**os.environ, "PYTHONPATH": str(tree)}
-    command = [sys.executable, "-m", "pytest", *options, *tests]
     try:
         done = subprocess.run(
             command, cwd=tree, env=environment, capture_output=True, text=True, timeout=seconds, check=False
         )
     except subprocess.TimeoutExpired:
         return "time limit"
-    found = re.search(r"^(?:FAILED|ERROR) (\S+)", done.stdout, re.MULTILINE)
+    found = re.search(r"^(?:FAILED|ERROR) (\S.*?)(?: - .*)?$", done.stdout, re.MULTILINE)
     return found[1] if found else "" if done.returncode == 0 else f"exit code {done.returncode}"
 
 
-def tried(tree: Path, mutant: Mutant, seconds: float, long: bool) -> str:
-    """What catches a mistake in a tree, which is put right again; "not there" if the tree lacks its lines."""
-    file = tree / mutant.path
-    right = file.read_text() if file.exists() else ""
-    wrong = exchanged(right, mutant)
-    if not wrong:
-        return "not there"
-    groups, spared = ordered(tree, mutant), list[str]()
-    while groups:
-        file.write_text(wrong)
-        found = failing(tree, groups[0], seconds, long, spared)
+def tried(tree: Path, mutant: Mutant, executed: Executed, seconds: float) -> str:
+    """What catches a mistake in a tree, which is put right again."""
+    file, tests, spared = tree / mutant.path, executed.tests(mutant), list[str]()
+    if not tests:
+        return "not executed"
+    right = file.read_text()
+    while True:
+        file.write_text(exchanged(right, mutant))
+        found = failing(tree, [name for name in tests if name not in spared], seconds)
         file.write_text(right)
-        if not found:
-            groups.pop(0)
-        elif "::" not in found or not failing(tree, [found], seconds, long=True):
-            return found
-        else:  # it fails without the mistake, too
-            spared.append(found)
-    return "survived"
+        if "::" not in found or not failing(tree, [found], seconds):
+            return found or "survived"
+        spared.append(found)  # it fails without the mistake, too
 
 
 def unpacked(ref: str, folder: Path) -> Path:
@@ -203,20 +277,24 @@ def main() -> None:
     parser.add_argument("--count", type=int, default=60)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--seconds", type=float, default=1200.0, help="time limit of each run of the tests")
-    parser.add_argument("--long", action="store_true", help="the long tests, too")
-    parser.add_argument("--against", metavar="REF", help="try survivors with the tests of another commit")
+    parser.add_argument("--long", action="store_true", help="measure the long tests, too")
+    parser.add_argument("--ref", default="HEAD", help="the commit that is tried")
+    parser.add_argument(
+        "--lines", type=Path, help="which tests execute which lines; measured if it isn't there"
+    )
     parser.add_argument("--out", type=Path, default=Path("mutations.tsv"))
     given = parser.parse_args()
-    with tempfile.TemporaryDirectory() as here, tempfile.TemporaryDirectory() as there:
-        tree = unpacked("HEAD", Path(here))
-        other = None if given.against is None else unpacked(given.against, Path(there))
+    with tempfile.TemporaryDirectory() as folder:
+        tree = unpacked(given.ref, Path(folder))
+        lines = given.lines or tree / "lines.json"
+        if not lines.exists():
+            measure(tree, lines, given.long)
+        executed = Executed(lines)
         with given.out.open("w") as out:
             for mutant in drawn(tree, given.count, given.seed):
-                found = [tried(tree, mutant, given.seconds, given.long)]
-                if other is not None and found == ["survived"]:
-                    found.append(tried(other, mutant, given.seconds, given.long))
+                found = tried(tree, mutant, executed, given.seconds)
                 place = f"{mutant.path}:{mutant.line}"
-                row = "\t".join([place, mutant.kind, mutant.before, mutant.after, *found])
+                row = "\t".join([place, mutant.kind, mutant.before, mutant.after, found])
                 print(row.replace("\n", " "), file=out, flush=True)
                 print(row.replace("\n", " "), flush=True)
 
