@@ -25,6 +25,7 @@ from rigidsim.store.netcdf import (
     label_attributes,
     reading,
     root_attributes,
+    rows_in,
 )
 from rigidsim.store.variables import LABELS, OF_THE_RUN, Extra, Variable, used_labels
 
@@ -174,7 +175,8 @@ def _not_begun(first: xarray.Dataset, last: Path) -> set[str]:
         return set()
     names = {str(name) for name, variable in first.variables.items() if "put_back_of" in variable.attrs}
     with reading(last) as file:
-        begun = any(file[name].shape[0] and float(file[name][-1]) != 0.0 for name in names)
+        rows = rows_in(file)
+        begun = any(name in rows and len(rows[name]) and float(rows[name][-1]) != 0.0 for name in names)
     return set() if begun else names
 
 
@@ -201,8 +203,8 @@ class _Joined(BackendArray):
         for path, start, stop in zip(self._paths, self._starts[:-1], self._starts[1:], strict=True):
             first, end = (-(-max(edge - rows.start, 0) // rows.step) for edge in (start, stop))
             inside = rows[first:end]
-            if len(inside) or (not pieces and path == self._paths[-1]):
+            if len(inside) or path == self._paths[0]:
                 part = slice(inside.start - start, inside.stop - start, inside.step) if inside else slice(0)
                 with reading(path) as file:
-                    pieces.append(np.asarray(file[self._name][(part, *rest)]))
+                    pieces.append(np.asarray(rows_in(file)[self._name][(part, *rest)]))
         return np.concatenate(pieces)

@@ -1,8 +1,9 @@
 """Immutable segments, by which samples reach the disk while a run is under way.
 
-Each segment is a complete small dataset with a checkpoint, sealed, written once and never changed. A
-sample is saved when its segment has its final name; a crash can only cost later ones. Each names the run
-that it belongs to and the seal of the one before, so that a missing, foreign or old one is noticed.
+Each segment holds rows and a checkpoint, sealed, written once and never changed. The first is a labelled
+dataset, which says what the rows of all are. A sample is saved when its segment has its final name; a crash
+can only cost later ones. Each names the run that it belongs to and the seal of the one before, so that a
+missing, foreign or old one is noticed.
 """
 
 import io
@@ -114,7 +115,8 @@ class SegmentWriter:
         """A whole segment in memory."""
         buffer = io.BytesIO()
         with netcdf.writing(buffer) as file:
-            netcdf.write_blocks(file, self._variables, blocks, {**self._attributes, **place})
+            attributes = {**self._attributes, **place}
+            netcdf.write_blocks(file, self._variables, blocks, attributes, labelled=place["segment"] == 0)
             file.group("checkpoint", checkpoint)
             file.group("events", events)
         return sealed(buffer)
@@ -240,8 +242,9 @@ def _misfit(path: Path, labels: Mapping[str, Any], number: int, rows: int, run: 
 
 def _copy(path: Path, chunks: Mapping[str, ChunkedVariable]) -> None:
     """Append a segment, or a finished dataset that is being prolonged, which may lack variables of zeros."""
-    with netcdf.reading(path) as segment:
-        rows = len(segment["time"])
+    with netcdf.reading(path) as file:
+        segment = netcdf.rows_in(file)
+        rows = len(segment["time"]) if len(segment) else 0
         for name, chunk in chunks.items():
             for first in range(0, rows, _ROWS_AT_ONCE):
                 stop = min(first + _ROWS_AT_ONCE, rows)
