@@ -184,6 +184,13 @@ class Diagnostics:
             )
         if found is None:
             return
+        relative = max(found.angular_momentum_norm or 0.0, found.energy or 0.0)
+        if relative > UNCERTAIN:
+            yield Caution(
+                WarningCode.MODEL_UNCERTAIN,
+                f'[model] level = "{found.level}" leaves the momentum\'s size or the energy uncertain by '
+                f"about {relative:.2g} of itself at the end; choose a less averaged level, or a nearer end",
+            )
         worst, most = found.worst or 0.0, UNCERTAIN
         if asked is not None:  # of the axes, by whatever cause
             most = float(asked)

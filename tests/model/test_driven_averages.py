@@ -101,10 +101,6 @@ def test_the_averaged_motion_starts_in_the_middle_of_the_full_one() -> None:
         ({"loads": AS_FORMULAS.replace("1e-4*wx", "1e-4*abs(wx)")}, "kink or jump"),
         ({"moments": [1, 1, 1]}, "moments are all the same"),
         (
-            {"loads": VISCOUS.replace("2e-4", "0.2")},
-            "of its size within a wobble, of which up to 0.05 is allowed",
-        ),
-        (
             {"rates": [0.3, 1.2, 0.2], "end": "1e5", "loads": VISCOUS.replace("2e-4", "1e-3")},
             "near the separatrix",
         ),

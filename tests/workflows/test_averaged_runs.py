@@ -7,6 +7,7 @@ from support import config, run_text
 import rigidsim
 from rigidsim import ConfigError
 from rigidsim.accuracy.choice import choose_level
+from rigidsim.session.verdict import Soundness, verdict_on
 
 FLATTENING, SPIN, ECCENTRICITY = 0.02, 60.0, 0.2
 BODY = f"principal_moments = [{1 - FLATTENING}, {1 - FLATTENING}, 1]"
@@ -72,6 +73,22 @@ def test_the_announced_error_covers_the_true_one(full: rigidsim.Run) -> None:
         assert true <= found["momentum_axis"] <= 10 * true
         assert apart(run, full, "figure_axis") <= found["figure_axis"]
         assert run.summary["accuracy"]["estimated_attitude_error"] < 1e-9  # of the integration: apart from it
+
+
+@pytest.mark.parametrize(
+    ("level", "spin", "moments"),
+    [("orbit_averaged", 3.0, [1, 1, 2]), ("spin_averaged", 0.9624, [1, 1, 1.05])],
+    ids=["precessing as fast as the source goes round", "with a source as fast as the free precession"],
+)
+def test_an_average_that_fails_within_an_orbit_is_found_by_measurement(
+    level: str, spin: float, moments: list[float]
+) -> None:
+    start = START.replace(f"{SPIN}", f"{spin}")
+    model = f'[model]\nlevel = "{level}"'
+    body = f"principal_moments = {moments}"
+    run = run_text(config(body, start, LOAD, "end = 400\nsamples = 101", "", "", model), estimate=True)
+    assert run.summary["modelling"]["momentum_axis"] > 0.01
+    assert verdict_on(run.outcome).soundness is Soundness.INACCURATE
 
 
 def test_the_accuracy_of_axes_chooses_the_model() -> None:

@@ -8,6 +8,7 @@ from support import cases, config, run_text
 
 import rigidsim
 from rigidsim import ConfigError
+from rigidsim.session.verdict import Soundness, verdict_on
 from rigidsim.solve.problem import prepare
 
 EPS = np.finfo(float).eps
@@ -78,6 +79,17 @@ def test_the_announced_errors_cover_the_true_ones(more: str) -> None:
         assert error <= announced[name] <= 4 * error, name
     assert announced["whole"] == bool(more)
     assert list(run.summary["invariants"]) == ["momentum_axis_norm"]
+
+
+def test_torques_too_strong_for_an_average_are_found_by_measurement() -> None:
+    """They take a twentieth of the rotation within a wobble."""
+    loads = 'kind = "viscous_torque"\ncoefficients = [1e-4, 0.2, 1.5e-4]'
+    run, full = (run_text(text(level, loads, 50), estimate=True) for level in ("spin_averaged", "full"))
+    told, true = run.summary["modelling"], apart(run, full)
+    assert 0.01 < true["momentum_axis"] <= told["momentum_axis"]
+    assert 0.01 < true["energy"] <= told["energy"]
+    assert verdict_on(run.outcome).soundness is Soundness.INACCURATE
+    assert len(run.summary["warnings"]) == 2
 
 
 @pytest.mark.slow

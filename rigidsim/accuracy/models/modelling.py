@@ -214,8 +214,8 @@ def _extrapolated(
     else:
         grown = carried.grown(along + faster, across)
     oscillation = max(w.recorded for w in windows)
-    if average.driven is not None:  # which may be larger between the windows
-        oscillation = max(oscillation, average.driven.course.swing) + average.driven.scatter
+    if average.driven is not None:  # resonances between the windows
+        oscillation += average.driven.passed
     return grown, oscillation
 
 
@@ -224,9 +224,8 @@ def _changed(average: Average, windows: Sequence[Window], span: float) -> dict[s
     found: dict[str, float] = {}
     if average.driven is None:
         return found
-    swings = dict(zip((SIZE, ENERGY), average.driven.course.swings, strict=True))
     for name in (SIZE, ENERGY):
-        largest = max(swings[name], *(window.changes[name].largest for window in windows))
+        largest = max(window.changes[name].largest for window in windows)
         grown = _grown(windows, name, span)
         found[name] = _SPARE * grown + _SPARE_OF_WHOLE * (largest + average.driven.passed)
     return found

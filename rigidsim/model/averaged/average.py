@@ -13,13 +13,13 @@ from typing import Any
 
 import numpy as np
 
-from rigidsim.model.averaged.applies import AXIAL, refuse_frequencies, refuse_scene, refused
-from rigidsim.model.averaged.driven import Driven, driven_by, frame_along, passing
+from rigidsim.model.averaged.applies import AXIAL, kept_resonance, refuse_scene, refused
+from rigidsim.model.averaged.driven import Driven, driven_by, frame_along
 from rigidsim.model.averaged.free_motion import FreeMotion, Separatrix, free_motion
 from rigidsim.model.averaged.orbit_terms import nutation
 from rigidsim.model.averaged.resonance import Resonance, SlowStart
 from rigidsim.model.averaged.sources import Source, sources_of, unit
-from rigidsim.model.averaged.spectrum import BodySpectrum, body_spectrum
+from rigidsim.model.averaged.wobble import Wobble
 from rigidsim.model.load import Load
 from rigidsim.model.orbits.prescribed import Carried
 from rigidsim.model.scaling import Scaling
@@ -96,8 +96,8 @@ class Average:
         if self.driven is not None:
             spread, unit = max(self.motion.moments) - min(self.motion.moments), self.driven.torques.scaling
             strength = sum((source.strength * source.nearest for source in self.sources), 0 * spread)
-            own = math.ldexp(self.driven.course.fastest, -unit.time)
-            return strength * spread / (self.motion.momentum * self.driven.course.least) + own
+            own = math.ldexp(self.driven.fastest, -unit.time)
+            return strength * spread / (self.motion.momentum * self.driven.least) + own
         found = sum(abs(self.rate(source)) * source.nearest for source in self.sources)
         if self.resonance is not None:
             assert self.slow is not None
@@ -119,7 +119,7 @@ class Average:
                 square = dot(across, across)
             total += size * square
         # as the momentum becomes smaller, it precesses faster
-        return total if self.driven is None else total / self.driven.course.least
+        return total if self.driven is None else total / self.driven.least
 
 
 def average_of(
@@ -137,19 +137,19 @@ def average_of(
     sources = sources_of(scene, loads)
     try:
         motion = free_motion(context, body, momentum)
-        spectrum = body_spectrum(motion)
+        wobble = Wobble.of(motion, unit(context, momentum))
         alone = [load for load in loads if load.gradient_source is None]
         if along is not None:
             resonance = None if along.resonance is None else along.resonance.among(sources)
         else:
-            resonance = None if alone else refuse_frequencies(scene, spectrum, sources)
+            resonance = None if alone else kept_resonance(scene, wobble, sources, motion)
         if resonance is not None:
             return _resonant(scene, resonance, sources)
         vector = apply(matrix, momentum)
-        removed = _left_out_at_start(scene, spectrum, sources, unit(context, vector))
+        removed = _left_out_at_start(scene, motion, wobble, sources)
         vector = [x - context.mpf(float(y)) for x, y in zip(vector, removed, strict=True)]
         if alone:
-            return _driven(scene, alone, sources, unit(context, vector), scaling, along)
+            return _driven(scene, alone, sources, unit(context, vector), scaling, known=along is not None)
         motion = free_motion(context, body, momentum, norm(context, vector))
     except Separatrix:
         what = "the body turns about its intermediate axis, where its wobble takes forever and nothing "
@@ -180,17 +180,17 @@ def _driven(
     sources: Sequence[Source],
     direction: Vector,
     scaling: Scaling,
-    along: Average | None,
+    *,
+    known: bool,
 ) -> Average:
     """The average under torques of the body alone as well."""
     context, level = scene.context, scene.config.model.level
     epsilon = 2.0 ** (1 - working_bits(scene.config.integrator.precision))
-    driven = driven_by(scene, scaling, alone, epsilon)
-    driven = passing(scene, driven, sources) if along is None else driven
+    driven = driven_by(scene, scaling, alone, sources, epsilon, known=known)
     start = [x - context.mpf(float(y)) for x, y in zip(direction, driven.direction, strict=True)]
     motion = driven.motion(driven.axial, driven.transverse)
     energy = driven.polhodes.energy(driven.axial, driven.transverse)
-    figure, start = _figure(scene, motion) if driven.course.tilt <= AXIAL else 0, unit(context, start)
+    figure, start = _figure(scene, motion) if driven.tilt <= AXIAL else 0, unit(context, start)
     return Average(level, False, motion, sources, start, energy, figure, driven=driven)
 
 
@@ -202,15 +202,14 @@ def _figure(scene: Scene, motion: FreeMotion) -> int:
 
 
 def _left_out_at_start(
-    scene: Scene, spectrum: BodySpectrum, sources: Sequence[Source], direction: Vector
+    scene: Scene, motion: FreeMotion, wobble: Wobble, sources: Sequence[Source]
 ) -> np.ndarray:
     """Part of the initial momentum that averaging over the rotation removes, kg m^2/s, space axes."""
-    space = frame_along(np.array(direction, dtype=float))
     body = np.array(attitude.rotation_matrix(scene.quaternion), dtype=float)
-    principal = np.array(spectrum.motion.axes, dtype=float).T
-    phases = spectrum.phases(space @ body @ principal)
-    _, integral = spectrum.tensors(*phases)
-    integral = space.T @ integral @ space
+    momentum = apply(scene.body.inertia, scene.angular_velocity)
+    space = frame_along(body @ np.array([float(x) for x in unit(scene.context, momentum)]))
+    turn = wobble.precessed(space @ body @ np.array(motion.axes, dtype=float).T)
+    integral = space.T @ wobble.removed_tensor(turn) @ space
     total = np.zeros(3)
     for source in sources:
         pull = source.pull_at_start(scene)

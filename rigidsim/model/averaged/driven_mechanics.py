@@ -39,13 +39,13 @@ class DrivenMechanics(AveragedMechanics):
     @cached_property
     def mean_square(self) -> Symbolic:
         """<sin^2 f> over the polhode."""
-        largest, epsilon = self.driven.course.parameter, self.driven.epsilon
+        largest, epsilon = self.driven.parameter, self.driven.epsilon
         return self.driven.torques.mean_square(*self.amplitudes, self.number, largest, epsilon)
 
     @cached_property
     def amplitude_rates(self) -> list[Symbolic]:
         """Derivatives of P and Q, per internal unit of time."""
-        nodes = self.driven.course.nodes
+        nodes = self.driven.nodes
         return self.driven.torques.rates(*self.amplitudes, self.number, nodes, self.mean_square)
 
     @cached_property

@@ -10,11 +10,10 @@ from typing import Any, Self
 import numpy as np
 
 from rigidsim.model.averaged.orbit_terms import Ellipse, OrbitPlace, place_by_elements
-from rigidsim.model.averaged.spectrum import orbit_harmonics
 from rigidsim.model.gradient import GradientSource
 from rigidsim.model.load import Load
 from rigidsim.scene.arithmetic import Vector, eccentric_anomaly, norm
-from rigidsim.scene.kepler import plane_vectors
+from rigidsim.scene.kepler import eccentric_anomalies, plane_vectors
 from rigidsim.scene.orbit_tables.pieces import AXIS
 from rigidsim.scene.scene import Scene
 
@@ -53,8 +52,15 @@ class Source:
 
     @property
     def harmonics(self) -> np.ndarray:
-        """Sizes of the harmonics of (a/r)^3 r r^T in the mean motion, the mean first."""
-        return np.ones(1) if self.motion == 0 else orbit_harmonics(self.eccentricity)
+        """Sizes (Frobenius norms) of the harmonics k >= 0 of (a/r)^3 r r^T in the mean motion."""
+        if self.motion == 0:
+            return np.ones(1)
+        e, points = self.eccentricity, 512 if self.eccentricity < 0.6 else 4096
+        anomaly = eccentric_anomalies(2 * np.pi * np.arange(points) / points, e)
+        x, y = np.cos(anomaly) - e, math.sqrt(1 - e * e) * np.sin(anomaly)
+        place = np.array([x, y])
+        parts = np.fft.fft(place[:, None] * place[None, :] * (x * x + y * y) ** -2.5) / points
+        return np.asarray(np.linalg.norm(parts, axis=(0, 1))[: points // 2])
 
     def strength_at(self, context: Any, time: Any) -> Any:
         """3 G M / a^3 (mpf, 1/s^2) at a time."""

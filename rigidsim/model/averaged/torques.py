@@ -18,6 +18,7 @@ import heyoka as hy
 import numpy as np
 
 from rigidsim.model.averaged.free_motion import Polhodes, mean_square_sine, means_needed, nodes_needed
+from rigidsim.model.averaged.wobble import Wobble
 from rigidsim.model.carriers import Carrier
 from rigidsim.model.load import Load
 from rigidsim.model.mechanics import Mechanics
@@ -137,8 +138,7 @@ class DrivingTorques:
         """
         if not self.others:
             return 0
-        ratio = float(self.polhodes.ratio)
-        largest = max(float((1 - ratio) * (q / p) ** 2) for p, q in amplitudes) if ratio != 1 else 0.0
+        largest = max(map(self.parameter_at, amplitudes))
         count = nodes_needed(largest, max(epsilon, 2.0**-_BITS_CHECKED)) + 8
         # of what is averaged: a mean may vanish
         around = 2 * np.pi * (np.arange(count) + 0.5) / count
@@ -150,6 +150,20 @@ class DrivingTorques:
                 return int(np.ceil(count * max(1.0, more)))
             count *= 2
         raise ArithmeticError
+
+    def wobble(self, axial: float, transverse: float, amplitude: float = 0.0) -> Wobble:
+        """The rotation of these amplitudes, internal units."""
+        return Wobble(self._moments, axial, transverse, amplitude)
+
+    def parameter_at(self, amplitudes: np.ndarray) -> float:
+        """k^2 at amplitudes P and Q."""
+        ratio = float(self.polhodes.ratio)
+        return 0.0 if ratio == 1 else float((1 - ratio) * (amplitudes[1] / amplitudes[0]) ** 2)
+
+    def across(self, wobble: Wobble) -> np.ndarray:
+        """Torque across the momentum, x + i y in the frame that precesses, (points,)."""
+        turned = np.einsum("nab,bn->an", wobble.turns, self.at(wobble.momentum))
+        return np.asarray(turned[0] + 1j * turned[1])
 
     def change(self, axial: float, transverse: float, angle: np.ndarray) -> np.ndarray:
         """P' and Q', (2, n), at amplitudes f, per internal unit of time."""

@@ -46,7 +46,7 @@ class Averaged(Formulation):
 
     def __init__(self, average: Average) -> None:
         self.average, self.longitude = average, average.longitude
-        summed = average.driven is not None and average.driven.course.nodes
+        summed = average.driven is not None and average.driven.nodes
         self.wide = average.resonance is not None or bool(summed)
         self.variables = Variables(average.level, general=False)  # type: ignore[misc]  # told by the scene
 
