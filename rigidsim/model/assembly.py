@@ -9,7 +9,7 @@ import heyoka as hy
 from rigidsim.model.formulations.formulation import Formulation, ModelPlan
 from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.observables.mechanical import WORK
-from rigidsim.model.observables.observable import work_is_needed
+from rigidsim.model.observables.observable import carries_work
 from rigidsim.model.own_states import own_blocks, refuse_taken_names
 from rigidsim.model.scaling import Rounder
 from rigidsim.model.state_blocks import BODY, StateBlock, joined
@@ -44,7 +44,7 @@ def assemble_states(
         blocks.append(m.point_masses.block(pulls))
     blocks += _load_blocks(m)
     blocks += own_blocks(m)
-    if work_is_needed(m):
+    if carries_work(m):
         why, unit = "work of the loads without a potential, to check the energy", [m.work_unit]
         blocks.append(
             StateBlock([WORK], [m.carried(m.power)], [m.scene.context.zero], exponents=unit, why=why)

@@ -14,6 +14,7 @@ from rigidsim.model.formulations.formulation import Formulation, ModelPlan
 from rigidsim.model.heyoka_expressions import carries_sign, plain_angles
 from rigidsim.model.mechanics import Mechanics
 from rigidsim.model.names import above_zero, written
+from rigidsim.model.observables.observable import BALANCE, carries_work, has_balance
 from rigidsim.model.orbits.pieces import Pieces, PieceSeries
 from rigidsim.model.orbits.prescribed import TablePieces
 from rigidsim.model.outputs import Invariant, Recorded, drift_outputs, find_invariants, recorded_variables
@@ -165,6 +166,20 @@ class System:
             why = f"near the singularity of {self.sequence}: angles of {regular}, which is regular there"
             found.append((angles, why))
         return found
+
+    @property
+    def unwatched(self) -> dict[str, str]:
+        """Invariants of the scene that aren't monitored, and why."""
+        if not self.formulation.resolves_rotation or carries_work(self.mechanics):
+            return {}
+        why = "neither it nor work is recorded, and no max_drift is given"
+        return {BALANCE[1]: why} if has_balance(self.mechanics) else {}
+
+    @property
+    def left_out(self) -> list[tuple[str, str]]:
+        """(what, why) for groups of states that aren't carried."""
+        work = [("work of the loads", f"{name}: {why}") for name, why in self.unwatched.items()]
+        return [*self.requirements.left_out, *work]
 
     @property
     def angle_states(self) -> tuple[int, ...]:

@@ -63,6 +63,7 @@ def summarise(
         hold_invariants=prepared.holds_invariants,
         hold_from_step=LATE if prepared.holds_late else None,
         invariants=_invariants(found, initial),
+        unwatched=system.unwatched,
         accuracy=_accuracy(found),
         modelling=_modelling(found),
         tables=_tables(found),

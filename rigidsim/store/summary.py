@@ -126,6 +126,7 @@ class Summary(Brief):
         warnings, warning_codes: texts, and a ``WarningCode`` for each.
         time_reached: time of the last sample, or of the event that ended the run, s.
         engine_time: time that the integration reached, s; its own steps go past the last sample.
+        unwatched: invariants of the scene that weren't monitored, and why.
         loads: what acts on the body, in a reader's terms.
         advice: settings that would do better at about the same cost, the best last.
         undefined_samples: number of NaN samples of each recorded variable that has any.
@@ -147,6 +148,7 @@ class Summary(Brief):
     hold_invariants: Annotated[StrictBool, Claim()] = False
     hold_from_step: Annotated[StrictInt | None, Claim()] = None
     invariants: dict[Text, InvariantDrift]
+    unwatched: dict[Text, Text] = Field(default_factory=dict)
     accuracy: Accuracy
     modelling: Modelling | None = None
     tables: dict[Text, TableErrors] = Field(default_factory=dict)

@@ -238,7 +238,7 @@ def plan(
         state_count=len(system.states),
         loads=list(told_loads(prepared)),
         reasons=[StatesWhy(states=states, why=why) for states, why in system.reasons],
-        left_out=[LeftOut(what=what, why=why) for what, why in system.requirements.left_out],
+        left_out=[LeftOut(what=what, why=why) for what, why in system.left_out],
         switching=[PlannedSurface(surface=s.text, where=s.where) for s in system.plan.surfaces.found],
         turning=list(system.plan.surfaces.turning),
         shared_terms=shared,

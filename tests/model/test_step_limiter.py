@@ -99,3 +99,48 @@ def test_an_event_on_a_narrow_function_of_time(runs: Path) -> None:
     found = run.dataset["peak_time"].values
     reach = 1e-4 * math.sqrt(math.log(2))
     assert found == pytest.approx([50 - reach, 50 + reach], abs=20 * 50 * EPS)
+
+
+@pytest.mark.parametrize(
+    ("speed", "record", "carried"),
+    [
+        ("7668.6", "", {"work"}),  # a circle at 400 km
+        ("7668.6", 'record = ["quaternion"]', set()),
+        ("8500", 'record = ["quaternion"]', {"pace"}),  # it rises by 4,600 km
+        ("7668.6", 'record = ["quaternion"]\n[limits]\nmax_drift = 1e-3', {"work"}),
+        ("0", 'record = ["quaternion"]', {"pace"}),  # it falls
+    ],
+)
+def test_orbits_through_air_carry_what_they_need(
+    speed: str, record: str, carried: set[str], runs: Path
+) -> None:
+    """And the summary says what isn't monitored."""
+    text = f"""name = "orbit"
+[body]
+principal_moments = [1, 2, 3]
+mass = 4
+[[body.surfaces]]
+radius = 0.2
+[initial]
+position = [6778136, 0, 0]
+velocity = [1, {speed}, 0]
+angular_velocity = [0.01, 0.02, 0.03]
+[[loads]]
+kind = "central_gravity"
+gravitational_parameter = 3.986004418e14
+radius = 6378136
+[[loads]]
+kind = "drag"
+density = 4e-12
+altitude = "400 km"
+scale_height = "60 km"
+[time]
+end = 60
+samples = 2
+[output]
+{record}
+"""
+    run = rigidsim.run(rigidsim.parse(text, overrides=["output.timeline=false"]), out=runs, force=True)
+    assert {"work", "pace"} & set(run.summary["states"]) == carried
+    assert ("energy_balance" in run.summary["invariants"]) == ("work" in carried)
+    assert list(run.summary["unwatched"]) == ([] if "work" in carried else ["energy_balance"])

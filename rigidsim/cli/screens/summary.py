@@ -122,6 +122,8 @@ def _print_ended(summary: Summary, loads: Sequence[str], on: Page) -> None:
         on.line("CPU", ", ".join(spent))
     _print_invariants(summary, on)
     on.line("drifts", "relative to: " + _scales(summary.invariants))
+    for name, why in summary.unwatched.items():
+        on.line("", f"{name} isn't monitored: {why}")
     if summary.held:
         on.line(
             "projected", "correction: what the drift would have been; the residual is no independent check"

@@ -7,6 +7,7 @@ the force is -rho C A (n . v) v / 2, that of the area seen against the stream; a
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Annotated, Any, Literal
@@ -14,20 +15,30 @@ from typing import Annotated, Any, Literal
 from pydantic import Field
 
 from rigidsim.model.air_density import AIR_DENSITY, INDICES, LEAST, NRLMSISE, height
-from rigidsim.model.flight_names import RELATIVE_NAMES
+from rigidsim.model.flight_names import RELATIVE_NAMES, flown_about
 from rigidsim.model.kinematics import Kinematics
+from rigidsim.model.load import Load, loads_of
+from rigidsim.model.loads.applied import Applied
+from rigidsim.model.loads.central_gravity import CentralGravity
+from rigidsim.model.loads.point_attraction import PointAttraction
 from rigidsim.model.loads.surface_load import Pushes, SurfaceLoad
+from rigidsim.model.names import written
 from rigidsim.model.plausibility import about_altitude
 from rigidsim.model.rotations import Symbolic
 from rigidsim.scene.bodies.outside import Plate
 from rigidsim.scene.bodies.presets import known_body
 from rigidsim.scene.cautions import Caution
 from rigidsim.scene.exact import ExactNumber
-from rigidsim.scene.expressions.tree import Expression
+from rigidsim.scene.expressions.tree import Expression, evaluate, names_used
 from rigidsim.scene.fields import Dimensionless, Metre, NumberOrFormula, Positive
 from rigidsim.scene.initial_values import start_values
+from rigidsim.scene.point_masses import kepler_reach
 from rigidsim.scene.registry import LoadFields, Setting, register_load
 from rigidsim.scene.scene import Scene
+from rigidsim.scene.transitions import WIDE, narrow_parts, root_parts
+
+_FALLING = 2.0**-10  # ratio of the least to the largest distance of an orbit that all but meets the centre
+_PLACES = 16  # along an orbit, between which what reads the altitude is smooth
 
 Density = Annotated[Any, NumberOrFormula("kg/m^3")]
 
@@ -94,11 +105,24 @@ class Drag(SurfaceLoad):
         for number, surface in pushes.surfaces():
             size = -half * surface.drag_coefficient * surface.area
             if isinstance(surface, Plate):
-                pushes.along_vector(surface, size, number)
+                pushes.on_plate(surface, number, size)
             else:
-                pushes.along_vector(surface, size, speed=True)
+                pushes.on_sphere(surface, size, speed=True)
         kind = DragInThermosphere if fields.density == NRLMSISE else cls
-        return kind(pushes.acting(), tuple(factors), around.free_flight, law)
+        return kind(pushes.acting(), pushes.stream, tuple(factors), around.free_flight, law)
+
+    def narrow(self, m: Kinematics) -> list[Symbolic]:
+        """What is narrow in it, but for what reads the altitude alone and changes by less than a transition
+        along the orbit at the start: no step is longer than that orbit.
+        """
+        parts, reach = narrow_parts(*self.formulas()), _altitudes(m.scene)
+        return written(m, [part for part in parts if reach is None or _range(part, reach, m.scene) > WIDE])
+
+    def roots(self, m: Kinematics) -> list[Symbolic]:
+        """Of the density alone in an orbit, where the speed of the air vanishes by coincidence only."""
+        if _altitudes(m.scene) is None:
+            return super().roots(m)
+        return written(m, root_parts(*self.never_negative()))
 
     def never_negative(self) -> list[Expression]:
         return [] if self.law is None else [self.law]
@@ -123,6 +147,40 @@ class DragInThermosphere(Drag):
 
     def _words(self) -> str:
         return "drag in NRLMSISE-00"
+
+
+def _altitudes(scene: Scene) -> tuple[Any, Any] | None:
+    """Least and largest altitude (m, mpf) of the Kepler orbit at the start; None if it falls to the centre or
+    leaves, or where a thrust or another body may change it.
+    """
+    source, context = flown_about(scene.config), scene.context
+    load = None if source is None else source.of(scene)
+    others = [x for x in loads_of(scene) if x is not load]
+    if source is None or not isinstance(load, CentralGravity) or any(map(_steers, others)):
+        return None
+    place = [-x for x in load.source_at_start(scene)]
+    least, largest = kepler_reach(context, place, load.motion_at_start(scene), load.strength)
+    if largest is None or least < largest * _FALLING:
+        return None
+    surface = source.radius(context) if source.extended else context.zero
+    return least - surface, largest - surface
+
+
+def _steers(load: Load) -> bool:
+    """Whether a load may change an orbit by much: a thrust, a body, or what Python gives."""
+    if isinstance(load, Applied):
+        return load.pushes
+    return isinstance(load, PointAttraction) or not type(load).__module__.startswith("rigidsim.")
+
+
+def _range(part: Expression, reach: tuple[Any, Any], scene: Scene) -> float:
+    """Change of a part along a range of altitudes; infinite if it reads anything else."""
+    context, (low, high) = scene.context, reach
+    if names_used(part) != {"altitude"}:
+        return math.inf
+    places = [low + (high - low) * n / _PLACES for n in range(_PLACES + 1)]
+    found = [evaluate(part, {"altitude": place}, context) for place in places]
+    return float(context.maximum(found) - context.minimum(found))
 
 
 def _refuse_indices(fields: DragFields, around: Setting) -> None:

@@ -83,7 +83,7 @@ class RadiationPressure(SurfaceLoad):
         factors = [pushes.parsed(f"({_AU}/r_{name})^2")]
         if fields.shadow and f"shadow_{name}" in around.names:
             factors.append(pushes.parsed(f"shadow_{name}"))
-        return cls(pushes.acting(), tuple(factors), around.free_flight, name)
+        return cls(pushes.acting(), pushes.stream, tuple(factors), around.free_flight, name)
 
     def _words(self) -> str:
         return f"radiation pressure of {self.light}"
@@ -92,10 +92,9 @@ class RadiationPressure(SurfaceLoad):
 def _push(pushes: Pushes, number: int, surface: OuterSurface, pressure: Any) -> None:
     size = pressure * surface.area
     if not isinstance(surface, Plate):
-        size = size * (1 + 4 * surface.diffuse / 9)
-        pushes.along_vector(surface, -size)
+        pushes.on_sphere(surface, -size * (1 + 4 * surface.diffuse / 9))
         return
-    pushes.along_vector(surface, -size * (1 - surface.specular), number)
-    back = [-2 * size * x for x in surface.unit(pushes.around.context)]
-    pushes.add(surface, [surface.specular * x for x in back], number, power=2)
-    pushes.add(surface, [surface.diffuse * x / 3 for x in back], number)
+    normal = surface.unit(pushes.around.context)
+    pushes.on_plate(surface, number, -size * (1 - surface.specular))
+    pushes.on_plate(surface, number, -2 * size * surface.specular, normal, power=2)
+    pushes.on_plate(surface, number, -2 * size * surface.diffuse / 3, normal)

@@ -1,4 +1,5 @@
-"""Loads that push on the surfaces of the body: each push is a constant vector times an expression.
+"""Loads that push on the surfaces of the body: along the stream that they meet (air, light), and along the
+normals of plates.
 
 The expressions read names, as a user's own do (``rigidsim.scene.expressions.names``): directions of sources,
 shadows, the velocity relative to the air. So their kinks and jumps, at which a plate comes out of the light
@@ -7,7 +8,8 @@ or the stream, are surfaces on which steps end, and the states that they take ar
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+import math
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -18,7 +20,7 @@ from rigidsim.model.load import Load, Term
 from rigidsim.model.load_words import value_text
 from rigidsim.model.names import written
 from rigidsim.model.rotations import Symbolic, apply
-from rigidsim.scene.arithmetic import Vector, cross, diagonal, norm, unit_vectors
+from rigidsim.scene.arithmetic import Vector, cross, diagonal, norm
 from rigidsim.scene.bodies.outside import OuterSurface, Plate
 from rigidsim.scene.exact import ExactNumber
 from rigidsim.scene.expressions.tree import Expression, evaluate, states_read
@@ -26,14 +28,25 @@ from rigidsim.scene.initial_values import start_values
 from rigidsim.scene.registry import Setting
 from rigidsim.scene.scene import Scene
 
+Sum = Mapping[Expression, Any]
+"""A sum of expressions times coefficients (mpf)."""
+
 
 @dataclass(frozen=True)
 class Push:
-    """A force ``along`` (mpf, body axes) times an expression, at a ``place`` (m, body axes)."""
+    """A force of a size (mpf) times an expression, at a ``place`` (m, body axes): along a vector (mpf, body
+    axes), or along the stream (None).
+    """
 
-    along: Vector
+    size: Any
     expression: Expression
     place: Vector
+    along: Vector | None = None
+
+    @property
+    def turns(self) -> bool:
+        """Whether it has a torque at all."""
+        return any(x != 0 for x in (self.place if self.along is None else cross(self.place, self.along)))
 
 
 @dataclass(frozen=True)
@@ -41,6 +54,7 @@ class SurfaceLoad(Load):
     """The sum of its pushes times the product of its factors, which are the same for all."""
 
     pushes: tuple[Push, ...]
+    stream: tuple[Expression, ...]  # components in body axes
     factors: tuple[Expression, ...]
     flies: bool  # whether it accelerates the centre of mass
 
@@ -50,7 +64,7 @@ class SurfaceLoad(Load):
     @property
     def expressions(self) -> tuple[Expression, ...]:
         """All different ones, factors first."""
-        return tuple(dict.fromkeys((*self.factors, *(push.expression for push in self.pushes))))
+        return tuple(dict.fromkeys((*self.factors, *self.stream, *(push.expression for push in self.pushes))))
 
     def formulas(self) -> list[Expression]:
         return list(self.expressions)
@@ -59,49 +73,80 @@ class SurfaceLoad(Load):
     def reads(self) -> frozenset[str]:  # type: ignore[override]
         return states_read(*self.expressions) | {"attitude"} | ({"flight"} if self.flies else set())
 
-    def _acting(self, m: Kinematics) -> list[tuple[Push, Symbolic]]:
-        """The pushes with their expressions times the factors."""
-        factors = written(m, self.factors)
-        found = dict(zip(self.expressions, written(m, self.expressions), strict=True))
-        return [(push, hy.prod([*factors, found[push.expression]])) for push in self.pushes]
+    def _parts(self, *, torque: bool) -> tuple[list[Sum], list[Sum]]:
+        """Sums (N or N m) by which the stream is multiplied, one of sizes or three of arms, and the sums
+        along the body axes.
+        """
+        streaming = [
+            (push, push.place if torque else [1, 0, 0]) for push in self.pushes if push.along is None
+        ]
+        others = [
+            (push, cross(push.place, push.along) if torque else push.along)
+            for push in self.pushes
+            if push.along is not None
+        ]
+        return _joined(streaming)[: 3 if torque else 1], _joined(others)
+
+    def _vector(
+        self,
+        parts: tuple[list[Sum], list[Sum]],
+        values: Mapping[Expression, Any],
+        number: Callable[[Any], Any],
+        add: Callable[[list[Any]], Any],
+    ) -> list[Any | None]:
+        """The force or torque but for the factors, body axes; None where nothing acts."""
+
+        def total(part: Sum) -> Any | None:
+            terms = [number(x) * values[expression] for expression, x in part.items()]
+            return add(terms) if terms else None
+
+        along, axes = ([total(part) for part in group] for group in parts)
+        stream, found = [values[x] for x in self.stream], []
+        for i in range(3):
+            j, k = (i + 1) % 3, (i + 2) % 3
+            pairs = [(along[0], stream[i])]
+            if len(along) == 3:
+                pairs = [(along[j], stream[k]), (along[k], -stream[j])]
+            terms = [x for x in (axes[i], *(a * b for a, b in pairs if a is not None)) if x is not None]
+            found.append(add(terms) if terms else None)
+        return found
+
+    def _in_body(self, m: Kinematics, *, torque: bool) -> tuple[Any, list[Symbolic | None]]:
+        """The largest coefficient (mpf), and the force or torque in units of it: so that sums are within the
+        range of single precision.
+        """
+        parts, context = self._parts(torque=torque), m.scene.context
+        largest = context.maximum(
+            [context.zero, *(abs(x) for group in parts for y in group for x in y.values())]
+        )
+        values = dict(zip(self.expressions, written(m, self.expressions), strict=True))
+        found = self._vector(parts, values, lambda x: m.number(x / largest), hy.sum)
+        factors = [values[x] for x in self.factors]
+        return largest, [None if x is None else hy.prod([*factors, x]) for x in found]
 
     def torque(self, m: Kinematics) -> list[Term]:
         """Torque place x force."""
-        size = m.scene.context.ldexp(m.scene.context.one, -m.scaling.energy)
-        found = []
-        for push, value in self._acting(m):
-            arm = [size * x for x in cross(push.place, push.along)]
-            if any(x != 0 for x in arm):
-                found.append((arm, value))
-        return found
+        largest, parts = self._in_body(m, torque=True)
+        axes = diagonal([m.scene.context.ldexp(largest, -m.scaling.energy)] * 3)
+        return [(axis, x) for axis, x in zip(axes, parts, strict=True) if x is not None]
 
     def force(self, m: Kinematics) -> list[Term]:
         """Acceleration of a freely flying body: the force over its mass."""
         if m.velocity is None or not self.pushes:
             return []
         context = m.scene.context
-        acting = self._acting(m)
-        size = context.ldexp(1 / m.carried(m.scene.body.mass), m.scaling.time - m.scaling.speed)
-        # in units of the largest push, so that sums of them are within the range of single precision
-        largest = context.maximum([abs(x) for push in self.pushes for x in push.along])
-        sums = []
-        for i in range(3):
-            parts = [m.number(p.along[i] / largest) * value for p, value in acting if p.along[i] != 0]
-            sums.append(hy.sum(parts) if parts else hy.expression(0.0))
-        return list(zip(diagonal([size * largest] * 3), apply(m.matrix, sums), strict=True))
+        largest, parts = self._in_body(m, torque=False)
+        size = context.ldexp(largest / m.carried(m.scene.body.mass), m.scaling.time - m.scaling.speed)
+        pushed = apply(m.matrix, [hy.expression(0.0) if x is None else x for x in parts])
+        return list(zip(diagonal([size] * 3), pushed, strict=True))
 
     def _at_start(self, scene: Scene) -> tuple[Vector, Vector]:
-        """Body axes, N and N m (mpf)."""
+        """Force and torque in body axes, N and N m (mpf)."""
         context, values = scene.context, start_values(scene)
-        factor = context.one
-        for x in self.factors:
-            factor = factor * evaluate(x, values, context)
-        force, torque = [context.zero] * 3, [context.zero] * 3
-        for push in self.pushes:
-            size = factor * evaluate(push.expression, values, context)
-            force = [f + size * x for f, x in zip(force, push.along, strict=True)]
-            turning = cross(push.place, push.along)
-            torque = [t + size * x for t, x in zip(torque, turning, strict=True)]
+        found = {x: evaluate(x, values, context) for x in self.expressions}
+        factor = math.prod(found[x] for x in self.factors)
+        sums = (self._vector(self._parts(torque=torque), found, lambda x: x, sum) for torque in (False, True))
+        force, torque = ([context.zero if x is None else factor * x for x in parts] for parts in sums)
         return force, torque
 
     def told(self, scene: Scene) -> str:
@@ -117,27 +162,32 @@ class SurfaceLoad(Load):
         return self.title
 
 
+def _joined(vectors: Iterable[tuple[Push, Vector]]) -> list[Sum]:
+    """Components of the sum of vectors times the sizes of their pushes, without those that vanish."""
+    found: list[dict[Expression, Any]] = [{}, {}, {}]
+    for push, vector in vectors:
+        for part, x in zip(found, vector, strict=True):
+            part[push.expression] = part.get(push.expression, 0) + push.size * x
+    return [{expression: x for expression, x in part.items() if x != 0} for part in found]
+
+
 class Pushes:
     """What makes the pushes of a load on the surfaces of a body.
 
     Args:
         title: of the load.
-        vector: names of the components of the vector that surfaces are met from, body axes.
-
-    Attributes:
-        found: the pushes so far; those of a vanishing size are left out.
+        stream: names of the components of the vector that surfaces are met from, body axes.
     """
 
-    def __init__(self, around: Setting, title: str, vector: Sequence[str]) -> None:
+    def __init__(self, around: Setting, title: str, stream: Sequence[str]) -> None:
         self.around, self._title = around, title
-        self.found: list[Push] = []
-        self._vector = tuple(vector)
-        self._flies = around.free_flight
+        self._found: list[Push] = []
+        self._names = tuple(stream)
+        self.stream = tuple(self.parsed(name) for name in stream)
 
     def acting(self) -> tuple[Push, ...]:
-        """Those that turn the body, or all of a body in flight."""
-        turns = (any(x != 0 for x in cross(push.place, push.along)) for push in self.found)
-        return tuple(p for p, turning in zip(self.found, turns, strict=True) if turning or self._flies)
+        """The pushes that turn the body, or all of a body in flight."""
+        return tuple(push for push in self._found if push.turns or self.around.free_flight)
 
     def surfaces(self) -> Iterator[tuple[int, OuterSurface]]:
         """Those of the body, counted from 1; refused if there are none."""
@@ -147,35 +197,35 @@ class Pushes:
             raise self.around.fault("", what + "plate, size of a box, or radius of a sphere")
         yield from enumerate(body.surfaces, start=1)
 
-    def along_vector(self, surface: OuterSurface, size: Any, number: int = 0, *, speed: bool = False) -> None:
-        """A push along the vector, with ``speed`` times its length; on a plate as far as it faces it."""
-        first, second, third = self._vector
-        length = f"sqrt({first}^2 + {second}^2 + {third}^2)*" if speed else ""
-        for axis, name in zip(unit_vectors(self.around.context), self._vector, strict=True):
-            self.add(surface, [size * x for x in axis], number, 1, f"{length}{name}")
+    def on_sphere(self, sphere: OuterSurface, size: Any, *, speed: bool = False) -> None:
+        """A push along the stream, with ``speed`` times its length."""
+        text = f"sqrt({' + '.join(f'{name}^2' for name in self._names)})" if speed else "1"
+        self._add(size, text, sphere)
 
-    def add(
-        self, surface: OuterSurface, along: Vector, number: int = 0, power: int = 1, text: str = ""
+    def on_plate(
+        self, plate: Plate, number: int, size: Any, along: Vector | None = None, power: int = 1
     ) -> None:
-        """A push times a text; on a plate times a power of the vector's component along the normal."""
-        if all(x == 0 for x in along):
-            return
-        if not isinstance(surface, Plate):
-            self.found.append(Push(along, self.parsed(text), surface.position))
-            return
+        """A push along the stream or a vector times a power of how far the plate faces the stream: twice the
+        larger of zero and the stream's component along the normal is what it and its size add up to.
+        """
         context = self.around.context
-        facing, given = self._facing(surface, number)
-        length = norm(context, [x.at(context) for x in surface.normal]) ** power
-        factors = [f"max({facing}, 0)", *([f"({facing})"] * (power - 1)), *([text] if text else [])]
-        where = f"[body] {surface.place}, under {self.around.where(self._title)}"
-        expression = self.parsed("*".join(factors), parameters=given, where=where)
-        self.found.append(Push([x / length for x in along], expression, surface.position))
+        facing, given = self._facing(plate, number)
+        length = 2 * norm(context, [x.at(context) for x in plate.normal])
+        text = f"({facing} + abs({facing}))" + f"^{power}" * (power > 1)
+        where = f"[body] {plate.place}, under {self.around.where(self._title)}"
+        self._add(size / length**power, text, plate, along, parameters=given, where=where)
+
+    def _add(
+        self, size: Any, text: str, surface: OuterSurface, along: Vector | None = None, **options: Any
+    ) -> None:
+        if size != 0:
+            self._found.append(Push(size, self.parsed(text, **options), surface.position, along))
 
     def _facing(self, plate: Plate, number: int) -> tuple[str, dict[str, ExactNumber]]:
         """The vector's component along the normal as written, in text, and what stands for numbers there."""
         sign, given = "" if plate.side > 0 else "-", {}
         terms = []
-        for axis, x, name in zip("xyz", plate.normal, self._vector, strict=True):
+        for axis, x, name in zip("xyz", plate.normal, self._names, strict=True):
             if x.swept or (x.sign and abs(x.rational) != 1):
                 given[f"n{number}{axis}"] = x.alone
                 terms.append(f"n{number}{axis}*{name}")

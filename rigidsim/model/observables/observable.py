@@ -53,8 +53,19 @@ class Need:
     missing: Callable[[Scene, str], str | None] = lambda scene, formulation: None
 
 
-def work_is_needed(m: Mechanics) -> bool:
-    """Whether the loads' power is integrated: energy isn't conserved, and there is no Jacobi constant."""
+BALANCE = ("work", "energy_balance")
+"""Observables that take the work of the loads, a state that nothing else reads."""
+
+
+def carries_work(m: Mechanics) -> bool:
+    """Whether the loads' power is integrated: if one asks for what takes it, or guards all drifts."""
+    config = m.scene.config
+    asked = config.output.record is None or not set(BALANCE).isdisjoint(config.output.record)
+    return (asked or config.limits.max_drift is not None) and has_balance(m)
+
+
+def has_balance(m: Mechanics) -> bool:
+    """Whether the energy balances the work of the loads: neither it nor a Jacobi constant is conserved."""
     acting = [load for load in m.loads if m.driven_within or not load.changes]
     has_jacobi = m.attitude is not None and len(acting) == 1 and acting[0].corotating_orbit is not None
     return _has_energy(m) and not m.conserves_energy and not has_jacobi and m.power is not None
@@ -128,7 +139,7 @@ NEEDS: dict[str, Need] = {
     "potential": Need(lambda m: m.potential_energy is not None, _flight_of_a_free_body, _NO_POTENTIAL),
     "energy": Need(_has_energy, _flight_of_a_free_body),
     "symmetry": Need(lambda m: m.symmetry_direction is not None),
-    "work": Need(work_is_needed),
+    "work": Need(carries_work),
     "jacobi": Need(lambda m: m.attitude is not None and rotating_orbit(m) is not None),
     "kovalevskaya": Need(lambda m: kovalevskaya_top(m) is not None),
     "goryachev_chaplygin": Need(lambda m: goryachev_chaplygin_top(m) is not None),

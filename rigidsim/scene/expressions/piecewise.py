@@ -44,6 +44,8 @@ def _step(u: Expression) -> Expression:
 
 
 def _abs(u: Expression) -> Expression:
+    while isinstance(u, Operation) and u.operator == "negative":
+        (u,) = u.operands
     return sign(u) * u
 
 
